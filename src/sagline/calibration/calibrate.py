@@ -64,7 +64,7 @@ def calibrate(
 
     Raises:
         InvalidValueError: If an unknown has another name, or neither readings nor a prior; if the log is not of this
-            robot, has swapped cables or wrong units, or has fewer readings than unknowns; the message says which.
+            robot, has swapped cables or wrong units, or has fewer readings than unknowns; the message names the reason.
 
     Examples:
         >>> import numpy as np

@@ -220,7 +220,7 @@ def whitened_rows(
 def predicted_rows(
     robot: Robot, model: CableModel, parameters: Parameters, sensors: Sensors, poses: Array, lengths: Array
 ) -> WhitenedRows:
-    """Slopes of readings of these sensors at equilibria: pose rows and unstrained lengths (N, m) [m]; no misfit."""
+    """Slopes of readings of these sensors at equilibria: pose rows and unstrained lengths (N, m) [m]; zero misfit."""
     machine = machine_of(robot, model, parameters, sensors, np.zeros(robot.cable_count))
     counts = None if machine.drums is None else counts_at(machine.drums, lengths)
     slopes, count = winch_slopes(robot, parameters, counts, lengths), len(lengths)

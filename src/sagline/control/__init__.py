@@ -1,4 +1,4 @@
-"""The controller of a cable robot: states, loops, faults, and the link to a machine."""
+"""The controller of a cable robot: states, loops, faults, and link to the machine."""
 
 from sagline.control.checks import Motion
 from sagline.control.controller import Controller

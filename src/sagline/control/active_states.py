@@ -20,13 +20,13 @@ from sagline.control.states import RefusedError, State
 from sagline.core.arrays import Array
 from sagline.kinematics.status import ForwardStatus
 
-LEAVING: Final = 0.3  # s, longest time until all grants are given back
+LEAVING: Final = 0.3  # longest time until all grants are given back [s]
 LOOP_ON: Final = frozenset({State.IDLE, State.MOVING, State.PAUSING})
 POSE_LOST: Final = "the pose of the platform is not known; home again"
 
 
 class ActiveState(ABC):
-    """State of a controller as an object; `context.state` has its name.
+    """State of a controller as an object; `context.state` is its name.
 
     Attributes:
         context: Shared by all states.
@@ -63,7 +63,7 @@ class ActiveState(ABC):
         row, sample = point.row, c.sample
         if c.tension_loop is not None and row is not None and sample is not None and c.state in LOOP_ON:
             planned = point.tension if due is None else due.tension
-            leads = point.leading or (due is not None and due.leading)  # the tensions differ by intention
+            leads = point.leading or (due is not None and due.leading)  # the tensions are intentionally different
             c.correction = c.tension_loop.step(sample.tension, planned, row, frozen=c.degraded or leads)
         length = point.length + c.correction
         length -= c.zero
@@ -71,7 +71,7 @@ class ActiveState(ABC):
         c.sender.follow(length, point.rate, point.drum_tension, point.enable)
 
     def settle(self, length: Array, status: ExecutionStatus, reason: str) -> ActiveState | None:
-        """IDLE at lengths [m] once the pose is known, until then this state; None if no pose is found."""
+        """IDLE at lengths [m] if the pose is known, this state until then; None if no pose is found."""
         c = self.context
         if self._equilibrium is None:
             self._equilibrium = c.find_equilibrium(length)
@@ -82,7 +82,7 @@ class ActiveState(ABC):
 
 
 class Off(ActiveState):
-    """OFF: all grants are given back, then no commands are sent."""
+    """OFF: the controller gives all grants back, and then sends no commands."""
 
     def __init__(self, context: Context, reason: str = "", point: SetPoint | None = None) -> None:
         """Begin to give the grants back, after the command of a set point; without a reason there are no grants yet."""
@@ -101,7 +101,7 @@ class Off(ActiveState):
         return self
 
     def leave(self, sample: Sample | None) -> None:
-        """Command to leave, as long as the controller has the grant of a group."""
+        """Command LEAVE as long as the controller has the grant of a group."""
         self._cycles = max(self._cycles - 1, 0)
         if self._cycles and (sample is None or bool((sample.owner == self.context.owner).any())):
             self.rest(Mode.LEAVE, enabled=False)
@@ -148,12 +148,12 @@ class Holding(ActiveState):
     """READY or FAULT: the drives hold their position."""
 
     def __init__(self, context: Context, state: State, reason: str) -> None:
-        """Enter the given one of these two states."""
+        """Enter READY or FAULT."""
         context.enter(state, reason)
         super().__init__(context)
 
     def next(self, answer: Sample | Missing) -> ActiveState:
-        """Command to hold."""
+        """Command HOLD."""
         self.rest(Mode.HOLD, enabled=True)
         return self
 
@@ -174,7 +174,7 @@ class Emergency(ActiveState):
         super().__init__(c, source=before.source)
 
     def next(self, answer: Sample | Missing) -> ActiveState:
-        """Command to lock."""
+        """Command LOCK."""
         self.rest(Mode.LOCK, enabled=False)
         return self
 
@@ -184,7 +184,7 @@ class Emergency(ActiveState):
 
 
 class HomingState(ActiveState):
-    """HOMING: single winches are jogged until the tensions agree with the plan.
+    """HOMING: the operator jogs single winches until the tensions agree with the plan.
 
     Attributes:
         homing: The pose named by the operator, and its comparison with samples.
@@ -195,10 +195,10 @@ class HomingState(ActiveState):
         context.enter(State.HOMING, "the operator named the pose")
         super().__init__(context)
         self.homing = homing
-        self._largest_tension = np.full(len(context.zero), np.inf)  # during a jog [N]
+        self._largest_tension = np.full(len(context.zero), np.inf)  # tension limits during a jog [N]
 
     def jog(self, winch: int, by: float) -> None:
-        """Begin to jog one winch [m]; the other winches have no power, and only tensions are monitored."""
+        """Begin to jog one winch [m]; the other winches have no power, and the controller monitors only tensions."""
         c = self.context
         if c.sample is None or self.source is not None:
             raise RefusedError("the jog", "another winch is being jogged", "Wait until it stands.")
@@ -253,7 +253,7 @@ class HomingState(ActiveState):
 
 
 class Following(ActiveState):
-    """IDLE, MOVING, JOGGING or PAUSING: one set point of a source in each cycle."""
+    """IDLE, MOVING, JOGGING or PAUSING: each cycle sends one set point of a source."""
 
     def __init__(
         self, context: Context, state: State, text: str, point: SetPoint | None, source: SetPointSource
@@ -297,7 +297,7 @@ class Following(ActiveState):
 
 
 class Stopping(ActiveState):
-    """STOPPING: all rates go to zero together, from the last set point that was sent.
+    """STOPPING: all rates go to zero together, starting from the last set point that was sent.
 
     Attributes:
         after: State at the end of the ramp.

@@ -21,17 +21,17 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 
-START: Final = 2e-3  # m: largest distance of the first pose of a path from the platform
-ON_TICK: Final = 1e-6  # share of a period: largest distance of a sample from a tick
-LARGEST_LEAD: Final = 5e-3  # m: equal to the largest correction of the tension loop
-ROUNDING: Final = 5e-6  # m: allowed difference between a plan's lengths and rates, without accelerations
-LARGEST_STEP: Final = 1e-3  # m: larger steps count as a jump of an encoder
-AT_REST: Final = 1e-3  # m/s and rad/s: a path that begins or ends faster would cause a shock at the winches
+START: Final = 2e-3  # [m], largest distance of the first pose of a path from the platform
+ON_TICK: Final = 1e-6  # largest distance of a sample from a tick, as a share of a period
+LARGEST_LEAD: Final = 5e-3  # [m], equal to the largest correction of the tension loop
+ROUNDING: Final = 5e-6  # [m], allowed difference between a plan's lengths and rates, without accelerations
+LARGEST_STEP: Final = 1e-3  # [m], larger steps count as a jump of an encoder
+AT_REST: Final = 1e-3  # [m/s] and [rad/s], a faster start or end of a path would cause a shock at the winches
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """Checked plan with one row for each cycle, from which set points are taken.
+    """Checked plan, with one row of set points for each cycle.
 
     Attributes:
         period: Period of a cycle, and between two rows [s].
@@ -99,7 +99,7 @@ def plan_motion(
 
 
 def check_motion(motion: Motion, robot: Robot, period: float) -> None:
-    """Reject a motion that was planned for another robot or period [s]."""
+    """Reject a motion that was planned for another robot or another period [s]."""
     step = "Plan it with this controller: control.plan(path)."
     if abs(motion.period - period) > ON_TICK * period:
         reason = f"it was planned for cycles of {1e3 * motion.period:g} ms; they take {1e3 * period:g} ms"
@@ -109,7 +109,7 @@ def check_motion(motion: Motion, robot: Robot, period: float) -> None:
 
 
 def check_lead(what: str, lead: Array) -> None:
-    """Reject lengths at rest too far from the first ones of a plan; lead: their difference [m], (m,)."""
+    """Reject lengths at rest that are too far from the first lengths of a plan; lead: their difference [m], (m,)."""
     i = int(np.argmax(np.abs(lead)))
     if not abs(lead[i]) <= LARGEST_LEAD:
         away, allowed = f"{1e3 * lead[i]:+.3g} mm", f"{1e3 * LARGEST_LEAD:g} mm"
@@ -128,7 +128,7 @@ def check_start(robot: Robot, here: Pose, start: Pose) -> None:
 
 
 def _at_ticks(path: Path, period: float) -> Path:
-    """Samples of a path at the ticks; its end pose is held until the next tick."""
+    """Samples of a path at the ticks; the end pose continues until the next tick."""
     time = path.time - path.time[0]
     count = int(np.floor(time[-1] / period + ON_TICK)) + 1
     ticks = np.asarray(period * np.arange(count), dtype=np.float64)
@@ -173,10 +173,10 @@ def _check_feasible(plan: Plan, path: Path) -> None:
 def _check_winches(robot: Robot, path: Path, length: Array, rate: Array, drum: Array) -> None:
     """Reject speeds and torques beyond the known limits of the winches."""
     winches = robot.winches
-    lever = drum_lever(robot, length)  # raises an error for missing data
+    lever = drum_lever(robot, length)  # this call raises an error for missing data
     if winches is None:
         return
-    ratio = np.abs(winches.gear) / lever  # radians of the motor per meter of cable
+    ratio = np.abs(winches.gear) / lever  # rotation of the motor per length of cable [rad/m]
     speed, step = winches.speed_limit, np.diff(length, axis=0) / np.diff(path.time)[:, None]
     _refuse_beyond(path, "turn at", rate * ratio, speed, "rad/s")
     _refuse_beyond(path, "turn at", step * 0.5 * (ratio[1:] + ratio[:-1]), speed, "rad/s")
@@ -187,11 +187,12 @@ def _check_winches(robot: Robot, path: Path, length: Array, rate: Array, drum: A
 
 
 def _check_steps(time: Array, length: Array, rate: Array) -> None:
-    """Reject lengths that jump relative to their rates: the twist of the path is not that of its poses.
+    """Reject lengths that jump relative to their rates: the twist of the path then contradicts its poses.
 
-    If a rate remains between those at the two ends of a step, the step deviates from the mean rate times h by at most
-    half of their difference times h. The largest difference among the adjacent steps counts. More than the allowed jump
-    of an encoder is never accepted. The times are those of the path, whose end may be before a tick.
+    A step deviates from the mean rate times h by at most half the difference of the two rates times h, if the rate
+    within the step is between the rates at its ends. The largest difference among the adjacent steps is used. A
+    deviation above the allowed jump of an encoder is never accepted. The times are those of the path, which may end
+    before a tick.
     """
     h = np.diff(time)[:, None]
     off = np.abs(np.diff(length, axis=0) - 0.5 * h * (rate[1:] + rate[:-1]))

@@ -1,4 +1,4 @@
-"""Commands of a controller, and the claim of the grants of all groups."""
+"""Commands of a controller, and the claim of all groups' grants."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from sagline.control.link import (
 from sagline.control.states import RefusedError
 from sagline.core.arrays import Array, Flags
 
-VALID_FOR: Final = HEARTBEAT  # s: validity of a command for a PLC
+VALID_FOR: Final = HEARTBEAT  # validity of a command for a PLC [s]
 MOST_OWNER: Final = 2**31
 
 
@@ -60,25 +60,25 @@ class Sender:
         self.command = None
 
     def stand_at(self, sample: Sample | None, tension: Array | None = None) -> None:
-        """Set the lengths at rest to those of a sample, and the tensions [N] (m,) to the given or measured ones."""
+        """Set the lengths at rest to those of a sample, and the tensions to the given or measured ones [N], (m,)."""
         if sample is not None:
             self.length, self.tension = sample.length, sample.filtered if tension is None else tension
 
     def _send(self, mode: Mode, length: Array, rate: Array, tension: Array, enable: Flags, claims: bool) -> None:
         self.counter = self.counter % COUNTERS + 1
-        positive = np.maximum(tension, 0.0)  # for a reading below zero: a PLC rejects negative tensions
+        positive = np.maximum(tension, 0.0)  # readings can be below zero, but a PLC rejects negative tensions
         self.command = Command(self.counter, self.owner, mode, VALID_FOR, length, rate, positive, enable, claims)
 
 
-CLAIMING: Final = OWNER_TIMEOUT + 0.7  # s, longest time until all grants are available
-SILENT: Final = 7.0  # s, longest time until every group has answered once
-GIVING_BACK: Final = 0.05  # s, for the grants of an incomplete set of groups
-LONGEST_WAIT: Final = 0.6  # s, upper limit of the random wait before the next claim
+CLAIMING: Final = OWNER_TIMEOUT + 0.7  # longest time until all grants are available [s]
+SILENT: Final = 7.0  # longest time until every group has answered once [s]
+GIVING_BACK: Final = 0.05  # longest time with an incomplete set of grants [s]
+LONGEST_WAIT: Final = 0.6  # upper limit of the random wait before the next claim [s]
 TRIES: Final = 4
-FRESH: Final = 3  # cycles: largest age of a sample
-AGREEING: Final = 5  # consecutive cycles
-SURE: Final = 20  # cycles: a cause that persists longer is not a state from before the claim
-BEHIND: Final = 10  # commands: largest lag of an echo
+FRESH: Final = 3  # largest age of a sample [cycles]
+AGREEING: Final = 5  # consecutive cycles in which all groups must agree
+SURE: Final = 20  # [cycles], a cause that persists longer did not exist before the claim
+BEHIND: Final = 10  # largest lag of an echo [commands]
 _LOCKED, _PRESSED, _READY = int(GroupStatus.LOCKED), int(GroupStatus.EMERGENCY), int(GroupStatus.READY)
 _AGAIN: Final = "Try again; if it continues, check the program of the PLC."
 
@@ -151,7 +151,7 @@ class Claim:
     def __init__(
         self, owner: int, groups: tuple[tuple[int, ...], ...], period: float, random: np.random.Generator
     ) -> None:
-        """Begin to claim; period [s]."""
+        """Begin the claim; period [s]."""
         self._owner, self._groups, self._period, self._random = owner, groups, period, random
         self._silent = self._cycles = self._agreed = 0
         self._waiting = 0
@@ -161,7 +161,7 @@ class Claim:
         self.refused: Disagreement | None = None
 
     def look(self, answer: Sample | Missing, counter: int) -> None:
-        """Evaluate an answer, and set the next command."""
+        """Evaluate an answer of the machine, and set the next command."""
         if isinstance(answer, Missing):
             self._silent += 1
             if self._silent * self._period >= SILENT:
@@ -186,7 +186,7 @@ class Claim:
         return self._cycles * self._period >= CLAIMING
 
     def _give_back(self) -> None:
-        """Leave for a random time: another controller may have the missing grants, and wait for the present ones."""
+        """Leave for a random time, because a controller with the missing grants may wait for the present ones."""
         self._tries += 1
         self.mode = Mode.LEAVE
         longest = LONGEST_WAIT / self._period

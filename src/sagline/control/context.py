@@ -36,12 +36,12 @@ from sagline.tension.method import TensionMethod
 from sagline.tension.methods import Closest
 
 MOST_SEED: Final = 2**128
-SAME: Final = 1e-9  # share of a period
-MARGIN: Final = 500  # cycles on the tape in addition to those of the plan: ramps, pauses
+SAME: Final = 1e-9  # tolerance of the period, as a share of it
+MARGIN: Final = 500  # cycles on the tape in addition to those of the plan, for ramps and pauses
 
 
 class Estimator:
-    """Forward kinematics of each sample, started at the previous pose.
+    """Forward kinematics of each sample, with the previous pose as start.
 
     Attributes:
         position: Position of the platform's origin [m], shape (3,); NaN if it was never known.
@@ -69,7 +69,7 @@ class Estimator:
         self.position, self.quaternion, self.status = pose.position, pose.quaternion, int(ForwardStatus.SOLVED)
 
     def locate(self, length: Array, wrench: Array | None) -> ForwardStatus | None:
-        """Solve for the pose; return the status if the pose was just lost. length [m] (m,), wrench (6,) or None."""
+        """Solve for the pose; return the status if the pose is newly lost. length: [m], (m,); wrench: (6,) or None."""
         position, quaternion = np.empty(3), np.empty(4)
         status = self._solver.step_into(length, position, quaternion, wrench)
         lost = status not in STABLE and self.status in STABLE
@@ -110,7 +110,7 @@ class Context:
         zero: Offset from homing, added to lengths of samples [m], shape (m,).
         homed: True if the pose of the platform is known.
         run: Present or last motion.
-        previous_plan: Plan at whose end the platform rests, for the next plan to continue; None elsewhere.
+        previous_plan: Plan at whose end the platform rests, which the next plan continues; None elsewhere.
         correction: Correction of the tension loop, added to the lengths of the plan [m], shape (m,).
         number: Index of the cycle, from 0.
         time: Time on the link's clock [s].
@@ -184,7 +184,7 @@ class Context:
     # samples, faults and estimate
 
     def check_agreement(self, what: str) -> Sample:
-        """Newest sample; an error for a request that needs all groups if one of them does not agree."""
+        """Newest sample for a request to all groups; an error if one of them does not agree."""
         if self.sample is None:
             raise RefusedError(what, "no group has answered", "Connect first.")
         why = disagreement(self.sample, self.owner, self.sender.counter, self.link.groups, self.period)
@@ -193,7 +193,7 @@ class Context:
         return self.sample
 
     def locate(self, sample: Sample, wrench: Array | None) -> str:
-        """Estimate the pose, with the correction of the tension loop as an encoder error; message if it is lost."""
+        """Estimate the pose, with the tension loop's correction as an encoder error; message if it is lost."""
         length = sample.length + self.zero
         length -= self.correction
         lost = self.estimator.locate(length, wrench)
@@ -204,7 +204,7 @@ class Context:
         return line
 
     def find_faults(self, cycle: Cycle) -> tuple[Reaction, str]:
-        """Strongest reaction of the fault rules in a cycle, and the message of its first fault."""
+        """Strongest reaction of the fault rules in a cycle, and the message of the first fault with this reaction."""
         reaction, first, homing = Reaction.EVENT, "", False
         for fault in self.faults:
             line = fault.look(cycle)
@@ -214,7 +214,7 @@ class Context:
             homing |= fault.homing
             if fault.reaction > reaction:
                 reaction, first = fault.reaction, line
-        self.degraded = any([fault.present for fault in self.degrading])  # noqa: C419 a third of the time
+        self.degraded = any([fault.present for fault in self.degrading])  # noqa: C419 takes a third of the time
         if homing:
             self.homed = False
         return reaction, first
@@ -248,7 +248,7 @@ class Context:
         run.tape = Tape(self.robot.cable_count, len(self.link.groups), count)
         run.first_event = len(self.journal.events)
         if run.announced:
-            self._announce_end()  # end of a plan that was paused
+            self._announce_end()  # ends the record of a paused plan
         plan = None if motion is None else motion.plan
         if self.journal.watched and plan is not None:
             run.announced = True

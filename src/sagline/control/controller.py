@@ -29,15 +29,15 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 
-SPEED: Final = 0.1  # m/s, for go_to
-TURNING: Final = 0.2  # rad/s
-SPEEDING_UP: Final = 0.5  # s, shortest time to full speed: a short path is slow
+SPEED: Final = 0.1  # default speed of go_to [m/s]
+TURNING: Final = 0.2  # default angular speed of go_to [rad/s]
+SPEEDING_UP: Final = 0.5  # shortest time to full speed [s], which makes short paths slow
 
 
 class Controller(Preparation):
-    """Drives a robot through a `Link`.
+    """Controller of a robot through a `Link`.
 
-    All data come from samples; each `cycle` sends one checked command. The methods that begin an action (`start`,
+    All data are from samples, and each `cycle` sends one checked command. The methods that begin an action (`start`,
     `begin_homing`, `start_jog`, `claim`) return immediately, and the caller must call `cycle` each period. The methods
     that wait (`execute`, `go_to`, `home`, `jog`, `connect`) call it themselves until the motion ends.
     """
@@ -55,19 +55,20 @@ class Controller(Preparation):
         shadow: bool = False,
         seed: int | None = None,
     ) -> None:
-        """Prepare everything; nothing is sent.
+        """Prepare the controller; nothing is sent.
 
         Args:
-            robot: Robot for planning. Its winches need at least drum_radius.
+            robot: Robot for planning. Its winches must have at least drum_radius.
             link: Connection to the machine.
-            pace: Real time. None for lockstep: every cycle begins when the previous one ends, on the clock of a machine
-                that waits for it.
+            pace: Real time. None for lockstep: every cycle begins when the previous one ends, and the machine and its
+                clock wait for the controller.
             model: Cable model; the default is exact.
             tension: Tension distribution method; the default is `Closest`.
             loop: Settings of the tension loop. A robot without redundancy has none.
             record: Receives every cycle and event.
             shadow: True for read-only operation: nothing is ever sent, and the state remains OFF.
-            seed: Seed of the id and of random waiting times; None for the system's, so that every controller differs.
+            seed: Seed of the id and of random waiting times; None for a seed of the system, so that every controller
+                differs.
 
         Raises:
             InvalidValueError: If data of the winches are missing, the link is for another number of winches, or an
@@ -98,7 +99,7 @@ class Controller(Preparation):
             A motion for `start` and `execute`.
 
         Raises:
-            RefusedError: If a check fails; with the check, the location, and the next step.
+            RefusedError: If a check fails; the message names the check, the location and the next step.
         """
         c, given = self._context, instance(path, Path, "path")
         arguments = c.robot, given, c.period, c.model, c.method, c.previous_plan
@@ -225,7 +226,7 @@ class Controller(Preparation):
         self._run_while(lambda: self.moving)
 
     def start_jog_platform(self, by: ArrayLike) -> None:
-        """Begin to jog the platform along a straight line; each pose is solved in its cycle.
+        """Begin to jog the platform along a straight line; each cycle solves its pose.
 
         Args:
             by: Displacement [m], and optionally a rotation vector [rad], world axes, shape (3,) or (6,).
@@ -254,7 +255,7 @@ class Controller(Preparation):
         self._run_while(lambda: self.moving)
 
     def wait(self) -> Execution:
-        """Run cycles until the motion ends; Ctrl-C stops the robot and then interrupts.
+        """Run cycles until the motion ends; Ctrl-C stops the robot and then raises KeyboardInterrupt.
 
         Returns:
             The execution of the motion.
@@ -269,7 +270,7 @@ class Controller(Preparation):
         return done
 
     def pause(self) -> None:
-        """Slow down on the path and stop; `resume` continues the motion.
+        """Slow down along the path and stop; `resume` continues the motion.
 
         Raises:
             RefusedError: If no path is being followed.

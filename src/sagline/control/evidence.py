@@ -15,7 +15,7 @@ from sagline.control.null_space import SIGMAS, NullSpace
 from sagline.core.arrays import Array, Flags
 from sagline.robot.robot import Robot
 
-MOVING: Final = 1e-3  # m/s: a faster change of a set point is a motion
+MOVING: Final = 1e-3  # [m/s], a faster change of a set point is a motion
 
 
 class Cycle(NamedTuple):
@@ -28,7 +28,7 @@ class Cycle(NamedTuple):
         tension: T_A, planned for this cycle [N], shape (m,); NaN without a plan, for example before homing.
         gains: Row of the plan's gains at this time; None if there is none.
         correction: Correction of the plan's lengths by the tension loop [m], shape (m,).
-        late: Delay of the start of the cycle [s]; 0 on the clock of an in-process machine.
+        late: Delay of the start of the cycle [s]; 0 on the clock of a machine in the same process.
         recording: Reason why recording has stopped; "" while it continues, or without recording.
     """
 
@@ -51,9 +51,9 @@ class Cycle(NamedTuple):
 SLACK_SHARE: Final = 0.3  # share of the lower limit: a cable with less tension is slack
 PLANNED_SHARE: Final = 0.9  # share of the lower limit: a cable with a larger planned tension is taut
 PULLING: Final = 0.5  # share of the planned tension: a motor with a larger torque holds a taut cable
-STEADY_TIME: Final = 0.5  # s, time constant of the filter for the constant part of the tension errors
-QUICK_TIME: Final = 0.1  # s, time constant of the filter for the comparison with the balance of the platform
-MOST_CHANGE: Final = 6.0  # N per cycle, limit of the quick filter's change: it suppresses single outliers
+STEADY_TIME: Final = 0.5  # time constant of the filter for the constant part of the tension errors [s]
+QUICK_TIME: Final = 0.1  # time constant of the filter for the comparison with the platform's force balance [s]
+MOST_CHANGE: Final = 6.0  # limit of the quick filter's change [N per cycle], which suppresses single outliers
 _TRIPPED: Final = int(WinchState.FAULT)
 
 
@@ -61,7 +61,7 @@ class Evidence:
     """Tensions of this cycle and data of the machine, shared by one set of rules.
 
     Attributes:
-        group_of: Group of each winch, shape (m,).
+        group_of: Index of the group of each winch, shape (m,).
         period: Period of a cycle [s].
         largest: Correction of a length above which there is a fault [m].
         noise: Standard deviation of a reading [N].
@@ -69,8 +69,8 @@ class Evidence:
         limit: Upper limits of T_A [N], shape (m,).
         full_scale: Full scale of the cells [N], infinite if unknown, shape (m,).
         believed: Cells that are not ignored, shape (m,).
-        tension: T_A [N], shape (m,): the reading of a cell that is not ignored and finite; otherwise the planned
-            tension, or without a plan a value between slack and tight.
+        tension: T_A [N], shape (m,): the reading of the cell if it is finite and not ignored; otherwise the planned
+            tension, or, without a plan, a value between slack and tight.
         plain: True if no cell is ignored and all readings are finite.
         stopped: True while a reported fault stops the motion and the winches still move.
         broken: Cables found broken, shape (m,).
@@ -83,8 +83,8 @@ class Evidence:
         faulted: True if a PLC reports a fault.
         tripped: True if a drive reports a fault.
         states: Codes of the winches' states, as plain numbers.
-        low: Number of consecutive new readings with a slack cable that is taut in the plan, shape (m,).
-        before_low: Last reading before these [N], shape (m,).
+        low: Number of consecutive new readings for which a cable is slack but taut in the plan, shape (m,).
+        before_low: Last reading before these readings [N], shape (m,).
         steady: T_A minus the plan after the slow filter, which stops while a cable is slack [N], shape (m,).
         quick: T_A minus the plan after the quick filter [N], shape (m,).
         compared: True if tensions can be compared with a plan.
@@ -98,7 +98,7 @@ class Evidence:
         cell: tuple[float, float],
         largest: float,
     ) -> None:
-        """Begin without evidence; period [s], cell: deviation and bias [N], largest correction [m]."""
+        """Begin without evidence; period [s]; cell: deviation and bias [N]; largest correction [m]."""
         m, winch = robot.cable_count, robot.winches
         self.group_of = np.zeros(m, dtype=np.int64)
         for g, members in enumerate(groups_of(m) if groups is None else groups):
@@ -123,7 +123,7 @@ class Evidence:
         self.compared = self.any_low = self.stopped = False
         self.plain, self._all_believed = True, True
         self._still, self._settled = 0, round(RAMP / period)
-        # full-size arrays: numpy takes three times as long with a number or a column
+        # full-size arrays, because numpy takes three times as long with a number or a column
         self._shares = np.array([[period / (time + period)] * m for time in (STEADY_TIME, QUICK_TIME)])
         self.cycle: Cycle | None = None
         self.tension = np.full(m, math.nan)
@@ -163,11 +163,11 @@ class Evidence:
         self._all_believed = False
 
     def stop(self) -> None:
-        """Store that a fault stops the motion: later faults are mostly its consequences until the winches stop."""
+        """Store that a fault stops the motion. Until the winches stop, later faults are mostly its consequences."""
         self.stopped, self._still = True, 0
 
     def _wait(self, cycle: Cycle) -> None:
-        """Check if the winches have stopped, by their set points; without set points, by new rates."""
+        """Check if the winches have stopped, from their set points, or from new rates without set points."""
         moves = cycle.moving if cycle.command is not None else largest(cycle.sample.rate * self.fresh) > MOVING
         self._still = 0 if moves else self._still + 1
         self.stopped = self._still <= self._settled
@@ -216,14 +216,14 @@ class Evidence:
         change[:] = error
         change -= self._filtered
         change *= self._shares
-        if (most := largest(change[1])) > MOST_CHANGE:  # scaled as a whole, so that a load looks like a load
+        if (most := largest(change[1])) > MOST_CHANGE:  # one factor for all errors: a load remains a load
             change[1] *= MOST_CHANGE / most
         if self.any_low:
             change[0] = 0.0
         self._filtered += change
 
     def pull(self, cycle: Cycle) -> Array:
-        """Cable tension from the motor torque [N], up to friction; NaN if drums are unknown, shape (m,)."""
+        """Cable tension from the motor torque [N], with an error due to friction; NaN for unknown drums, shape (m,)."""
         torque = cycle.sample.torque
         return np.full(torque.shape, np.nan) if self._pull_of_torque is None else self._pull_of_torque * torque
 
@@ -239,11 +239,11 @@ class Reaction(IntEnum):
     EVENT = 0  # reported and recorded
     DEGRADED = 1  # the tension loop keeps its correction; the motion continues
     STOPPING = 2  # the ramp, then FAULT
-    EMERGENCY = 3  # drums locked, no motion offered
+    EMERGENCY = 3  # drums locked, no motion possible
 
 
 class Fault(ABC):
-    """One rule. `faults_of` makes a new set without memory, for use after the operator has acknowledged a fault.
+    """One fault rule. `faults_of` makes a new set without memory, for use after the operator has acknowledged a fault.
 
     Attributes:
         name: Name of its events.
@@ -252,9 +252,10 @@ class Fault(ABC):
         within: Time until detection, as text.
         homing: True if a length is unreliable, so that the robot must be homed again.
         lasting: True if the fault remains until a new set of rules; each item is reported once.
-        quiet: Time after a report in which repeats are only counted [s].
-        present: True if its condition holds; during a stop by another fault, only after the winches have stopped.
-        seen: Evidence of the whole set.
+        quiet: Time after a report during which repeats are only counted [s].
+        present: True if the condition holds; during a stop by another fault, it is set only after the winches have
+            stopped.
+        seen: Evidence of the whole set of rules.
     """
 
     name: ClassVar[str]
@@ -276,19 +277,20 @@ class Fault(ABC):
         self._since_report, self._suppressed = 10**9, 0  # cycles since the last report, and suppressed repeats
 
     def look(self, cycle: Cycle) -> str | None:
-        """Check a cycle; must be called once for every cycle, in order.
+        """Check a cycle; call this once for every cycle, in order.
 
         Args:
             cycle: The cycle.
 
         Returns:
-            Message for the operator when the fault begins: fault, item, value, limit, next step. None otherwise, while
-            the fault persists, and while another fault stops the motion: then it is reported when the winches have
-            stopped.
+            Message for the operator when the fault begins: fault, item, value, limit, next step. Otherwise None, also
+            while the fault persists, and while another fault stops the motion. In the latter case, the report follows
+            when the winches have stopped.
         """
         if cycle is not self.seen.cycle:  # the first rule computes it for all others
             self.seen.at(cycle)
-        # a fault after a stop is mostly its consequence; one that makes a length unreliable is still reported
+        # a fault after a stop is mostly a consequence of the stop; a fault that makes a length unreliable is still
+        # reported
         stops, waits = self.reaction >= Reaction.STOPPING, False
         if self.seen.stopped and self.reaction is Reaction.STOPPING and not self.homing:
             if self.lasting:  # each item is reported once

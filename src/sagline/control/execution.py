@@ -44,7 +44,7 @@ class ExecutionStatus(Status):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Samples(Result):
-    """N samples of a machine; names and units as in `Sample`.
+    """N samples of a machine, with names and units as in `Sample`.
 
     In cycles without a sample, floats are NaN and integers 0.
 

@@ -1,4 +1,4 @@
-"""Minimum and maximum of short arrays: lists take a quarter of the time of numpy."""
+"""Minimum and maximum of short arrays; lists take a quarter of the time of numpy."""
 
 from __future__ import annotations
 

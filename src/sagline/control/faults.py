@@ -26,9 +26,9 @@ from sagline.core.arrays import number
 from sagline.core.errors import InvalidValueError
 from sagline.robot.robot import Robot
 
-LARGEST_CORRECTION: Final = TensionSettings().largest  # m
+LARGEST_CORRECTION: Final = TensionSettings().largest  # largest correction of the tension loop [m]
 
-# order of evaluation: a dead cell is found before its cable could count as slack
+# order of evaluation: a dead cell must be found before its cable counts as slack
 FAULTS: Final[tuple[type[Fault], ...]] = (
     EmergencyStop,
     OwnerLost,
@@ -54,7 +54,7 @@ FAULTS: Final[tuple[type[Fault], ...]] = (
 
 
 class FaultRow(NamedTuple):
-    """One fault, in the form of the documentation.
+    """One fault, in the form for the documentation.
 
     Attributes:
         name: Name of its events.
@@ -100,19 +100,19 @@ def faults_of(
     cell_bias: float | None = None,
     largest_correction: float = LARGEST_CORRECTION,
 ) -> tuple[Fault, ...]:
-    """New set of rules without memory: one for each time that a controller leaves OFF, FAULT or homing.
+    """New set of rules without memory; a controller creates one each time that it leaves OFF, FAULT or homing.
 
     Args:
         robot: Robot for planning.
         period: Period of a cycle [s], > 0.
-        groups: Winches of each group, as in the link; None for two neighbors each.
+        groups: Winches of each group, as in the link; None for groups of two neighbors.
         cell_deviation: Standard deviation of a good load cell [N], > 0; None for that of the robot's winches, or 1 N if
             they have none.
         cell_bias: Bias that a good load cell may have [N], >= 0; None for that of the winches, at least 2 N.
         largest_correction: Largest correction of a length by the tension loop [m], > 0.
 
     Returns:
-        The rules, to be evaluated in this order, every rule in every cycle.
+        The rules. Evaluate all of them in every cycle, in this order.
 
     Raises:
         InvalidValueError: If an argument is of the wrong kind or out of its range.

@@ -12,9 +12,9 @@ from sagline.control.extrema import largest
 from sagline.control.null_space import SIGMAS
 from sagline.core.arrays import Array
 
-NEAR: Final = 0.9  # share of the upper limit; a plan that exceeds it stops the motion
+NEAR: Final = 0.9  # share of the upper limit; a larger planned tension stops the motion
 NEAR_SAMPLES, SLACK_SAMPLES = 5, 3
-SUDDEN: Final = 0.5  # share of the planned tension: minimum tension one sample before a broken cable became slack
+SUDDEN: Final = 0.5  # share of the planned tension: smallest tension one sample before a broken cable became slack
 
 
 class OverTension(Fault):
@@ -113,8 +113,8 @@ class Slack(Fault):
 
 
 STUCK_SAMPLES: Final = 50
-ODD_TIME: Final = 0.35  # s: duration of the contradiction; ramps and oscillations of the platform are shorter
-DISPROVED: Final = 0.5  # share of full scale: a motor with less torque disproves the reading
+ODD_TIME: Final = 0.35  # duration of the contradiction [s]; ramps and oscillations of the platform are shorter
+DISPROVED: Final = 0.5  # share of full scale; a motor torque for less tension disproves the reading
 _STEP: Final = "The tension loop is off. Check cell, plug and amplifier when the platform stands, then acknowledge."
 
 
@@ -175,7 +175,7 @@ class CellStuck(Fault):
             return None
         same = tension == before
         self._for = np.where(same, self._for + seen.fresh, 0)
-        stuck = (self._for >= STUCK_SAMPLES - 1) & seen.believed  # this many samples after the first one
+        stuck = (self._for >= STUCK_SAMPLES - 1) & seen.believed  # number of samples after the first one
         if not stuck.any():
             return None
         seen.ignore_cells(stuck)
@@ -200,7 +200,7 @@ class CellOff(Fault):
         self._quiet = True
 
     def found(self, cycle: Cycle) -> str | None:
-        """Wrong cell, reported once; with one cell in doubt the others cannot be compared."""
+        """Wrong cell, reported once; the other cells cannot be compared while one cell is in doubt."""
         seen = self.seen
         error = self._error(cycle)
         limit = SIGMAS * seen.sigma

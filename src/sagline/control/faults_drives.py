@@ -13,16 +13,16 @@ from sagline.control.extrema import finite, largest
 from sagline.control.link import COUNTERS, Command, GroupStatus, Mode, Sample, WinchState, newer
 from sagline.core.arrays import Array
 
-JUMP: Final = 1e-3  # m per cycle
-OFF_BEAT: Final = 1.5  # cycles: allowed difference of a PLC's clock and its accepted commands between samples
-CATCHING_UP: Final = 10  # cycles, after a larger difference
-FOLLOWING: Final = 5e-3  # m
-SATURATED: Final = 0.2  # s
-IDLE: Final = 3  # samples within which a group must begin to follow
+JUMP: Final = 1e-3  # largest jump [m per cycle]
+OFF_BEAT: Final = 1.5  # allowed difference between a PLC's clock and its accepted commands [cycles]
+CATCHING_UP: Final = 10  # wait after a larger difference [cycles]
+FOLLOWING: Final = 5e-3  # largest distance from a set point [m]
+SATURATED: Final = 0.2  # duration of the fault [s]
+IDLE: Final = 3  # number of samples within which a group must begin to follow
 _AT_LIMIT, _ENABLED = int(WinchState.SATURATED), int(WinchState.ENABLED)
 _FOLLOWING, _FOLLOW = int(GroupStatus.FOLLOWING), int(Mode.FOLLOW)
-REMEMBERED: Final = 32  # commands: more than may be in transit
-LONGEST: Final = 1.0  # s between two samples of a PLC; a longer time means that its clock was reset
+REMEMBERED: Final = 32  # [commands], more than can be in transit
+LONGEST: Final = 1.0  # longest time between two samples of a PLC [s]; a longer time means that its clock was reset
 
 
 class EncoderJump(Fault):
@@ -42,7 +42,7 @@ class EncoderJump(Fault):
         """Begin without a sample."""
         super().__init__(seen)
         self._numbers = False  # True if the previous sample had finite values
-        self._regular = np.full(seen.group_of.max() + 1, CATCHING_UP)  # for how many cycles each group's commands were
+        self._regular = np.full(seen.group_of.max() + 1, CATCHING_UP)  # number of cycles of each group's commands
 
     def found(self, cycle: Cycle) -> str | None:
         """Largest jump, or a reading that is not finite."""
@@ -60,7 +60,7 @@ class EncoderJump(Fault):
         return self._jump(cycle, sample, before) if known and before is not None else None
 
     def _jump(self, cycle: Cycle, sample: Sample, before: Sample) -> str | None:
-        """Message if a length jumps relative to the previous rate, else None; the rate after a jump may contain it."""
+        """Message if a length jumps relative to the previous rate, else None; the rate after a jump may include it."""
         passed = (sample.plc_time - before.plc_time)[self.seen.group_of]
         change = sample.length - before.length
         jump = change - before.rate * passed
@@ -69,12 +69,12 @@ class EncoderJump(Fault):
         jump = np.abs(jump)
         if cycle.command is not None:
             jump = np.minimum(jump, np.abs(change - cycle.command.rate * passed))
-        # a locked drum stops immediately, and a drive at its limit moves with the cable
+        # a locked drum stops immediately, and a drive at its force limit moves with the cable
         free = (sample.state == _ENABLED) & (before.state == _ENABLED)
         free &= (passed >= 0.0) & (passed < LONGEST)
-        # after some cycles without commands, a drive moves to the next one at its largest speed
+        # after some cycles without commands, a drive moves to the next set point at its largest speed
         free &= (self._regular >= CATCHING_UP)[self.seen.group_of]
-        allowed = JUMP * np.maximum(1.0, passed / self.seen.period)  # during a gap rates may have changed more
+        allowed = JUMP * np.maximum(1.0, passed / self.seen.period)  # rates may have changed more during a gap
         jumped = free & ~(jump <= allowed)
         if not jumped.any():
             return None
@@ -88,7 +88,7 @@ class EncoderJump(Fault):
 
 
 class FollowingError(Fault):
-    """Drum too far from its set point."""
+    """Fault: a drum is too far from its set point."""
 
     name = "following error"
     rule = f"|set point - length| > {1e3 * FOLLOWING:g} mm, set points being those that the PLC has taken and follows"
@@ -123,20 +123,20 @@ class FollowingError(Fault):
     def _away(self, cycle: Cycle) -> Array:
         """Distance of each drum from the interval between the last two commands accepted by its PLC [m], (m,).
 
-        A command in transit does not count; neither do drives that may not move.
+        Commands in transit and drives that are not enabled are excluded.
         """
         sent = {command.counter: k for k, command in enumerate(self._sent)}
         length = cycle.sample.length
         away = np.zeros(length.size)
         for g, echo in enumerate(cycle.sample.echo.tolist()):
             k = sent.get(echo, 0)
-            if k == 0 or not cycle.sample.status[g] & _FOLLOWING:  # unknown, no previous command, or not following
+            if k == 0 or not cycle.sample.status[g] & _FOLLOWING:  # not known: no previous command, or not following
                 continue
             mine = self.seen.group_of == g
             last, first = self._sent[k], self._sent[k - 1]
             low, high = np.minimum(first.length, last.length), np.maximum(first.length, last.length)
             out = np.maximum(np.maximum(low - length, length - high), 0.0)
-            # a length that is not finite is infinitely far
+            # a length that is not finite has an infinite distance
             away[mine & last.enable] = np.where(np.isfinite(out), out, np.inf)[mine & last.enable]
         return away
 
@@ -159,7 +159,7 @@ class NotFollowing(Fault):
         self._idle: dict[int, int] = {}  # consecutive samples of a group that accepted a command but does not follow
 
     def found(self, cycle: Cycle) -> str | None:
-        """First such group."""
+        """First group that does not accept or follow commands."""
         command, sample = cycle.command, cycle.sample
         if command is None or command.mode != _FOLLOW:
             self._first = None
@@ -173,7 +173,7 @@ class NotFollowing(Fault):
             return None
         asked = {int(group) for group in self.seen.group_of[command.enable]}
         for g in sorted(asked):
-            missed = behind[g] - round(float(sample.age[g]) / self.seen.period)  # without those after its last sample
+            missed = behind[g] - round(float(sample.age[g]) / self.seen.period)  # without later ones
             if missed > BEHIND:
                 return (
                     f"group {g} has taken no command for {missed} cycles; allowed: {BEHIND}. "
@@ -223,7 +223,7 @@ class ServoSaturated(Fault):
 
 
 class CorrectionAtLimit(Fault):
-    """Correction of the tension loop that is larger than the error of any good encoder."""
+    """Fault: a correction of the tension loop is larger than the error of any good encoder."""
 
     name = "correction at its limit"
     rule = "the tension loop has changed a length by as much as it may, 5 mm unless set otherwise"

@@ -11,13 +11,13 @@ from sagline.control.evidence import Cycle, Evidence, Fault, Reaction
 from sagline.control.link import GroupFault, GroupStatus, Mode, WinchState, fault_text
 from sagline.core.arrays import Flags
 
-STALE, SILENT = 3, 10  # cycles
-WINDOW: Final = 100  # cycles in the evaluated window
-LATE, LATE_OFTEN, LOST = 0.02, 0.005, 0.1  # s
-OFTEN: Final = 3  # per window
-ROUNDING: Final = 1e-6  # share of an age
+STALE, SILENT = 3, 10  # largest age [cycles]
+WINDOW: Final = 100  # length of the evaluated window [cycles]
+LATE, LATE_OFTEN, LOST = 0.02, 0.005, 0.1  # delay of a late cycle [s]
+OFTEN: Final = 3  # largest number of late cycles per window
+ROUNDING: Final = 1e-6  # tolerance, as a share of an age
 
-# plain integers: a member of an enumeration makes each array operation four times slower
+# plain integers, because members of an enumeration make each array operation four times slower
 _LOCKED, _EMERGENCY, _PRESSED = int(GroupStatus.LOCKED), int(GroupStatus.EMERGENCY), int(GroupFault.EMERGENCY_STOP)
 _TRIPPED, _LEAVE = int(WinchState.FAULT), int(Mode.LEAVE)
 
@@ -41,7 +41,7 @@ class _Old(Fault):
 
 
 class GroupStale(_Old):
-    """Late group; the tension loop is off until it is back."""
+    """Fault: a group is late; the tension loop is off until the group answers again."""
 
     name = "group stale"
     rule = f"newest sample of a group {STALE} cycles old: it is silent, or its blocks are repeated, late or invalid"
@@ -64,7 +64,7 @@ class GroupSilent(_Old):
 
 
 class BlockDiscarded(Fault):
-    """Invalid blocks; without valid ones, the group becomes stale."""
+    """Fault: a group sends invalid blocks; without valid ones, it becomes stale."""
 
     name = "block discarded"
     rule = "torn or foreign, by counters at both ends, magic, version or size; repeated, or older than one before"
@@ -77,7 +77,7 @@ class BlockDiscarded(Fault):
         self._quiet, self._line = WINDOW, ""
 
     def found(self, cycle: Cycle) -> str | None:
-        """Group and number of its discarded blocks; ends after one second without another."""
+        """Group and number of its discarded blocks; the fault ends after one second without another one."""
         sample, before = cycle.sample, cycle.before
         self._quiet += 1
         if before is not None and sample.discarded.tolist() != before.discarded.tolist():
@@ -112,7 +112,7 @@ class OwnerLost(Fault):
 
 
 class GroupActs(Fault):
-    """Group that its PLC or drive has stopped."""
+    """Fault: a group that was stopped by its PLC or a drive."""
 
     name = "group acts by itself"
     rule = "a PLC reports a fault or locked drums, or a drive reports a fault"
@@ -163,7 +163,7 @@ class EmergencyStop(Fault):
     homing = True
 
     def found(self, cycle: Cycle) -> str | None:
-        """Groups that report it."""
+        """Groups that report an emergency stop."""
         if not (self.seen.faulted or self.seen.bits & _EMERGENCY):
             return None
         sample = cycle.sample
@@ -175,7 +175,7 @@ class EmergencyStop(Fault):
 
 
 class CycleLate(Fault):
-    """Late cycle: the computer is too busy."""
+    """Fault: late cycles, because the computer is too busy."""
 
     name = "cycle late"
     rule = f"> {1e3 * LATE:g} ms late, or {OFTEN} of {WINDOW} cycles > {1e3 * LATE_OFTEN:g} ms late"
@@ -210,7 +210,7 @@ class CycleLate(Fault):
 
 
 class CycleLost(Fault):
-    """Cycle so late that the PLCs have stopped the winches."""
+    """Fault: a cycle is so late that the PLCs have stopped the winches."""
 
     name = "cycle lost"
     rule = f"> {1e3 * LOST:g} ms late"
@@ -218,7 +218,7 @@ class CycleLost(Fault):
     within = "1 cycle"
 
     def found(self, cycle: Cycle) -> str | None:
-        """Delay of the cycle."""
+        """Text of the cycle's delay."""
         if cycle.late <= LOST:
             return None
         return (
@@ -228,7 +228,7 @@ class CycleLost(Fault):
 
 
 class RecordingStopped(Fault):
-    """Recording stopped; the motion continues."""
+    """Fault: recording has stopped; the motion continues."""
 
     name = "recording stopped"
     rule = "a write fails, for instance because the disk is full, or the queue to the writer is full"

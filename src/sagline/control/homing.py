@@ -19,8 +19,8 @@ from sagline.robot.robot import Robot
 from sagline.statics.stiffness import stiffness
 from sagline.tension.method import TensionMethod
 
-WINDOW: Final = 50  # number of samples for the mean, all of them at rest
-MOST: Final = 1.2  # ratio to the plan's tension: a larger tension ends a jog
+WINDOW: Final = 50  # number of samples at rest for the mean
+MOST: Final = 1.2  # largest ratio to the plan's tension; a larger tension ends a jog
 
 
 class Homing:
@@ -38,7 +38,7 @@ class Homing:
     """
 
     def __init__(self, robot: Robot, pose: Pose, model: CableModel, method: TensionMethod) -> None:
-        """Plan the pose."""
+        """Plan the named pose."""
         self.plan = inverse(robot, pose, model, method)
         if not self.plan.feasible:
             gap = self.plan.gaps[0]
@@ -60,7 +60,7 @@ class Homing:
         self._lengths[:] = self._tensions[:] = 0.0
 
     def look(self, sample: Sample) -> bool:
-        """Add a sample at rest; True if there are enough samples, and they agree with the plan."""
+        """Add a sample at rest; returns True if the samples are sufficient and agree with the plan."""
         if self._counter.size and bool((sample.counter == self._counter).any()):
             return False  # a group repeats its previous sample
         self._counter = sample.counter
@@ -99,7 +99,7 @@ class HomingJog:
     """Set points of a jog of one winch while the pose is unknown."""
 
     def __init__(self, point: SetPoint, winch: int, by: float, period: float) -> None:
-        """Begin at the lengths of the winches; by [m], period [s]."""
+        """Begin at the lengths of the winches; by: change [m]; period [s]."""
         self._lengths, self._rates = winch_lengths(point.length, winch, by, period)
         self._row, self._point = 0, point
         self._enable = np.zeros(len(point.length), dtype=np.bool_)
@@ -118,5 +118,5 @@ class HomingJog:
 
 
 def jog_tension_limits(homing: Homing, sample: Sample) -> Array:
-    """Tension limits of a jog [N], shape (m,): 1.2 of the plan, or the present tension if that is larger."""
+    """Tension limits of a jog [N], shape (m,): 1.2 times the plan, or the present tension if that is larger."""
     return np.maximum(MOST * homing.tension, sample.tension + 3.0 * homing.sigma)

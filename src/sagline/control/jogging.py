@@ -23,12 +23,12 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 
-WINCH_SPEED: Final = 0.01  # m/s, for a jog of a winch
-PLATFORM_SPEED: Final = 0.02  # m/s
-PLATFORM_TURNING: Final = 0.05  # rad/s
-SHORTEST: Final = 0.4  # s, for a jog
-MOST_WINCH: Final = 0.1  # m per jog
-MOST_PLATFORM: Final = 0.2  # m or rad per jog
+WINCH_SPEED: Final = 0.01  # speed of a winch jog [m/s]
+PLATFORM_SPEED: Final = 0.02  # speed of a platform jog [m/s]
+PLATFORM_TURNING: Final = 0.05  # angular speed of a platform jog [rad/s]
+SHORTEST: Final = 0.4  # shortest duration of a jog [s]
+MOST_WINCH: Final = 0.1  # largest jog of a winch [m]
+MOST_PLATFORM: Final = 0.2  # largest jog of the platform [m or rad]
 
 
 def checked_winch(robot: Robot, winch: int, by: float) -> tuple[int, float]:
@@ -38,7 +38,7 @@ def checked_winch(robot: Robot, winch: int, by: float) -> tuple[int, float]:
 
 
 def winch_lengths(length: Array, winch: int, by: float, period: float) -> tuple[Array, Array]:
-    """Lengths and rates of a jog of one winch by a length [m] from rest, (N, m), one row per cycle; period [s]."""
+    """Lengths and rates of one winch's jog by a length [m] from rest, (N, m), one row per cycle; period [s]."""
     count = ceil(max(SHORTEST, 1.5 * abs(by) / WINCH_SPEED) / period)
     share = np.arange(count + 1) / count
     lengths, rates = np.repeat(length[None], count + 1, axis=0), np.zeros((count + 1, len(length)))
@@ -50,7 +50,7 @@ def winch_lengths(length: Array, winch: int, by: float, period: float) -> tuple[
 def winch_jog(
     robot: Robot, length: Array, here: Pose, winch: int, by: float, period: float, model: CableModel
 ) -> Motion:
-    """Plan and check a jog of one winch by a length [m] from lengths at rest (m,), in which the platform moves too."""
+    """Plan and check a jog of one winch by a length [m] from lengths at rest (m,); the platform moves too."""
     lengths, rates = winch_lengths(length, winch, by, period)
     found = forward(robot, lengths, here, model)
     what, step = f"a jog of winch {winch} by {1e3 * by:+g} mm", "Jog it by less, or another one."
@@ -63,7 +63,7 @@ def winch_jog(
         ("tension_min", robot.tension_min, tension < robot.tension_min),
         ("tension_max", robot.tension_max, tension > robot.tension_max),
     ):
-        leaves = wrong & ~wrong[0]  # a winch beyond the limit may be jogged back
+        leaves = wrong & ~wrong[0]  # a winch beyond the limit can be jogged back
         if leaves.any():
             k, i = (int(index) for index in np.argwhere(leaves)[0])
             reason = f"cable {i} would have {tension[k, i]:.3g} N; allowed: its {name}, {limit[i]:.3g} N"
@@ -82,7 +82,7 @@ def winch_jog(
 
 
 class PlatformJog:
-    """Jog of the platform along a straight line; each pose is solved when it is due."""
+    """Jog of the platform along a straight line; each pose is solved in its cycle."""
 
     def __init__(
         self,
@@ -94,7 +94,7 @@ class PlatformJog:
         model: CableModel,
         method: TensionMethod,
     ) -> None:
-        """Prepare the solver and check the end; by [m, rad] (6,), period [s]."""
+        """Prepare the solver and check the end; by: displacement and rotation [m, rad], (6,); period [s]."""
         self._robot, self._pose, self._by, self._period = robot, pose, by, period
         self._solver = InverseSolver(robot, model, method)
         move, turn = float(np.linalg.norm(by[:3])), float(np.linalg.norm(by[3:]))
@@ -114,7 +114,7 @@ class PlatformJog:
         self._fade = Fade(lead, period)
 
     def step(self) -> SetPoint:
-        """Set point of the next cycle; if its pose has no solution, the last set point, and `failed` has the reason."""
+        """Set point of the next cycle; if its pose has no solution, the last set point, with the reason in `failed`."""
         self._cycle = min(self._cycle + 1, self._count)
         share = self._cycle / self._count
         found = self._solver.step(*self._at(smooth(share)))

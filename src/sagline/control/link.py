@@ -13,12 +13,12 @@ from sagline.core.status import Status
 
 Whole: TypeAlias = NDArray[np.int64]
 
-PERIOD: Final = 0.01  # s, of the controller's cycle: the article's 100 samples per second
-GROUP_SIZE: Final = 2  # winches per PLC
+PERIOD: Final = 0.01  # period of the controller's cycle [s]; the article uses 100 samples per second
+GROUP_SIZE: Final = 2  # number of winches per PLC
 COUNTERS: Final = 2**31 - 1  # counters of commands and blocks run from 1 to this value, then start at 1 again
-HEARTBEAT: Final = 0.1  # s without a change of the command counter, after which a PLC ramps its winches down and holds
-OWNER_TIMEOUT: Final = 0.5  # s without a change of the command counter, after which another controller may take over
-RAMP: Final = 0.2  # s: time in which rates go to zero, here and in a PLC
+HEARTBEAT: Final = 0.1  # [s], without a change of the command counter, until a PLC ramps its winches down and holds
+OWNER_TIMEOUT: Final = 0.5  # [s], without a change of the command counter, until another controller may take over
+RAMP: Final = 0.2  # duration of the ramp of rates to zero, here and in a PLC [s]
 
 
 class Mode(IntEnum):
@@ -46,11 +46,11 @@ class GroupFault(Status):
     """Reason why a PLC has stopped its winches; `text` describes it."""
 
     NONE = 0, "no fault"
-    HEARTBEAT = 1, "no command came for 100 ms"  # the counter stood, or a command was valid no longer
+    HEARTBEAT = 1, "no command came for 100 ms"  # the counter did not change, or a command was no longer valid
     OVER_TENSION = (
         2,
         "a tension was too large, or its cell had no finite reading, while a cable was wound in",
-    )  # pays out only
+    )  # the winch only pays out cable
     FOLLOWING_ERROR = 3, "a drive lagged too far behind its set points"
     SET_POINT = 4, "a set point or a tension of a command was out of its range"
     EMERGENCY_STOP = 5, "the emergency stop is pressed"
@@ -58,7 +58,7 @@ class GroupFault(Status):
 
 
 def fault_text(code: int) -> str:
-    """Meaning of a PLC's fault code; also of unknown codes."""
+    """Meaning of a PLC's fault code, with a text for unknown codes."""
     return GroupFault(code).text if code in set(GroupFault) else f"unknown code {code}"
 
 
@@ -157,8 +157,8 @@ class Missing(NamedTuple):
 class Link(Protocol):
     """Connection to a machine.
 
-    A sample is never older than the previous one: a torn, foreign, repeated or out-of-order block is discarded, and the
-    group's age increases.
+    A sample is never older than the previous one. Incomplete, foreign, repeated and out-of-order blocks are discarded,
+    and the age of their group increases.
     """
 
     @property
@@ -167,12 +167,13 @@ class Link(Protocol):
 
     @property
     def period(self) -> float:
-        """Time between two commands; set points are reached after it [s]."""
+        """Time between two commands [s]; a set point is reached after this time."""
 
     def exchange(self, command: Command | None) -> Sample | Missing:
         """Send a command and return the newest sample, without waiting for an answer.
 
-        `sent_to` returns the message for each group: the command only if its owner has the grant.
+        `sent_to` returns the message for each group. A group receives the command only if the command's owner has the
+        grant.
 
         Args:
             command: Command to send; None to read only.
@@ -198,7 +199,7 @@ def sent_to(owner: int, command: Command) -> Sent:
 
 
 def newer(counter: int, known: int) -> bool:
-    """True if a counter is ahead of another, by less than half of the range."""
+    """True if a counter is ahead of another by less than half of the range."""
     return 0 < (counter - known) % COUNTERS < COUNTERS // 2
 
 

@@ -19,7 +19,7 @@ UNWATCHED = frozenset({State.OFF, State.CONNECTING})
 
 
 class Loop:
-    """Cycles of a controller.
+    """Control loop: the cycles of a controller.
 
     Attributes:
         context: Shared by all states.
@@ -140,7 +140,7 @@ class Loop:
 
 
 def _aged(known: Sample | None, missing: Missing) -> Sample | None:
-    """Previous sample with a larger age if a link that had samples has none; otherwise None."""
+    """Previous sample with a larger age if a link has no new sample; None if there was no sample before."""
     if known is None:
         return None
     return known._replace(time=missing.time, age=known.age + (missing.time - known.time))

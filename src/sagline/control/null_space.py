@@ -19,10 +19,10 @@ from sagline.statics.slopes import cable_slopes, on_platform, tension_slopes
 from sagline.statics.stiffness import stiffness
 
 SIGMAS: Final = 5.0  # tolerance of a reading, in standard deviations
-OWN_DEVIATION: Final = 1.0  # N, for a load cell without data
-BIAS: Final = 2.0  # N, 0.1 % of a load cell of 2 kN
+OWN_DEVIATION: Final = 1.0  # deviation of a load cell without data [N]
+BIAS: Final = 2.0  # bias of a load cell without data [N], 0.1 % of 2 kN
 _LIFT: Final = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-_HIDDEN: Final = 1e-6  # share of an error: with a smaller visible part, an error counts as invisible
+_HIDDEN: Final = 1e-6  # an error counts as invisible if its visible part is below this share
 
 
 def cell_sigma(robot: Robot) -> Array:
@@ -31,14 +31,14 @@ def cell_sigma(robot: Robot) -> Array:
 
 
 def cell_errors(robot: Robot) -> tuple[Array, Array]:
-    """Standard deviations of good load cells, and the biases they may have [N], both of shape (m,)."""
+    """Standard deviations of good load cells, and their largest biases [N], both of shape (m,)."""
     winches, none = robot.winches, np.zeros(robot.cable_count)
     own, bias = (none, none) if winches is None else (winches.load_cell_deviation, np.abs(winches.load_cell_bias))
     return np.where(own > 0.0, own, OWN_DEVIATION), np.maximum(bias, BIAS)
 
 
 def balance_slope(state: Equilibrium) -> Array:
-    """Free components of d(wrench)/d(tension) at the frame ends, platform held, (..., n, m) [N/N, N m/N]."""
+    """Free components of d(wrench)/d(tension) at the frame ends, with a fixed platform, (..., n, m) [N/N, N m/N]."""
     slopes = cable_slopes(state)
     wrench = on_platform(slopes.by_length, slopes.levers) / tension_slopes(state, slopes).by_length[..., None, :]
     found: Array = -first_of(state.robot).freedom @ wrench  # the slopes refer to the force on the cable
@@ -48,11 +48,11 @@ def balance_slope(state: Equilibrium) -> Array:
 def parity(state: Equilibrium) -> Array:
     """Parity matrix for fault detection of load cells, independent of the weight of the load.
 
-    At rest, tension errors must not change the wrench, except for a load that differs from the planned one. V is the
-    projection on all changes that are excluded, without the direction of the load. Row i is V_i/sqrt(V_ii). Its product
-    with the tensions minus the plan is the error of cell i that fits the observation best, as far as it is visible. The
-    cell with the largest product is reported. If the load's direction were not removed, a load of another weight would
-    look like a wrong cell.
+    At rest, tension errors must not change the wrench, except in the direction of the load, whose weight may differ
+    from the plan. V is the projection onto all other changes of the wrench. Row i is V_i/sqrt(V_ii). Its product with
+    the tensions minus the plan is the best-fitting error of cell i, as far as the error is visible. The cell with the
+    largest product is reported. Without the exception for the load's direction, a load of another weight would look
+    like a wrong cell.
 
     Args:
         state: An equilibrium, single or N of them.
@@ -88,11 +88,11 @@ def parity(state: Equilibrium) -> Array:
 
 
 class NullSpace(NamedTuple):
-    """Null-space and parity matrices at a pose; N_L = `null_lengths`, K_A = `tension_sensitivity`.
+    """Null-space and parity matrices at a pose, with N_L = `null_lengths` and K_A = `tension_sensitivity`.
 
     Attributes:
-        projection: Pi = N_L N_L^T, projection of lengths on those that do not move the platform, shape (..., m, m).
-        visible: K_A N_L G, projection of tensions on those that such lengths change, shape (..., m, m); G = (K_A
+        projection: Pi = N_L N_L^T, projection of lengths onto those that do not move the platform, shape (..., m, m).
+        visible: K_A N_L G, projection of tensions onto those that such lengths change, shape (..., m, m); G = (K_A
             N_L)^+.
         correction: N_L G, lengths that compensate such tensions, shape (..., m, m) [m/N].
         parity: Parity matrix of the load cells, shape (..., m, m): see `parity`.
@@ -107,8 +107,9 @@ class NullSpace(NamedTuple):
 def null_space(state: Equilibrium) -> NullSpace:
     """Changes of length that do not move the platform, to first order, and their effect on the tensions.
 
-    Six of the eight directions of a tension error are a wrench that is not in the plan, such as a payload or a load
-    cell's own error. Lengths that compensate such an error would move the platform. They are excluded.
+    For eight cables, six of the eight directions of a tension error correspond to a wrench that is not in the plan,
+    such as a payload or an error of a load cell. Lengths that compensate such an error would move the platform. They
+    are excluded.
 
     Args:
         state: An equilibrium of a robot with more cables than free motions, single or N of them.
@@ -138,7 +139,7 @@ def null_space(state: Equilibrium) -> NullSpace:
     return NullSpace(locked(projection), locked(slope @ inverse), locked(basis @ inverse), parity(state))
 
 
-EVERY: Final = 0.5  # s between rows: 3 cm at the article's speed
+EVERY: Final = 0.5  # time between rows [s]; 3 cm at the article's speed
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -152,7 +153,7 @@ class Gains:
 
     time: Array
     rows: tuple[NullSpace, ...]
-    _changes: tuple[float, ...]  # points with equal distances to two rows, R - 1 of them
+    _changes: tuple[float, ...]  # times with equal distances to two rows, R - 1 of them
 
     def at(self, time: float) -> NullSpace:
         """Matrices of the nearest pose in time.
@@ -171,7 +172,8 @@ def gains_along(plan: Plan, every: float = EVERY) -> Gains | None:
         every: Time between two rows [s], > 0; the plan's samples nearest to these times are used.
 
     Returns:
-        The table; None for a robot without redundancy, which has no tension loop: its tensions follow from the load.
+        The table; None for a robot without redundancy, which has no tension loop, because its tensions follow from the
+        load.
 
     Raises:
         InvalidValueError: If the plan is of poses without a path, or has a pose without lengths.

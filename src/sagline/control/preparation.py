@@ -19,7 +19,7 @@ from sagline.core.arguments import instance
 from sagline.robot.pose import Pose
 
 T = TypeVar("T")
-SETTLING: Final = 3.0  # s, longest time in which homing compares tensions
+SETTLING: Final = 3.0  # longest time in which homing compares tensions [s]
 
 
 class Preparation(Monitor):
@@ -28,8 +28,8 @@ class Preparation(Monitor):
     def cycle(self) -> None:
         """Run one cycle: exchange data, estimate the pose, check for faults, and prepare the next command.
 
-        An exception in the cycle stops the winches: it becomes an event, a hold command is sent, and it is raised
-            again.
+        An exception in the cycle stops the winches. It becomes an event, a hold command is sent, and the exception is
+            raised again.
         """
         self._loop.cycle()
 
@@ -37,7 +37,7 @@ class Preparation(Monitor):
         """Begin to connect.
 
         Raises:
-            RefusedError: If the controller is already connected, or only reads.
+            RefusedError: If the controller is already connected, or is read-only.
         """
         if self._context.shadow:
             raise RefusedError("connecting", "this controller only reads", "Make one without shadow.")
@@ -59,7 +59,7 @@ class Preparation(Monitor):
             raise (refused or Disagreement(self._context.run.reason, step)).refusal("connecting")
 
     def begin_homing(self, pose: Pose) -> None:
-        """Name the pose in which the platform is held, and begin to compare tensions.
+        """State the pose of the platform at rest, and begin to compare tensions.
 
         Args:
             pose: A single pose.
@@ -83,13 +83,13 @@ class Preparation(Monitor):
             self._loop.active = HomingState(c, homing)
 
     def home(self, pose: Pose) -> None:
-        """Name the pose in which the platform is held, and wait until the tensions agree.
+        """State the pose of the platform at rest, and wait until the tensions agree.
 
         Args:
             pose: A single pose.
 
         Raises:
-            RefusedError: If the tensions do not agree: the state remains HOMING, and the message names a jog.
+            RefusedError: If the tensions do not agree. The state remains HOMING, and the message recommends a jog.
         """
         self.begin_homing(pose)
         last = self._context.number + round(SETTLING / self.period)
@@ -122,7 +122,7 @@ class Preparation(Monitor):
         sample = c.check_agreement(what)
         begun = c.find_equilibrium(sample.length + c.zero - c.correction) if c.homed else None
         found = None if begun is None else self._wait_for(begun)
-        c.check_agreement(what)  # after the cycles beside it
+        c.check_agreement(what)  # after the cycles that ran at the same time
         check_transition(self.state, State.READY, what)
         c.clear_faults()
         self._loop.active = Holding(c, State.READY, "the operator acknowledged")
@@ -163,7 +163,7 @@ class Preparation(Monitor):
         return begun.result()
 
     def _result_of(self, work: Callable[[], T]) -> T:
-        """Result of long work; in real time cycles continue meanwhile, otherwise the PLCs would hold."""
+        """Result of long work; in real time, cycles continue during the work, because the PLCs would hold otherwise."""
         if self.pace is None or self.state is State.OFF:
             return work()
         with interrupt_calls(self.stop):

@@ -28,8 +28,8 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 
-BIN: Final = 1e-4  # s
-BINS: Final = 1000  # and one bin for all longer durations
+BIN: Final = 1e-4  # width of a bin [s]
+BINS: Final = 1000  # number of bins, besides one for all longer durations
 
 
 class Histogram:
@@ -37,7 +37,7 @@ class Histogram:
 
     def __init__(self) -> None:
         """Begin empty."""
-        self._counts = [0] * (BINS + 1)  # a list counts faster than an array
+        self._counts = [0] * (BINS + 1)  # a list is faster than an array
         self.longest = 0.0
 
     def add(self, duration: float) -> None:
@@ -51,7 +51,7 @@ class Histogram:
 
     @property
     def counts(self) -> Indices:
-        """Number of durations in each bin, shape (1001,); the last bin has all from 100 ms on."""
+        """Number of durations in each bin, shape (1001,); the last bin has all durations from 100 ms on."""
         return locked(np.array(self._counts))
 
     def quantile(self, share: float) -> float:
@@ -73,9 +73,9 @@ class Histogram:
 
 
 class Pace:
-    """Wait for the next tick of a clock without drift: ticks are one period apart, whatever a cycle takes.
+    """Wait for the next tick of a clock without drift; ticks are one period apart for any duration of a cycle.
 
-    It sleeps and does not spin, because threads of the link need the time. If a cycle is late by more than a period,
+    The wait sleeps and does not spin, because threads of the link require the time. If a cycle is late by more than a
     the ticks start again at that time: missed set points are not sent in a burst.
     """
 
@@ -90,7 +90,7 @@ class Pace:
         """
         self.period = number(period, "period", "s", above=0.0)
         self.lateness = Histogram()
-        self.periods = Histogram()  # from the start of a cycle to the start of the next
+        self.periods = Histogram()  # from the start of a cycle to the start of the next one
         self._next: float | None = None
         self._began = 0.0
 
@@ -133,10 +133,10 @@ def in_background(work: Callable[[], T], threaded: bool) -> Future[T]:
 
 
 class Garbage:
-    """Garbage collection, which is off during motion because it takes longer than a cycle."""
+    """Switch of the garbage collection, which is off during motion because it takes longer than a cycle."""
 
     def __init__(self) -> None:
-        """Begin without change."""
+        """Begin without a change."""
         self._stopped = False
 
     def stop(self) -> None:
@@ -178,12 +178,12 @@ def interrupt_calls(stop: Callable[[], object]) -> Iterator[None]:
         raise KeyboardInterrupt
 
 
-MOVE = 0.01  # m
-HEIGHTS = (0.25, 0.5, 0.1, 0.75)  # below the frame anchors, as shares of the frame width
+MOVE = 0.01  # length of the path [m]
+HEIGHTS = (0.25, 0.5, 0.1, 0.75)  # depths below the frame anchors, as shares of the frame width
 
 
 def load_kernels(robot: Robot, period: float, model: CableModel, method: TensionMethod) -> None:
-    """Run homing, a path and jogs once near the middle of a robot to load their kernels; refusals do not matter."""
+    """Run homing, a path and jogs once near the middle of a robot to load their kernels; rejections are ignored."""
     middle, homing = _first_feasible(robot, model, method)
     beside = Pose.from_euler(middle.position + np.array([MOVE, 0.0, 0.0]), 0.0, 0.0, 0.0)
     path, by = septic_path([middle, beside], speed=0.1), np.full(6, 1e-3)

@@ -22,7 +22,7 @@ class EventKind(StrEnum):
 
     STATE = "state"  # change of state
     FAULT = "fault"
-    NOTE = "note"  # for the operator; without consequences
+    NOTE = "note"  # note for the operator, without consequences
 
 
 class Event(NamedTuple):
@@ -45,7 +45,7 @@ class Event(NamedTuple):
     text: str
 
 
-# record of a cycle with m winches and G groups: real numbers, and whole ones
+# record of a cycle with m winches and G groups: real numbers, then whole numbers
 REAL_OWN: Final = ("time", "late", "clock")
 PLACE: Final = (("position", 3), ("quaternion", 4))
 REAL_OF_GROUPS: Final = ("age", "plc_time")
@@ -91,7 +91,7 @@ class Recorded(NamedTuple):
 
 
 class Recorder(Protocol):
-    """Receiver of cycles and events, such as a log or a status line. It must never block: the loop waits for it."""
+    """Receiver of cycles and events, such as a log or a status line. It must never block; the loop waits for it."""
 
     @property
     def stopped(self) -> str:
@@ -170,7 +170,7 @@ class Tape:
         own = (answer.time, cycle.late, cycle.clock)
         sight = (cycle.position, cycle.quaternion)
         np.concatenate((own, *sight, *read, *asked, cycle.planned_tension, cycle.correction), out=self._numbers[k])
-        # plain integers: numpy takes them ten times as fast as members of an enumeration
+        # plain integers, which numpy converts ten times as fast as members of an enumeration
         about = (int(answer.__class__ is Sample), int(cycle.state), cycle.estimate, int(mode))
         np.concatenate((about, *codes), out=self._codes[k])
         self._count = k + 1

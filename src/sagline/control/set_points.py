@@ -19,8 +19,8 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
-LEAD_SPEED: Final = 0.01  # m/s: largest rate of the transition from the lengths at rest to a plan's first lengths
-WHOLE: Final = 1e-9  # share of a row
+LEAD_SPEED: Final = 0.01  # [m/s], largest rate of the transition from the lengths at rest to a plan's first lengths
+WHOLE: Final = 1e-9  # tolerance, as a share of a row
 
 
 class SetPoint(NamedTuple):
@@ -36,7 +36,8 @@ class SetPoint(NamedTuple):
         clock: Time on the plan [s]; NaN outside a plan.
         done: True if the source ends here.
         enable: Drives that may move, shape (m,); None for all.
-        leading: True while the lengths at rest still change to those of a plan: tensions are not yet the planned ones.
+        leading: True while the lengths at rest still change to those of a plan; tensions are then not yet the planned
+            ones.
     """
 
     length: Array
@@ -55,7 +56,7 @@ class SetPointSource(Protocol):
     """Source of one set point in each cycle."""
 
     def step(self) -> SetPoint:
-        """Next set point; beyond the end the last one again, with rates of zero."""
+        """Next set point; after the end, the last one again with rates of zero."""
 
 
 class Standing:
@@ -93,7 +94,7 @@ class Standing:
 
 
 def standing_at(robot: Robot, length: Array, start: Pose | None, model: CableModel) -> Standing | ForwardStatus:
-    """Constant set point at lengths [m] (m,), with the pose from forward kinematics; or the status without one."""
+    """Constant set point at lengths [m] (m,), with the pose from forward kinematics; the status if no pose is found."""
     found = forward(robot, length, start, model)
     return Standing.at(found.state) if found.status in STABLE else ForwardStatus(int(found.status))
 
@@ -102,7 +103,7 @@ class Fade:
     """Smooth transition from the lengths at rest to those of a plan."""
 
     def __init__(self, lead: Array, period: float) -> None:
-        """Begin with the whole difference: lead [m] (m,); period [s]."""
+        """Begin with the whole difference; lead: [m], (m,); period [s]."""
         largest = float(np.abs(lead).max())
         self._lead, self._period = lead, period
         self._cycle, self._cycles = 0, ceil(max(RAMP, 1.5 * largest / LEAD_SPEED) / period) if largest > 0.0 else 0
@@ -180,7 +181,7 @@ class Along:
         done = self.at_end or (self._wanted == 0.0 and self._speed == 0.0)
         clock, gains = self.clock, motion.gains
         at = None if gains is None else gains.at(clock)
-        on_plan = clock if motion.plan is not None else np.nan  # a jog has none
+        on_plan = clock if motion.plan is not None else np.nan  # a jog does not have one
         return SetPoint(length, rate, tension, drum, motion.wrench[k], at, on_plan, done, None, left is not None)
 
     def _between(self, k: int, u: float) -> tuple[Array, Array, Array, Array]:
@@ -196,7 +197,7 @@ class Along:
 
 
 class Ramp:
-    """All rates to zero in the same time, so that the direction is kept: l' = l'_0 (1 - t/t_s)."""
+    """Ramp of all rates to zero in the same time, which preserves the direction: l' = l'_0 (1 - t/t_s)."""
 
     def __init__(self, point: SetPoint, period: float) -> None:
         """Begin at the last set point; period [s]."""

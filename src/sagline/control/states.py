@@ -29,7 +29,7 @@ _FAULT: Final = {State.STOPPING: "a fault"}
 _STOP: Final = {State.STOPPING: "stop, or a fault"}
 _EMERGENCY: Final = {State.EMERGENCY: "emergency stop, or a broken cable"}
 
-# by state: the action of the winches in it, and the condition of each transition by the state that it leads to
+# for each state: the action of the winches, and the conditions of its transitions by next state
 TABLE: Final[dict[State, tuple[str, dict[State, str]]]] = {
     State.OFF: ("brakes", {State.CONNECTING: "the operator"}),
     State.CONNECTING: (
@@ -92,7 +92,7 @@ class RefusedError(SaglineError):
         what: Rejected request.
         reason: Reason of the rejection.
         next_step: Next step for the reader.
-        item: Equal to `what`; the name that all errors have.
+        item: Equal to `what`; all errors have this attribute.
     """
 
     def __init__(self, what: str, reason: str, next_step: str) -> None:

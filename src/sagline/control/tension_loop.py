@@ -1,4 +1,4 @@
-"""Tension loop: tension errors are corrected by changes of length that do not move the platform."""
+"""Tension loop: correction of tension errors by changes of length that do not move the platform."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.fields import NumberFields, rule
 
 MOST_CABLES: Final = 10**6
-MOST_GAIN: Final = 0.1  # per cycle: a loop with five cycles of delay is unstable from 0.17 on
+MOST_GAIN: Final = 0.1  # largest gain per cycle; a loop with five cycles of delay is unstable from 0.17 on
 
 
 @dataclass(frozen=True, slots=True)
 class TensionSettings(NumberFields):
-    """Settings of the tension loop; the defaults have 24 dB and 62 degrees at a delay of five cycles.
+    """Settings of the tension loop; the defaults have margins of 24 dB and 62 degrees for five cycles of delay.
 
     Attributes:
         filter_time: Time constant of the input filter [s], > 0.
@@ -52,7 +52,7 @@ class TensionSettings(NumberFields):
 
 
 class TensionLoop:
-    """Correction of lengths that brings the tensions back to the plan; it lasts for a session, as length errors do.
+    """Correction of lengths that brings the tensions back to the plan; it remains for a session, like length errors.
 
     f <- f + h/(tau + h) (T - T_plan - f), and while the loop acts delta <- delta - k N_L G f; docs/model.md, section
     12.
@@ -76,7 +76,7 @@ class TensionLoop:
         m = whole_number(cable_count, "cable_count", 1, MOST_CABLES)
         self.settings = TensionSettings() if settings is None else instance(settings, TensionSettings, "settings")
         cycle = number(period, "period", "s", above=0.0)
-        self._share = np.full(m, cycle / (self.settings.filter_time + cycle))  # numpy is slower with one number
+        self._share = np.full(m, cycle / (self.settings.filter_time + cycle))  # numpy is slower with single numbers
         self._row: NullSpace | None = None
         self._filtered, self._correction = np.zeros(m), np.zeros(m)
         self._error, self._change = np.empty(m), np.empty(m)
@@ -99,13 +99,13 @@ class TensionLoop:
             tension: T_A, tension measured by the load cells [N], shape (m,).
             planned: Planned tension at the same time [N], shape (m,).
             row: Row of the plan's gains at this time.
-            frozen: True if the tensions are old or doubtful: they are then not used. The present correction is still
-                adapted to the pose.
+            frozen: True if the tensions are old or doubtful. They are then not used, but the present correction is
+                still adapted to the pose.
 
         Returns:
             Correction of the lengths of the plan [m], shape (m,), an array owned by the caller.
         """
-        if row is not self._row:  # lengths in the null space at one pose move the platform at the next
+        if row is not self._row:  # lengths in the null space at one pose move the platform at the next pose
             if self._row is not None:
                 np.matmul(row.projection, self._correction, out=self._change)
                 self._correction[:] = self._change
@@ -129,4 +129,4 @@ class TensionLoop:
         change *= settings.gain
         self._correction -= change
         if (most := largest(self._correction)) > settings.largest:  # a fault reports it
-            self._correction *= settings.largest / most  # scaled as a whole: separate limits would move the platform
+            self._correction *= settings.largest / most  # one common factor; separate limits would move the platform

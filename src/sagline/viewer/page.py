@@ -62,7 +62,8 @@ class Source(NamedTuple):
 class Page:
     """Page of a robot, optionally with a run or simulation. The caller starts and stops the server.
 
-    Its state is used in the thread of `serve`; other threads call only `later`, `refresh`, `extend` and `stop`.
+    Only the thread of `serve` uses the state of the page. Other threads call only `later`, `refresh`, `extend` and
+    `stop`.
 
     Attributes:
         server: A running server with an empty page.
@@ -98,11 +99,11 @@ class Page:
         source: Source | None = None,
         beside: Beside | None = None,
     ) -> None:
-        """Build the page; `beside` is a second run of the robot with the same clock. Other arguments: see above."""
+        """Build the page; `beside` is a second run of the robot with the same clock. Other arguments: see the class."""
         self.server, self.robot, self.wrench = server, robot, wrench
         self.mode, self.found, self.source = mode, found, source or Source()
         self._wake, self._stopping = threading.Event(), threading.Event()
-        self._tasks: deque[Callable[[], None]] = deque()  # appended to by any thread
+        self._tasks: deque[Callable[[], None]] = deque()  # any thread may append
         self.scale, self.size = TensionScale.of(robot), shapes.size_of(robot)
         self.channel = Channel(server.gui, self.later)
         server.on_client_connect(self.channel.connect)

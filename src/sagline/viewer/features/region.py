@@ -152,7 +152,7 @@ class RegionFeature(Feature):
             self._refuse(str(error))
 
     def tick(self) -> None:
-        """Write the progress of a hull."""
+        """Write the progress of a hull's computation."""
         if self._region_box.value and self._task.elapsed:
             text = f"Computing the region: {100.0 * self._progress:.0f} %, {self._task.elapsed:.0f} s so far"
             self._hull_html.content = sentence(text)
