@@ -1,28 +1,41 @@
-/* One cable, moved by sliders: docs/explore.md. The exact one is that of the pages of `sagline share`, catenary.js; the
-   other formulas are those of docs/model.md, section 3, which the tests compare with the library's. SI units everywhere
-   but in what is written on the page. */
+/* One cable, moved by sliders: docs/explore.md. Both cables are computed by the library's kernels, compiled to
+   WebAssembly; docs/hooks/explore.py describes their calls. SI units everywhere but in what is written on the page. */
 "use strict";
 
 const cable = (() => {
-  /** The exact cable at a chord tension; given: span, rise, density, stiffness, tension, gravity. */
-  function exact(given) {
-    const found = catenary.exact(given);
-    return { ...found, sag: catenary.sag(found), at: (share) => catenary.at(found, share) };
+  const read = (name) => document.querySelector(`script[data-part=${name}]`).textContent;
+  const ready = kernels.made(read("kernels"), JSON.parse(read("calls")));
+  let of = null;
+
+  /** Cables at chord tensions; given: span, rise, density, stiffness, gravity. */
+  function at(model, given, tensions) {
+    for (const name of ["span", "rise", "density", "stiffness"]) of[name][0] = given[name];
+    of.tension.fill(tensions[0]);
+    of.tension.set(tensions);
+    of[model]();
+    const weight = given.density * given.gravity, chord = Math.hypot(given.span, given.rise);
+    return tensions.map((tension, i) => {
+      const [length, horizontal, vertical] = [of.length[i], of.horizontal[i], of.vertical[i]];
+      const [frameEnd, platformEnd] = [Math.hypot(horizontal, vertical - weight * length), Math.hypot(horizontal, vertical)];
+      return { ...given, tension, chord, weight, length, horizontal, vertical, frameEnd, platformEnd, valid: of.status[i] === 0 };
+    });
   }
 
-  /** The article's closed form at a chord tension: its line, (21), and its length, (48). */
-  function empirical(given) {
-    const { span, rise, density, tension, stiffness, kh, kp } = given;
-    const chord = Math.hypot(span, rise), pull = kh * density * chord;
-    const vertical = (tension * rise) / chord + pull, end = Math.hypot((tension * span) / chord, vertical);
-    const shallow = kp * ((density * span) / tension) ** 2;
-    const found = catenary.state(given, (chord * (1 + shallow)) / (1 + end / stiffness), vertical);
-    const drop = (t) => (pull * chord * t * (1 - t)) / tension;
-    const valid = (tension * Math.abs(rise)) / chord > Math.abs(pull); // its lowest point is outside the span
-    return { ...found, valid, sag: drop(0.5), at: (t) => ({ x: t * span, z: t * rise - drop(t) }) };
+  /** One cable with its largest sag and its points; given: also its tension. */
+  function one(model, given) {
+    const [found] = at(model, given, [given.tension]);
+    of[`${model}Sag`]();
+    of[`${model}Points`]();
+    const points = Array.from({ length: of.points.length / 2 }, (_, k) => ({ x: of.points[2 * k], z: of.points[2 * k + 1] }));
+    return { ...found, sag: of.sag[0], points };
   }
 
-  return { exact, empirical };
+  return {
+    ready: ready.then((found) => (of = found)),
+    exact: (given) => one("exact", given),
+    empirical: (given) => one("empirical", given),
+    many: (given, tensions) => at("exact", given, tensions),
+  };
 })();
 
 /* The page. */
@@ -41,7 +54,7 @@ const cable = (() => {
   /** Both cables between their ends, to scale. */
   function picture(found, closed) {
     const place = ({ x, z }) => [PLACE.left + PLACE.meter * x, PLACE.top - PLACE.meter * z];
-    const drawn = (one) => path(Array.from({ length: POINTS + 1 }, (_, i) => place(one.at(i / POINTS))));
+    const drawn = (one) => path(one.points.map(place));
     const [from, to] = [{ x: 0, z: 0 }, { x: found.span, z: found.rise }].map(place);
     const bar = [PLACE.left, HIGH - 18];
     return [
@@ -63,9 +76,8 @@ const cable = (() => {
     const most = 1.4 * Math.max(found.horizontal, 0.5 * found.weight * found.chord);
     const least = 0.04 * found.weight * found.span; // where half the cable’s weight is some ten chord tensions
     const forces = Array.from({ length: POINTS + 1 }, (_, i) => least * (most / least) ** (i / POINTS));
-    const course = (model) =>
-      forces.map((force) => [force, model({ ...found, tension: (force * found.chord) / found.span }).vertical]);
-    const curve = course(cable.exact), straight = [[0, closed.vertical - (found.rise / found.span) * found.horizontal]];
+    const many = cable.many(found, forces.map((force) => (force * found.chord) / found.span));
+    const curve = many.map(({ vertical }, i) => [forces[i], vertical]), straight = [[0, closed.vertical - (found.rise / found.span) * found.horizontal]];
     straight.push([most, straight[0][1] + (found.rise / found.span) * most]);
     // the values of the slackest cables are outside the picture
     const heights = [...curve.filter(([force]) => force > 0.6 * found.horizontal), ...straight].map(([, height]) => height);
@@ -154,5 +166,5 @@ const cable = (() => {
     tell();
   }
 
-  for (const page of document.querySelectorAll(".explore")) begin(page);
+  cable.ready.then(() => document.querySelectorAll(".explore").forEach(begin));
 })();

@@ -10,19 +10,24 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
+import numpy as np
+
 from sagline.cables.cable import Cable
 from sagline.cables.model import CableModel, CableState
 from sagline.cables.models import Catenary, Empirical
+from sagline.kernels.cable.batch import BUFFERS, CHUNK
+from sagline.share.calls import Call, described_calls, module_text
 
 if TYPE_CHECKING:  # the tests load this without MkDocs
     from mkdocs.config.defaults import MkDocsConfig
     from mkdocs.structure.files import Files
 
-CATENARY: Final = Path(__file__).parents[2] / "src/sagline/share/page/catenary.js"
+KERNELS: Final = Path(__file__).parents[2] / "src/sagline/share/page/kernels.js"
 MOVED, STILL = "<!-- one cable, to be moved -->", "<!-- one cable, standing still -->"
 SPAN, RISE, DENSITY, STIFFNESS, GRAVITY = 12.0, -4.0, 0.067, 44e3, 9.81  # m, m, kg/m, N, m/s^2: the article's cable
 TENSIONS: Final = (30.0, 100.0, 300.0, 1000.0)  # N, of the table
 HEAVY, STANDING = 0.5, (20.0, 40.0, 200.0)  # kg/m and N, of the static picture
+CURVE = 81  # points of a cable and of the curve that the scripts draw
 POINTS, METER, LEFT, TOP = 60, 26.0, 24.0, 20.0  # of that picture: points per cable; px per meter, and of the frame end
 
 
@@ -85,10 +90,10 @@ NOTE: Final = "Outside the article’s range: the lowest point of the cable is i
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add the script of the exact cable, shared with the pages of `sagline share`."""
+    """Add the script that calls kernels, shared with the pages of `sagline share`."""
     from mkdocs.structure.files import File
 
-    files.append(File.generated(config, CATENARY.name, abs_src_path=str(CATENARY)))
+    files.append(File.generated(config, KERNELS.name, abs_src_path=str(KERNELS)))
     return files
 
 
@@ -99,8 +104,7 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
 
 def moved() -> str:
     """Controls, hidden until the script runs, and the static picture that it hides."""
-    model = Empirical()
-    constants = {"span": SPAN, "gravity": GRAVITY, "kh": model.k_h, "kp": model.k_p}
+    constants = {"span": SPAN, "gravity": GRAVITY}
     data = "".join(f' data-{name}="{value:g}"' for name, value in constants.items())
     buttons = "".join(
         f"<button type=\"button\" data-steps='{json.dumps(steps)}'>{name}</button>" for name, steps in TRIED.items()
@@ -131,8 +135,27 @@ def moved() -> str:
         f'<p role="status" class="heard"></p><p data-note="range" class="note">{NOTE}</p>'
         f'<table class="numbers"><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
         f"<div data-still>{still_picture()}</div></div>"
-        '<script src="catenary.js" defer></script><script src="explore.js" defer></script>'
+        f'<script type="text/plain" data-part="kernels">{module_text()}</script>'
+        f'<script type="application/json" data-part="calls">{json.dumps(calls())}</script>'
+        '<script src="kernels.js" defer></script><script src="explore.js" defer></script>'
     )
+
+
+def calls() -> dict[str, Any]:
+    """Calls of the kernels for docs/explore.js: cables at tensions by both models, sag and points of the first."""
+    given = dict(zip(("span", "rise", "density", "stiffness"), np.zeros((4, 1)), strict=True))
+    found = dict(zip(("tension", "length", "horizontal", "vertical"), np.zeros((4, CURVE)), strict=True))
+    status, sag, points = np.zeros(CURVE, dtype=np.int8), np.zeros(1), np.zeros((1, CURVE, 2))
+    tension, length, horizontal, vertical = found.values()
+    forces, work = (length, horizontal, vertical), np.zeros((BUFFERS, CHUNK))
+    described: dict[str, Call] = {}
+    for name, model in (("exact", Catenary()), ("empirical", Empirical())):
+        terms = model.terms(GRAVITY)
+        described[name] = "batch_from_tension", (terms, *given.values(), tension, *forces, status, work)
+        state = (terms, *given.values(), *(each[:1] for each in (*forces, tension)))
+        described[f"{name}Sag"] = "largest_sags", (*state, sag)
+        described[f"{name}Points"] = "shape_points", (*state, points)
+    return described_calls(described, {**given, **found, "status": status, "sag": sag, "points": points})
 
 
 def still_picture() -> str:

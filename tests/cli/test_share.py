@@ -8,6 +8,7 @@ from typer.testing import CliRunner, Result
 
 import sagline as sl
 from sagline.cli.main import app
+from sagline.share import calls
 from tests.files.executions import execution
 from tests.tiers import extended
 
@@ -32,7 +33,7 @@ def test_a_robot_becomes_one_page_and_its_size_is_told(folder: Path) -> None:
     assert result.exit_code == 0, result.output
     page = (folder / "cogiro.html").read_bytes()
     assert f": {len(page) / 1e3:,.0f} kB" in result.stdout
-    assert len(page) < 150_000
+    assert len(page) < 250_000
     assert b"src=" not in page
     assert b"default-src 'none'" in page
 
@@ -59,3 +60,12 @@ def test_a_name_nobody_chose_is_not_taken_from_other_pages(folder: Path) -> None
     assert (folder / "cogiro.html").read_text(encoding="utf-8") == "<p>my notes"
     assert shared("cogiro", "--out", "cogiro.html").exit_code == 0
     assert shared("cogiro").exit_code == 0  # over a page of its own
+
+
+def test_without_the_module_one_line_says_how_it_is_made(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(calls, "MODULE", folder / "kernels.wasm")
+    result = shared("no-such-robot")
+    assert result.exit_code == 2
+    assert result.stderr.count("\n") == 1
+    assert "kernels.wasm" in result.stderr
+    assert "python -m tools.build" in result.stderr

@@ -25,7 +25,6 @@ SIZES = ((390, 640), (1000, 640), (1440, 900))
 OVERFLOWING = """[...document.querySelectorAll("body *:not(.heard)")].filter((each) => each.checkVisibility())
     .filter((each) => each.getBoundingClientRect().right > innerWidth + 1 || each.scrollWidth > each.clientWidth + 1
         && getComputedStyle(each).overflow !== "visible").map((each) => each.outerHTML.slice(0, 200))"""
-DRAWN = "it.moment().lines.map((line, i) => robot.course(line, it.moment().hung[i], 40, 16))"
 STATES = (
     "Object.fromEntries(Object.entries(it.course).map(([name, all]) => [name, all.map((each) => Array.from(each))]))"
 )
@@ -91,7 +90,7 @@ def test_a_run_plays(
         k, end = 30, plan.path.time[-1]
         asking(page, f"it.scrub({plan.path.time[k]:.6f})")
         expect(page.get_by_role("status")).to_have_text("Feasible")
-        drawn = np.array(asking(page, DRAWN))
+        drawn = np.array(asking(page, "it.moment().courses"))
         robot = plan.state.one_robot
         state = plan.state[k]
         expected = shapes.catenaries(shapes.chords(robot, state.pose), state.cables, 1.0)
@@ -145,6 +144,7 @@ def test_a_robot_is_dragged(
         check_balance(page, robot, moved)
         page.get_by_role("button", name="Home").click()
         np.testing.assert_allclose(asking(page, "it.moment().pose.position"), start)
+        check_winch(page, robot)
         slider = page.get_by_role("slider", name="z")
         slider.focus()
         page.keyboard.press("End")
@@ -170,6 +170,25 @@ def test_a_platform_that_stands_out_of_its_frame_is_seen_whole(browser: Browser,
 def check_balance(page: Page, robot: sl.Robot, position: Array) -> None:
     plan = sl.inverse(robot, sl.Pose(position, np.eye(3)))
     assert plan.feasible
-    np.testing.assert_allclose(asking(page, "it.moment().tension"), plan.chord_tension, rtol=1e-9)
+    np.testing.assert_allclose(asking(page, "it.moment().tension"), plan.chord_tension, rtol=1e-12)
     rows = page.locator("[data-part=cables] tr").all_inner_texts()
     assert [float(row.split()[2]) for row in rows] == pytest.approx(plan.unstrained_length, abs=6e-5)
+
+
+def check_winch(page: Page, robot: sl.Robot) -> None:
+    """A longer cable: the platform comes to rest where the library says, and returns with the slider."""
+    planned = sl.Pose(asking(page, "it.moment().pose.position"), np.eye(3))
+    before = np.array(asking(page, "it.moment().length"))
+    page.get_by_label("Cable to wind").select_option("1")
+    slider = page.get_by_label("Change of its length")
+    slider.focus()
+    page.keyboard.press("PageUp")
+    length = np.array(asking(page, "it.moment().length"))
+    assert np.flatnonzero(length != before).tolist() == [1]
+    assert length[1] > before[1]
+    rest = sl.forward(robot, length, start=planned)
+    np.testing.assert_allclose(asking(page, "it.moment().pose.position"), rest.pose.position, rtol=0.0, atol=1e-12)
+    way = 1e3 * np.linalg.norm(rest.pose.position - planned.position)
+    expect(page.locator("[data-part=verdict]")).to_contain_text(f" {way:.1f} mm ")
+    slider.fill("0")
+    np.testing.assert_array_equal(asking(page, "it.moment().pose.position"), planned.position)

@@ -55,6 +55,7 @@ SIGNATURES: Final[dict[str, dict[str, tuple[Type, ...]]]] = {
     "batch_from_length": {"": (TERMS, *[F1] * 8, CODES1)},
     "batch_from_tension": {"": (TERMS, *[F1] * 8, CODES1, F2)},
     "begin_period": {"": (plain_tuple(F1, F1, F1), F1, F1, F2, COURSE, F1, I1, BOOL, BOOL, FLOAT)},
+    "cable_courses": {"": (F2, F1, F1, F1, INT, F2, F2, F3)},
     "cable_geometries": {"": (F3, F2, F2, F2, F3)},
     "closures": {"": (*STATE, F1)},
     "creep_strains": {"": (F1, F2, F1, F1, FLAGS1, F2)},

@@ -34,8 +34,8 @@ def share(
 ) -> None:
     """Make one HTML page of a robot or a run that needs no server and no network: for a phone, a mail, a lecture.
 
-    A run is played, a robot can be dragged; the page computes the catenaries itself. The view turns by mouse, touch and
-    keys. The file has about 80 kB, and 150 kB more for each minute of a run.
+    A run is played, a robot can be dragged; the page computes with the kernels of sagline. The view turns by mouse, touch and
+    keys. The file has about 180 kB, and 150 kB more for each minute of a run.
 
     For example:
 
@@ -47,8 +47,10 @@ def share(
     """
     from sagline.files.writing import file_stem
     from sagline.robot.robot import Robot
+    from sagline.share.calls import check_module
     from sagline.share.page import course_page, robot_page
 
+    check_module()
     source = Path(what)
     if out is not None and out.suffix.lower() not in ENDINGS:
         raise FileError(out, "is no name for a page", "Let it end in .html.")

@@ -9,12 +9,23 @@ from typing import Any, Final
 import numpy as np
 
 from sagline.cables.models import Catenary
-from sagline.core.arrays import Array
-from sagline.robot.batch import pulleys_of
+from sagline.core.arrays import Array, locked
+from sagline.kernels import tables
+from sagline.kernels.cable.courses import cable_courses
+from sagline.kernels.cable.geometry import GEOMETRY_ROWS
+from sagline.kernels.memory import memory_for
+from sagline.kinematics.forward_rows import ForwardRows, new_chain
+from sagline.kinematics.inverse_rows import UNDECIDED, InverseRows, Verdicts, covers_all
+from sagline.kinematics.status import ForwardStatus, PoseStatus
+from sagline.robot.batch import has_routing, pulleys_of
 from sagline.robot.pose import Pose
 from sagline.robot.reach import bounds, home_pose
 from sagline.robot.robot import Robot
+from sagline.share.calls import AnyArray, Call, described_calls
 from sagline.share.packing import PackedColumn, encode_columns
+from sagline.statics.tables import pose_rows, robot_terms
+from sagline.tension.method import kernel_options
+from sagline.tension.methods import MinimumNorm
 from sagline.viewer import shapes
 from sagline.viewer.tension_scale import ForceUnit, TensionScale
 
@@ -27,34 +38,67 @@ _UP: Final = np.array([-0.154, 0.318, 0.936])
 _EDGES: Final = [(a, b) for a in range(8) for b in range(a) if (a ^ b) in (1, 2, 4)]
 
 
+def drawing_data(robot: Robot) -> dict[str, Any]:
+    """Kernel that draws the cables of a run, for page/robot.js, with the data of the robot."""
+    pose, tension = np.zeros((1, tables.POSE_COLUMNS)), np.zeros(robot.cable_count)
+    arguments = _draw_arguments(robot, robot_terms(robot), pose[0], tension)
+    return _described(robot, {"draw": ("cable_courses", arguments)}, pose, arguments)
+
+
 def model_data(robot: Robot) -> dict[str, Any]:
-    """Data of the model of docs/model.md, for page/robot.js; None for no upper limit."""
-    radius, entry = pulleys_of(robot)
-    winches = robot.winches
-    nothing = np.zeros(robot.cable_count)
-    dead, rise = (nothing, nothing) if winches is None else (winches.dead_cable, winches.dead_rise)
-    columns = {
-        "frame": robot.frame_anchors,
-        "platform": robot.platform_anchors,
-        "density": robot.cables.linear_density,
-        "stiffness": robot.cables.axial_stiffness,
-        "low": robot.tension_min,
-        "high": robot.tension_max,
-        "radius": radius,
-        "entry": entry,
-        "dead": dead,
-        "rise": rise,
+    """Kernels of inverse and forward kinematics and of the drawing, for page/robot.js, with the data of the robot."""
+    behind, m, n = has_routing(robot) or None, robot.cable_count, robot.degrees_of_freedom
+    model, method = Catenary(), MinimumNorm()
+    terms, options, memory = robot_terms(robot), kernel_options(robot, model, method), memory_for(m)
+    pose, length, tension = np.zeros((1, tables.POSE_COLUMNS)), np.zeros((1, m)), np.zeros(m)
+    wrench, first, reference = (locked(each) for each in (np.zeros((1, 6)), np.zeros(1, np.int64), np.full(m, np.nan)))
+    found, verdicts = InverseRows.empty(1, m, n, bool(behind)), Verdicts.empty(1, m, n)
+    rest = ForwardRows.empty(1, m, behind)
+    given, decided = (
+        (terms, pose, wrench),
+        (first, covers_all(method.code, m - n), memory, found.answers, verdicts.answers),
+    )
+    forward = (model.code, *model.parameters, behind), False, (*terms, length, pose, wrench), new_chain(m, n)
+    draw = _draw_arguments(robot, terms, pose[0], tension)
+    calls = {
+        "inverse": ("inverse_poses", (*options, *given, reference, memory, None, found.answers, 0, 1)),
+        "decide": ("decide_poses", (options.model, options.limits, *given, *decided)),
+        "forward": (f"forward_poses{'_pulleys' * bool(behind)}", (*forward, memory, rest.arrays)),
+        "draw": ("cable_courses", draw),
     }
-    whole = {
-        name: np.broadcast_to(column, (robot.cable_count, *np.shape(column)[1:])) for name, column in columns.items()
+    arrays = {
+        "span": found.results[tables.SPAN, 0],
+        "rise": found.results[tables.RISE, 0],
+        "tension": found.results[tables.TENSION, 0],
+        "length": found.results[tables.LENGTH, 0],
+        "status": found.pose_status,
+        "bracket": verdicts.brackets,
+        "blocking": verdicts.blocking,
+        "given": length,
+        "rest": rest.poses,
+        "restTension": rest.results[tables.TENSION, 0],
+        "restStatus": rest.pose_status,
     }
     return {
-        "mass": robot.mass,
-        "center_of_mass": json_numbers(robot.center_of_mass),
-        "gravity": robot.gravity,
+        **_described(robot, calls, pose, draw, arrays),
+        "statuses": {each.value: each.text.partition(";")[0] for each in PoseStatus},
+        "rests": {each.value: each.text.partition(";")[0] for each in ForwardStatus},
+        "undecided": list(UNDECIDED),
+        "chordless": PoseStatus.NO_CHORD.value,
+        "infeasible": PoseStatus.INFEASIBLE.value,
         "freedom": json_numbers(robot.freedom),
-        "limits_of": robot.tension_limits_of,
-        "cables": [{name: json_numbers(column[i]) for name, column in whole.items()} for i in range(robot.cable_count)],
+    }
+
+
+def _described(
+    robot: Robot, calls: dict[str, Call], pose: Array, draw: tuple[Any, ...], arrays: dict[str, AnyArray] | None = None
+) -> dict[str, Any]:
+    """Calls and arrays, those of the drawing too, and the anchors and pulley radii that are drawn [m]."""
+    drawn = {"pose": pose, "drawn": draw[3], "points": draw[-1]}
+    return {
+        "kernels": described_calls(calls, drawn | (arrays or {})),
+        "anchors": json_numbers(robot.frame_anchors),
+        "radii": json_numbers(pulleys_of(robot).radius + np.zeros(robot.cable_count)),
     }
 
 
@@ -108,15 +152,23 @@ def _triangles(solid: shapes.Solid, size: float) -> tuple[dict[str, object], str
     return encode_columns([PackedColumn("corners", solid.vertices[solid.faces].reshape(-1, 3), FINEST * size)])
 
 
+def courses_at(robot: Robot, pose: Pose, tension: Array) -> Array:
+    """Points of exact cables at chord tensions (m,), straight where NaN, (m, points_per_cable, 3)."""
+    arguments = _draw_arguments(robot, robot_terms(robot), pose_rows(pose)[0], tension)
+    cable_courses(*arguments)
+    return arguments[-1]
+
+
+def _draw_arguments(robot: Robot, terms: tuple[Array, Array, Array], pose: Array, tension: Array) -> tuple[Any, ...]:
+    """Arguments of `cable_courses`, the points last; pose: a pose row."""
+    m, points = robot.cable_count, shapes.points_per_cable(robot)
+    work = np.empty((3, 3)), np.empty((GEOMETRY_ROWS, m)), np.empty((m, points, 3))
+    return terms[2][0], terms[1][0], pose, tension, points - shapes.POINTS, *work
+
+
 def robot_drawing(robot: Robot, pose: Pose, tension: Array) -> str:
-    """SVG of frame, platform and the catenaries of chord tensions."""
-    ends = shapes.chords(robot, pose)
-    run = ends[:, 1] - ends[:, 0]
-    known = np.isfinite(tension) & (np.linalg.norm(run, axis=1) > 0.0)
-    courses = shapes.straight(ends)
-    if known.all():
-        cables = Catenary().from_tension(robot.cables, np.hypot(*run[:, :2].T), run[:, 2], tension, robot.gravity)
-        courses = shapes.catenaries(ends, cables, 1.0)
+    """SVG of frame, platform and cables at chord tensions."""
+    courses = courses_at(robot, pose, tension)
     low, high = bounds(robot)
     frame = np.array(np.meshgrid(*zip(low, high, strict=True), indexing="ij")).reshape(3, -1).T
     body = shapes.platform_solid(robot)

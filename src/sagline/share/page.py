@@ -16,18 +16,21 @@ from sagline.core.numbers import n
 from sagline.kinematics.inverse import inverse
 from sagline.robot.reach import bounds, home_pose
 from sagline.robot.robot import Robot
+from sagline.share.calls import module_text
 from sagline.share.course import SharedMotion
-from sagline.share.machine import colors, json_numbers, model_data, robot_drawing, solids_data
+from sagline.share.machine import colors, drawing_data, json_numbers, model_data, robot_drawing, solids_data
 from sagline.share.packing import PackedColumn, encode_columns
+from sagline.viewer.shapes import round_below, size_of
 from sagline.viewer.tension_scale import number_text
 
 SCRIPTS: Final = (  # in the order of their dependencies
-    "catenary.js", "sharing.js", "robot.js", "states.js", "theme.js",
+    "kernels.js", "robot.js", "states.js", "theme.js",
     "renderer.js", "camera.js", "scene.js", "panel.js",
     "pointers.js", "player.js", "share.js",
 )  # fmt: skip
 MADE: Final = '<meta name="generator" content="sagline'  # mark of our pages
 POSITION, TURN, LENGTH, TENSION, TIME = 1e-5, 1e-6, 1e-5, 1e-4, 1e-6  # resolutions: m, -, m, relative, s
+WOUND: Final = 0.002  # largest change of a length by the slider, as a share of the robot's size
 SPEEDS: Final = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)
 RING: Final = '<div class="ring" data-part="ring" aria-hidden="true"></div>'
 HOME: Final = '<button type="button" class="home" data-part="home">Home</button>'
@@ -38,7 +41,7 @@ def robot_page(robot: Robot) -> str:
     """Page of a robot whose platform can be dragged; its scripts compute the tensions."""
     at = home_pose(robot)
     plan = inverse(robot, at)
-    facts = {**_facts(robot), "home": {"position": json_numbers(at.position)}}
+    facts = {**_facts(robot, model_data(robot)), "home": {"position": json_numbers(at.position)}}
     return _filled(
         title=robot.name,
         about=_about(robot),
@@ -73,7 +76,11 @@ def course_page(course: SharedMotion, title: str) -> str:
             PackedColumn("verdict", kept.verdict.astype(np.float64), 1.0),
         ]
     )
-    facts = {**_facts(robot), "states": header, "verdicts": [each._asdict() for each in kept.verdicts]}
+    facts = {
+        **_facts(robot, drawing_data(robot)),
+        "states": header,
+        "verdicts": [each._asdict() for each in kept.verdicts],
+    }
     about = f"{robot.name}, {kept.kind} of {kept.time[-1]:.4g} s"
     return _filled(
         title=title,
@@ -104,6 +111,7 @@ def _filled(robot: Robot, facts: dict[str, Any], notes: Sequence[str], **parts: 
         "version": version("sagline"),
         "style": own.joinpath("share.css").read_text(encoding="utf-8"),
         "script": "\n".join(own.joinpath(name).read_text(encoding="utf-8") for name in SCRIPTS),
+        "kernels": module_text(),
         "unit": scale["unit"],
         "legend": f"Colors of the cables: from {low} to {high} {scale['unit']}",
         "notes": "".join(f'<p class="notes">{escape(note)}</p>' for note in notes),
@@ -114,8 +122,8 @@ def _filled(robot: Robot, facts: dict[str, Any], notes: Sequence[str], **parts: 
     return pieces[0] + "".join(words[name] + rest for name, _, rest in (piece.partition("}") for piece in pieces[1:]))
 
 
-def _facts(robot: Robot) -> dict[str, Any]:
-    return {"machine": model_data(robot), "picture": solids_data(robot), "colors": colors(robot)}
+def _facts(robot: Robot, machine: dict[str, Any]) -> dict[str, Any]:
+    return {"machine": machine, "picture": solids_data(robot), "colors": colors(robot)}
 
 
 def _about(robot: Robot) -> str:
@@ -135,7 +143,18 @@ def _sliders(robot: Robot) -> str:
     ]
     if free[5]:
         found.append(_slider("turn", 3, -180.0, 180.0, 1.0))
-    return "".join(found)
+    return "".join(found) + _winch(robot)
+
+
+def _winch(robot: Robot) -> str:
+    """Choice of a cable, and a slider of the change of its length [mm]."""
+    names = "".join(f'<option value="{i}">{i}</option>' for i in range(robot.cable_count))
+    most = 1e3 * round_below(WOUND * size_of(robot))
+    return (
+        f'<label>cable <select data-part="cable" aria-label="Cable to wind">{names}</select>'
+        f'<input type="range" data-part="wind" aria-label="Change of its length" min="{-most:g}" max="{most:g}" '
+        f'step="{most / 50:g}" value="0"><span aria-hidden="true"></span></label>'
+    )
 
 
 def _slider(name: str, axis: int, low: float, high: float, step: float) -> str:

@@ -5,7 +5,7 @@ const camera = (() => {
   const FIELD = 0.7; // rad, upright
   const START = [-1.12, 0.36]; // rad, about the vertical and above the horizon
   const BORDER = 1.08; // of what is to be seen, to stay off the edges
-  const { dot, plus } = sharing;
+  const { dot, plus } = robot;
   const scaled = (factor, a) => a.map((each) => factor * each);
 
   /** A camera; changed() is called after every move. */

@@ -33,7 +33,7 @@ const panel = (() => {
   /** Rows of the table, one a cable; tell(tensions, lengths) writes them. */
   function table(facts) {
     const { colors, machine } = facts, body = found("cables");
-    const rows = machine.cables.map((_, i) => {
+    const rows = machine.anchors.map((_, i) => {
       const row = body.insertRow(), name = document.createElement("th");
       name.scope = "row";
       name.innerHTML = `<i></i>${i}`;
@@ -58,12 +58,12 @@ const panel = (() => {
   }
 
   /** Numbers of the cables at their frame anchors; put(view) moves them to where those are seen. */
-  function marks(cables) {
+  function marks(anchors) {
     const layer = found("marks");
     return (view) => {
       const { width, height } = layer.getBoundingClientRect(), groups = [];
-      cables.forEach(({ frame }, i) => {
-        const { x, y } = view.seen(frame), place = [x * width, y * height];
+      anchors.forEach((anchor, i) => {
+        const { x, y } = view.seen(anchor), place = [x * width, y * height];
         const near = groups.find((one) => Math.hypot(one.place[0] - place[0], one.place[1] - place[1]) < NEAR);
         if (near) near.names.push(i);
         else groups.push({ place, names: [i] });

@@ -2,7 +2,6 @@
 "use strict";
 
 const scene = (() => {
-  const POINTS = 40, WRAPS = 12; // of a cable that hangs, and on its pulley
   const CABLE = 2.4, THIN = 1.1; // px
   const GRAY = [0.51, 0.53, 0.56]; // of a cable without a tension
 
@@ -58,20 +57,22 @@ const scene = (() => {
     }
 
     /** The rim of each pulley, as it stands for its cable. */
-    function pulleys(lines, color) {
-      return lines.flatMap(({ cable: { frame, radius }, away }) => {
+    function pulleys(courses, color) {
+      return courses.flatMap((points, i) => {
+        const radius = machine.radii[i], frame = points[0], [x, y] = robot.plus(points[points.length - 1], -1, frame), span = Math.hypot(x, y);
         if (!(radius > 0)) return [];
+        const away = span > 0 ? [x / span, y / span] : [1, 0];
         const round = Array.from({ length: 33 }, (_, k) => (k * Math.PI) / 16);
         return segments(round.map((angle) => {
-          const x = radius * (1 - Math.cos(angle));
-          return [frame[0] + away[0] * x, frame[1] + away[1] * x, frame[2] + radius * Math.sin(angle)];
+          const out = radius * (1 - Math.cos(angle));
+          return [frame[0] + away[0] * out, frame[1] + away[1] * out, frame[2] + radius * Math.sin(angle)];
         }), color, 2);
       });
     }
 
-    /** moment: pose, lines, there, hung (or null), tension (told), each; feasible. trace: points of the way, or null. */
+    /** moment: pose, feasible; courses, there, taut, tension (told), each. trace: points of the way, or null. */
     function draw(moment, trace) {
-      const { pose, lines, there, hung, tension, feasible } = moment;
+      const { pose, courses, there, taut, tension, feasible } = moment;
       const [steel, ground, ink] = ["steel", "ground", "shadow"].map(named);
       const body = named(feasible === false ? "infeasible" : "platform"), place = standing(pose);
       drawn.begin(view.matrix());
@@ -81,12 +82,12 @@ const scene = (() => {
       drawn.draw(meshes.frame, identity, [...steel, 1]);
       if (meshes.winches) drawn.draw(meshes.winches, identity, [...steel.map((each) => 0.85 * each), 1]);
       drawn.draw(meshes.platform, place, [...body, 1]);
-      const cables = lines.map((line, i) => (there[i] ? robot.course(line, hung[i], POINTS, WRAPS) : []));
+      const cables = courses.map((points, i) => (there[i] ? points : []));
       const shadows = cables.flatMap((points) => segments(points.map(([x, y]) => [x, y, floor]), [...ink, 0.1], THIN));
       drawn.segments(shadows, true);
       const found = trace ? segments(trace, named("way"), 1.6) : [];
-      cables.forEach((points, i) => found.push(...segments(points, colored(colors, tension[i]), CABLE, !hung[i])));
-      drawn.segments([...found, ...pulleys(lines, steel)]);
+      cables.forEach((points, i) => found.push(...segments(points, colored(colors, tension[i]), CABLE, !taut[i])));
+      drawn.segments([...found, ...pulleys(courses, steel)]);
     }
 
     return { draw };

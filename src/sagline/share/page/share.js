@@ -4,44 +4,45 @@
 const share = (() => {
   const { found, say, written } = panel;
   const facts = JSON.parse(found("facts").textContent);
-  const WHY = {
-    chord: "Not possible: an end of a cable is at its anchor or inside its pulley",
-    singular: "Not possible: some motion no cable resists",
-    rounds: "Not possible: the tensions do not settle",
-  };
+  let machine = null; // its functions, once the kernels are compiled
 
   /** Why there are no tensions. */
-  function reason({ why, blocking, short }) {
-    if (why !== "limits") return WHY[why] + (blocking.length ? `: cable ${blocking.join(", ")}` : "");
-    const { newtons, unit, digits } = facts.colors;
+  function reason({ status, blocking, short }) {
+    const { statuses, infeasible } = facts.machine, { newtons, unit, digits } = facts.colors;
+    if (status !== infeasible) return `Not possible: ${statuses[status]}${blocking.length ? `: cable ${blocking.join(", ")}` : ""}`;
     const much = short < Infinity ? `short of ${written(short / newtons, digits)} ${unit}` : "no force alone would do";
     return `Not feasible: ${much}; at their limits: cables ${blocking.join(", ")}`;
   }
 
+  /** A moment for scene and panel: cables with a chord tension hang, the others are straight. */
+  function moment(pose, drawn, { there = drawn.map(() => true), tension = drawn, length, verdict }) {
+    const courses = machine.courses(pose, drawn), taut = drawn.map((each) => each > 0);
+    return { pose, courses, there, taut, tension, length, feasible: verdict.good, verdict };
+  }
+
   /** A robot at a pose, balanced. */
   function balanced(pose) {
-    const state = robot.balanced(facts.machine, pose);
-    const { lines } = state, none = lines.map(() => NaN);
-    return {
-      pose, lines,
-      there: lines.map(() => true),
-      hung: state.hung ?? lines.map(() => null),
-      tension: state.tension ?? none,
-      length: state.hung?.map(robot.lengthOf) ?? none,
-      feasible: state.feasible,
-      verdict: { good: state.feasible, words: state.feasible ? "Feasible" : reason(state) },
-    };
+    const state = machine.balanced(pose), none = facts.machine.anchors.map(() => NaN);
+    const verdict = { good: state.feasible, words: state.feasible ? "Feasible" : reason(state) };
+    return moment(pose, state.tension ?? none, { length: state.length ?? none, verdict });
+  }
+
+  /** A planned moment with one cable longer by some meters: where the platform comes to rest. */
+  function wound(planned, cable, more) {
+    const length = planned.length.map((each, i) => (i === cable ? each + more : each));
+    const rest = machine.atRest(length, planned.pose), solved = rest.status === 0;
+    const way = 1e3 * Math.hypot(...robot.plus(rest.pose.position, -1, planned.pose.position));
+    const words = solved ? `At rest ${written(way, 1)} mm from the planned pose` : `Not held: ${facts.machine.rests[rest.status]}`;
+    return moment(rest.pose, rest.tension, { length, verdict: { good: solved ? null : false, words } });
   }
 
   /** A sample of a run. */
   function sample(course, k) {
     const row = (name) => course[name].map((column) => column[k]), turned = row("quaternion"), norm = Math.hypot(...turned);
-    const pose = { position: row("position"), matrix: robot.rotation(turned.map((each) => each / norm)) };
-    const lines = robot.cablesAt(facts.machine, pose), drawn = row("chord_tension");
-    const hung = lines.map((line, i) => (drawn[i] > 0 && line.there ? robot.hang(line, drawn[i], facts.machine.gravity) : null));
+    const pose = robot.posed(row("position"), turned.map((each) => each / norm));
     const verdict = facts.verdicts[course.verdict[0][k]], length = row("length");
     const there = length.map((each) => verdict.good === false || each > 0); // one that broke has no length
-    return { pose, lines, hung, there, tension: row("tension"), length, feasible: verdict.good, verdict };
+    return moment(pose, row("chord_tension"), { there, tension: row("tension"), length, verdict });
   }
 
   /** The platform as it is dragged, for pointers.js: in the plane of the picture, as far as its freedom goes. */
@@ -65,7 +66,7 @@ const share = (() => {
       },
       by(x, y) {
         const way = view.shift(pose().position, x, y);
-        moved(allowed.reduce((sum, row) => sharing.plus(sum, sharing.dot(row, way), row), [0, 0, 0]));
+        moved(allowed.reduce((sum, row) => robot.plus(sum, robot.dot(row, way), row), [0, 0, 0]));
       },
       begin: () => canvas.classList.add("held"),
       end: () => canvas.classList.remove("held"),
@@ -76,7 +77,7 @@ const share = (() => {
   function controls(changed) {
     const start = facts.home, pose = { position: [...start.position], turn: 0 };
     const sliders = [...document.querySelectorAll("[data-axis]")];
-    const now = () => ({ position: pose.position, matrix: robot.rotation([0, 0, Math.sin(pose.turn / 2), Math.cos(pose.turn / 2)]) });
+    const now = () => robot.posed(pose.position, [0, 0, Math.sin(pose.turn / 2), Math.cos(pose.turn / 2)]);
 
     function show() {
       for (const slider of sliders) {
@@ -101,22 +102,44 @@ const share = (() => {
       show();
     }
     const moved = (way) => {
-      pose.position = sharing.plus(pose.position, 1, way);
+      pose.position = robot.plus(pose.position, 1, way);
       show();
     };
     return { home, moved, now, show };
   }
 
+  /** The winch of one cable, by a slider; changed(cable, meters) after each move. Returns the function that resets it. */
+  function winch(changed) {
+    const cable = found("cable"), slider = found("wind");
+    function show() {
+      const words = `${written(Number(slider.value), 1)} mm`;
+      slider.setAttribute("aria-valuetext", words);
+      say(slider.nextElementSibling, words);
+    }
+    function reset(possible) {
+      [slider.value, slider.disabled] = ["0", !possible];
+      show();
+    }
+    const move = () => {
+      show();
+      changed(Number(cable.value), Number(slider.value) / 1e3);
+    };
+    slider.addEventListener("input", move);
+    cable.addEventListener("change", move);
+    return reset;
+  }
+
   /** Begin; resolves with what a script may ask: moment(), and where the platform goes or the clock stands. */
   async function begin() {
-    const canvas = found("scene"), { picture, machine, colors } = facts;
+    const canvas = found("scene"), { picture, colors } = facts;
     if (!("DecompressionStream" in window)) {
       found("without").hidden = false;
       return null;
     }
-    let moment = null, trace = null, waiting = false, held = null;
+    machine = robot.made(facts.machine, await kernels.made(found("kernels").textContent, facts.machine.kernels));
+    let seen = null, trace = null, waiting = false, held = null;
     const view = camera.made(() => redraw());
-    const stage = await scene.made(canvas, facts, view), tell = panel.table(facts), put = panel.marks(machine.cables);
+    const stage = await scene.made(canvas, facts, view), tell = panel.table(facts), put = panel.marks(facts.machine.anchors);
     panel.legend(colors);
     found("without").hidden = stage !== null;
 
@@ -125,16 +148,16 @@ const share = (() => {
       waiting = true;
       requestAnimationFrame(() => {
         waiting = false;
-        if (moment && stage) stage.draw(moment, trace);
+        if (seen && stage) stage.draw(seen, trace);
         put(view);
         held?.mark();
       });
     }
 
     function show(next) {
-      moment = next;
-      panel.verdict(moment.verdict);
-      tell(moment.tension, moment.length);
+      seen = next;
+      panel.verdict(seen.verdict);
+      tell(seen.tension, seen.length);
       redraw();
     }
 
@@ -158,12 +181,17 @@ const share = (() => {
     theme.follow(redraw);
     resize();
     if (!facts.states) {
-      const platform = controls((pose) => show(balanced(pose)));
+      let planned = null;
+      const reset = winch((cable, more) => show(planned.feasible && more ? wound(planned, cable, more) : planned));
+      const platform = controls((pose) => {
+        show(planned = balanced(pose));
+        reset(planned.feasible);
+      });
       found("home").addEventListener("click", platform.home);
       held = handle(view, canvas, platform.now, platform.moved);
       pointers.listen(canvas, view, held);
       platform.show();
-      return { moment: () => moment, moved: platform.moved, view };
+      return { moment: () => seen, moved: platform.moved, view };
     }
     pointers.listen(canvas, view, null);
     const course = await states.unpacked(facts.states, found("states").textContent);
@@ -171,7 +199,7 @@ const share = (() => {
     player.spans(course.time[0], Array.from(course.verdict[0], (each) => facts.verdicts[each].good));
     const clock = player.made(course.time[0], (k) => show(sample(course, k)));
     clock.show();
-    return { moment: () => moment, scrub: clock.scrub, course, view };
+    return { moment: () => seen, scrub: clock.scrub, course, view };
   }
 
   return { balanced, facts, ready: begin() };

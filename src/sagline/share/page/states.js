@@ -23,15 +23,9 @@ const states = (() => {
     relative: (step) => (code) => Math.exp(code * step),
   };
 
-  async function inflated(text) {
-    const packed = Uint8Array.from(atob(text), (each) => each.charCodeAt(0));
-    const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
-    return new Uint8Array(await new Response(stream).arrayBuffer());
-  }
-
   /** Columns by their names: arrays of Float64Array; a code that stands for nothing becomes NaN. */
   async function unpacked(header, text) {
-    const bytes = await inflated(text), found = {};
+    const bytes = await kernels.inflated(text), found = {};
     let place = 0;
     for (const { name, scale, step, nothing, columns } of header.channels) {
       const number = value[scale](step);
