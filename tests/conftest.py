@@ -20,8 +20,10 @@ from hypothesis import settings, strategies
 from numba.core import event
 from typer.main import get_command
 
+from sagline.share.calls import MODULE
 from tests.effort import slowness
 from tests.tiers import FILE_LIMIT, TEST_LIMIT
+from tools.translate import wasm
 
 ALL_EXTENDED: Final = re.compile(r"^pytestmark = (extended|\[extended\b)", re.MULTILINE)
 EXAMPLES: Final = 40  # of a property, in the first tier
@@ -34,10 +36,12 @@ def first_tier_alone(config: pytest.Config) -> bool:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Let hypothesis try fewer examples in the first tier; `make soak` runs all tests with its own number."""
+    """Let hypothesis try fewer examples in the first tier (`make soak` has its own number); make a missing module."""
     settings.register_profile("first tier", max_examples=EXAMPLES)
     if first_tier_alone(config):
         settings.load_profile("first tier")
+    if not MODULE.is_file() and not hasattr(config, "workerinput"):
+        wasm.build(Path(__file__).parents[1])
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -55,7 +55,7 @@ def robot_page(robot: Robot) -> str:
         robot=robot,
         still=robot_drawing(robot, at, plan.chord_tension),
         table=_table(robot, plan.chord_tension, plan.unstrained_length),
-        notes=("Tensions of least norm within their limits, elastic catenaries, platform at rest.",),
+        notes=("Tensions of least norm within their limits, elastic catenaries, platform at rest.", *_guides(robot)),
         facts=facts,
         states="",
     )
@@ -144,6 +144,12 @@ def _sliders(robot: Robot) -> str:
     if free[5]:
         found.append(_slider("turn", 3, -180.0, 180.0, 1.0))
     return "".join(found) + _winch(robot)
+
+
+def _guides(robot: Robot) -> tuple[str, ...]:
+    """Note on guides, between which the kernels have no catenaries."""
+    given = robot.winches is not None and robot.winches.guides is not None
+    return ("Cables between guides count as straight.",) * given
 
 
 def _winch(robot: Robot) -> str:
