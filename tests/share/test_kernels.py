@@ -85,7 +85,8 @@ class Answers:
         answer = json.loads(in_node(model_data(self.robot), self.rows, folder, repeat=3))
         self.found: list[dict[str, Any]] = answer["found"]
         self.times: dict[str, list[float]] = answer["times"]
-        self.held = np.flatnonzero(self.plan.feasible)
+        self.held: list[int] = np.flatnonzero(self.plan.feasible).tolist()
+        self.lost: list[int] = np.flatnonzero(~self.plan.feasible).tolist()
 
 
 @pytest.fixture(
@@ -102,14 +103,14 @@ def test_the_page_computes_what_the_library_does(answers: Answers) -> None:
     np.testing.assert_allclose([found[i]["tension"] for i in held], plan.chord_tension[held], rtol=1e-12)
     lengths = [found[i]["length"] for i in held]
     np.testing.assert_allclose(lengths, plan.unstrained_length[held], rtol=0.0, atol=1e-12)
-    for i in np.flatnonzero(~plan.feasible):
+    for i in answers.lost:
         np.testing.assert_allclose(float(found[i]["short"]), plan.shortfall[i], rtol=1e-9)
         assert found[i]["blocking"] == np.flatnonzero(plan.blocking[i]).tolist()
     for i in held:
-        rest = sl.forward(answers.robot, answers.rows[i]["given"], start=answers.pose[int(i)])
+        rest = sl.forward(answers.robot, answers.rows[i]["given"], start=answers.pose[i])
         assert found[i]["rest"]["status"] == rest.status
         np.testing.assert_allclose(found[i]["rest"]["pose"]["position"], rest.pose.position, rtol=0.0, atol=1e-12)
-    for i in (int(held[0]), int(np.flatnonzero(~plan.feasible)[0])):
+    for i in (held[0], answers.lost[0]):
         pose, tension = answers.pose[i], plan.chord_tension[i]
         expected = Snapshot(answers.robot, pose, sl.inverse(answers.robot, pose), None).courses(1.0)
         np.testing.assert_allclose(found[i]["courses"], expected, rtol=0.0, atol=1e-9)

@@ -156,7 +156,8 @@ def courses_at(robot: Robot, pose: Pose, tension: Array) -> Array:
     """Points of exact cables at chord tensions (m,), straight where NaN, (m, points_per_cable, 3)."""
     arguments = _draw_arguments(robot, robot_terms(robot), pose_rows(pose)[0], tension)
     cable_courses(*arguments)
-    return arguments[-1]
+    points: Array = arguments[-1]
+    return points
 
 
 def _draw_arguments(robot: Robot, terms: tuple[Array, Array, Array], pose: Array, tension: Array) -> tuple[Any, ...]:
