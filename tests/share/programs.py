@@ -56,7 +56,7 @@ def in_node(machine: dict[str, Any], rows: Rows, folder: Path, repeat: int | Non
 
 def compiled_kernels(folder: Path) -> Path:
     """Object file of the kernels for this machine."""
-    wasm.compile_c(wasm.source(), TARGET, folder / "kernels.o", "-c")
+    wasm.compile_c(wasm.source(), TARGET, folder / "kernels.o", "-c", "-O2")
     return folder / "kernels.o"
 
 

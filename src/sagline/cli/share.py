@@ -35,7 +35,7 @@ def share(
     """Make one HTML page of a robot or a run that needs no server and no network: for a phone, a mail, a lecture.
 
     A run is played, a robot can be dragged; the page contains the kernels. The view turns by mouse, touch and keys. The
-    file has about 180 kB, and 150 kB more for each minute of a run.
+    file has about 160 kB, and 150 kB more for each minute of a run.
 
     For example:
 

@@ -49,8 +49,11 @@ const robot = (() => {
       place(pose);
       of.drawn.set(tensions);
       of.draw();
-      const m = of.drawn.length, count = of.points.length / (3 * m);
-      return Array.from({ length: m }, (_, i) => Array.from({ length: count }, (_, k) => each(of.points.subarray(3 * (i * count + k), 3 * (i * count + k + 1)))));
+      const { drawn, points } = of, count = points.length / (3 * drawn.length);
+      return each(drawn).map((_, i) => Array.from({ length: count }, (_, k) => {
+        const first = 3 * (i * count + k);
+        return [points[first], points[first + 1], points[first + 2]];
+      }));
     }
 
     return { atRest, balanced, courses };
