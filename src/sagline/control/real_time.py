@@ -76,7 +76,7 @@ class Pace:
     """Wait for the next tick of a clock without drift; ticks are one period apart for any duration of a cycle.
 
     The wait sleeps and does not spin, because threads of the link require the time. If a cycle is late by more than a
-    the ticks start again at that time: missed set points are not sent in a burst.
+    period, the ticks start again at that time, so that missed set points are not sent in a burst.
     """
 
     def __init__(self, period: float = PERIOD) -> None:

@@ -1,1 +1,1 @@
-"""Files that people and other programs read and write."""
+"""Files for users and other programs."""

@@ -39,7 +39,7 @@ from sagline.robot.robot import Robot
 if TYPE_CHECKING:
     from xarray import Dataset
 
-READ: Final = ("lengths", "counts")  # index: Parameters.counted; quantity read from the winches
+READ: Final = ("lengths", "counts")  # quantity that is read from the winches; the index is Parameters.counted
 UNITS = ("m", "kg/m", "N", "kg", "rad", "1")
 OUTLYING = ("length", "load cell", "position", "rotation")
 P: Final = ("parameter",)
@@ -78,7 +78,7 @@ FOUND: Final = (
     Quantity("chi_squared_of_pose", N, "1", "share of each pose in chi_squared", low=0.0),
     Quantity("weight", N, "1", "less than 1 for a pose that does not fit the rest", "weights", low=0.0),
 )
-SENSORS: Final = {  # name in the file -> attribute, unit; one number each, or one per cable or axis
+SENSORS: Final = {  # name in the file -> attribute, unit; one number, or one per cable or axis
     "length_deviation": ("cable", "m"),
     "tension_deviation": ("cable", "N"),
     "position_deviation": ("axis", "m"),
@@ -114,7 +114,7 @@ CROSS_VALIDATION: Final = (
 )
 
 
-DIRECTIONS: Final = {  # in parameter space that are unobservable or weakly observable
+DIRECTIONS: Final = {  # unobservable or weakly observable directions in parameter space
     group: (
         Quantity(f"{group}_name", (group,), "", "what each is", "name", values=str),
         Quantity(f"{group}_vector", (group, *P), "", "combination of the numbers, in their units", "vector"),
@@ -126,7 +126,7 @@ DIRECTIONS: Final = {  # in parameter space that are unobservable or weakly obse
 
 
 def _check_calibration(data: Dataset, robot: Robot, before: Robot, sensors: Sequence[Quantity]) -> None:
-    """Refuse a data set that is not a calibration; its two robots and the quantities of its sensors are given."""
+    """Refuse a data set that is not a calibration; its two robots and the quantities of its sensors are arguments."""
     m = robot.cable_count
     if before.cable_count != m:
         raise InvalidValueError("robot_before", f"of {before.cable_count} cables", f"of {m}, as robot", STEP)

@@ -24,17 +24,17 @@ HEAD: Final = """\
 # reads it, and `sagline track` plans it. Each pose contains the tensions to read there: frame_end_tension [N],
 # reached by unstrained_length [m], all cable off the drums{counts}.
 """
-SPEED: Final = 0.2  # m/s, largest speed between two poses
-ANGULAR_SPEED: Final = 0.1  # rad/s, largest angular speed between two poses
-DWELL: Final = 2.0  # s, shortest time between two poses, and between two sets of tensions at one pose
-RATE: Final = 10.0  # samples of the path per second
+SPEED: Final = 0.2  # largest speed between two poses [m/s]
+ANGULAR_SPEED: Final = 0.1  # largest angular speed between two poses [rad/s]
+DWELL: Final = 2.0  # shortest time between two poses, and between two sets of tensions at one pose [s]
+RATE: Final = 10.0  # sample rate of the path [1/s]
 _PEAK: Final = 15.0 / 8.0  # ratio of the peak speed of a quintic to its mean speed
 _DECIMALS: Final = {"position": 4, "quaternion": 6, "frame_end_tension": 1, "unstrained_length": 5, "counts": 0}
 _DIGITS: Final = 4  # significant digits of an expected error; further digits have no meaning
 
 
 def save(plan: CalibrationPoses, file: os.PathLike[str] | str) -> None:
-    """Write poses, tensions and lengths, and the errors to expect, to a YAML file atomically."""
+    """Write poses, tensions and lengths, and expected errors, to a YAML file atomically."""
     rows = {
         "position": plan.poses.position,
         "quaternion": plan.poses.quaternion,
@@ -56,7 +56,7 @@ def save(plan: CalibrationPoses, file: os.PathLike[str] | str) -> None:
 
 
 def _durations(poses: Pose) -> list[float]:
-    """Duration of each motion [s], at least DWELL; slow enough for any machine."""
+    """Duration of each motion [s], at least DWELL, and slow enough for any machine."""
     way = np.linalg.norm(np.diff(poses.position, axis=0), axis=1)
     turn = (poses.rotation[1:] * poses.rotation[:-1].inv()).magnitude()
     times = np.maximum(_PEAK * np.maximum(way / SPEED, turn / ANGULAR_SPEED), DWELL)

@@ -51,8 +51,8 @@ def load_caspr(source: str | os.PathLike[str], cables: Cable | None = None, cabl
     """Read a robot of CASPR that has one platform.
 
     Cables in CASPR have no weight, and its ideal cables do not stretch. Without the argument `cables`, missing values
-    are those of a 4 mm steel rope and are listed in the robot's `assumed`. Pulleys that swivel about a vertical axis
-    are read.
+    are those of a 4 mm steel rope; the robot's `assumed` lists them. Pulleys that swivel about a vertical axis are
+    read.
 
     Args:
         source: The robot's folder, or its file of bodies or of cables; the other is searched for in the same folder.
@@ -60,7 +60,7 @@ def load_caspr(source: str | os.PathLike[str], cables: Cable | None = None, cabl
         cable_set: Name of the set of cables; None takes the file's default.
 
     Returns:
-        Imported: the robot, and the data that were lost.
+        Imported: the robot, and the lost data.
 
     Raises:
         FileError: If a file cannot be read, one of the two is not found, or they do not describe a robot with one
@@ -129,7 +129,7 @@ def _kind(root: Element) -> str | None:
 
 
 def _platform(root: Element) -> tuple[dict[str, Any], list[str]]:
-    """Fields of the robot from the file of bodies, and the data of this file that are lost."""
+    """Fields of the robot from the file of bodies, and the lost data of this file."""
     links = root.findall(".//link_rigid")
     if len(links) != 1:
         raise InvalidValueError("number of <link_rigid>", len(links), "1", "sagline moves a single platform.")

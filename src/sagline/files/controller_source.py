@@ -31,7 +31,7 @@ from sagline.robot.robot import Robot
 from sagline.twin.plc_program import FOLLOWING, TINY
 from sagline.twin.start import plc_limits
 
-REDUNDANT: Final = 2  # number of cables minus degrees of freedom that sagline.c supports
+REDUNDANT: Final = 2  # redundancy (cables minus degrees of freedom) that sagline.c supports
 _PRECISIONS = {
     np.float64: "typedef double sagline_real;",
     np.float32: "#define SAGLINE_FLOAT /* single precision */\ntypedef float sagline_real;",
@@ -53,8 +53,8 @@ STOP: Final = """\
 def export_scl(robot: Robot, file: str | os.PathLike[str]) -> Path:
     """Write the SCL source for the PLCs of a robot (TIA Portal): data blocks, limits and program.
 
-    The program grants and withdraws control, accepts commands, enforces the limits, and slows the winches down by
-    itself when no commands arrive. Its header lists the settings of the CPU. It has not been compiled yet.
+    The program grants and withdraws control, accepts commands and enforces the limits. Without commands, it slows the
+    winches down by itself. Its header lists the settings of the CPU. It has not been compiled yet.
 
     Args:
         robot: The robot used for planning; its winches need drum_radius and counts_per_turn.
@@ -142,7 +142,7 @@ def _row(name: str, values: list[float]) -> str:
 
 
 def _scl_number(value: float) -> str:
-    """A number in SCL syntax; SCL has no infinite numbers."""
+    """A number in SCL syntax, which does not have infinite numbers."""
     text = repr(min(value, 1e300)).upper()
     return text if "." in text else text.replace("E", ".0E")
 
@@ -151,15 +151,15 @@ def export_c(robot: Robot, file: str | os.PathLike[str], *, single_precision: bo
     """Write C99 that computes a robot's tensions and lengths on a microcontroller, and SCL of one function for a PLC.
 
     NAME.c is the same for every robot: the forward and inverse problem of one cable (P2 and P3 of "The model"), the
-    structure matrix and the inverse kinematics of a pose, with the tension distribution of `Closest` or
-    `MinimumNorm`. It has no heap and no recursion, its loops are bounded, and each function returns a status. NAME.h
-    holds the robot's constants. NAME.scl is P3 in SCL for a Siemens PLC; it has not been compiled yet.
+    structure matrix and the inverse kinematics of a pose, with the tension distribution of `Closest` or `MinimumNorm`.
+    It uses no heap and no recursion, all loops are bounded, and each function returns a status. NAME.h holds the
+    robot's constants. NAME.scl is P3 in SCL for a Siemens PLC; it has not been compiled yet.
 
     Args:
         robot: The robot, with two more cables than degrees of freedom, no pulleys or drums behind its frame anchors,
             and limits of its chord tensions.
         file: Path of the source, sagline.c; the other files are in the same folder. Existing files are replaced.
-        single_precision: If true, numbers are `float`, for controllers whose hardware has single precision only.
+        single_precision: True for `float` numbers, for controllers whose hardware has only single precision.
 
     Returns:
         Paths of the source, the header and the SCL text.

@@ -36,7 +36,7 @@ PLAN_GROUP: Final = "plan"
 
 
 def load_execution(file: os.PathLike[str] | str, plan: int | None = None) -> Execution:
-    """Read an execution from a log in MCAP; the log may contain a whole session, or end early (killed process).
+    """Read an execution from a log in MCAP, which may contain a whole session or end early (killed process).
 
     Numbers written by `save` of an execution are read back to the last bit.
 
@@ -53,7 +53,7 @@ def load_execution(file: os.PathLike[str] | str, plan: int | None = None) -> Exe
         InvalidValueError: If the log does not have this plan.
 
     Warns:
-        SaglineWarning: If the log was cut off; its last second of recording is missing.
+        SaglineWarning: If the log was cut off; the last second of recording is then missing.
 
     Examples:
         >>> import sagline as sl

@@ -27,7 +27,7 @@ class Format(Content, Generic[T]):
     pack: Callable[[T], Dataset]  # data set of a result
     # result of a data set; takes the path for messages. None for results that are only written
     unpack: Callable[[Path, Dataset], T] | None = None
-    sealed_from: int = 1  # first version whose files end with a digest
+    sealed_from: int = 1  # first version with a digest at the end of the file
 
     def save(self, result: T, file: os.PathLike[str] | str) -> None:
         """Write a result to a file atomically, with a digest at its end."""
@@ -47,7 +47,7 @@ class Format(Content, Generic[T]):
             return self.unpack(path, data)
 
 
-# A module is loaded when a result of its type is saved. Each has a function save(result, file).
+# A module is loaded when a result of its type is saved. Each module has a function save(result, file).
 MODULES: Final = {
     "Calibration": "calibration_file",
     "CalibrationPoses": "calibration_poses_file",

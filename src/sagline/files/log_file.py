@@ -32,7 +32,7 @@ DEVIATIONS: Final = {
 }
 _KEYS: Final = (*DEVIATIONS, "frame", "target")
 _COMMENT = re.compile(r"\s*#\s*([A-Za-z_ ]+?)\s*:(.*)")
-_NEAR: Final = 0.7  # similarity above which a word is taken as a misspelt key: "name" is less similar to "frame"
+_NEAR: Final = 0.7  # similarity above which a word counts as a misspelt key; "name" and "frame" are less similar
 XYZ: Final = ("x", "y", "z")
 COMMANDED: Final = "_commanded"
 _MOST: Final = 1000  # largest number of cables
@@ -152,7 +152,7 @@ def _fields(table: CsvTable, cables: int) -> dict[str, Any]:
 
 
 def _stack_columns(table: CsvTable, names: Iterable[str], *, all_of_them: bool = True) -> Array | None:
-    """Columns side by side, NaN for those that are missing; None where all are."""
+    """Columns side by side, with NaN for missing columns; None if all columns are missing."""
     names = list(names)
     found = [name for name in names if name in table.columns]
     if not found:
@@ -164,7 +164,7 @@ def _stack_columns(table: CsvTable, names: Iterable[str], *, all_of_them: bool =
 
 
 def _rotation(table: CsvTable, suffix: str) -> Array | None:
-    """Rotations as unit quaternions; rows of NaN where no rotation is given."""
+    """Rotations as unit quaternions; rows of NaN without a rotation."""
     angles = _stack_columns(table, [name + suffix for name in EULER])
     quaternion = _stack_columns(table, [name + suffix for name in QUATERNION])
     if angles is not None and quaternion is not None:
@@ -222,7 +222,7 @@ def _log_columns(log: WinchLog) -> Iterator[tuple[str, Array]]:
 
 
 def load_log(file: os.PathLike[str] | str, sensors: Sensors | None = None) -> WinchLog:
-    """Read values of a robot's encoders, load cells and (optional) measuring system, recorded at poses at rest.
+    """Read readings of a robot's encoders, load cells and (optional) measuring system at poses at rest.
 
     The CSV file has a header with the names of the columns, in any order, and one row per pose:
 
@@ -256,8 +256,8 @@ def load_log(file: os.PathLike[str] | str, sensors: Sensors | None = None) -> Wi
         The log; its source is the name of the file.
 
     Raises:
-        FileError: If it cannot be read, a column, comment or number is wrong, or the deviation of a sensor is missing;
-            the message names the line or the key.
+        FileError: If the file cannot be read, a column, comment or number is wrong, or the deviation of a sensor is
+            missing; the message names the line or the key.
         InvalidValueError: If `sensors` is not a `Sensors` object, or has another number of cables.
 
     Examples:

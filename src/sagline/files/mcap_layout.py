@@ -27,10 +27,10 @@ if TYPE_CHECKING:
 ROWS: Final = "time"
 GROUP, CABLE, AXIS, TURN = ("group",), ("cable",), ("axis",), ("quaternion_part",)
 WORLD, PLATFORM = "world", "platform"
-FINE, COARSE = 2.0**20, 2.0**10  # 1/m: drawn coordinates are rounded to these steps; most of their bytes are then zero
-POINTS: Final = 7  # points per cable
-_THICKNESS: Final = 3.0  # px
-_STEEL, _BLUE, _CABLE = (0.47, 0.5, 0.54), (0.23, 0.53, 0.79), (0.55, 0.36, 0.17)  # red, green, blue, 0 to 1
+FINE, COARSE = 2.0**20, 2.0**10  # [1/m], rounding of drawn coordinates, after which most of their bytes are zero
+POINTS: Final = 7  # number of points per cable
+_THICKNESS: Final = 3.0  # line width [px]
+_STEEL, _BLUE, _CABLE = (0.47, 0.5, 0.54), (0.23, 0.53, 0.79), (0.55, 0.36, 0.17)  # color: red, green, blue, 0 to 1
 
 
 def _real(name: str, parts: tuple[str, ...], unit: str, long_name: str, source: str = "") -> Quantity:
@@ -75,9 +75,9 @@ CYCLES: Final = (
 )
 EVERY: Final = (TIME, *CYCLES)
 SMALL: Final = frozenset({"estimate", "mode"})  # integers that are stored in one byte
-# Decimals that a log keeps of quantities recorded while the machine runs. They are finer than the sensors: an encoder
-# step is 72 nm and its integer counts are kept; the noise of a load cell is 1 N. With all digits of that noise, a log
-# of 14 minutes would be twice as large.
+# Decimals of the quantities that are recorded while the machine runs. They are finer than the resolution of the
+# sensors: an encoder step is 72 nm, and the noise of a load cell is 1 N. Integer counts are not rounded. With all
+# digits of the noise, a log of 14 minutes would be twice as large.
 DECIMALS: Final = {
     "time": 6, "late": 6, "clock": 6, "age": 5, "plc_time": 5, "position": 7, "quaternion": 8, "length": 7,
     "set_length": 8, "correction": 8, "rate": 5, "set_rate": 7, "torque": 3, "tension": 2, "filtered": 2,
@@ -107,8 +107,8 @@ PLAN: Final = "plan-{}.sagline"  # attachment: a packed data set
 END: Final = "plan-{}-end.json"  # attachment: status and reason
 PACKED: Final = "application/x-sagline-columns"
 JSON: Final = "application/json"
-SHARE_TF, SHARE_SCENE = 10, 100  # one message per so many cycles
-PER_METER: Final = 1e3  # mm per m
+SHARE_TF, SHARE_SCENE = 10, 100  # number of cycles per message
+PER_METER: Final = 1e3  # [mm/m]
 
 
 class _CycleField(NamedTuple):
@@ -117,7 +117,7 @@ class _CycleField(NamedTuple):
     digits: int  # number of decimals
     unit: str
     what: str
-    several: bool = False  # true if it is a list
+    several: bool = False  # True for a list
 
 
 CYCLE_FIELDS: Final = {
@@ -254,7 +254,7 @@ class Scene:
         points = np.asarray(start + share * run)
         chord = np.linalg.norm(run[:, 0], axis=1)
         span = np.hypot(run[:, 0, 0], run[:, 0, 1])
-        weight = robot.cables.linear_density * robot.gravity  # N/m
+        weight = robot.cables.linear_density * robot.gravity  # weight per length [N/m]
         deep = 0.5 * weight * span * chord / np.maximum(tension, weight * chord)  # m, times share (1 - share)
         points[:, :, 2] -= np.where(np.isfinite(deep), deep, 0.0)[:, None] * (share * (1.0 - share))[:, 0]
         return points
@@ -274,7 +274,7 @@ def _lines(entity: SceneEntity, stamp: int, name: str, frame: str, color: tuple[
 
 
 def _corners(points: Array) -> Array:
-    """Lines between pairs of points, unless a third point is closer to both than they are to each other, (e, 2, 3)."""
+    """Lines between pairs of points (e, 2, 3), except for pairs with a third point that is closer to both."""
     distance = np.linalg.norm(points[:, None] - points[None], axis=2)
     near = [
         (i, j)

@@ -31,7 +31,7 @@ AGAIN: Final = "Take the file from where it came."
 _HEAD: Final = 9  # bytes of a record before its content: type and length
 _CHUNK, _ATTACHMENT, _DATA_END = 0x06, 0x09, 0x0F
 _NEEDED: Final = {quantity.name for quantity in EVERY} | {"plan", "zero", "epoch"}  # columns required in every chunk
-_LARGEST: Final = 1 << 27  # bytes of a chunk; one second of a sagline log has about a thousandth of it
+_LARGEST: Final = 1 << 27  # largest chunk [bytes]; one second of a sagline log has about a thousandth of it
 _PLAN_NAME, _END_NAME = (re.compile(name.replace(".", r"\.").format(r"(\d+|none)")) for name in (PLAN, END))
 
 
@@ -39,7 +39,7 @@ class Ending(NamedTuple):
     """End of a plan."""
 
     status: str  # name of its `ExecutionStatus`
-    reason: str  # one line
+    reason: str  # reason in one line
 
 
 class Truth(NamedTuple):
@@ -47,13 +47,13 @@ class Truth(NamedTuple):
 
     stamp: int  # time on the log's clock [ns]
     time: float  # time on the twin's clock [s]
-    position: list[float]  # [m], 3
-    quaternion: list[float]  # scalar last, 4
+    position: list[float]  # position [m], three numbers
+    quaternion: list[float]  # quaternion, scalar last, four numbers
 
 
 @dataclass(slots=True)
 class RecordedLog:
-    """Content of a log as far as it has been read."""
+    """Content of the part of a log that has been read."""
 
     path: Path  # the file
     robot: Robot | None = None  # the robot; None until it has been read
@@ -64,7 +64,7 @@ class RecordedLog:
     events: list[Event] = field(default_factory=list)  # events in order
     truth: list[Truth] = field(default_factory=list)  # true poses of the platform, in the log of a twin
     epoch: int = 0  # zero of the log's clock [ns]
-    complete: bool = False  # true if the end of the log has been read
+    complete: bool = False  # True if the end of the log has been read
 
 
 class LogReader:
@@ -82,7 +82,7 @@ class LogReader:
         self._topics: dict[int, str] = {}
 
     def more(self) -> bool:
-        """Read the records added since the last call; True if there are any."""
+        """Read the records added since the last call; returns True if there are new records."""
         before, data = self._offset, self._bytes()
         if not before:
             self._check_kind(data)
@@ -125,7 +125,7 @@ class LogReader:
         raise FileError(self.log.path, "is not a log in MCAP", step)
 
     def _records(self, data: bytes) -> Iterator[tuple[int, bytes]]:
-        """Complete records; an incomplete record is read by the next call."""
+        """Complete records; the next call reads an incomplete record."""
         place = 0 if self._offset else len(MAGIC)
         start = self._offset
         if not start:
@@ -217,7 +217,7 @@ class LogReader:
 
 
 def read_log(file: os.PathLike[str] | str) -> RecordedLog:
-    """Content of a log, also of one that was cut off."""
+    """Content of a log, also of a log that was cut off."""
     reader = LogReader(file)
     reader.more()
     log = reader.log

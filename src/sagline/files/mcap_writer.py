@@ -1,8 +1,8 @@
 """Writing of logs in MCAP, chunk by chunk: complete chunks remain readable if the process is killed.
 
-All numbers are in `/record`, one message per chunk with the packed values of its cycles. Attachments hold the robot
-and the plans. The other topics are for other programs: `/cycle` and `/event` in JSON, `/tf` and `/scene` in the
-schemas of Foxglove.
+The topic `/record` contains all numbers; it has one message per chunk with the packed values of its cycles. Attachments
+contain the robot and the plans. The other topics are for other programs: `/cycle` and `/event` in JSON, `/tf` and
+`/scene` in the schemas of Foxglove.
 """
 
 from __future__ import annotations
@@ -38,15 +38,15 @@ from sagline.kinematics.plan import Plan
 from sagline.robot.robot import Robot
 
 PACKAGES: Final = ("mcap", "mcap_protobuf", "foxglove_schemas_protobuf", "zstandard")
-_UNLIMITED: Final = 1 << 40  # bytes: no chunk ends by its size
-CHUNK: Final = 0.9  # s between chunks; with the time to write one, less than one second is lost
-BLOCK: Final = 100  # largest number of cycles per chunk: on a lockstep clock cycles come faster
-ROOM: Final = 4096  # capacity of the queue: 41 s of cycles
-PATIENCE: Final = 0.1  # s between two checks that the writer thread is alive
+_UNLIMITED: Final = 1 << 40  # [bytes], so large that no chunk ends because of its size
+CHUNK: Final = 0.9  # time between chunks [s]; a killed process loses less than one second
+BLOCK: Final = 100  # largest number of cycles per chunk, because cycles are faster on a lockstep clock
+ROOM: Final = 4096  # capacity of the queue, 41 s of cycles
+PATIENCE: Final = 0.1  # time between two checks that the writer thread is alive [s]
 
 
 class _Unbuffered:
-    """Unbuffered output: the library's own writer would buffer."""
+    """Unbuffered output, because the library's own writer would buffer."""
 
     def __init__(self, file: RawIOBase) -> None:
         self._file = file
@@ -65,7 +65,7 @@ class _Unbuffered:
         return self._size
 
     def flush(self) -> None:
-        """Do nothing: nothing is buffered."""
+        """Do nothing, because nothing is buffered."""
 
 
 class McapFile:
@@ -73,9 +73,8 @@ class McapFile:
 
     def __init__(self, file: RawIOBase, robot: Robot, period: float, epoch: int = 0) -> None:
         """Begin a log."""
-        # file: output, opened unbuffered, closed by the caller
-        # period: period of a cycle [s]
-        # epoch: offset added to times to get those of the log [ns]
+        # file: output, opened unbuffered, closed by the caller period: period of a cycle [s] epoch: offset from the
+        # given times to times of the log [ns]
         import xarray  # noqa: F401 — loaded here, before the machine moves
         from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
         from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
@@ -87,7 +86,7 @@ class McapFile:
         self._plans = 0
         self._blocks = 0
         output: Any = _Unbuffered(file)
-        writer: Any = Writer(output, chunk_size=_UNLIMITED, enable_data_crcs=True)  # Any: it is only partly typed
+        writer: Any = Writer(output, chunk_size=_UNLIMITED, enable_data_crcs=True)  # Any, because partly typed
         self._writer = writer
         writer.start(library=mcap_layout.SOURCE)
         self._attach(mcap_layout.HEAD, mcap_layout.JSON, mcap_layout.head_of(dump_robot(robot), period))
@@ -159,7 +158,7 @@ class McapFile:
     def _known(
         columns: Mapping[str, NDArray[Any]], stamps: list[int], share: int
     ) -> list[tuple[int, dict[str, Array]]]:
-        """Stamp, pose and tensions of every `share`-th cycle that has an estimate of the pose."""
+        """Stamp, pose and tensions of every `share`-th cycle with an estimate of the pose."""
         names = ("position", "quaternion", "tension")
         known = np.flatnonzero(np.isfinite(columns["position"]).all(axis=1))
         return [(stamps[k], {name: columns[name][k] for name in names}) for k in known[::share].tolist()]
@@ -175,8 +174,8 @@ def check_packages() -> None:
 class Recorder:
     """A log written by a separate thread while a controller or a twin runs.
 
-    Data are put into a queue, so the caller never waits for a disk. If the queue or the disk is full, recording stops
-    permanently, `stopped` gives the reason, and the data already in the file remain. Numbers are rounded to the
+    Data are put into a queue, so that the caller never waits for a disk. If the queue or the disk is full, recording
+    stops permanently, `stopped` gives the reason, and the data already in the file remain. Numbers are rounded to the
     decimals of `DECIMALS`.
     """
 
@@ -278,7 +277,7 @@ class Recorder:
             self._why = f"{self.file}: {ROOM} entries wait to be written, and the queue is full; the disk is too slow"
 
     def _date(self, time_of_link: float) -> None:
-        """Set the start time of the log; from now on its times are times of day."""
+        """Set the start time of the log; from now on, times of the log are times of day."""
         if self._epoch is None:
             self._epoch = self._mcap.epoch = time.time_ns() - round(time_of_link * mcap_layout.NANO)
             for event in self._early:

@@ -13,7 +13,7 @@ from sagline.core.arrays import Array, locked
 from sagline.files.reading import read_text
 from sagline.files.table import TABLE_LIMIT, CsvTable
 
-# for each kind of column: the other kind, and the next step if a file has that kind
+# for each kind of column: the other kind, and the next step for a file with the other kind
 _OTHERS: Final = {"L": ("C", "these are counts: add --counts"), "C": ("L", "these are lengths: leave out --counts")}
 UNITS = {"span": "m", "rise": "m", "length": "m", "tension": "N"}
 
@@ -22,21 +22,20 @@ class LengthSamples(NamedTuple):
     """N samples of the unstrained lengths of m cables."""
 
     time: Array | None  # times [s], shape (N,); None if the file has no times
-    unstrained_length: Array  # [m], shape (N, m)
+    unstrained_length: Array  # lengths [m], shape (N, m)
 
 
 class CountSamples(NamedTuple):
     """N samples of the counts of m encoders."""
 
     time: Array | None  # times [s], shape (N,); None if the file has no times
-    counts: Array  # shape (N, m)
+    counts: Array  # counts, shape (N, m)
 
 
 def load_lengths(file: os.PathLike[str] | str, cable_count: int, size: float = np.inf) -> LengthSamples:
     """Read a CSV file with one column per cable, L0, L1, ..., and optionally the time."""
-    # Units are in brackets, `time [s],L0 [mm],L1 [mm]`; the defaults are s and m
-    # cable_count: number of cables m of the robot
-    # size: largest extent of the robot [m]; lengths a hundred times longer must have another unit
+    # Units are in brackets, `time [s],L0 [mm],L1 [mm]`; the defaults are s and m cable_count: number of cables m of the
+    # robot size: largest extent of the robot [m]; lengths more than a hundred times larger must have another unit
     table, names = _read(file, "L", "m", cable_count)
     for name in names:
         table.refuse(table.columns[name] <= 0.0, name, table.columns[name], "m", "> 0 m")
@@ -80,8 +79,8 @@ class Measurements(NamedTuple):
 
     span: Array  # horizontal distance of the ends [m], shape (n,)
     rise: Array  # height of the platform end above the frame end [m], shape (n,)
-    unstrained_length: Array  # measured by the encoder [m], shape (n,)
-    tension: Array  # [N], shape (n,)
+    unstrained_length: Array  # length measured by the encoder [m], shape (n,)
+    tension: Array  # tension [N], shape (n,)
 
 
 def load_measurements(file: os.PathLike[str] | str) -> Measurements:
@@ -96,7 +95,7 @@ def load_measurements(file: os.PathLike[str] | str) -> Measurements:
         The four columns in SI.
 
     Raises:
-        FileError: If it cannot be read, or a column or number is wrong; the message names the line.
+        FileError: If the file cannot be read, or a column or number is wrong; the message names the line.
 
     Examples:
         >>> import sagline as sl

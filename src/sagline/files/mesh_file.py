@@ -1,4 +1,4 @@
-"""Triangle meshes in files of other programs: closed solids are read, surfaces are written."""
+"""Triangle meshes in files of other programs: reading of closed solids, writing of surfaces."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from sagline.files.writing import atomic_file, check_file
 from sagline.interference.mesh import MOST, Mesh, extent_text
 from sagline.workspaces.surface import Surface
 
-LIMIT: Final = 200.0  # MB, largest size of a file
+LIMIT: Final = 200.0  # largest size of a file [MB]
 CHECKED: Final = 20_000  # largest number of triangles for which self-intersections are searched
 KINDS: Final = (".stl", ".ply", ".obj", ".glb")
 _CONTACTS: Final = 40  # contacts per triangle; most are with its own neighbors
-_UPRIGHT: Final = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])  # z up to y up of glTF
+_UPRIGHT: Final = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])  # from z up to y up, as in glTF
 ENDINGS: Final = (".stl", ".glb", ".ply", ".vtk", ".vtu")
 _VTK: Final = (".vtk", ".vtu")
 
@@ -109,7 +109,7 @@ def _triangles(path: Path, data: bytes) -> tuple[Array, Indices]:
 
 
 def first_crossing(mesh: Mesh) -> Array | None:
-    """Point [m] where a surface crosses itself, common edges and corners not counted; None if there is none."""
+    """Point [m] at which a surface crosses itself, except at common edges and corners; None if there is none."""
     from sagline.interference.meshed import package
 
     fcl = package()

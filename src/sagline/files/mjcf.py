@@ -1,11 +1,11 @@
 """MJCF, the model format of MuJoCo: straight elastic cables as spatial tendons, pulleys as cylinders.
 
 The cylinders do not swivel. Let the platform end of a cable move by a small u in its vertical plane, perpendicular to
-the chord, and by v out of this plane. Over a swiveling pulley the cable then lengthens by
-u^2/(2 l) + v^2 cos phi/(2 s), where l is its free length and s the distance of the end from the swivel axis. On a
-fixed cylinder the cable unrolls to a straight line and lengthens by v^2/(2 a), where a is the length from its first
-point to its end. The tendon therefore starts where a = s/cos phi, R tan(psi/2) before it leaves the cylinder; force
-and stiffness are then those of a swiveling pulley.
+the chord, and by v out of this plane. Over a swiveling pulley the cable then lengthens by u^2/(2 l) + v^2 cos phi/(2
+s), where l is its free length and s the distance of the end from the swivel axis. On a fixed cylinder the cable unrolls
+to a straight line and lengthens by v^2/(2 a), where a is the length from its first point to its end. The tendon
+therefore starts at the point with a = s/cos phi, which is R tan(psi/2) before it leaves the cylinder. Force and
+stiffness are then those of a swiveling pulley.
 """
 
 from __future__ import annotations
@@ -38,18 +38,18 @@ NOTE = (
     "and a part of the wrap), and its springlength excludes it. "
     "The model has no friction on the pulleys and no drums. "
 )
-_OFF = 0.05  # share of the radius: a tendon that starts closer to its cylinder would not wrap around it
+_OFF = 0.05  # smallest distance of a tendon's start from its cylinder, in radii; a closer one would not wrap
 _WIDTH = 0.2  # ratio of the drawn width of a pulley to its radius
 _BESIDE = 2.0  # distance of the side point from the pulley center in radii, on the side of the cable
-_LONGEST = 1e3  # largest length of a tendon before its cylinder, in radii
+_LONGEST = 1e3  # largest length of a tendon before its cylinder, in pulley radii
 _NOTE = (
     " Written by sagline. Every cable is a straight spring that pulls and never pushes, of the given unstrained length "
     "and axial stiffness. Its sag, its weight and the tension limits are not in this model. The damping is not the "
     "robot's: it lets the platform come to rest, and acts on slack cables too. "
 )
 _RADIUS = 0.002  # ratio of the radius of drawn cable ends to the size of the robot
-_DRAWN = {"contype": "0", "conaffinity": "0"}  # no contacts
-_THINNEST = 0.02  # ratio of the shortest to the longest edge of a box that is only drawn
+_DRAWN = {"contype": "0", "conaffinity": "0"}  # geometry without contacts
+_THINNEST = 0.02  # ratio of the shortest to the longest edge of a box for display
 _STEPS = 20.0  # time steps per period of the fastest motion
 _LONGEST_STEP = 0.002  # default time step of MuJoCo [s]
 _DOWN = Context(prec=2, rounding=ROUND_DOWN)  # the time step is rounded down to two digits
@@ -63,7 +63,7 @@ class _Lead(NamedTuple):
     """First points of the tendons, and points beside the pulleys, in the world [m], (m, 3)."""
 
     start: Array
-    side: Array  # points on the side of each pulley where the cable is
+    side: Array  # points beside the pulleys, on the side of the cable
     missing: Array  # cable off the drum minus tendon length [m], (m,); negative if the tendon is longer
 
 
@@ -73,7 +73,7 @@ def _lead_of(robot: Robot, pose: Pose) -> _Lead:
     wrap = touching_angle(robot, pose)
     if np.isnan(wrap).any():
         refuse_missing_chords(robot, pose)
-    before = np.minimum(np.tan(0.5 * wrap), _LONGEST)  # radii from the start of the tendon to the exit point
+    before = np.minimum(np.tan(0.5 * wrap), _LONGEST)  # from the start of the tendon to the exit point, in pulley radii
     off = np.maximum(np.minimum(_OFF, 0.5 * before), before - wrap)
     first = np.maximum(wrap - before + off, 0.0)
     sine, cosine = np.sin(first), np.cos(first)
@@ -113,11 +113,12 @@ def _add(parent: Element, tag: str, **attributes: str | ArrayLike) -> Element:
 def dump_mjcf(robot: Robot, pose: Pose, unstrained_length: ArrayLike | None = None) -> str:
     """Text of a MuJoCo model of the robot, with the platform at a pose.
 
-    A cable of unstrained length L is a spatial tendon of stiffness EA/L that is slack below L (the model `Elastic`).
-    A pulley is a cylinder that does not swivel: forces, lengths and stiffness agree with the robot at the pose, and
-    comments in the file state the deviations elsewhere. The time step is short enough for the fastest vibration of the
-    platform on its cables at any pose. Damping brings the platform to rest: the damping of a cable is proportional to
-    its stiffness; the platform's joints are damped as well if the cables do not resist all motions.
+    A cable of unstrained length L becomes a spatial tendon with the stiffness EA/L, which is slack if it is shorter
+    than L (the model `Elastic`). A pulley is a cylinder that does not swivel. Forces, lengths and stiffness agree with
+    the robot at the given pose, and comments in the file state the deviations at other poses. The time step is short
+    enough for the fastest vibration of the platform on its cables at any pose. Damping brings the platform to rest. The
+    damping of a cable is proportional to its stiffness. The platform's joints also have damping if the cables do not
+    resist all motions.
 
     Args:
         robot: The robot.
@@ -152,7 +153,7 @@ def dump_mjcf(robot: Robot, pose: Pose, unstrained_length: ArrayLike | None = No
     root.append(Comment(_NOTE + NOTE if over_pulley.any() else _NOTE))
     _add(root, "compiler", angle="radian", inertiafromgeom="false")
     step = f"{_DOWN.create_decimal_from_float(time_step):g}"
-    # implicitfast integrates damping implicitly, so damping does not limit the time step
+    # implicitfast integrates damping implicitly, so that damping does not limit the time step
     _add(root, "option", gravity=(0.0, 0.0, -robot.gravity), timestep=step, integrator="implicitfast")
     radius = _RADIUS * _add_view(root, robot)
     world = _add(root, "worldbody")
@@ -181,10 +182,9 @@ def dump_mjcf(robot: Robot, pose: Pose, unstrained_length: ArrayLike | None = No
 
 def _step_and_damping(robot: Robot, pose: Pose, stiffness: Array) -> tuple[float, float, float]:
     """Time step [s], damping of a cable over its stiffness [s], and damping of each joint [N s/m, N m s/rad]."""
-    # The joint damping is zero if the cables resist every motion.
-    # Bound of the frequencies at every pose: the square of the angular frequency is at most the sum over the cables of
-    # stiffness times the largest mobility of the platform end. Forces that rotate with the platform add to this; the
-    # large number of steps per period is a margin for them.
+    # The joint damping is zero if the cables resist every motion. At every pose, the squared angular frequency is at
+    # most the sum over the cables of stiffness times the largest mobility of the platform end. Forces that rotate with
+    # the platform increase it; the large number of steps per period is a margin for them.
     levers = (robot.platform_anchors - robot.center_of_mass) @ pose.matrix.T
     along, about = robot.freedom[:, :3], robot.freedom[:, 3:]
     moved = along + np.cross(about, levers[:, None])  # displacement of the end of cable i in free motion j, (m, n, 3)
@@ -198,7 +198,7 @@ def _step_and_damping(robot: Robot, pose: Pose, stiffness: Array) -> tuple[float
     directions = cables / np.where(distance > 0.0, distance, 1.0)[:, None]
     stretch = np.einsum("ik,ijk->ij", directions, moved)
     slowest = eigh((stretch.T * stiffness) @ stretch, masses, eigvals_only=True)[0]
-    swing = robot.gravity / max(distance.max(), _SHORTEST)  # of a pendulum as long as the longest cable, squared
+    swing = robot.gravity / max(distance.max(), _SHORTEST)  # squared; pendulum of the longest cable
     drag = _SWING_DAMPING * robot.mass * np.sqrt(swing) if slowest < swing else 0.0
     return step, _STRETCH_DAMPING / fastest, float(drag)
 

@@ -1,7 +1,7 @@
 """NetCDF files: atomic writing with a digest at the end, and reading of undamaged files only.
 
-An HDF5 file states its own length and HDF5 ignores later bytes, so the digest is appended at the end. The digest is
-checked before anything else is read, because reading a damaged file may take any amount of memory and time.
+An HDF5 file contains its own length, and HDF5 ignores later bytes. The digest is therefore appended at the end of the
+file. It is checked before anything else is read, because reading a damaged file may take any amount of memory and time.
 """
 
 from __future__ import annotations
@@ -41,15 +41,15 @@ _KINDS: Final = {
     **dict.fromkeys((".xml", ".wcrfx"), "an XML file"),
     **{f".{kind}": f"a {kind.upper()} file" for kind in ("csv", "json", "png", "svg")},
 }
-INFLATION = 1000  # largest ratio of memory to file size; no real file is compressed more
-HEADERS: Final = 1 << 18  # bytes, more than all names and attributes need, except for long texts such as the robot
+INFLATION = 1000  # largest ratio of memory to file size; real files have smaller ratios
+HEADERS: Final = 1 << 18  # [bytes], more than all names and attributes, except for long texts such as the robot
 _HEAD, _TAIL = b"\nsagline sha256 ", b"\n"
 _LENGTH = len(_HEAD) + sha256().digest_size * 2 + len(_TAIL)
 _BLOCK = 1 << 20  # bytes per read
 
 
 def seal(file: Path) -> None:
-    """Put the digest of a file at its end."""
+    """Append the digest of a file at its end."""
     with file.open("rb+") as handle:
         handle.write(_line(handle, file.stat().st_size))
 
@@ -67,7 +67,7 @@ def _digest_is_right(file: Path) -> bool | None:
 
 
 def _line(handle: BinaryIO, size: int) -> bytes:
-    """Digest line of the next `size` bytes of a file; moves the file position behind them."""
+    """Digest line of the next `size` bytes of a file; moves the file position to their end."""
     found = sha256()
     while size > 0 and (block := handle.read(min(_BLOCK, size))):
         found.update(block)
@@ -151,7 +151,7 @@ def write_dataset(data: Dataset, file: Path, groups: Mapping[str, Dataset] | Non
 
 
 def read_dataset(path: Path, content: Content) -> tuple[Dataset, bool]:
-    """Data set of an undamaged file, and true if the file has a digest; the digest is checked before reading."""
+    """Data set of an undamaged file, and True if the file has a digest, which is checked before reading."""
     try:
         check_regular(path, path.stat().st_mode)  # opening a pipe would wait for its writer
         right = _digest_is_right(path)
@@ -200,12 +200,12 @@ def _load(path: Path, content: Content) -> Dataset:
             if data.nbytes > INFLATION * size:
                 raise ValueError(f"{size} bytes that say to hold {data.nbytes:.2g}")
             return data.load()
-    except Exception as error:  # h5py, h5netcdf and xarray have no error class for a damaged file, so any is caught
+    except Exception as error:  # h5py, h5netcdf and xarray have no common error class for a damaged file
         raise FileError(path, *_cause(path, content)) from error
 
 
 def _cause(path: Path, content: Content) -> tuple[str, str]:
-    """Reason why a file cannot be read, and the next step; the libraries' own messages are too technical."""
+    """Reason why a file cannot be read, and the next step; the messages of the libraries are too technical."""
     with path.open("rb") as file:
         begin = file.read(len(_BEGIN))
     if begin == _BEGIN:

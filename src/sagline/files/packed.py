@@ -1,9 +1,9 @@
 """Lossless compression of columns of numbers, and of data sets inside other files.
 
-Measured and planned values are smooth in time. A column is converted to integers: scaled decimals if all values have
-few decimals, otherwise the bits of the floats (their order is that of the numbers). Differences of order 0 to 5 are
-stored; the order with the fewest bits is chosen. Their upper bytes are nearly all zero. Bytes of equal weight are
-stored together, so zstandard compresses them strongly.
+Measured and planned values are smooth in time. A column is converted to integers. These are scaled decimals if all
+values have few decimals, otherwise the bits of the floats, whose order is that of the numbers. Differences of order 0
+to 5 of the integers are stored; the order with the fewest bits is chosen. The upper bytes of these differences are
+nearly all zero. Bytes of equal weight are stored together, so that zstandard compresses them strongly.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class _Column:
     name: str  # name of the column
     type: str  # type of the values
     shape: tuple[int, ...]  # shape of the column
-    decimals: int  # largest number of decimals; -1: stored as the bits of floats, or integers
+    decimals: int  # largest number of decimals; -1 for integers or bits of floats
     order: int  # order of the differences
 
 
@@ -100,7 +100,7 @@ def unpack(data: bytes) -> dict[str, NDArray[Any]]:
 
 
 def _count(column: _Column) -> int:
-    """Number of values of a column; ValueError if `pack` does not write such a head."""
+    """Number of values of a column; ValueError if `pack` never writes such a head."""
     sizes = all(0 <= size < 1 << 40 for size in column.shape)
     if not (
         column.type in TYPES and sizes and column.order in range(MOST_ORDER + 1) and column.decimals in range(-1, 16)
@@ -146,7 +146,7 @@ def _smallest(whole: NDArray[np.int64]) -> tuple[int, NDArray[np.uint64]]:
         bits = float(np.log2(small + 1.0).sum())
         if best is None or bits < best[0]:
             best = bits, order, small
-        whole = np.diff(whole, axis=0, prepend=np.int64(0)) if whole.size else whole  # wraps around, and back
+        whole = np.diff(whole, axis=0, prepend=np.int64(0)) if whole.size else whole  # overflow is reversible
     assert best is not None
     return best[1], best[2]
 

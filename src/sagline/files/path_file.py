@@ -24,7 +24,7 @@ PLACE = ("time", "x", "y", "z")
 EULER = ("alpha", "beta", "gamma")
 QUATERNION = ("qx", "qy", "qz", "qw")
 UNITS = dict(zip(PLACE + EULER + QUATERNION, ("s", "m", "m", "m", "rad", "rad", "rad", "", "", "", ""), strict=True))
-_LEAST_STEP = 1e-12  # s; shortest time step for which differences of positions give a velocity
+_LEAST_STEP = 1e-12  # shortest time step for which differences of positions give a velocity [s]
 TIMING_UNITS = {
     "rate": "1/s",
     "durations": "s",

@@ -200,7 +200,7 @@ def save_plan(plan: Plan, file: os.PathLike[str] | str) -> None:
 
     Raises:
         InvalidValueError: If the plan has several robots (one per pose), a cable model or a tension method that is not
-            part of sagline, or values that `inverse` cannot give.
+            part of sagline, or values that `inverse` never returns.
         FileError: If the file cannot be written; an existing file is then unchanged.
 
     Examples:
@@ -281,7 +281,7 @@ def plan_of_dataset(path: FilePath, data: Dataset, item: str = "robot") -> Plan:
     found = fields_of(data, (*QUANTITIES, *MACHINE, WINDING, TIME, *MOTION, JERK))
     state, motion = found["state"], found.get("path")
     pose = Pose.from_quaternion(**state["pose"])
-    spans = {"chord_tension": found["chord_tension"], **state["cables"]}  # of the free span at a pulley
+    spans = {"chord_tension": found["chord_tension"], **state["cables"]}  # values of the free span at a pulley
     cables = CableState(
         model=choice_of(path, data.attrs, "model", MODELS),
         cable=robot.cables,

@@ -13,8 +13,8 @@ from sagline.files.quantity import in_si, plain_number
 from sagline.files.yaml_text import YamlEntry
 from sagline.robot.pose import Pose
 
-FARTHEST, STRONGEST = 1e6, 1e12  # m; N and N m: beyond all machines, far below what overflows
-QUATERNION_TOLERANCE: Final = 1e-3  # largest deviation of the length from 1: rounding to three decimals
+FARTHEST, STRONGEST = 1e6, 1e12  # [m]; [N] and [N m]: larger than on any machine, far below overflow
+QUATERNION_TOLERANCE: Final = 1e-3  # largest deviation of a quaternion's length from 1, for three decimals
 POSE_STEP: Final = "Give meters, and degrees about z, y and x: --pose 1,0,1.5 or --pose 1,0,1.5,10,0,0."
 WRENCH_STEP: Final = (
     "Give newtons, and newton meters about the center of mass: --wrench 0,0,-50 or --wrench 0,0,-50,0,5,0."
@@ -45,7 +45,7 @@ def wrench_of_text(text: str | None, item: str = "--wrench", step: str = WRENCH_
 
 
 def _three_or_six(text: str, item: str, unit: str, largest: float, step: str) -> list[float]:
-    """Six numbers from three or six separated by commas; three numbers are followed by three zeros."""
+    """Six numbers from three or six numbers between commas; three numbers are followed by three zeros."""
     parts = text.split(",", maxsplit=6)
     if len(parts) not in (3, 6):
         raise InvalidValueError(item, repr(text), "three or six numbers", step)

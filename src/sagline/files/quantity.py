@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 Nested = float | list["Nested"]
 
-LARGEST: Final = 1e50  # in SI; products of a few such numbers do not overflow
+LARGEST: Final = 1e50  # largest number in SI; products of a few such numbers do not overflow
 REACH: Final = f"numbers up to {LARGEST:g}"
 _LONGEST: Final = 60  # largest number of characters of a number with its unit; a float64 needs 24
 
@@ -33,10 +33,11 @@ _WITH_UNIT = re.compile(rf"[ \t]*({_DECIMAL})([ \t]+1[ \t]?/[ \t]?{_UNIT}|[ \t]*
 def plain_number(text: str) -> float | None:
     """A decimal number in the digits 0 to 9, with optional point, sign and exponent; or inf, or nan.
 
-    Other notations of YAML, Python or C are not accepted: 1:30, 0x10, 1_000, digits of other alphabets.
+    Other notations of YAML, Python or C are not accepted, for example 1:30, 0x10, 1_000 and digits of other alphabets.
 
     Returns:
-        The number, infinite only for the word inf (1e999 is the largest float64); None if the text is not a number.
+        The number; None if the text is not a number. Only the word inf is infinite, and 1e999 becomes the largest
+        float64.
 
     Examples:
         >>> from sagline.files.quantity import plain_number
@@ -88,7 +89,7 @@ def _from_text(text: str, unit: str) -> float | None:
 
 
 def _limit(number: float) -> float:
-    """Number limited to the range of float64: only the word inf is infinite, not a number with too many digits."""
+    """Number limited to the range of float64; only the word inf is infinite, not a number that is too large."""
     return max(-float_info.max, min(number, float_info.max))
 
 
@@ -110,7 +111,7 @@ def _factor(given: str, wanted: str) -> float | None:
 
 @cache
 def _registry() -> UnitRegistry[Any]:
-    # slow to build (as long as a track run): built once, and only if a file has units
+    # slow to build, as slow as a run of `sagline track`, and therefore built once, and only if a file has units
     from pint import UnitRegistry
 
     return UnitRegistry(autoconvert_offset_to_baseunit=False)

@@ -44,7 +44,7 @@ def exists(path: Path) -> bool:
 
 
 def read_bytes(path: Path, limit: float) -> bytes:
-    """Bytes of a regular file up to `limit` MB; pipes and devices are not opened, as they may never end."""
+    """Bytes of a regular file up to `limit` MB; pipes and devices are not opened, because they may never end."""
     most = int(limit * MEGABYTE)
     try:
         check_regular(path, path.stat().st_mode)

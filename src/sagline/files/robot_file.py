@@ -46,8 +46,8 @@ def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
             # origin and standard errors of estimated values, written by `calibrate`
         scene: [{name: pole, capsule: [[1, 0, 0], [1, 0, 3]], radius: 5 cm}]      # obstacles: `load_scene`
 
-    A file may be based on a preset (`base: cogiro` in addition to its own name): it gives only the values that differ;
-    all other values, and the notes on which of them are assumed, are those of the preset.
+    A file may be based on a preset (`base: cogiro` in addition to its own name). It then contains only the values that
+    differ. All other values, and the notes on assumed values, are those of the preset.
 
     Args:
         name_or_path: One of `robot_names()`, or the path of a file. An argument is a path if it is a path
@@ -169,7 +169,7 @@ def _is_name(text: str, path: Path) -> bool:
 def load_scene(file: str | os.PathLike[str]) -> tuple[Obstacle, ...]:
     """Load the obstacles around a robot from the `scene` of its file.
 
-    A scene is a list; positions are in the world, a quantity is a number in SI or a text with its unit:
+    A scene is a list. Positions are in the world. A quantity is a number in SI or a text with its unit:
 
         scene:
           - {name: table, box: [1.2, 0.8, 70 cm], center: [2, 0, 0.35], turned: 30 deg}
@@ -178,7 +178,7 @@ def load_scene(file: str | os.PathLike[str]) -> tuple[Obstacle, ...]:
           - {name: hall, mesh: hall.stl, unit: mm, position: [0, 0, -1], turned: 90 deg}
 
     `turned` is a rotation about z; `mesh` is a file in the folder of the robot file, read by `load_mesh`. The scene is
-    part of the file only: a `Robot` has no scene, and `dump_robot` does not write one.
+    part of the file only. A `Robot` does not have a scene, and `dump_robot` does not write one.
 
     Args:
         file: The robot file.

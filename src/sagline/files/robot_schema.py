@@ -65,10 +65,10 @@ class ObstacleEntry(YamlEntry):
     """Obstacle around the robot; `_KINDS` lists the keys that may be combined."""
 
     name: str
-    box: Any = None  # lengths of its edges
+    box: Any = None  # edges of a box
     center: Any = None  # center of a box
-    capsule: Any = None  # end points of its axis
-    sphere: Any = None  # its center
+    capsule: Any = None  # end points of the axis of a capsule
+    sphere: Any = None  # center of a sphere
     radius: Any = None  # radius of a capsule or sphere
     mesh: str | None = None  # file in the folder of the robot file
     unit: str = "m"  # unit of the coordinates of a mesh
@@ -130,7 +130,7 @@ class _RobotPart(YamlEntry):
         return in_si(getattr(self, key), _UNITS.get(item, "kg*m^2"), item)
 
     def only_way(self, item: str, ways: tuple[tuple[str, ...], ...], beside: tuple[str, ...]) -> tuple[str, ...]:
-        """The only set of keys that is given, complete; of other keys only those in `beside` are allowed."""
+        """The only set of keys of which some are given; it must be complete, and other keys must be in `beside`."""
         found = self.model_fields_set.difference(beside)
         for way in ways:
             if found == set(way):
@@ -150,7 +150,7 @@ def _with_keys(names: Iterable[str]) -> Any:
 
 
 class _Cables(_RobotPart):
-    """Material of the cables; each value one number for all of them, or a list."""
+    """Material of the cables; each value is one number for all cables, or a list."""
 
     linear_density: Any
     axial_stiffness: Any = None
@@ -182,7 +182,7 @@ class _Cables(_RobotPart):
 class _Winches(_with_keys(units(Winch))):  # type: ignore[misc]
     """Winches and pulleys; each value is one number for all cables, or a list."""
 
-    swivel_axis: Any = None  # may be a word
+    swivel_axis: Any = None  # a vector or a word
 
     def winches(self) -> Winch:
         """The winches; missing values are the defaults of `Winch`."""
@@ -210,7 +210,7 @@ def _vectors(value: object) -> object:
 
 
 class _Inertia(_RobotPart):
-    """Inertia about the center of mass: a matrix, its diagonal, its elements, or a solid body of the robot's mass."""
+    """Inertia about the center of mass: a matrix, its diagonal, its elements, or a solid body with the robot's mass."""
 
     matrix: Any = None
     diagonal: Any = None

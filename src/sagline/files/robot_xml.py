@@ -21,20 +21,20 @@ from sagline.files.reading import error_at_line, read_bytes
 from sagline.robot.robot import Robot
 from sagline.robot.winch import UPRIGHT
 
-Column: TypeAlias = Sequence[float | None]  # a number for each cable, None where the file gives none
-_LIMIT: Final = 4.0  # MB; the largest of CASPR's files has 0.1
+Column: TypeAlias = Sequence[float | None]  # one number per cable, None if missing in the file
+_LIMIT: Final = 4.0  # largest size of a file [MB]; the largest file of CASPR has 0.1 MB
 _ENCODING = re.compile(r"utf-?8|utf-?16|us-ascii|ascii|latin-?1|iso-8859-1?[0-9]|(windows-|cp)125[0-8]", re.IGNORECASE)
 
 _DECLARED = re.compile(rb"""\s*<\?xml[^>]*?encoding\s*=\s*["']([A-Za-z0-9._-]+)""")
 _CUT_OFF: Final = (3, 4, 5, 6, 20)  # error codes of expat: no element; incomplete token, character or section
 # Material if a file gives none: a 4 mm steel rope, as assumed for the preset cogiro.
-_STEEL_ROPE: Final = {"linear density": 0.065, "axial stiffness": 700e3}  # kg/m, N
+_STEEL_ROPE: Final = {"linear density": 0.065, "axial stiffness": 700e3}  # [kg/m], [N]
 
 
 def read_xml(path: Path) -> Element:
     """The root element of an XML file."""
-    # A file that declares entities is refused, as an entity can grow without bound or refer to another file. A document
-    # type is skipped; the file it refers to is never opened
+    # files that declare entities are refused, because an entity can grow without bound or refer to another file; a
+    # document type is skipped, and the file that it refers to is never opened
     data = read_bytes(path, _LIMIT)
     builder, parser = TreeBuilder(), expat.ParserCreate()
     parser.StartElementHandler = builder.start
@@ -44,7 +44,7 @@ def read_xml(path: Path) -> Element:
     parser.XmlDeclHandler = _check_encoding
     try:
         parser.Parse(data, True)
-    except (expat.ExpatError, LookupError, ValueError) as error:  # the last two: an encoding that does not fit
+    except (expat.ExpatError, LookupError, ValueError) as error:  # the last two are for an encoding that does not fit
         raise error_at_line(path, *_cause(error, data)) from None
     except _RefusedError as error:
         raise FileError(path, *error.args) from None
@@ -120,7 +120,7 @@ def _decodes(data: bytes, encoding: str) -> bool:
 
 
 class _RefusedError(Exception):
-    """Stops the parser; its arguments are the reason and the next step."""
+    """Exception that stops the parser, with the reason and the next step as arguments."""
 
 
 def _refuse_entity(name: str, *_: object) -> NoReturn:
@@ -134,7 +134,7 @@ def _check_encoding(version: str, encoding: str | None, standalone: int) -> None
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Imported:
-    """A robot read from a file of another tool, and the data that were lost.
+    """A robot read from a file of another tool, and the lost data.
 
     Attributes:
         robot: The robot; `robot.assumed` lists the fields that the file does not give, with the reason, and

@@ -81,7 +81,7 @@ OF_EITHER: Final = ("brake",)
 
 
 ROWS: Final = "time"
-ROUNDING: Final = 1e-12  # share of the largest energy
+ROUNDING: Final = 1e-12  # tolerance, as a share of the largest energy
 
 
 def _check_simulation(data: Dataset, cables: int) -> None:
@@ -155,7 +155,7 @@ def _check_events(data: Dataset, time: Array, cables: int) -> Array:
 
 
 def _check_gaps(name: str, values: Array, gone: Any) -> None:
-    """Refuse values of broken cables and missing values of intact ones; `gone` has the shape (samples, cables)."""
+    """Refuse values of broken cables and missing values of intact ones; gone: flags, shape (samples, cables)."""
     missing = np.isnan(values)
     gone = gone.reshape(gone.shape + (1,) * (values.ndim - 2))
     for index in np.argwhere(missing != gone)[:1].tolist():

@@ -20,13 +20,13 @@ from sagline.core.arrays import Array
 from sagline.core.errors import FileError, InvalidValueError, nearest
 from sagline.files.quantity import LARGEST, REACH, in_si, plain_number
 
-TABLE_LIMIT: Final = 64.0  # MB, about half a million rows
-_TOO_LONG: Final = 100.0  # ratio to the size of the object above which a length is taken to be in mm
+TABLE_LIMIT: Final = 64.0  # largest size [MB], about half a million rows
+_TOO_LONG: Final = 100.0  # ratio to the size of the object above which a length must be in mm
 _NONE: Final[Mapping[str, str]] = MappingProxyType({})
 _COLUMN = re.compile(r"\s*(\w+)\s*(?:\[(.*)\])?\s*")  # name, or name [unit]
 _PLAIN_ROW = re.compile(
     r"(?:[-+.0-9eE \t]*,|nan,)*"
-)  # with these characters only, `float` reads plain numbers, and it is much faster
+)  # texts of these characters only are plain numbers for `float`, which is much faster
 _DECIMAL_COMMA = re.compile(r"\s*[-+]?[0-9]+,[0-9]+\s*")
 
 

@@ -30,7 +30,7 @@ PARTS = {
 
 
 class Known(Enum):
-    """Poses at which a quantity has values; elsewhere it is NaN."""
+    """Poses at which a quantity has values; it is NaN at all others."""
 
     EVERYWHERE = "at every pose"
     SOLVED = "at the solved poses alone"
@@ -45,20 +45,20 @@ class Quantity(NamedTuple):
 
     name: str  # name in the file
     parts: tuple[str, ...]  # dimensions after those of the rows: poses, or samples in time
-    unit: str  # unit as the file states it; "" for a plain number
+    unit: str  # unit in the file; "" for a plain number
     long_name: str  # description
-    source: str = ""  # dotted attribute of the result that holds the values; "": its name is `name`
-    # poses at which it has values; an integer of a record that is known SOMEWHERE is `NONE` elsewhere
+    source: str = ""  # dotted attribute of the result with the values; "" if the attribute is called `name`
+    # poses at which it has values; an integer of a record with values SOMEWHERE is `NONE` at all others
     known: Known = EVERYWHERE
     low: float = -np.inf  # lowest value
-    infinite: bool = False  # true if it may be infinite
+    infinite: bool = False  # True if values may be infinite
     codes: type[IntEnum] | None = None  # status type of the codes it holds, if any
     # type of values that are not codes: float, int, bool or str
     values: type[float | int | bool | str] = float
 
     @property
     def place(self) -> str:
-        """Dotted attribute of the result that holds the values."""
+        """Dotted attribute of the result with the values."""
         return self.source or self.name
 
     @property
@@ -122,7 +122,7 @@ def fields_of(data: Dataset, quantities: Iterable[Quantity]) -> dict[str, Any]:
 
 
 def records_of(data: Dataset, quantities: Iterable[Quantity]) -> list[dict[str, Any]]:
-    """Records written by `record_variables`, by attribute; integers that are known SOMEWHERE may be None."""
+    """Records written by `record_variables`, by attribute; integers with values SOMEWHERE may be None."""
     columns: dict[str, list[Any]] = {}
     for one in quantities:
         values = data[one.name].values
@@ -162,7 +162,7 @@ def check_variables(
 
 
 def check_indices(data: Dataset, ranges: Mapping[str, tuple[int, int]]) -> None:
-    """Refuse indices out of range; each range includes its first number and excludes its second."""
+    """Refuse indices out of range; each range includes its first and excludes its second number."""
     for name, (low, high) in ranges.items():
         values = data.variables[name].values
         wrong = (values < low) | (values >= high)

@@ -29,9 +29,9 @@ from sagline.robot.robot import Robot
 from sagline.robot.winch import Winch
 
 _AXES: Final = ("x", "y", "z")
-_FLATTEST: Final = 0.1  # smallest ratio of edges of the assumed box; anchors may lie in a plane, a body has thickness
+_FLATTEST: Final = 0.1  # smallest ratio of edges of the assumed box; anchors may lie in a plane, unlike a body
 _VERSIONS: Final = ("0.31", "0.32")
-_INFINITE: Final = re.compile(r"\+?(inf|infinity|1\.#inf0*)", re.IGNORECASE)  # 1.#INF is printed by Windows
+_INFINITE: Final = re.compile(r"\+?(inf|infinity|1\.#inf0*)", re.IGNORECASE)  # Windows prints 1.#INF
 
 
 def load_wirex(source: str | os.PathLike[str], cables: Cable | None = None) -> Imported:
@@ -39,15 +39,15 @@ def load_wirex(source: str | os.PathLike[str], cables: Cable | None = None) -> I
 
     WireX does not require material, inertia or limits. Missing values are assumed and listed in the robot's `assumed`.
     Missing moments of inertia are set to the largest given moment, missing products of inertia to zero. If no inertia
-    is given, the platform is a box around its anchors. Pulleys that swivel about a vertical axis are read. The values
-    read from a winch are its largest force, its drum and the inertia of its motor.
+    is given, the platform is a box around its anchors. Pulleys that swivel about a vertical axis are read. Of a winch,
+    the largest force, the drum and the inertia of the motor are read.
 
     Args:
         source: The `.wcrfx` file.
         cables: The cables' material; None takes that of the file, or a 4 mm steel rope if the file has none.
 
     Returns:
-        Imported: the robot, and the data that were lost.
+        Imported: the robot, and the lost data.
 
     Raises:
         FileError: If the file cannot be read, has another version, or does not describe a robot with one platform.
@@ -135,7 +135,7 @@ def _point(chain: Element, tag: str, k: int) -> list[float]:
 
 
 def _material(root: Element, chain: Element, k: int) -> Element:
-    """The <cable> of a chain, given by its cable_id from 1; the first if it has none; an empty one if none exists."""
+    """The <cable> of a chain by its cable_id, from 1; the first one without an id; an empty one if none exists."""
     known = root.findall("cable")
     text = chain.get("cable_id", "1")
     if not known:
@@ -162,7 +162,7 @@ def _cables(materials: list[Element], assumed: dict[str, str]) -> Cable:
 
 
 def _winches(root: Element, chains: list[Element]) -> tuple[Winch | None, tuple[str, ...]]:
-    """Pulleys and drums, and their data that are lost."""
+    """Pulleys and drums, and their lost data."""
     lost, radii, axes = [], [], []
     for k, chain in enumerate(chains):
         item = f"chain {k + 1}: base"
@@ -192,7 +192,7 @@ def _axis(base: Element, item: str) -> tuple[float, float, float] | None:
     if base.get("a33") is None:
         return (0.0, 0.0, 1.0)
     upright = _required(base, "a33", item, "")
-    # in a rotation with vertical z axis, the last row and column are both zero off the diagonal
+    # in a rotation with a vertical z axis, last row and last column are zero off the diagonal
     sideways = max(abs(_optional(base, key, item, "") or 0.0) for key in ("a13", "a23", "a31", "a32"))
     return vertical_axis(sideways, upright)
 
@@ -221,7 +221,7 @@ def _pattern(robot: Element, assumed: dict[str, str]) -> MotionPattern:
 
 
 def _limits(root: Element, materials: list[Element], assumed: dict[str, str]) -> tuple[list[float], list[float]]:
-    """Lower limit from the cable, upper from the winch, or else from the cable's breaking load."""
+    """Lower limit from the cable, and upper limit from the winch, otherwise from the cable's breaking load."""
     low = [_optional(element, "minimum_load", "cable", "N") for element in materials]
     break_at = [_optional(element, "breaking_load", "cable", "N") or None for element in materials]
     winch = _optional(root.find("winch/cable"), "f_max", "winch: cable", "N") or None

@@ -1,8 +1,8 @@
 """Atomic file writing, names of files, and JSON text.
 
-A file is written next to its target and then renamed in one step, so that it is complete or absent. Folders,
-devices, pipes, sockets and links are refused as targets; links among the folders above are followed. A file that is
-replaced keeps its permissions; its other hard links keep the old content.
+A file is written next to its target and then renamed in one step, so that it is complete or absent. Folders, devices,
+pipes, sockets and links are refused as targets. Links among the parent folders are followed. A file that is replaced
+keeps its permissions; its other hard links keep the old content.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ import numpy as np
 from sagline.core.errors import FileError, is_seen
 from sagline.files.reading import check_regular
 
-LONGEST = 120  # bytes; with the added words and suffix a name stays below 255, the limit of common file systems
+LONGEST = 120  # [bytes]; with added words and suffix, a name stays below the common limit of 255
 UNNAMED = "robot"
-LOCK = "lock"  # file locked while the folder is in use; the system frees the lock when the process ends
+LOCK = "lock"  # locked while the folder is in use; the system releases the lock at the end of the process
 TRIES = 100
 _finished: ContextVar[list[Path] | None] = ContextVar("finished", default=None)
 _OTHERS = re.compile(r"[^\n -~]+")  # all except printable ASCII and line feed; json escapes control characters
@@ -39,7 +39,7 @@ _DEVICES = re.compile(r"(con|prn|aux|nul|com[\d¹²³]|lpt[\d¹²³])(\..*)?", r
 
 
 def file_stem(name: str, *words: str) -> str:
-    """A name for files of a robot, without a suffix: never a path, never empty, hidden, too long or a device.
+    """A name for files of a robot, without a suffix, which is never a path, empty, hidden, too long or a device.
 
     Letters and digits of all scripts, dots, hyphens and underscores are kept; spaces become hyphens. If the name has
     other characters or is too long, eight digits of its digest are added, so that two robots do not share files.
@@ -77,7 +77,7 @@ def staging(folder: Path) -> Iterator[Path]:
 
 
 def _new_place(folder: Path) -> tuple[Path, int]:
-    """New folder and its lock; another is made if a process has removed it as abandoned."""
+    """New folder and its lock; another folder is made if a process has removed this one as abandoned."""
     for _ in range(TRIES):
         place = Path(tempfile.mkdtemp(prefix=PREFIX, suffix=SUFFIX, dir=folder))
         try:
@@ -91,7 +91,7 @@ def _new_place(folder: Path) -> tuple[Path, int]:
 
 
 def _remove_if_left(place: Path) -> None:
-    """Remove a folder that no process uses; one that cannot be removed stays."""
+    """Remove a folder that no process uses; a folder that cannot be removed remains."""
     with suppress(OSError):
         if place.is_symlink():
             return
@@ -109,7 +109,7 @@ def _open_lock(place: Path) -> int:
 
 
 def try_lock(lock: int, *, if_unknown: bool) -> bool:
-    """True if the lock of an open file could be taken; `if_unknown` where the system has no locks."""
+    """True if the lock of an open file could be taken; `if_unknown` on systems without locks."""
     if sys.platform == "win32":
         return if_unknown
     import fcntl
@@ -135,7 +135,7 @@ def atomic_file(file: os.PathLike[str] | str, size: int = 0) -> Iterator[Path]:
 
 @contextmanager
 def atomic_files(folder: os.PathLike[str] | str, names: Sequence[str], size: int = 0) -> Iterator[tuple[Path, ...]]:
-    """Temporary files that replace files of one folder together when the block ends without an error."""
+    """Temporary files that together replace files of one folder when the block ends without an error."""
     targets = [check_file(Path(folder) / name) for name in names]
     try:
         with staging(Path(folder)) as place:
@@ -242,7 +242,7 @@ def _check_space(file: Path, size: int) -> None:
 
 
 def _finish(part: Path, target: Path) -> None:
-    """Give a file the permissions of the one it replaces, and flush it to the disk."""
+    """Give a file the permissions of the replaced file, and flush it to the disk."""
     if target.is_file():
         shutil.copymode(target, part)
     with part.open("rb+") as handle:
@@ -250,13 +250,13 @@ def _finish(part: Path, target: Path) -> None:
 
 
 def _target_of(error: OSError, targets: Sequence[Path]) -> Path:
-    """The target that an error refers to, found by the name of its temporary file; the first if it is unknown."""
+    """The target that an error refers to, found by the name of its temporary file; the first one if unknown."""
     name = Path(str(error.filename)).name.removesuffix(SUFFIX)
     return targets[int(name)] if name.isdecimal() and int(name) < len(targets) else targets[0]
 
 
 def _reason(error: Exception) -> str:
-    reason: str = getattr(error, "strerror", None) or str(error)  # HDF5 gives a text without an error number
+    reason: str = getattr(error, "strerror", None) or str(error)  # HDF5 raises a text without an error number
     return next(iter(reason.splitlines()), type(error).__name__)
 
 
@@ -284,6 +284,6 @@ def plain(what: Any) -> Any:
 
 
 def json_text(what: Any) -> str:
-    """One JSON document of data that `plain` accepts; control characters are escaped, so it is safe for a terminal."""
+    """One JSON document of data that `plain` accepts; control characters are escaped for safety in a terminal."""
     text = json.dumps(plain(what), indent=2, ensure_ascii=False, allow_nan=False)
     return _OTHERS.sub(lambda found: "".join(c if is_seen(c) else json.dumps(c)[1:-1] for c in found[0]), text)

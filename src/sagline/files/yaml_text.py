@@ -19,7 +19,7 @@ from sagline.files.reading import error_at_line
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
-YAML_LIMIT: Final = 1.0  # MB; enough for thousands of waypoints or cables
+YAML_LIMIT: Final = 1.0  # largest size [MB], sufficient for thousands of waypoints or cables
 _DEEPEST: Final = 20  # largest number of nesting levels
 _MOST: Final = 25_000  # largest number of values; reading them takes a second
 _TAG: Final = "tag:yaml.org,2002:"
@@ -45,7 +45,7 @@ def validate(data: Mapping[Any, Any], schema: type[Schema], origin: Path | str) 
         return schema.model_validate(data)
     except ValidationError as error:
         mistakes = error.errors(include_url=False)
-    # a misspelt key is reported first, because it also causes a missing key
+    # misspelt keys are reported first, because they also cause missing keys
     first = next((mistake for mistake in mistakes if mistake["type"] == "extra_forbidden"), mistakes[0])
     key, found, allowed, next_step = _explain(first, schema)
     refused = FileError(origin, f"{key} is {found}{allowed and f'; allowed: {allowed}'}", next_step, item=key)
@@ -86,13 +86,13 @@ def _at(schema: type[YamlEntry], where: tuple[int | str, ...]) -> type[YamlEntry
 
 def parse_mapping(text: str, origin: Path | str) -> dict[Any, Any]:
     """Mapping at the top level of a YAML text; duplicate keys are refused."""
-    # Only plain decimal numbers, true, false and null are converted, all else stays text: yes is not true, 1:30 is not
-    # 90, and there are no dates and no tags. Aliases are allowed if their expansion is not too large.
+    # Only plain decimal numbers, true, false and null are converted. All else remains text: yes is not true, 1:30 is
+    # not 90, and dates and tags do not exist. Aliases are allowed if their expansion is not too large.
     try:
         data = yaml.load(text, Loader=_PlainLoader)
     except yaml.MarkedYAMLError as error:
         raise error_at_line(origin, *_cause(error, text)) from None
-    except (yaml.YAMLError, RecursionError, ValueError, OverflowError) as error:  # the last two: for \UFFFFFFFF
+    except (yaml.YAMLError, RecursionError, ValueError, OverflowError) as error:  # the last two are for \UFFFFFFFF
         reason = f"is not YAML as read here ({_reason(error, text)})"
         raise error_at_line(origin, reason, "Check that this is the file you mean.") from None
     if data is None:
@@ -144,7 +144,7 @@ def _reason(error: Exception, text: str) -> str:
 
 
 class _PlainLoader(yaml.SafeLoader):
-    """Text, plain numbers, null, lists and mappings; unique keys; a bounded number of levels and values."""
+    """Text, plain numbers, null, lists and mappings, with unique keys and a bounded number of levels and values."""
 
     yaml_constructors: ClassVar[dict[Any, Any]] = {}
 
@@ -197,8 +197,8 @@ class _PlainDumper(yaml.SafeDumper):
 
 
 def _tag_of(kind: type[yaml.Node], value: str | None, implicit: Any) -> str:
-    """The tag of a value that has none."""
-    if kind is yaml.ScalarNode and value is not None and implicit[0]:  # neither quoted nor tagged
+    """The tag of a value without an explicit tag."""
+    if kind is yaml.ScalarNode and value is not None and implicit[0]:  # neither quotes nor a tag
         if value in _WORDS:
             return _WORDS[value]
         if plain_number(value) is None:

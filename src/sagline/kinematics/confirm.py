@@ -31,9 +31,9 @@ class Confirmation(Result):
 
     Attributes:
         plan: The plan, of any cable model.
-        pose: Equilibrium with catenary cables of the planned lengths; NaN where the plan has no solution.
+        pose: Equilibrium with catenary cables of the planned lengths; NaN if the plan has no solution.
         status: Codes of `ForwardStatus`, shape () or (N,).
-        wrench_residual: Norms of the unbalanced force [N] and moment [N m] there, shape (2,) or (N, 2).
+        wrench_residual: Norms of the unbalanced force [N] and moment [N m] at this pose, shape (2,) or (N, 2).
     """
 
     plan: Plan
@@ -55,7 +55,8 @@ class Confirmation(Result):
     def rotation_error(self) -> Array:
         """Angle between the platform's orientation and the planned one [rad], shape () or (N,)."""
         planned, real = self.plan.state.pose.quaternion, self.pose.quaternion
-        # Computed from sine and cosine of half the angle: precise for very small angles, unlike the cosine alone.
+        # The angle is computed from sine and cosine of half the angle, which is precise for very small angles, unlike
+        # the cosine alone.
         sine = 0.5 * np.linalg.norm(real - planned, axis=-1) * np.linalg.norm(real + planned, axis=-1)
         cosine = np.abs(np.einsum("...i,...i->...", real, planned))
         return locked(np.asarray(2.0 * np.arctan2(sine, cosine)))
@@ -88,7 +89,7 @@ def confirm(plan: Plan, *, progress: Progress | None = None) -> Confirmation:
     """
     callback(progress, "progress")
     state, lengths = instance(plan, Plan, "plan").state, plan.unstrained_length
-    if not state.pose.shape or not len(lengths):  # one block
+    if not state.pose.shape or not len(lengths):  # a single block
         found = _forward(state, progress)
         return Confirmation(plan, found.pose, found.status, found.wrench_residual)
     parts = []

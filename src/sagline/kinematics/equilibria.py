@@ -24,8 +24,8 @@ from sagline.robot.robot import Robot
 from sagline.robot.routing import differs, with_routing
 from sagline.statics.balance import external_wrench
 
-START_BYTES = 250.0  # memory per cable of one start during the solution
-_SAME = 1e-6  # relative to the mean length, and in radians: poses with a smaller distance are the same
+START_BYTES = 250.0  # memory per cable and start during the solution
+_SAME = 1e-6  # poses with a smaller distance, relative to the mean length and in radians, are the same
 _KEPT = (*STABLE, ForwardStatus.FITTED)
 _CATENARY = Catenary()
 
@@ -36,7 +36,8 @@ class Equilibria(Result):
 
     Attributes:
         solutions: The equilibria, a batch of K.
-        reached: Number of starts that ended in each, shape (K,): a share of the start orientations, not a probability.
+        reached: Number of starts that ended in each equilibrium, shape (K,); this measures start orientations, not
+            probabilities.
         starts: Number of starts; the remaining starts ended at an unstable equilibrium or did not converge.
     """
 
@@ -59,16 +60,16 @@ def equilibria(
 ) -> Equilibria:
     """Stable equilibria of a robot at given lengths, found by a search over orientations.
 
-    For a fixed orientation the energy is convex in the position, so only orientations are searched: starts are
-    uniformly random over all orientations, each at the unique equilibrium position for its orientation. A robot without
-    rotations has exactly one equilibrium. For other robots the list can be incomplete: an equilibrium that no start
-    reached is missing.
+    For a fixed orientation the energy is convex in the position. Therefore only orientations are searched. Starts are
+    uniformly random over all orientations; each start is at the unique equilibrium position for its orientation. A
+    robot without rotations has exactly one equilibrium. For other robots the list can be incomplete, because an
+    equilibrium that no start reaches is missing.
 
     Args:
         robot: The robot, with m cables.
         unstrained_length: L [m], > 0, shape (m,).
-        model: Cable model. The shallow models have no energy: their equilibria are sorted by the number of starts. For
-            straight cables: the local least-squares fits, sorted by misfit.
+        model: Cable model. The shallow models do not have an energy, and their equilibria are sorted by the number of
+            starts. For straight cables, the results are local least-squares fits, sorted by misfit.
         wrench: External plus inertial wrench about the center of mass, world axes [N, N m], shape (6,); None for zero.
         starts: Number of initial orientations, >= 1.
         seed: Seed of the random orientations.

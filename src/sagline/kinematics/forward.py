@@ -40,8 +40,8 @@ from sagline.robot.routing import differs, with_routing
 from sagline.statics.balance import external_wrench
 from sagline.statics.tables import pose_rows
 
-_TILTS = (25.0, 60.0)  # degrees, tried if the level start fails
-_DEPTH = 0.1  # relative to the mean length
+_TILTS = (25.0, 60.0)  # tilts that are tried if the level start fails [degree]
+_DEPTH = 0.1  # depth of the first position below the center, relative to the mean length
 _LIMIT_SLACK = 0.01  # a measured tension may be outside its limits by this share
 _POOR = np.array([0, 1, 2, 3, 4, 5, 6, 0])  # rank of each status; a fitted sample has the rank of a solved one
 
@@ -49,12 +49,12 @@ _POOR = np.array([0, 1, 2, 3, 4, 5, 6, 0])  # rank of each status; a fitted samp
 def search(
     robot: Robots, model: CableModel, lengths: Array, wrenches: Array, progress: Progress | None = None
 ) -> ForwardRows:
-    """Forward kinematics without initial poses; each sample is searched independently.
+    """Forward kinematics without initial poses; each sample has an independent search.
 
-    With fixed orientation the platform has a single equilibrium, because the energy is convex in the position. It is
-    found from any start and is the start for all motions together. The first start orientation is level. Samples
-    without a stable equilibrium within the tension limits are repeated from tilted starts. The best result is kept:
-    better status first, then fewer cables outside their limits, then lower energy.
+    With fixed orientation the platform has a single equilibrium, because the energy is convex in the position. This
+    equilibrium is found from any start. It is the start for all motions together. The first start orientation is level.
+    Samples without a stable equilibrium within the tension limits are repeated from tilted starts. The best result is
+    kept. It has the better status, then fewer cables outside their limits, then the lower energy.
 
     lengths: unstrained lengths (N, m), rows of NaN are skipped; wrenches: external plus inertial (1 or N, 6); progress:
     called after each block with the number of finished samples and the total number.
@@ -106,7 +106,7 @@ def from_orientations(
 def starting_positions(robot: Robots, lengths: Array, quaternion: Array) -> Array:
     """Positions slightly below the center of the frame ends, within the free motions of the platform.
 
-    Not the center itself, because the two ends of a single cable must not coincide.
+    The center itself is not suitable, because the two ends of a single cable must not coincide.
 
     lengths: unstrained lengths (N, m); quaternion: orientation of the platform, shape (4,) or (N, 4). Returns positions
     of the platform origin [m], shape (N, 3).
@@ -191,23 +191,23 @@ def forward(
     """The equilibrium pose of the platform on cables of given unstrained lengths.
 
     Args:
-        robot: The robot, with m cables. Or a sequence of N robots, one per sample, with equal number of cables, motion
-            pattern with plane, type of tension limits and gravity; all other data may differ.
+        robot: The robot, with m cables; or a sequence of N robots, one per sample. The robots must have the same number
+            of cables, motion pattern with plane, type of tension limits and gravity; all other data may differ.
         unstrained_length: L [m], > 0, shape (m,) for one sample or (N, m). A row of NaN, as in a plan at an infeasible
             pose, gets the status NO_LENGTHS.
-        start: Initial pose. A batch of N poses: one per sample. A single pose with N samples: a trajectory; the first
-            sample starts at this pose, each following one at the previous result. None: every sample is searched
-            independently, from the level platform; of several equilibria, the first one found within the tension limits
-            of the robot is taken (see `equilibria` for the others).
+        start: Initial pose. With a batch of N poses, each sample has its own start. With a single pose and N samples,
+            the samples are a trajectory: the first sample starts at this pose, and each following one at the previous
+            result. With None, every sample is searched independently from the level platform. Of several equilibria,
+            the first one found within the tension limits of the robot is taken (see `equilibria` for the others).
         model: Cable model; the default is exact.
         wrench: External plus inertial wrench on the platform about its center of mass in world axes, without gravity:
             force [N], then moment [N m], shape (6,) or (N, 6). None for zero.
-        tension_measured: Load cell data. Lengths then count as measured too; lengths and tensions are corrected within
-            their deviations to fit each other, and the result has the covariance of the pose.
+        tension_measured: Load cell data. Lengths are then treated as measured too. Lengths and tensions are corrected
+            within their deviations so that they fit each other, and the result has the covariance of the pose.
         winding: Last direction of the drums, for the friction of pulleys and guides: +1 winding in, -1 paying out, 0 at
             rest, shape (m,) or (N, m). None: no friction. Friction and guides change the lengths by iteration; with
             load cells, this change is computed once, at the measured lengths. With high friction and soft cables,
-            several adjacent poses can be in equilibrium.
+            several nearby poses can be equilibria.
         progress: Called about every tenth of a second: number of solved samples, total number.
 
     Returns:
@@ -286,7 +286,7 @@ def checked_lengths(robot: Robots, lengths: ArrayLike) -> Array:
             "> 0 m, finite; or NaN for all cables of a sample",
             "Correct the length of this cable.",
         )
-    fitting = dead.shape[:-1] in ((), array.shape[:-1])  # other counts are refused later
+    fitting = dead.shape[:-1] in ((), array.shape[:-1])  # other numbers of lengths are refused later
     if fitting and ((array <= dead) & (dead > 0.0)).any():
         raise dead_only(array, np.broadcast_to(dead, array.shape))
     return locked(array)

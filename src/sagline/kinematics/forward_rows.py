@@ -39,13 +39,13 @@ class ForwardSolution(Result):
     """Result of `forward`: a single sample, or N of them with a leading axis.
 
     Attributes:
-        state: Robot, poses, wrench and cables in equilibrium; NaN where the lengths were NaN.
+        state: Robot, poses, wrench and cables in equilibrium; NaN if the lengths are NaN.
         status: Codes of `ForwardStatus`, shape () or (N,).
         stiffness_min: Smallest stiffness of the platform against its free motions [N/m], shape () or (N,). A rotation
             is measured by its arc length at the root mean square distance of the platform ends from the center of mass.
-        energy: Potential energy of cables, weight and given force [J], shape () or (N,); zero at the frame ends and at
-            the origin of the world. The shallow models have none: NaN. Straight cables: their objective instead, half
-            the sum of squared length errors [m^2].
+        energy: Potential energy of cables, weight and given force [J], shape () or (N,); the heights of frame ends and
+            world origin are the zero levels. It is NaN for the shallow models, which do not have an energy. For
+            straight cables, it is their objective, half the sum of squared length errors [m^2].
         wrench_residual: Norms of the unbalanced force [N] and moment [N m] in the platform's free motions,
             shape (2,) or (N, 2).
         iterations: Number of Newton steps, shape () or (N,).
@@ -87,7 +87,7 @@ class ForwardSolution(Result):
         return np.asarray(cables.chord_tension <= 0.5 * density * cables.gravity * cables.chord)
 
 
-BLOCK = 1 << 13  # cables per block: from a few to 130 ms, after which an interrupt is handled
+BLOCK = 1 << 13  # cables per block, which take a few to 130 ms; interrupts are handled between blocks
 
 
 class ForwardRows(NamedTuple):

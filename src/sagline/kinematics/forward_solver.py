@@ -50,7 +50,7 @@ class ForwardStep(NamedTuple):
 
 
 class ForwardSolver:
-    """Solver for successive samples; each starts from the last stable equilibrium.
+    """Solver for successive samples; each sample starts from the last stable equilibrium.
 
     The solver owns its work arrays and stores the last equilibrium; `reset` clears it. Use one solver per control loop;
     do not share it between threads.
@@ -105,7 +105,7 @@ class ForwardSolver:
         self.reset(start)
 
     def reset(self, start: Pose | None = None) -> None:
-        """Clear the last pose: the next step starts at the given pose, or searches.
+        """Clear the last pose. The next step starts at the given pose, or searches.
 
         Args:
             start: Initial pose of the next step; None: a search.

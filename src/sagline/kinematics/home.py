@@ -23,10 +23,10 @@ from sagline.robot.winch import Winch
 from sagline.statics.tables import body_table, cable_table, pose_rows, refuse_missing_chords
 
 _CATENARY = Catenary()
-MISSED: Final = 1e-9  # relative to the tension: a cable with a larger error cannot have this tension
-LARGEST_STRAIN: Final = 0.5  # larger than the strain of any rope; such a measured value has another unit
-HALVINGS: Final = 50  # largest number of bisections of the interval ratio that contains the smallest tension of a cable
-PRECISION: Final = 1e-4  # precision of this smallest tension, as a ratio
+MISSED: Final = 1e-9  # a cable with a larger error, relative to the tension, cannot have this tension
+LARGEST_STRAIN: Final = 0.5  # a strain larger than that of any rope, which shows that a measured value has another unit
+HALVINGS: Final = 50  # largest number of bisections for the smallest tension of a cable
+PRECISION: Final = 1e-4  # relative precision of this smallest tension
 
 
 def home(
@@ -45,7 +45,7 @@ def home(
         pose: Pose of the platform, a single one.
         frame_end_tension: Load cell values at the frame ends at this pose [N], a number or shape (m,). The tension is
             this value minus load_cell_bias, divided by load_cell_gain. The tensions need not balance the platform
-            exactly: each cable is evaluated separately.
+            exactly, because each cable is evaluated separately.
         counts: Encoder counts at this pose, a number or shape (m,).
         model: Cable model; the default is exact.
         temperature: Cable temperature at this pose minus the temperature for which the lengths are valid [K].

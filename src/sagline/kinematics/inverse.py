@@ -32,7 +32,7 @@ from sagline.statics.tables import pose_rows, refuse_missing_chords
 from sagline.tension.method import TensionMethod, Variable, kernel_options, shared_tension
 from sagline.tension.methods import Closest
 
-STANDING: Final = 1e-7  # relative to the fastest cable's rate: slower cables are at rest; rates are accurate to 1e-8
+STANDING: Final = 1e-7  # slower cables, relative to the fastest cable, are at rest; rates are accurate to 1e-8
 _CATENARY = Catenary()
 _CLOSEST = Closest()
 
@@ -51,17 +51,17 @@ def inverse(
     """Tensions that balance the platform within their limits, and the corresponding unstrained lengths.
 
     Args:
-        robot: The robot, with m cables and n degrees of freedom, m >= n. Or a sequence of N robots, one per pose, with
-            equal number of cables, motion pattern with plane, type of tension limits and gravity; all other data may
-            differ.
+        robot: The robot, with m cables and n degrees of freedom, m >= n; or a sequence of N robots, one per pose. The
+            robots must have the same number of cables, motion pattern with plane, type of tension limits and gravity;
+            all other data may differ.
         motion: A path of N samples, whose inertia is included; or a pose or batch of N poses at rest.
         model: Cable model; the default is exact.
         tension: Tension distribution method. `Closest` keeps its reference only along a path; in a batch of poses, each
             pose is solved independently.
         wrench: External wrench on the platform about its center of mass in world axes, without gravity and inertia:
             force [N], then moment [N m], shape (6,) or (N, 6). None for zero.
-        previous: A plan that this one continues: `Closest` starts from its last feasible tensions. Or such tensions, in
-            the tension variable [N], shape (m,).
+        previous: A plan that this one continues, from whose last feasible tensions `Closest` starts; or such tensions,
+            in the tension variable [N], shape (m,).
         winding: Direction of the drums, for the friction of pulleys and guides: +1 winding in, -1 paying out, 0 at
             rest, shape (m,) or (N, m); or "path": the direction of the length changes along the path without friction.
             It affects only wrapped and dead lengths. None: no friction.
@@ -77,8 +77,8 @@ def inverse(
             support its number of cables, several robots do not fit together (the message names the property), winding
             is "path" for poses without times, an argument has the wrong type or shape, a pose is outside the motions of
             the robot's pattern, or the poses need more memory than is free.
-        CableGeometryError: If a cable has no chord at some pose: its ends coincide, or its platform end is inside its
-            pulley.
+        CableGeometryError: If a cable has no chord at some pose, because its ends coincide or its platform end is
+            inside its pulley.
 
     Source:
         Gia Luan & Truong Thinh 2020, figure 16; made exact in docs/model.md, section 5.

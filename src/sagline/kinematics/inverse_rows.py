@@ -16,9 +16,9 @@ from sagline.robot.batch import Robots, first_of, has_routing
 from sagline.statics.tables import robot_terms
 from sagline.tension.method import Options, TensionMethod, takes_default_kernel
 
-UNDECIDED = (codes.POSE_INFEASIBLE, codes.POSE_NOT_CONVERGED)  # poses without a result from the iterations
-BLOCK = 1 << 12  # poses per block of the solution: at most a tenth of a second, after which an interrupt is handled
-DECIDED = 1 << 10  # poses per block of the feasibility decision, which takes longer
+UNDECIDED = (codes.POSE_INFEASIBLE, codes.POSE_NOT_CONVERGED)  # statuses of poses without a result from the iterations
+BLOCK = 1 << 12  # poses per block of the solution, at most 0.1 s; interrupts are handled between blocks
+DECIDED = 1 << 10  # poses per block of the feasibility decision, which takes longer per pose
 
 
 class InverseRows(NamedTuple):
@@ -96,10 +96,10 @@ class Verdicts(NamedTuple):
     # Proved and sufficient value of the smallest change of the force [N], (N, 2): 0 at a solved pose, NaN if the load
     # is not the cause of the failure.
     brackets: Array
-    reliefs: Array  # sufficient change of the force [N], along the free motions, (N, n), NaN if not needed or not known
+    reliefs: Array  # sufficient change of the force along the free motions [N], (N, n); NaN if not needed or unknown
     farkas: Array  # Farkas vectors along the free motions, (N, n)
     blocking: Flags  # cables whose limits oppose the needed wrench, (N, m)
-    at_border: Flags  # poses solved by this search, not by the tension distribution method, (N,)
+    at_border: Flags  # True for poses solved by this search instead of the tension distribution method, (N,)
 
     @classmethod
     def empty(cls, count: int, cables: int, freedoms: int) -> Verdicts:
@@ -114,7 +114,7 @@ class Verdicts(NamedTuple):
 
     @property
     def shortfall(self) -> Array:
-        """Smallest change of the force known to be sufficient [N], (N,); infinite only if provably none exists."""
+        """Smallest known sufficient change of the force [N], (N,); infinite only if it is proved that none exists."""
         proved, enough = self.brackets[:, PROVED], self.brackets[:, ENOUGH]
         return np.where(np.isinf(enough) & np.isfinite(proved), np.nan, enough)
 
@@ -125,7 +125,7 @@ class Verdicts(NamedTuple):
 
 
 def covers_all(method: int, redundant: int) -> bool:
-    """True if a distribution method finds tensions whenever feasible ones exist; closed-form methods do not.
+    """True if a distribution method finds tensions whenever feasible ones exist, unlike closed-form methods.
 
     redundant: number of cables beyond the degrees of freedom.
     """

@@ -30,10 +30,10 @@ from sagline.statics.tables import robot_terms
 from sagline.tension.method import TensionMethod, kernel_options, takes_default_kernel
 from sagline.tension.methods import Closest
 
-_STATUSES = tuple(sorted(PoseStatus))  # indexed by code; a lookup takes a tenth of the time of a conversion
-# Accepts exactly this number of real numbers, faster than an array assignment from a tuple.
+_STATUSES = tuple(sorted(PoseStatus))  # statuses by code; a lookup takes a tenth of the time of a conversion
+# A struct accepts exactly this number of real numbers, and is faster than an array assignment from a tuple.
 _POSE = struct.Struct(f"{tables.POSE_COLUMNS}d").pack_into
-QUATERNION_TOLERANCE = 1e-6  # relative deviation of the length, as in `Pose.from_quaternion`
+QUATERNION_TOLERANCE = 1e-6  # largest relative deviation of the length of a quaternion, as in `Pose.from_quaternion`
 _PLAIN = (tuple, list)
 ROUNDING = 1e-15  # relative deviation of the length below which no normalization is needed
 
@@ -98,11 +98,11 @@ class InverseSolver:
         self._load = self._wrench[0].data
         self._reference = np.full(m, np.nan)
         self._found = InverseRows.empty(1, m, n, has_routing(robot))
-        self._status = self._found.pose_status.data  # read five times faster than an array of one element
+        self._status = self._found.pose_status.data  # a read takes a fifth of the time of an array of one element
         self._loaded = False  # True if the wrench of the last step was not zero
         self._lengths = self._found.results[tables.LENGTH, 0]
-        # The views are read-only: kernels are compiled for read-only inputs. Values are written through the owner of
-        # the memory.
+        # The views are read-only, because kernels are compiled for read-only inputs. Values are written through the
+        # owner of the memory.
         self._rows = locked(self._pose.view())
         model_terms, sharing_terms, limit_terms = self._options
         given = (robot_terms(robot), self._rows, locked(self._wrench.view()))
@@ -209,7 +209,7 @@ class InverseSolver:
                 raise TypeError
             out[WHOLE] = self._lengths
         except (AttributeError, IndexError, TypeError, ValueError):
-            copy_out(self._lengths, out, "out")  # converts, or raises an error with a reason
+            copy_out(self._lengths, out, "out")  # this converts, or raises an error with a reason
         status: PoseStatus = _STATUSES[code]
         return status
 

@@ -20,7 +20,7 @@ from sagline.statics.stiffness import stiffness
 
 _STEPS = 100
 _HALVINGS = 20
-# relative to the sum of squares: a smaller predicted gain means less than 1e-4 standard deviations to the optimum
+# predicted gain relative to the sum of squares; a smaller gain means less than 1e-4 standard deviations to the optimum
 _TOLERANCE = 1e-8
 
 

@@ -21,16 +21,16 @@ from sagline.tension.method import TensionMethod
 
 
 class Gap(NamedTuple):
-    """A run of consecutive poses without a solution.
+    """Consecutive poses of a plan without a solution.
 
     Attributes:
-        first: Index of its first pose.
-        last: Index of its last pose.
-        status: Reason for the missing solution at its first pose.
+        first: Index of the first pose.
+        last: Index of the last pose.
+        status: Reason for the missing solution at the first pose.
         shortfall: Largest finite shortfall in the gap [N]; infinite if all shortfalls are infinite, NaN if there are
             none.
         cables: Indices of the cables whose limits oppose the wrench at any pose of the gap.
-        hopeless: Number of its poses that no change of the force alone makes feasible.
+        hopeless: Number of poses that no change of the force alone makes feasible.
     """
 
     first: int
@@ -46,34 +46,35 @@ class Plan(Result, Saved):
     """Result of `inverse`: a single pose with fields of shape (m,), or N poses with fields of shape (N, m).
 
     Attributes:
-        state: Robot, poses, wrench and cables; NaN forces and lengths where a pose has no solution.
+        state: Robot, poses, wrench and cables; forces and lengths are NaN at poses without a solution.
         path: The path of the plan, or None for poses alone.
         tension: Tension distribution method.
         status: Codes of `PoseStatus`, shape () or (N,).
         shortfall: Smallest change of the force on the platform that makes the pose feasible [N], shape () or (N,), with
-            tensions within their limits: 0 if it is feasible, infinite if it is proved that no force alone is
-            sufficient, NaN if the force is not the cause or no value was found.
+            tensions within their limits. It is 0 for a feasible pose, infinite if it is proved that no force alone is
+            sufficient, and NaN if the force is not the cause or no value was found.
         wrench_residual: Norms of the unbalanced force [N] and moment [N m] in the platform's free motions,
             shape (2,) or (N, 2).
-        blocking: True for cables at a limit that opposes the needed wrench: a wider limit reduces the shortfall, shape
-            (m,) or (N, m).
+        blocking: True for cables at a limit that opposes the needed wrench, shape (m,) or (N, m); a wider limit would
+            reduce the shortfall.
         farkas: Proof of each infeasible pose, shape (6,) or (N, 6), NaN elsewhere. With y = farkas, the component of
             the cable wrench along y, the sum of y . (J_i tau_i - G_i pull_i(tau_i)), is less than y . (needed - the sag
             forces in it) for all chord tensions within their limits, on the exact catenaries; J is the structure
             matrix, pull_i the sag force and G_i its wrench matrix. Tensions below a tenth of a cable's weight are
             excluded and, without an upper limit, tensions that stretch the cable to more than twice its length. The
-            force part of y has length 1, so the difference is in newtons. NaN also if a single direction proves nothing
-            and tension ranges were narrowed or split. None for a plan from an old file without this field.
+            force part of y has length 1, so that the difference is in newtons. It is also NaN if no single direction is
+            a proof, because tension ranges were narrowed or split. None for a plan from an old file without this field.
         needed: The wrench J tau that the chord tensions must supply, shape (6,) or (N, 6): weight, given wrench and the
-            cables' sag forces T_z - tau sin phi; without a solution, at the tensions that minimize the remaining
-            wrench. None for a plan from an old file.
+            cables' sag forces T_z - tau sin phi. Without a solution, the sag forces are those at the tensions that
+            minimize the remaining wrench. None for a plan from an old file.
         bracket: Proved and sufficient value of the shortfall [N], shape (2,) or (N, 2); infinite if no sufficient value
             was found. None for a plan from an old file.
-        relief: The force change of this size [N], in world axes: added to the wrench, it makes the pose feasible, shape
-            (3,) or (N, 3); NaN if not needed or not known. None for a plan from an old file.
-        at_border: True for poses so close to the border of feasibility that the iterations found no tensions; their
-            tensions were found on the exact catenaries, without the tension distribution method, shape () or (N,). None
-            for a plan from an old file.
+        relief: Change of the force, with the sufficient value of the shortfall as its magnitude, in world axes [N],
+            shape (3,) or (N, 3). Added to the wrench, it makes the pose feasible. It is NaN if not needed or not known.
+            None for a plan from an old file.
+        at_border: True for poses so close to the border of feasibility that the iterations found no tensions, shape ()
+            or (N,). Their tensions were then computed on the exact catenaries without the tension distribution method.
+            None for a plan from an old file.
     """
 
     state: Equilibrium
@@ -96,22 +97,22 @@ class Plan(Result, Saved):
 
     @property
     def unstrained_length(self) -> Array:
-        """L: unstrained lengths off the drums [m], including wrapped and dead lengths."""
+        """Unstrained lengths L off the drums [m], including wrapped and dead lengths."""
         return self.state.unstrained_length
 
     @property
     def horizontal_tension(self) -> Array:
-        """T_x [N]."""
+        """Horizontal tensions T_x [N]."""
         return self.state.cables.horizontal_tension
 
     @property
     def vertical_force(self) -> Array:
-        """T_z on the cable at its platform end [N]."""
+        """Vertical forces T_z on the cables at their platform ends [N]."""
         return self.state.cables.vertical_force
 
     @property
     def chord_tension(self) -> Array:
-        """Tau = T_x/cos phi [N]."""
+        """Chord tensions tau = T_x/cos phi [N]."""
         return self.state.chord_tension
 
     @property
@@ -133,14 +134,14 @@ class Plan(Result, Saved):
     def length_rate(self) -> Array | None:
         """Length rate dL/dt [m/s], shape (N, m), along the path; None for poses without a path.
 
-        The rate of `unstrained_length` due to platform motion and tension changes; NaN where the plan has no solution.
-        Computed at each call. See docs/model.md, section 7.
+        The rate of `unstrained_length` due to platform motion and tension changes; NaN if the plan has no solution. It
+        is computed at each call. See docs/model.md, section 7.
         """
         return None if self.path is None else length_rate(self.state, self.path, self.tension, self.feasible)
 
     @property
     def gaps(self) -> tuple[Gap, ...]:
-        """The runs of consecutive poses without a solution, in order; a single pose counts as a batch of one."""
+        """Gaps: consecutive poses without a solution, in order; a single pose counts as a batch of one."""
         lost = ~np.atleast_1d(self.feasible)
         edges = np.flatnonzero(np.diff(np.concatenate(([False], lost, [False])).astype(np.int8)))
         return tuple(self._gap(int(first), int(end) - 1) for first, end in edges.reshape(-1, 2))

@@ -24,7 +24,7 @@ from sagline.tension.method import Options, Variable, check_sharing, kernel_opti
 from sagline.tension.methods import Centroid, MinimumNorm
 from sagline.tension.polygon import Side, TensionPolygon
 
-MERGED = 1e-10  # relative to the largest tension: corners with a smaller distance are merged
+MERGED = 1e-10  # corners with a smaller distance, relative to the largest tension, are merged
 
 _CATENARY = Catenary()
 

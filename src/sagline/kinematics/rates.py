@@ -22,9 +22,9 @@ from sagline.statics.tables import pose_rows
 from sagline.tension.method import TensionMethod, kernel_options, shared_tension
 from sagline.tension.methods import Closest
 
-SHARE = 1e-5  # relative to the time scale of the motion: finite differences are then accurate to 1e-9
-LONGEST = 1e-2  # relative to the time between samples
-_CONSTANT = 1e-9  # relative to the largest component of a wrench: a smaller difference counts as constant
+SHARE = 1e-5  # step relative to the time scale of the motion, for which finite differences are accurate to 1e-9
+LONGEST = 1e-2  # largest step relative to the time between samples
+_CONSTANT = 1e-9  # smaller differences of a wrench, relative to its largest component, count as zero
 
 
 class _Instant(NamedTuple):
@@ -73,7 +73,7 @@ def _rate(time: Array, values: Array) -> Array:
 
 
 def _step(path: Path, jerk: Array) -> float:
-    """Step [s]: a small share of the time for a change by 1 m or 1 rad, and of the time between samples."""
+    """Step [s], a small share of the time for a change by 1 m or 1 rad and of the time between samples."""
     rates = (path.twist, path.twist_rate, jerk)
     quickest = max(float(np.abs(rate).max()) ** (1.0 / order) for order, rate in enumerate(rates, start=1))
     between = float(np.diff(path.time).min()) if len(path) > 1 else 1.0
@@ -92,9 +92,9 @@ def _poses_later(path: Path, jerk: Array, h: float) -> Pose:
 
 
 TENSION_STEP = 1e-5  # relative step of a tension, for derivatives at a fixed pose
-LEAST_STEP = 1e-6  # N, smallest step, used at zero tension
-AT_LIMIT = 1e-8  # relative to the tension: a smaller distance to a limit counts as at the limit
-OUTWARD = 1e-9  # relative to the largest rate: a slower approach does not cross a limit
+LEAST_STEP = 1e-6  # smallest step [N], used at zero tension
+AT_LIMIT = 1e-8  # a smaller distance to a limit, relative to the tension, counts as at the limit
+OUTWARD = 1e-9  # a slower approach, relative to the largest rate, does not cross a limit
 
 
 class _PlacedCables(NamedTuple):
@@ -128,9 +128,9 @@ def _held_limit_rates(
 ) -> Array:
     """Rates of the chord tensions of `Closest` along the path.
 
-    Each tension set is the one nearest to the previous set. In the limit, the rates are the smallest, in the tension
-    variable, that keep the balance and cross no limit. Cables that would cross a limit at these rates are held at it,
-    starting with the largest violation.
+    `Closest` chooses each set of tensions nearest to the previous set. In the limit of small steps, the rates are the
+    smallest rates, in the tension variable, that keep the balance and do not cross a limit. Cables that would cross a
+    limit at these rates are held at the limit, starting with the largest violation.
 
     step: the step [s]. Returns d(tau)/dt [N/s], shape (N, m).
     """
@@ -146,7 +146,7 @@ def _held_limit_rates(
     )
 
     def slopes(values: Callable[[_PlacedCables], Array]) -> tuple[Array, Array]:
-        """d/d(tau) at a fixed pose, and d/dt at fixed tensions."""
+        """Derivatives by tau at a fixed pose, and by time at fixed tensions."""
         by_tau, drift = ((values(last) - values(first)) / by for first, last, by in (by_tension, by_time))
         return by_tau, drift
 
@@ -171,14 +171,14 @@ class _RateConditions(NamedTuple):
 
     structure: Array  # structure matrix J, whose rows combine to the rates of the tension variable, shape (N, n, m)
     matrix: Array  # balance condition: matrix x = right, shape (N, n, m)
-    right: Array  # shape (N, n)
+    right: Array  # right side of this condition, shape (N, n)
     scale: Array  # the rate of the tension variable, scale x + drift, is minimized; shape (N, m)
     drift: Array  # shape (N, m)
     gap_slope: Array  # the distance to the nearest limit has the rate gap_slope x + gap_drift, shape (N, m)
     gap_drift: Array  # shape (N, m)
 
     def solved(self, held: Flags) -> Array:
-        """The smallest rates, (N, m), with some cables held at their limits."""
+        """The smallest rates (N, m) with some cables held at their limits."""
         count, n, m = self.matrix.shape
         system, right = np.zeros((count, m + n, m + n)), np.empty((count, m + n))
         index = np.arange(m)
@@ -197,7 +197,7 @@ class _RateConditions(NamedTuple):
 
 
 def _smallest_rates(conditions: _RateConditions, at_limit: Flags) -> Array:
-    """Smallest rates that cross no limit; cables are held one by one, starting with the largest outward rate."""
+    """Smallest rates that do not cross a limit; cables are held one by one, starting with the largest outward rate."""
     _, n, m = conditions.matrix.shape
     held = np.zeros_like(at_limit)
     rates = conditions.solved(held)
@@ -239,7 +239,7 @@ def _nearest_limits(
         limited = limited_tension(state.robot, cables)
         found = [limited - limits.low, limits.high - limited]
         if method.lowest_point_margin is not None:
-            with np.errstate(divide="ignore", invalid="ignore"):  # a horizontal cable has no such bound
+            with np.errstate(divide="ignore", invalid="ignore"):  # a horizontal cable does not have this bound
                 weight = 0.5 * cables.cable.linear_density * cables.gravity * cables.chord
                 bound = weight * cables.chord / np.abs(cables.rise)
                 if method.lowest_point_margin > 0.0:  # on a vertical cable, a bound of zero remains zero

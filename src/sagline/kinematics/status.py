@@ -40,7 +40,7 @@ class PoseStatus(Status):
         "the feasible tensions are unbounded, so they have no center; give tension_max, or choose MinimumNorm",
     )
     NO_POSE = (
-        100,  # not from a kernel: a value that is not a pose never reaches one
+        100,  # set by the caller, because kernels never get invalid poses
         "the value is not a pose: a number is not finite, or the quaternion is not of length 1; give a position and "
         "a unit quaternion, scalar last",
     )
@@ -88,5 +88,5 @@ class ForwardStatus(Status):
     )
 
 
-# Stable equilibria: the platform does not leave them by itself.
+# Statuses of stable equilibria, which the platform does not leave by itself.
 STABLE = (ForwardStatus.SOLVED, ForwardStatus.LOOSE, ForwardStatus.OVERSTRETCHED)

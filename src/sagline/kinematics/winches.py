@@ -19,7 +19,7 @@ from sagline.robot.drum import Drums, drum_tension, drums_of, warmth
 from sagline.robot.robot import Robot
 
 Winding = Literal["constant", "remembered"]
-LARGEST: Final = 2.0**53  # counts: larger whole numbers are not exact as floats
+LARGEST: Final = 2.0**53  # [counts], larger whole numbers are not exact as floats
 
 
 def encoder_counts(
@@ -30,8 +30,8 @@ def encoder_counts(
     Args:
         plan: A plan of a robot whose winches have a drum, counts, and the zeros of counts and lengths.
         winding: State of the cable on the drum. "constant": all cable was wound at the winches' winding_tension.
-            "remembered": cable is also wound along the plan, each meter at its tension at the drum when it was wound
-            in; the cable below, on the drum since the first sample, was wound at winding_tension.
+            "remembered": cable that is wound in along the plan keeps its tension at the drum at that time; the cable
+            below it, on the drum since the first sample, was wound at winding_tension.
         temperature: Temperature of the cables minus the temperature for which the winch lengths are valid [K], a number
             or one per cable.
         creep: Creep of the cables along the path of the plan, zero at its first sample, under the plan's
@@ -187,8 +187,8 @@ class WinchRates(Result):
     """Speeds and torques of the winches along a path, arrays of shape (N, m); NaN where the plan has no solution.
 
     Drum speeds are positive while cable is paid out. Motor quantities are positive in the direction in which the
-    encoder on the motor shaft counts up. With a positive gear both directions agree, and a motor that only holds a
-    cable has a negative torque.
+    encoder on the motor shaft counts up. With a positive gear both directions agree, and a motor that holds a cable at
+    rest has a negative torque.
 
     Attributes:
         drum_speed: Speed of the drum [rad/s].
@@ -228,9 +228,9 @@ def winch_rates(plan: Plan) -> WinchRates:
     """Speeds and torques of the winches along a plan, and samples at which they exceed their limits.
 
     The lever of the cable is the change of its length per drum turn divided by 2 pi, so that power is conserved. It
-    equals the pitch radius of the layer except for two effects: the pitch of the helix adds about 0.01 %, and the
-    moving exit adds the pitch times the slant of the run, 0.06 % for a groove pitch of 4 mm, 40 mm off center at a
-    distance of 0.8 m. The cable on the drums is at winding_tension.
+    differs from the pitch radius of the layer by two effects. The pitch of the helix adds about 0.01 %. The moving exit
+    adds the groove pitch times the slant of the cable to the pulley, for example 0.06 % for a groove pitch of 4 mm, 40
+    mm off center at a distance of 0.8 m. The cable on the drums is at winding_tension.
 
     Args:
         plan: A plan along a path, of a robot whose winches have drum_radius and groove_pitch and whose cables have a
@@ -296,7 +296,7 @@ def _exceeds(values: Array | None, limit: Array | None) -> Flags | None:
 
 
 def _differences(time: Array, values: Array) -> Array:
-    """Rates of values, (N, m), within each run of valid samples; NaN for an isolated sample."""
+    """Rates of values (N, m) within each range of consecutive valid samples; NaN for an isolated sample."""
     found = np.full(values.shape, np.nan)
     kept = np.isfinite(values).all(axis=-1)
     gradient: Any = np.gradient  # its type annotations do not support arrays of two axes

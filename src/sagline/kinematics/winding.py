@@ -18,10 +18,10 @@ from sagline.robot.robot import Robot
 from sagline.robot.routing import with_routing
 
 Winding = ArrayLike | Literal["path"]
-ITERATIONS: Final = 100  # usually about ten; more if the routing length changes a lot, or friction is high
+ITERATIONS: Final = 100  # usually about ten; more for large changes of the routing length or high friction
 MEMORY: Final = 5  # previous iterations used in Anderson mixing
 _RANK: Final = 1e-6
-TOLERANCE: Final = 1e-13  # relative to a length
+TOLERANCE: Final = 1e-13  # convergence tolerance, relative to a length
 _OPEN = (codes.FORWARD_NOT_CONVERGED, codes.FORWARD_NO_LENGTHS)
 
 
@@ -47,7 +47,7 @@ def checked_winding(winding: ArrayLike, shape: tuple[int, ...], cables: int) -> 
 
 
 def without_guides(robot: Robot, solver: str, instead: str) -> Robot:
-    """The robot; refuses one whose cables sag between guides.
+    """The robot, unchanged; a robot whose cables sag between guides is refused.
 
     solver: name of the function that does not support guides, for the message.
     """
@@ -69,7 +69,7 @@ def iterate_routing(
     """Equilibria at lengths that include the actual routing.
 
     The lengths for the kernels are the given lengths minus the correction for guides and friction at the tensions of
-    the previous iteration; repeated until convergence.
+    the previous iteration. This is repeated until convergence.
 
     found: equilibria for a straight guided run without friction, at the lengths minus the initial correction; lengths:
     unstrained lengths (N, m); loads: external plus inertial wrenches (1 or N, 6); winding: directions of friction,

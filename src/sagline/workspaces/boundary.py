@@ -1,4 +1,4 @@
-"""Boundary of a set described by a function: its surface, its volume with an error bar, its components."""
+"""Boundary of a set that a function describes: surface, volume with an error bar, and components."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from sagline.workspaces.region import Region
 from sagline.workspaces.surface import Components, Surface, components_of, normals_of, vertex_areas, volumes_of
 
 MOST_CELLS: Final = 128  # along an axis
-MOST_HALVED: Final = 256  # along an axis: 17 million nodes, half a gigabyte
+MOST_HALVED: Final = 256  # largest number of cells along an axis: 17 million nodes, half a gigabyte
 MOST_HALVINGS: Final = 3
-AT_NODE: Final = 1e-10  # share of a grid edge: a closer vertex counts as at the node
+AT_NODE: Final = 1e-10  # a vertex closer to a node than this share of a grid edge counts as at the node
 FACES: Final = ("x low", "x high", "y low", "y high", "z low", "z high")
 
 
@@ -41,11 +41,11 @@ class Boundary(Result):
     Attributes:
         surface: The boundary, closed along the faces of the box; vertices off these faces are on the boundary to 1e-10
             of a cell.
-        volume: Volume of the set within the box [m^3]: that of the surface plus that of the bulges between its
-            vertices.
-        volume_error: Error bound of the volume [m^3]. Not included are parts of the set, and gaps in it, that are
-            thinner than two cells of the finest grid.
-        grid: The function at the nodes of the grid, before cells were halved.
+        volume: Volume of the set within the box [m^3]: enclosed volume of the surface plus volume between its triangles
+            and the boundary.
+        volume_error: Error bound of the volume [m^3]. It does not include parts and gaps of the set that are thinner
+            than two cells of the finest grid.
+        grid: Values of the function at the nodes of the grid before refinement.
         components: The separate pieces of the set.
         open_faces: Faces of the box that the set reaches, for example "x low"; the set may continue beyond them.
         evaluations: Number of positions at which the function was evaluated.
@@ -139,7 +139,7 @@ def _place_vertices(
         return net, vertices, slope
     one = merge_vertices(net.inner, np.where(at_node[:, None], net.inner, net.outer), net.faces, grid.values.shape)
     kept = Surface(vertices[one.first], one.faces)
-    if not kept.closed:  # a sheet without thickness: its two sides remain separate
+    if not kept.closed:  # the two sides of a sheet without thickness remain separate
         return net, vertices, slope
     return one, kept.vertices, np.where(at_node, np.nan, slope)[one.first]
 
@@ -163,9 +163,9 @@ def _faces_on_box(surface: Surface, grid: Grid) -> list[NDArray[np.bool_]]:
     return [(corners[:, :, k] == axis[end]).all(axis=1) for k, axis in enumerate(grid.axes) for end in (0, -1)]
 
 
-MEAN: Final = 3.0 / 4.0  # share of the distance at the center of a curved triangle
-MISSED: Final = 5.0 / 12.0  # largest share of this distance
-FLAT: Final = 1e-6  # share of the reach: a smaller distance adds nothing
+MEAN: Final = 3.0 / 4.0  # mean distance relative to that at the center of a curved triangle
+MISSED: Final = 5.0 / 12.0  # largest value of this share
+FLAT: Final = 1e-6  # smaller distances, relative to the reach, are ignored
 
 
 def _bulge_volumes(level: Level, vertices: Array, faces: Indices, slope: Array, grid: Grid) -> tuple[Array, Array]:
@@ -202,7 +202,7 @@ def _distances_to_boundary(
 
 
 def _between(level: Level, ends: Brackets) -> Array:
-    """Position of the sign change in brackets: by their chord, or by iteration if an end is infinite."""
+    """Position of the sign change in brackets, by linear interpolation, or by iteration if an end is infinite."""
     inner, outer, at_inner, at_outer = (part[ends.k] for part in ends[:4])
     with np.errstate(invalid="ignore"):
         share = at_inner / (at_inner - at_outer)
@@ -211,7 +211,7 @@ def _between(level: Level, ends: Brackets) -> Array:
     return np.asarray(inner + share[:, None] * (outer - inner))
 
 
-PRECISE: Final = 1e-4  # of the level at the nearer node, and of an edge of the grid at jumps: less than is seen
+PRECISE: Final = 1e-4  # precision relative to the level at the nearer node, and to a grid edge at jumps; not visible
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,6 +1,6 @@
 """Criteria of a workspace: margin, sag, position error, stiffness, frequency, clearance and frame.
 
-If a criterion depends on tensions, they balance the middle load of the wrench set.
+The tensions for criteria on tensions balance the middle load of the wrench set.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from sagline.statics.slopes import cable_slopes
 from sagline.statics.stiffness import compliance_of, modes
 from sagline.workspaces.criterion import NOT_NEGATIVE, POSITIVE, Criterion, Given, Judged
 
-_PRECISION: Final = 1e-6  # m: largest jump of the clearance function from pose to pose
+_PRECISION: Final = 1e-6  # [m], largest jump of the clearance function from pose to pose
 _CABLE: Final = re.compile(r"cable (\d+)")
 _CORNERS: Final = 0.5 * np.array(list(product((-1.0, 1.0), repeat=3)))
 
@@ -37,7 +37,7 @@ _CORNERS: Final = 0.5 * np.array(list(product((-1.0, 1.0), repeat=3)))
 class LeastMargin(Criterion):
     """The cables balance every wrench of the set with a reserve in any direction.
 
-    Every workspace includes it with zero reserve: `workspace` puts it first.
+    Every workspace includes this criterion with zero reserve; `workspace` puts it first.
 
     Attributes:
         limit: Reserve [N], >= 0.
@@ -51,7 +51,7 @@ class LeastMargin(Criterion):
 
     @property
     def always(self) -> bool:
-        """True for zero reserve: every workspace includes it."""
+        """True for zero reserve, which every workspace includes."""
         return self.limit == 0.0
 
     def judge(self, given: Given) -> Judged:
@@ -59,7 +59,7 @@ class LeastMargin(Criterion):
         return Judged(locked(given.margin - self.limit), given.cable)
 
     def scale(self, robot: Robot) -> float:
-        """Weight of the platform; without gravity the largest tension of a cable [N]."""
+        """Weight of the platform [N]; without gravity the largest tension of a cable."""
         weight = robot.mass * robot.gravity
         if weight > 0.0:
             return weight
@@ -92,8 +92,8 @@ class MaximumSag(Criterion):
 class PositionError(Criterion):
     """The position error of a simpler cable model is within a limit.
 
-    The lengths are those of the simpler model, with its tensions, under the middle load of the set. The platform then
-    rests at the equilibrium of exact cables of these lengths, as in `confirm`.
+    The simpler model gives tensions and lengths for the middle load of the set. The platform then rests at the
+    equilibrium of exact cables with these lengths, as in `confirm`.
 
     Attributes:
         model: Cable model, for example `Straight()`.
@@ -152,7 +152,7 @@ class LeastStiffness(Criterion):
 class LeastFrequency(Criterion):
     """The lowest natural frequency of the platform on massless cables, as by `modes`, is above a limit.
 
-    The load is the middle load of the set; 0 Hz without a stable equilibrium.
+    The load is the middle load of the set. The frequency is 0 Hz without a stable equilibrium.
 
     Attributes:
         limit: Smallest natural frequency [Hz], > 0.
@@ -218,8 +218,8 @@ class Clearance(Criterion):
 class InFrame(Criterion):
     """The platform's box and anchors keep a distance from the faces of the frame.
 
-    The frame is the robot's frame_size, or the box of its anchors down to the floor. For a planar robot, its plane
-    counts.
+    The frame is the robot's frame_size, or the box of its anchors down to the floor. For a planar robot, only
+    directions in its plane are used.
 
     Attributes:
         limit: Smallest distance from the faces [m], >= 0.
@@ -271,7 +271,7 @@ def _least_stiffness(freedom: Array, matrix: Array) -> Array:
     own = 0.5 * (own + np.swapaxes(own, 1, 2))
     size = np.sqrt(np.abs(np.einsum("kii->ki", own)))
     size[size == 0.0] = 1.0
-    balanced = own / (size[:, :, None] * size[:, None, :])  # scaled, so that forces and moments are comparable
+    balanced = own / (size[:, :, None] * size[:, None, :])  # scaled so that forces and moments are comparable
     stable = np.linalg.eigvalsh(balanced)[:, 0] > 0.0
     compliance = compliance_of(freedom, matrix)[:, :3, :3]
     known = np.asarray(stable & ~np.isnan(compliance).any(axis=(1, 2)))

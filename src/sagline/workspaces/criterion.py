@@ -63,21 +63,21 @@ class Given:
 
     @cached_property
     def held(self) -> Flags:
-        """True at poses whose margin is not negative, shape (N,)."""
+        """True at held poses, whose margin is not negative, shape (N,)."""
         return np.asarray(self.margin >= 0.0)
 
     @cached_property
     def plan(self) -> Plan:
-        """Tensions and lengths at the K poses that are held."""
+        """Tensions and lengths at the K held poses."""
         return self.planned(self.model)
 
     def planned(self, model: CableModel) -> Plan:
-        """Tensions and lengths of another cable model at the K poses that are held."""
+        """Tensions and lengths of another cable model at the K held poses."""
         return inverse(self.robot, self.pose[self.held], model, self.tension, self.wrench)
 
     @property
     def state(self) -> Equilibrium:
-        """Equilibrium at the K poses that are held."""
+        """Equilibria at the K held poses."""
         return self.plan.state
 
     def spread(self, values: Array) -> Array:

@@ -12,7 +12,7 @@ from sagline.core.arrays import Array, Indices
 from sagline.workspaces.grid import Level, level_values
 
 TRIAL = 3  # steps of regula falsi, after which a bracket must have shrunk to an eighth
-ITERATIONS = 100  # a jump takes some 45 by bisection; continuous functions end after 5 to 8
+ITERATIONS = 100  # largest number of steps; a jump takes about 45 by bisection, a continuous function 5 to 8
 
 
 class Brackets(NamedTuple):
@@ -41,7 +41,7 @@ class Brackets(NamedTuple):
 def brackets(
     level: Level, points: Array, outward: Array, at_points: Array, step: Array, outer_limit: Array, inner_limit: Array
 ) -> Brackets:
-    """Search from points (N, 3) [m], outward if they are inside, else inward, in steps that triple up to a limit."""
+    """Search from points (N, 3) [m], outward from inside points, else inward, in steps that triple up to a limit."""
     is_inside = at_points >= 0.0
     limit = np.where(is_inside, outer_limit, inner_limit)
     away = np.where(is_inside, 1.0, -1.0)[:, None] * outward
@@ -71,7 +71,7 @@ def crossings(
     precision: float = 1e-10,
     narrow: float = 1e-12,
 ) -> Array:
-    """Share of each line that is inside one function, (V,): `crossings_of` with the same function for all lines."""
+    """Share of each line that is inside, (V,): `crossings_of` with the same function for all lines."""
 
     def values(_: Indices, positions: Array) -> Array:
         return level_values(level, positions)
@@ -130,7 +130,7 @@ class _BisectionSchedule:
     """Bisection steps due for each bracket, doubled each time a trial of regula falsi is slower than bisection."""
 
     def __init__(self, count: int) -> None:
-        self._width = np.ones(count)  # at the start of a trial
+        self._width = np.ones(count)  # width of the bracket at the start of a trial
         self._steps, self._due = np.zeros((2, count), dtype=np.int64)
         self._next = np.ones(count, dtype=np.int64)
 

@@ -1,8 +1,8 @@
-"""Grid of values of a function of positions, refined where its sign changes, and the net around its inside.
+"""Grid of values of a function of positions, with refinement where its sign changes, and the net around its inside.
 
-The net is that of marching cubes. Only signs enter: where on its edge a vertex lies is found afterwards, on the exact
-function. Nodes inside are joined along the edges of the grid; those outside also across faces and corners, which closes
-the net everywhere.
+The net is that of marching cubes. It depends only on signs. The position of a vertex on its edge is computed afterwards
+with the exact function. Nodes inside are connected along the edges of the grid. Nodes outside are also connected across
+faces and corners, which closes the net everywhere.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from sagline.core.errors import FileError, InvalidValueError
 from sagline.core.results import Result
 
 Level = Callable[[Array], Array]
-"""A function of positions [m], shape (N, 3): >= 0 inside, shape (N,); it may be infinite, and may jump."""
+"""A function from positions [m], shape (N, 3), to values, shape (N,), >= 0 inside; it may be infinite or jump."""
 Mask = NDArray[np.bool_]
 
 _CELL = tuple(product((0, 1), repeat=3))  # the corners of a cell
-_HALVED = tuple(product((0, 1, 2), repeat=3))  # nodes of a cell with halved edges
+_HALVED = tuple(product((0, 1, 2), repeat=3))  # indices of the nodes of a cell with halved edges
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,8 +35,8 @@ class Grid(Result):
         y: The same along y, shape (ny,).
         z: The same along z, shape (nz,).
         values: The function, >= 0 inside, shape (nx, ny, nz).
-        evaluated: True if the function was evaluated, shape (nx, ny, nz); elsewhere only the sign is valid, and the
-            value is that of a neighbor.
+        evaluated: True if the function was evaluated, shape (nx, ny, nz); at other nodes only the sign is valid, and
+            the value is that of a neighbor.
     """
 
     x: Array
@@ -90,7 +90,7 @@ def sample_grid(level: Level, low: Array, high: Array, cells: tuple[int, int, in
 
 
 def refine_grid(grid: Grid, level: Level) -> Grid:
-    """Grid of half the step, evaluated only in cells that the boundary crosses on either grid."""
+    """Grid of half the step, evaluated only in cells that the boundary crosses on one of the grids."""
     axes = [np.interp(np.arange(2 * len(a) - 1) / 2.0, np.arange(len(a)), a) for a in grid.axes]
     nearest = np.ix_(*(np.arange(len(axis)) // 2 for axis in axes))
     fine = _grid(axes, grid.values[nearest], np.zeros([len(axis) for axis in axes], dtype=np.bool_), lock=False)
@@ -156,7 +156,7 @@ def triangulate(inside: Mask) -> Net:
     except ModuleNotFoundError:
         raise FileError.not_installed("scikit-image", "Workspaces need it", "workspace") from None
     padded = np.pad(np.where(inside, np.float32(1.0), np.float32(-1.0)), 1, constant_values=-1.0)
-    # the older table has only signs, and vertices only on edges
+    # the older table uses only signs, and has vertices only on edges
     middle, faces, _, _ = marching_cubes(  # type: ignore[no-untyped-call]
         padded, 0.0, method="lorensen", gradient_direction="ascent"
     )

@@ -18,7 +18,7 @@ from sagline.workspaces.margin_rows import MarginRows
 from sagline.workspaces.orientations import Orientations
 from sagline.workspaces.wrench_sets import WrenchSet
 
-BLOCK: Final = 1 << 12  # poses per block: a tenth of a second, the delay of an interrupt
+BLOCK: Final = 1 << 12  # poses per block, about 0.1 s; interrupts are handled between blocks
 
 
 class Details(NamedTuple):
@@ -43,8 +43,8 @@ class Details(NamedTuple):
 class Levels:
     """Smallest value of all criteria, each divided by its scale, at positions of the platform: >= 0 inside.
 
-    If the margin is negative, criteria on tensions do not count, because there are no tensions. Among the rotations the
-    smallest level counts, or the largest if any rotation is sufficient.
+    If the margin is negative, criteria on tensions are ignored, because there are no tensions. Among the rotations the
+    smallest level is taken, or the largest one if any rotation is sufficient.
 
     Attributes:
         robot: The robot.
@@ -54,7 +54,7 @@ class Levels:
         model: Cable model.
         tension: Tension distribution method.
         moment_arm: Lever arm as in `margin` [m].
-        held: Axis along which all positions are the same, and their coordinate [m]; None for none.
+        held: Axis along which all positions have the same coordinate, and this coordinate [m]; None if there is none.
         on_block: Called after each block with its number of poses.
         middle: Middle of the wrench set, which the tensions balance, shape (6,).
     """
@@ -125,11 +125,11 @@ class Levels:
             if one.needs_tensions and not given.held.any():
                 continue
             judged = one.judge(given)
-            # tensions that a tension method does not find although they exist: outside. At the border of what can
-            # be held, and beyond, the margin decides.
+            # A pose at which the tension method does not find existing tensions counts as outside. Near the border of
+            # feasibility and outside, the margin decides.
             lost = np.isnan(judged.value) & (bracket.low >= 0.0)
             value = np.where(lost, -np.inf, judged.value / scale)
-            least = value < level  # NaN compares false
+            least = value < level  # NaN compares as false
             level[least], criterion[least] = value[least], index
             cable[least] = -1 if judged.cable is None else judged.cable[least]
         return Details(level, bracket.value, criterion, cable, np.full(len(rows), rotation, dtype=np.int64))

@@ -1,4 +1,4 @@
-"""Signed margin of a wrench set: the additional load that a pose can support; above zero inside the workspace."""
+"""Signed margin of a wrench set: the additional load that a pose can support; positive inside the workspace."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class MarginStatus(Status):
 
 
 _CATENARY = Catenary()
-_POSE_BYTES = 200.0  # memory per pose, with rows and results
+_POSE_BYTES = 200.0  # memory per pose for rows and results [bytes]
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -68,18 +68,19 @@ class Margin(Result):
         robot: The robot, or one per pose.
         pose: The poses.
         wrenches: The set of loads.
-        moment_arm: Lever arm by which moments count [m]; None for each robot's mean lever arm.
-        value: Largest load beyond the set that can still be balanced, whatever its direction, where a moment counts as
-            a force at the lever arm; below zero what the set is too large by [N], shape () or (N,). Continuous, and
-            never NaN: infinite where nothing limits, -infinite where the status has no margin.
-        low: Lower end of the bracket that the cables' sag leaves [N]; at zero and above every load of the set is
-            proved feasible, shape as of value. Both ends are the value where cables do not sag.
-        high: Upper end [N]; below zero a load of the set is proved infeasible.
-        direction: Normal of the facet that the value is the distance to, shape (..., 6): force part, and moment part
-            [1/m], world axes, of length 1 where the moment part is times the lever arm. Along it the cables give too
-            little first; a load against it fails first. A force part of zero: a moment alone does.
-        limiting_cable: The cable whose limit moves the value fastest, -1 where there is none, shape as of value.
-        status: Codes of `MarginStatus`, shape as of value.
+        moment_arm: Lever arm that converts moments to forces [m]; None for each robot's mean lever arm.
+        value: Largest additional load that can still be balanced in any direction [N], shape () or (N,); a moment
+            counts as a force at the lever arm. A negative value is the excess of the set. It is continuous and never
+            NaN: infinite without limits, -infinite if the status has no margin.
+        low: Lower bound of the margin for all sag forces [N], with the shape of value. If it is not negative, every
+            load of the set is proved feasible. Without sag, both bounds are equal to the value.
+        high: Upper bound [N]; if it is negative, a load of the set is proved infeasible.
+        direction: Normal of the facet whose distance is the value, shape (..., 6): force part, and moment part [1/m],
+            in world axes. Its length is 1 if the moment part is multiplied by the lever arm. A growing load against
+            this direction is the first that the cables cannot balance. A force part of zero means that this load is a
+            moment alone.
+        limiting_cable: The cable whose limit changes the value fastest, -1 if there is none, with the shape of value.
+        status: Codes of `MarginStatus`, with the shape of value.
     """
 
     robot: Robots
@@ -95,11 +96,11 @@ class Margin(Result):
 
     @property
     def feasible(self) -> Flags:
-        """True where every load of the set is proved feasible, shape () or (N,)."""
+        """True if every load of the set is proved feasible, shape () or (N,)."""
         return locked(np.asarray(self.status == MarginStatus.FEASIBLE))
 
     def __str__(self) -> str:
-        """Margin of a single pose, or of many the number of each status, and the least and largest."""
+        """Margin of a single pose; for many poses, the number of each status, and the smallest and largest margin."""
         if self.value.ndim == 0:
             cable = f", cable {int(self.limiting_cable)}" * (int(self.limiting_cable) >= 0)
             status = MarginStatus(int(self.status))
@@ -134,19 +135,19 @@ def margin(
 ) -> Margin:
     """Signed margin of a set of loads at each pose, with a bracket for the cables' sag.
 
-    Also valid at poses without a tension distribution. With sag the bracket is proved for all tensions: low >= 0 means
-    that every load of the set can be balanced within the limits, high < 0 that at least one load cannot. Sagging cables
-    are included up to a length of fifteen times their chord, because a lower limit of zero has no largest sag force.
-    Without an upper limit they are included until they are stretched to twice their own length.
+    The margin is also valid at poses without a tension distribution. With sag, the bracket is proved for all tensions.
+    low >= 0 means that every load of the set can be balanced within the limits, and high < 0 that at least one load
+    cannot. Sagging cables are included up to a length of fifteen times their chord, because a lower limit of zero has
+    no largest sag force. Without an upper limit, tensions are included up to a stretch to twice the cable's length.
 
     Args:
         robot: The robot, or a sequence of N robots, one per pose.
         pose: A single pose or N.
         wrenches: The set of loads; None for the weight alone.
-        model: Cable model; with `Straight()` both ends of the bracket are the value.
+        model: Cable model; with `Straight()` both ends of the bracket are equal to the value.
         moment_arm: Lever arm at which a moment counts like a force [m], >= 0. None: the mean distance of the platform
-            anchors from the center of mass. 0: forces alone, the capacity margin of `capacity_margin`; where a moment
-            alone fails the value is then -infinite.
+            anchors from the center of mass. 0: only forces count, as in the capacity margin of `capacity_margin`; the
+            value is then -infinite if a moment alone is infeasible.
         progress: Called after every few thousand poses with the number of finished poses and the number of all poses.
 
     Returns:

@@ -23,17 +23,17 @@ from sagline.statics.tables import robot_terms
 from sagline.tension.method import LIMITS_OF
 from sagline.workspaces.wrench_sets import NO_LOAD, WrenchSet
 
-BLOCK = 1 << 13  # poses per block: a tenth of a second, the delay of an interrupt
+BLOCK = 1 << 13  # poses per block, about 0.1 s; interrupts are handled between blocks
 _CATENARY = Catenary()
 
 
 class Bracket(NamedTuple):
-    """Margins of N poses; `Margin` has these fields with robot and poses.
+    """Margins of N poses; `Margin` has these fields together with robot and poses.
 
     Attributes:
         value: Continuous margin between `low` and `high` [N], (N,).
-        low: Lower end of the bracket that the cables' sag leaves [N], (N,).
-        high: Upper end [N], (N,).
+        low: Lower bound of the margin for all sag forces [N], (N,).
+        high: Upper bound [N], (N,).
         cable: Cable whose limit changes the value most, -1 for none, (N,).
         status: Codes of `MarginStatus`, (N,).
         direction: Normal of the facet of the value, (N, 6).
@@ -48,7 +48,7 @@ class Bracket(NamedTuple):
 
 
 class MarginRows:
-    """Margins of rows of poses, for one robot or for many that share motion pattern, gravity and number of cables.
+    """Margins of rows of poses, for one robot or for many with the same motion pattern, gravity and number of cables.
 
     All pose-independent data are prepared once; `rows` then costs a few microseconds per call and a few per pose.
     Several threads may call it at the same time.
@@ -64,9 +64,9 @@ class MarginRows:
         moment_arm: float | None = None,
         cables: Array | None = None,
     ) -> None:
-        """Prepare one robot or R of them; moment_arm [m] as of `margin`.
+        """Prepare one robot or R robots; moment_arm [m] as in `margin`.
 
-        With `cables`, the tables (R, m, CABLE_COLUMNS) of R robots that differ from the one in nothing else.
+        With `cables`, R robots that differ from the given robot only in these cable tables (R, m, CABLE_COLUMNS).
         """
         robots = together(robot)
         shared = first_of(robots)

@@ -1,4 +1,4 @@
-"""Pose nearest to a feasible one, for a robot whose workspace is empty."""
+"""Pose that is nearest to feasibility, for a robot with an empty workspace."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from sagline.workspaces.levels import Details, Levels
 from sagline.workspaces.wrench_sets import NO_LOAD, WrenchSet
 
 _STARTS: Final = 3  # number of best grid points from which the search starts
-_STEP: Final = 0.1  # share of the box: initial step
-_EVALUATIONS: Final = 300  # largest number from each start
-_PRECISION: Final = 1e-4  # m
+_STEP: Final = 0.1  # initial step, as a share of the box
+_EVALUATIONS: Final = 300  # largest number of evaluations from each start
+_PRECISION: Final = 1e-4  # precision of the position [m]
 _FAR: Final = 1e6  # replaces levels of minus infinity, because the search needs finite numbers
 _UNHELD: Final = 1e3  # reduction of the levels at infeasible poses
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Nearest(Result):
-    """Pose nearest to a feasible one.
+    """Pose that is nearest to feasibility.
 
     Attributes:
         pose: A single pose.
@@ -70,9 +70,9 @@ def nearest_to(levels: Levels, grid: Grid, low: Array, high: Array) -> Nearest:
 
 
 def _merit(levels: Levels, positions: Array) -> Array:
-    """Finite merit of positions: levels, and the feasible fraction of the load if the full load is not feasible.
+    """Finite merit of positions: their levels, or the feasible fraction of the load if the full load is not feasible.
 
-    Margins alone would lead to singular poses, at which all of them are small.
+    Margins alone would lead to singular poses, where all margins are small.
     """
     found = levels.details(positions)
     bare = levels.margins_of(NO_LOAD, positions, found.rotation)
@@ -85,7 +85,7 @@ def _merit(levels: Levels, positions: Array) -> Array:
 
 
 def _share(bare: Array, margin: Array) -> Array:
-    """Proved feasible fraction of the load if the weight alone is feasible: margins are concave in the load."""
+    """Proved feasible fraction of the load if the weight alone is feasible, because margins are concave in the load."""
     return np.asarray(bare / (bare - margin))
 
 

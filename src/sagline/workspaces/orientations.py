@@ -1,4 +1,4 @@
-"""Orientations in which the platform is held: level, all of some rotations, or any of them."""
+"""Orientations of the platform in a workspace: level, all of some rotations, or any of them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 Need = Literal["all", "any"]
 _NEEDS: Final = ("all", "any")
-_SHARES: Final = np.array([-1.0, -0.5, 0.5, 1.0])  # shares of the angle by which a planar platform is rotated
+_SHARES: Final = np.array([-1.0, -0.5, 0.5, 1.0])  # rotations of a planar platform, as shares of the angle
 _CORNERS: Final = np.array([one for one in product((-1.0, 0.0, 1.0), repeat=3) if any(one)])
 _AXES: Final = _CORNERS / np.linalg.norm(_CORNERS, axis=1, keepdims=True)
 
@@ -87,7 +87,7 @@ class Orientations:
         return f"turned by {turn_in_words(turn * np.copysign(1.0, self.quaternion[0, 3]))}"
 
     def __reduce__(self) -> tuple[Any, tuple[Array, Need]]:
-        """Exact pickling."""
+        """Pickle data that preserve all bits."""
         return Orientations._of, (self.quaternion, self.need)
 
     def at(self, positions: Array, index: int) -> Array:

@@ -1,4 +1,4 @@
-"""Proofs for boxes of poses with sagging cables: the robot can work at every pose of a box, or at none."""
+"""Proofs for boxes of poses with sagging cables: every pose of a box is feasible, or no pose is."""
 
 from __future__ import annotations
 
@@ -36,16 +36,16 @@ class ProofVerdict(Status):
     PROVED_OUTSIDE = OUTSIDE, "at no position is every load balanced by tensions within the limits"
 
 
-BLOCK: Final = 1 << 11  # boxes per block: some hundredths of a second, the delay of an interrupt
-MOST_CELLS: Final = 4_000_000  # waiting cells: 100 MB
-OBLONG: Final = 0.6  # share of the longest edge: longer edges are halved with it
-PARTS: Final = (1, 4, 8, 16)  # numbers of cubes of rotation vectors along an edge, in order: two are hardly smaller
-PRECISION: Final = (1.0, 1e-12)  # all that slopes leave out counts; a sum of a thousand parts errs by 1e-13 of them
+BLOCK: Final = 1 << 11  # boxes per block, some hundredths of a second; interrupts are handled between blocks
+MOST_CELLS: Final = 4_000_000  # largest number of waiting cells, 100 MB
+OBLONG: Final = 0.6  # edges longer than this share of the longest edge are halved with it
+PARTS: Final = (1, 4, 8, 16)  # tried numbers of cubes of rotation vectors along an edge; two are hardly smaller
+PRECISION: Final = (1.0, 1e-12)  # full weight of nonlinear terms; relative error of a sum of a thousand terms
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cells(Result):
-    """K cells of a divided box of poses.
+    """The K cells of a divided box of poses.
 
     Attributes:
         low: Lowest position of each [m], shape (K, 3).
@@ -76,7 +76,7 @@ class Prover:
         precision: tuple[float, float] = PRECISION,
         progress: Progress | None = None,
     ) -> None:
-        """Prepare; the robot has no pulleys, and only tests use a precision other than the default."""
+        """Prepare the proofs; the robot must not have pulleys, and only tests change the precision."""
         limits = (LIMITS_OF[robot.tension_limits_of], np.nan)
         self._given = (
             (model.code, *model.parameters), limits, robot_terms(robot), _load_terms(wrenches, robot), precision,
@@ -90,8 +90,8 @@ class Prover:
     def verdicts(self, middle: Array, half: Array, rotations: Array | None = None, turns: Array | float = 0.0) -> Codes:
         """Verdicts (N,) of boxes of poses, block by block; OPEN after the deadline.
 
-        Boxes: centers (N, 3) and half edges (3,) [m], rotation vectors (N, 3), None for level, and largest rotations
-        relative to them [rad], () or (N,).
+        A box is given by its center (N, 3) and half edges (3,) [m], a rotation vector (N, 3), None for level, and the
+        largest rotation relative to it [rad], () or (N,).
         """
         boxes = np.zeros((len(middle), BOX_COLUMNS))
         boxes[:, :3] = middle
@@ -143,9 +143,11 @@ def _bisect(prover: Prover, box: PoseBox, smallest: float) -> Cells:
 def _decide(prover: Prover, middle: Array, half: Array, tilt: float) -> Codes:
     """Verdicts of cells of positions, level or at all tilts up to one.
 
-    Tilts are rotation vectors in a ball, which cubes cover, or of a planar robot along its normal, which pieces do. A
-    turn from one cube's middle to any vector in it is no longer than their difference. Outside needs one orientation,
-    inside all. Cubes stay larger than the cells, which turn the cables by their size over a chord.
+    Tilts are rotation vectors in a ball, which is covered by cubes. For a planar robot they are rotations about the
+    normal of its plane, and their range is divided into intervals. The rotation between the middle of a cube and
+    another vector of the cube is at most the difference of the two vectors. A cell is outside if one orientation is
+    infeasible, and inside if all orientations are feasible. Cubes remain larger than the rotation of the cables within
+    a cell, which is the cell's size divided by a chord.
     """
     if tilt == 0.0:
         return prover.verdicts(middle, half)
@@ -187,7 +189,7 @@ def _smaller_cubes(cells: Indices, vectors: Array, edges: Array, parts: int, mor
 
 
 def _children(half: Array) -> tuple[Array, Array]:
-    """Centers of the parts of a box, relative to its own, and their half edges: all long edges are bisected."""
+    """Centers of the parts of a box, relative to its own center, and their half edges; all long edges are bisected."""
     long = (half >= OBLONG * half.max()) & (half > 0.0)
     halved = np.where(long, 0.5 * half, half)
     steps = [np.array([-1.0, 1.0]) * halved[k] if long[k] else np.zeros(1) for k in range(3)]
@@ -251,12 +253,12 @@ class Proof(Result):
 
     @property
     def inside_volume(self) -> float:
-        """Volume proved inside [m^3]: the workspace in the box is at least that large."""
+        """Volume that is proved inside [m^3], a lower bound of the workspace in the box."""
         return self.inside * self.volume
 
     @property
     def outside_volume(self) -> float:
-        """Volume proved outside [m^3]: the workspace in the box is at most the rest."""
+        """Volume that is proved outside [m^3]; the rest of the box is an upper bound of the workspace."""
         return self.outside * self.volume
 
     @property
@@ -281,13 +283,13 @@ def prove(
     smallest: float | None = None,
     progress: Progress | None = None,
 ) -> Proof:
-    """Prove that a robot can work at every pose of a box, or at none; or divide the box into cells of both kinds.
+    """Prove that every pose of a box is feasible, or that no pose is; or divide the box into cells of both kinds.
 
-    Poses are level; with a tilt of the box a position is inside where every orientation tilted by at most this angle
-    is, about any axis, and outside where one of them is; a planar platform turns about the normal of its plane alone.
-    The box is halved along its edges, again and again, and each cell that can be decided is; what remains when the
-    budget ends is open, never a guess. With `Catenary()` the proofs hold for the exact cables, at tensions of the same
-    range as in `margin`.
+    Without a tilt of the box, poses are level. With a tilt, the orientations of a position are all rotations by at most
+    this angle about any axis (for a planar platform, about the normal of its plane). A position is inside if all its
+    orientations are feasible, and outside if one of them is not. The box is halved along its edges repeatedly until a
+    proof succeeds for each cell. Cells without a proof at the end of the budget are open; no cell is guessed. With
+    `Catenary()` the proofs are valid for the exact cables, at tensions of the same range as in `margin`.
 
     Args:
         robot: The robot, without pulleys.
@@ -303,8 +305,8 @@ def prove(
         Proof.
 
     Raises:
-        InvalidValueError: If an argument is of the wrong kind, the robot has pulleys, or fewer cables
-            than degrees of freedom, or the box tilts a platform that does not turn.
+        InvalidValueError: If an argument is of the wrong kind, the robot has pulleys, or fewer cables than degrees of
+            freedom, or the box has a tilt but the platform cannot rotate.
 
     Examples:
         >>> import sagline as sl

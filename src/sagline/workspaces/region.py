@@ -1,4 +1,4 @@
-"""Region of positions that is examined: a box, a plane, or a slice through a box."""
+"""Region of positions for a workspace: a box, a plane, or a slice through a box."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ class Region(NamedTuple):
     """Region of positions, and its grid.
 
     Attributes:
-        box: As given, or the robot's own.
-        low: Lowest corner of what is searched [m], shape (3,).
-        high: Highest corner, higher along every axis.
-        flat: The axis along which the box has no extent, None for none: positions are taken to lie in that plane, and
-            what is searched is so thick that what it holds a meter is an area.
-        thickness: Of what is searched along it [m]; 1 where there is none.
+        box: The given box, or the robot's own box.
+        low: Lowest corner of the region [m], shape (3,).
+        high: Highest corner [m], which is higher along every axis.
+        flat: The axis along which the box has no extent; None if there is none. Positions are then in this plane, and
+            the region has a thickness, by which a volume is divided to obtain an area.
+        thickness: Thickness of the region along this axis [m]; 1 without such an axis.
         cells: Number of cells along each axis.
     """
 
@@ -41,12 +41,12 @@ class Region(NamedTuple):
 
     @property
     def unit(self) -> str:
-        """Unit of its volume or area."""
+        """Unit of the region's volume or area."""
         return "m³" if self.flat is None else "m²"
 
 
 def region_of(robot: Robot, box: PoseBox | None, cells: int) -> Region:
-    """Region of a box, or by default of the robot's frame and test box; of a planar robot in its cables' plane."""
+    """Region of a box, by default of the robot's frame and test box; for a planar robot, in the plane of its cables."""
     plane = _plane_axis(robot)
     optional(box, PoseBox, "box")
     if box is None:
@@ -88,7 +88,7 @@ def flat_axis(box: PoseBox) -> tuple[int, float] | None:
 
 
 def _plane_axis(robot: Robot) -> int | None:
-    """Axis of a planar robot's plane normal; refused if it is along none."""
+    """Axis of a planar robot's plane normal; an error if it is not along an axis."""
     if robot.plane_normal is None:
         return None
     axis = int(np.argmax(np.abs(robot.plane_normal)))
@@ -104,15 +104,15 @@ def _place_of_plane(robot: Robot, axis: int) -> float:
     return float(robot.frame_anchors[:, axis].mean() - robot.platform_anchors[:, axis].mean())
 
 
-_IN_PLANE: Final = ((1, 2), (0, 2), (0, 1))  # axes across and up a drawing, by the axis that is normal to it
+_IN_PLANE: Final = ((1, 2), (0, 2), (0, 1))  # horizontal and vertical axis of a drawing, by its normal axis
 
 
 class Plane(NamedTuple):
-    """A plane at right angles to an axis of the world.
+    """A plane perpendicular to an axis of the world.
 
     Attributes:
-        normal: That axis, 0 to 2.
-        at: Coordinate of the plane on it [m].
+        normal: Index of the axis, 0 to 2.
+        at: Coordinate of the plane along the axis [m].
     """
 
     normal: int
@@ -128,7 +128,7 @@ class Plane(NamedTuple):
         return f"{AXES[self.normal]} = {self.at:.3g} m"
 
     def positions(self, across: Array, up: Array) -> Array:
-        """Positions (U C, 3) [m] of a grid on it, row by row, from columns (C,) and rows (U,) [m]."""
+        """Positions (U C, 3) [m] of a grid in the plane, row by row, from columns (C,) and rows (U,) [m]."""
         places = np.empty((up.size, across.size, 3))
         first, second = self.axes
         places[..., self.normal] = self.at
@@ -148,8 +148,8 @@ class Slice:
         across: Coordinates of the columns [m], shape (C,).
         up: Coordinates of the rows [m], shape (U,).
         level: >= 0 inside of the workspace, shape (U, C).
-        margin: Signed margins [N], negative where the loads cannot be borne, minus infinity where the robot is
-            singular, shape (U, C).
+        margin: Signed margins [N], negative if the loads are infeasible, minus infinity if the robot is singular, shape
+            (U, C).
         criterion: Index of the deciding criterion, shape (U, C).
         cable: Limiting cable, -1 for none, shape (U, C).
     """

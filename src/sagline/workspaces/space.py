@@ -23,21 +23,21 @@ from sagline.workspaces.region import flat_axis
 from sagline.workspaces.surface import Components, Surface, vertex_areas
 from sagline.workspaces.wrench_sets import WrenchSet
 
-BY_BOX: Final = -1  # of `limiting`: the surface is the face of the box
-MOST_LIMITS: Final = 10  # shares that are printed
-_MOST_PARTS: Final = 5  # whose volumes are printed
-_WIDTH: Final = 80  # columns of what is printed
-_HEAD: Final = 12  # of them, before each line
+BY_BOX: Final = -1  # value in `limiting` for a face of the box
+MOST_LIMITS: Final = 10  # largest number of printed shares
+_MOST_PARTS: Final = 5  # largest number of components with printed volumes
+_WIDTH: Final = 80  # width of the printed text, in columns
+_HEAD: Final = 12  # indentation of each line, in columns
 
 
 class Limit(NamedTuple):
-    """Share of the surface with one deciding criterion and cable.
+    """Share of the surface with one limiting criterion and cable.
 
     Attributes:
-        criterion: Its title.
-        cable: Deciding cable, -1 for none.
-        share: Of the surface without the faces of the box.
-        number: Of the criterion, counted from 0.
+        criterion: Title of the criterion.
+        cable: Limiting cable, -1 if there is none.
+        share: Share of the surface without the faces of the box.
+        number: Index of the criterion, from 0.
     """
 
     criterion: str
@@ -54,35 +54,34 @@ class Limit(NamedTuple):
 class Workspace(Result, Saved):
     """Result of `workspace`.
 
-    Of a planar robot, and in a box without height, all is of the plane: the volume is an area [m2], and the surface
-    a slab around it.
+    For a planar robot, and in a box without extent along one axis, the workspace is a part of a plane. The volume is
+    then an area [m2], and the surface encloses a slab around it.
 
     Attributes:
         robot: The robot.
         box: Box of positions that was searched.
-        wrenches: Loads that it bears there besides its weight.
-        orientations: Of the platform.
-        criteria: Criteria that are met there, the margin first.
+        wrenches: Loads in addition to the weight.
+        orientations: Orientations of the platform.
+        criteria: Criteria that are met in the workspace, the margin first.
         model: Cable model.
         tension: Tension distribution method, for criteria on tensions.
-        moment_arm: As of `margin`; None for the mean lever arm.
-        unit: Of the volume, "m³" or "m²".
-        volume: In that unit.
-        volume_error: By how much the volume can be wrong, except for parts and gaps that are thinner than two cells of
-            the finest grid; 0 where it is empty.
+        moment_arm: Lever arm as in `margin` [m]; None for the mean lever arm.
+        unit: Unit of the volume, "m³" or "m²".
+        volume: Volume or area in this unit.
+        volume_error: Error bound of the volume, which excludes parts and gaps that are thinner than two cells of the
+            finest grid; 0 for an empty workspace.
         components: Components of the workspace.
-        surface: The boundary, closed, the faces of the box where it reaches them included.
-        limiting: At each vertex of the surface the criterion that decides, as an index; -1 where the box does,
-            shape (V,).
-        limiting_cable: And the cable, -1 where none does, shape (V,).
-        margin: And the margin of the loads there [N], shape (V,).
-        open_faces: Faces of the box through which the workspace continues, "x low" for instance: the volume is what
-            there is of it in this box.
+        surface: The closed boundary, including the faces of the box that the workspace reaches.
+        limiting: Index of the limiting criterion at each vertex of the surface, shape (V,); -1 on a face of the box.
+        limiting_cable: Limiting cable at each vertex, shape (V,); -1 if there is none.
+        margin: Margin of the loads at each vertex [N], shape (V,).
+        open_faces: Faces of the box through which the workspace continues, for example "x low". The volume is only that
+            of the part in the box.
         x: Coordinates of the nodes of the grid [m], shape (X,).
         y: The same along y, shape (Y,).
         z: The same along z, shape (Z,).
-        level: Least value of the criteria over their scales at these nodes, >= 0 inside, shape (X, Y, Z).
-        nearest: The pose nearest to feasible where the workspace is empty; None elsewhere.
+        level: Smallest value of the criteria, each divided by its scale, at these nodes, >= 0 inside, shape (X, Y, Z).
+        nearest: The pose nearest to feasibility if the workspace is empty; otherwise None.
     """
 
     robot: Robot
@@ -115,7 +114,7 @@ class Workspace(Result, Saved):
 
     @property
     def limits(self) -> tuple[Limit, ...]:
-        """Criteria and cables that limit the workspace, the largest share of its surface first."""
+        """Criteria and cables that limit the workspace, with the largest share of its surface first."""
         inner = (self.limiting[self.surface.faces] != BY_BOX).any(axis=1)  # a face with all corners on the box is its
         areas = vertex_areas(self.surface.vertices, self.surface.faces[inner])
         k = np.flatnonzero((self.limiting != BY_BOX) & (areas > 0.0))
@@ -130,9 +129,9 @@ class Workspace(Result, Saved):
 
     @property
     def field(self) -> Any:
-        """Level, margin, deciding criterion and cable at the points of the grid, with their coordinates.
+        """Level, margin, limiting criterion and cable at the points of the grid, with their coordinates.
 
-        An xarray Dataset with dimensions x, y and z; computed at each call.
+        The result is an xarray Dataset with dimensions x, y and z. It is computed at each call.
         """
         return formats().module_of(self).field_of(self)
 
@@ -177,7 +176,7 @@ def amount_of(space: Workspace) -> str:
     """Volume or area with its error bar, "789.4 ± 0.2 m³", and the number of parts."""
     if space.nearest is not None:
         return f"empty, 0 {space.unit}"
-    if space.volume_error <= 1e-9 * space.volume:  # all of the box
+    if space.volume_error <= 1e-9 * space.volume:  # the whole box
         return f"{space.volume:.6g} ± 0 {space.unit}"
     places = max(0, 1 - int(np.floor(np.log10(space.volume_error))))
     size = f"{space.volume:.{places}f} ± {space.volume_error:.{places}f} {space.unit}"
@@ -186,7 +185,7 @@ def amount_of(space: Workspace) -> str:
 
 
 def facts_of(space: Workspace) -> list[tuple[str, str]]:
-    """Box, loads, orientations, model and criteria of a workspace, as pairs of a word and a text."""
+    """Box, loads, orientations, model and criteria of a workspace, as pairs of a heading and a text."""
     facts = [("box", f"{span_of(space.box)} m"), ("loads", str(space.wrenches))]
     facts += [("platform", str(space.orientations)), ("cables", type(space.model).__name__)]
     if asked := [str(one) for one in space.criteria if not one.always]:

@@ -1,4 +1,4 @@
-"""Closed surfaces of triangles, and the components of the set that one encloses."""
+"""Closed surfaces of triangles, and the components of the set that a surface encloses."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from sagline.workspaces.grid import Grid
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Surface(Result):
-    """A surface of triangles, the corners of each counterclockwise as seen from outside.
+    """A surface of triangles, whose corners are counterclockwise as seen from outside.
 
     Attributes:
         vertices: Positions [m], shape (V, 3).
@@ -39,7 +39,7 @@ class Surface(Result):
 
     @property
     def closed(self) -> bool:
-        """True if each edge of a triangle is that of exactly one other, in the opposite direction."""
+        """True if each edge of a triangle is an edge of exactly one other triangle, in the opposite direction."""
         edges = np.concatenate([self.faces[:, [i, (i + 1) % 3]] for i in range(3)])
         count = len(self.vertices)
         there, back = edges @ [count, 1], edges @ [1, count]
@@ -55,21 +55,21 @@ class Surface(Result):
         return f"{counts}, {'closed' if self.closed else 'open'}, {spans} m"
 
     def export(self, file: Path | str) -> None:
-        """Write it to a file atomically, in meters and z up (GLB: y up, as that format requires).
+        """Write the surface to a file atomically, in meters and with z up (GLB: y up, as the format requires).
 
         Args:
-            file: The file: "hull.stl", ".glb", ".ply", or ".vtk" or ".vtu" where meshio or PyVista is installed; one
-                that exists is replaced.
+            file: The file: "hull.stl", ".glb" or ".ply"; also ".vtk" or ".vtu" if meshio or PyVista is installed. An
+                existing file is replaced.
 
         Raises:
-            FileError: If the ending is another, a package is missing, or the file cannot be written; what was there
-                before is untouched.
+            FileError: If the suffix is another one, a package is missing, or the file cannot be written; an existing
+                file is then unchanged.
         """
         formats().save(self, file)
 
 
 def normals_of(vertices: Array, faces: Indices) -> Array:
-    """Outward normals (F, 3) of triangles, each as long as its triangle's area [m^2]."""
+    """Outward normals (F, 3) of triangles, each with the triangle's area as its length [m^2]."""
     first, second, third = (vertices[faces[:, k]] for k in range(3))
     return np.asarray(np.cross(second - first, third - first) / 2.0)
 
@@ -78,15 +78,15 @@ def volumes_of(vertices: Array, faces: Indices) -> Array:
     """Contribution of each triangle to the enclosed volume [m^3], (F,): the signed volume of a pyramid over it."""
     if not len(faces):
         return np.zeros(0)
-    top = vertices.mean(axis=0)  # near the surface, so that little cancels
+    top = vertices.mean(axis=0)  # reference point near the surface, which reduces cancellation
     return np.asarray(np.einsum("fi,fi->f", vertices[faces[:, 0]] - top, normals_of(vertices, faces)) / 3.0)
 
 
-_TOLD: Final = 8  # volumes that are printed
+_TOLD: Final = 8  # largest number of printed volumes
 
 
 def vertex_areas(vertices: Array, faces: Indices) -> Array:
-    """Area of the surface that belongs to each vertex [m^2], (V,): a third of each of its triangles."""
+    """Area of the surface per vertex [m^2], (V,): a third of the area of each of its triangles."""
     areas = np.linalg.norm(normals_of(vertices, faces), axis=1) / 3.0
     return np.asarray(np.bincount(faces.ravel(), np.repeat(areas, 3), minlength=len(vertices)), dtype=np.float64)
 
@@ -96,12 +96,12 @@ class Components(Result):
     """The components of a set, the largest first; a cavity belongs to the component around it.
 
     Attributes:
-        volume: Of each piece, as of the whole [m^3], shape (K,).
-        vertices: The piece of each vertex of the surface, shape (V,).
+        volume: Volume of each component [m^3], shape (K,).
+        vertices: Index of the component of each vertex of the surface, shape (V,).
         x: Coordinates of the nodes of the grid that separates the components [m], shape (nx,).
         y: The same along y, shape (ny,).
         z: The same along z, shape (nz,).
-        nodes: The piece of each node, -1 outside all of them, shape (nx, ny, nz).
+        nodes: Index of the component of each node, -1 outside all components, shape (nx, ny, nz).
     """
 
     volume: Array
@@ -123,17 +123,17 @@ class Components(Result):
         return f"{counted(self.count, 'piece')}" + f", volume {sizes}{more}" * (self.count > 0)
 
     def label(self, position: ArrayLike) -> NDArray[np.int32]:
-        """Component of positions, to within a cell of the grid.
+        """Index of the component of positions, with the accuracy of a grid cell.
 
         Args:
             position: Positions [m], shape (..., 3), each in the set.
 
         Returns:
-            Index of the piece, that of the nearest node of the cell which is in one, shape (...,); -1 where the cell
-            has no such node.
+            Index of the component, shape (...,): that of the nearest node of the cell that is in a component; -1 if
+            there is no such node.
 
         Raises:
-            InvalidValueError: If a position is no such numbers.
+            InvalidValueError: If a position does not have this form.
         """
         given = checked(position, "position", "m", shape=(3,))
         axes = (self.x, self.y, self.z)
@@ -153,13 +153,13 @@ class Components(Result):
 
 def components_of(grid: Grid, inner: Indices, faces: Indices, volumes: Array) -> Components:
     """Components of a set, from its grid, the inner nodes and triangles of its net, and volumes (F,) [m^3]."""
-    from scipy.ndimage import label  # a third of a second to load
+    from scipy.ndimage import label  # the import takes a third of a second
 
-    nodes, count = label(grid.inside)  # neighbors along the axes: as the net joins them
+    nodes, count = label(grid.inside)  # neighbors along the axes, as in the net
     vertices = nodes[tuple(inner.T)] - 1
     volume = np.bincount(vertices[faces[:, 0]], volumes, minlength=count)
     order = np.argsort(-volume, kind="stable")
     rank = np.empty(count + 1, dtype=np.int32)
-    rank[order], rank[-1] = np.arange(count), -1  # -1 last: where a node's number is 0, minus 1
+    rank[order], rank[-1] = np.arange(count), -1  # number 0, outside, becomes -1
     labels = locked(np.ascontiguousarray(rank[nodes - 1]))
     return Components(locked(volume[order]), locked(rank[vertices]), grid.x, grid.y, grid.z, labels)

@@ -29,8 +29,8 @@ from sagline.workspaces.space import BY_BOX, Workspace
 from sagline.workspaces.wrench_sets import WrenchSet, load_of
 
 LEAST_CELLS: Final = 4
-_CROSSED: Final = 100  # poses at which a cell is evaluated that the boundary passes through, about
-ON_BOX: Final = 1e-9  # of the box: a vertex so near to its face is on it
+_CROSSED: Final = 100  # approximate number of evaluated poses in a cell that the boundary crosses
+ON_BOX: Final = 1e-9  # a vertex closer to a face than this share of the box is on the face
 _CATENARY, _MINIMUM_NORM = Catenary(), MinimumNorm()
 
 
@@ -48,33 +48,33 @@ def workspace(
     moment_arm: float | None = None,
     progress: Progress | None = None,
 ) -> Workspace:
-    """Workspace: the positions at which the cables bear every load of a set, and all criteria are met.
+    """Workspace: the positions at which the cables can balance every load of a set, and all criteria are met.
 
-    The boundary is found with cables that sag, by the sign of `margin`, whatever its shape and in however many parts.
-    Its vertices are exact; between them it is flat, and the error bar says what that makes. What is thinner than a
-    cell can be missed: `prove` alone is certain of a whole box.
+    The boundary is computed for sagging cables from the sign of `margin`. It can have any shape and any number of
+    parts. Its vertices are exact. The surface is flat between them, and the error bar includes the effect of this.
+    Parts thinner than a cell can be missed; only `prove` is certain for a whole box.
 
     Args:
-        robot: The robot. Of a planar one, whose plane_normal is along x, y or z, the workspace is an area.
-        box: Box of positions; one of no height along an axis: in that plane. Its tilt means `Tilts`. None: all of
-            the frame of the robot, or of the box that its anchors span down to the floor.
-        wrenches: Loads that the platform has to bear besides its weight; None for none.
-        orientations: In which it is held: `Tilts`, or `Orientations`; None for level.
-        criteria: Further criteria, `MaximumSag(0.05)` for instance. Those on tensions take the tensions of
-            the load in the middle of the set.
+        robot: The robot. For a planar robot, whose plane_normal must be along x, y or z, the workspace is an area.
+        box: Box of positions; a box without extent along an axis is a part of a plane. Its tilt has the meaning of
+            `Tilts`. None: the whole frame of the robot, or the box of its anchors down to the floor.
+        wrenches: Loads on the platform in addition to its weight; None if there are none.
+        orientations: Orientations of the platform: `Tilts` or `Orientations`; None for level.
+        criteria: Further criteria, for example `MaximumSag(0.05)`. Criteria on tensions use the tensions for the load
+            in the middle of the set.
         model: Cable model; the default is exact.
-        tension: Tension distribution method, for criteria on tensions; continuous.
+        tension: Tension distribution method for criteria on tensions; its tensions must be continuous.
         cells: Number of cells along the box's longest edge, 4 to 128.
-        refine: Number of times that cells on the boundary are divided once more, up to 3; True for once.
-        moment_arm: Length at which a moment counts as a force in the margin [m]; None for the mean lever arm.
-        progress: Called between blocks: how many poses are done, of how many as far as is known.
+        refine: Number of times that cells on the boundary are halved, up to 3; True for once.
+        moment_arm: Lever arm that converts moments to forces in the margin [m]; None for the mean lever arm.
+        progress: Called between blocks with the number of finished poses and the expected total number.
 
     Returns:
         Workspace.
 
     Raises:
-        InvalidValueError: If an argument is of the wrong kind, box and orientations both tilt, the platform does not
-            turn so, or a criterion needs tensions and the method's jump.
+        InvalidValueError: If an argument is of the wrong kind, box and orientations both have a tilt, the platform
+            cannot rotate in this way, or a criterion needs tensions but those of the method are not continuous.
         FileError: If a package of the extra "workspace" is not installed.
 
     Examples:
@@ -128,7 +128,7 @@ def workspace(
 
 
 def _progress_of(progress: Progress, cells: tuple[int, int, int]) -> Callable[[int], None]:
-    """Progress of an estimated number of poses: all nodes, and those of cells that the boundary crosses."""
+    """Progress of an estimated number of poses: all nodes, and the poses in cells that the boundary crosses."""
     x, y, z = cells
     about, done = (x + 1) * (y + 1) * (z + 1) + _CROSSED * (x * y + y * z + z * x), 0
 
@@ -143,7 +143,7 @@ def _progress_of(progress: Progress, cells: tuple[int, int, int]) -> Callable[[i
 def _checked(
     robot: Robot, criteria: Sequence[Criterion], model: CableModel, tension: TensionMethod
 ) -> tuple[Criterion, ...]:
-    """Criteria, checked, with the margin first."""
+    """Checked criteria, with the margin first."""
     instance(robot, Robot, "robot")
     instance(model, CableModel, "model")
     instance(tension, TensionMethod, "tension")

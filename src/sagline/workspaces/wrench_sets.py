@@ -26,7 +26,7 @@ def _wrench(wrench: Array) -> str:
 
 
 def _segments(segments: Array) -> str:
-    """Text of segments: sizes of those along the axes, number of the others."""
+    """Text of segments: sizes of segments along the axes, and number of the others."""
     along = np.count_nonzero(segments, axis=1) == 1
     sizes = np.abs(segments[along]).sum(axis=0)
     parts = [f"±{_each(own, unit)}" for own, unit in ((sizes[:3], "N"), (sizes[3:], "N m")) if own.any()]
@@ -45,8 +45,8 @@ def _each(values: Array, unit: str) -> str:
 class WrenchSet(ByFields):
     """A set of wrenches on the platform: force and moment about the center of mass in world axes, without gravity.
 
-    Results of `WrenchBox`, `WrenchEllipsoid`, `WrenchPolytope` and `Accelerations`, and of the sum of two sets with
-    `+`: all sums of one wrench of each set.
+    `WrenchBox`, `WrenchEllipsoid`, `WrenchPolytope` and `Accelerations` are such sets. The sum of two sets with `+`
+    contains all sums of one wrench from each set.
 
     Attributes:
         center: A wrench [N, N m], shape (6,).
@@ -55,7 +55,7 @@ class WrenchSet(ByFields):
         corners: Corners of the polytopes [N, N m], polytope by polytope, shape (C, 6).
         sizes: Number of corners of each polytope, shape (P,).
         accelerations: Largest acceleration of the center of mass along each world axis [m/s^2], and largest angular
-            acceleration about each [rad/s^2], shape (2,): the loads of these, by the robot's mass and inertia.
+            acceleration about each [rad/s^2], shape (2,); their loads follow from the robot's mass and inertia.
     """
 
     center: Array
@@ -124,7 +124,7 @@ class WrenchBox(WrenchSet):
         Args:
             force: Largest difference of each force component [N], a number or shape (3,), >= 0.
             moment: Largest difference of each moment component [N m], a number or shape (3,), >= 0.
-            center: Force [N], then moment [N m], shape (6,); None for none.
+            center: Force [N], then moment [N m], shape (6,); None for zero.
 
         Raises:
             InvalidValueError: If a number is not finite or negative, or a shape is wrong.
@@ -157,11 +157,11 @@ class WrenchEllipsoid(WrenchSet):
         Args:
             force: Semi-axes along the force components [N], a number or shape (3,), >= 0.
             moment: Semi-axes along the moment components [N m], a number or shape (3,), >= 0.
-            center: Force [N], then moment [N m], shape (6,); None for none.
-            matrix: Instead of the semi-axes: A of the wrenches A s with s no longer than 1, shape (6, 6).
+            center: Force [N], then moment [N m], shape (6,); None for zero.
+            matrix: Matrix A of the wrenches A s with |s| <= 1, shape (6, 6), instead of the semi-axes.
 
         Raises:
-            InvalidValueError: If a number is not finite or a semi-axis negative, a shape is another, or semi-axes and
+            InvalidValueError: If a number is not finite or a semi-axis negative, a shape is wrong, or semi-axes and
                 matrix are both given.
         """
         axes = _six(force, moment)
@@ -191,7 +191,7 @@ class WrenchPolytope(WrenchSet):
             corners: Wrenches [N, N m], shape (C, 6), C >= 1; wrenches between the others are allowed.
 
         Raises:
-            InvalidValueError: If a number is not finite, or there is none.
+            InvalidValueError: If a number is not finite, or there are no corners.
         """
         given = checked(corners, "corners", "N, N m", shape=(6,))
         if given.ndim != 2 or not len(given):
@@ -203,8 +203,8 @@ class WrenchPolytope(WrenchSet):
 class Accelerations(WrenchSet):
     """Inertial loads of an accelerating platform, from the robot's mass, inertia and orientation.
 
-    The loads are those of the center of mass's acceleration and of the angular acceleration; what turning adds without
-    accelerating (the gyroscopic moment) is left out.
+    The loads are those of the center of mass's acceleration and of the angular acceleration. The gyroscopic moment,
+    which does not need an acceleration, is not included.
 
     Examples:
         >>> import sagline as sl
@@ -224,17 +224,17 @@ class Accelerations(WrenchSet):
             angular: Largest angular acceleration about each world axis [rad/s^2], >= 0.
 
         Raises:
-            InvalidValueError: If one is not finite or negative.
+            InvalidValueError: If an acceleration is not finite or is negative.
         """
         both = [number(linear, "linear", "m/s^2", low=0.0), number(angular, "angular", "rad/s^2", low=0.0)]
         self._fill(accelerations=np.array(both))
 
 
-NO_LOAD: Final[WrenchSet] = Accelerations()  # the one point 0: the weight alone
+NO_LOAD: Final[WrenchSet] = Accelerations()  # only the point 0, for the weight alone
 
 
 def load_of(value: object) -> WrenchSet:
-    """Argument `wrenches`, checked: a set, or None for the weight alone."""
+    """Checked argument `wrenches`: a set, or None for the weight alone."""
     if value is None:
         return NO_LOAD
     if not isinstance(value, WrenchSet):
@@ -248,12 +248,12 @@ def _center(center: ArrayLike | None) -> Array:
 
 
 def _six(force: ArrayLike, moment: ArrayLike) -> Array:
-    """Force and moment components, checked, >= 0, shape (6,)."""
+    """Checked force and moment components, >= 0, shape (6,)."""
     return np.concatenate([_three(force, "force", "N"), _three(moment, "moment", "N m")])
 
 
 def _three(value: ArrayLike, item: str, unit: str) -> Array:
-    """One number or three, checked, >= 0, as shape (3,)."""
+    """Checked numbers >= 0, one or three, as shape (3,)."""
     given = checked(value, item, unit, low=0.0)
     if given.shape not in ((), (3,)):
         raise InvalidValueError(item, f"of shape {given.shape}", "a number, or shape (3,)", "Give one x, y, z.")
