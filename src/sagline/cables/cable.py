@@ -17,7 +17,7 @@ from sagline.core.memory import check_memory
 
 @frozen(eq=False, weakref_slot=False)
 class Cable:
-    """Material of one cable or of many: all given fields have one shape.
+    """Material of one cable or of many cables. All given fields have one shape.
 
     Attributes:
         linear_density: Mass per unstrained length [kg/m], shape (...), >= 0.
@@ -75,9 +75,10 @@ class Cable:
 
         Args:
             linear_density: Mass per unstrained length [kg/m], >= 0.
-            youngs_modulus: E [Pa], > 0: that of the whole rope, smaller than that of its fibers or wires.
-            section_area: A [m^2], > 0: the area for which E was measured; for a rope usually that of its fibers or
-                metal alone.
+            youngs_modulus: Young's modulus E of the whole rope [Pa], > 0, which is smaller than that of its fibers or
+                wires.
+            section_area: Section area A for which E was measured [m^2], > 0; for a rope usually the area of its fibers
+                or metal alone.
             diameter: Diameter of the rope [m], > 0; None if not known. The section area does not follow from it.
             expansion: Coefficient of thermal expansion [1/K], or None.
 

@@ -23,10 +23,10 @@ class Creep:
     five-element model of polymer ropes. The creep is recoverable: without tension the strain returns to zero.
 
     Attributes:
-        axial_stiffness: Stiffness k of each element [N], > 0, shape (1,) or (2,): under a constant tension T its strain
-            approaches T/k.
-        time: Retardation time of each element [s], > 0, of the same shape: the strain then differs from T/k by 1/e of
-            it.
+        axial_stiffness: Stiffness k of each element [N], > 0, shape (1,) or (2,). Under a constant tension T, the
+            strain of an element approaches T/k.
+        time: Retardation time of each element [s], > 0, of the same shape. After this time, the strain differs from T/k
+            by the share 1/e.
 
     Examples:
         A fiber rope under 1 kN, after a second, a minute and an hour:
@@ -48,11 +48,11 @@ class Creep:
         """Check the elements.
 
         Args:
-            axial_stiffness: Stiffness of each element [N], > 0: a number, or a list of one or two.
-            time: Retardation time of each element [s], > 0: a number, or a list of one or two.
+            axial_stiffness: Stiffness of each element [N], > 0: a number, or a list of one or two numbers.
+            time: Retardation time of each element [s], > 0: a number, or a list of one or two numbers.
 
         Raises:
-            InvalidValueError: If one is not positive, or there are more than two.
+            InvalidValueError: If a number is not positive, or there are more than two elements.
         """
         stiffness = checked(axial_stiffness, "axial_stiffness", "N", above=0.0)
         delay = checked(time, "time", "s", above=0.0)
@@ -65,9 +65,9 @@ class Creep:
             object.__setattr__(self, name, locked(np.array(np.broadcast_to(values, shape))))
 
     def strain(self, time: ArrayLike, tension: ArrayLike, *, settled: bool = False) -> Array:
-        """Creep strain for a time series of tensions: unstrained lengths become L (1 + strain).
+        """Creep strain for a time series of tensions; unstrained lengths become L (1 + strain).
 
-        Exact for tensions that vary linearly between samples.
+        The strain is exact for tensions that vary linearly between samples.
 
         Args:
             time: Times of the samples [s], increasing, shape (N,).
@@ -78,7 +78,7 @@ class Creep:
             Strain, of the shape of tension; NaN where the tension is NaN.
 
         Raises:
-            InvalidValueError: If the times do not rise, or the shapes do not fit.
+            InvalidValueError: If the times do not increase, or the shapes do not fit.
         """
         clock = checked(time, "time", "s", shape=(None,))
         force = checked(tension, "tension", "N", missing=True)

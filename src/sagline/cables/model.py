@@ -58,14 +58,14 @@ class CableModel:
 
     Attributes:
         code: Code of the equations in the kernels (`sagline.kernels.codes`).
-        weightless: Whether the model ignores the cable's weight.
+        weightless: True if the model ignores the cable's weight.
     """
 
     code: ClassVar[int]
     weightless: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
-        """Refuse direct use of the interface: it is not a cable model."""
+        """Refuse direct use of the interface, which is not a cable model."""
         if type(self) is CableModel:
             step = "Choose one of the models, Catenary() for instance."
             raise InvalidValueError("CableModel()", "the interface alone", "a cable model", step)
@@ -227,7 +227,7 @@ class CableState(Result):
         horizontal_tension: T_x [N], >= 0.
         vertical_force: T_z [N], up positive.
         chord_tension: tau = T_x/cos phi [N].
-        status: Codes of `CableStatus`; values are NaN unless the code is SOLVED, SLACK or BELOW_VALIDITY.
+        status: Codes of `CableStatus`; values are NaN for all codes except SOLVED, SLACK and BELOW_VALIDITY.
     """
 
     model: CableModel
@@ -265,22 +265,22 @@ class CableState(Result):
         return replace(self, cable=self.cable._part(part, self.shape), **arrays)
 
     def __iter__(self) -> Iterator[CableState]:
-        """The entries along the first axis, one by one."""
+        """Iterate over the entries along the first axis."""
         return (self[i] for i in range(len(self)))
 
     @property
     def chord(self) -> Array:
-        """D, distance between the two ends [m]."""
+        """Chord D, the distance between the two ends [m]."""
         return np.hypot(self.span, self.rise)
 
     @property
     def adjusting_length(self) -> Array:
-        """The article's d = L - D [m]."""
+        """Adjusting length d = L - D of the article [m]."""
         return self.unstrained_length - self.chord
 
     @property
     def cable_weight(self) -> Array:
-        """Weight of the whole cable in its model [N]: zero in the weightless models."""
+        """Weight of the whole cable in its model [N]; zero in the weightless models."""
         if self.model.weightless:
             return np.zeros(self.shape)
         return self.cable.linear_density * self.gravity * self.unstrained_length

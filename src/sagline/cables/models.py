@@ -14,7 +14,7 @@ from sagline.kernels import codes
 class Straight(CableModel):
     """A cable without elongation and sag: L = D.
 
-    The tension does not follow from a length: it is NaN, and the closure residual is |L - D|.
+    A length does not determine the tension. The tension is then NaN, and the closure residual is |L - D|.
 
     Source:
         docs/model.md, section 3.
@@ -28,7 +28,7 @@ class Straight(CableModel):
 class Elastic(CableModel):
     """A cable with elongation but without weight: L = D/(1 + tau/EA).
 
-    Where L >= D the cable is slack and its tension is zero.
+    If L >= D, the cable is slack and its tension is zero.
 
     Source:
         docs/model.md, section 3.
@@ -40,10 +40,10 @@ class Elastic(CableModel):
 
 @dataclass(frozen=True, slots=True)
 class Empirical(CableModel):
-    """The article's closed form: T_z = tan(phi) T_x + k_h rho D, and L of T_x by its equation (48).
+    """The article's closed form: T_z = tan(phi) T_x + k_h rho D, and L as a function of T_x by equation (48).
 
-    Valid while the lowest point of the cable lies outside the span, T_x > w D/(2 |tan phi|); below that the result is
-    returned with the status BELOW_VALIDITY. For a given length, (48) is solved on its decreasing branch.
+    The model is valid if the lowest point of the cable is outside the span, T_x > w D/(2 |tan phi|). Results for
+    smaller T_x have the status BELOW_VALIDITY. For a given length, (48) is solved on its decreasing branch.
 
     Attributes:
         k_h: Intercept constant [m/s^2]; the published 4.845 in magnitude (exactly g/2 for a shallow cable).
@@ -70,9 +70,9 @@ class Empirical(CableModel):
 
 @dataclass(frozen=True, slots=True)
 class Parabolic(CableModel):
-    """A shallow cable to first order: L = D (1 + (w D cos phi)^2/(24 tau^2))/(1 + tau/EA), T_z = tau sin phi + w D/2.
+    """A shallow cable of first order: L = D (1 + (w D cos phi)^2/(24 tau^2))/(1 + tau/EA), T_z = tau sin phi + w D/2.
 
-    For a given length: the positive root of its cubic equation in tau.
+    For a given length, tau is the positive root of a cubic equation.
 
     Source:
         docs/model.md, section 3.

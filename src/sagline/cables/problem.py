@@ -1,4 +1,4 @@
-"""A batch of cables to be solved: checked, flattened, and the results reshaped to the caller's shape."""
+"""A batch of cables to solve: checks and flattening of operands, and results in the caller's shape."""
 
 from __future__ import annotations
 
@@ -70,5 +70,5 @@ def _checked_span(span: ArrayLike) -> Array:
 
 
 def _flat(field: Array, shape: tuple[int, ...]) -> Array:
-    """Flatten to one axis: the whole batch, or a single value valid for all of it."""
+    """Flatten to one axis: the whole batch, or a single value for the whole batch."""
     return field.reshape(1) if field.size == 1 else kernel_input(field, shape).reshape(-1)

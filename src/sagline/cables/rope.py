@@ -9,7 +9,7 @@ from typing import Final
 from sagline.cables.cable import Cable
 from sagline.core.arrays import checked
 
-SAFETY = 5.0  # breaking force over the highest allowed tension, as usual for general lifting
+SAFETY = 5.0  # ratio of breaking force to highest allowed tension, as usual for general lifting
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,9 +19,9 @@ class Rope:
     Attributes:
         name: Name in the catalogue.
         description: Description of the rope.
-        density_factor: Linear density over the diameter squared [kg/m^3].
-        stiffness_factor: Axial stiffness over the diameter squared [Pa].
-        strength_factor: Breaking force over the diameter squared [Pa].
+        density_factor: Linear density divided by the squared diameter [kg/m^3].
+        stiffness_factor: Axial stiffness divided by the squared diameter [Pa].
+        strength_factor: Breaking force divided by the squared diameter [Pa].
         source: Source of the numbers.
         assumed: Assumed values with the reason.
     """
@@ -78,9 +78,9 @@ def _braid(name: str, fiber: str, modulus: float, strength: float, source: str) 
     )
 
 
-_STEEL_MODULUS = 100e9  # Pa, on the metallic section
-_BRAID_FILL = 2.0 / 3.0  # share of fiber in the circle of the nominal diameter
-_POLYETHYLENE = 975.0  # kg/m^3, our assumption: a common value of the fiber
+_STEEL_MODULUS = 100e9  # modulus for the metallic section [Pa]
+_BRAID_FILL = 2.0 / 3.0  # share of fiber in the area of the nominal diameter
+_POLYETHYLENE = 975.0  # [kg/m^3], assumed: a common value of the fiber
 _DSM = "DSM Dyneema, fact sheet UHMWPE fiber, CIS YA100 (2010): {}; density 975 kg/m^3 assumed"
 
 ROPES: Final = MappingProxyType(

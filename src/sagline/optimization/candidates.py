@@ -19,14 +19,14 @@ from sagline.robot.robot import Robot
 from sagline.statics.tables import cable_table
 
 MOST_SAMPLES = 1000
-COINCIDENT = 1e-9  # m: two cables with closer ends are one
+COINCIDENT = 1e-9  # [m], two cables with closer ends count as coincident
 
 
 class Candidates:
-    """All robots that differ from one in its design variables."""
+    """All robots that differ from one robot in the design variables."""
 
     def __init__(self, robot: Robot, free: Sequence[Free], item: str = "free") -> None:
-        """Bind the design variables to the robot that the search begins with; `item` names them in messages."""
+        """Bind the design variables to the initial robot; `item` is their name in messages."""
         self.robot = robot
         self.free = free_parts(free, item)
         self._bound: list[Bound] = [one.bound(robot, f"{item}[{k}]") for k, one in enumerate(self.free)]
@@ -46,7 +46,7 @@ class Candidates:
         return np.array([part.start for part in self.parts])
 
     def units(self, values: Array) -> Array:
-        """Points of the unit cube of design variables, both (N, d); a choice is the middle of its interval."""
+        """Points of the unit cube of design variables, both (N, d); a choice maps to the middle of its interval."""
         span = np.where(self._choices > 0, self._choices, self._high - self._low)
         return np.asarray((values - self._low + 0.5 * (self._choices > 0)) / span)
 
@@ -71,7 +71,7 @@ class Candidates:
             first = last
 
     def costs(self, values: Array) -> Array | None:
-        """Cost of a meter of cable, shape (N,); None without a catalogue, refused if an entry has no cost."""
+        """Cost of a meter of cable, shape (N,); None without a catalogue, an error if an entry has no cost."""
         for k, one in enumerate(self.free):
             if isinstance(one, FreeCable):
                 missing = [entry.name for entry in one.catalogue if entry.cost is None]
@@ -115,7 +115,7 @@ class Candidates:
 
 
 def free_parts(free: object, item: str) -> tuple[Free, ...]:
-    """Design variables as a tuple, checked; `item` names them in messages."""
+    """Checked design variables as a tuple; `item` is their name in messages."""
     given = [free] if isinstance(free, Free) else free
     step = 'Give [FreeAnchors("frame", low, high), ...].'
     allowed = "a sequence of FreeAnchors, FreeCable and FreeLimit"
@@ -128,7 +128,7 @@ def free_parts(free: object, item: str) -> tuple[Free, ...]:
 
 
 def impossible(cables: Array) -> Flags:
-    """Mask (N,) of cable tables (N, m, CABLE_COLUMNS) with coincident cables or crossed tension limits."""
+    """Mask (N,) of cable tables (N, m, CABLE_COLUMNS) with coincident cables, or a lower limit above the upper one."""
     ends = cables[..., : tables.PLATFORM_Z + 1]
     first, second = np.triu_indices(cables.shape[1], 1)
     apart = np.abs(ends[:, first] - ends[:, second]).max(axis=-1, initial=0.0)
@@ -137,10 +137,10 @@ def impossible(cables: Array) -> Flags:
 
 
 class PlatformBox:
-    """Platform as a box at G poses, which no frame anchor may enter."""
+    """Box of the platform at G poses, which must not contain a frame anchor."""
 
     def __init__(self, robot: Robot, poses: Pose) -> None:
-        """Take the platform's size, or else the extent of its anchors."""
+        """Store the platform's size, or the extent of its anchors without a size."""
         low, high = robot.platform_anchors.min(axis=0), robot.platform_anchors.max(axis=0)
         self._half = 0.5 * ((high - low) if robot.platform_size is None else robot.platform_size)
         self._middle = 0.5 * (low + high)
@@ -161,13 +161,13 @@ class PlatformBox:
 
 @frozen(weakref_slot=False)
 class AnchorErrors:
-    """Errors of all anchors as a sample, the same for all candidates: normally distributed, each coordinate by itself.
+    """Sample of anchor errors, equal for all candidates, with independent normally distributed coordinates.
 
     Attributes:
         deviation: Standard deviation of each coordinate [m], > 0.
         samples: Number of robots with errors for each candidate, 1 to 1000.
         take: Value of the candidate from those of its samples, "worst" or "mean".
-        seed: Of the sample, a whole number >= 0.
+        seed: Seed of the sample, a whole number >= 0.
 
     Raises:
         InvalidValueError: If an argument is of the wrong kind, or out of range.
@@ -196,7 +196,7 @@ class AnchorErrors:
             Shape (N, samples, m, CABLE_COLUMNS).
         """
         many = np.repeat(cables[:, None], self.samples, axis=1)
-        ends = tables.PLATFORM_Z + 1  # both ends come first
+        ends = tables.PLATFORM_Z + 1  # the columns of both ends come first
         errors = np.random.default_rng(self.seed).standard_normal((self.samples, cables.shape[1], ends))
         many[..., :ends] += self.deviation * errors
         return many

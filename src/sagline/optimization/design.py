@@ -1,4 +1,4 @@
-"""Design search: the design variables of a robot are optimized for goals."""
+"""Design search: optimization of the design variables of a robot for goals."""
 
 from __future__ import annotations
 
@@ -46,40 +46,40 @@ def design(
     folder: Path | str | None = None,
     progress: Progress | None = None,
 ) -> Front:
-    """Search for a better robot than the given one, or for a front of such robots.
+    """Search for a better robot than the given one, or for a Pareto front of such robots.
 
-    The search begins with the robot itself and a seeded sample; results for one seed are identical bit for bit.
+    The search begins with the robot itself and a seeded sample. Results for one seed are identical bit by bit.
 
     Args:
         robot: Initial robot of the search.
         free: Design variables: `FreeAnchors`, `FreeCable`, `FreeLimit`.
-        goals: Goals, or their names. "cma" and "differential_evolution" add them up by
-            their weights; "nsga2" finds robots of which none is better than another in every goal.
+        goals: Goals, or their names. "cma" and "differential_evolution" optimize the weighted sum of the goals. "nsga2"
+            finds robots of which none is better than another in every goal.
         wrenches: Set of loads at every pose, for example a `WrenchBox`; None for the weight alone.
         poses: Poses; None for a grid of level poses in a box.
         box: Box of the grid; None for the robot's test box, level.
         grid: Number of poses of the grid along x, y and z.
-        inner: Anchors that the machine itself moves from pose to pose: `FreeAnchors`, shifted at each pose to the
-            largest margin.
+        inner: Anchors that the machine itself moves from pose to pose, as `FreeAnchors`. They are shifted at each pose
+            to the largest margin.
         robust: Errors of the anchors for the rating of a robot.
         model: Cable model.
         optimizer: "cma", "differential_evolution" or "nsga2".
         evaluations: Largest number of robots that are rated.
         seed: Seed of all random numbers.
-        folder: Folder of the rated robots: an interrupted search continues from there, and so does one that is asked
-            for more evaluations too. None: nowhere.
+        folder: Folder of the rated robots, from which an interrupted search, or a search with more evaluations,
+            continues. None: no folder.
         progress: Called after each generation with the number of rated robots and the largest number.
 
     Returns:
-        Front; if no robot is better, it reports so and contains the first one.
+        Front. If no robot is better, it contains the initial robot and reports this.
 
     Raises:
-        InvalidValueError: If an argument is of the wrong kind, a part is free beyond what the robot has or allows, or
-            there are too few evaluations for two generations.
+        InvalidValueError: If an argument is of the wrong kind, a design variable does not exist in the robot or is out
+            of its range, or the evaluations are too few for two generations.
         FileError: If the folder holds another search, or cannot be written.
 
     Examples:
-        Posts that may be higher or lower, moved in pairs:
+        Posts with variable heights, equal in pairs:
 
         >>> import sagline as sl
         >>> robot = sl.load_robot("article-suspended")
@@ -102,7 +102,7 @@ def design(
     if count < 2 * population:
         allowed = f">= {2 * population:,}, two generations of {optimizer} for {dimensions} free numbers"
         raise InvalidValueError("evaluations", f"{count:,}", allowed, "Allow more, or free less.")
-    ledger = Ledger(request, candidates, count, progress)  # raises errors before any file is written
+    ledger = Ledger(request, candidates, count, progress)  # errors are raised before any file is written
     sample = latin_hypercube(population - 1, dimensions, request.seed)
     first = np.concatenate((candidates.units(candidates.start[None]), sample))
     with nullcontext() if folder is None else open_record(folder, request) as ledger.record:

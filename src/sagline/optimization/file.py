@@ -57,10 +57,10 @@ def load_design(file: str | os.PathLike[str]) -> dict[str, Any]:
         file: The file.
 
     Returns:
-        Names of arguments and their values; what the file leaves out is left out.
+        Names of arguments and their values; only arguments in the file are included.
 
     Raises:
-        FileError: If the file cannot be read, or says something wrong; the message names the key and the value.
+        FileError: If the file cannot be read, or a value is wrong; the message names the key and the value.
 
     Examples:
         >>> from pathlib import Path
@@ -89,7 +89,7 @@ class _Part(YamlEntry):
         return in_si(getattr(self, key), unit, key)
 
     def given(self, **units: str) -> dict[str, Any]:
-        """Quantities in SI of the keys that are given, by the unit of each."""
+        """Quantities of the given keys in SI, by the unit of each key."""
         return {key: self.si(key, unit) for key, unit in units.items() if key in self.model_fields_set}
 
 
@@ -161,7 +161,7 @@ class _Goal(_Part):
     @model_validator(mode="before")
     @classmethod
     def _accept_name(cls, data: object) -> object:
-        """Accept the name of a goal alone."""
+        """Accept only the name of a goal."""
         return {"goal": data} if isinstance(data, str) else data
 
     def wanted(self) -> Goal:
@@ -228,7 +228,7 @@ class _Design(_Part):
     seed: int = 0
 
     def arguments(self) -> dict[str, Any]:
-        """Arguments of `design` that the file gives."""
+        """Arguments of `design` from the file."""
         found: dict[str, Any] = {
             "free": [one.free(f"free[{k}]") for k, one in enumerate(self.free)],
             "goals": [_made(f"goals[{k}]", one.wanted) for k, one in enumerate(self.goals)],
@@ -250,7 +250,7 @@ class _Design(_Part):
 
 
 def _made(item: str, make: Callable[[], T]) -> T:
-    """Object made from a part of the file; its errors name the part."""
+    """Object from a part of the file; errors name the part."""
     try:
         return make()
     except InvalidValueError as error:

@@ -1,8 +1,9 @@
 """Folder of a design search: rated candidates, from which the search continues, and the resulting robots.
 
 `design.json` identifies the search by a digest of the request without the number of evaluations. `evaluations.csv` has
-a line for each candidate with a checksum, appended generation by generation: a line that a crash or a full disk cut off
-is recognized, removed and computed again. `front.csv` and the robot files are written at the end.
+one line with a checksum per candidate, and lines are appended generation by generation. A line that is incomplete after
+a crash or on a full disk is detected, removed and computed again. `front.csv` and the robot files are written at the
+end.
 """
 
 from __future__ import annotations
@@ -32,15 +33,15 @@ from sagline.optimization.goals import heading
 from sagline.optimization.request import Request
 
 REQUEST, EVALUATIONS = "design.json", "evaluations.csv"
-LIMIT: Final = 1000.0  # MB of evaluations
+LIMIT: Final = 1000.0  # largest file of evaluations [MB]
 ANOTHER: Final = "Name another folder, or remove this one."
 
 
 class DesignFolder:
-    """Record of a design search: known candidates (K, d + g), and the file to which others are appended."""
+    """Record of a design search: known candidates (K, d + g), and the file to which new candidates are appended."""
 
     def __init__(self, file: Path, handle: int, known: Array) -> None:
-        """Adopt an open file."""
+        """Take over an open file."""
         self._file, self._handle, self.known = file, handle, known
 
     def add(self, rows: Array) -> None:
@@ -61,7 +62,7 @@ class DesignFolder:
 
 @contextmanager
 def open_record(folder: Path | str, request: Request) -> Iterator[DesignFolder]:
-    """Open the record of a search in a folder, new or continued; refused for another search or process."""
+    """Open the record of a search in a folder, new or continued; an error for another search or process."""
     place = file_path(folder, "folder", folder=True)
     check_files(place, [REQUEST, EVALUATIONS])
     create_folder(place)
@@ -88,12 +89,12 @@ def open_record(folder: Path | str, request: Request) -> Iterator[DesignFolder]:
 
 
 def digest_of(request: Request) -> str:
-    """Digest of a request, 64 hexadecimal digits; the number of evaluations does not enter."""
+    """Digest of a request, 64 hexadecimal digits; it does not depend on the number of evaluations."""
     return sha256(_canonical(request).encode()).hexdigest()
 
 
 def _canonical(value: Any) -> str:
-    """Text that differs for any two values that differ."""
+    """Text that is different for different values."""
     if isinstance(value, np.ndarray):
         return f"array({value.dtype.str}, {value.shape}, {np.ascontiguousarray(value).tobytes().hex()})"
     if is_dataclass(value) or attrs.has(type(value)):
@@ -140,7 +141,7 @@ def _read(file: Path, heads: list[str]) -> tuple[Array, int]:
         right = cells == expected if k == 0 else len(numbers) == len(heads) and None not in numbers
         if not right:
             if k == len(lines) - 1:
-                break  # torn
+                break  # incomplete line
             raise FileError(file, f"line {k + 1} is damaged", ANOTHER, item=f"line {k + 1}")
         whole += len(line.encode())
         if k:
@@ -149,14 +150,14 @@ def _read(file: Path, heads: list[str]) -> tuple[Array, int]:
 
 
 def _line(cells: list[str]) -> str:
-    """Line of CSV whose last cell is a checksum of the others."""
+    """Line of CSV with a checksum of all other cells as its last cell."""
     text = StringIO()
     csv.writer(text, lineterminator="").writerow(cells)
     return f"{text.getvalue()},{crc32(text.getvalue().encode()):08x}\n"
 
 
 def _cells(line: str) -> list[str] | None:
-    """Cells of a line without the checksum; None where that is wrong."""
+    """Cells of a line without the checksum; None if the checksum is wrong."""
     text, _, check = line.rpartition(",")
     if not line.endswith("\n") or check != f"{crc32(text.encode()):08x}\n":
         return None

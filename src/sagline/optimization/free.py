@@ -41,7 +41,7 @@ class DesignVariable(NamedTuple):
 
 
 class Bound(NamedTuple):
-    """Design variables of a given robot.
+    """Design variables for a given robot.
 
     Attributes:
         parts: The K design variables.
@@ -58,7 +58,7 @@ class Free(ByFields):
     __slots__ = ()
 
     def bound(self, robot: Robot, item: str) -> Bound:
-        """Design variables of the robot that the search begins with.
+        """Design variables for the initial robot of the search.
 
         Args:
             robot: Initial robot of the search.
@@ -82,7 +82,7 @@ def check_order(low: Array, high: Array, unit: str, *, strictly: bool = False) -
 
 
 def cable_numbers(cables: Any) -> tuple[int, ...]:
-    """Checked cable indices without repetitions; empty for None, all cables."""
+    """Checked cable indices without repetitions; empty for None, which means all cables."""
     if cables is None:
         return ()
     given = list(cables) if isinstance(cables, Sequence | np.ndarray) and not isinstance(cables, str) else []
@@ -94,7 +94,7 @@ def cable_numbers(cables: Any) -> tuple[int, ...]:
 
 
 def cables_of_robot(cables: tuple[int, ...], robot: Robot, item: str) -> Indices:
-    """Cable numbers checked against a robot; all cables if none is given."""
+    """Cable indices, checked for a robot; all cables if none are given."""
     wrong = [one for one in cables if one >= robot.cable_count]
     if wrong:
         step = f"{robot.name} has {robot.cable_count} cables, numbered from 0."
@@ -103,11 +103,11 @@ def cables_of_robot(cables: tuple[int, ...], robot: Robot, item: str) -> Indices
 
 
 def whose_text(cables: Indices, count: int) -> str:
-    """Suffix of a name for some of the cables; empty for all."""
+    """Suffix of a name for some of the cables; empty for all cables."""
     return "" if len(cables) == count else f"[{' '.join(map(str, cables))}]"
 
 
-SAME: Final = 1e-9  # relative tolerance for a match of a robot's cable with one of a catalogue
+SAME: Final = 1e-9  # relative tolerance for a match of a robot's cable with a cable of a catalogue
 
 
 def _one_cable(value: Any, item: str) -> Cable:
@@ -128,11 +128,11 @@ class CableChoice:
     Attributes:
         name: Name in messages and files.
         cable: Material of the cable, with numbers instead of arrays.
-        cost: Cost per meter, in any currency, >= 0; None if no goal needs it.
+        cost: Cost per meter, in any currency, >= 0; None if no goal requires it.
         tension_max: Upper tension limit [N], > 0; None to keep the robot's limits.
 
     Raises:
-        InvalidValueError: If the material is that of several cables, or an argument is of the wrong kind.
+        InvalidValueError: If the material has values for several cables, or an argument is of the wrong kind.
     """
 
     name: str = field(metadata=checked_by(label))
@@ -149,7 +149,7 @@ class FreeCable(Free):
     """The material of all cables, from a catalogue.
 
     Attributes:
-        catalogue: The cables, preferably sorted by weight, because neighbors are tried one after the other.
+        catalogue: The cables, preferably sorted by weight, because the search tries neighbors one after the other.
     """
 
     catalogue: tuple[CableChoice, ...]
@@ -174,7 +174,7 @@ class FreeCable(Free):
         object.__setattr__(self, "catalogue", entries)
 
     def bound(self, robot: Robot, item: str) -> Bound:
-        """Design variables of a given robot."""
+        """Design variables for a given robot."""
         own = robot.cables
         for k, one in enumerate(self.catalogue):
             pairs = ((own.linear_density, one.cable.linear_density), (own.axial_stiffness, one.cable.axial_stiffness))
@@ -203,7 +203,7 @@ LIMITS: Final = {"tension_min": tables.TENSION_MIN, "tension_max": tables.TENSIO
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FreeLimit(Free):
-    """A variable tension limit, one value for all its cables.
+    """A variable tension limit with one value for all its cables.
 
     Attributes:
         which: "tension_min" or "tension_max".
@@ -239,7 +239,7 @@ class FreeLimit(Free):
         set_fields(self, which=choice(which, "which", LIMITS), low=lower, high=upper, cables=cable_numbers(cables))
 
     def bound(self, robot: Robot, item: str) -> Bound:
-        """Design variables of a given robot."""
+        """Design variables for a given robot."""
         cables = cables_of_robot(self.cables, robot, f"{item}: cables")
         own = getattr(robot, self.which)[cables]
         name = f"{self.which}{whose_text(cables, robot.cable_count)}"

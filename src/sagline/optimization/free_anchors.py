@@ -1,4 +1,4 @@
-"""Design variables of anchors: shifts in a box or along lines, mirrored, turned about the vertical, or together."""
+"""Design variables of anchors: shifts in a box or along lines, also mirrored, rotated about the vertical, or equal."""
 
 from __future__ import annotations
 
@@ -29,15 +29,16 @@ from sagline.robot.robot import Robot
 Symmetry: TypeAlias = str
 MIRRORED: Final = tuple("".join(axes) for count in (1, 2, 3) for axes in combinations("xyz", count))
 NAMES: Final = (*MIRRORED, "turned", "together")
-_ON_PLANE: Final = 1e-9  # of the extent of the anchors
+_ON_PLANE: Final = 1e-9  # tolerance, relative to the extent of the anchors
 
 
 def _symmetric_shifts(
     symmetry: Symmetry | None, anchors: Array, along: Array, bounds: tuple[Array, Array], item: str
 ) -> list[tuple[int | None, Array]]:
-    """Shifts (K, c, 3) of anchors (c, 3) per meter of shift of a leading one along K directions, and its index.
+    """Shifts (K, c, 3) of anchors (c, 3) per meter of shift of a leading anchor along K directions, and its index.
 
-    The index is None where one leads all. Refused if an anchor could pass its mirror plane, or turns about no axis.
+    The index is None if all anchors have the same shift. An error is raised if an anchor could pass its mirror plane or
+    has no axis of rotation.
     """
     count = len(anchors)
     if symmetry is None:
@@ -64,7 +65,7 @@ def _turned(anchors: Array, along: Array, item: str) -> Array:
 
 
 def _mirrored(symmetry: str, anchors: Array, along: Array, bounds: tuple[Array, Array], item: str) -> Array:
-    """Mirrored shifts (K, c, 3): the side of an anchor gives the sign; an anchor on the plane stays on it."""
+    """Mirrored shifts (K, c, 3); the side of an anchor gives the sign, and an anchor on the plane remains on it."""
     shifts = np.repeat(along[:, None, :], len(anchors), axis=1)
     for axis in ("xyz".index(name) for name in symmetry):
         low, high = float(anchors[:, axis].min()), float(anchors[:, axis].max())
@@ -72,7 +73,7 @@ def _mirrored(symmetry: str, anchors: Array, along: Array, bounds: tuple[Array, 
         away = anchors[:, axis] - plane
         side = np.where(np.abs(away) <= _ON_PLANE * max(high - low, 1.0), 0.0, np.sign(away))
         if side[0] == 0.0:
-            side = np.zeros_like(side)  # the one that leads stays on the plane, and so do all
+            side = np.zeros_like(side)  # the leading anchor remains on the plane, and so do all others
         lead, side = side[0], side * side[0]
         shifts[..., axis] *= side
         inward = -np.minimum(*(bound * along[:, axis] * lead for bound in bounds)).sum()
@@ -86,25 +87,25 @@ def _mirrored(symmetry: str, anchors: Array, along: Array, bounds: tuple[Array, 
 
 
 ENDS: Final = {"frame": tables.FRAME_X, "platform": tables.PLATFORM_X}
-_UNIT: Final = 1e-9  # of a vector's length
+_UNIT: Final = 1e-9  # tolerance of a vector's length
 _AXES: Final = "xyz"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FreeAnchors(Free):
-    """Anchors that may be shifted from where the robot has them: in a box, along lines, symmetrically.
+    """Variable shifts of anchors from their positions in the robot: in a box or along lines, also with a symmetry.
 
-    The dead length behind guides follows in the resulting robots, and is constant during the search.
+    The dead length of guides is constant during the search, and adapted in the resulting robots.
 
     Attributes:
         end: "frame" or "platform".
-        low: Least shifts [m], along x, y, z or, with `along`, along each direction: shape (K,), <= 0.
-        high: Largest shifts [m], shape (K,), >= 0; where both are 0 nothing is free.
+        low: Lowest shifts [m], <= 0, shape (K,): along x, y, z, or along each direction in `along`.
+        high: Largest shifts [m], shape (K,), >= 0; a coordinate with low = high = 0 is fixed.
         along: Directions, world axes for the frame and platform axes for the platform, shape (K, 3), unit vectors.
-        cables: Whose anchors, numbers from 0; empty for all.
-        symmetry: Symmetry to the first of them: "x", "xy" or any other axes: mirrored in the planes across
-            these; "turned": about the vertical, with the angle between them; "together": by the same shift; None:
-            each moves by itself.
+        cables: Indices of the cables whose anchors are shifted, from 0; empty for all.
+        symmetry: Symmetry to the first of these anchors. "x", "xy" or other axes: mirrored at the planes normal to
+            these axes. "turned": rotated about the vertical by the angle between the anchors. "together": the same
+            shift. None: independent shifts.
     """
 
     end: str
@@ -128,15 +129,15 @@ class FreeAnchors(Free):
 
         Args:
             end: "frame" or "platform".
-            low: Least shifts [m]: three numbers along x, y, z; with `along` one a direction.
+            low: Lowest shifts [m]: three numbers along x, y, z; with `along` one number per direction.
             high: Largest shifts [m], of the same shape.
-            along: A direction or several, of any length but zero; None for x, y and z.
-            cables: Whose anchors, numbers from 0; None for all.
+            along: One or several directions of any nonzero length; None for x, y and z.
+            cables: Indices of the cables whose anchors are shifted, from 0; None for all.
             symmetry: "x", "y", "z", "xy", ..., "turned", "together", or None.
 
         Raises:
-            InvalidValueError: If low is above high, 0 (where the robot has its anchors) is not between them, nothing
-                is free, or an argument is of the wrong kind.
+            InvalidValueError: If low is above high, 0 (the position in the robot) is not between them, all coordinates
+                are fixed, or an argument is of the wrong kind.
 
         Examples:
             >>> import sagline as sl
@@ -164,14 +165,14 @@ class FreeAnchors(Free):
         )
 
     def bound(self, robot: Robot, item: str) -> Bound:
-        """Design variables of a given robot."""
+        """Design variables for a given robot."""
         cables = cables_of_robot(self.cables, robot, f"{item}: cables")
         anchors = robot.frame_anchors if self.end == "frame" else robot.platform_anchors
         parts: list[DesignVariable] = []
         rates: list[Array] = []
         names = _direction_names(self.along)
         shifts = _symmetric_shifts(self.symmetry, anchors[cables], self.along, (self.low, self.high), item)
-        for which, moved in shifts:  # moved: of each cable, for each direction (K, c, 3)
+        for which, moved in shifts:  # moved: shifts of each cable for each direction, (K, c, 3)
             for k, name in enumerate(names):
                 rate = np.zeros((robot.cable_count, tables.CABLE_COLUMNS))
                 rate[cables, ENDS[self.end] : ENDS[self.end] + 3] = moved[k]
@@ -186,7 +187,7 @@ class FreeAnchors(Free):
             raise InvalidValueError(f"{item}: symmetry", "one that holds all anchors", "one that lets some move", step)
 
         def write(tables_of_cables: Array, values: Array) -> None:
-            for k, rate in enumerate(rates):  # sums in a fixed order, whatever the number of candidates
+            for k, rate in enumerate(rates):  # the order of the sum does not depend on the number of candidates
                 tables_of_cables += values[:, k, None, None] * rate
 
         return Bound(tuple(parts), write)

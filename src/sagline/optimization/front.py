@@ -1,4 +1,4 @@
-"""Result of a design search, and the ledger of its rated candidates."""
+"""Result of a design search, and the record of its rated candidates."""
 
 from __future__ import annotations
 
@@ -30,20 +30,20 @@ FRONT: Final = "front.csv"
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Front(Result):
-    """Result of `design`: better robots, none of which is better than another in every goal.
+    """Result of `design`: better robots than the initial one, none of which is better than another in every goal.
 
     Attributes:
         start: Initial robot of the search.
-        robots: The better ones, K of them, best by the first goal first; the start alone where none is better. One
-            only, the best by the weights, where the optimizer is not "nsga2".
+        robots: The K better robots, sorted by the first goal, the best first; only the initial robot if none is better.
+            For optimizers other than "nsga2", this is only the robot with the best weighted sum.
         goals: The g goals.
-        values: Goals of the robots, each in its unit, shape (K, g).
-        start_values: Goals of the initial robot, shape (g,).
+        values: Goal values of the robots, each in its unit, shape (K, g).
+        start_values: Goal values of the initial robot, shape (g,).
         parts: The d design variables.
         changed: Design variables of the robots, shape (K, d).
         better: True if a robot is better than the start.
-        evaluated: Design variables of all candidates, in their order, the start first, shape (N, d).
-        evaluated_values: Their goals, shape (N, g), NaN for an impossible candidate.
+        evaluated: Design variables of all candidates in the order of evaluation, the initial robot first, shape (N, d).
+        evaluated_values: Goal values of all candidates, shape (N, g); NaN for an impossible candidate.
         optimizer: Name of the optimizer.
         seed: Seed of the search.
     """
@@ -63,12 +63,12 @@ class Front(Result):
 
     @property
     def best(self) -> Robot:
-        """The first of the robots."""
+        """The first robot."""
         return self.robots[0]
 
     @property
     def text(self) -> str:
-        """Summary in a sentence."""
+        """Summary in one sentence."""
         count, name = len(self.evaluated), self.start.name
         if not self.better:
             return f"None of {count:,} robots is better than {name}: widen the bounds, or allow more evaluations."
@@ -87,7 +87,7 @@ class Front(Result):
             folder: The folder; created if missing. Files of the same names are replaced.
 
         Returns:
-            The files: front.csv, and for each robot its name with .yaml.
+            The files: front.csv, and one .yaml file per robot with its name.
 
         Raises:
             FileError: If a file cannot be written.
@@ -109,23 +109,23 @@ class Front(Result):
         return [place / name for name in names]
 
     def __str__(self) -> str:
-        """Summary in a sentence."""
+        """Summary in one sentence."""
         return self.text
 
 
 def costs_of(values: Array, goals: tuple[Goal, ...], start: Array) -> Array:
-    """Costs (N, g) to minimize from goal values (N, g), scaled and limited to PENALTY; twice that for NaN."""
+    """Costs (N, g) to minimize from goal values (N, g), scaled and limited to PENALTY; twice PENALTY for NaN."""
     signs = np.array([-1.0 if goal.maximize else 1.0 for goal in goals])
     scales = np.array([_scale_of(goal, value) for goal, value in zip(goals, start, strict=True)])
     costs = np.nan_to_num(signs * values / scales, nan=2.0 * PENALTY, posinf=PENALTY, neginf=-PENALTY)
     return np.asarray(np.where(np.isnan(values), PENALTY * 2.0, np.clip(costs, -PENALTY, PENALTY)))
 
 
-PENALTY = 1e9  # largest cost of a goal, many times more than any value
+PENALTY = 1e9  # largest cost of a goal, many times larger than normal values
 
 
 def _scale_of(goal: Goal, start: float) -> float:
-    """Scale of a goal, in its unit: its own, or the value of the first robot."""
+    """Scale of a goal in its unit: the goal's own scale, or the value of the first robot."""
     if goal.scale is not None:
         return goal.scale
     return abs(float(start)) if np.isfinite(start) and start != 0.0 else 1.0
@@ -138,7 +138,7 @@ def _weighted_costs(costs: Array, goals: tuple[Goal, ...]) -> Array:
 
 
 def pareto_front(costs: Array) -> Indices:
-    """Indices of the Pareto-optimal candidates of costs (N, g); of equal ones the first."""
+    """Indices of the Pareto-optimal candidates of costs (N, g); of equal candidates, the first one."""
     _, first = np.unique(costs, axis=0, return_index=True)
     kept = np.sort(first)
     own = costs[kept]
@@ -150,14 +150,14 @@ def _beaten(one: Array, others: Array) -> bool:
     return bool(((others <= one).all(axis=1) & (others < one).any(axis=1)).any())
 
 
-LONGEST: Final = 80  # kept letters of a robot's name before a suffix
+LONGEST: Final = 80  # number of letters of a robot's name that are kept before a suffix
 
 
 class Ledger:
-    """Rates candidates for an optimizer.
+    """Rating of candidates for an optimizer.
 
-    An optimizer with a seed asks for the same candidates again. Those of the record are not rated again, so that a
-    continued search ends as if it had never been interrupted.
+    An optimizer with the same seed requests the same candidates again. Recorded candidates are not rated again. A
+    continued search therefore has the same result as one without interruption.
     """
 
     def __init__(
@@ -167,7 +167,7 @@ class Ledger:
         evaluations: int,
         progress: Progress | None,
     ) -> None:
-        """Prepare, and reject goals that are not finite for the first robot."""
+        """Prepare the rating, and reject goals that are not finite for the first robot."""
         self._request, self._candidates = request, candidates
         self.record: DesignFolder | None = None
         self._evaluations, self._progress = evaluations, progress
@@ -188,7 +188,7 @@ class Ledger:
         return len(self._request.goals) if self._request.optimizer == "nsga2" else 1
 
     def rate(self, points: Array) -> Array:
-        """Costs (N, costs) of points of the unit cube (N, d); the first of all is the first robot."""
+        """Costs (N, costs) of points of the unit cube (N, d); the very first point is the first robot."""
         values = self._candidates.values(points)
         values[(points == self._start).all(axis=1)] = self._candidates.start
         known = self._recalled(values)
@@ -241,7 +241,7 @@ class Ledger:
         return costs_of(rows[:, self._width :], self._request.goals, self._first)
 
     def _recalled(self, values: Array) -> Array:
-        """Rows of the record for the first of these candidates, as far as known."""
+        """Recorded rows of the leading candidates, up to the first unknown one."""
         if self.record is None:
             return np.zeros((0, self._rows.shape[1]))
         first = len(self._rows)

@@ -16,13 +16,13 @@ from sagline.core.results import set_fields
 
 
 class Measured(NamedTuple):
-    """Quantities of candidates, each with S samples of its anchors (one where these are exact) at G poses.
+    """Quantities of candidates at G poses, each with S samples of its anchors (one sample for exact anchors).
 
     Attributes:
         margin: Margin of the wrench set [N], shape (N, S, G); -inf if a pose is singular or a cable has no length.
         tension: Largest cable tension [N], shape (N, S, G), NaN without tensions; None if not needed.
-        sag: Largest cable sag [m], of this shape, or None.
-        stiffness: Stiffness in the softest direction [N/m], of this shape, or None.
+        sag: Largest cable sag [m], of the same shape, or None.
+        stiffness: Stiffness in the softest direction [N/m], of the same shape, or None.
         cost: Cost of the cables, shape (N, S), or None.
     """
 
@@ -37,9 +37,9 @@ class _Kind(NamedTuple):
     """A kind of goal.
 
     Attributes:
-        unit: Its unit; "" for a share or a currency.
+        unit: Unit of the goal; "" for a share or a currency.
         larger_is_better: True if it is maximized by default.
-        needs: Field of `Measured` that it uses.
+        needs: Field of `Measured` that the goal uses.
         over_poses: Function from that field to the goal's value, over the last axis.
         text: Description.
     """
@@ -83,21 +83,21 @@ KINDS: Final = MappingProxyType(
         "cable_cost": _Kind("", False, "cost", lambda cost: cost, "cost of the cables"),
     }
 )
-AT_POSES: Final = ("tension", "sag", "stiffness")  # goals that need a tension distribution
+AT_POSES: Final = ("tension", "sag", "stiffness")  # goals that require a tension distribution
 
 
 @dataclass(frozen=True, slots=True)
 class Goal:
     """A quantity to maximize or minimize.
 
-    Tensions, sag and stiffness are those of the platform's weight and the middle of the wrench set, shared by
-    `MinimumNorm`; they are taken over the feasible poses of the initial robot, and a robot for which one of these is
-    not feasible is no candidate.
+    Tensions, sag and stiffness are those for the platform's weight and the middle of the wrench set, with the tension
+    distribution `MinimumNorm`. They are evaluated at the feasible poses of the initial robot. A robot for which one of
+    these poses is not feasible is rejected.
 
     Attributes:
-        kind: "workspace_share" (of the poses, those whose margin is not negative), "mean_margin" or "least_margin"
-            [N], "largest_tension" [N], "largest_sag" [m], "least_stiffness" [N/m] (against a force, whatever its
-            direction) or "cable_cost" (each cable as long as the longest chord it spans, by the catalogue's costs).
+        kind: "workspace_share" (share of the poses with a margin that is not negative), "mean_margin" or "least_margin"
+            [N], "largest_tension" [N], "largest_sag" [m], "least_stiffness" [N/m] (against a force in any direction) or
+            "cable_cost" (catalogue cost of cables with the lengths of their longest chords).
         maximize: True to maximize, False to minimize.
         weight: Weight relative to other goals, > 0.
         scale: Unit size of the goal, in its unit; None for the first robot's value, or 1 if that is 0.
@@ -114,8 +114,8 @@ class Goal:
         """Check kind, direction, weight and scale.
 
         Args:
-            kind: One of the seven.
-            maximize: True to maximize, False to minimize; None: by its kind.
+            kind: One of the seven kinds.
+            maximize: True to maximize, False to minimize; None: the default of the kind.
             weight: Weight relative to other goals, > 0.
             scale: Unit size of the goal, > 0, or None.
 
@@ -140,12 +140,12 @@ class Goal:
 
     @property
     def unit(self) -> str:
-        """Unit of its values."""
+        """Unit of the goal's values."""
         return KINDS[self.kind].unit
 
     @property
     def needs(self) -> str:
-        """Field of `Measured` that it is computed from."""
+        """Field of `Measured` from which the goal is computed."""
         return KINDS[self.kind].needs
 
     def values(self, measured: Measured, *, worst: bool) -> Array:
@@ -153,7 +153,7 @@ class Goal:
 
         Args:
             measured: Quantities of the candidates.
-            worst: True to take the worst of a sample of anchors, False for the mean.
+            worst: True for the worst value over a sample of anchors, False for the mean.
 
         Returns:
             Values in the unit of the goal, shape (N,).

@@ -1,4 +1,4 @@
-"""Moving anchors: placed at each pose for the largest margin."""
+"""Moving anchors, which are placed for the largest margin at each pose."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from sagline.robot.pose import Pose, PoseBox
 from sagline.robot.robot import Robot
 from sagline.workspaces.wrench_sets import WrenchSet
 
-BLOCK: Final = 1 << 11  # poses per block: a tenth of a second, the delay of an interrupt
+BLOCK: Final = 1 << 11  # poses per block, about 0.1 s; interrupts are handled between blocks
 _CATENARY: Final = Catenary()
 
 
@@ -40,7 +40,7 @@ class MovingAnchors(Result):
         moved: Values of these coordinates at each pose, shape (G, q).
         margin: Margin with moved anchors [N], shape (G,).
         fixed_margin: Margin without moved anchors [N], shape (G,).
-        moving: Moving anchors as given.
+        moving: The given moving anchors.
     """
 
     robot: Robot
@@ -74,9 +74,9 @@ def moving_anchors(
     model: CableModel = _CATENARY,
     progress: Progress | None = None,
 ) -> MovingAnchors:
-    """Move anchors of a robot at each pose to the positions of largest margin.
+    """Move anchors of a robot to the positions with the largest margin at each pose.
 
-    The best of a sample is improved by steps along one coordinate after another.
+    The best positions of a sample are improved by steps along one coordinate after another.
 
     Args:
         robot: The robot.
@@ -95,7 +95,7 @@ def moving_anchors(
         InvalidValueError: If an argument is of the wrong kind.
 
     Examples:
-        Posts whose anchors go up and down, all by the same:
+        Posts whose anchors move up and down together:
 
         >>> import sagline as sl
         >>> robot = sl.load_robot("article-suspended")

@@ -1,4 +1,4 @@
-"""Ratings of candidates: goals of whole generations together, from cable tables."""
+"""Ratings of candidates: goals of a whole generation at once, from cable tables."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ from sagline.workspaces.levels import middle_wrench
 from sagline.workspaces.margin_rows import MarginRows, mean_arms
 from sagline.workspaces.wrench_sets import NO_LOAD, WrenchSet
 
-BLOCK = 1 << 12  # poses per block: a tenth of a second, the delay of an interrupt
+BLOCK = 1 << 12  # poses per block, about 0.1 s; interrupts are handled between blocks
 
 
 def distribute(
     robot: Robot, model: CableModel, cables: Array, poses: Array, wrench: Array, *, stiffness: bool
 ) -> tuple[Array, Array, Array | None]:
-    """Largest tension [N], largest sag [m] and, if asked for, least stiffness [N/m], by the minimum norm, each (N,).
+    """Largest tension [N], largest sag [m] and, on request, least stiffness [N/m], by the minimum norm, each (N,).
 
-    NaN without tensions. Tables (N, m, CABLE_COLUMNS), one per pose row; the stiffness is that of the softest direction
-    of a force on the center of mass.
+    Values are NaN without tensions. There is one table (m, CABLE_COLUMNS) per pose row, N in total. The stiffness is
+    that of the softest direction of a force on the center of mass.
     """
     method = MinimumNorm()
     options = kernel_options(robot, model, method.alone)
@@ -81,7 +81,7 @@ def _sag(model: CableModel, gravity: float, results: Array, cables: Array) -> Ar
 def _stiffness(
     robot: Robot, model: CableModel, results: Array, given: tuple[Array, Array, Array], behind: bool
 ) -> Array:
-    """Force over displacement of the center of mass in the softest direction [N/m], (N,)."""
+    """Ratio of force to displacement of the center of mass in the softest direction [N/m], (N,)."""
     cables, poses, load = given
     count, m = cables.shape[:2]
     matrices, levers = np.empty((count, 6, 6)), np.empty((count, m, 3))
@@ -97,17 +97,17 @@ def _stiffness(
     return np.asarray(np.where(known & (softest > 0.0), 1.0 / np.where(softest > 0.0, softest, 1.0), np.nan))
 
 
-Margins: TypeAlias = Callable[[Array, Array], Array]  # of tables (R, m, CABLE_COLUMNS) and pose rows (R, POSE_COLUMNS)
+Margins: TypeAlias = Callable[[Array, Array], Array]  # of tables (R, m, CABLE_COLUMNS) at pose rows (R, POSE_COLUMNS)
 
 SPREAD: Final = 4  # sample points per coordinate
-STEP: Final = 0.25  # share of the bounds' distance: initial step
-ITERATIONS: Final = 14  # each halves the step
+STEP: Final = 0.25  # initial step, as a share of the distance of the bounds
+ITERATIONS: Final = 14  # number of halvings of the step
 
 
 def move_anchors(inner: Candidates, margins: Margins, cables: Array, poses: Array) -> tuple[Array, Array]:
     """Best anchor coordinates (R, q) of cable tables (R, m, CABLE_COLUMNS) at their pose rows, and margins (R,) [N].
 
-    The best of a sample, then coordinate search with steps that are halved: a local maximum.
+    The result is a local maximum: the best point of a sample, improved by a coordinate search with halved steps.
     """
     count, q = len(poses), len(inner.parts)
 
@@ -139,7 +139,7 @@ def move_anchors(inner: Candidates, margins: Margins, cables: Array, poses: Arra
     return inner.values(best), found
 
 
-ROWS: Final = 1 << 14  # pose rows per block: a tenth of a second, and little memory
+ROWS: Final = 1 << 14  # pose rows per block, about 0.1 s and little memory
 
 
 class Rating:
@@ -155,7 +155,7 @@ class Rating:
         robust: AnchorErrors | None,
         inner: Candidates | None,
     ) -> None:
-        """Prepare; an error if a cost is missing, or the first robot has no feasible pose for a goal on tensions."""
+        """Prepare; an error if a cost is missing, or if a goal on tensions has no feasible pose of the first robot."""
         self._candidates, self._goals, self._robust, self._inner = candidates, tuple(goals), robust, inner
         self._model, self._poses, self.rows = model, poses, pose_rows(poses)
         self._wrench = np.zeros(6) if wrenches is None else middle_wrench(wrenches)
@@ -171,15 +171,16 @@ class Rating:
     def __call__(self, values: Array) -> Array:
         """Values (N, g) of the goals for design variables (N, d).
 
-        NaN for an impossible candidate: coincident cables, crossed limits, a frame anchor inside the platform, or
-        without tensions at a pose that the first robot holds and a goal needs.
+        Values are NaN for an impossible candidate: one with coincident cables, a lower limit above an upper limit, a
+        frame anchor inside the platform, or without tensions at a pose that is feasible for the first robot and
+        required by a goal.
         """
         size = max(1, ROWS // (len(self.rows) * (1 if self._robust is None else self._robust.samples)))
         parts = [self._rated(values[first : first + size]) for first in range(0, len(values), size)]
         return np.concatenate(parts)
 
     def margins(self, cables: Array, rows: Array) -> Array:
-        """Margins [N] of tables (R, m, CABLE_COLUMNS), each at as many of the pose rows (N, POSE_COLUMNS), (N,)."""
+        """Margins [N], (N,), of tables (R, m, CABLE_COLUMNS), each at its N/R pose rows of (N, POSE_COLUMNS)."""
         made = MarginRows(self._candidates.robot, self._wrenches, self._model, self._arm, cables)
         return made.rows(rows).value
 
@@ -197,7 +198,7 @@ class Rating:
         return found
 
     def _measured(self, cables: Array, values: Array) -> Measured:
-        """Quantities of feasible candidates that the goals need."""
+        """Quantities of feasible candidates that the goals require."""
         many = cables[:, None] if self._robust is None else self._robust.added(cables)
         shape = (*many.shape[:2], len(self.rows))
         robots = many.reshape(-1, *many.shape[2:])
@@ -224,7 +225,7 @@ class Rating:
         return Measured(margin, tension, sag, stiffness, cost)
 
     def _cost(self, cables: Array, values: Array) -> Array:
-        """Cost of cables as long as the longest chords, of tables (N, S, G, m, CABLE_COLUMNS), shape (N, S)."""
+        """Cost (N, S) of cables with the lengths of their longest chords; tables (N, S, G, m, CABLE_COLUMNS)."""
         costs = self._candidates.costs(values)
         if costs is None:
             step = "Free the cable: FreeCable([CableChoice(name, cable, cost=1.5), ...])."

@@ -1,4 +1,4 @@
-"""Request of a design search, checked: robot, design variables, goals, loads and poses."""
+"""Checked request of a design search: robot, design variables, goals, loads and poses."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot
 from sagline.workspaces.wrench_sets import WrenchSet
 
-COUNTS: Final = (9, 7, 5)  # of the grid, along x, y and z
-MOST: Final = 100_000  # poses
+COUNTS: Final = (9, 7, 5)  # points of the grid along x, y and z
+MOST: Final = 100_000  # largest number of poses
 
 
 def poses_of(robot: Robot, poses: Pose | None, box: PoseBox | None, grid: Sequence[int]) -> Pose:
@@ -72,8 +72,8 @@ def _grid(box: PoseBox, counts: tuple[int, ...]) -> Pose:
 
 
 MOST_EVALUATIONS: Final = 10_000_000
-LOOKED_AT: Final = 256  # candidates whose anchors are checked before the search begins
-_SEED: Final = 2**31 - 1  # the largest that all optimizers take
+LOOKED_AT: Final = 256  # number of candidates whose anchors are checked before the search begins
+_SEED: Final = 2**31 - 1  # largest seed that all optimizers accept
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,7 +81,7 @@ class Request:
     """A design search, without its number of evaluations.
 
     Attributes:
-        robot: The robot that it begins with.
+        robot: Initial robot of the search.
         free: Design variables.
         goals: Goals.
         wrenches: Set of loads; None for the weight alone.
@@ -90,7 +90,7 @@ class Request:
         inner: Anchors that move at each pose.
         robust: Errors of the anchors, or None.
         optimizer: Name of the optimizer.
-        seed: Of all that is random.
+        seed: Seed of all random numbers.
     """
 
     robot: Robot
@@ -106,7 +106,7 @@ class Request:
 
     @property
     def candidates(self) -> Candidates:
-        """The robots that are searched."""
+        """The space of robots that the search covers."""
         return Candidates(self.robot, self.free)
 
 
@@ -114,7 +114,7 @@ def checked_request(
     robot: Any, free: Any, goals: Any, wrenches: Any, poses: Pose, model: Any, inner: Any, robust: Any,
     optimizer: Any, seed: Any,
 ) -> Request:  # fmt: skip
-    """Request from the arguments of `design`, checked."""
+    """Checked request from the arguments of `design`."""
     optional(wrenches, WrenchSet, "wrenches")
     request = Request(
         instance(robot, Robot, "robot"),
@@ -144,7 +144,7 @@ def checked_request(
 
 
 def _goals(given: Any) -> tuple[Goal, ...]:
-    """Goals, checked; a name means its goal."""
+    """Checked goals; a name means the goal of this name."""
     many = [given] if isinstance(given, Goal | str) else given
     if not isinstance(many, Sequence) or not many:
         step = 'Give [Goal("workspace_share")] for instance.'
@@ -167,7 +167,7 @@ def _refuse_weights(goals: tuple[Goal, ...]) -> None:
 
 
 def _check_platform(request: Request) -> None:
-    """Refuse frame anchors that are or can get inside the platform."""
+    """Refuse frame anchors that are inside the platform, or can move inside it."""
     for name, free in (("free", request.free), ("inner", request.inner)):
         if not free:
             continue

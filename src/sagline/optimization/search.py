@@ -1,4 +1,4 @@
-"""Optimizers: CMA-ES by the package cma, differential evolution by scipy, and NSGA-II by the package pymoo."""
+"""Optimizers: CMA-ES from the package cma, differential evolution from scipy, and NSGA-II from the package pymoo."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def _optional_module(module: str) -> Any:
         raise InvalidValueError(f"the package {package}", "missing", "installed", step) from None
 
 
-Rate: TypeAlias = Callable[[Array], Array]  # points of the unit cube (N, d) to costs (N, g), which are minimized
+Rate: TypeAlias = Callable[[Array], Array]  # from points of the unit cube (N, d) to costs (N, g) to minimize
 
 
 class Task(NamedTuple):
@@ -33,10 +33,10 @@ class Task(NamedTuple):
 
     Attributes:
         rate: Function that returns the costs of a generation of points of the unit cube.
-        first: Points of the first generation, the robot itself first, shape (K, d).
+        first: Points of the first generation, with the initial robot first, shape (K, d).
         goals: Number of costs, g.
         seed: Seed of the search.
-        evaluations: Number of points that may be rated, the first generation included.
+        evaluations: Largest number of rated points, including the first generation.
     """
 
     rate: Rate
@@ -53,9 +53,9 @@ def latin_hypercube(count: int, dimensions: int, seed: int) -> Array:
     return np.asarray((intervals + random.random((count, dimensions))) / count)
 
 
-SPREAD: Final = 0.2  # first standard deviation, of the bounds' distance: they lie within some three of it
+SPREAD: Final = 0.2  # first standard deviation, relative to the distance of the bounds
 GROWTH: Final = 2  # factor of the population at each restart
-LEAST_DIMENSIONS: Final = 2  # numbers: with a single one the package fails; a second that means nothing goes along
+LEAST_DIMENSIONS: Final = 2  # the package fails with one variable; a second one without effect is then added
 
 
 def _search_cma(task: Task) -> None:
@@ -79,12 +79,12 @@ def _search_cma(task: Task) -> None:
 
 
 def _strategy(cma: Any, start: Array, random: np.random.Generator, population: int | None) -> Any:
-    """One run of CMA-ES with its own random numbers; numpy's global generator is untouched."""
+    """One run of CMA-ES with its own random numbers; numpy's global generator does not change."""
     padded = np.concatenate((start, np.full(max(LEAST_DIMENSIONS - len(start), 0), 0.5)))
     options = {
         "bounds": [0.0, 1.0],
         "randn": lambda *shape: random.standard_normal(shape),
-        "seed": np.nan,  # no seed: randn has its own
+        "seed": np.nan,  # no seed, because randn has its own
         "verbose": -9,
         **({} if population is None else {"popsize": population}),
     }
@@ -97,7 +97,7 @@ def _search_differential_evolution(task: Task) -> None:
 
     generations = task.evaluations // len(task.first) - 1
 
-    def costs(points: Array) -> Array:  # scipy's points are columns
+    def costs(points: Array) -> Array:  # scipy passes points as columns
         return task.rate(np.ascontiguousarray(points.T))[:, 0]
 
     differential_evolution(
@@ -125,7 +125,7 @@ def _search_nsga2(task: Task) -> None:
     left = task.evaluations
     while left > 0:
         asked = algorithm.ask()
-        if asked is None or not 0 < len(asked) <= left:  # none: it finds no point that it has not tried
+        if asked is None or not 0 < len(asked) <= left:  # None if it finds no point that it has not tried
             return
         costs = task.rate(asked.get("X"))
         evaluator.Evaluator().eval(static.StaticProblem(problem, F=costs), asked)
@@ -139,7 +139,7 @@ SEARCHES: Final[MappingProxyType[str, Callable[[Task], None]]] = MappingProxyTyp
 
 
 def population_of(optimizer: str, dimensions: int) -> int:
-    """Number of candidates of the first generation, the robot itself among them."""
+    """Number of candidates of the first generation, including the initial robot."""
     if optimizer == "cma":
         return 2 * (4 + int(3.0 * np.log(dimensions)))
     return max(16, 4 * dimensions) if optimizer == "differential_evolution" else max(24, 4 * dimensions)

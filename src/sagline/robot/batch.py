@@ -15,7 +15,7 @@ from sagline.core.errors import InvalidValueError
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
-Robots: TypeAlias = Robot | tuple[Robot, ...]  # type after `together`
+Robots: TypeAlias = Robot | tuple[Robot, ...]  # type of a checked robot or robots
 Index: TypeAlias = int | slice | NDArray[Any]  # index of a batch
 
 # common properties and their units
@@ -32,7 +32,7 @@ def together(robot: Robot | Sequence[Robot]) -> Robots:
     """
     if isinstance(robot, Robot):
         return robot
-    given: Any = robot  # a caller without type checks may give anything
+    given: Any = robot  # a caller without type checks may pass anything
     robots: tuple[Any, ...] = ()
     if isinstance(given, Sequence | np.ndarray) and not isinstance(given, str):
         robots = tuple(given)
@@ -48,7 +48,7 @@ def together(robot: Robot | Sequence[Robot]) -> Robots:
 
 
 def check_count(robot: Robots, poses: int | None) -> None:
-    """Refuse a tuple of robots unless it has one robot per pose; poses: their number, None for a single pose."""
+    """Refuse a tuple of robots unless it has one robot per pose; poses: number of poses, None for a single pose."""
     if isinstance(robot, Robot) or len(robot) == poses:
         return
     allowed = "one robot" if poses is None else f"one robot, or a sequence of {poses}"
@@ -64,7 +64,7 @@ def one_a_pose(robot: Robot | Sequence[Robot], poses: int | None) -> Robots:
 
 
 def first_of(robot: Robots) -> Robot:
-    """The robot, or the first of several, for properties common to all; refuses an empty selection."""
+    """The robot, or the first of several robots, for common properties; refuses an empty selection."""
     if isinstance(robot, Robot):
         return robot
     if not robot:
@@ -129,7 +129,7 @@ class _Pulleys(NamedTuple):
     """The pulleys of the cables; without pulleys, the radius is 0 and the entry is from below."""
 
     radius: Array  # R [m], shape (m,) or, for several robots, (N, m)
-    entry: Array  # +1 where a cable enters from below, -1 from above, of the same shape
+    entry: Array  # +1 if a cable enters from below, -1 if from above, of the same shape
 
 
 def pulleys_of(robot: Robots) -> _Pulleys:
@@ -182,7 +182,7 @@ _TINY = 1e-300
 
 
 def outward(robot: Robots, pose: Pose) -> Array:
-    """Horizontal unit vectors from frame anchors to platform ends, (..., m, 2); zero for a vertical one."""
+    """Horizontal unit vectors from frame anchors to platform ends, (..., m, 2); zero for a vertical cable."""
     anchors = anchors_of(robot)
     ends = pose.position[..., None, :] + anchors.platform @ np.swapaxes(pose.matrix, -1, -2)
     level = (ends - anchors.frame)[..., :2]
@@ -194,8 +194,8 @@ def points_on_pulleys(robot: Robots, pose: Pose, angle: Array) -> Array:
     """Points on the pulleys, measured along the cables from the entry points.
 
     pose: one pose, or a batch of N: it defines the swivel angles of the pulleys; angle: angle along the cable from the
-    frame anchor [rad], shape (..., m); the wrap angle gives the exit point. Returns points in the world [m], shape
-    (..., m, 3); the frame anchors where there is no pulley.
+    frame anchor [rad], shape (..., m), for which the wrap angle gives the exit point. Returns points in the world [m],
+    shape (..., m, 3); frame anchors for cables without a pulley.
     """
     radius, entry = pulleys_of(robot)
     away = outward(robot, pose) * (radius * (1.0 - np.cos(angle)))[..., None]
@@ -211,7 +211,7 @@ def pulley_centers(robot: Robot, pose: Pose) -> Array:
 
 
 def dead_cable(robot: Robots) -> Array:
-    """Length of each cable between pulley and drum [m], (m,) or (N, m): the smallest possible length off the drum."""
+    """Length of each cable between pulley and drum [m], (m,) or (N, m), the smallest possible length off the drum."""
     if not isinstance(robot, Robot):
         return np.stack([dead_cable(one) for one in robot])
     return np.zeros(robot.cable_count) if robot.winches is None else robot.winches.dead_cable

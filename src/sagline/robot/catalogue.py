@@ -24,7 +24,7 @@ def robot_names() -> tuple[str, ...]:
     """Names of the presets.
 
     Returns:
-        In alphabetical order.
+        The names are in alphabetical order.
 
     Examples:
         >>> import sagline as sl
@@ -50,9 +50,9 @@ def preset_text(name: str) -> str:
 
 LAYOUTS: Final = ("top", "mixed", "bottom")
 COUNTS: Final = {"top": (8, 6), "mixed": (8, 7)}
-THINNEST, THICKEST = 0.0003, 0.08  # m, allowed diameters of ropes for cable robots
-SLACK_LIMIT = 0.05  # lowest tension, relative to the weight of the platform
-_CORNERS = np.array([[0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.5, -0.5]])  # counter-clockwise, relative to the edges
+THINNEST, THICKEST = 0.0003, 0.08  # allowed diameters of ropes for cable robots [m]
+SLACK_LIMIT = 0.05  # lower tension limit, relative to the weight of the platform
+_CORNERS = np.array([[0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.5, -0.5]])  # counter-clockwise, per edge
 _POSTS = np.array([[0.5, -0.5], [-0.5, -0.5], [0.0, 0.5]])  # a triangle in the same rectangle
 
 
@@ -91,7 +91,7 @@ class Design:
         cables: int = 8,
         layout: str = "top",
     ) -> None:
-        """Check the data that the robot itself does not check, or reports in other terms.
+        """Check the data that the robot itself does not check or reports in other terms.
 
         Args:
             name: Name of the robot.
@@ -174,7 +174,7 @@ class Design:
     def placed(self, share: float) -> PoseBox:
         """Box of platform positions around the center of the frame.
 
-        share: edges of the box relative to the free edges, frame minus platform, 0 to 1.
+        share: edges of the box relative to the edges of frame minus platform, 0 to 1.
         """
         middle = np.array([0.0, 0.0, 0.5 * self.frame[2]])
         half = 0.5 * share * (self.frame - self.platform)

@@ -14,7 +14,7 @@ from sagline.robot.pose import unit
 from sagline.robot.winch import Winch
 
 _SYMMETRY = 1e-9  # largest difference of mirrored elements, relative to the largest element
-# tolerance for moments given with three digits: for a thin plate the largest moment equals the sum of the others
+# tolerance for moments with three digits, because the largest moment of a thin plate equals the sum of the others
 _ROUNDED = 0.01
 
 
@@ -68,7 +68,7 @@ def cables(given: Cable, count: int) -> Cable:
 
 
 def winch_of_each_cable(given: Winch | None, frame: Array) -> Winch | None:
-    """The winches, one per cable, or None; guides that lead to the frame anchors (m, 3) define the dead length."""
+    """The winches, one per cable, or None; guides define the dead length up to the frame anchors (m, 3)."""
     winch = optional(given, Winch, "winches")
     return None if winch is None else winch.per_cable(len(frame))._run_to(frame)
 
@@ -77,8 +77,8 @@ def inertia(given: ArrayLike | None, pattern: str, normal: Array | None) -> Arra
     """Inertia about the center of mass: symmetric, no negative moment, positive about each free rotation axis.
 
     A body with three free rotations must also satisfy the triangle inequality: each principal moment is at most the sum
-    of the other two. The moments of a planar platform about the axes in its plane may be zero, as other tools write
-    them; without rotations all moments may be zero.
+    of the other two. The moments of a planar platform about the axes in its plane may be zero, because other tools
+    write them so. Without rotations all moments may be zero.
 
     given: inertia [kg m^2], or None; pattern: the motion pattern, which defines the free rotations; normal: unit normal
     of the plane of a planar pattern, shape (3,); None for the other patterns. Returns a matrix of shape (3, 3).

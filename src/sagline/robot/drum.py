@@ -105,7 +105,7 @@ class Drums:
         return turns, travel
 
     def _off(self, turns: Array) -> tuple[int, int] | None:
-        """The first sample and cable whose length is outside the range of its drum."""
+        """Index of the first sample and cable with a length outside the range of the drum."""
         wrong = (turns > self.most + ROUNDING) | (turns < self.fewest - ROUNDING)
         if not wrong.any():
             return None
@@ -183,7 +183,7 @@ def _tables(winches: Winch, diameter: Array) -> tuple[Array, Array]:
 
 
 def _layer_starts(winches: Winch, table: Array) -> Array:
-    """Lengths at which layers begin: cable length minus the length on the layers below and the slant of the run."""
+    """Lengths at which layers begin: cable length minus the length on the layers below and the slant to the pulley."""
     count = np.arange(int(winches.layers.max()) + 1)
     known = winches.cable_length if winches.cable_length is not None else winches.length_zero
     whole = np.zeros(len(table)) if known is None else known  # without cable_length, turns are counted from length_zero
@@ -209,11 +209,11 @@ def _limits(winches: Winch, robot: Robot) -> tuple[Array, Array, Array]:
 def drum_tension(state: Equilibrium) -> Array:
     """Tension of the cables where they leave the drum, with friction if the state has winding directions.
 
-    Along an exact cable without friction T + T^2/(2 EA) - w z is constant, z the height. Cables of the other models
-    have no weight between pulley and drum; their tension there is the chord tension.
+    Along an exact cable without friction, T + T^2/(2 EA) - w z is constant, with z the height. Cables of the other
+    models have no weight between pulley and drum; their tension there is the chord tension.
 
-    Returns tensions [N], shape (m,) or (N, m); negative where a slack cable leaves a drum downward; NaN where a cable
-    would have to be compressed to a negative length.
+    Returns tensions [N], shape (m,) or (N, m). They are negative if a slack cable leaves a drum downward, and NaN if a
+    cable would have to be compressed to a negative length.
 
     Source:
         docs/model.md, section 10.

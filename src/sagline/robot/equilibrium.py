@@ -35,8 +35,9 @@ class Contact(Result):
         wrap_angle: Psi, the angle over which a cable lies on its pulley [rad].
         wrapped_length: Unstrained length on the pulley [m].
         dead_length: Unstrained length between pulley and drum [m].
-        chord_tension: T_x/cos phi along the chord that is tangent to the pulley and ends at the platform end [N]: the
-            tension that is distributed and limited. The chord of the free span itself starts at the actual exit point.
+        chord_tension: T_x/cos phi along the chord that is tangent to the pulley and ends at the platform end [N], to
+            which tension distribution and limits apply. The chord of the free span itself starts at the actual exit
+            point.
         chord_sine: sin phi of the tangent chord.
         winding: The direction of friction: +1 winding in, -1 paying out, 0 at rest; None: no friction.
     """
@@ -69,10 +70,9 @@ class Equilibrium(Result):
         pose: Pose of the platform, single or a batch of N.
         wrench: External plus inertial wrench on the platform about its center of mass, world axes, without
             gravity: force [N], moment [N m], shape (6,) or (N, 6).
-        cables: State of the free spans, from where they leave the frame to their platform ends, fields of shape
-            (m,) or (N, m).
-        contact: Wrapped and dead lengths of the cables; None if there are none: each cable then starts at its frame
-            anchor, and its whole length is off the drum.
+        cables: State of the free spans, from their exit points to their platform ends, fields of shape (m,) or (N, m).
+        contact: Wrapped and dead lengths of the cables; None without pulleys and dead lengths. Each cable then starts
+            at its frame anchor, and its length off the drum is its free length.
     """
 
     robot: Robot | tuple[Robot, ...]
@@ -83,7 +83,7 @@ class Equilibrium(Result):
 
     @property
     def unstrained_length(self) -> Array:
-        """L: whole unstrained length off the drum: free, wrapped and dead length [m], shape (m,) or (N, m)."""
+        """Whole unstrained length L off the drum [m], shape (m,) or (N, m): free, wrapped and dead length."""
         if self.contact is None:
             return self.cables.unstrained_length
         return locked(self.free_length + (self.contact.wrapped_length + self.contact.dead_length))
@@ -95,9 +95,9 @@ class Equilibrium(Result):
 
     @property
     def chord_tension(self) -> Array:
-        """Tau = T_x/cos phi [N], shape (m,) or (N, m); over a pulley, phi is the angle of the tangent chord.
+        """Chord tension tau = T_x/cos phi [N], shape (m,) or (N, m); over a pulley, phi is that of the tangent chord.
 
-        This tension is distributed, and limited by limits on the chord.
+        Tension distribution and chord limits apply to this tension.
         """
         return self.cables.chord_tension if self.contact is None else self.contact.chord_tension
 
@@ -151,7 +151,7 @@ class Equilibrium(Result):
         return Equilibrium(robot, self.pose[part], wrench, self.cables[part], contact)
 
     def __iter__(self) -> Iterator[Equilibrium]:
-        """The poses of a batch, one by one."""
+        """Iterate over the poses of a batch."""
         return (self[i] for i in range(len(self)))
 
     @property
@@ -174,7 +174,7 @@ def limited_tension(robot: Robots, cables: CableState, contact: Contact | None =
 def cables_of_results(
     robot: Robots, model: CableModel, results: Array, status: Codes, shape: tuple[int, ...]
 ) -> tuple[CableState, Contact | None]:
-    """States of the free spans of solved poses, and their contact, which is None without pulleys and dead lengths.
+    """States of the free spans of solved poses, and their contact (None without pulleys and dead lengths).
 
     results: rows as in `sagline.kernels.tables`, (RESULT_ROWS, N, m); status: status of each cable, (N, m); shape: ()
     for a single pose, (N,) for a batch.

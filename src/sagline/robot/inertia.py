@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 def box_inertia(mass: float, x: float, y: float, z: float) -> Array:
     """Inertia of a solid box whose edges are along the platform axes.
 
-    mass: [kg]; x: edge along x [m]; y: edge along y [m]; z: edge along z [m]. Returns inertia about the center of mass
-    [kg m^2], shape (3, 3).
+    mass: mass [kg]; x, y, z: edges along the axes [m]. Returns the inertia about the center of mass [kg m^2], shape (3,
+    3).
     """
     return np.diag([y * y + z * z, x * x + z * z, x * x + y * y]) * (mass / 12.0)
 
@@ -27,7 +27,8 @@ def box_inertia(mass: float, x: float, y: float, z: float) -> Array:
 def cylinder_inertia(mass: float, radius: float, height: float) -> Array:
     """Inertia of a solid cylinder whose axis is along the z axis of the platform.
 
-    mass: [kg]; radius: [m]; height: [m]. Returns inertia about the center of mass [kg m^2], shape (3, 3).
+    mass: mass [kg]; radius: radius [m]; height: height [m]. Returns the inertia about the center of mass [kg m^2],
+        shape (3, 3).
     """
     across = (3.0 * radius * radius + height * height) / 12.0
     return np.diag([across, across, 0.5 * radius * radius]) * mass
@@ -42,14 +43,14 @@ def with_mass(robot: Robot, mass: float) -> Robot:
 
 
 def without_cables(robot: Robot, *cables: int) -> Robot:
-    """Robot after the failure of some cables; their weight on the platform is removed too.
+    """Robot after the failure of some cables; the weight of these cables on the platform is removed too.
 
     Args:
         robot: The whole robot.
         cables: Indices of the broken cables, 0 to m - 1.
 
     Returns:
-        A robot with the remaining cables, in their order; everything else is unchanged.
+        A robot with the remaining cables, in their order; all other data are unchanged.
 
     Raises:
         InvalidValueError: If an index is out of range, or no cable remains.

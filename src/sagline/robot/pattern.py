@@ -1,4 +1,4 @@
-"""Motion patterns: which of the six motions of a platform are free."""
+"""Motion patterns: selection of a platform's free motions among the six motions."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ def freedom_matrix(pattern: MotionPattern, plane_normal: Array | None) -> Array:
 
 
 def _plane_axes(normal: Array) -> Array:
-    horizontal = np.cross((0.0, 0.0, 1.0), normal)  # its length is the sine of the normal's angle to the vertical
+    horizontal = np.cross((0.0, 0.0, 1.0), normal)  # the length of e1 is the sine of the normal's angle to the vertical
     length = float(np.linalg.norm(horizontal))
-    if length < 1e-12:  # horizontal plane, up to rounding: every direction is horizontal, so x is chosen
+    if length < 1e-12:  # horizontal plane, except for rounding: every direction is horizontal, and x is chosen
         horizontal = np.array([1.0, 0.0, 0.0]) - normal[0] * normal
         length = float(np.linalg.norm(horizontal))
     first = horizontal / length

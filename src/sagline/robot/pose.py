@@ -25,9 +25,9 @@ _ROUNDING = 4.0 * np.finfo(np.float64).eps
 
 
 def unit(vectors: Array) -> Array:
-    """Normalize vectors along the last axis; vectors of length 1 up to rounding stay unchanged in every bit.
+    """Normalize vectors along the last axis; vectors of length 1, except for rounding, do not change in any bit.
 
-    Files, pickles and copies normalize again, and their values must not drift. Zero vectors give NaN: check lengths
+    Files, pickles and copies normalize again, and their values must not drift. Zero vectors give NaN; check lengths
     first.
 
     vectors: shape (..., k). Returns array of the same shape; the given array itself if all lengths are 1.
@@ -80,8 +80,8 @@ class PoseBox:
     __reduce__ = reduced
 
 
-_MATRIX_TOLERANCE = 1e-9  # largest element of Q Q^T - 1 of an accepted rotation matrix
-_QUATERNION_TOLERANCE = 1e-6  # accepts a quaternion written with seven digits
+_MATRIX_TOLERANCE = 1e-9  # largest element of Q Q^T - 1 for an accepted rotation matrix
+_QUATERNION_TOLERANCE = 1e-6  # tolerance that accepts a quaternion with seven digits
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -164,7 +164,7 @@ class Pose:
 
     @classmethod
     def _adopt(cls, position: Array, quaternion: Array) -> Pose:
-        """Pose from arrays that sagline created: without a copy; only the counts are checked."""
+        """Pose from arrays that sagline created, without a copy; only the counts are checked."""
         pose = object.__new__(cls)
         pose._fill(position, quaternion)
         return pose
@@ -254,7 +254,7 @@ class Pose:
         return Pose._adopt(self.position[part], self.quaternion[part])
 
     def __iter__(self) -> Iterator[Pose]:
-        """The poses of a batch, one by one."""
+        """Iterate over the poses of a batch."""
         return (self[i] for i in range(len(self)))
 
     def __reduce__(self) -> tuple[Any, tuple[Array, Array]]:

@@ -1,4 +1,4 @@
-"""Checks that poses fit the motion pattern of a robot: without a free rotation, no rotation may be requested."""
+"""Checks of poses against the motion pattern of a robot: rotations that are not free must not be requested."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
 LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
-# rad and m: a smaller deviation counts as zero; it is the rounding of numbers written with seven digits
+# [rad] and [m], smaller deviations count as zero; numbers with seven digits have such rounding errors
 ROUNDING = 1e-6
 
 
 def check_reach(robot: Robot, pose: Pose, item: str) -> None:
-    """Refuse poses that the motion pattern of the robot does not connect.
+    """Refuse poses with differences that the motion pattern of the robot does not allow.
 
-    A platform without rotations keeps its orientation, which is arbitrary. A planar platform rotates only about the
-    normal of its plane and stays in one of the parallel planes.
+    The orientation of a platform without rotations is arbitrary but constant. A planar platform rotates only about the
+    normal of its plane, and remains in one of the parallel planes.
 
-    robot: the robot, or the first of several with a common pattern; pose: one pose, which is always accepted, or a
-    batch; NaN is accepted.
+    robot: the robot, or the first of several with a common pattern; pose: a batch, or one pose, which is always
+    accepted; NaN is accepted.
     """
     pattern, normal = robot.motion_pattern, robot.plane_normal
     if pattern == "3R3T" or len(pose.shape) == 0 or len(pose) == 0:
@@ -47,10 +47,10 @@ def check_reach(robot: Robot, pose: Pose, item: str) -> None:
 
 
 def forbidden_turn(robot: Robot, pose: Pose, other: Array) -> Array:
-    """Component of the rotation from an orientation to each pose that is not free in the motion pattern of the robot.
+    """Part of the rotation from an orientation to each pose that the motion pattern of the robot does not allow.
 
     pose: one pose or a batch of N; other: the orientation, a unit quaternion, shape (4,). Returns sine of half the
-    angle times the axis, shape (N, 3); zeros where all motions are free.
+    angle times the axis, shape (N, 3); zeros if all motions are free.
     """
     own = np.atleast_2d(pose.quaternion)
     if robot.motion_pattern == "3R3T":
@@ -87,7 +87,7 @@ def out_of_plane(robot: Robot, pose: Pose) -> Array:
     return distance
 
 
-_FLAT: Final = 0.05  # relative to the robot's size: anchors whose heights differ by less are all at the top
+_FLAT: Final = 0.05  # height difference, relative to the robot's size, below which all anchors are at the top
 
 
 def bounds(robot: Robot) -> tuple[Array, Array]:

@@ -36,13 +36,13 @@ class Robot(Shown):
         winches: Pulleys, dead lengths, drums and motors, one for all cables or one per cable, fields of shape (m,);
             None if cables start at the frame anchors and their lengths are prescribed directly.
         mass: Mass of the platform [kg], > 0.
-        inertia: Inertia about the center of mass in the platform frame [kg m^2], shape (3, 3): positive definite, no
-            principal moment larger than the sum of the other two. A planar pattern requires only a positive moment
-            about plane_normal. A pattern without rotation requires no inertia; it may be omitted.
+        inertia: Inertia about the center of mass in the platform frame [kg m^2], shape (3, 3). It is positive definite,
+            and no principal moment is larger than the sum of the other two. A planar pattern requires only a positive
+            moment about plane_normal. The inertia may be omitted for a pattern without rotation.
         center_of_mass: Center of mass in the platform frame [m], shape (3,).
         gravity: Gravitational acceleration along -z [m/s^2], >= 0.
         motion_pattern: "3R3T", "3T" (point mass), "1R2T" (planar) or "2T" (planar without rotation).
-        plane_normal: Normal of the plane of a planar pattern, world axes, shape (3,), of any length but zero, stored
+        plane_normal: Normal of the plane of a planar pattern, world axes, shape (3,), of any nonzero length, stored
             with length 1; None for the other patterns.
         tension_min: Lower tension limits [N], >= 0, one for all or one per cable, shape (m,).
         tension_max: Upper tension limits [N], may be infinite, one for all or one per cable, shape (m,).
@@ -51,13 +51,13 @@ class Robot(Shown):
         frame_size: Edges of the frame, for drawing [m], shape (3,), or None.
         test_box: Box of poses, nearly all of them wrench-feasible, or None.
         source: Source of the numbers.
-        assumed: Field name -> reason; the fields whose values are not from the source.
+        assumed: Reasons by field name, for the fields with values that are not from the source.
         notes: Further remarks for users.
-        tolerances: Name of a quantity -> standard deviation of its value given here [SI], > 0, from a drawing or data
-            sheet; infinite if nothing is known. Give one number for the whole field, one per axis for a quantity with
-            three components, or an array of the shape of the field. Names: frame_anchors, platform_anchors,
-            center_of_mass (with three components each), mass, and per cable length_zero, drum_radius, linear_density,
-            axial_stiffness, pulley_radius, dead_cable, load_cell_gain, load_cell_bias.
+        tolerances: Standard deviations of the robot's values by name of the quantity [SI], > 0, from a drawing or data
+            sheet; infinite if unknown. A deviation is one number for the whole field, one number per axis for a
+            quantity with three components, or an array of the shape of the field. Names: frame_anchors,
+            platform_anchors, center_of_mass (with three components each), mass, and per cable length_zero, drum_radius,
+            linear_density, axial_stiffness, pulley_radius, dead_cable, load_cell_gain, load_cell_bias.
         calibration: The calibration that identified some of the values, with their standard errors; or None.
 
     Raises:
@@ -174,7 +174,7 @@ class Robot(Shown):
             choice(name, "field", Robot.__slots__)
         guides = None if self.winches is None else self.winches.guides
         if self.winches is not None and guides is not None and "frame_anchors" in changes and "winches" not in changes:
-            changes["winches"] = self.winches.replace(guides=guides)  # the robot computes the dead length again
+            changes["winches"] = self.winches.replace(guides=guides)  # the new robot computes the dead length again
         return evolve(self, **changes)._kept(self) if "calibration" not in changes else evolve(self, **changes)
 
     def _kept(self, before: Robot) -> Robot:

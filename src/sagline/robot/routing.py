@@ -1,12 +1,12 @@
 """Routing between the pulleys' exit points and the drums: friction, and catenary spans between guides.
 
-Kernels model this routing as a straight, guided run without friction, also in energy and stiffness. This module
-computes the difference of unstrained length between the actual routing and that run; docs/model.md, section 10.
+Kernels model this routing as a straight, guided cable without friction, also for energy and stiffness. This module
+computes the difference of unstrained length between the actual routing and this model; docs/model.md, section 10.
 
-Friction: over a bend of angle psi the tensions differ by the factor exp(mu psi), and the pulley's bearing takes the
-share f of the tension. While winding in, both increase the tension toward the drum. The effect of the weight of the
-cable on the pulley is kept to first order, as without friction. Between guides a cable is a catenary: the tension of
-its far end follows from T + T^2/(2 EA) - w z, which is constant along the whole cable without friction.
+With friction, the tensions on the two sides of a bend of angle psi differ by the factor exp(mu psi), and the pulley's
+bearing takes the share f of the tension. While winding in, both increase the tension toward the drum. The effect of the
+cable's weight on the pulley is of first order, as without friction. Between guides a cable is a catenary. The tension
+of its far end follows from T + T^2/(2 EA) - w z, which is constant along the whole cable without friction.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.robot import Robot
 from sagline.robot.winch import Winch
 
-# iterations between bend angles and tensions, which depend on each other; each gains a digit or more
+# iterations between bend angles and tensions, which depend on each other; each iteration adds at least one correct
+# digit
 PASSES: Final = 40
 STEPS: Final = 60  # iterations of Newton's method for one span
 _TOLERANCE: Final = 1e-15  # relative change of a length
@@ -44,7 +45,7 @@ class _Routing(NamedTuple):
 
 
 class _ExitState(NamedTuple):
-    """Cables where they leave their pulleys, arrays of shape (K,) for the K cables of the calculation."""
+    """State of the cables at their exit points, arrays of shape (K,) for the K cables of the calculation."""
 
     tension: Array  # T_A at the exit point P [N]
     weight: Array  # w [N/m]; 0 if the model has no weight there
@@ -53,19 +54,19 @@ class _ExitState(NamedTuple):
     sine: Array  # sin psi
     tangent: Array  # unit tangent at P, toward the platform, shape (K, 3)
     radius: Array  # R [m]
-    entry: Array  # +1 where a cable enters from below, -1 from above
+    entry: Array  # +1 if a cable enters from below, -1 if from above
     friction: Array  # mu, with the sign of the winding
     rolling: Array  # 1 + f while winding in, 1 - f while paying out, 1 at rest
 
     def entering(self, bend: Array) -> Array:
-        """Tension on the drum side of the pulley [N], after an additional bend at the frame anchor [rad]."""
+        """Tension on the drum side of the pulley [N], for an additional bend at the frame anchor [rad]."""
         rubbed = self.tension * np.exp(self.friction * (self.wrap + bend)) * self.rolling
         drop = 2.0 * self.weight * self.radius * self.entry * self.sine / self.stiffness
         return _tension_after(rubbed, drop, self.stiffness)
 
 
 def differs(robot: Robot | tuple[Robot, ...], winding: Array | None) -> bool:
-    """True if the routing differs from a straight guided run without friction.
+    """True if the routing differs from a straight guided cable without friction.
 
     winding: +1, -1 and 0, or None.
     """
@@ -81,8 +82,8 @@ def with_routing(state: Equilibrium, winding: Array | None) -> Equilibrium:
     """Equilibrium of the kernels, corrected for the actual routing between exit points and drums.
 
     state: robot, pose and cables in the model of the kernels; winding: +1 winding in, -1 paying out, 0 at rest, shape
-    (m,) or (N, m); None: no friction. Returns the equilibrium with corrected wrapped and dead lengths, NaN where a
-    cable is too slack for a catenary between guides; the given equilibrium itself if there is no routing.
+    (m,) or (N, m); None: no friction. Returns the equilibrium with corrected wrapped and dead lengths, NaN if a cable
+    is too slack for a catenary between guides; without routing, the given equilibrium itself.
     """
     if state.contact is None or (winding is None and not differs(state.robot, None)):
         return state
@@ -95,7 +96,7 @@ def with_routing(state: Equilibrium, winding: Array | None) -> Equilibrium:
 
 
 def kernel_length(state: Equilibrium) -> Array:
-    """Unstrained lengths for the kernels: computed for a straight guided run [m]."""
+    """Unstrained lengths for the kernels, computed for a straight guided cable [m]."""
     contact = state.contact
     if contact is None or not differs(state.robot, contact.winding) or state.cables.model.code == codes.STRAIGHT:
         return state.unstrained_length
@@ -113,7 +114,7 @@ def actual_routing(state: Equilibrium) -> _Routing:
 
 
 def _routing(state: Equilibrium, *, guided: bool) -> _Routing:
-    """The routing; several robots are evaluated one by one. guided: True for a straight guided run."""
+    """The routing; several robots are evaluated one by one. guided: True for a straight guided cable."""
     if isinstance(state.robot, Robot):
         return _routing_of_robot(state, state.robot, guided=guided)
     parts = [_routing_of_robot(state[i], one, guided=guided) for i, one in enumerate(state.robot)]
@@ -145,7 +146,7 @@ def _routing_of_robot(state: Equilibrium, robot: Robot, *, guided: bool) -> _Rou
 
 
 def _exit_tension(state: Equilibrium) -> Array:
-    """Tensions at P in the model of the kernels [N]: they vary along the cable only in the exact model."""
+    """Tensions at P in the model of the kernels [N], which vary along the cable only in the exact model."""
     cables = state.cables
     return cables.frame_end_tension if cables.model.code == codes.CATENARY else state.chord_tension
 
@@ -178,7 +179,7 @@ def _exit_state(state: Equilibrium, robot: Robot, winches: Winch, known: Flags, 
 
 
 def _tension_after(tension: Array, drop: Array, stiffness: Array) -> Array:
-    """Tension [N] where (1 + e)^2 is smaller by a given drop: T + T^2/(2 EA) - w z is constant."""
+    """Tension [N] at a point where (1 + e)^2 is smaller by a given drop, because T + T^2/(2 EA) - w z is constant."""
     strain = tension / stiffness
     gained = strain * (2.0 + strain) - drop  # (1 + strain)^2 - 1
     with np.errstate(invalid="ignore"):
@@ -200,7 +201,7 @@ def _wrapped_length(at: _ExitState) -> Array:
 
 
 def _straight_run(at: _ExitState, length: Array, rise: Array) -> tuple[Array, Array]:
-    """Unstrained length of straight guided runs [m], and the tension at the drum [N]."""
+    """Unstrained length of straight guided cables [m], and the tension at the drum [N]."""
     first = at.entering(np.zeros(1))
     last = _tension_after(first, 2.0 * at.weight * rise / at.stiffness, at.stiffness)
     return 2.0 * length / (2.0 + (first + last) / at.stiffness), last
@@ -211,13 +212,13 @@ def _guided_spans(
 ) -> tuple[Array, Array]:
     """Unstrained length between pulley and drum [m], and tension at the drum [N]; points (K, k + 1, 3), starting at A.
 
-    Tensions depend on the bend angles, and bend angles on the tensions: both are iterated alternately.
+    Tensions and bend angles depend on each other and are iterated alternately.
     """
     hanging = Catenary() if model.code == codes.CATENARY else Elastic()
     material = Cable(robot.cables.linear_density[cable], robot.cables.axial_stiffness[cable])
     axis, eyelet = winches.swivel_axis[cable], at.radius == 0.0
-    # An eyelet at the frame anchor is one bend, from the drum-side span to the cable; at a pulley the span begins along
-    # the swivel axis.
+    # an eyelet at the frame anchor is one bend from the drum-side span to the cable; at a pulley, the span begins along
+    # the swivel axis
     onward = np.where(eyelet[:, None], at.tangent, axis)
     at = at._replace(wrap=np.where(eyelet, 0.0, at.wrap))
     steps = points[:, :-1] - points[:, 1:]
@@ -244,7 +245,7 @@ def _guided_spans(
 def _span(model: CableModel, cable: Cable, step: Array, tension: Array, gravity: float) -> CableState:
     """Catenaries over steps (K, 3) with given tension at the upper ("platform") ends; NaN if there is no solution.
 
-    The upper tension increases with the chord tension, down to a minimum: below it no catenary exists.
+    The upper tension increases with the chord tension, above a minimum. No catenary has a smaller upper tension.
     """
     level, rise = np.hypot(step[:, 0], step[:, 1]), step[:, 2]
     weight = 0.0 if model.weightless else cable.linear_density * gravity

@@ -24,8 +24,8 @@ class _Uncertain(NamedTuple):
     place: str  # location in the robot, as a dotted attribute
     unit: str  # its unit in SI
     each: bool = True  # True if every cable has its own value
-    axes: bool = False  # True if it has three components, along x, y and z
-    share: bool = False  # True if a file may give its tolerance relative to it, in percent
+    axes: bool = False  # True for three components, along x, y and z
+    share: bool = False  # True if a file may state the tolerance in percent of the value
 
     def shape(self, cables: int) -> tuple[int, ...]:
         """Shape of the quantity in a robot with a given number of cables."""
@@ -108,8 +108,8 @@ class Provenance:
     Attributes:
         log: The winch log that it used.
         date: Date of the calibration, ISO 8601.
-        standard_error: Name of an identified quantity -> standard error of the robot's value, in the shape of the field
-            and its SI unit; infinite with neither observations nor a prior. The names are those of tolerances.
+        standard_error: Standard errors of the robot's values by name of the identified quantity, in the shape and SI
+            unit of the field; infinite with neither observations nor a prior. The names are those of tolerances.
         note: Further remarks for users.
 
     Raises:
@@ -123,7 +123,7 @@ class Provenance:
 
     def __attrs_post_init__(self) -> None:
         """Check the fields, except for names and shapes, which the robot checks."""
-        given: Any = self.standard_error  # a caller without type checks may give anything
+        given: Any = self.standard_error  # a caller without type checks may pass anything
         if not isinstance(given, Mapping):
             allowed, step = "names of fields and standard errors", 'Give {"frame_anchors": 0.001}, in SI.'
             raise InvalidValueError("calibration: standard_error", brief(given), allowed, step)

@@ -16,14 +16,14 @@ from sagline.core.memory import check_memory
 from sagline.robot.pose import unit
 
 UPRIGHT: Final = 1e-9  # tolerance of a vertical swivel axis, as the sine of an angle
-_AGREEING: Final = 1e-9  # relative to the dead length: largest difference between a given one and that of the guides
+_AGREEING: Final = 1e-9  # largest difference between a given dead length and that of the guides, relative to it
 MOST_NAMED: Final = 3  # largest number of fields in a message
 _AXES: Final = {"swivel_axis": 1, "guides": 2}  # number of array axes of a field for one cable, if it is not a number
 
 
 @frozen(eq=False, weakref_slot=False)
 class Winch:
-    """One winch with its pulley, or those of all cables: all given fields have one shape, () or (m,).
+    """One winch with its pulley, or the winches of all cables. All given fields have one shape, () or (m,).
 
     A field that is None is not known; a function that needs it raises an error that names it.
 
@@ -35,20 +35,21 @@ class Winch:
             pulley swivels about a vertical axis through the frame anchor, where the cable enters it.
         swivel_axis: Unit vector in the direction from drum to pulley at the pulley's entry, shape (..., 3): up (0, 0,
             1), from a drum below, or down (0, 0, -1).
-        pulley_friction: Friction coefficient mu of the cable on the pulley and at the guides: tensions on the two sides
-            of a bend differ by exp(mu psi), psi the bend angle; the tension is larger on the side toward which the
-            cable moves. Friction acts only if the direction of `winding` is given, as in `inverse` and `forward`.
-        rolling_friction: Share f of the tension that the pulley's bearing takes, >= 0, < 1: on the drum side of the
+        pulley_friction: Friction coefficient mu of the cable on the pulley and at the guides. The tensions on the two
+            sides of a bend of angle psi differ by the factor exp(mu psi). The tension is larger on the side toward
+            which the cable moves. Friction acts only if the direction of `winding` is given, as in `inverse` and
+            `forward`.
+        rolling_friction: Share f of the tension that the pulley's bearing takes, >= 0, < 1. On the drum side of the
             pulley, friction multiplies the tension by 1 + f while winding in and by 1 - f while paying out.
-        dead_cable: Length of the straight guided run from drum to pulley [m], >= 0; with a moving exit, measured where
-            the cable leaves the drum opposite the first pulley. With guides, the robot computes it as the sum of the
-            distances.
+        dead_cable: Length of the straight guided cable from drum to pulley [m], >= 0. With a moving exit, it is
+            measured for a cable that leaves the drum opposite the first pulley. With guides, the robot computes it as
+            the sum of the distances.
         dead_rise: Height of the pulley's entry above the drum [m], at most dead_cable in magnitude; negative if lower.
             With guides, the robot computes it.
         guides: Eyelets, or pulleys small enough to be points, along the cable from the drum to the frame anchor, world
-            axes [m], shape (..., k, 3): the first is where the cable leaves the drum, and the frame anchor is not among
-            them. Between two guides the cable is a free catenary. None: the whole dead length is guided. Stiffness and
-            sensitivities are those of a straight guided run of the same length.
+            axes [m], shape (..., k, 3). The first guide is the point where the cable leaves the drum, and the frame
+            anchor is not among the guides. Between two guides the cable is a free catenary. None: the whole dead length
+            is guided. Stiffness and sensitivities are those of a straight guided cable of the same length.
         drum_radius: Radius of the drum to the surface under the cable [m]; None if the drum is not known.
         drum_width: Usable width along the drum axis [m], >= groove_pitch; a layer has drum_width/groove_pitch turns,
             not necessarily a whole number. None: wide enough for one layer.
@@ -71,14 +72,14 @@ class Winch:
         speed_limit: Largest speed of the motor's shaft [rad/s].
         friction: Friction of the whole drive, as a force on the cable where it leaves the drum [N], >= 0.
         position_gain: k_p of the drive's position loop, referred to the cable [1/s].
-        speed_gain: k_v of its speed loop, referred to the cable [N s/m].
-        integral_gain: k_i of its speed loop, referred to the cable [N/m].
+        speed_gain: k_v of the drive's speed loop, referred to the cable [N s/m].
+        integral_gain: k_i of the drive's speed loop, referred to the cable [N/m].
         load_cell_range: Largest value that the load cell measures [N].
         load_cell_deviation: Standard deviation of a measured value [N], >= 0.
         load_cell_bias: Measured value without load [N].
         load_cell_gain: Measured value per newton of load.
 
-    All fields are in SI, one number for all cables or one per cable. A swivel axis may have any length but zero. Guides
+    All fields are in SI, one number for all cables or one per cable. A swivel axis may have any nonzero length. Guides
     have the shape (k, 3) for all cables or (m, k, 3), k >= 1; dead_cable and dead_rise then remain 0.
 
     Raises:
@@ -178,7 +179,7 @@ class Winch:
     def _long(self) -> str:
         """Names, for a message, of the fields that differ among the cables.
 
-        All fields are expanded to one shape, so their original shapes are not known here.
+        All fields are expanded to one shape, so that their original shapes are not known here.
         """
         differ = [name for name, field in self.known().items() if (field != field[0]).any()]
         if not differ:
@@ -210,7 +211,7 @@ class Winch:
         for name in changes:
             choice(name, "field", self.__slots__)
         if self.guides is not None and changes.get("guides") is not None:
-            changes = {"dead_cable": 0.0, "dead_rise": 0.0, **changes}  # the robot computes them again
+            changes = {"dead_cable": 0.0, "dead_rise": 0.0, **changes}  # the robot computes dead length and rise again
         return evolve(self, **changes)
 
     def _run_to(self, frame_anchors: Array) -> Winch:
@@ -256,7 +257,7 @@ class Winch:
         """The fields that are known, by their names, in order.
 
         Returns:
-            Those that are not None.
+            The fields that are not None.
         """
         return {name: field for name in self.__slots__ if (field := getattr(self, name)) is not None}
 

@@ -12,13 +12,13 @@ from sagline.core.arrays import number
 from sagline.core.errors import InvalidValueError, nearest
 from sagline.robot.winch import Winch
 
-_TURN: Final = 2.0 * pi / 60.0  # rad/s per revolution per minute
-_SHORT: Final = 1e-4  # kg m^2, the unit of the data sheets
+_TURN: Final = 2.0 * pi / 60.0  # [rad/s] per revolution per minute
+_SHORT: Final = 1e-4  # unit of the data sheets [kg m^2]
 
 
 @dataclass(frozen=True, slots=True)
 class WinchDrive:
-    """Data sheet of a motor, with its gear if it has one.
+    """Data sheet of a motor, including its gear, if any.
 
     Attributes:
         name: Name for `winch_drive`.
@@ -161,7 +161,7 @@ def winch_drive_names() -> tuple[str, ...]:
     """Names of the drives in the catalogue.
 
     Returns:
-        In alphabetical order.
+        The names are in alphabetical order.
 
     Examples:
         >>> import sagline as sl
@@ -187,7 +187,7 @@ def winch_drive(name: str) -> WinchDrive:
         >>> import sagline as sl
         >>> drive = sl.winch_drive("yaskawa-sgmah-01aj1")
     """
-    given: Any = name  # a caller without type checks may give anything
+    given: Any = name  # a caller without type checks may pass anything
     word = str(given) if isinstance(given, str) else ""
     if word in _DRIVES:
         return _DRIVES[word]

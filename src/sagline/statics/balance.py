@@ -42,7 +42,8 @@ def inertial_wrench(robot: Robot | Sequence[Robot], pose: Pose, twist: ArrayLike
         (6001, 6)
 
     Source:
-        Newton and Euler; docs/model.md, section 4. Uses the angular velocity itself, not Euler-angle rates.
+        Newton and Euler; docs/model.md, section 4. The equations use the angular velocity itself, not Euler-angle
+        rates.
     """
     if not instance(pose, Pose, "pose").shape:
         raise InvalidValueError("pose", "a single one", "a batch of N poses", "Take Pose(position[None], rotation).")
@@ -98,7 +99,7 @@ def _geometry(robot: Robots, pose: Pose) -> Array:
 
 
 def structure_matrix(robot: Robot | Sequence[Robot], pose: Pose) -> Array:
-    """J: the wrenches of unit chord tensions, about the center of mass, in world axes.
+    """Structure matrix J: the wrenches of unit chord tensions about the center of mass, in world axes.
 
     Args:
         robot: The robot; or a sequence of N that fit together (see `inverse`), one per pose.
@@ -134,8 +135,9 @@ def structure_matrix(robot: Robot | Sequence[Robot], pose: Pose) -> Array:
 def article_balance(robot: Robot, pose: Pose, k_h: float = 4.845) -> ArticleBalance:
     """The article's own H and b, in the horizontal tensions t_x, for comparison.
 
-    H and b follow the article's equations with the levers b_i = B_i - P from the center of mass, the corrected sign of
-    b_pi (erratum 1) and gravity counted once (erratum 2); they are infinite under an anchor (erratum 8).
+    H and b follow the article's equations with the levers b_i = B_i - P from the center of mass, with the corrected
+    sign of b_pi (erratum 1) and with gravity counted once (erratum 2). They are infinite directly under an anchor
+    (erratum 8).
 
     Args:
         robot: The robot.

@@ -24,7 +24,7 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.routing import kernel_length
 from sagline.statics.tables import body_table, cable_table, pose_rows
 
-BLOCK = 1 << 12  # samples per block: a tenth of a second, after which an interrupt is handled
+BLOCK = 1 << 12  # samples per block, about 0.1 s; interrupts are handled between blocks
 _TINY = 1e-300
 
 
@@ -38,8 +38,8 @@ class CableSlopes(NamedTuple):
     by_stiffness: Array  # dT/d(EA), shape (..., m, 3) [1]
     by_radius: Array  # dT/dR of the pulley, shape (..., m, 3) [N/m]
     by_dead: Array  # dT/d(dead length), shape (..., m, 3) [N/m]
-    levers: Array  # from the center of mass to the platform ends, shape (..., m, 3) [m]
-    force: Array  # T on the platform ends, shape (..., m, 3) [N]
+    levers: Array  # levers from the center of mass to the platform ends, shape (..., m, 3) [m]
+    force: Array  # forces T on the platform ends, shape (..., m, 3) [N]
 
 
 def cable_slopes(state: Equilibrium) -> CableSlopes:
@@ -142,14 +142,14 @@ def _at_anchors(state: Equilibrium, slopes: CableSlopes, forces: Array) -> Array
     at_frame, forces = slopes.force.copy(), forces.copy()
     at_frame[..., 2] -= cables.cable_weight
     forces[..., 2] -= _weight(state)[..., None] * _LONGER
-    # a cable without force has no direction
+    # a cable without force does not have a direction
     direction = at_frame / np.maximum(np.linalg.norm(at_frame, axis=-1, keepdims=True), _TINY)
     slope: Array = np.einsum("...ik,...ijk->...ij", direction, forces)
     return slope
 
 
 def _leaving(state: Equilibrium, slopes: CableSlopes, forces: Array, ends: Array) -> Array:
-    """Derivatives of the tension with pulleys, by H = T + T^2/(2 EA) - w z, which is constant along the cable.
+    """Derivatives of the tension with pulleys, from H = T + T^2/(2 EA) - w z, which is constant along the cable.
 
     Shapes: forces (..., m, 7, 3).
     """

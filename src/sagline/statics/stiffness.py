@@ -15,8 +15,8 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.statics.slopes import CableSlopes, cable_slopes, on_platform, tension_slopes
 from sagline.statics.strings import strings_below, strings_of
 
-_SINGULAR = 1e-14  # relative limit of a determinant, for diagonal elements of 1
-# relative to the largest squared frequency: smaller positive, and smaller negative, values are rounding
+_SINGULAR = 1e-14  # smallest determinant of a regular matrix with diagonal elements of 1
+# relative to the largest squared frequency: smaller positive or negative values count as zero
 NEUTRAL, UNSTABLE = 1e-13, 1e-10
 _STIFFNESS_BYTES, _MODES_BYTES = 2500.0, 800.0  # memory per cable of a state, during the calculation
 
@@ -26,13 +26,14 @@ class Stiffness(Result):
     """Result of `stiffness`, single or with a leading axis N.
 
     Motions are (displacement of the center of mass [m], rotation vector [rad]); wrenches are (force [N], moment [N m])
-    about it, all in world axes. Sensitivities are zero for motions outside the robot's motion pattern, and NaN if the
-    stiffness is singular.
+    about this center. All are in world axes. Sensitivities are zero for motions outside the robot's motion pattern, and
+    NaN if the stiffness is singular.
 
     Attributes:
         state: The equilibrium of the calculation.
-        matrix: -d(wrench of the cables)/d(motion) at fixed lengths: elastic, sag and geometric stiffness, shape
-            (..., 6, 6). Symmetric except for half the given moment, whose direction does not rotate with the platform.
+        matrix: -d(wrench of the cables)/d(motion) at fixed lengths, shape (..., 6, 6): elastic, sag and geometric
+            stiffness. It is symmetric except for half the given moment, whose direction does not rotate with the
+            platform.
         compliance: d(motion)/d(wrench on the platform), shape (..., 6, 6).
         length_sensitivity: d(motion)/dL of each cable, shape (..., 6, m) [m/m, rad/m].
         density_sensitivity: d(motion)/d(linear density) of each cable, shape (..., 6, m) [m^2/kg, rad m/kg].
@@ -49,8 +50,8 @@ class Stiffness(Result):
             [m/m, rad/m].
         tension_sensitivity: d(tension at the frame end of cable i)/dL_j with the platform in equilibrium, shape (...,
             m, m) [N/m].
-        null_lengths: Changes of length that do not move the platform, to first order: orthonormal columns, shape
-            (..., m, m - n), n the number of free motions; no columns if m <= n.
+        null_lengths: First-order changes of length that do not move the platform, as orthonormal columns, shape (...,
+            m, m - n), with n the number of free motions. There are no columns if m <= n.
     """
 
     state: Equilibrium
@@ -74,8 +75,8 @@ class Modes(Result):
 
     Attributes:
         state: The equilibrium of the calculation.
-        frequency: Natural frequencies [Hz], ascending, shape (..., n); 0 for a motion without stiffness, NaN for an
-            unstable motion.
+        frequency: Natural frequencies [Hz], ascending, shape (..., n); 0 for motions without stiffness, NaN for
+            unstable motions.
         shape: Motions (displacement of the center of mass, rotation vector, world axes) of unit modal mass, one per
             column, shape (..., 6, n) [m/sqrt(kg), rad/(sqrt(kg) m)].
     """
@@ -88,8 +89,8 @@ class Modes(Result):
     def above_strings(self) -> Flags:
         """True for modes above the lowest string frequency of any cable with both ends fixed.
 
-        Above this frequency the platform modes do not approximate the modes of the robot, because the cables take part
-        in these: see `vibration`. Shape (..., n); False for a motion without stiffness.
+        Above this frequency the platform modes do not approximate the modes of the robot, because the cables vibrate
+        too (see `vibration`). The shape is (..., n); the value is False for a motion without stiffness.
         """
         frequency = np.nan_to_num(self.frequency.reshape(-1, self.frequency.shape[-1]))
         below = strings_below(strings_of(self.state), frequency)
@@ -106,7 +107,7 @@ def stiffness(state: Equilibrium) -> Stiffness:
         Stiffness; NaN if the state has no lengths, or the cables are straight (their stiffness is undefined).
 
     Raises:
-        InvalidValueError: If the state is not an Equilibrium (of a plan: plan.state).
+        InvalidValueError: If the state is not an Equilibrium (for a plan, pass plan.state).
 
     Examples:
         Platform height change due to 100 N upward, and due to 1 mm more length of cable 0:
@@ -147,7 +148,7 @@ def stiffness(state: Equilibrium) -> Stiffness:
 
 
 def _by_frame_anchor(slopes: CableSlopes, compliance: Array) -> Array:
-    """Frame anchor sensitivity: moving a frame end by da acts like moving the platform end by -da, (..., 6, m, 3)."""
+    """Frame anchor sensitivity (..., 6, m, 3); a motion da of a frame end acts like -da of the platform end."""
     columns = [compliance @ on_platform(slopes.blocks[..., k], slopes.levers) for k in range(3)]
     return np.stack(columns, axis=-1)
 
@@ -180,16 +181,16 @@ def _null_space(matrix: Array) -> Array:
 
 
 def modes(state: Equilibrium) -> Modes:
-    """Natural frequencies and mode shapes of the platform on its cables; cable mass does not vibrate.
+    """Natural frequencies and mode shapes of the platform on its cables; cables are massless.
 
     Args:
-        state: An equilibrium, single or N of them. The free motions must have mass: give an inertia.
+        state: An equilibrium, single or N of them. The free motions must have mass; rotations require an inertia.
 
     Returns:
         Modes; NaN if the state has no lengths.
 
     Raises:
-        InvalidValueError: If the state is not an Equilibrium (of a plan: plan.state).
+        InvalidValueError: If the state is not an Equilibrium (for a plan, pass plan.state).
 
     Examples:
         >>> import numpy as np
@@ -215,8 +216,8 @@ def modes(state: Equilibrium) -> Modes:
 def natural_frequency(squares: Array) -> Array:
     """Frequencies [Hz] from squares of angular frequencies, shape (..., n), n per platform.
 
-    A motion without stiffness, such as a rotation about a single rope, has 0 Hz: its square is only rounding. An
-    unstable motion has no frequency: NaN.
+    A motion without stiffness, such as a rotation about a single rope, has 0 Hz, because its square is only a rounding
+    error. The frequency of an unstable motion is NaN.
     """
     largest = np.abs(squares).max(axis=-1, keepdims=True, initial=0.0)
     known = np.where(squares > NEUTRAL * largest, squares, np.where(squares < -UNSTABLE * largest, np.nan, 0.0))
@@ -239,7 +240,7 @@ def _inverse(matrix: Array) -> Array:
     known = np.where(np.isnan(matrix).any(axis=(-1, -2), keepdims=True), 0.0, matrix)
     diagonal = np.abs(np.einsum("...ii->...i", known))
     scale = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
-    # equilibrated rows and columns, so that N and N m have the same scale
+    # rows and columns are scaled, so that N and N m have the same magnitude
     balanced = known / (scale[..., :, None] * scale[..., None, :])
     lost = np.abs(np.linalg.det(balanced))[..., None, None] < _SINGULAR
     inverse: Array = np.linalg.inv(np.where(lost, unit, known))

@@ -83,7 +83,7 @@ def chord_geometry(robot: Robots, pose: Pose) -> Array:
 
 
 def touching_angle(robot: Robot, pose: Pose) -> Array:
-    """Wrap angle psi of straight cables: defined by the tangents from the platform ends to the pulleys.
+    """Wrap angle psi of straight cables, from the tangents of the platform ends to the pulleys.
 
     Returns (m,) [rad].
     """
@@ -94,7 +94,7 @@ def touching_angle(robot: Robot, pose: Pose) -> Array:
 
 
 def refuse_missing_chords(robot: Robots, pose: Pose, geometry: Array | None = None) -> None:
-    """Refuse poses at which a cable has no chord: its ends coincide, or no tangent to its pulley exists."""
+    """Refuse poses at which a cable has no chord, because its ends coincide or no tangent to its pulley exists."""
     chord = (chord_geometry(robot, pose) if geometry is None else geometry)[:, rows.CHORD]
     missing = np.argwhere(~(chord >= SHORTEST_CHORD))
     if not len(missing):
@@ -114,10 +114,10 @@ def refuse_missing_chords(robot: Robots, pose: Pose, geometry: Array | None = No
 
 
 def _inside_pulley(item: str, robot: Robot, pose: Pose, cable: int, radius: float) -> CableGeometryError:
-    """Error for a platform end inside or on its pulley: no tangent to the pulley exists."""
+    """Error for a platform end inside or on its pulley, for which no tangent to the pulley exists."""
     anchors = anchors_of(robot)
     away = pose.transform(anchors.platform)[cable] - anchors.frame[cable]
-    ahead = float(pulleys_of(robot).entry[cable] * away[2])  # in the direction from drum to pulley at the entry
+    ahead = float(pulleys_of(robot).entry[cable] * away[2])  # direction from drum to pulley at the entry
     half = np.sqrt(max(radius**2 - max(ahead, 0.0) ** 2, 0.0))
     near = f"< {radius - half:.6g} m or " if ahead > 0.0 else ""
     return CableGeometryError(

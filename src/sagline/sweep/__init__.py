@@ -1,4 +1,4 @@
-"""Sweeps: every robot at every pose under every wrench, computed by Dask workers into a folder that can be resumed."""
+"""Sweeps: every robot at every pose under every wrench, computed by Dask workers into a folder."""
 
 from sagline.sweep.request import QUANTITIES, Request
 from sagline.sweep.result import Sweep, load

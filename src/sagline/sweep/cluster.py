@@ -1,4 +1,4 @@
-"""Workers of Dask: processes of this machine, or those of a cluster whose address is given."""
+"""Workers of Dask: processes of this computer, or workers of a cluster with a given address."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.sweep.folder import is_installed
 from sagline.sweep.work import task
 
-HERE: Final = "127.0.0.1"  # not reachable from other machines
+HERE: Final = "127.0.0.1"  # not reachable from other computers
 DASHBOARD: Final = 8787
-PATIENCE: Final = 15.0  # s, for a scheduler to answer and a worker to be there
-AHEAD: Final = 2  # tasks a worker: it has the next when it has done one
-LOOK: Final = 5.0  # s between two looks at how many workers there are
+PATIENCE: Final = 15.0  # longest wait for the answer of a scheduler and for a worker [s]
+AHEAD: Final = 2  # number of tasks per worker, so that each worker has the next task when it finishes one
+LOOK: Final = 5.0  # time between two checks of the number of workers [s]
 SCHEMES: Final = ("tcp://", "tls://", "ws://", "wss://")
 LOGGERS: Final = ("distributed", "tornado", "bokeh", "asyncio")
 SILENT: Final = logging.CRITICAL + 1
 
-SETTINGS: Final = {  # of workers, which else give memory back after each array, to get it again page by page
+SETTINGS: Final = {  # setting of workers, which avoids that memory is released and allocated again for each array
     "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 1 << 28,
     "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 1 << 28,
     "distributed.worker.profile.enabled": False,
@@ -40,19 +40,19 @@ Finish = Callable[[int, float, tuple[int, ...]], None]
 
 def cores() -> int:
     """Number of processors available to this process."""
-    with suppress(AttributeError):  # not on every system
+    with suppress(AttributeError):  # not available on every system
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
 @contextmanager
 def local_workers(workers: int, tell: Callable[[str], None]) -> Iterator[Any]:
-    """Worker processes of this machine, not reachable from others; `tell` gets the address of the dashboard."""
+    """Worker processes of this computer, not reachable from others; `tell` receives the address of the dashboard."""
     with _silence_dask():
         import dask.config
         import distributed
 
-        api: Any = distributed  # it is only partly typed
+        api: Any = distributed  # Any, because the package is only partly typed
         settings: Any = dask.config
         free = _is_free(DASHBOARD)
         given: dict[str, Any] = {
@@ -101,7 +101,7 @@ def remote_workers(address: str) -> Iterator[Any]:
 
 
 def check_address(address: object) -> str:
-    """Address of a scheduler, checked."""
+    """Checked address of a scheduler."""
     if isinstance(address, str) and address.isprintable() and address.isascii():
         scheme = next((each for each in SCHEMES if address.startswith(each)), None)
         host, _, port = address.removeprefix(scheme or "").rpartition(":")
@@ -111,7 +111,7 @@ def check_address(address: object) -> str:
 
 
 def run_tasks(client: Any, job: Job, numbers: Iterable[int], finish: Finish, tell: Callable[[str], None]) -> None:
-    """Run tasks on the workers, a few ahead of each worker; after an error or Ctrl-C the running tasks are finished."""
+    """Run tasks on the workers, with a few waiting per worker; after an error or Ctrl-C, running tasks are finished."""
     import distributed
 
     api: Any = distributed
@@ -132,7 +132,7 @@ def run_tasks(client: Any, job: Job, numbers: Iterable[int], finish: Finish, tel
             ahead.add(future)
 
     def take(future: Any) -> None:
-        if future.status == "lost":  # its worker ended before the result was fetched: the scheduler repeats the task
+        if future.status == "lost":  # its worker ended before the result was fetched; the scheduler repeats the task
             ahead.add(future)
             return
         number = which.pop(future)
@@ -157,13 +157,13 @@ def run_tasks(client: Any, job: Job, numbers: Iterable[int], finish: Finish, tel
 
 @contextmanager
 def _silence_dask() -> Iterator[None]:
-    """Silence Dask's loggers and warnings inside, and its loggers after a failure, when its threads report late."""
+    """Silence Dask's loggers and warnings in the block, and its loggers after a failure, for late reports."""
     loggers = [logging.getLogger(name) for name in LOGGERS]
     levels = [logger.level for logger in loggers]
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", module=rf"({'|'.join((*LOGGERS, 'dask'))})(\.|$)")
         if is_installed("distributed"):
-            import distributed  # noqa: F401 - sets its loggers up, and would undo what follows
+            import distributed  # noqa: F401 - the import sets up its loggers and would undo the following lines
         for logger in loggers:
             logger.setLevel(SILENT)
         yield
@@ -199,7 +199,7 @@ def _first_line(error: BaseException) -> str:
 
 
 def dask_setup(worker: object) -> None:
-    """Ignore SIGINT in a worker process, so that it finishes its task; Dask calls this by its name as it starts."""
+    """Ignore SIGINT in a worker process, so that it finishes its task; Dask calls it by name at the start."""
     if threading.current_thread() is threading.main_thread():
         with suppress(ValueError, OSError):
             signal.signal(signal.SIGINT, signal.SIG_IGN)

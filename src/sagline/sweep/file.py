@@ -28,14 +28,14 @@ from sagline.sweep.request import Request
 from sagline.tension.methods import METHODS
 from sagline.workspaces.wrench_sets import WrenchBox, WrenchSet
 
-KEYS: Final = ("low", "high", "count")  # of an axis: its ends, and how many points there are between them
+KEYS: Final = ("low", "high", "count")  # keys of an axis: its ends and its number of points
 ANGLES: Final = ("alpha", "beta", "gamma")
-MOST: Final = 1_000_000  # points along an axis
-_POINT_BYTES: Final = 400.0  # of a point of a grid, while poses are made of them
+MOST: Final = 1_000_000  # largest number of points along an axis
+_POINT_BYTES: Final = 400.0  # bytes per point of a grid during the construction of poses
 
 
 class _Grid(YamlEntry):
-    """A grid of poses: each coordinate one value, or an axis."""
+    """A grid of poses; each coordinate is one value or an axis."""
 
     x: Any
     y: Any
@@ -51,7 +51,7 @@ class _Poses(YamlEntry):
 
 
 class _Loads(YamlEntry):
-    """A grid of forces and moments: each component one value, or an axis."""
+    """A grid of forces and moments; each component is one value or an axis."""
 
     force_x: Any = 0.0
     force_y: Any = 0.0
@@ -67,7 +67,7 @@ class _Wrenches(YamlEntry):
 
 
 class _Around(YamlEntry):
-    """Loads around each wrench: largest components of force and moment, one number each or three."""
+    """Loads around each wrench: largest components of force and moment, as one or three numbers each."""
 
     force: Any = 0.0
     moment: Any = 0.0
@@ -87,8 +87,8 @@ class _SweepEntry(YamlEntry):
 def load_sweep(file: os.PathLike[str] | str) -> Request:
     """Read the request of a sweep from a file.
 
-    A sweep file is YAML; a quantity is a number in SI or a text with its unit, and what varies is an axis with its ends
-    and how many points there are from one to the other:
+    A sweep file is YAML. A quantity is a number in SI or a text with its unit. A variable quantity is an axis with its
+    two ends and its number of points:
 
         robots: [cogiro, own_robot.yaml]       # presets, and files beside this one
         poses:
@@ -112,7 +112,7 @@ def load_sweep(file: os.PathLike[str] | str) -> Request:
         The request.
 
     Raises:
-        FileError: If the file cannot be read, or what it says is no request; the message names the key.
+        FileError: If the file cannot be read, or is not a valid request; the message names the key.
 
     Examples:
         >>> import sagline as sl
@@ -198,7 +198,7 @@ def _one(given: Any, item: str, unit: str) -> float:
 
 
 def _axis(given: Any, item: str, unit: str) -> Array:
-    """Points of an axis, or its one value."""
+    """Points of an axis, or the single value."""
     if not isinstance(given, dict):
         return np.array([_one(given, item, unit)])
     if set(given) != set(KEYS):
@@ -220,7 +220,7 @@ def _product(axes: dict[str, Array]) -> Array:
 
 
 def _named(word: str, item: str, kinds: Mapping[str, type[Choice]]) -> type[Choice]:
-    """Model or method by its word on the command line: minimum-norm."""
+    """Model or method by its name on the command line, for example minimum-norm."""
     words = {_word(name): kind for name, kind in kinds.items()}
     if word not in words:
         raise InvalidValueError(item, brief(word), ", ".join(words), f"Choose one of them as {item}.")

@@ -1,7 +1,7 @@
-"""Folders of sweeps: a Zarr group with the request in it, one chunk of each variable for each task.
+"""Folders of sweeps: a Zarr group that contains the request, and one chunk of each variable per task.
 
-The folder has the exact request; so a task is a number, on any machine that sees the folder. Chunks carry their
-checksum, which shows incomplete ones.
+The folder contains the exact request. A number therefore identifies a task on any computer with access to the folder.
+Each chunk contains a checksum, which detects incomplete chunks.
 """
 
 from __future__ import annotations
@@ -42,14 +42,14 @@ CONTENT: Final = Content(
     version=1,
 )
 DIMENSIONS: Final = ("robot", "pose", "wrench")
-GROUP: Final = "numbers.zarr"  # in the folder
+GROUP: Final = "numbers.zarr"  # name in the folder
 UNASKED: Final = -1  # status of requests that are not computed yet
-GIVEN: Final = {  # arrays of the request: their dimensions and units
+GIVEN: Final = {  # dimensions and units of the arrays of the request
     "position": ("pose", "axis", "m"),
     "quaternion": ("pose", "quaternion_part", "1"),
     "wrench": ("wrench", "wrench_part", "N, N m"),
 }
-SHAPES: Final = {  # of the parts of a set of loads
+SHAPES: Final = {  # dimensions of the parts of a set of loads
     "center": (6,),
     "segments": (-1, 6),
     "ellipsoids": (-1, 6, 6),
@@ -61,14 +61,14 @@ STEP: Final = "Free some space or correct the permissions, and run the same swee
 
 
 class TaskSize(NamedTuple):
-    """Numbers of poses and wrenches of one robot in a task; fixed when the folder is made."""
+    """Numbers of poses and wrenches of one robot in a task; fixed when the folder is created."""
 
     poses: int
     wrenches: int
 
 
 class SweepFolder(NamedTuple):
-    """An open folder of a sweep: path, Zarr group, request with its digest, size of a task, and sagline's version."""
+    """An open folder of a sweep: path, Zarr group, request with its digest, size of a task, and version of sagline."""
 
     path: Path
     group: Group
@@ -89,7 +89,7 @@ class SweepFolder(NamedTuple):
         return math.prod(self.grid)
 
     def part(self, number: int) -> RequestBox:
-        """Box of requests of a task."""
+        """Box of requests that a task computes."""
         _, poses, wrenches = self.request.shape
         robot, row, column = (int(k) for k in np.unravel_index(number, self.grid))
         first, left = row * self.size.poses, column * self.size.wrenches
@@ -108,7 +108,7 @@ class SweepFolder(NamedTuple):
             raise FileError(self.path, f"cannot be written ({error.strerror or error})", STEP) from None
 
     def read(self, number: int) -> dict[str, NDArray[np.generic]] | None:
-        """Numbers of a task; None where a chunk is missing or damaged."""
+        """Numbers of a task; None if a chunk is missing or damaged."""
         robot, rows, columns = self.part(number)
         numbers = {}
         for variable in variables_of(self.request.quantities):
@@ -117,18 +117,18 @@ class SweepFolder(NamedTuple):
                 return None
             try:
                 numbers[variable.name] = np.asarray(array[robot, rows, columns])
-            except (ValueError, RuntimeError, OSError):  # of the checksum, of what unpacks, of the disk
+            except (ValueError, RuntimeError, OSError):  # errors of the checksum, of unpacking, and of the disk
                 return None
         return numbers
 
     def _chunk(self, number: int, variable: SweepArray) -> Path:
-        """File of a chunk, as Zarr names it."""
+        """File of a chunk, with the name that Zarr gives it."""
         place: list[Any] = [*np.unravel_index(number, self.grid), *[0] * variable.a_cable]
         return self.path.joinpath(GROUP, variable.name, "c", *map(str, place))
 
 
 def make_folder(path: Path, request: Request, size: TaskSize) -> None:
-    """Make the folder of a sweep atomically; FileError or InvalidValueError if the request cannot be written."""
+    """Create the folder of a sweep atomically; FileError or InvalidValueError if the request cannot be written."""
     check_package("zarr", "sweeps")
     texts = [dump_robot(robot) for robot in request.robots]
     options = _options(request)
@@ -187,7 +187,7 @@ def open_folder(path: Path) -> SweepFolder:
 
 
 def request_digest(request: Request) -> str:
-    """Digest of a request: equal for the same robots, poses, wrenches, quantities and methods."""
+    """Digest of a request, which is equal for the same robots, poses, wrenches, quantities and methods."""
     return _digest([dump_robot(robot) for robot in request.robots], _options(request), request)
 
 
@@ -212,7 +212,7 @@ def check_package(name: str, purpose: str) -> None:
 
 
 def _options(request: Request) -> dict[str, Any]:
-    """JSON values of a request besides robots and arrays."""
+    """JSON values of a request, without robots and arrays."""
     options = {
         "quantities": list(request.quantities),
         **choice_attributes("model", request.model, MODELS),

@@ -1,4 +1,4 @@
-"""Requests of sweeps: robots x poses x wrenches, and the quantities of each."""
+"""Requests of sweeps: all combinations of robots, poses and wrenches, and the quantities to compute."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ class SweepArray(NamedTuple):
     """One array of a sweep; its first dimensions are robot, pose and wrench.
 
     Attributes:
-        name: Its name.
-        unit: Unit of its values, "" for none.
+        name: Name of the array.
+        unit: Unit of the values, "" for a plain number.
         long_name: Description.
-        a_cable: True if it has a value for each cable, along a fourth dimension.
-        codes: The status that it holds codes of, if any.
+        a_cable: True for one value per cable, along a fourth dimension.
+        codes: Status type of its codes, if any.
         whole: True for whole numbers.
     """
 
@@ -50,7 +50,7 @@ class SweepArray(NamedTuple):
 
     @property
     def type(self) -> str:
-        """Type of its values."""
+        """Type of the values."""
         return "int8" if self.whole or self.codes is not None else "float64"
 
 
@@ -82,29 +82,29 @@ QUANTITIES: Final = MappingProxyType(
 
 
 def variables_of(quantities: Iterable[str]) -> tuple[SweepArray, ...]:
-    """Variables of some quantities, each once, in the order of the quantities."""
+    """Variables of some quantities, without repetitions, in the order of the quantities."""
     return tuple(dict.fromkeys(variable for name in quantities for variable in QUANTITIES[name]))
 
 
-MOST: Final = 1 << 40  # requests: a year on a hundred cores
+MOST: Final = 1 << 40  # largest number of requests, a year on a hundred cores
 _CATENARY: Final = Catenary()
 _MINIMUM_NORM: Final = MinimumNorm()
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Request(Result):
-    """Every robot at every pose under every wrench, and the quantities of each.
+    """Request for every robot at every pose under every wrench, with the quantities to compute.
 
     Attributes:
-        robots: R of them.
+        robots: The R robots.
         poses: A batch of P.
         wrenches: External wrenches on the platform, about the center of mass in world axes [N, N m], shape (W, 6).
         quantities: Quantities, in the order of `sl.sweep.QUANTITIES`: "tension", "length",
             "shortfall", "margin".
         model: Cable model.
-        tension: Tension distribution method, applied to each request alone.
-        around: Loads around each wrench, all of which the margin is for.
-        moment_arm: Of the margin's norm [m]; None for each robot's mean lever arm.
+        tension: Tension distribution method, applied to each request independently.
+        around: Loads around each wrench, for all of which the margin is computed.
+        moment_arm: Lever arm of the margin's norm [m]; None for each robot's mean lever arm.
     """
 
     robots: tuple[Robot, ...]
@@ -131,18 +131,18 @@ class Request(Result):
         """Check the request.
 
         Args:
-            robots: A robot, or a sequence of them; they need not have equally many cables.
+            robots: A robot, or a sequence of robots, whose numbers of cables may differ.
             poses: A pose, or a batch.
             wrenches: Force [N], then moment [N m], shape (6,) or (W, 6); None for the weight alone.
-            quantities: One of `sl.sweep.QUANTITIES`, or several.
+            quantities: One or several of `sl.sweep.QUANTITIES`.
             model: Cable model.
             tension: Tension distribution method.
             around: Set of loads that is added to each wrench for the margin; None for each wrench alone.
-            moment_arm: Of the margin's norm [m], >= 0, as in `sl.margin`.
+            moment_arm: Lever arm of the margin's norm [m], >= 0, as in `sl.margin`.
 
         Raises:
-            InvalidValueError: If an argument is of the wrong kind, there is nothing of one, a robot cannot share its
-                load so, or a pose is outside its motions.
+            InvalidValueError: If an argument is of the wrong kind or empty, the tension distribution method does not
+                support a robot, or a pose is outside the motions of a robot.
         """
         machines = (robots,) if isinstance(robots, Robot) else _sequence(robots, "robots", "a Robot, or a list of them")
         machines = tuple(instance(one, Robot, f"robots[{k}]") for k, one in enumerate(machines))
@@ -190,7 +190,7 @@ class Request(Result):
 
     @property
     def cable_count(self) -> int:
-        """Number of cables of the robot that has most."""
+        """Largest number of cables of a robot."""
         return max(robot.cable_count for robot in self.robots)
 
     def __len__(self) -> int:

@@ -1,4 +1,4 @@
-"""State of a sweep on the disk: its results, and the file `done` with a line for each task that is done."""
+"""State of a sweep on the disk: its results, and the file `done` with one line per finished task."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ HEAD: Final = "#    task  seconds  feasible infeasible   unable     open     los
 
 
 class TaskMark(NamedTuple):
-    """Record of a finished task: time of its worker [s], 0 for a chunk from the disk, and outcomes of its requests."""
+    """Record of a finished task: computing time [s], 0 for an existing chunk, and outcomes of its requests."""
 
     seconds: float
     counts: Counts
 
 
 def _read_marks(folder: SweepFolder) -> dict[int, TaskMark]:
-    """Tasks that are done, by their numbers; damaged lines are ignored."""
+    """Finished tasks by their numbers; damaged lines are ignored."""
     try:
         lines = (folder.path / NAME).read_bytes().decode("ascii", "replace").splitlines(keepends=True)
     except FileNotFoundError:
@@ -55,12 +55,12 @@ class TaskMarks:
     """The file `done` while a sweep runs, locked against other processes."""
 
     def __init__(self, folder: SweepFolder, file: IO[bytes], marks: dict[int, TaskMark]) -> None:
-        """Continue from the marks that were read; use `open_marks`."""
+        """Continue after the given marks; created by `open_marks`."""
         self._folder, self._file = folder, file
         self.marks = marks
 
     def add(self, number: int, mark: TaskMark, left: float | None) -> None:
-        """Add the mark of a task, with the remaining time [s] if known."""
+        """Add the mark of a task, with the remaining time of the sweep [s] if known."""
         self.marks[number] = mark
         counts = mark.counts
         progress = f"{len(self.marks)} of {self._folder.tasks}"
@@ -70,7 +70,7 @@ class TaskMarks:
         self._write(text)
 
     def begin(self) -> None:
-        """Write the head of the columns on a line of its own."""
+        """Write the heads of the columns on a separate line."""
         size = self._file.seek(0, 2)
         torn = False
         if size:
@@ -128,15 +128,15 @@ def _mark(line: str) -> tuple[int, TaskMark] | None:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Sweep(Result):
-    """Sweep in a folder; numbers are read when they are used.
+    """Sweep in a folder, whose numbers are read when they are used.
 
     Attributes:
         folder: Path of the folder.
         request: The request.
         tasks: Number of tasks.
-        done: Number of tasks that are done.
-        counts: Outcomes of the requests of these tasks.
-        seconds: Time that they took all workers together [s].
+        done: Number of finished tasks.
+        counts: Outcomes of the requests of the finished tasks.
+        seconds: Sum of the computing times of all workers [s].
     """
 
     folder: Path
@@ -148,11 +148,11 @@ class Sweep(Result):
 
     @property
     def complete(self) -> bool:
-        """True if all tasks are done."""
+        """True if all tasks are finished."""
         return self.done == self.tasks
 
     def __str__(self) -> str:
-        """Request, number of tasks done, and outcome of the requests."""
+        """Request, number of finished tasks, and outcomes of the requests."""
         ends = ", ".join(f"{count:,} {name}" for name, count in self.counts._asdict().items() if count)
         return f"{self.request}; {self.done:,} of {counted(self.tasks, 'task')} done" + f": {ends}" * bool(ends)
 
@@ -166,16 +166,16 @@ class Sweep(Result):
 
         Args:
             name: One of `names`.
-            index: Robots, poses, wrenches and cables, as numpy takes whole numbers and slices: (0, slice(10)).
-                All of them by default.
+            index: Robots, poses, wrenches and cables, as whole numbers and slices of numpy, for example (0, slice(10)).
+                The default is all.
 
         Returns:
-            Array of shape (R, P, W), for tensions and lengths (R, P, W, m), or what the index leaves of it: NaN where
-            there is no solution, or not yet; a status not yet known is -1.
+            Array of shape (R, P, W), for tensions and lengths (R, P, W, m), or the part selected by the index. Values
+            are NaN without a solution and before their computation; a status is -1 before its computation.
 
         Raises:
-            InvalidValueError: If there is no such variable, the index is unknown, or it needs more memory than
-                there is.
+            InvalidValueError: If there is no such variable, the index is invalid, or more memory is required than is
+                available.
             FileError: If a chunk is damaged.
         """
         choice(name, "name", self.names)
@@ -194,7 +194,7 @@ class Sweep(Result):
 
     @property
     def field(self) -> Any:
-        """All variables with units and labels, as a Dataset of xarray; nothing is read before it is used."""
+        """All variables with units and labels, as a Dataset of xarray; values are read when they are used."""
         import xarray
 
         data: Dataset = xarray.open_zarr(
@@ -207,7 +207,7 @@ class Sweep(Result):
 
 
 def load(folder: os.PathLike[str] | str) -> Sweep:
-    """Read the folder of a sweep, which may still be running.
+    """Open the folder of a sweep, which may still be running.
 
     Args:
         folder: The folder.
@@ -216,7 +216,7 @@ def load(folder: os.PathLike[str] | str) -> Sweep:
         The sweep.
 
     Raises:
-        FileError: If it is no folder of a sweep, or damaged.
+        FileError: If the folder does not contain a sweep, or is damaged.
         InvalidValueError: If Zarr is not installed.
 
     Examples:

@@ -1,4 +1,4 @@
-"""Runs of sweeps on Dask workers or task by task, also continued ones."""
+"""Running and continuing of sweeps, on Dask workers or task by task."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from sagline.sweep.result import Sweep, TaskMark, TaskMarks, load, open_marks
 from sagline.sweep.work import Counts, found_counts, measured_size, task
 
 MOST_WORKERS: Final = 1024
-FEW: Final = 4  # tasks that are done before workers would have started
+FEW: Final = 4  # number of tasks that take less time than the start of workers
 Tell = Callable[[str], None]
 
 
@@ -43,26 +43,26 @@ def run(
 ) -> Sweep:
     """Run a sweep into a folder, or continue it.
 
-    The folder has partial results from the first minute, and a file `done` with a line for each finished task. The same
-    call continues a stopped sweep; complete chunks are not computed again. Ctrl-C stops after the running tasks. A
-    killed worker is replaced, and its task repeated.
+    The folder contains partial results from the first minute on, and a file `done` with one line per finished task. The
+    same call continues a stopped sweep; complete chunks are not computed again. Ctrl-C stops the sweep after the
+    running tasks. A killed worker is replaced, and its task is repeated.
 
     Args:
         request: The request.
-        folder: Path of the folder; made if missing. It may have the same sweep, but no other files.
-        workers: Processes of this machine; None for one per processor. With 1, without Dask, and for four tasks or
-            fewer, this process computes the tasks one after the other.
-        scheduler: Address of Dask's scheduler of a cluster, "tcp://10.0.0.1:8786", in place of workers; all its workers
-            must see the folder under the same name.
-        progress: Function of the number of finished tasks and of all tasks.
-        tell: Function of messages, such as the address of the dashboard.
+        folder: Path of the folder; created if missing. It may contain the same sweep, but no other files.
+        workers: Number of processes of this computer; None for one per processor. This process computes the tasks one
+            after the other if the number is 1, Dask is missing, or there are at most four tasks.
+        scheduler: Address of Dask's scheduler of a cluster, "tcp://10.0.0.1:8786", instead of local workers; all its
+            workers must have access to the folder under the same name.
+        progress: Function that is called with the number of finished tasks and the number of all tasks.
+        tell: Function that is called with messages, such as the address of the dashboard.
 
     Returns:
         The sweep, as `load` reads it.
 
     Raises:
         InvalidValueError: If an argument is of the wrong kind, or Zarr is not installed.
-        FileError: If the folder has something else or cannot be written; finished tasks are kept.
+        FileError: If the folder contains something else or cannot be written; finished tasks are kept.
         SaglineError: If the workers or the scheduler fail; finished tasks are kept.
 
     Examples:
@@ -111,7 +111,7 @@ def run(
 
 
 def open_matching_folder(path: Path, request: Request) -> SweepFolder:
-    """Open the folder of a request; the folder of another request is refused."""
+    """Open the folder of a request; an error for the folder of another request."""
     opened = open_folder(path)
     if opened.digest != request_digest(request):
         step = "Give this one another folder, or remove that one."
@@ -133,7 +133,7 @@ def _open_or_make_folder(path: Path, request: Request) -> SweepFolder:
 
 
 def _waiting(folder: SweepFolder, marks: TaskMarks) -> list[int]:
-    """Tasks to be done; those whose chunks are complete on the disk are marked as done."""
+    """Remaining tasks; tasks with complete chunks on the disk are marked as finished."""
     waiting = []
     for number in range(folder.tasks):
         counts = found_counts(folder, number)
@@ -147,7 +147,7 @@ def _waiting(folder: SweepFolder, marks: TaskMarks) -> list[int]:
 
 @contextmanager
 def _workers(count: int, scheduler: str | None, tasks: int, tell: Tell) -> Iterator[Any]:
-    """Client of Dask; None where tasks are done one after the other."""
+    """Client of Dask; None if tasks are computed one after the other."""
     if scheduler is not None and tasks:
         with remote_workers(scheduler) as client:
             yield client
@@ -162,6 +162,6 @@ def _workers(count: int, scheduler: str | None, tasks: int, tell: Tell) -> Itera
 
 
 def _check_not_imported() -> None:
-    """End a worker that imports the script which runs the sweep; the parent process reports the reason."""
+    """End a worker that imports the script of the sweep; the parent process reports the reason."""
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         raise SystemExit(1)

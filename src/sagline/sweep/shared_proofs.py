@@ -1,8 +1,8 @@
-"""Verdicts of many loads at each pose, with shared proofs: the proof of one load holds for all loads beyond it.
+"""Verdicts on many loads at each pose, with shared proofs: the proof of one load is valid for all loads beyond it.
 
-The proof that a load w is infeasible is a direction y in which the cable forces are too small, by a gap. For another
-load w' of the same pose the gap is that of w minus y (w' - w). A positive gap proves w' infeasible; it is also a least
-change of the force. So one proof decides a half-plane of loads.
+The proof that a load w is infeasible is a direction y along which the cable forces are too small by a gap. For another
+load w' at the same pose, the gap is that of w minus y (w' - w). A positive gap proves that w' is infeasible, and it is
+a lower bound of the sufficient change of the force. One proof therefore decides a half-space of loads.
 """
 
 from __future__ import annotations
@@ -18,16 +18,17 @@ from sagline.robot.batch import has_routing
 from sagline.robot.robot import Robot
 from sagline.tension.method import Options
 
-ITERATIONS: Final = 32  # loads of each pose whose proofs are tried on the others
-TRUST: Final = 1e-8  # share of the present forces: ten times the tolerance of a verdict; rounding is far below
+ITERATIONS: Final = 32  # number of loads per pose whose proofs are tried on the other loads
+TRUST: Final = 1e-8  # smallest gap relative to the forces, ten times the tolerance of a verdict and far above rounding
 PROVED: Final = 0  # column of the brackets
 
 
 def proofs_of(robot: Robot, options: Options, poses: Array, loads: Array, found: InverseRows) -> Array:
-    """Decide the requests that the tension distribution left open; complete the feasible ones.
+    """Decide the requests that the tension distribution left open, and complete the feasible ones.
 
-    Poses are rows (P, POSE_COLUMNS), loads (W, 6); the P W requests in `found` are all loads at the first pose, then at
-    the next. Returns the proved least change of the force [N], (P W,): 0 if feasible, NaN if it is not the reason.
+    Poses are rows (P, POSE_COLUMNS), and loads have the shape (W, 6). The P W requests in `found` are all loads at the
+    first pose, then all loads at the next pose, and so on. Returns the proved least change of the force [N], (P W,); it
+    is 0 if the request is feasible, and NaN if the force is not the reason.
     """
     proof = np.full(found.pose_status.size, np.nan)
     proof[found.pose_status == codes.POSE_SOLVED] = 0.0
@@ -52,12 +53,12 @@ def proofs_of(robot: Robot, options: Options, poses: Array, loads: Array, found:
 
 
 def _shares(robot: Robot, loads: Array) -> bool:
-    """True if proofs can be shared: there are several loads, and upper tension limits."""
+    """True if proofs can be shared, with several loads and upper tension limits."""
     return len(loads) > 1 and bool(np.isfinite(robot.tension_max).all())
 
 
 def _forces_at_hand(robot: Robot, loads: Array) -> Array:
-    """Size of the forces at each load [N], (W,), moments divided by the least lever arm; no less than in a verdict."""
+    """Size of the forces at each load [N], (W,), with moments divided by the least lever arm; not below a verdict's."""
     arms = np.linalg.norm(robot.platform_anchors - robot.center_of_mass, axis=1)
     arm = float(arms[arms > 0.0].min(initial=np.inf))
     moments = np.abs(loads[:, 3:]).sum(axis=1) / arm
@@ -77,7 +78,7 @@ def _gaps(verdicts: tuple[Array, Array, Flags], along: Array, columns: Indices) 
 def _decide(
     robot: Robot, options: Options, poses: Array, loads: Array, found: InverseRows, which: Indices, proof: Array
 ) -> tuple[Array, Array, Flags]:
-    """Decide some requests: proved least changes, Farkas directions, and a mask of those that are proofs."""
+    """Decide some requests; returns proved least changes, Farkas directions, and a mask of the proofs among these."""
     rows = locked(poses[which // len(loads)])
     wrenches = locked(loads[which % len(loads)])
     n, m = robot.degrees_of_freedom, robot.cable_count

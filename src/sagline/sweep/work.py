@@ -1,4 +1,4 @@
-"""Tasks of a sweep: pure functions of the request and the number of the task."""
+"""Tasks of a sweep, which are pure functions of the request and the number of the task."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ from sagline.tension.method import kernel_options
 from sagline.workspaces.margin import MarginStatus
 from sagline.workspaces.margin_rows import MarginRows
 
-# statuses of what is feasible, infeasible, open and lost
+# statuses that count as feasible, infeasible, open and lost
 INVERSE_ENDS: Final = (PoseStatus.SOLVED, PoseStatus.INFEASIBLE, PoseStatus.BORDERLINE, PoseStatus.NOT_CONVERGED)
-MARGIN_ENDS: Final = (MarginStatus.FEASIBLE, MarginStatus.INFEASIBLE, MarginStatus.OPEN, -1)  # none is lost
-ROWS: Final = 1 << 14  # requests per call; their arrays fit the cache of the processor
+MARGIN_ENDS: Final = (MarginStatus.FEASIBLE, MarginStatus.INFEASIBLE, MarginStatus.OPEN, -1)  # no status counts as lost
+ROWS: Final = 1 << 14  # requests per call, whose arrays fit the cache of the processor
 
 
 class Counts(NamedTuple):
     """Numbers of requests by outcome.
 
     Attributes:
-        feasible: Tensions within their limits.
-        infeasible: Proof that there are no such tensions.
-        unable: No result for another reason; see the status.
-        open: Too close to the boundary for a verdict.
-        lost: No verdict.
+        feasible: Number of requests with tensions within the limits.
+        infeasible: Number of requests with a proof that no such tensions exist.
+        unable: Number of requests without a result for another reason; see the status.
+        open: Number of requests too close to the boundary for a verdict.
+        lost: Number of requests without a verdict.
     """
 
     feasible: int
@@ -128,7 +128,7 @@ class _Margins:
 
 
 def _rows(poses: Pose, part: slice) -> Array:
-    """Exact pose rows: a new Pose would normalize the quaternions again."""
+    """Exact pose rows; a new Pose would normalize the quaternions again."""
     return locked(np.concatenate((poses.position[part], poses.quaternion[part]), axis=1))
 
 
@@ -144,19 +144,19 @@ SOLVERS: Final[dict[type[_Inverse | _Margins], frozenset[str]]] = {
 }
 
 
-SECONDS: Final = 0.75  # of a task: what a scheduler does for it is a hundredth of that
-LONGEST: Final = 10.0  # s, of a task of a sweep that takes days
-TASKS: Final = 4000  # upper limit, until tasks reach that duration
-LARGEST: Final = 1 << 26  # bytes that a task may write
-SAMPLES, SAMPLE = 16, 4096  # parts that are timed, and requests in each
-TIMED: Final = 0.5  # s: enough for a time per request
+SECONDS: Final = 0.75  # duration of a task [s], a hundred times the time of the scheduler for it
+LONGEST: Final = 10.0  # longest duration of a task [s], for a sweep of several days
+TASKS: Final = 4000  # upper limit of the number of tasks, until tasks reach this duration
+LARGEST: Final = 1 << 26  # largest output of a task [bytes]
+SAMPLES, SAMPLE = 16, 4096  # number of timed parts, and number of requests in each
+TIMED: Final = 0.5  # [s], sufficient to measure the time per request
 
 
 def task(folder: str, digest: str, number: int) -> tuple[float, tuple[int, ...]]:
     """Compute one task of the folder with a digest and write its chunks; returns its seconds and outcomes."""
     start = time.perf_counter()
     opened = _opened(folder, digest)
-    numbers = opened.read(number)  # written by a worker that ended before it reported
+    numbers = opened.read(number)  # complete output of a worker that ended before its report
     if numbers is None:
         numbers = compute_variables(opened.request, opened.part(number))
         opened.write(number, numbers)
@@ -165,7 +165,7 @@ def task(folder: str, digest: str, number: int) -> tuple[float, tuple[int, ...]]
 
 @lru_cache(maxsize=4)
 def _opened(folder: str, digest: str) -> SweepFolder:
-    """Open folder, kept from task to task."""
+    """Open folder, which is kept from task to task."""
     found = open_folder(Path(folder))
     if found.digest != digest:
         step = "Let all workers see the same folder under the same name."
@@ -201,13 +201,13 @@ def measured_size(request: Request) -> TaskSize:
 
 
 def _size(rows: int, poses: int, wrenches: int) -> TaskSize:
-    """Task size of so many requests: wrenches before poses, because the loads of a pose share proofs."""
+    """Task size for a number of requests; wrenches before poses, because the loads of a pose share proofs."""
     wide = min(wrenches, rows)
     return TaskSize(min(poses, max(1, rows // wide)), wide)
 
 
 def _sample(place: Indices, request: Request) -> RequestBox:
-    """A few requests from one place on: robot, pose and wrench, (3,)."""
+    """A box of a few requests that starts at given indices of robot, pose and wrench, (3,)."""
     robot, pose, wrench = (int(k) for k in place)
     _, poses, wrenches = request.shape
     tall, wide = _size(SAMPLE, poses, wrenches)

@@ -14,7 +14,7 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.statics.tables import pose_rows, robot_terms
 from sagline.tension.method import LIMITS_OF
 
-BLOCK = 1 << 12  # poses per block: a tenth of a second, after which an interrupt is handled
+BLOCK = 1 << 12  # poses per block, about 0.1 s; interrupts are handled between blocks
 
 
 def limit_margin(state: Equilibrium) -> Array:
@@ -24,11 +24,11 @@ def limit_margin(state: Equilibrium) -> Array:
         state: Robot or robots, and cables; `plan.state` for instance.
 
     Returns:
-        Smallest distance [N] of the tension of a cable to its limits, shape () or (N,): 0 if a cable is at its limit,
-        NaN where there are no tensions. It depends on the tension distribution.
+        Smallest distance [N] of the tension of a cable to its limits, shape () or (N,). It is 0 if a cable is at its
+        limit, and NaN without tensions. It depends on the tension distribution.
 
     Raises:
-        InvalidValueError: If the state is not an Equilibrium (of a plan: plan.state).
+        InvalidValueError: If the state is not an Equilibrium (for a plan, pass plan.state).
 
     Examples:
         >>> import sagline as sl
@@ -52,21 +52,21 @@ def cable_margins(state: Equilibrium) -> Array:
 
 
 def capacity_margin(state: Equilibrium) -> Array:
-    """Largest additional force that tensions within the limits can balance at each pose, whatever its direction.
+    """Largest additional force in any direction that tensions within the limits can balance at each pose.
 
-    The moment remains unchanged. Exact for weightless cables; for sagging cables, the sag forces of the state are kept.
-    The computing time grows with the binomial coefficient of m over n - 1: 56 faces for eight cables, about twenty
-    microseconds per pose.
+    The moment does not change. The result is exact for weightless cables. For sagging cables, the sag forces of the
+    state are constant. The computing time is proportional to the number of faces, the binomial coefficient of m over n
+    - 1. Eight cables have 56 faces, which take about twenty microseconds per pose.
 
     Args:
         state: Robot or robots, poses, wrench and cables; `plan.state` for instance.
 
     Returns:
         Force [N], shape () or (N,), independent of the tension distribution; infinite if no additional force makes the
-        pose infeasible, NaN where there are no tensions.
+        pose infeasible, NaN without tensions.
 
     Raises:
-        InvalidValueError: If the state is not an Equilibrium (of a plan: plan.state).
+        InvalidValueError: If the state is not an Equilibrium (for a plan, pass plan.state).
 
     Examples:
         >>> import sagline as sl

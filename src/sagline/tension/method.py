@@ -25,7 +25,7 @@ VARIABLES = {
 }
 
 # rows of the array of cable preferences
-ROOT_WEIGHT, GOAL = 0, 1  # square root of a cable's weight; target tension [N]
+ROOT_WEIGHT, GOAL = 0, 1  # square root of a cable's weight, and target tension [N]
 PREFERENCE_ROWS = 2
 
 
@@ -40,9 +40,10 @@ class TensionMethod:
         continuous: True if tensions follow the pose without jumps.
         variable: The tension variable of the method: "chord" (default), "horizontal", the article's T_x, or
             "frame_end", the tension at the winch's load cell. The minimum-norm results of the variables differ. A
-            vertical cable has no horizontal tension: directly under an anchor, the pose is singular in this variable.
-        lowest_point_margin: The article's T_adj of (54) [N]: requires T_x >= w D/(2 |tan phi|) + T_adj, which keeps the
-            lowest point of each cable outside its span. None (default): no such bound.
+            vertical cable does not have a horizontal tension. A pose directly under an anchor is therefore singular in
+            this variable.
+        lowest_point_margin: The article's T_adj of (54) [N]. It requires T_x >= w D/(2 |tan phi|) + T_adj, so that the
+            lowest point of each cable is outside its span. None (default): no such bound.
     """
 
     code: ClassVar[int]
@@ -64,7 +65,7 @@ class TensionMethod:
 
     @property
     def alone(self) -> TensionMethod:
-        """The method for a pose without a previous pose; methods without memory remain unchanged."""
+        """The method for a pose without a previous pose; methods without memory do not change."""
         return self
 
     @property
@@ -128,7 +129,7 @@ def kernel_options(robot: Robots, model: CableModel, tension: TensionMethod) -> 
     else:
         for index, one in enumerate(robot):
             check_sharing(one, tension, f"robot[{index}]")
-    # A weightless cable has the same tension everywhere, which is linear even at zero tension.
+    # the tension of a weightless cable is the same everywhere, and linear even at zero tension
     alike = model.weightless and tension.variable == "frame_end"
     variable = codes.CHORD_TENSION if alike else tension.variable_code
     weight, goal = (locked(row) for row in tension.preference(shared.cable_count))

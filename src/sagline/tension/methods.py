@@ -20,8 +20,8 @@ from sagline.tension.method import GOAL, PREFERENCE_ROWS, ROOT_WEIGHT, TensionMe
 class MinimumNorm(TensionMethod):
     """The feasible tensions with the smallest Euclidean norm: the projection of 0 onto the feasible set.
 
-    The result depends only on the pose, so that a closed path ends with the initial tensions. Cables that are not
-    needed are at their lower limits. Choose it for repeated motions and for low tensions in general.
+    The result depends only on the pose. A closed path therefore ends with the initial tensions. Cables that are not
+    needed are at their lower limits. Choose this method for repeated motions and for low tensions in general.
 
     Source:
         Gia Luan & Truong Thinh 2020, (53); docs/model.md, section 5.
@@ -32,11 +32,11 @@ class MinimumNorm(TensionMethod):
 
 @dataclass(frozen=True, slots=True)
 class Closest(TensionMethod):
-    """The article's choice (55): nearest to the previous tension set, by projection onto the feasible polygon.
+    """The article's choice (55): the tensions nearest to the previous ones, by projection onto the feasible polygon.
 
-    Tensions change smoothly along a path but depend on it: the first pose takes the minimum norm, and after a gap of
-    infeasible poses the last feasible set is the reference. In a batch of poses, each pose is solved independently.
-    Choose it for the smoothest tensions along one path.
+    Tensions change smoothly along a path but depend on it. The first pose takes the minimum norm. After a gap of
+    infeasible poses, the last feasible tensions are the reference. In a batch of poses, each pose is solved
+    independently. Choose this method for the smoothest tensions along one path.
 
     Source:
         Gia Luan & Truong Thinh 2020, (55); the projection is derived in docs/model.md, section 5.
@@ -54,8 +54,9 @@ class Closest(TensionMethod):
 class QuadraticProgram(TensionMethod):
     """The feasible tensions with the smallest weighted sum of squared distances to targets.
 
-    In tensions scaled by the root weights this is a projection onto the feasible set: exact, and without iterations for
-    up to two redundant cables. Continuous. Choose it to keep a pretension, or to reduce the load of some cables.
+    For tensions scaled by the root weights, this is a projection onto the feasible set. It is exact, continuous, and
+    without iterations for up to two redundant cables. Choose this method to keep a pretension, or to reduce the load of
+    some cables.
 
     Attributes:
         weights: Weight of each cable, > 0, shape () or (m,).
@@ -107,9 +108,10 @@ class QuadraticProgram(TensionMethod):
 class LowestSum(TensionMethod):
     """The feasible tensions with the smallest 1-norm: a corner of the feasible set.
 
-    Smallest total motor torque; at least as many cables as are redundant are at their limits. The tensions are not
-    continuous: along a path the optimum can jump to another corner. If all points of a side are optimal, the one with
-    the smallest norm is taken (for more than two redundant cables, one of its corners). Choose it for static loads.
+    The method minimizes the total motor torque. At least as many cables as the redundancy are at their limits. The
+    tensions are not continuous: along a path the optimum can jump to another corner. If all points of a side are
+    optimal, the one with the smallest norm is taken (for more than two redundant cables, one of its corners). Choose
+    this method for static loads.
 
     Source:
         Borgstrom, Jordan, Sukhatme, Batalin & Kaiser 2009, "Rapid computation of optimally safe tension
@@ -124,8 +126,9 @@ class LowestSum(TensionMethod):
 class LowestMaximum(TensionMethod):
     """The feasible tensions with the smallest infinity-norm; if not unique, those with the smallest Euclidean norm.
 
-    Minimizes the largest cable load, and so the required size of the winches. The largest tension is continuous, the
-    other tensions are not. Choose it to size cables and drives; for motion take `PNorm`, a smooth approximation.
+    The method minimizes the largest cable load, and thus the required size of the winches. The largest tension is
+    continuous, but the other tensions are not. Choose this method to size cables and drives. For motions take `PNorm`,
+    a smooth approximation.
 
     Source:
         Gosselin & Grenier 2011, "On the determination of the force distribution in overconstrained cable-driven
@@ -136,15 +139,15 @@ class LowestMaximum(TensionMethod):
     continuous: ClassVar[bool] = False
 
 
-LARGEST = 32.0  # with larger exponents, powers of small tensions are lost by rounding in Newton's method
+LARGEST = 32.0  # largest exponent; with larger ones, rounding hides powers of small tensions in Newton's method
 
 
 @dataclass(frozen=True, slots=True)
 class PNorm(TensionMethod):
     """The feasible tensions with the smallest p-norm, the p-th root of the sum of their p-th powers.
 
-    Continuous for every p: p = 2 is `MinimumNorm`, large p approximates `LowestMaximum` without its jumps. Choose it,
-    with p from 4 to 8, to reduce the largest cable load of a moving platform.
+    The tensions are continuous for every p. p = 2 is `MinimumNorm`, and large p approximates `LowestMaximum` without
+    its jumps. Choose this method, with p from 4 to 8, to reduce the largest cable load of a moving platform.
 
     Attributes:
         p: Exponent, 2 to 32.
@@ -174,9 +177,10 @@ class PNorm(TensionMethod):
 class Centroid(TensionMethod):
     """The centroid (barycenter) of the feasible polygon; the center of the interval for one redundant cable.
 
-    Continuous and far from all limits, so slack and overload are unlikely; tensions are higher than necessary. The
-    result is the same in every variable. For more than two redundant cables take `AnalyticCenter`. Choose it for a
-    stiff, robust setup where energy is unimportant. An unbounded set has no centroid: the pose is UNBOUNDED.
+    The tensions are continuous and far from all limits, so that slackness and overload are unlikely. They are higher
+    than necessary. The result is the same in every variable. For more than two redundant cables take `AnalyticCenter`.
+    Choose this method for a stiff, robust setup without regard to energy. A pose with an unbounded set does not have a
+    centroid and gets the status UNBOUNDED.
 
     Source:
         Mikelsons, Bruckmann, Hiller & Schramm 2008, "A real-time capable force calculation algorithm for redundant
@@ -191,10 +195,10 @@ class Centroid(TensionMethod):
 class AnalyticCenter(TensionMethod):
     """The feasible tensions with the largest product of distances to all limits.
 
-    Smooth wherever the feasible set has an interior: no limit ever becomes active. Near the border of the workspace,
-    the set shrinks to a point, and the result converges to it. Any number of redundant cables; the result is the same
-    in every variable. Choose it for controllers that need differentiable tensions. An unbounded set has no center:
-    UNBOUNDED.
+    The tensions are smooth wherever the feasible set has an interior, because no limit ever becomes active. Near the
+    border of the workspace, the set shrinks to a point, and the result converges to it. The method supports any number
+    of redundant cables, and the result is the same in every variable. Choose this method for controllers that require
+    differentiable tensions. A pose with an unbounded set does not have a center and gets the status UNBOUNDED.
 
     Source:
         Di Paola, Goldsztejn, Zoso & Caro 2023, "Analytic center based tension distribution for cable-driven
@@ -208,8 +212,8 @@ class AnalyticCenter(TensionMethod):
 class ClosedForm(TensionMethod):
     """The balanced tensions nearest to the middle of the limits, if they satisfy the limits.
 
-    Linear in the wrench and smooth, but some feasible poses get no result: NOT_COVERED. Choose it if every microsecond
-    counts and the platform stays in the inner workspace.
+    The tensions are smooth and linear in the wrench, but some feasible poses get no result and the status NOT_COVERED.
+    Choose this method for the shortest computing time if the platform remains in the inner workspace.
 
     Source:
         Pott, Bruckmann & Mikelsons 2009, "Closed-form force distribution for parallel wire robots".
@@ -221,10 +225,11 @@ class ClosedForm(TensionMethod):
 
 @dataclass(frozen=True, slots=True)
 class ImprovedClosedForm(TensionMethod):
-    """The closed form, iterated: the cable that violates its limit most is fixed at it, and the rest is solved again.
+    """The closed form with iterations: each fixes the cable with the largest violation at its limit.
 
     The number of iterations is at most the number of redundant cables. Nearly all feasible poses get a result; the
-    others are NOT_COVERED. Continuous except when the fixed cable changes. Choose it if ClosedForm fails too early.
+    others have the status NOT_COVERED. The tensions are continuous except when the fixed cable changes. Choose this
+    method if ClosedForm fails too early.
 
     Source:
         Pott 2014, "An improved force distribution algorithm for over-constrained cable-driven parallel robots".
@@ -239,8 +244,8 @@ class ImprovedClosedForm(TensionMethod):
 class Puncture(TensionMethod):
     """First point within the limits on the line from the minimum-norm solution to the (improved) closed form.
 
-    Low tensions at the computing time of a closed form; covers the same poses as `ImprovedClosedForm`. Choose it for
-    low tensions on hardware too slow for a polygon.
+    The method gives low tensions in the computing time of a closed form, for the same poses as `ImprovedClosedForm`.
+    Choose this method for low tensions on hardware that is too slow for a polygon.
 
     Source:
         Mueller, Reichert & Bruckmann 2015, "Analysis of a real-time capable cable force computation method".
@@ -257,10 +262,10 @@ _OPTIMA = {"1-norm": WALK_SUM, "2-norm": WALK_NORM, "centroid": WALK_CENTROID}
 
 @dataclass(frozen=True, slots=True)
 class PolygonWalk(TensionMethod):
-    """The algorithm for n + 2 cables: walk around the feasible polygon, take its best point.
+    """The algorithm for n + 2 cables: a walk around the feasible polygon to its best point.
 
     Its results equal those of `LowestSum`, `MinimumNorm` and `Centroid`, which are faster because they clip the polygon
-    instead. Choose it for comparison with the published algorithm.
+    instead. Choose this method for comparison with the published algorithm.
 
     Attributes:
         optimum: "1-norm", "2-norm" (default) or "centroid".

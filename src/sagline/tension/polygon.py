@@ -1,4 +1,4 @@
-"""The feasible tensions of one pose for plotting: a polygon in the null space of up to two redundant cables."""
+"""The feasible tensions of one pose for plotting: a polygon in the null space, for up to two redundant cables."""
 
 from __future__ import annotations
 
@@ -26,23 +26,25 @@ class Side(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TensionPolygon(Result):
-    """All tensions that balance one pose within their limits: tensions = origin + lambda basis.
+    """All tensions within their limits that balance one pose: tensions = origin + lambda basis.
 
-    For sagging cables the balance depends on the tensions: this is the polygon of the last linearization, with the sag
-    forces T_z - tau sin phi at the minimum-norm tensions (docs/model.md, section 5).
+    For sagging cables the balance depends on the tensions. The polygon is then that of the last linearization, with the
+    sag forces T_z - tau sin phi at the minimum-norm tensions (docs/model.md, section 5).
 
     Attributes:
         vertices: The article's Omega_lambda: corners, counter-clockwise, in coordinates of the null space [N], shape
-            (h, 2); for one redundant cable the ends of an interval, shape (2, 1), possibly infinite; for no redundant
-            cable one point without coordinates, shape (1, 0). Shape (0, r) if no tensions are feasible.
+            (h, 2). For one redundant cable, these are the ends of an interval, possibly infinite, shape (2, 1). Without
+            redundant cables, this is one point without coordinates, shape (1, 0). If no tensions are feasible, the
+            shape is (0, r).
         tensions: The article's Omega_t: tensions at the vertices [N], in the tension variable, shape (h, m).
-        sides: The limit of each side, from vertex k to vertex k + 1 (at vertex k for an interval); None where the
-            polygon is unbounded: the vertices at both ends of such a side represent infinity.
+        sides: The limit of each side, from vertex k to vertex k + 1 (at vertex k for an interval); None for a side at
+            which the polygon is unbounded. The vertices at both ends of such a side represent infinity.
         bounded: True if every side is a limit.
         basis: Orthonormal basis of the null space, shape (r, m).
         origin: The minimum-norm tensions that balance the wrench, without limits [N], shape (m,).
-        scale: The tension variable is scale times the chord tension plus offset, shape (m,): 1, or cos phi for the
-            horizontal tension, or the derivative of the frame-end tension.
+        scale: Factor of the tension variable, which is scale times chord tension plus offset, shape (m,). It is 1 for
+            the chord tension, cos phi for the horizontal tension, and the derivative of the frame-end tension for this
+            tension.
         offset: Zero except for the frame-end tension [N], shape (m,).
     """
 
@@ -65,7 +67,7 @@ class TensionPolygon(Result):
             Coordinates in the null space [N], shape (..., r); NaN for tensions that are NaN.
 
         Raises:
-            InvalidValueError: If they are not numbers, or not one per cable.
+            InvalidValueError: If the tensions are not numbers, or not one number per cable.
         """
         given = checked(chord_tension, "chord_tension", "N", missing=True)
         if given.ndim == 0 or given.shape[-1] != self.scale.size:

@@ -18,10 +18,10 @@ class UnresistedMotion(NamedTuple):
     """The motion that the cables of a pose constrain least.
 
     Attributes:
-        twist: Velocity of the center of mass and angular velocity, world axes, shape (6,); its angular part has length
-            1, or its linear part if the platform does not rotate.
-        resistance: Largest rate of a cable's length in this motion, relative to that in the most constrained motion; 0
-            up to rounding at a singular pose.
+        twist: Velocity of the center of mass and angular velocity, world axes, shape (6,). Its angular part has length
+            1; if the platform does not rotate, its linear part has length 1.
+        resistance: Largest rate of a cable's length in this motion, relative to the rate in the most constrained
+            motion. At a singular pose it is 0, except for rounding.
         text: Description of the motion.
     """
 
@@ -31,7 +31,7 @@ class UnresistedMotion(NamedTuple):
 
 
 def unresisted_motion(robot: Robot, pose: Pose) -> UnresistedMotion:
-    """The motion of the platform that changes the cable lengths least; at a singular pose it does not change them.
+    """The motion of the platform that changes the cable lengths least (not at all at a singular pose).
 
     Args:
         robot: The robot.
@@ -56,8 +56,8 @@ def unresisted_motion(robot: Robot, pose: Pose) -> UnresistedMotion:
     lever = float(np.linalg.norm(robot.platform_anchors - robot.center_of_mass, axis=1).max()) or 1.0
     units = np.where(np.linalg.norm(robot.freedom[:, 3:], axis=1) > 0.5, 1.0 / lever, 1.0)
     structure = units[:, None] * structure_matrix(robot, pose)
-    # The right singular vectors, whose number is that of the cables squared, are computed only if the left ones are not
-    # complete.
+    # The right singular vectors, a matrix of the size of the squared number of cables, are computed only if the left
+    # ones are not complete.
     left, values, _right = np.linalg.svd(structure, full_matrices=structure.shape[1] < structure.shape[0])
     twist = robot.freedom.T @ (units * left[:, -1])
     linear, angular = np.linalg.norm(twist[:3]), np.linalg.norm(twist[3:])
