@@ -61,7 +61,7 @@ def accuracy_of_cables() -> Iterator[Row]:
 
 
 def speed_of_cables() -> Iterator[Row]:
-    """A batch of ordinary cables: the public call, the bare kernel, and the article's formula."""
+    """Times for a batch of ordinary cables: public call, kernel alone, and the article's formula."""
     rng = np.random.default_rng(0)
     span, rise = locked(rng.uniform(1, 15, CABLES)), locked(rng.uniform(-6, 6, CABLES))
     tension = locked(rng.uniform(20, 400, CABLES))
@@ -111,7 +111,7 @@ def inverse_kinematics() -> Iterator[Row]:
     """The article's suspended robot on random poses, and one pose at a time."""
     robot = sl.load_robot("article-suspended")
     rng = np.random.default_rng(1)
-    drawn = 6 * POSES // 5  # infeasible poses run other code and are left out
+    drawn = 6 * POSES // 5  # infeasible poses run other code and are omitted
     pose = sl.Pose.from_euler(
         rng.uniform((-5, -3.5, 1), (5, 3.5, 4), (drawn, 3)), *rng.uniform(-0.05, 0.05, (3, drawn))
     )

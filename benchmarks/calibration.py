@@ -1,4 +1,4 @@
-"""Calibration: of 60 poses, its remaining error, of a million rows, and recommended poses; one core."""
+"""Calibration of 60 poses, its remaining error, calibration of a million rows, and recommended poses; one core."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from tests.calibration.synthetic import Truth, true_robot, usual_sensors, with_d
 from tests.calibration.varied import ERRORS, at_chosen, left_error, varied
 
 ANCHORS = ("frame_anchors", "platform_anchors", "length_zero", "drum_radius")
-ALL = (*ANCHORS, "linear_density", "axial_stiffness", "mass", "center_of_mass")  # 63 numbers
+ALL = (*ANCHORS, "linear_density", "axial_stiffness", "mass", "center_of_mass")  # 63 numbers in total
 UNKNOWNS = [sl.Unknown(name, deviation=error) for name, error in ERRORS.items()]
 COGIRO = with_drums()
 ROBOTS = 16
-TILED = 100_000  # rows of a timed iteration
+TILED = 100_000  # number of rows in a timed iteration
 MILLION = 1_000_000
 
 
@@ -64,7 +64,7 @@ def plain_seconds(log: sl.WinchLog) -> float:
 
 
 def single() -> Iterator[Row]:
-    """63 numbers from 60 poses, anchors 5 cm off."""
+    """63 numbers from 60 poses, with anchor errors of 5 cm."""
     log = varied(true_robot(COGIRO, ERRORS, 1), 60, 1).log
     own = best_seconds(lambda: sl.calibrate(COGIRO, log, UNKNOWNS, folds=0), 15)
     plain = plain_seconds(log)
@@ -136,7 +136,7 @@ def large() -> Iterator[Row]:
 
 
 def poses() -> Iterator[Row]:
-    """40 recommended poses of 500 for 63 unknowns, against random ones."""
+    """40 recommended poses of 500 for 63 unknowns, compared with random poses."""
     for name in ("cogiro", "article-suspended"):
         robot, sensors = with_drums(name), usual_sensors()
         seconds = best_seconds(lambda robot=robot, sensors=sensors: sl.calibration_poses(robot, 40, ALL, sensors), 3)  # type: ignore[misc]

@@ -75,7 +75,7 @@ def commands() -> Iterator[Row]:
 
 
 def viewer() -> Iterator[Row]:
-    """The viewer, until the cables can be dragged, and until the region is there."""
+    """Time of the viewer until the cables can be dragged, and until the region is complete."""
     _, _, told = cold((sys.executable, "-c", VIEW, str(time.time())))
     first, region = map(float, told.split())
     yield Row("sagline view, cold: cables and all readings", "<= 25 s", f"{first:.1f} s")

@@ -20,12 +20,12 @@ from tests.dynamics.simulation.test_chains import cogiro as broken_state
 from tests.dynamics.simulation.test_chains import moved, pushed, spectrum_peaks
 from tests.dynamics.trajectories.test_fastest import shortest_quintic
 
-AWAY: Final = np.array([0.004, -0.003, 0.0033])  # m
-LUMPED_STEP: Final = 5e-5  # s, the default of 20 nodes on CoGiRo
+AWAY: Final = np.array([0.004, -0.003, 0.0033])  # [m]
+LUMPED_STEP: Final = 5e-5  # [s], the default of 20 nodes on CoGiRo
 
 
 def residuals() -> Iterator[Row]:
-    """Vibration after x from 0 to 3 m in 2 s, article-suspended."""
+    """Vibration after a motion in x from 0 to 3 m in 2 s, article-suspended."""
     seen = {
         "static lengths": "5.9 mm",
         "static lengths, ZV": "2.1 mm",

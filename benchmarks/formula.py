@@ -1,4 +1,4 @@
-"""The article's closed form (48) as peers in the same run: as printed, and written algebraically."""
+"""The article's closed form (48) for comparison in the same run: as printed, and in algebraic form."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def as_printed(span: Array, rise: Array, horizontal: Array, density: float, stif
 
 @entry
 def algebraic(span: Array, rise: Array, horizontal: Array, density: float, stiffness: float, length: Array) -> None:
-    """The same without an angle: tan = z/x, cos^2 = x^2/D^2."""
+    """Equations (26)-(28) and (48) without an angle: tan = z/x, cos^2 = x^2/D^2."""
     for i in range(length.shape[0]):
         x, z, t_x = span[i], rise[i], horizontal[i]
         d2 = x * x + z * z

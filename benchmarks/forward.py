@@ -22,7 +22,7 @@ BOX_POSES = 10_000
 PRESET_POSES = 1_000
 TIMED_POSES = 1_000
 ARTICLE_TILT = np.radians(10.0)
-SAME = 1e-6  # [m], and radians: closer poses count as equal
+SAME = 1e-6  # closer poses count as equal [m], [rad]
 
 
 def wider(robot: sl.Robot) -> sl.Robot:
@@ -52,7 +52,7 @@ def percent(flags: Flags) -> str:
 
 
 def far_starts(share: float) -> Iterator[Row]:
-    """CoGiRo from starts off by a meter and up to 40 degrees."""
+    """CoGiRo from starts with errors of a meter and up to 40 degrees."""
     plan = plan_of(sl.load_robot("cogiro"), int(share * BOX_POSES), seed=1)
     pose, count = plan.state.pose, len(plan.unstrained_length)
     for degrees in (2.0, 10.0, 20.0, 40.0):
@@ -65,7 +65,7 @@ def far_starts(share: float) -> Iterator[Row]:
 
 
 def without_start(share: float) -> Iterator[Row]:
-    """Every preset from its lengths alone, and back from the plan's own poses."""
+    """Every preset from its lengths alone, and from the plan's own poses."""
     worst_shift, worst_turn, worst_force = 0.0, 0.0, 0.0
     for name in sl.robot_names():
         robot = wider(sl.load_robot(name))
@@ -98,13 +98,13 @@ def walk(robot: sl.Robot, count: int) -> tuple[sl.Pose, sl.Plan]:
     radius = 0.002 * count / (2.0 * np.pi)
     angle = 2.0 * np.pi * t / count
     position = middle + radius * np.column_stack((np.cos(angle), np.sin(angle), 0.0 * t))
-    tilt = 0.1 * np.column_stack((np.sin(0.01 * t), np.cos(0.01 * t), 0.0 * t))  # 1 mrad a step
+    tilt = 0.1 * np.column_stack((np.sin(0.01 * t), np.cos(0.01 * t), 0.0 * t))  # 1 mrad per step
     pose = sl.Pose(position, Rotation.from_rotvec(tilt))
     return pose, sl.inverse(robot, pose, tension=sl.MinimumNorm())
 
 
 def speed(share: float) -> Iterator[Row]:
-    """Times a solve: tracking, far starts, none, and one at a time from Python."""
+    """Times per solution: tracking, distant starts, no starts, and single samples from Python."""
     robot = sl.load_robot("cogiro")
     pose, plan = walk(robot, TIMED_POSES)
     lengths = plan.unstrained_length
@@ -128,7 +128,7 @@ def speed(share: float) -> Iterator[Row]:
 
 
 def derivatives(share: float) -> Iterator[Row]:
-    """Sensitivities against central differences, extrapolated from two steps."""
+    """Sensitivities against central differences, which are extrapolated from two steps."""
     robot = sl.load_robot("cogiro")
     plan = plan_of(robot, 20, seed=6)
     pose, lengths = plan.state.pose, plan.unstrained_length

@@ -17,12 +17,12 @@ from tests.interference.scenes import box_mesh
 from tests.kernels.interference.hanging import agreement, all_pairs, nearest_cable_pairs
 
 ROBOTS = ("article-suspended", "cogiro", "ipanema-1", "expo2015-lucia-pulleys")
-POSES = 40  # few, so that a run ends before another program disturbs it
+POSES = 40  # few poses, so that a run ends before another program disturbs it
 RUNS = 50
 
 
 def states(name: str) -> sl.Equilibrium:
-    """Feasible poses in a robot's test box, tilted a little."""
+    """Feasible poses in a robot's test box, with small tilts."""
     robot, rng = sl.load_robot(name), np.random.default_rng(14)
     assert robot.test_box is not None
     places = rng.uniform(robot.test_box.low, robot.test_box.high, (POSES, 3))
@@ -32,7 +32,7 @@ def states(name: str) -> sl.Equilibrium:
 
 
 def measured(rows: Array, pairs: Indices, precision: float, together: bool = False) -> tuple[float, Array, Array]:
-    """Seconds a pose, distances and lower bounds."""
+    """Seconds per pose, distances and lower bounds."""
     still, numbers = locked(np.zeros((0, shapes.COLUMNS))), locked(pairs)
     shape = len(rows), len(pairs)
     value, low, nearest = np.empty(shape), np.empty(shape), np.empty((*shape, 2, 3))

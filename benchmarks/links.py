@@ -1,4 +1,4 @@
-"""The links to PLCs, on the loopback: four servers in another process, as of `sagline twin`; write and read."""
+"""Links to PLCs on the loopback interface: four servers in another process, as in `sagline twin`; write and read."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from sagline.twin.block_servers import BlockServers
 
 GROUPS, WINCHES, OWNER = 4, 8, 7
 CYCLES = 600
-SLOW = 3e-3  # s, response time of a slow server
+SLOW = 3e-3  # response time of a slow server [s]
 KINDS = {"s7": sl.plc.S7Link, "slow": sl.plc.S7Link, "modbus": sl.plc.ModbusLink}
 
 

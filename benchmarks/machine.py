@@ -22,7 +22,7 @@ ROBOTS = ("article-suspended", "article-mixed", "cogiro", "ipanema-1")
 
 
 def counts() -> Iterator[Row]:
-    """Counts to lengths and back, over four layers with a wandering exit."""
+    """Counts to lengths and back, over four layers with a moving exit."""
     robot = wound()
     drums = drums_of(robot)
     turns = np.random.default_rng(6).uniform(0.0, drums.most[0], (COUNTS // 8, 8))
@@ -47,7 +47,7 @@ def hard_cables() -> Iterator[Row]:
 
 
 def speed() -> Iterator[Row]:
-    """The same robots with pulleys and dead length and without, in turn."""
+    """The same robots with and without pulleys and dead length, alternately."""
     for name in ROBOTS:
         bare = sl.load_robot(name)
         over = bare.replace(winches=sl.Winch(0.05, dead_cable=4.0))
@@ -69,7 +69,7 @@ def speed() -> Iterator[Row]:
 
 
 def ratio_of(run: Callable[[sl.Robot], object], one: sl.Robot, other: sl.Robot) -> tuple[float, float]:
-    """Ratio of two least times, measured in turn, and the first one [s]."""
+    """Ratio of two shortest times, measured alternately, and the first time [s]."""
     times: list[list[float]] = [[], []]
     for _ in range(TURNS):
         for kept, robot in zip(times, (one, other), strict=True):
@@ -78,14 +78,14 @@ def ratio_of(run: Callable[[sl.Robot], object], one: sl.Robot, other: sl.Robot) 
 
 
 def course(robot: sl.Robot) -> sl.Path:
-    """Through the middle of the test box, at 500 samples a second."""
+    """Path through the middle of the test box, at 500 samples per second."""
     assert robot.test_box is not None
     low, high = robot.test_box.low, robot.test_box.high
     return sl.quintic_path([0.7 * low + 0.3 * high, 0.3 * low + 0.7 * high], durations=5.0, rate=500)
 
 
 def formula() -> Iterator[Row]:
-    """The straight cable's exit and wrap, with the exact catenary from there, against the exact contact."""
+    """The straight cable's exit and wrap with the exact catenary from there, compared with the exact contact."""
     for dead in (0.0, 4.0):
         worst = 0.0
         for name in ROBOTS:

@@ -1,4 +1,4 @@
-"""Measurement of times: the best of many short runs on one core, because other programs disturb."""
+"""Measurement of times: the best of many short runs on one core, because other programs disturb the measurement."""
 
 from __future__ import annotations
 

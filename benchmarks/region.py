@@ -23,8 +23,8 @@ from tests.viewer.client import Client, await_that
 
 ROBOTS = ("cogiro", "falcon-7", "fast", "article-suspended", "ipanema-2-pulleys")
 LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
-MOVES, DRAGGED = 7, 3.0  # moves of a slider, and seconds of a drag
-QUIET = 0.02  # s without a message: all messages have been received
+MOVES, DRAGGED = 7, 3.0  # number of moves of a slider, and duration of a drag [s]
+QUIET = 0.02  # time without a message after which all messages have been received [s]
 
 
 class Shown(NamedTuple):
@@ -90,7 +90,7 @@ def regions() -> Iterator[Row]:
 
 
 def work() -> Iterator[Row]:
-    """Processor time of a region, with the coarse one before it."""
+    """Processor time of a region, including the coarse region before it."""
     robot = sl.load_robot("cogiro")
     asked = WorkspaceQuery(robot, LEVEL, sl.Catenary(), sl.WrenchBox())
     taken = []

@@ -19,9 +19,9 @@ from sagline.sweep.folder import make_folder
 from sagline.sweep.work import measured_size, task
 
 ROBOT = Path(__file__).parents[1] / "examples" / "own_planar.yaml"
-PUBLISHED = 5844.0  # s, of the same number of requests on eight workers, 57,952 of them lost
+PUBLISHED = 5844.0  # time of the same number of requests on eight workers [s], of which 57,952 were lost
 POSES, LOADS = 31_000, 1_000
-SHARE = 10  # of them, for a loop and workers side by side
+SHARE = 10  # number of tasks for the comparison of a loop with workers
 
 
 def asked(poses: int, loads: int) -> sl.sweep.Request:
@@ -55,7 +55,7 @@ def without_the_start() -> Iterator[Row]:
     """Tasks per second of one worker and of two after their start, as in a long sweep."""
     from sagline.sweep.cluster import local_workers, run_tasks
 
-    request = asked(POSES // 4, LOADS)  # of some twenty tasks; with fewer the first and the last would dominate
+    request = asked(POSES // 4, LOADS)  # about twenty tasks; the first and the last would dominate fewer tasks
     size, rates = measured_size(request), []
     with tempfile.TemporaryDirectory() as place:
         make_folder(alone := Path(place) / "alone", request, size)

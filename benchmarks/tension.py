@@ -45,8 +45,8 @@ METHODS: dict[str, sl.TensionMethod] = {
     "PolygonWalk": sl.PolygonWalk(),
 }
 LINES = ("article-mixed", "article-suspended", "cogiro", "ipanema-1")
-ALONE = {"PNorm(p=4)": 8, "PNorm(p=16)": 8, "AnalyticCenter": 8, "LowestMaximum": 2.5}  # us a pose
-SAG = {"PNorm(p=4)": 5, "PNorm(p=16)": 5, "AnalyticCenter": 5}  # us more
+ALONE = {"PNorm(p=4)": 8, "PNorm(p=16)": 8, "AnalyticCenter": 8, "LowestMaximum": 2.5}  # microseconds per pose
+SAG = {"PNorm(p=4)": 5, "PNorm(p=16)": 5, "AnalyticCenter": 5}  # additional microseconds
 
 
 @entry
@@ -142,7 +142,7 @@ def continuity() -> Iterator[Row]:
 
 
 def _steepest(name: str, method: sl.TensionMethod, count: int) -> float:
-    """Along a line through the test box, off its middle, without inertia; in upper limits a meter."""
+    """Slope along a line through the test box, beside its middle, without inertia; in upper limits per meter."""
     robot = sl.load_robot(name)
     box = robot.test_box
     assert box is not None

@@ -16,7 +16,7 @@ from sagline.tension.method import kernel_options
 from tests.tension.reference import BORDER_ROBOTS, found_border, random_poses
 
 POSES = 2000
-OVERLOADS = (1e-3, 1e-6)  # of the weight, beyond the border
+OVERLOADS = (1e-3, 1e-6)  # distance beyond the border, relative to the weight
 METHOD = sl.MinimumNorm()
 
 

@@ -15,11 +15,11 @@ from tests.dynamics.vibration.test_vibration import LOWEST_SIX
 from tests.kernels.dynamics.strings import chain, held, string
 from tests.kernels.dynamics.test_collocation import CABLES, extrapolated, irvine_errors
 
-UP_TO: Final = 20.0  # Hz
+UP_TO: Final = 20.0  # [Hz]
 
 
 def cables() -> Iterator[Row]:
-    """One cable: frequencies with fixed ends against closed forms and chains of springs."""
+    """One cable: frequencies with fixed ends, compared with closed forms and chains of springs."""
     table = string(30.0, 40.0, 7.0, 0.1, 1e6)
     table[0, 3] = 0.0
     exact = np.sqrt(50.0 / (0.1 * (1.0 + 50.0 / 1e6))) / 14.0

@@ -1,4 +1,4 @@
-"""Times of the viewer, warm: `python -m benchmarks.viewer`. Another process is the server, this one the clients."""
+"""Times of the viewer, warm: `python -m benchmarks.viewer`. Another process is the server; this one is the clients."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ from tests.viewer.client import Client
 
 ROBOT = "cogiro"
 REPEATS = 5
-WATCHED = 5.0  # s
-RENDERING = 0.05  # s, time of a picture for the filming client
+WATCHED = 5.0  # duration [s]
+RENDERING = 0.05  # time of a picture for the filming client [s]
 CUT = ("falcon-7", "cogiro", "fast")
-SETTLED, QUIET = 6.0, 1.0  # s without a message: the page is complete
+SETTLED, QUIET = 6.0, 1.0  # time without a message after which the page is complete [s]
 PORT = ("--no-browser", "--port", "0")
 
 
@@ -57,11 +57,11 @@ def cables_in(message: dict[str, Any]) -> bool:
 
 
 def first_cables() -> Iterator[Row]:
-    """Time from the command to its first cables."""
+    """Time from the command to the first cables."""
     waits, spent, whole = [], [], []
     for _ in range(REPEATS):
         with serving(ROBOT) as (port, processor):
-            told, before = time.perf_counter(), processor()  # the browser is opened at this moment
+            told, before = time.perf_counter(), processor()  # the browser opens at this time
             with Client(port) as client:
                 next(message for message in client.heard(60.0) if cables_in(message))
             waits.append(time.perf_counter() - told)
@@ -75,7 +75,7 @@ def first_cables() -> Iterator[Row]:
 
 
 def two_while_a_third_films() -> Iterator[Row]:
-    """Update rates with one client that drags, one that watches, and a third that films."""
+    """Update rates with three clients: one drags, one watches, and one records a film."""
     with tempfile.TemporaryDirectory() as folder:
         robot = sl.load_robot(ROBOT)
         ends = sl.Pose(np.array([[0.0, 0.0, 2.0], [2.0, 1.0, 2.0]]), np.stack([np.eye(3)] * 2))
@@ -102,7 +102,7 @@ def two_while_a_third_films() -> Iterator[Row]:
 
 
 def watched(dragging: Client, looking: Client, processor: Callable[[], float]) -> tuple[float, float, float]:
-    """Updates per second of both, and the share of a processor."""
+    """Updates per second of both clients, and the share of a processor."""
     counts = [0, 0]
     until = time.perf_counter() + WATCHED
 

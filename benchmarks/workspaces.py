@@ -21,7 +21,7 @@ CENTER = (0.0, 0.0, 1.0)
 MODELS = (sl.Straight(), sl.Catenary())
 FRAME = (-7.5, -5.5, 0.0), (7.5, 5.5, 6.0)
 POSES = 4_000
-SETTINGS = ((24, 0.5), (64, 2.0))  # cells, and largest time [s]
+SETTINGS = ((24, 0.5), (64, 2.0))  # number of cells, and longest time [s]
 
 
 def hulls() -> Iterator[Row]:
@@ -39,7 +39,7 @@ def hulls() -> Iterator[Row]:
 
 
 def volumes() -> Iterator[Row]:
-    """The true volume of that hull."""
+    """The true volume of this hull."""
     robot, low, high = ipanema()
     level = level_of(robot, sl.Straight())
     for cells, reach in SETTINGS:
@@ -55,7 +55,7 @@ def volumes() -> Iterator[Row]:
 
 
 def frames() -> Iterator[Row]:
-    """The article's suspended robot in its frame, with sag and without."""
+    """The article's suspended robot in its frame, with and without sag."""
     robot = sl.load_robot("article-suspended")
     for model, reach in zip(MODELS, ("782.7", "789.4"), strict=True):
         level = level_of(robot, model)
@@ -69,10 +69,10 @@ def frames() -> Iterator[Row]:
 
 
 def proofs() -> Iterator[Row]:
-    """Proofs of boxes of poses: processor time of a cell, and distance from the true volume of that hull."""
+    """Proofs of boxes of poses: processor time per cell, and difference from the true volume of the hull."""
     robot, low, high = ipanema()
     box = sl.PoseBox(low, high)
-    sl.prove(robot, sl.PoseBox(CENTER, CENTER))  # compiles
+    sl.prove(robot, sl.PoseBox(CENTER, CENTER))  # compilation
     for edge, reach in ((0.06, "7.16 to 14.25 m3 in a study"), (0.03, "within 10 % in 60 s, <= 15 us a cell")):
         start = time.process_time()
         proof = sl.prove(robot, box, model=sl.Straight(), budget=60.0, smallest=edge)
@@ -122,7 +122,7 @@ def margins() -> Iterator[Row]:
 
 
 def calls() -> Iterator[Row]:
-    """One pose a call, and many robots in one call."""
+    """One pose per call, and many robots in one call."""
     robot = sl.load_robot("article-suspended")
     assert robot.test_box is not None
     prepared = MarginRows(robot, sl.WrenchBox(50.0, 5.0))

@@ -26,7 +26,7 @@ for position, quaternion, wrench in zip(
     if status != sl.PoseStatus.SOLVED:
         raise SystemExit(status.text)  # stop the winches
     wound.append(lengths.copy())
-plan = sl.inverse(robot, path)  # the same lengths in one call
+plan = sl.inverse(robot, path)  # the same lengths from a single call
 difference = np.abs(np.array(wound) - plan.unstrained_length).max()
 print(f"{len(path)} set points; the planner's lengths to {difference:.0e} m")
 print(f"{1e6 * np.median(times):.1f} µs a pose, median")

@@ -8,7 +8,7 @@ import sagline as sl
 robot = sl.load_robot("article-suspended")
 path = sl.quintic_path([(0, 0, 1.5), (2, 1, 2)], durations=4.0, rate=50)
 plan = sl.inverse(robot, path)
-# 1 mm per cable
+# errors of 1 mm per cable
 noise = np.random.default_rng(1).normal(
     scale=1e-3, size=plan.unstrained_length.shape
 )

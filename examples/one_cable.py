@@ -5,8 +5,8 @@ from matplotlib.figure import Figure
 
 import sagline as sl
 
-cable = sl.Cable(linear_density=0.067, axial_stiffness=44e3)  # kg/m, N
-tension = np.array([20.0, 50.0, 100.0, 200.0])  # along the chord, N
+cable = sl.Cable(linear_density=0.067, axial_stiffness=44e3)  # [kg/m], [N]
+tension = np.array([20.0, 50.0, 100.0, 200.0])  # along the chord [N]
 exact = sl.Catenary().from_tension(
     cable, span=12.0, rise=-4.0, chord_tension=tension
 )
@@ -16,7 +16,7 @@ for k, pull in enumerate(tension):
         f"{1e3 * exact.sag[k]:5.0f} mm of sag",
     )
 
-worst = {}  # of the length, at 20 N
+worst = {}  # relative length error at 20 N
 for model in (sl.Parabolic(), sl.Empirical(), sl.Elastic(), sl.Straight()):
     length = model.from_tension(cable, 12.0, -4.0, tension).unstrained_length
     worst[type(model).__name__] = 1e3 * abs(length - exact.unstrained_length)[0]

@@ -7,7 +7,7 @@ import sagline as sl
 
 robots = ("cogiro", "article-prototype", "ipanema-1", "expo2015-lucia")
 left_out = {
-    "pulleys of 25 mm": sl.Winch(0.025),  # m
+    "pulleys of 25 mm": sl.Winch(0.025),  # [m]
     "pulleys of 50 mm": sl.Winch(0.050),
     "3 m of dead length": sl.Winch(dead_cable=3.0),
 }

@@ -1,7 +1,7 @@
 """Workspace of a robot with different loads.
 
-The hull is exact at its corners, the slice at its points. The mesh opens in any
-program for meshes.
+The hull is exact at its corners, and the slice is exact at its points. Any
+program for meshes can open the mesh.
 """
 
 import sagline as sl

@@ -20,7 +20,7 @@ from types import FunctionType, ModuleType
 from typing import Final
 
 ROOT: Final = Path(__file__).parents[1]
-LONG_FUNCTION, LONG_FILE = 60, 400  # code lines of a function, lines of a file
+LONG_FUNCTION, LONG_FILE = 60, 400  # largest numbers of code lines of a function and lines of a file
 LAYOUT: Final = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENCODING}
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 

@@ -1,4 +1,4 @@
-"""Calls: other kernels, NamedTuples, functions of math, and the few built-in ones that the subset knows."""
+"""Calls: other kernels, NamedTuples, functions of math, and the few built-in functions of the subset."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Calls(Indexing):
         return self._builtin(function, arguments, node)
 
     def _record(self, class_: Any, arguments: list[Value], node: ast.Call) -> Value:
-        """A NamedTuple: numbers take the type of their fields."""
+        """A NamedTuple; numbers take the type of their fields."""
         names: tuple[str, ...] = class_._fields
         arguments += [self.constant(class_._field_defaults[name], node) for name in names[len(arguments) :]]
         if len(arguments) != len(names):
@@ -75,7 +75,7 @@ class Calls(Indexing):
         return value
 
     def _reshape(self, node: ast.Call) -> Value:
-        """Other sizes of a contiguous array; an array of another size ends the entry with a code."""
+        """Contiguous array with other sizes; an array with another number of elements ends the entry with a code."""
         assert isinstance(node.func, ast.Attribute)
         array, *sizes = self.operands([node.func.value, *node.args])
         if len(sizes) == 1 and isinstance(sizes[0].type, TupleType):
@@ -115,7 +115,7 @@ class Calls(Indexing):
         return self._conversion(target, one, node)
 
     def _extreme(self, name: str, arguments: list[Value]) -> Value:
-        """Min or max: the first argument unless a later one is smaller or larger, as in Python."""
+        """Minimum or maximum: the first argument, unless a later one is smaller or larger, as in Python."""
         found = arguments[0]
         for other in arguments[1:]:
             assert isinstance(found.type, Scalar)

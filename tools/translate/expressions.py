@@ -108,7 +108,7 @@ class Expressions(Scope):
         return UNSET
 
     def constant(self, value: Any, node: ast.AST) -> Value:
-        """A value that translation knows."""
+        """A value that is known during translation."""
         if value is None:
             return Value("", NONE, known=None)
         if isinstance(value, bool | np.bool_):
@@ -135,7 +135,7 @@ class Expressions(Scope):
         if type_ is None:
             raise NoTypeYetError
         self.read.add(node.id)
-        if node.id not in self.declared:  # read, in the order of lines, before it is assigned
+        if node.id not in self.declared:  # read before it is assigned, in the order of lines
             self.declared.add(node.id)
             self.above[node.id] = None
         return Value(identifier(node.id), type_, known=None if type_ == NONE else UNSET)
@@ -162,7 +162,7 @@ class Expressions(Scope):
         self.refuse(node, f"{words(type_)} has no {node.attr} here", "Use fields of NamedTuples, .shape, .size, .real.")
 
     def listed(self, nodes: Sequence[ast.expr]) -> list[Value]:
-        """Values of a list of expressions, with starred tuples taken apart."""
+        """Values of a list of expressions; starred tuples are unpacked."""
         plain = [node.value if isinstance(node, ast.Starred) else node for node in nodes]
         found: list[Value] = []
         for node, value in zip(nodes, self.operands(plain), strict=True):
@@ -190,7 +190,7 @@ class Expressions(Scope):
         return Value(f"{sign}{inner}", type_, UNARY, reads=value.reads, writes=value.writes)
 
     def binary(self, left: Value, op: ast.operator, right: Value, node: ast.AST) -> Value:
-        """An operation of two numbers, or two tuples joined."""
+        """An operation of two numbers, or the concatenation of two tuples."""
         kind = type(op)
         if isinstance(left.type, TupleType) and isinstance(right.type, TupleType) and kind is ast.Add:
             return self.tuple_of([*self.parts(left, node), *self.parts(right, node)], node)
@@ -241,7 +241,7 @@ class Expressions(Scope):
         return Value(text, Scalar.BOOL if both else Scalar.INT, reads=reads, writes=writes)
 
     def _power(self, base: Value, exponent: Value, node: ast.AST) -> Value:
-        """A power: by squaring, as numba's, for whole exponents; else that of C."""
+        """A power: by repeated squaring for whole exponents, as in numba; else the power of C."""
         assert isinstance(base.type, Scalar)
         assert isinstance(exponent.type, Scalar)
         if base.is_known and exponent.is_known:
@@ -260,7 +260,7 @@ class Expressions(Scope):
     # ---- conditions
 
     def boolean(self, node: ast.BoolOp) -> Value:
-        """`and`, `or`: && and || of C, or nested ifs where an operand needs lines of its own."""
+        """`and`, `or`: && and || of C, or nested ifs if an operand requires separate lines."""
         stops = isinstance(node.op, ast.Or)
         found: list[tuple[list[str], Value]] = []
         for operand in node.values:
@@ -328,7 +328,7 @@ class Expressions(Scope):
         return self.constant((left.type == NONE) == isinstance(node.ops[0], ast.Is), node)
 
     def choice(self, node: ast.IfExp) -> Value:
-        """`a if b else c`: the operator ?: of C, or if and else where a side needs lines of its own."""
+        """`a if b else c`: the operator ?: of C, or if and else if a side requires separate lines."""
         test = self.truth(self.expression(node.test), node.test)
         if test.is_known:
             return self.expression(node.body if test.known else node.orelse)

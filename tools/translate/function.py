@@ -20,7 +20,7 @@ class FunctionTranslation(Statements):
     name: str = ""
 
     def text(self) -> str:
-        """The function in C, with its place and the first line of its docstring."""
+        """The function in C, with its source location and the first line of its docstring."""
         doc = (ast.get_docstring(self.node) or "").partition("\n")[0].replace("*/", "* /")
         lines = [*self._declarations(), *_without_unused(self._with_returns())]
         used = set(WORD.findall("\n".join(lines)))
@@ -47,7 +47,7 @@ class FunctionTranslation(Statements):
         ]
 
     def _with_returns(self) -> list[str]:
-        """All lines, with the returns after failed calls and checks, whose type is known now."""
+        """All lines, with the returns after failed calls and checks, whose types are known now."""
         if self.result == NONE:
             leave = "return;"
         elif isinstance(self.result, TupleType | ArrayType):
@@ -59,7 +59,7 @@ class FunctionTranslation(Statements):
 
 
 def _without_unused(lines: list[str]) -> list[str]:
-    """Lines in which a value that is named and never used has no name."""
+    """Lines without names for values that are never used."""
     counts = Counter(WORD.findall("\n".join(lines)))
     found = []
     for line in lines:

@@ -1,7 +1,7 @@
 """Elements and views of arrays, and items of tuples.
 
 An element is written with a macro, AT2(array, i, j), which tests its indices if the C is compiled with -DSL_CHECK.
-Bounds of slices are clamped as Python's; an index counts from the end only if it is a negative constant.
+Bounds of slices are clamped as in Python. An index counts from the end only if it is a negative constant.
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ class Indexing(Expressions):
         return start, f"sl_count({start}, {upper or size})"
 
     def _bound(self, node: ast.expr | None, size: str, slice_: ast.AST) -> str:
-        """A bound of a slice, clamped to 0 and the size; "" for none."""
+        """A bound of a slice, clamped to 0 and the size; "" if there is none."""
         if node is None:
             return ""
         value = self.expression(node)

@@ -1,4 +1,4 @@
-"""Names in the source of a function: their counts, and which loops own their variable. Computed once per node."""
+"""Names in the source of a function: counts, and loops that own their variable. They are computed once per node."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ def names_in(nodes: Iterable[ast.AST]) -> Counter[str]:
 
 
 def stored_in(nodes: Iterable[ast.AST], context: type[ast.expr_context] = ast.Store) -> set[str]:
-    """Names that statements assign, or those that they use in another context."""
+    """Names that statements assign, or names that they use in another context."""
     return {name for node in nodes for name, kind in _names(node) if kind is context}
 
 
 @cache
 def as_load(target: ast.expr) -> ast.expr:
-    """The target of `x += y` as an expression, at the same place of the source."""
+    """The target of `x += y` as an expression, at the same location in the source."""
     load = ast.parse(ast.unparse(target), mode="eval").body
     for part in ast.walk(load):
         ast.copy_location(part, target)
@@ -42,14 +42,14 @@ def as_load(target: ast.expr) -> ast.expr:
 
 @cache
 def own_loops(function: ast.FunctionDef) -> frozenset[ast.For]:
-    """Loops over range whose variable is known in such loops only, one inside the other not, and changed by none."""
+    """Loops over range that are not nested, whose variable occurs only in such loops and is not assigned in them."""
     loops = [each for each in ast.walk(function) if isinstance(each, ast.For) and _over_range(each)]
     counts = names_in(function.body)
     parameters = {each.arg for each in function.args.args}
     found = set[ast.For]()
     for name in {each.target.id for each in loops if isinstance(each.target, ast.Name)} - parameters:
         same = [each for each in loops if isinstance(each.target, ast.Name) and each.target.id == name]
-        stored = any(name in stored_in(each.body) for each in same)  # so none is inside another
+        stored = any(name in stored_in(each.body) for each in same)  # therefore the loops are not nested
         if not stored and sum(names_in([each])[name] for each in same) == counts[name]:
             found.update(same)
     return frozenset(found)

@@ -60,7 +60,7 @@ class Program:
         self._entries: list[tuple[str, FunctionTranslation]] = []
 
     def _unique(self, name: str) -> str:
-        """The name, or the next of its numbers."""
+        """The name, with a number if it is already used."""
         found, number = name, 1
         while found in self._names:
             number += 1
@@ -69,7 +69,7 @@ class Program:
         return found
 
     def c_type(self, type_: Type) -> str:
-        """Name of a type in C; defines its struct at first."""
+        """Name of a type in C; defines its struct at the first call."""
         if isinstance(type_, Scalar):
             return C_SCALARS[type_]
         if type_ not in self._structs:
@@ -93,7 +93,7 @@ class Program:
         return name, [pointer, sizes, *([strides] if type_.strided else [])]
 
     def table(self, array: Any, name: str) -> tuple[str, ArrayType]:
-        """A constant array: its numbers and its sizes, both static."""
+        """A constant array: static numbers and static sizes."""
         if id(array) not in self._tables:
             type_ = ArrayType(ELEMENTS[array.dtype], array.ndim, constant=True)
             unique = self._unique(name.strip("_"))
@@ -108,7 +108,7 @@ class Program:
     def function(
         self, function: FunctionType, types: Sequence[Type], caller: Scope | None = None, call: ast.AST | None = None
     ) -> FunctionTranslation:
-        """A function for argument types, translated at first."""
+        """A function for argument types, translated at the first call."""
         node = definition(function)
         reader = caller or Scope(self, function, node, types)
         place = call or node
@@ -136,11 +136,11 @@ class Program:
         return self._functions[key]
 
     def export(self, function: Any, types: Sequence[Type], symbol: str) -> None:
-        """Add an entry under a name that other programs see."""
+        """Add an entry with an exported name."""
         self._entries.append((symbol, self.function(getattr(function, "py_func", function), types)))
 
     def text(self) -> str:
-        """All of the C: only what the entries reach."""
+        """The whole C text, with only the functions that entries use."""
         wrappers = [self._wrapper(symbol, each) for symbol, each in self._entries]
         by_name = {each.name: each for each in self._functions.values()}
         waiting, reached, tables = [each.name for _, each in self._entries], set[str](), set[str]()

@@ -1,7 +1,7 @@
 """State of the translation of one function: its lines of C, its variables, and values on their way through a statement.
 
-The body of a function is translated again and again, each time with the variables' types of the time before, until the
-types stay. A statement that needs the type of a variable which has none yet is passed over until the next time.
+The body of a function is translated repeatedly, each time with the types of the variables from the previous pass, until
+the types do not change. A pass skips statements that require the unknown type of a variable.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ from tools.translate.types import (
 if TYPE_CHECKING:
     from tools.translate.program import Program
 
-ATOM, UNARY, TIMES, PLUS, COMPARE, EQUAL, AND, OR, CHOICE = 20, 14, 13, 12, 10, 9, 5, 4, 3  # precedence in C
+ATOM, UNARY, TIMES, PLUS, COMPARE, EQUAL, AND, OR, CHOICE = 20, 14, 13, 12, 10, 9, 5, 4, 3  # levels of precedence in C
 WORD: Final = re.compile(r"[A-Za-z_]\w*")
 PATH: Final = re.compile(r"[A-Za-z_]\w*(\.\w+)*")
-TEMPORARY: Final = re.compile(r"[tk]_\d+_*")  # names of the translator's own
-# places of the returns after a failed call and a failed check: their type is known at the end only
+TEMPORARY: Final = re.compile(r"[tk]_\d+_*")  # names that the translator uses itself
+# marks of the returns after a failed call and a failed check, whose type is known only at the end
 FAIL: Final = "@fail"
 SHORT: Final = "@short"
 UNSET: Final = object()
@@ -51,13 +51,13 @@ class NoTypeYetError(Exception):
 
 @dataclass(frozen=True)
 class Value:
-    """A value inside a statement.
+    """A value within a statement.
 
     Attributes:
         text: Its expression in C.
         type: Its type.
         level: Precedence of the expression.
-        items: The items, if it is a tuple written out.
+        items: The items of an explicit tuple.
         known: The Python value, if translation knows it.
         reads: True if the expression reads elements of arrays.
         writes: True if it calls a function that may write elements of arrays.
@@ -90,7 +90,7 @@ class Scope:
     """Lines, variables and values of one function."""
 
     def __init__(self, program: Program, function: FunctionType, node: ast.FunctionDef, types: Sequence[Type]) -> None:
-        """Take a function with the types of its parameters."""
+        """Store a function with the types of its parameters."""
         self.program, self.function, self.node = program, function, node
         self.parameters = dict(zip((each.arg for each in node.args.args), types, strict=True))
         self.types: dict[str, Type] = dict(self.parameters)
@@ -100,10 +100,10 @@ class Scope:
         self.begin_pass()
 
     def begin_pass(self) -> None:
-        """Forget the lines of the pass before; types stay."""
+        """Discard the lines of the previous pass; types remain."""
         self.lines: list[str] = []
         self.depth = 1
-        self.complete: ast.AST | None = None  # else the first node without a type
+        self.complete: ast.AST | None = None  # otherwise the first node without a type
         self.read: set[str] = set()
         self.declared: set[str] = set(self.parameters)
         self.above: dict[str, None] = {}  # variables that are declared above all lines
@@ -125,7 +125,7 @@ class Scope:
 
     @property
     def result(self) -> Type:
-        """Type of what the function returns."""
+        """Type of the function's result."""
         return NONE if self.returned is None else self.returned
 
     def refuse(self, node: ast.AST, construct: str, instead: str) -> NoReturn:
@@ -134,7 +134,7 @@ class Scope:
         raise TranslationError(self.function.__code__.co_filename, line, construct, instead)
 
     def joined(self, node: ast.AST, first: Type | None, second: Type, place: str) -> Type:
-        """The type that holds both, or the error that names the place."""
+        """The type that holds both types, or the error that names the location."""
         try:
             return join(first, second)
         except JoinError as error:
@@ -169,10 +169,11 @@ class Scope:
         return Value(name, value.type, known=value.known)
 
     def kept_in_order(self, values: list[Value], marks: list[int], written: list[int]) -> list[Value]:
-        """Operands in Python's order, left to right, where C leaves it open.
+        """Operands in Python's order from left to right, which C does not guarantee.
 
-        A value that reads or writes arrays gets a name at its mark, the number of lines after it, if a later one writes
-        them; one that writes also if a later one reads.
+        A value that reads or writes arrays gets a name if a later value writes arrays. A value that writes arrays also
+        gets a name if a later value reads them. The name is inserted at the mark of the value, the number of lines
+        after it.
         """
         for k in range(len(values) - 2, -1, -1):
             later = values[k + 1 :]
@@ -212,12 +213,12 @@ class Scope:
         return Value(f"{held.within(ATOM)}.{identifier(name)}", type_, known=None if type_ == NONE else UNSET)
 
     def tuple_of(self, items: Sequence[Value], node: ast.AST) -> Value:
-        """A tuple written out."""
+        """An explicit tuple."""
         type_ = plain_tuple(*(item.type for item in items))
         return self.packed(type_, items, node)
 
     def packed(self, type_: TupleType, items: Sequence[Value], node: ast.AST) -> Value:
-        """Items as a struct of a type, converted."""
+        """Items, converted, as a struct of a type."""
         pairs = zip(items, type_.types, strict=True)
         texts = [self.converted(item, each, node) for item, each in pairs if each != NONE]
         text = f"(({self.program.c_type(type_)}){{{', '.join(texts) or '0'}}})"
@@ -237,7 +238,7 @@ class Scope:
         self.refuse(node, f"{words(value.type)} stands for {words(type_)}", "Use one type.")
 
     def widened(self, value: Value, scalar: Scalar) -> Value:
-        """A number as one of a larger type."""
+        """A number, converted to a larger type."""
         if scalar is Scalar.COMPLEX and value.type is not Scalar.COMPLEX:
             return Value(f"sl_complex({value.text}, 0.0)", scalar, reads=value.reads, writes=value.writes)
         if scalar is Scalar.FLOAT and value.is_known and value.type is not Scalar.FLOAT:
@@ -245,7 +246,7 @@ class Scope:
         return value
 
     def _other_layout(self, value: Value, type_: ArrayType) -> str:
-        """An array with strides, or as one that is not written."""
+        """An array, converted to one with strides or to a constant one."""
         held, source = self.hold(value).text, value.type
         assert isinstance(source, ArrayType)
         sizes = [f"{held}.n{k}" for k in range(type_.rank)]
@@ -272,7 +273,7 @@ class Scope:
         self.refuse(node, f"{words(value.type)} is a condition", "Compare with a number, or with `is None`.")
 
     def annotated(self, annotation: ast.expr | None, type_: Type) -> Type:
-        """The type that an annotation gives a number: an int given for a float becomes one."""
+        """The type of a number by its annotation; an int for a float becomes a float."""
         if isinstance(annotation, ast.Constant) and isinstance(annotation.value, str):
             annotation = ast.parse(annotation.value, mode="eval").body
         if isinstance(annotation, ast.Name) and isinstance(type_, Scalar):

@@ -25,8 +25,8 @@ FLAGS1, FLAGS2 = (ArrayType(Element.FLAG, rank) for rank in (1, 2))
 C2, C3, C4 = (ArrayType(Element.COMPLEX, rank) for rank in (2, 3, 4))
 
 MODEL: Final = plain_tuple(INT, FLOAT, FLOAT)  # code, k_h, k_p
-TERMS: Final = plain_tuple(INT, FLOAT, FLOAT, FLOAT)  # of a cable model, with gravity
-FORWARD: Final = plain_tuple(INT, FLOAT, FLOAT, NONE)  # None: nothing is behind the cables
+TERMS: Final = plain_tuple(INT, FLOAT, FLOAT, FLOAT)  # cable model with gravity
+FORWARD: Final = plain_tuple(INT, FLOAT, FLOAT, NONE)  # None: no pulleys or dead lengths
 FORWARD_PULLEYS: Final = plain_tuple(INT, FLOAT, FLOAT, BOOL)
 LIMITS: Final = plain_tuple(INT, FLOAT)
 DISTRIBUTION: Final = plain_tuple(INT, FLOAT, INT, F1, F1)

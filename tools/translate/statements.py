@@ -1,4 +1,4 @@
-"""Statements in C, and the passes over the body of a function until the types stay."""
+"""Statements in C, and the passes over the body of a function until the types do not change."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Statements(Calls):
     """Statements of one function."""
 
     def infer(self) -> None:
-        """Repeat the passes until types, read names and the kind of the function stay."""
+        """Repeat the passes until types, read names and the kind of the function do not change."""
         body = self.node.body
         for _ in range(PASSES):
             before = (dict(self.types), self.returned, self.unread, self.fallible)
@@ -55,7 +55,7 @@ class Statements(Calls):
 
     @contextmanager
     def _names_of(self, nodes: Sequence[ast.AST]) -> Iterator[None]:
-        """Names of these nodes alone, which the lines that follow may declare."""
+        """Names that occur only in these nodes, so that the following lines may declare them."""
         inner = names_in(nodes)
         self.blocks.append(frozenset(name for name, count in inner.items() if count == self.mentions[name]))
         try:
@@ -64,7 +64,7 @@ class Statements(Calls):
             self.blocks.pop()
 
     def inner_block(self, body: Sequence[ast.stmt]) -> bool:
-        """A block one level deeper."""
+        """A block of one more level of indentation."""
         self.depth += 1
         left = self.block(body)
         self.depth -= 1
@@ -113,7 +113,7 @@ class Statements(Calls):
     # ---- assignments
 
     def _call_alone(self, node: ast.Expr) -> None:
-        """A call for what it writes, or a docstring."""
+        """A call whose result is not used, or a docstring."""
         if isinstance(node.value, ast.Constant):
             return
         if not isinstance(node.value, ast.Call):
@@ -146,7 +146,7 @@ class Statements(Calls):
                 self.refuse(node, f"an assignment to {ast.unparse(target)}", "Assign names, elements and tuples.")
 
     def _store_name(self, name: str, value: Value, node: ast.AST) -> None:
-        """Assign a variable; declare it here if this is the only block that knows it."""
+        """Assign a variable; declare it here if it occurs only in this block."""
         if name in self.unread:
             if value.writes:
                 self.emit(f"(void){value.text};")
@@ -166,7 +166,7 @@ class Statements(Calls):
         self.emit(text)
 
     def _store_tuple(self, targets: list[ast.expr], value: Value, node: ast.AST) -> None:
-        """Assign the items of a tuple; those that an earlier target changes get a name first."""
+        """Assign the items of a tuple; items that an earlier target changes get a name first."""
         items = self.parts(value, node)
         if len(items) != len(targets):
             self.refuse(node, f"{len(items)} values for {len(targets)} targets", "Give as many.")
@@ -181,7 +181,7 @@ class Statements(Calls):
             self.store(target, item, node)
 
     def _copied(self, value: Value) -> Value:
-        """The value under a name of its own, even if it is a variable."""
+        """The value with a new name, even if it is a variable."""
         name = self.temporary()
         self.emit(f"{self.program.c_type(value.type)} {name} = {value.text};")
         self.written += value.writes
@@ -205,7 +205,7 @@ class Statements(Calls):
         self.emit(f"{'    ' * rank}{macro}{rank}({', '.join([held, *indices])}) = {number};")
 
     def _for_element(self, value: Value, type_: Scalar, node: ast.AST) -> str:
-        """A number as an element of an array: smaller types may take it only by int or float."""
+        """A number as an element of an array; smaller types accept it only with int or float."""
         if isinstance(value.type, Scalar) and value.type > type_:
             found = f"{words(value.type)} assigned to an element of {words(type_)}"
             self.refuse(node, found, "Convert it with int, or make the array larger.")
@@ -221,7 +221,7 @@ class Statements(Calls):
             self.refuse(node, f"{ast.unparse(target.value)} is a constant array", "Write to arrays that are arguments.")
 
     def _update(self, node: ast.AugAssign) -> None:
-        """X += y and its like: the operator of C if types allow it, else an operation and an assignment."""
+        """Assignments such as x += y: the operator of C if types allow it, else an operation and an assignment."""
         load = as_load(node.target)
         place, value = self.operands([load, node.value])
         if (
@@ -247,7 +247,7 @@ class Statements(Calls):
     # ---- control
 
     def _return(self, node: ast.Return) -> None:
-        """Return a value, of the type that the annotation gives it."""
+        """Return a value with the type of the annotation."""
         value = self.expression(node.value) if node.value is not None else Value("", NONE)
         type_ = self.annotated(self.node.returns, value.type)
         self.returned = self.joined(node, self.returned, type_, "the returned value")
@@ -259,7 +259,7 @@ class Statements(Calls):
             self.emit(f"return {self.converted(value, self.returned, node)};")
 
     def _if(self, node: ast.If, start: str = "if") -> bool:
-        """A condition; what translation knows to be false is left out."""
+        """A condition; parts that are known to be false are omitted."""
         test = self.truth(self.expression(node.test), node.test)
         if test.is_known:
             return self.block(node.body if test.known else node.orelse)
@@ -280,7 +280,7 @@ class Statements(Calls):
         return left and bool(node.orelse)
 
     def _is_one_if(self, place: int) -> bool:
-        """True if the lines from a place on are one if with its closing brace."""
+        """True if the lines from a position on are a single `if` with its closing brace."""
         inner = "    " * (self.depth + 1)
         heads = [line for line in self.lines[place:] if line.startswith(inner) and not line[len(inner)].isspace()]
         return (
@@ -300,7 +300,7 @@ class Statements(Calls):
         self.emit("}")
 
     def _for(self, node: ast.For) -> None:
-        """A loop over range, an array of one axis, or constants written out."""
+        """A loop over range, an array of one axis, or explicit constants."""
         if node.orelse:
             self.refuse(node, "for with else", "Set a flag.")
         if isinstance(node.iter, ast.Call) and self.static(node.iter.func) is range and not node.iter.keywords:
@@ -318,7 +318,7 @@ class Statements(Calls):
         self._turn(node, item)
 
     def _constants(self, iterated: Value, index: str, node: ast.For) -> Value:
-        """The head of a loop over constants, and the item of a turn."""
+        """The head of a loop over constants, and the item of an iteration."""
         items = iterated.items or ()
         types = {item.type for item in items}
         if len(types) != 1 or not all(item.is_known for item in items) or items[0].type == NONE:
@@ -355,7 +355,7 @@ class Statements(Calls):
         self._turn(node, None if name else Value(index, Scalar.INT))
 
     def _turn(self, node: ast.For, item: Value | None) -> None:
-        """The body of a loop, after the item of the turn is assigned."""
+        """The body of a loop, after the assignment of the iteration's item."""
         self.depth += 1
         with self._names_of([node]):
             if item is not None:

@@ -1,4 +1,4 @@
-"""Text of C that every translation begins with: sizes of arrays, elements, and Python's meaning of operators."""
+"""C text at the beginning of every translation: sizes of arrays, elements, and operators with Python's meaning."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ _MATH: Final = (  # functions of one or two floats that C99 has under the same n
     "sinh sqrt tan tanh"
 )
 MATH: Final = tuple(_MATH.split(" "))
-_WORDS: Final = (  # of C99, and the other functions that the text uses
+_WORDS: Final = (  # functions of C99, and other functions that the text uses
     "auto break case char const continue default do double else enum extern float for goto if inline int long register "
     "restrict return short signed sizeof static struct switch typedef union unsigned void volatile while bool true "
     "false complex I NAN INFINITY sl_code ceil creal cimag fabs floor fmod isfinite isinf isnan llabs pow rint"
 )
-RESERVED: Final = frozenset((*_WORDS.split(" "), *MATH))  # no variable has these names
+RESERVED: Final = frozenset((*_WORDS.split(" "), *MATH))  # names that variables must not have
 RANKS: Final = 5
 
 _HEAD: Final = """\

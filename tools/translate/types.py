@@ -1,4 +1,4 @@
-"""Types of the subset: scalars, arrays, tuples and None; how two of them join, and the error of the translator."""
+"""Types of the subset: scalars, arrays, tuples and None; their common types, and the error of the translator."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ class TranslationError(Exception):
 
     Attributes:
         file: Python source.
-        line: Line of it.
+        line: Line of the source.
         construct: The construct, with its types where they matter.
         instead: The form to write instead.
     """
@@ -28,7 +28,7 @@ class JoinError(Exception):
 
 
 class Scalar(IntEnum):
-    """Type of a number. The larger one holds both values of an operation."""
+    """Type of a number. The larger of two types holds both values of an operation."""
 
     BOOL = 0
     INT = 1
@@ -109,7 +109,7 @@ def plain_tuple(*types: Type) -> TupleType:
 
 
 def join(first: Type | None, second: Type) -> Type:
-    """Smallest type that holds values of both; None is no value so far."""
+    """Smallest type that holds values of both; None means that there is no value yet."""
     if first is None or first == second:
         return second
     if isinstance(first, Scalar) and isinstance(second, Scalar):

@@ -1,1 +1,1 @@
-"""The article's studies, recomputed: one module per study, pure functions of numbers."""
+"""The article's studies, computed again: one module per study, with pure functions of numbers."""

@@ -18,10 +18,10 @@ from sagline.present.page import Finding, Panel, Table
 
 COUNTS = ("one parameter", "two parameters", "three parameters")
 SHOWN = 8  # rows of the table with two and with three parameters
-FEW = 6e-3  # m, largest remaining error of a good explanation
-PRINTING = 1e-3 / np.sqrt(12.0)  # m: scatter of positions printed in whole millimeters
-NOTHING = 0.95  # share of the measured error; a model with a larger remaining error explains nothing
-ALIKE = 0.2  # share of the measured slope over height; a smaller slope counts as zero
+FEW = 6e-3  # largest remaining error of a good explanation [m]
+PRINTING = 1e-3 / np.sqrt(12.0)  # scatter of positions that are printed in whole millimeters [m]
+NOTHING = 0.95  # a model with a larger remaining error, as a share of the measured one, explains nothing
+ALIKE = 0.2  # a smaller slope over height, as a share of the measured one, counts as zero
 AS_MEASURED = 0.15  # relative difference below which a slope counts as equal to the measured one
 LOWEST, HIGHEST = "P8", "P7"
 

@@ -28,9 +28,9 @@ from sagline.present.page import Chapter, Finding, table_of
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-MIDDLE = 2  # index of the sampled angle 0.754 rad of the article
-LOWEST = np.geomspace(40.0, 800.0, 12)  # N, lowest sampled tensions
-HIGHEST = np.geomspace(300.0, 40_000.0, 12)  # N, highest sampled tensions
+MIDDLE = 2  # index of the article's angle of 0.754 rad among the samples
+LOWEST = np.geomspace(40.0, 800.0, 12)  # lowest sampled tensions [N]
+HIGHEST = np.geomspace(300.0, 40_000.0, 12)  # highest sampled tensions [N]
 FACTORS = np.array([1.0, 2.0, 4.0, 8.0, 16.0, 32.0])
 
 

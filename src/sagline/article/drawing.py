@@ -25,10 +25,10 @@ if TYPE_CHECKING:
     from matplotlib.contour import ContourSet
     from matplotlib.path import Path
 
-WIDTH, HEIGHT = 4.6, 3.1  # in: size on a desktop screen; on a phone it is four fifths of this
-LEFT, RIGHT, BELOW, ABOVE = 0.16, 0.975, 0.5, 0.12  # margins: shares of the width, then in
-POINT = 1.0 / 72.0  # in
-NAME_SIZE = TICK - 0.5  # pt, text size of legends
+WIDTH, HEIGHT = 4.6, 3.1  # size on a desktop screen [in]; on a phone it is four fifths of this
+LEFT, RIGHT, BELOW, ABOVE = 0.16, 0.975, 0.5, 0.12  # margins as shares of the width, then in [in]
+POINT = 1.0 / 72.0  # [in]
+NAME_SIZE = TICK - 0.5  # text size of legends [pt]
 SHADES = "viridis"
 MOST_POINTS = 400  # largest number of points of a curve over time, to limit the size of the page
 
@@ -36,11 +36,11 @@ _remarks = re.compile(r"<metadata>.*?</metadata>|<!--.*?-->|\n\s*(?=\n)", flags=
 _size = re.compile(r' (?:width|height)="[^"]*pt"')
 HALO = (patheffects.withStroke(linewidth=2.2, foreground="white"),)
 LOOK: dict[str, Any] = {"colors": "black", "linestyles": "-", "linewidths": 0.8}
-MAP_LEFT, MAP_RIGHT = 0.13, 0.9  # margins: room for a color bar
+MAP_LEFT, MAP_RIGHT = 0.13, 0.9  # margins with space for a color bar
 
 
 class Drawings:
-    """Converts figures to drawings of one page, so that every identifier is unique in the page."""
+    """Converter from figures to drawings of one page, with identifiers that are unique in the page."""
 
     def __init__(self, page: str) -> None:
         """Prepare drawings whose identifiers begin with the name of their part of the page."""
@@ -194,7 +194,7 @@ class Courses(NamedTuple):
     def panels(
         self, labels: tuple[str, str, str], one: int, captions: tuple[str, str], draw: Drawings
     ) -> tuple[Panel, Panel]:
-        """Draw one curve alone, and all; labels of both axes and of the legend are given."""
+        """Draw one curve alone, and all curves, with labels of both axes and of the legend."""
         figure, ax = axes(*labels[:2])
         with_fit(ax, self.x, self.rows[one], self.fine, self.fits[one])
         second, bx = axes(*labels[:2])
@@ -203,7 +203,7 @@ class Courses(NamedTuple):
 
 
 def map_axes(x: str, y: str) -> tuple[Sheet, Axes]:
-    """Axes with room for a color bar."""
+    """Axes with space for a color bar."""
     figure, ax = axes(x, y)
     figure.subplots_adjust(left=MAP_LEFT, right=MAP_RIGHT)
     ax.grid(visible=False)

@@ -18,17 +18,17 @@ from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.present.page import Chapter, Finding, Table
 
-POSE = (2.0, 1.0, 1.5)  # m: a pose of the simulated robots outside their planes of symmetry
-PATH_RATE = 5.0  # samples per second; enough because the errors change slowly
-TAUT = 1e4  # N: so large that only the leading terms matter
+POSE = (2.0, 1.0, 1.5)  # a pose of the simulated robots outside their planes of symmetry [m]
+PATH_RATE = 5.0  # samples per second, sufficient because the errors change slowly
+TAUT = 1e4  # [N], so large that only the leading terms matter
 
 
-LONG = 15.0  # m, the simulated frame
+LONG = 15.0  # the simulated frame [m]
 TAUTER = 20.0  # factor on the sampled tensions, so that only the leading terms matter
-NEARLY = 1e-6  # rad from vertical or level
-TURN = (0.3, 0.2, 0.1)  # rad, about z, y, x
+NEARLY = 1e-6  # angle from vertical or level [rad]
+TURN = (0.3, 0.2, 0.1)  # [rad], about z, y, x
 
-# label, value, unit; for differences the size of the terms, to detect rounding errors
+# label, value, unit, and for differences the size of the terms, which shows rounding errors
 Number: TypeAlias = tuple[str, float, str] | tuple[str, float, str, float]
 
 
@@ -40,9 +40,9 @@ def _erratum(number: int, numbers: Sequence[Number]) -> Finding:
 
 
 def sign_of_intercept() -> Finding:
-    """Erratum 1: the intercept of pi at the platform end is +wD/2, the printed sign causes errors of centimeters."""
+    """Erratum 1: the intercept of pi at the platform end is +wD/2; the printed sign causes errors of centimeters."""
     cable, chord = sl.load_robot(ROBOTS[0]).cables, 10.0
-    angle = 0.754  # rad, the article's
+    angle = 0.754  # the article's angle [rad]
     state = sl.Catenary().from_tension(cable, chord * np.cos(angle), chord * np.sin(angle), TAUT, GRAVITY)
     half_weight = 0.5 * cable.linear_density * GRAVITY * chord / (1.0 + TAUT / cable.axial_stiffness)
     intercept = state.vertical_force - np.tan(angle) * state.horizontal_tension
@@ -60,7 +60,7 @@ def sign_of_intercept() -> Finding:
 
 
 def gravity_twice() -> Finding:
-    """Erratum 2: gravity in (5) and again in (6)/(51)."""
+    """Erratum 2: gravity is in (5) and again in (6) and (51)."""
     robot = sl.load_robot(ROBOTS[0])
     weight = robot.mass * robot.gravity
     numbers: list[Number] = [("weight of the platform", weight, "N")]
@@ -131,7 +131,7 @@ def _lifted(force: float) -> float:
     balance = sl.article_balance(robot, pose)
     wanted = np.array([0.0, 0.0, force, 0.0, 0.0, 0.0])
     tension = balance.h.T @ np.linalg.solve(balance.h @ balance.h.T, wanted - balance.b)
-    cables_alone = sl.article_balance(robot.replace(gravity=0.0), pose)  # b without the platform's weight
+    cables_alone = sl.article_balance(robot.replace(gravity=0.0), pose)  # vector b without the platform's weight
     return float((balance.h @ tension + cables_alone.b)[2])
 
 
@@ -151,7 +151,7 @@ def _angular(angles: Array, rates: Array, curvatures: Array) -> tuple[Array, Arr
 
 
 def _reversed(angles: Array) -> Array:
-    """(alpha, beta, gamma) about z, y, x as a vector along x, y, z: most favorable interpretation."""
+    """(alpha, beta, gamma) about z, y, x as a vector along x, y, z, the most favorable interpretation."""
     return angles[::-1]
 
 

@@ -1,8 +1,8 @@
-"""The experiment of ten points, repeated: home, the ten poses of Table 2, home, with a controller and a machine.
+"""Repetition of the experiment of ten points: home, the ten poses of Table 2, home, with controller and machine.
 
 In the article the prototype moves from point to point "with low speed", and stops at each point while its position is
-measured; this takes about 14 minutes. Speed and stops here are assumed so that the duration is equal. The machine is a
-twin, so its true position is known.
+measured; this takes about 14 minutes. Speed and stops are assumed so that the duration is equal. The machine is a twin,
+so that its true position is known.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from sagline.core.arrays import Array, locked
 from sagline.core.status import Status
 
 PROTOTYPE: Final = "article-prototype"
-SPEED: Final = 0.06  # m/s, largest speed of the platform; the fastest winch then has 61 mm/s
-STOP: Final = 14.0  # s at each point, including home twice; the total is 13.9 minutes
-LOOK: Final = 1.0  # s at the end of a stop; measured values are means over this time
-BIAS: Final = 2.0  # N, 0.1 % of the range of a 2 kN load cell
+SPEED: Final = 0.06  # largest speed of the platform [m/s]; the fastest winch then has 61 mm/s
+STOP: Final = 14.0  # time at each point, including home twice [s]; the total is 13.9 minutes
+LOOK: Final = 1.0  # time at the end of a stop [s]; measured values are means over this time
+BIAS: Final = 2.0  # [N], 0.1 % of the range of a 2 kN load cell
 NEXT: Final = "Correct that, and start again."
-EVERY: Final = 10  # cycles between two points of a drawn curve
+EVERY: Final = 10  # number of cycles between two points of a drawn curve
 
 Where = Callable[[], Array]  # the true position of the platform's origin [m], shape (3,)
 Tell = Callable[[float], None]  # completed share of the experiment
@@ -106,19 +106,19 @@ class Experiment:
     table: Table2
     robot: sl.Robot  # robot used by the controller
     true: Array  # true positions of the platform at the ten stops [m], shape (10, 3)
-    estimated: Array  # positions estimated from the encoders there [m], shape (10, 3)
-    tension: Array  # measured tensions there, mean of a second [N], shape (10, m)
-    planned_tension: Array  # planned tensions there [N], shape (10, m)
+    estimated: Array  # positions estimated from the encoders at the stops [m], shape (10, 3)
+    tension: Array  # measured tensions at the stops, means over a second [N], shape (10, m)
+    planned_tension: Array  # planned tensions at the stops [N], shape (10, m)
     # part of the tension error that lengths can correct without moving the platform: largest of a cable [N], (10,)
     null_error: Array
-    correction: Array  # correction of the lengths by the tension loop there [m], shape (10, m)
+    correction: Array  # correction of the lengths by the tension loop at the stops [m], shape (10, m)
     back: Array  # final minus initial position of the platform at home [m], shape (3,)
     time: Array  # time of motion, without the stops [s], shape (K,)
     cells: Array  # measured tensions [N], shape (K, m)
     planned: Array  # planned tensions [N], shape (K, m)
     lengths: Array  # lengths minus those at home [m], shape (K, m)
     stops: Array  # times of the ten stops, in the scale of `time` [s], shape (10,)
-    duration: float  # from home to home, stops included [s]
+    duration: float  # duration from home to home, including stops [s]
     winch_speed: float  # largest speed of a winch [m/s]
     farthest: float  # largest distance of the true position from the set point in motion [m]
     misjudged: float  # largest distance of the true position from the estimate [m]
@@ -154,7 +154,7 @@ def pair(robot: sl.Robot, errors: Errors) -> tuple[sl.Robot, sl.Robot]:
 
 
 def with_cells(robot: sl.Robot) -> sl.Robot:
-    """Robot with load cell offsets of +2 N and -2 N alternately, unless the robot has its own offsets."""
+    """Robot with alternating load cell offsets of +2 N and -2 N, unless it has its own offsets."""
     winches = robot.winches
     if winches is None or winches.load_cell_bias.any():
         return robot
@@ -284,7 +284,7 @@ def points() -> Array:
 
 
 def level_poses(position: ArrayLike) -> sl.Pose:
-    """Poses at positions (..., 3), the platform is not rotated, as in the article."""
+    """Poses at positions (..., 3), without rotation, as in the article."""
     return sl.Pose.from_euler(np.asarray(position, dtype=np.float64), 0.0, 0.0, 0.0)
 
 

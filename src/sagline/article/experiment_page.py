@@ -20,8 +20,8 @@ from sagline.present.page import Chapter, Finding, Panel, Table, page, table_of,
 NAMES = ("experiment.html", "experiment.json")
 TITLE = "The experiment, done again"
 NOTATION = "Errors are true less desired positions. A twin's true position is known; a prototype's has to be measured."
-JERK = 2.0  # s, duration of the jerk in the article
-AREA = 600.0  # pt^2, circle area of the largest error of a figure
+JERK = 2.0  # duration of the jerk in the article [s]
+AREA = 600.0  # circle area of the largest error of a figure [pt^2]
 
 
 def write_experiment(result: Experiment, folder: Path | str, how: str) -> Path:

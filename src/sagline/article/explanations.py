@@ -12,10 +12,10 @@ import sagline as sl
 from sagline.article.machine import Errors, Parameter
 from sagline.core.arrays import Array, Flags
 
-STEP = 0.01  # share of a plausible error, step of the difference quotients
+STEP = 0.01  # step of the difference quotients, as a share of a plausible error
 ITERATIONS = 20
-CONVERGED = 1e-5  # m, change of the platform position in the last step; positions are printed in millimeters
-NEAR = 1e-3  # share of a plausible error: a value closer to its limit than this counts as at the limit
+CONVERGED = 1e-5  # change of the platform position in the last step [m]; positions are printed in millimeters
+NEAR = 1e-3  # a value closer to its limit than this share of a plausible error counts as at the limit
 
 Model: TypeAlias = tuple[Parameter, ...]
 ErrorOf: TypeAlias = Callable[[Sequence[Errors]], Array]  # actual minus desired positions [m], (K, N, 3), of K machines
@@ -27,11 +27,12 @@ class Explanation(NamedTuple):
     parameters: Model  # the parameters, k of them
     values: Array  # errors of the parameters, each in its unit, shape (k,)
     deviation: Array  # standard deviations of the errors, each in its unit, shape (k,); NaN at a limit
-    at_limit: Flags  # true for errors at their plausible limit, shape (k,)
+    at_limit: Flags  # True for errors at their plausible limit, shape (k,)
     predicted: Array  # actual minus desired position with these errors [m], shape (N, 3)
     rms: float  # root mean square of measured minus predicted position, over all coordinates [m]
     worst: float  # largest distance of measured and predicted position [m]
-    # Akaike's information criterion, corrected for few measurements: smaller is better; a difference of 2 is small
+    # Akaike's information criterion, corrected for few measurements; smaller values are better, and a difference of 2
+    # is small
     aicc: float
     # root mean square of measured minus predicted position over all coordinates; each pose is predicted by the fit to
     # all other poses [m]
@@ -61,7 +62,7 @@ def explanations(error_of: ErrorOf, measured: Array, models: Sequence[Model]) ->
         for i, one in zip(moving, near, strict=True):
             right = measured.ravel() - one.error + one.slopes @ values[i]
             step = _bounded_least_squares(models[i], one.slopes, right) - values[i]
-            if step @ steps[i] < 0.0:  # the step reverses: it oscillates about the solution
+            if step @ steps[i] < 0.0:  # the step reverses its direction, because it oscillates about the solution
                 step *= 0.5
             values[i], steps[i], slopes[i] = values[i] + step, step, one.slopes
             if np.abs(one.slopes @ step).max() > CONVERGED:
@@ -163,7 +164,7 @@ def _explanation(model: Model, values: Array, slopes: Array, predicted: Array, m
 
 
 def _deviation(slopes: Array, free: Flags, rest: Array) -> Array:
-    """Standard deviations of the values, from the residuals; NaN for values at a limit."""
+    """Standard deviations of the values from the residuals; NaN for values at a limit."""
     normal = slopes[:, free].T @ slopes[:, free]
     scatter = np.sum(rest**2) / (rest.size - free.sum())
     deviation = np.full(free.size, np.nan)

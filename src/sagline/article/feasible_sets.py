@@ -17,12 +17,12 @@ from sagline.plot.sheet import BLUE, VERMILLION
 from sagline.present.page import Chapter, Finding
 
 CORNERS = np.array([(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0), (1.0, 0.0)])  # corners of |x| + |z| = 1
-CHORD = 10.0  # m
-TOLERANCES = (0.01, 0.001, 0.0001)  # m
-TENSIONS = np.linspace(10.0, 500.0, 200)  # N
-PSI_TENSIONS = np.array([30.0, 60.0, 120.0, 200.0, 300.0, 400.0])  # N
+CHORD = 10.0  # [m]
+TOLERANCES = (0.01, 0.001, 0.0001)  # [m]
+TENSIONS = np.linspace(10.0, 500.0, 200)  # [N]
+PSI_TENSIONS = np.array([30.0, 60.0, 120.0, 200.0, 300.0, 400.0])  # [N]
 SHOWN = 2  # index of the length whose set psi is drawn alone
-LOW_PART = 50.0  # N: the article ignores the curve below this tension
+LOW_PART = 50.0  # the article ignores the curve below this tension [N]
 
 
 class End(NamedTuple):
@@ -44,7 +44,7 @@ class End(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _FeasibleSets:
-    """The sets psi for some lengths, the curve Psi over all, and the line pi through its projection."""
+    """The sets psi for some lengths, the curve Psi over all lengths, and the line pi through its projection."""
 
     cable: sl.Cable  # material
     end: End  # desired position B_d
@@ -71,9 +71,9 @@ def feasible_sets(
     cable: sl.Cable, end: End, tolerance: float, tensions: Array, psi_tensions: Array, points: int = 80
 ) -> _FeasibleSets:
     """Exact sets psi and curve Psi of the article."""
-    # The map from (T, L) to B is one to one at a given L, so the outline of psi is the image, under the inverse
-    # map, of the outline of the tolerance |dx| + |dz| = epsilon_max around B_d; no search is needed
-    # source: Gia Luan & Truong Thinh 2020, (20), (21), figures 3 to 5, statements 1 and 2
+    # At a given L, the map from T to B is one to one. The outline of psi is therefore the image, under the inverse map,
+    # of the outline of the tolerance |dx| + |dz| = epsilon_max around B_d. A search is not necessary. Source: Gia Luan
+    # & Truong Thinh 2020, (20), (21), figures 3 to 5, statements 1 and 2
     if points % 4:
         raise sl.InvalidValueError("points", points, "a multiple of 4", "The outline has four edges.")
     model, stretch = sl.Catenary(), end.chord / end.span

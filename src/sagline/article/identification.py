@@ -14,13 +14,13 @@ from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.present.page import Chapter, Finding, Table, table_of
 
-SPANS = np.linspace(1.0, 13.0, 13)  # m: the working range of the simulated robots
-RISES = np.linspace(-5.0, 4.0, 10)  # m
-TENSIONS = np.linspace(20.0, 400.0, 77)  # N
-TOLERANCES = (1e-3, 2e-3, 5e-3, 10e-3)  # m
+SPANS = np.linspace(1.0, 13.0, 13)  # working range of the simulated robots [m]
+RISES = np.linspace(-5.0, 4.0, 10)  # [m]
+TENSIONS = np.linspace(20.0, 400.0, 77)  # [N]
+TOLERANCES = (1e-3, 2e-3, 5e-3, 10e-3)  # [m]
 EDGES, TICKS = np.outer(10.0 ** np.arange(-4.0, -1.0), (1.0, 2.0, 5.0)).ravel(), (1e-4, 1e-3, 1e-2)  # of the map [m]
-LINES = (1e-3, 5e-3, 1e-2)  # m, contour lines of the map
-SAMPLES, LENGTH_ERROR, TENSION_ERROR, SEED = 60, 1e-3, 1.0, 2020  # of the synthetic measurements: m, N
+LINES = (1e-3, 5e-3, 1e-2)  # contour lines of the map [m]
+SAMPLES, LENGTH_ERROR, TENSION_ERROR, SEED = 60, 1e-3, 1.0, 2020  # scatter of the synthetic measurements [m], [N]
 BOTH = ("linear_density", "axial_stiffness")
 UNITS = {"linear_density": "kg/m", "axial_stiffness": "N", "length_offset": "m"}
 CASES = (  # lowest and highest chord tension [N], unknowns

@@ -31,31 +31,31 @@ class Estimate(NamedTuple):
     The interval therefore shows the variation of the constant within the range, not the accuracy of the fit.
     """
 
-    value: float  # the constant
+    value: float  # value of the constant
     low: float  # lower end of the 95 % interval
-    high: float  # upper end
+    high: float  # upper end of the 95 % interval
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EmpiricalFit(Result):
     """An empirical model for one cable and working range, and its errors.
 
-    Axes of the maps: s spans, r rises, t tensions, in ascending order. The position error is (20) of the article,
-    |dx| + |dz|: distance from B_d to the end of the exact cable with the force and length of the model.
+    The axes of the maps are s spans, r rises and t tensions, in ascending order. The position error is |dx| + |dz|,
+    (20) of the article: the distance from B_d to the end of the exact cable with the force and length of the model.
 
     Attributes:
         model: The model to use.
-        k_h: Its intercept constant [m/s^2].
-        k_p: Its sag constant [m^2/s^4].
+        k_h: Intercept constant of the model [m/s^2].
+        k_p: Sag constant of the model [m^2/s^4].
         cable: Material, a single one.
-        gravity: [m/s^2].
-        spans: [m], shape (s,).
-        rises: [m], shape (r,).
-        tensions: T_x [N], shape (t,).
+        gravity: Gravitational acceleration [m/s^2].
+        spans: Sampled spans [m], shape (s,).
+        rises: Sampled rises [m], shape (r,).
+        tensions: Sampled T_x [N], shape (t,).
         force_residual: T_z of the model minus the exact value [N], shape (s, r, t).
         length_residual: L of the model minus the exact value [m], shape (s, r, t).
-        position_error: [m], shape (s, r, t).
-        cable_weight: w L [N], shape (s, r, t).
+        position_error: Position error [m], shape (s, r, t).
+        cable_weight: Cable weight w L [N], shape (s, r, t).
     """
 
     model: Empirical
@@ -72,7 +72,7 @@ class EmpiricalFit(Result):
     cable_weight: Array
 
     def tension_min(self, tolerance: float) -> float:
-        """T_x,min of the article [N]: for this and larger T_x, the position error of every sampled cable is allowed.
+        """T_x,min of the article [N]: for this and larger T_x, the position errors of all sampled cables are allowed.
 
         Args:
             tolerance: Allowed position error [m], > 0.
@@ -84,7 +84,7 @@ class EmpiricalFit(Result):
         return _first_of_good_tail(self.tensions, worst <= _tolerance(tolerance))
 
     def weight_max(self, tolerance: float, tension: float | None = None) -> float:
-        """w_max of the article [N]: up to this weight w L, the position error of every sampled cable is allowed.
+        """w_max of the article [N]: up to this weight w L, the position errors of all sampled cables are allowed.
 
         Args:
             tolerance: Allowed position error [m], > 0.
@@ -105,18 +105,18 @@ def identify_empirical(
 ) -> EmpiricalFit:
     """Find the constants of the empirical model for a cable and its working range.
 
-    Both constants enter their equations linearly, so one least-squares step each is sufficient: first k_h from T_z with
-    given slope tan phi, then k_p from L by (48) with this k_h.
+    Both constants enter their equations linearly, so that one least-squares step each is sufficient: first k_h from T_z
+    with given slope tan phi, then k_p from L by (48) with this k_h.
 
     Args:
         cable: Material, a single one of positive density.
         spans: Horizontal distances of the ends [m], shape (s,), > 0.
         rises: Heights of the platform end above the frame end [m], shape (r,); below it they are negative.
         tensions: T_x [N], shape (t,), > 0.
-        gravity: [m/s^2], > 0.
+        gravity: Gravitational acceleration [m/s^2], > 0.
 
     Returns:
-        The fit; `.model` is ready for `inverse`.
+        The fit; its `model` can be used in `inverse`.
 
     Raises:
         InvalidValueError: If `cable` is not a cable or has no weight, or a value is out of range.
@@ -178,8 +178,7 @@ def identify_empirical(
 
 def end_position_error(state: CableState) -> Array:
     """Position error (20) of the article, |dx| + |dz| [m]: distance from B_d to the ends of exact cables."""
-    # state: of any model, shape (...)
-    # returns shape (...)
+    # state: of any model, shape (...); returns shape (...)
     shape = state.shape
     horizontal, vertical, length, weight, stiffness = (
         kernel_input(operand, shape).reshape(-1)
@@ -214,7 +213,7 @@ def _tolerance(tolerance: float) -> float:
 
 
 def _first_of_good_tail(values: Array, good: Flags) -> float:
-    """First value from which all later ones are good; NaN if the last one is not good."""
+    """First value from which on all values are good; NaN if the last one is not good."""
     bad = np.flatnonzero(~good)
     first = int(bad[-1]) + 1 if bad.size else 0
     return float(values[first]) if first < values.size else float("nan")

@@ -34,7 +34,7 @@ class CableFit(Result):
     """A cable found from measurements.
 
     Attributes:
-        cable: The cable to use.
+        cable: The identified cable.
         names: Unknowns, in the order of the arrays below: "linear_density" [kg/m], "axial_stiffness" [N],
             "length_offset" [m], positive if the measured lengths are too long.
         values: Estimates, shape (k,).
@@ -111,7 +111,7 @@ def identify_cable(
         tension_at: Place of the measurement: "frame_end" (a load cell at the winch), "platform_end" or "chord".
         unknowns: Unknowns: any of "linear_density", "axial_stiffness", "length_offset".
         start: Initial values, and values of known parameters; None for 0.1 kg/m and 100 kN.
-        gravity: [m/s^2], > 0.
+        gravity: Gravitational acceleration [m/s^2], > 0.
 
     Returns:
         The fit, with covariance and `.warnings`.
@@ -173,7 +173,7 @@ class _Measured:
         half = 0.5 * cable.linear_density * self.gravity * chord
         side = {"frame_end": 1.0, "platform_end": -1.0, "chord": 0.0}[self.tension_at]
         across = half * self.span / chord if side else 0.0
-        floor = 1e-3 * tension  # lower bound: half the cable's weight can exceed the measured tension
+        floor = 1e-3 * tension  # lower bound, because half the cable's weight can exceed the measured tension
         tau = np.maximum(side * half * self.rise / chord + np.sqrt(np.maximum(tension**2 - across**2, 0.0)), floor)
         state = Catenary().from_tension(cable, self.span, self.rise, tau, self.gravity)
         for _ in range(ITERATIONS if side else 0):
@@ -189,7 +189,7 @@ class _Measured:
 def _fit(data: _Measured, names: tuple[str, ...], known: Cable, length_error: float, tension_error: float) -> CableFit:
     from scipy.optimize import least_squares
 
-    # logarithms keep density and stiffness positive; the offset counts in millimeters
+    # logarithms keep density and stiffness positive; the offset is in millimeters
     scale = np.array([1e-3 if name == "length_offset" else 1.0 for name in names])
     unknown = np.array([0.0 if name == "length_offset" else np.log(float(getattr(known, name))) for name in names])
     spread = np.full(data.length.size, length_error)
@@ -228,7 +228,7 @@ def _fit(data: _Measured, names: tuple[str, ...], known: Cable, length_error: fl
 
 
 def _bounds(names: tuple[str, ...]) -> tuple[list[float], list[float]]:
-    """Bounds wider than any rope: 1 mg/m to 1 t/m, 1 N to 1 PN."""
+    """Bounds that are wider than for any rope: 1 mg/m to 1 t/m, 1 N to 1 PN."""
     low = {"linear_density": np.log(1e-6), "axial_stiffness": 0.0, "length_offset": -np.inf}
     high = {"linear_density": np.log(1e3), "axial_stiffness": np.log(1e15), "length_offset": np.inf}
     return [low[name] for name in names], [high[name] for name in names]

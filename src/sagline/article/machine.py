@@ -24,8 +24,8 @@ class Parameter(NamedTuple):
     name: str
     unit: str  # unit of its error
     typical: float  # typical error, in that unit
-    plausible: float  # largest plausible error, in that unit; our assumption, not given in the article
-    positive: bool = False  # true if it can only be larger than planned
+    plausible: float  # largest plausible error, in that unit; assumed, not given in the article
+    positive: bool = False  # True if it can only be larger than planned
 
 
 PARAMETERS = (
@@ -66,13 +66,13 @@ def robot_with_errors(robot: sl.Robot, errors: Errors) -> sl.Robot:
 
 
 def wound_lengths(plan: sl.Plan, home: sl.Plan, errors: Errors) -> Array:
-    """Lengths wound by the winches when planned lengths are commanded."""
+    """Lengths that the winches wind if planned lengths are commanded."""
     from_home = plan.unstrained_length - home.unstrained_length
     return plan.unstrained_length + 0.01 * errors.get(DRUM, 0.0) * from_home + 1e-3 * errors.get(ZERO, 0.0)
 
 
 def rest_positions(robot: sl.Robot, plan: sl.Plan, home: sl.Plan, errors: Sequence[Errors]) -> Array:
-    """Equilibria of robots with errors; their winches wind the lengths planned for the robot without errors."""
+    """Equilibria of robots with errors; the winches wind the lengths that are planned for the robot without errors."""
     # Encoders are set with the platform at rest in its home pose with planned lengths, so additional lengths of pulleys
     # and dead length at home are not counted
     robots = [robot_with_errors(robot, one) for one in errors]

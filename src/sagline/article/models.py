@@ -31,14 +31,14 @@ MODELS: tuple[sl.CableModel, ...] = (
     sl.Parabolic(),
     sl.Catenary(),
 )  # from coarse to exact
-CHORDS = np.geomspace(1.0, 30.0, 41)  # m
-TENSIONS = np.geomspace(5.0, 2000.0, 61)  # N
-TOLERANCE = 1e-3  # m
-FLOOR = 1e-9  # m: errors below a nanometer are not drawn
+CHORDS = np.geomspace(1.0, 30.0, 41)  # [m]
+TENSIONS = np.geomspace(5.0, 2000.0, 61)  # [N]
+TOLERANCE = 1e-3  # [m]
+FLOOR = 1e-9  # errors below a nanometer are not drawn [m]
 EDGES, LINES = 10.0 ** np.arange(-9.0, 1.0), (1e-4, 1e-3, 1e-2)  # filled contours and contour lines of the maps [m]
-TICKS = (1e-9, 1e-6, 1e-3, 1.0)  # m
+TICKS = (1e-9, 1e-6, 1e-3, 1.0)  # [m]
 FINE_CHORDS, FINE_TENSIONS = np.geomspace(1.0, 30.0, 140), np.geomspace(5.0, 2000.0, 180)  # abscissae of the maps
-FINE_DENSITIES = np.geomspace(0.01, 1.0, 140)  # kg/m
+FINE_DENSITIES = np.geomspace(0.01, 1.0, 140)  # [kg/m]
 FINE_ANGLES = np.radians(np.linspace(-85.0, 0.0, 140))  # suspended: the platform end is below the frame end
 REFERENCE = {"chord": 10.0, "angle": float(np.radians(-30.0)), "density": 0.067, "tension": 100.0}
 USES = ((3.0, 300.0), (10.0, 300.0), (10.0, 50.0), (10.0, 15.0), (25.0, 100.0))  # chord [m], tension [N] of the table
@@ -48,9 +48,9 @@ USES = ((3.0, 300.0), (10.0, 300.0), (10.0, 50.0), (10.0, 15.0), (25.0, 100.0)) 
 class _ModelErrors:
     """Errors of the five models relative to the exact one, for every combination of four quantities of a cable.
 
-    All models have equal horizontal tension. The length error is therefore the error of the length wound by a winch.
-    The position error, |dx| + |dz| of (20), is the distance from the desired position to the end of an exact cable with
-    the force and length of the model.
+    All models have the same horizontal tension. The length error is therefore the error of the length that a winch
+    winds. The position error, |dx| + |dz| of (20), is the distance from the desired position to the end of an exact
+    cable with the force and length of the model.
     """
 
     models: tuple[sl.CableModel, ...]  # the models, shape (5,)
@@ -95,7 +95,7 @@ def model_errors(
 
 
 def models_chapter() -> Chapter:
-    """Page that helps to choose the cable model of a controller."""
+    """Chapter for the choice of a controller's cable model."""
     cable = simulated_cable()
     draw = Drawings("models")
     return chapter(
@@ -163,7 +163,7 @@ def _choice(label: str, heights: Array, errors: Array, caption: str, draw: Drawi
     colors = matplotlib.colormaps["viridis_r"](0.9 * np.arange(len(names)) / (len(names) - 1))
     figure, ax = map_axes("chord tension [N]", label)
     ax.add_patch(Rectangle((0.0, 0.0), 1.0, 1.0, transform=ax.transAxes, color=colors[-1], zorder=0.5))
-    for error, color in zip(errors[-2::-1], colors[-2::-1], strict=True):  # coarser models are drawn over better ones
+    for error, color in zip(errors[-2::-1], colors[-2::-1], strict=True):  # coarser models are drawn over better models
         band = ax.contourf(FINE_TENSIONS, heights, error, levels=[-TOLERANCE, TOLERANCE], colors=[color])
         band.set_rasterized(True)
     if heights is FINE_CHORDS:

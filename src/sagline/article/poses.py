@@ -15,7 +15,7 @@ from sagline.core.numbers import n
 from sagline.plot.sheet import BLUE, COLORS
 from sagline.present.page import Chapter, Finding, Table, table_of
 
-AREA = 2e4  # pt^2 per meter of error
+AREA = 2e4  # circle area per meter of error [pt^2/m]
 
 
 def poses_chapter() -> Chapter:

@@ -13,11 +13,11 @@ from sagline.article.feasible_sets import End
 from sagline.article.sampling import GRAVITY, UNSTRETCHABLE, Sampling, article_sampling, fit_factor, fit_line
 from sagline.core.arrays import Array
 
-PUBLISHED_K_H = 4.845  # m/s^2, in magnitude: Gia Luan & Truong Thinh 2020, section 4.2.2
-PUBLISHED_K_P = 4.385  # m^2/s^4: section 5.2.4
+PUBLISHED_K_H = 4.845  # [m/s^2], magnitude; Gia Luan & Truong Thinh 2020, section 4.2.2
+PUBLISHED_K_P = 4.385  # [m^2/s^4], section 5.2.4
 SHALLOW_K_H = GRAVITY / 2.0
 SHALLOW_K_P = GRAVITY**2 / 24.0
-LOWEST, HIGHEST = (20.0, 400.0), (500.0, 200_000.0)  # N: search intervals of the tension range of the article
+LOWEST, HIGHEST = (20.0, 400.0), (500.0, 200_000.0)  # search intervals of the tension range of the article [N]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,9 +35,9 @@ class InterceptStudy:
 
 def intercept_studies(sampling: Sampling) -> tuple[InterceptStudy, InterceptStudy]:
     """The article's regressions (21), (27), (28) at the platform end and at the frame end."""
-    # Both lines give the vertical force on the cable: at the frame end it is smaller by the cable's weight, so the
-    # intercept is negative there
-    # source: Gia Luan & Truong Thinh 2020, section 4.2, figures 6 and 7; erratum 1 in docs/errata.md
+    # both lines give the vertical force on the cable; at the frame end it is smaller by the cable's weight, so that the
+    # intercept is negative there; source: Gia Luan & Truong Thinh 2020, section 4.2, figures 6 and 7; erratum 1 in
+    # docs/errata.md
     state = sampling.hang()
     frame_end = state.vertical_force - state.cable_weight
     return _study(sampling, state.vertical_force), _study(sampling, frame_end)
@@ -63,11 +63,11 @@ class StretchStudy:
     """The adjusting length d = L - D of one cable over its tension."""
 
     cable: sl.Cable  # material
-    end: End  # its platform end
+    end: End  # desired position of its platform end
     tensions: Array  # T_x [N], shape (t,)
     magnitude: Array  # |T| on the platform end of the unstretchable cable [N], shape (t,)
-    unstretchable: Array  # d of a cable that does not stretch [m], shape (t,)
-    stretchable: Array  # d_e of the cable [m], shape (t,)
+    unstretchable: Array  # adjusting length d of a cable that does not stretch [m], shape (t,)
+    stretchable: Array  # adjusting length d_e of the elastic cable [m], shape (t,)
     relieved: Array  # d_e plus the article's elongation |T| L/EA of (36) [m], shape (t,)
     relieved_exactly: Array  # d_e plus the true elongation, of the mean force along the cable [m], shape (t,)
 
@@ -77,7 +77,7 @@ class SagStudy:
     """The article's chain of regressions from d to k_p, for cables that do not stretch."""
 
     sampling: Sampling  # the cables, a angles, c chords, r densities, t tensions
-    adjusting_length: Array  # d [m], shape (a, c, r, t)
+    adjusting_length: Array  # adjusting lengths d [m], shape (a, c, r, t)
     a_d: Array  # factor in d = a_d/T_x^2 (41) [m N^2], shape (a, c, r)
     q_a: Array  # factor in a_d = q_a D^3 (43) [N^2/m^2], shape (a, r)
     p_q: Array  # factor in q_a = p_q cos^4(phi) (44) [N^2/m^2], shape (r,)
@@ -85,17 +85,17 @@ class SagStudy:
 
     @property
     def fitted_length(self) -> Array:
-        """D of (41) [m], shape (a, c, r, t)."""
+        """Adjusting length d by (41) [m], shape (a, c, r, t)."""
         return self.a_d[..., None] * length_shape(self.sampling.tensions)
 
     @property
     def fitted_a_d(self) -> Array:
-        """a_d of (43) [m N^2], shape (a, c, r)."""
+        """Factor a_d by (43) [m N^2], shape (a, c, r)."""
         return self.q_a[:, None] * chord_shape(self.sampling.chords)[:, None]
 
     @property
     def fitted_q_a(self) -> Array:
-        """q_a of (44) [N^2/m^2], shape (a, r)."""
+        """Factor q_a by (44) [N^2/m^2], shape (a, r)."""
         return self.p_q * angle_shape(self.sampling.angles)[:, None]
 
 
@@ -121,7 +121,7 @@ def density_shape(density: Array) -> Array:
 
 
 def stretch_study(cable: sl.Cable, end: End, tensions: Array) -> StretchStudy:
-    """Remove the elongation from a cable's adjusting length, by (36) and (38), and correctly."""
+    """Subtract the elongation from a cable's adjusting length: by (36) and (38), and with the true elongation."""
     # The elongation under the force at the platform end, |T| L/EA, is too large by half the cable's weight along the
     # chord, w L^2 sin(phi)/(2 EA) (erratum 5)
     # source: Gia Luan & Truong Thinh 2020, (33) to (38), figures 8 and 9
@@ -166,7 +166,7 @@ class Constants(NamedTuple):
     highest: float  # highest sampled T_x [N]
     k_h_platform: float  # k_h at the platform end [m/s^2]
     k_h_frame: float  # k_h at the frame end [m/s^2], negative
-    k_p: float  # [m^2/s^4]
+    k_p: float  # k_p [m^2/s^4]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -174,9 +174,9 @@ class ConstantsStudy:
     """The constants over the range of tensions."""
 
     sampling: Sampling  # the cables; only their tensions change
-    over_lowest: tuple[Constants, ...]  # from each lowest tension to the highest one of the article
-    over_highest: tuple[Constants, ...]  # from the lowest tension of the article to each highest one
-    # both ends of the article's range multiplied by 1, 2, 4, ...: the limit of taut cables
+    over_lowest: tuple[Constants, ...]  # ranges from each lowest tension to the highest one of the article
+    over_highest: tuple[Constants, ...]  # ranges from the lowest tension of the article to each highest one
+    # ranges with both ends of the article's range multiplied by 1, 2, 4, and so on, up to the limit of taut cables
     scaled: tuple[Constants, ...]
     published: Constants  # the range that gives the published |k_h| (at the frame end) and k_p
 
@@ -210,7 +210,8 @@ def published_sampling() -> Sampling:
 
 def published_range(sampling: Sampling) -> Constants:
     """The range of tensions that gives both published constants: k_h = -4.845 at the frame end and k_p = 4.385."""
-    # Two ends of the range for two constants: k_p falls with the lower end, |k_h| rises with the upper one
+    # the two ends of the range determine the two constants: k_p falls with the lower end, and |k_h| rises with the
+    # upper one
     from scipy.optimize import brentq
 
     def best_lowest(highest: float) -> float:

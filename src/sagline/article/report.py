@@ -37,22 +37,22 @@ Progress = Callable[[int, int, str], None]
 _numbers = re.compile(r"(\d+)(?:-(\d+))?")
 REDONE = "3-15, 17-22 and 25-27; the others are drawings and photographs without data"
 KEY = "five-models"  # key of the finding whose numbers the drawing shows
-FIRST, LAST = 1e-3, 1e4  # mm, ends of the axis; smaller values are written at its edge
+FIRST, LAST = 1e-3, 1e4  # ends of the axis [mm]; smaller values are written at its edge
 ROBOTS = (("suspended", BLUE, -0.16), ("mixed", VERMILLION, 0.16))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ArticleReport:
-    """A report that has been written."""
+    """A written report."""
 
     page: Path  # the HTML file
     data: Path  # the JSON file of its numbers
-    chapters: tuple[Chapter, ...]  # chapters in it
-    numbers: dict[str, dict[str, Any]]  # chapter -> finding -> its numbers, unformatted
+    chapters: tuple[Chapter, ...]  # number of chapters
+    numbers: dict[str, dict[str, Any]]  # unformatted numbers by chapter and finding
 
 
 def write_article(folder: Path | str, parts: Sequence[str] = (), progress: Progress | None = None) -> ArticleReport:
-    """Redo the article's studies and write a self-contained HTML page and a JSON file of its numbers."""
+    """Repeat the article's studies and write a self-contained HTML page and a JSON file of its numbers."""
     wanted = selection(parts)
     check_files(folder, NAMES)
     chapters = []
@@ -71,9 +71,9 @@ def write_article(folder: Path | str, parts: Sequence[str] = (), progress: Progr
 class ReportPart(NamedTuple):
     """A chapter that can be selected."""
 
-    key: str  # its name
-    figures: tuple[int, ...]  # figures of the article in it
-    tables: tuple[int, ...]  # tables of the article in it
+    key: str  # name of the chapter
+    figures: tuple[int, ...]  # figures of the article in the chapter
+    tables: tuple[int, ...]  # tables of the article in the chapter
     module: str  # module that builds it, loaded on demand
     function: str  # the function that builds it
 
@@ -174,7 +174,7 @@ def _picture(chapters: Sequence[Chapter]) -> Panel | None:
         for k, error in enumerate(errors):
             text = n(error, ".2g", "mm", size=1e3 * numbers["longest_length_m"])
             place, away = (max(error, FIRST), k + shift), -7.0 if FIRST < error < 1e3 * ERROR_BAND else 7.0
-            side = "left" if away > 0.0 else "right"  # of the line of the article
+            side = "left" if away > 0.0 else "right"  # key of the line of the article
             ax.annotate(text, place, (away, 0.0), textcoords="offset points", fontsize=NAME_SIZE, va="center", ha=side)
     ax.set_xscale("log")
     ax.set_xlim(FIRST, LAST)

@@ -28,15 +28,15 @@ from sagline.core.numbers import n
 from sagline.plot.sheet import BLUE, GREEN, VERMILLION
 from sagline.present.page import Chapter, Finding
 
-CHORD = 10.0  # m
-TENSIONS = np.linspace(10.0, 500.0, 150)  # N
+CHORD = 10.0  # [m]
+TENSIONS = np.linspace(10.0, 500.0, 150)  # [N]
 MIDDLE, DENSE = 2, -1  # index of the article's angle, and index of the heaviest density
-PICKED = (1, 3, 5, 7)  # chords that are drawn
-DRAWN = (1, 3, 5, 7, 9)  # densities that are drawn
+PICKED = (1, 3, 5, 7)  # indices of drawn chords
+DRAWN = (1, 3, 5, 7, 9)  # indices of drawn densities
 
 
 def sag_chapter() -> Chapter:
-    """From the adjusting length to k_p."""
+    """Chapter from the adjusting length to k_p."""
     end = End.at_angle(CHORD)
     stretch, sag = stretch_study(simulated_cable(), end, TENSIONS), sag_study(published_sampling())
     draw = Drawings("sag")
@@ -174,10 +174,10 @@ def _named(values: Iterable[float], form: str) -> list[str]:
 
 
 def _middle_and_dense(study: SagStudy) -> str:
-    """Angle and density of the cables that are drawn, for a caption."""
+    """Angle and density of the drawn cables, for a caption."""
     return f"at φ = {n(ANGLE, unit='rad')}, ρ = {n(study.sampling.densities[DENSE], unit='kg/m')}"
 
 
 def _away(fit: Array, values: Array) -> float:
-    """Largest distance of a fit divided by the largest value along the fitted axis (the last but one)."""
+    """Largest distance of a fit divided by the largest value, along the fitted axis (the second to last)."""
     return float((np.abs(fit - values).max(axis=-2) / values.max(axis=-2)).max())

@@ -11,16 +11,16 @@ import sagline as sl
 from sagline.core.arrays import Array, checked
 from sagline.core.fields import given, rule
 
-GRAVITY = 9.81  # m/s^2, everywhere in the article's studies
-ANGLE = 0.754  # rad, of the article's figure 10
-UNSTRETCHABLE = 1e20  # N: strains are below the rounding error of a length
+GRAVITY = 9.81  # [m/s^2], in all of the article's studies
+ANGLE = 0.754  # angle of the article's figure 10 [rad]
+UNSTRETCHABLE = 1e20  # [N], so stiff that strains are below the rounding error of a length
 
 
 class FittedLine(NamedTuple):
     """Lines y = slope x + intercept fitted along the last axis."""
 
-    slope: Array  # shape (...)
-    intercept: Array  # shape (...)
+    slope: Array  # slope, shape (...)
+    intercept: Array  # intercept, shape (...)
     r_squared: Array  # share of the variance of y that the line explains, shape (...)
     deviation: Array  # largest distance of a sample from the line, in the unit of y, shape (...)
 
@@ -39,8 +39,8 @@ def fit_line(x: Array, y: Array) -> FittedLine:
 
 def fit_factor(shape: Array, y: Array, axis: int = -1) -> Array:
     """Least-squares factor a in y = a * shape, along one axis."""
-    # Every regression of the article except for the line has this form, with the shape 1/T_x^2, D^3, cos^4(phi),
-    # rho^2, D or rho
+    # all regressions of the article except for the line have this form, with the shape 1/T_x^2, D^3, cos^4(phi), rho^2,
+    # D or rho
     shape, y = np.broadcast_arrays(shape, y)
     factor: Array = np.sum(shape * y, axis=axis) / np.sum(shape**2, axis=axis)
     return factor
@@ -58,7 +58,7 @@ class Sampling:
     chords: Array = attrs.field(converter=given, metadata=rule("m", **_POSITIVE))
     densities: Array = attrs.field(converter=given, metadata=rule("kg/m", **_POSITIVE))
     tensions: Array = attrs.field(converter=given, metadata=rule("N", **_POSITIVE))  # T_x
-    axial_stiffness: float = UNSTRETCHABLE  # EA of all of them [N]
+    axial_stiffness: float = UNSTRETCHABLE  # EA of all cables [N]
 
     def __attrs_post_init__(self) -> None:
         """Check the four quantities."""
@@ -81,7 +81,7 @@ class Sampling:
 
 
 def article_sampling() -> Sampling:
-    """Assumed samples; the article gives phi = 0.754 rad and rho in (0, 2), and no other number."""
+    """Assumed samples; the article only gives phi = 0.754 rad and rho in (0, 2)."""
     # Chords from 2 to 16 m, as in the frames of its Table 1; five angles around its 0.754 rad; ten densities; sixty
     # tensions from 100 N to 10 kN, evenly spaced
     # source: Gia Luan & Truong Thinh 2020, figures 6 to 15

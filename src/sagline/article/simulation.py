@@ -16,7 +16,7 @@ ROBOTS = ("article-suspended", "article-mixed")  # the article's first and secon
 # The article describes (55), closest to the previous tensions. Its figures, however, show unneeded cables near their
 # minimum, and curves that return to their initial values. This is the minimum norm of its variable T_x.
 METHOD = sl.MinimumNorm("horizontal")
-ERROR_BAND = 6e-3  # m, the article's "(-6, 6) mm"
+ERROR_BAND = 6e-3  # [m], the article's "(-6, 6) mm"
 
 
 class Figures(NamedTuple):
@@ -30,8 +30,8 @@ class Figures(NamedTuple):
     vertical_max: float  # largest |T_z| [N]
     step_max: float  # largest change of T_x from one sample to the next [N]
     slope_max: float  # largest |dT_x/dt| [N/s]
-    # largest change of dT_x/dt from one step to the next [N/s]; at a corner of a curve it does not vanish with smaller
-    # steps
+    # largest change of dT_x/dt from one step to the next [N/s]; at a corner of a curve it does not become zero with
+    # smaller steps
     slope_jump: float
     length_min: float  # smallest L [m]
     length_max: float  # largest L [m]
@@ -64,7 +64,7 @@ class PathStudy:
 
     @property
     def tension_ratio(self) -> float:
-        """Highest T_x of the mixed robot over that of the suspended one, with the empirical model."""
+        """Ratio of the highest T_x of the mixed robot to that of the suspended one, with the empirical model."""
         suspended, mixed = (figures(run) for run in self.of(sl.Empirical))
         return mixed.tension_max / suspended.tension_max
 
@@ -83,8 +83,8 @@ class LowTension:
 def path_study(rate: float = 100.0, models: Sequence[sl.CableModel] = MODELS) -> PathStudy:
     """Plan both robots along the article's path and apply the lengths to exact cables.
 
-    The plan is the article's "simple controller", from tensions to lengths. The resulting pose of the platform is the
-    equilibrium on exact cables under equal inertial forces.
+    The plan is the article's "simple controller", which computes lengths from tensions. The resulting pose of the
+    platform is the equilibrium on exact cables with the same inertial forces.
 
     Source:
         Gia Luan & Truong Thinh 2020, section 7.1, figures 17 to 22.

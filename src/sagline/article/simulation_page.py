@@ -33,9 +33,9 @@ from sagline.present.page import Chapter, Finding, Panel, Table, Verdict
 
 LIMITS = np.array(
     [15.0, 17.0, 18.0, 18.5, 19.0, 19.5, 20.0, 22.5, 25.0, 30.0, 40.0, 50.0]
-)  # N, lower limits of the chord tension
-CORNER = (5.0, 3.5, 1.5)  # m, corner of the path
-FLOOR = 1e-9  # m: distances below a nanometer are not drawn
+)  # lower limits of the chord tension [N]
+CORNER = (5.0, 3.5, 1.5)  # corner of the path [m]
+FLOOR = 1e-9  # distances below a nanometer are not drawn [m]
 NEAR = 1.05  # tensions below this multiple of the lower limit count as near the minimum
 
 

@@ -26,9 +26,9 @@ from sagline.article.table2 import Table2, table2
 from sagline.core.arrays import Array, locked
 from sagline.motion.segments import QUINTIC
 
-HOME = (0.0, 0.0, 1.5)  # m, the prototype's home position
+HOME = (0.0, 0.0, 1.5)  # home position of the prototype [m]
 METHOD = sl.MinimumNorm("horizontal")
-TOUR_SPEED = 0.2  # m/s, assumed: the article states "low speed"
+TOUR_SPEED = 0.2  # assumed speed [m/s]; the article states "low speed"
 
 
 class Trend(NamedTuple):
@@ -36,13 +36,13 @@ class Trend(NamedTuple):
 
     parameter: Parameter
     error: Array  # predicted actual minus desired position [m], shape (10, 3)
-    # change of the vertical error with the height of the pose, mm per m; the measured one is negative
+    # change of the vertical error with the height of the pose [mm/m]; the measured change is negative
     height_slope: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TenPoses:
-    """The ten poses."""
+    """The ten poses, their errors, and possible explanations."""
 
     table: Table2
     plan: sl.Plan  # the prototype's plan for them, with the empirical model
@@ -70,8 +70,8 @@ class TenPoses:
 
 def ten_poses(most: int = 3) -> TenPoses:
     """Plan the prototype at the ten poses, and search for causes of its measured errors."""
-    # Every model of up to three of the parameters is fitted with the exact machine, within what we think plausible.
-    # Positions are printed in whole millimeters: no fit can be better than 0.3 mm.
+    # Every model with up to three of the parameters is fitted with the exact machine, within plausible limits.
+    # Positions are printed in whole millimeters, so that no fit can be better than 0.3 mm.
     table, robot = table2(), sl.load_robot("article-prototype")
     plan, home = _planned(robot, table.desired), _planned(robot, np.array([HOME]))
 

@@ -1,4 +1,4 @@
-"""Findings and chapters of the report: their texts are in data/report.toml, their numbers come from the studies."""
+"""Findings and chapters of the report; their texts are in data/report.toml, and their numbers are from the studies."""
 
 from __future__ import annotations
 

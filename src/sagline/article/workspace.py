@@ -16,16 +16,16 @@ from sagline.plot.sheet import BLUE, VERMILLION
 from sagline.present.page import Chapter, Finding, Panel, table_of
 from sagline.workspaces.region import Plane, slice_of
 
-CELLS = 24  # along the longest edge of the frame
-HEIGHT = 3.0  # m: half the height of the frame
-POINTS = 121  # along each side of a slice
+CELLS = 24  # cells along the longest edge of the frame
+HEIGHT = 3.0  # half the height of the frame [m]
+POINTS = 121  # points along each side of a slice
 
 
 class _Workspaces(NamedTuple):
     """One robot's workspace with sag and without."""
 
-    exact: sl.Workspace  # on exact catenaries
-    straight: sl.Workspace  # on straight cables without weight
+    exact: sl.Workspace  # workspace on exact catenaries
+    straight: sl.Workspace  # workspace on straight cables without weight
 
 
 def workspace_chapter() -> Chapter:
@@ -110,7 +110,7 @@ def _farthest(pair: _Workspaces) -> float:
     ends = []
     for space in pair:
         level = space.levels()(places.reshape(-1, 3)).reshape(reach.size, len(ways))
-        first = (level < 0.0).argmax(axis=0)  # beyond the boundary
+        first = (level < 0.0).argmax(axis=0)  # distance beyond the boundary
         row = np.arange(len(ways))
         inner, outer = level[first - 1, row], level[first, row]
         end = reach[first - 1] + (reach[first] - reach[first - 1]) * inner / (inner - outer)

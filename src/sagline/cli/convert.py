@@ -28,7 +28,7 @@ class _Format(StrEnum):
     MJCF = "mjcf"
 
 
-LEAST = 1e-6  # m: smallest distance that is printed
+LEAST = 1e-6  # smallest distance that is printed [m]
 ENDINGS = {_Format.ROBOT: (".yaml", ".yml"), _Format.MJCF: (".xml", ".mjcf")}
 
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from sagline.optimization.front import Front
 
 FIGURE: Final = "front"
-MOST_ROWS: Final = 12  # rows of the printed table; front.csv has all
+MOST_ROWS: Final = 12  # largest number of printed rows; front.csv has all rows
 
 
 def design(

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from threading import ExceptHookArgs
 
-OUTSIDE, BAD_INPUT, UNEXPECTED, INTERRUPTED, CUT_OFF = 1, 2, 70, 130, 141  # the last is that of SIGPIPE
+OUTSIDE, BAD_INPUT, UNEXPECTED, INTERRUPTED, CUT_OFF = 1, 2, 70, 130, 141  # the last one is that of SIGPIPE
 REPORT = "the authors of sagline"
 
 
@@ -24,12 +24,12 @@ def exit_code_of(command: Callable[[], object], *, debug: bool = False, last: bo
 
     Args:
         command: The work; returns the exit code, None for 0.
-        debug: Whether the traceback of an error is printed before its message.
-        last: Whether the process ends afterwards; then Ctrl-C stays without effect.
+        debug: True if the traceback of an error is printed before its message.
+        last: True if the process ends afterwards; Ctrl-C then has no effect.
 
     Returns:
         The exit code: BAD_INPUT for an error of sagline or the system, UNEXPECTED for a mistake in the program,
-        INTERRUPTED for Ctrl-C, even where Python lost it, CUT_OFF if the output has no reader any more.
+        INTERRUPTED for Ctrl-C, even if Python lost it, CUT_OFF if the output no longer has a reader.
     """
     interrupts = _Interrupts()
     code = UNEXPECTED
@@ -50,7 +50,7 @@ def exit_code_of(command: Callable[[], object], *, debug: bool = False, last: bo
 
 
 def report_thread(failed: ExceptHookArgs) -> None:
-    """Print one line on the error that ended a thread other than the first."""
+    """Print one line about the error that ended a thread other than the main thread."""
     if failed.exc_value is not None:
         _report(failed.exc_value, debug=False)
 
@@ -58,14 +58,14 @@ def report_thread(failed: ExceptHookArgs) -> None:
 def _finished(command: Callable[[], object]) -> int:
     code = command()
     if sys.stdout is not None:
-        sys.stdout.flush()  # a write error belongs to this command, not to the end of Python
+        sys.stdout.flush()  # a write error is then reported by this command, not at the end of Python
     return code if isinstance(code, int) else 0
 
 
 def _report(error: BaseException, debug: bool) -> int:
     """Print the message of an error; returns the exit code."""
     _give_up_unwritable()
-    if isinstance(error, BrokenPipeError) or isinstance(error.__context__, BrokenPipeError):  # the latter by typer
+    if isinstance(error, BrokenPipeError) or isinstance(error.__context__, BrokenPipeError):  # typer raises the latter
         return CUT_OFF
     if isinstance(error, SystemExit):
         return error.code if isinstance(error.code, int) else 0 if error.code is None else UNEXPECTED
@@ -87,7 +87,7 @@ def _report(error: BaseException, debug: bool) -> int:
 
 
 def _message(error: BaseException) -> tuple[str, str, int]:
-    """Head, text and exit code."""
+    """Heading, text and exit code."""
     from typer import Abort
 
     from sagline.core.errors import HEAD, SaglineError, shortened
@@ -96,7 +96,7 @@ def _message(error: BaseException) -> tuple[str, str, int]:
         return HEAD, str(error), BAD_INPUT
     if isinstance(error, Abort):
         return HEAD, "the input ended before all questions were answered. Answer them, or give the options.", BAD_INPUT
-    if hasattr(error, "format_message"):  # of the command line itself
+    if hasattr(error, "format_message"):  # errors of the command line itself
         return HEAD, _usage(error), BAD_INPUT
     if isinstance(error, MemoryError):
         reason = f" ({error})" if str(error) else ""
@@ -132,14 +132,14 @@ def _interrupted() -> int:
     _give_up_unwritable()
     # clears an interrupt inside another exec, after which Python would end itself by the signal
     exec("")
-    with suppress(OSError, ValueError, AttributeError):  # plain: the output library may be partly loaded
+    with suppress(OSError, ValueError, AttributeError):  # plain text, because the output library may be partly loaded
         sys.stderr.write("Interrupted. All written files are complete.\n")
         sys.stderr.flush()
     return INTERRUPTED
 
 
 def _give_up_unwritable() -> None:
-    """Drop the buffer of a stdout that cannot be written; else Python would try again at its end."""
+    """Discard the buffer of a stdout that cannot be written, because Python would try again at its end."""
     try:
         if sys.stdout is not None:
             sys.stdout.flush()

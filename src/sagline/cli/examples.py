@@ -44,7 +44,7 @@ def examples(
 
 
 def example_files() -> list[Path]:
-    """The example files: in an installed package beside its modules, in the source tree beside its docs."""
+    """Folder of the example files: beside the modules of an installed package, beside the docs in the source tree."""
     inside = Path(str(files("sagline"))) / "examples"
     folder = inside if inside.is_dir() else Path(__file__).parents[3] / "examples"
     return sorted(file for file in folder.glob("*") if file.suffix in KINDS)

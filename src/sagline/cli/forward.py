@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from sagline.kinematics.forward_rows import ForwardSolution
     from sagline.robot.robot import Robot
 
-SHOWN = 12  # rows of the printed table; the file has all
+SHOWN = 12  # largest number of printed rows; the file has all rows
 COLUMNS = ("x", "y", "z", "qx", "qy", "qz", "qw", "force_residual", "moment_residual", "iterations")
 Cell = float | str
 
@@ -103,7 +103,7 @@ def _counted(file: Path, robot: Robot) -> LengthSamples:
 
 
 def _rows(lengths: LengthSamples, found: ForwardSolution) -> list[list[Cell]]:
-    """Header and one row per sample; with the time if the file has it."""
+    """Header and one row per sample, with the time if the file has it."""
     from sagline.kinematics.status import ForwardStatus
 
     units = {"x": "m", "y": "m", "z": "m", "force_residual": "N", "moment_residual": "N*m"}

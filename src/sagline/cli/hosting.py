@@ -18,11 +18,11 @@ from sagline.robot.robot import Robot
 if TYPE_CHECKING:
     from sagline.viewer.page import Page
 
-LATER = "trimesh"  # a package that the viewer loads when it is needed
+LATER = "trimesh"  # a package that the viewer loads on demand
 
 
 class ServerAddress(NamedTuple):
-    """Address and port (0: any free port) of the page, and true to open a browser on this computer."""
+    """Address and port (0: any free port) of the page, and True to open a browser on this computer."""
 
     host: str
     port: int
@@ -74,5 +74,5 @@ def serve(
 
 
 def _has_display() -> bool:
-    """True if there is a display for a browser; over SSH it would open in the terminal."""
+    """True if there is a display for a browser; over SSH, the browser would open in the terminal."""
     return sys.platform in ("win32", "darwin") or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))

@@ -27,8 +27,8 @@ class _TensionPlace(StrEnum):
     CHORD = "chord"
 
 
-STEPS = 25  # along each axis of the working range
-TOLERANCE = 5e-3  # m, of the position: the article's own is 6 mm
+STEPS = 25  # number of samples along each axis of the working range
+TOLERANCE = 5e-3  # position tolerance [m]; the article has 6 mm
 
 
 def identify(

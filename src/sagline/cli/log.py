@@ -24,7 +24,7 @@ MOST_PLANS: Final = 100_000
 # limits of the classes of delay of a cycle [s]
 LATE: Final = (0.0, 1e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 1e-1, np.inf)
 EXTREME: Final = ("name", "value", "unit", "time", "cable")
-BAR: Final = 30  # characters of the longest bar
+BAR: Final = 30  # length of the longest bar in characters
 
 
 def log(

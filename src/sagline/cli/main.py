@@ -25,7 +25,7 @@ NAMES = (
     *("workspace", "sweep", "design", "calibrate", "robots", "show", "examples", "new", "convert", "export-c"),
     *("export-scl", "view", "share", "twin", "control", "experiment", "log"),
 )
-MODULES = {"encoder": "lengths", "show": "robots", "export-c": "export", "export-scl": "export"}  # else of their names
+MODULES = {"encoder": "lengths", "show": "robots", "export-c": "export", "export-scl": "export"}  # or their names
 DEBUG = "--debug"
 MOST_NAMES = 6  # largest number of files listed after an error
 START = """\
@@ -84,7 +84,7 @@ class _Commands(Mapping[str, _Command]):
     """The subcommands by name; the module of each is imported on demand."""
 
     def __getitem__(self, name: str) -> _Command:
-        """A subcommand."""
+        """The subcommand of a name."""
         if name not in NAMES:
             raise KeyError(name)
         return _load_command(name)
@@ -161,7 +161,7 @@ def _print_version(wanted: bool) -> None:
 
 
 def _help(text: str | None) -> str:
-    """A docstring as help; indented paragraphs keep their lines."""
+    """A docstring as help text; indented paragraphs keep their lines."""
     paragraphs = cleandoc(text or "").split("\n\n")
     return "\n\n".join(f"\b\n{paragraph}" if paragraph.startswith(" ") else paragraph for paragraph in paragraphs)
 

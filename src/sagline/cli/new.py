@@ -24,16 +24,16 @@ if TYPE_CHECKING:
     from sagline.robot.pose import Pose, PoseBox
     from sagline.robot.robot import Robot
 
-MIDDLE = 0.5  # ratio to the frame's edges: box of the printed feasible share
-GRID = 7  # poses along each edge of a box
+MIDDLE = 0.5  # edges of the box of the printed feasible share, relative to the frame's edges
+GRID = 7  # number of poses along each edge of a box
 NEARLY_ALL = 0.95  # smallest feasible share of the box in the file
-_BOXES = (0.7, 0.6, 0.5, 0.4, 0.3, 0.2)  # ratios to the frame's edges, tried in this order
+_BOXES = (0.7, 0.6, 0.5, 0.4, 0.3, 0.2)  # edges of the tried boxes, relative to the frame's edges, in this order
 
 
 ROPE_NAMES = "dyneema-sk78, dyneema-sk62, steel-6x19, steel-7x19"
 
 
-QUESTIONS = {  # text and default by the name of the option
+QUESTIONS = {  # text of the question and default, by the name of the option
     "frame": ("Frame, length x width x height", "6 x 4 x 3 m"),
     "layout": ("Cables from the top, or mixed from above and below (top, mixed)", "top"),
     "cables": ("Number of cables (6 to 8)", "8"),
@@ -131,7 +131,7 @@ def _answered(name: str, answers: dict[str, str | None]) -> tuple[Design, dict[s
 
 
 def _read(key: str, question: str, default: str) -> str:
-    """An answer from a pipe or a file: a line; an empty line is the default."""
+    """An answer from a pipe or a file: one line; an empty line is the default."""
     line = "" if sys.stdin is None or sys.stdin.isatty() else sys.stdin.readline()
     if line:
         return line.strip() or default
@@ -142,7 +142,7 @@ def _read(key: str, question: str, default: str) -> str:
 
 
 def _design(name: str, said: dict[str, str]) -> Design:
-    """The design from the answers so far; valid values replace those that are not known yet."""
+    """The design from the answers so far; valid values replace missing ones."""
     from sagline.cables.rope import ROPES
     from sagline.cli.values import quantity
     from sagline.robot.catalogue import COUNTS, LAYOUTS, Design
@@ -160,7 +160,7 @@ def _design(name: str, said: dict[str, str]) -> Design:
         layout=layout,
     )
     if len(said) == len(QUESTIONS):
-        design.robot()  # checks that the rope can support the platform
+        design.robot()  # this checks that the rope can support the platform
     return design
 
 
@@ -214,7 +214,7 @@ def _header(said: dict[str, str]) -> str:
 
 
 def _explained(robot: Robot, design: Design, middle: Plan) -> tuple[list[str], float]:
-    """Lines on the robot, and the feasible share of the poses in the middle of its frame."""
+    """Lines about the robot, with the feasible share of the poses in the middle of its frame."""
     from sagline.cables.rope import ROPES, SAFETY
     from sagline.robot.catalogue import SLACK_LIMIT
 

@@ -61,7 +61,7 @@ class Tension(StrEnum):
 
 
 def robot_completions(incomplete: str) -> list[str]:
-    """Presets and robot files that begin with a text, for the shell."""
+    """Names of presets and robot files that begin with a text, for completion in the shell."""
     from glob import escape, glob
 
     from sagline.robot.catalogue import robot_names
@@ -81,11 +81,11 @@ def option(metavar: str, text: str, *names: str) -> Any:
 
 
 def converted_option(metavar: str, text: str, function: str, *names: str, **arguments: object) -> Any:
-    """An option whose value a function of `sagline.cli.values` makes from its text, its name and further arguments."""
+    """An option; a function of `sagline.cli.values` makes its value from text, name and further arguments."""
 
     def converted(parameter: typer.CallbackParam, value: Any) -> Any:
         if not isinstance(value, str):
-            return value  # the default
+            return value  # the default value
         from sagline.cli import values
 
         return getattr(values, function)(value, parameter.opts[-1], **arguments)
@@ -94,7 +94,7 @@ def converted_option(metavar: str, text: str, function: str, *names: str, **argu
 
 
 def quantity_option(metavar: str, text: str, unit: str, *names: str, **limits: float) -> Any:
-    """An option whose value is a number in SI or a text with a unit: from `low` on, or above `above`."""
+    """An option whose value is a number in SI or a text with a unit, at least `low` or greater than `above`."""
     return converted_option(metavar, text, "quantity", *names, unit=unit, **limits)
 
 

@@ -50,7 +50,7 @@ class TextTable:
     prose: frozenset[int] = field(default=frozenset())
 
     def pieces(self, console: Console, width: int) -> list[tuple[Table, int]]:
-        """The fewest pieces that fit a width, with about the same number of columns, each with its least width."""
+        """The smallest number of pieces that fit a width, with about the same number of columns and smallest widths."""
         full = self._filled(console, width)
         even = list(_split(range(self.keys, len(self.heads)), len(full)))
         for parts in (even, full):  # evenly, if the number of pieces stays the same
@@ -75,7 +75,7 @@ class TextTable:
         return parts
 
     def _table(self, columns: Sequence[int], *, first: bool) -> Table:
-        """A piece; only the first has the title."""
+        """A piece of a table; only the first one has the title."""
         title = Text(printable(self.title)) if first and self.title else None
         table = Table(title=title, title_justify="left", title_style="bold", box=SIMPLE_HEAD, pad_edge=False)
         for k in columns:
@@ -103,7 +103,7 @@ def _least(console: Console, table: Table) -> int:
 
 
 def _split(columns: range, count: int) -> Iterable[range]:
-    """Consecutive parts that differ in size by one at most."""
+    """Consecutive parts whose sizes differ by at most one."""
     edges = [len(columns) * k // count for k in range(count + 1)]
     return [columns[first:end] for first, end in pairwise(edges)]
 
@@ -124,7 +124,7 @@ class Output:
     """The files that a command writes into a folder; the command fails before any work if one cannot be written."""
 
     def __init__(self, folder: Path, names: Iterable[str], figures: Sequence[str] = ()) -> None:
-        """Check that all files can be written; figures are names without suffix, each is written as PNG and SVG."""
+        """Check that all files can be written; figures are names without suffix, and each is written as PNG and SVG."""
         self.folder, self.files = folder, list[Path]()
         self._figures = list(figures)
         if every := [*names, *(f"{name}.{suffix}" for name in figures for suffix in SUFFIXES)]:

@@ -1,4 +1,4 @@
-"""The progress line on a terminal: the work, and the remaining time of long work."""
+"""The progress line on a terminal: name of the work, and remaining time of long work."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rich.text import Text
 from sagline.core.errors import printable
 from sagline.core.progress import Progress as ProgressCallback
 
-PATIENCE = 2.0  # s: work that takes longer shows a bar and the time left
+PATIENCE = 2.0  # longer work shows a bar and the remaining time [s]
 
 
 class ProgressLine:
@@ -29,7 +29,7 @@ class ProgressLine:
         return self.progress
 
     def progress(self, done: int, total: int) -> None:
-        """Show the part that is done."""
+        """Show the finished part."""
         self._bar.update(self._task, completed=done, total=total)
 
     def name(self, what: str) -> None:

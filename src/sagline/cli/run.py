@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 ROBOTS = ("article-suspended", "article-mixed")
 FIGURES = ("figure-18-path", "figure-19-velocity", "figure-20-suspended", "figure-21-mixed", "figure-22-error")
 HULLS = ("hull-suspended", "hull-mixed")  # workspaces with sag, the article's future work
-CELLS = 20  # along the longest edge of the frame: half a second per robot, error of volumes 0.2 %
+CELLS = 20  # cells along the longest edge of the frame; half a second per robot, error of volumes 0.2 %
 
 
 def run(folder: OutOption = Path("output"), as_json: JsonOption = False) -> int:
@@ -35,8 +35,8 @@ def run(folder: OutOption = Path("output"), as_json: JsonOption = False) -> int:
     from sagline.workspaces.workspace import workspace
 
     models = Empirical(), Catenary()
-    # The article describes (55), closest to the previous tensions, but its figures show lower cables near their minimum
-    # and curves that return to their start: this is the least norm of T_x.
+    # The article describes (55), the tensions closest to the previous ones. However, its figures show lower cables near
+    # their minimum, and curves that return to their start. This is the minimum norm of T_x.
     tension = MinimumNorm("horizontal")
     robots = [load_robot(name) for name in ROBOTS]
     plans = [f"{run_name(robot, model)}.nc" for robot in robots for model in models]

@@ -22,10 +22,10 @@ from sagline.files.path_file import load_path
 from sagline.files.pose_text import pose_of_text
 from sagline.robot.pose import Pose
 
-EVERY: Final = 0.2  # s between two updates of the status line
+EVERY: Final = 0.2  # time between two updates of the status line [s]
 PROMPT: Final = "> "
 FAILED: Final = 1  # exit code after a fault
-LATE: Final = 0.02  # s, delay above which a note is printed at the end
+LATE: Final = 0.02  # delay above which a note is printed at the end [s]
 AXES: Final = ("x", "y", "z")
 
 
@@ -33,7 +33,7 @@ class StatusLine:
     """Last line of a terminal, which does not scroll with the lines above; no effect if stdout is not a terminal."""
 
     def __init__(self, *, shown: bool) -> None:
-        """Use stdout, if `shown` and if it is a terminal."""
+        """Use stdout if it is a terminal and `shown` is True."""
         self._shown = shown and sys.stdout is not None and sys.stdout.isatty()
         self._next, self._size = 0.0, (0, 0)
 
@@ -71,7 +71,7 @@ class StatusLine:
             self._say("\r\x1b[K")
 
     def _fit(self) -> None:
-        """Set the scrolling region to all lines but the last."""
+        """Set the scrolling region to all lines except the last one."""
         self._size = shutil.get_terminal_size()
         rows = self._size[1]
         self._say(f"\n\x1b7\x1b[1;{max(rows - 1, 1)}r\x1b8\x1b[A")
@@ -82,25 +82,25 @@ class StatusLine:
 
 
 class _Line(NamedTuple):
-    """A line: its text, None at the end of the input, and its action, which raises its error."""
+    """A line: its text (None at the end of the input), and its action, which raises the error of an invalid line."""
 
     text: str | None
     act: Callable[[], object]
 
 
 class OperatorSession:
-    """Lines that are read, cycles of the controller, and events that are printed."""
+    """Session: reading of lines, cycles of the controller, and printing of events."""
 
     def __init__(self, controller: Controller, *, alone: bool, shadow: bool) -> None:
-        """Prepare a session; `alone`: lines from a pipe, each waits for the previous one; `shadow`: read only."""
+        """Prepare a session; `alone`: each line waits for the previous one, as from a pipe; `shadow`: read-only."""
         control = controller
         self.control, self._alone, self._shadow = controller, alone, shadow
         self._event_count = 0
         self._ended = self._is_interrupted = False
-        self._wait = 0  # cycles to wait
+        self._wait = 0  # number of cycles to wait
         self._lines: SimpleQueue[_Line] = SimpleQueue()
         self._line = StatusLine(shown=not alone)
-        # by command: arguments, help, parser of the arguments, and action
+        # arguments, help, parser of the arguments, and action of each command
         self._words: dict[str, tuple[str, str, Callable[[str], Any], Callable[..., object]]] = {
             "home": (
                 "[X,Y,Z[,A,B,C]]",

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from sagline.share.course import SharedMotion
 
 ENDINGS: Final = (".html", ".htm")
-HEAD: Final = 2000  # first bytes of a page, which contain its mark
+HEAD: Final = 2000  # number of first bytes of a page, which contain its mark
 
 
 def share(

@@ -40,10 +40,10 @@ ROWS = {  # rows of a summary: label and number format
     "feasible_share_percent": ("feasible poses [%]", ".4g"),
     "inverse_us_per_pose": ("inverse kinematics [µs a pose]", ".2f"),
 }
-NARROW, WIDE = 10, 30  # characters of a column's head: four narrow ones fit a line of 80
+NARROW, WIDE = 10, 30  # width of a column's head in characters; four narrow columns fit a line of 80
 MOST_GAPS = 5  # largest number of printed gaps
 WIDEN = " Move the path, or widen the tension limits."
-SAME_PLACE = 1e-6  # m: far above rounding errors, far below the distance to a second equilibrium
+SAME_PLACE = 1e-6  # [m], far above rounding errors and far below the distance to a second equilibrium
 
 
 class ConfirmedRun(NamedTuple):
@@ -66,7 +66,7 @@ class ConfirmedRun(NamedTuple):
     def lost(self) -> int:
         """Number of planned poses without a stable equilibrium of the platform."""
         stays = self.confirmation.held
-        if isinstance(self.plan.state.cables.model, Catenary):  # exact plan: elsewhere is another equilibrium
+        if isinstance(self.plan.state.cables.model, Catenary):  # exact plan: any other place is another equilibrium
             stays = stays & (np.linalg.norm(self.confirmation.position_error, axis=-1) < SAME_PLACE)
         return int(np.sum(self.plan.feasible & ~stays))
 
@@ -80,7 +80,7 @@ def run_along(
     robot: Robot, path: Path, model: CableModel, tension: TensionMethod, line: ProgressLine, wrench: Array | None = None
 ) -> ConfirmedRun:
     """Plan a path, and confirm the plan with exact cables."""
-    inverse(robot, path.pose[:1], model, tension, wrench)  # loads the compiled kernels, which are not timed
+    inverse(robot, path.pose[:1], model, tension, wrench)  # loads the compiled kernels before the timing
     start = perf_counter()
     progress = line.stage(f"{robot.name}: planning {len(path):,} poses")
     plan = inverse(robot, path, model, tension, wrench, progress=progress)
@@ -105,7 +105,7 @@ def summary(run: ConfirmedRun) -> dict[str, float]:
 
 
 def _gap_text(gap: Gap, plan: Plan) -> str:
-    """Time, shortfall and limiting cables of a part of a path outside the feasible region."""
+    """Time, shortfall and limiting cables of an infeasible part of a path."""
     assert plan.path is not None
     first, last = (f"{plan.path.time[k]:g} s" for k in (gap.first, gap.last))
     when = f"from {first} to {last}" if gap.last > gap.first else f"at {first}"
@@ -130,7 +130,7 @@ def tell(runs: Sequence[ConfirmedRun], output: Output, *, as_json: bool) -> int:
 
 
 def _summary_grid(runs: Sequence[ConfirmedRun]) -> TextTable:
-    """One column for each run, one row for each number."""
+    """Table with one column per run and one row per number."""
     heads = [""]
     for run in runs:
         name = fill(run.plan.state.one_robot.name, NARROW if len(runs) > 2 else WIDE)

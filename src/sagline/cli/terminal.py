@@ -21,15 +21,15 @@ from sagline.files.writing import json_text
 if TYPE_CHECKING:
     from sagline.cli.progress import ProgressLine
 
-FREE = 1 << 16  # width of a file or a pipe
+FREE = 1 << 16  # width of output to a file or a pipe
 
 _out = Console(highlight=False, markup=False, emoji=False)
-_wide = Console(highlight=False, markup=False, emoji=False, width=FREE)  # for files and pipes
+_wide = Console(highlight=False, markup=False, emoji=False, width=FREE)  # console for files and pipes
 _err = Console(stderr=True, highlight=False, markup=False, emoji=False)
 
 
 def working(what: str) -> AbstractContextManager[ProgressLine]:
-    """Show work and its progress on a terminal while inside."""
+    """Show work and its progress on a terminal inside the block."""
     from sagline.cli.progress import progress_line
 
     return progress_line(_err, what)
@@ -73,7 +73,7 @@ def notices() -> Iterator[None]:
 
 def show_note(head: str, text: str, style: str = "") -> None:
     """Print one line on stderr; paths in it are not broken into lines."""
-    with suppress(OSError):  # without stderr there is no message
+    with suppress(OSError):  # without stderr, the message is lost
         _err.print(Text.assemble((printable(head), style), printable(text).replace(SPACE, " ")), soft_wrap=True)
 
 
@@ -119,7 +119,7 @@ def _fits(character: str) -> bool:
 
 
 def _emit(what: RenderableType, width: int | None = None) -> None:
-    """Print in a width; None leaves lines whole."""
+    """Print in a width; None does not break lines."""
     console = _out if _out.is_terminal else _wide
     with _refused(), console.capture() as captured:
         console.print(what, width=width, soft_wrap=width is None, crop=False)
@@ -135,7 +135,7 @@ def _write(text: str) -> None:
 
 @contextmanager
 def _refused() -> Iterator[None]:
-    """Turn errors of the system on stdout into FileError; a pipe without reader stays a BrokenPipeError."""
+    """Turn errors of the system on stdout into FileError; a pipe without reader remains a BrokenPipeError."""
     try:
         if sys.stdout is None:
             raise OSError(errno.EBADF, "it is closed")

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from sagline.motion.path import Path as MotionPath
     from sagline.robot.robot import Robot
 
-TOO_FAR = 100.0  # times the robot's size, as for measured lengths
+TOO_FAR = 100.0  # largest ratio to the robot's size, as for measured lengths
 FIGURES = ("path", "velocity", "cables", "error")
 
 
@@ -107,7 +107,7 @@ def check_unit(file: Path, way: MotionPath, robot: Robot) -> None:
 
 
 def _figures(run: ConfirmedRun) -> tuple[Figure | Axes, ...]:
-    """In the order of FIGURES."""
+    """Figures in the order of FIGURES."""
     from sagline import plot
 
     way = run.plan.path

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from sagline.twin.machine import Machine
     from sagline.twin.server import Server
 
-LOOK: Final = 0.1  # s between two checks of the PLCs
-LATE: Final = 0.05  # s, largest delay of a scan without a message
-STATUS: Final = {  # the first that holds, by the names of `GroupStatus`
+LOOK: Final = 0.1  # time between two checks of the PLCs [s]
+LATE: Final = 0.05  # largest delay of a scan without a message [s]
+STATUS: Final = {  # the first applicable text, by the names of `GroupStatus`
     "EMERGENCY": "emergency stop",
     "LOCKED": "drums locked",
     "BRAKED": "brakes on",
@@ -82,7 +82,7 @@ def twin(
             watch.recorder = stack.enter_context(Recorder(log, real, period=SCAN))
         _greet(name, server, host, modbus=modbus)
         gc.collect()
-        gc.freeze()  # the collector skips all objects made so far, because the loop is in real time
+        gc.freeze()  # the garbage collector skips all existing objects, because the loop is in real time
         try:
             server.run(watch)
         finally:
@@ -107,7 +107,7 @@ def _greet(name: str, server: Server, host: str, *, modbus: bool) -> None:
 
 
 class TwinMonitor:
-    """Prints changes of the PLCs and records the motion of the platform."""
+    """Observer that prints changes of the PLCs and records the motion of the platform."""
 
     def __init__(self, machine: Machine) -> None:
         """Watch a machine from its present state."""

@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 
 LAST_PORT = 65535
 MOST_POSES = 1_000_000  # largest number of poses of a grid
-HEAVIEST = 1e12  # kg: beyond all machines, far below what overflows
+HEAVIEST = 1e12  # [kg], larger than on any machine, far below overflow
 
-_KINDS: Final = {"force": "N", "moment": "N m", "linear": "m/s^2", "angular": "rad/s^2"}  # of loads, and their units
+_KINDS: Final = {"force": "N", "moment": "N m", "linear": "m/s^2", "angular": "rad/s^2"}  # kinds of loads and units
 _SIGN: Final = re.compile(r"\s*(?:±|\+/-|\+-)\s*")
 _SPAN: Final = re.compile(r"(.*?)(?:\.\.|\bto\b)(.*)", re.DOTALL)
-_UNIT: Final = re.compile(r"(?!e[-+]?[0-9])[a-zµ].*", re.IGNORECASE | re.DOTALL)  # excludes an exponent
+_UNIT: Final = re.compile(r"(?!e[-+]?[0-9])[a-zµ].*", re.IGNORECASE | re.DOTALL)  # not an exponent
 _POINTS: Final = re.compile(r"([0-9]{1,4})\s*[x×]\s*([0-9]{1,4})\s*[x×]\s*([0-9]{1,4})")
 _STEP: Final = "Give forces, moments and accelerations with units: --wrench '±100 N, ±20 N m'."
 _LONGEST: Final = 200  # largest number of characters of a set of loads or a box
@@ -49,7 +49,7 @@ def whole_of(text: str, item: str, least: int, most: int) -> int:
 
 
 def port_of(text: str, item: str) -> int:
-    """A TCP port from its digits; 0 for any free one."""
+    """A TCP port from its digits; 0 for any free port."""
     return whole_of(text, item, 0, LAST_PORT)
 
 

@@ -53,7 +53,7 @@ class _Direction(StrEnum):
 
 LEAST_SHARE = 0.05  # smallest share of the platform in a printed mode; the file has all modes
 COLUMNS = ("mode", "kind", "frequency_hz", "platform_share", "cable", "cable_share", "damping_ratio")
-LOWEST = 3  # lowest modes that are always printed
+LOWEST = 3  # number of lowest modes that are always printed
 FIGURES = ("frequency", "peak")  # figures of a map
 
 
@@ -267,7 +267,7 @@ def _vibrate_in_box(
 
 
 def _grid(robot: Robot, points: Sequence[int]) -> Pose:
-    """Level poses evenly over the test box; the middle of an axis with one point."""
+    """Level poses on an even grid over the test box; an axis with one point has its middle."""
     from sagline.robot.pose import Pose
 
     box = robot.test_box

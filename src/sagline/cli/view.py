@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from sagline.viewer.session import LogFollower, PlayedLog
 
 LOG: Final = ".mcap"
-LOOK: Final = 0.5  # s between two checks of a growing file
+LOOK: Final = 0.5  # time between two checks of a growing file [s]
 
 
 _RobotOption = Annotated[
@@ -102,7 +102,7 @@ def view(
         item, step = "--live" if live else "--truth", "Give one: sagline view run.mcap."
         raise InvalidValueError(item, "given without a log", "a log in MCAP", step)
     found = run if run is not None and _is_calibration(run) else None
-    if found is None and Path(robot).suffix.lower() == ".nc":  # no robot file: the reader reports the error
+    if found is None and Path(robot).suffix.lower() == ".nc":  # not a robot file; the reader reports the error
         found = Path(robot)
     alone = {"--wrench": wrench, "--payload": payload, "--pose": pose, "--mode": mode}
     given = [item for item, value in alone.items() if value is not None]
@@ -190,7 +190,7 @@ def view_log(
 
 
 def played_in(robot: Robot, file: Path) -> Played:
-    """The run, simulation or log in a file of a robot; FileError if it is of another robot."""
+    """The run, simulation or log in a file of a robot; FileError if it belongs to another robot."""
     from sagline.files.netcdf import is_of
     from sagline.files.plan_file import load_plan
     from sagline.files.simulation_file import FORMAT, load_simulation

@@ -167,7 +167,7 @@ def workspace(
         "clearance": clearance,
     }
     cable = model.build()
-    if tilt > pi:  # the user may have meant degrees: a number without unit is in radians
+    if tilt > pi:  # the user may have meant degrees, but a number without unit is in radians
         step = "Give its unit, --tilt 10deg: no rotation turns by more than half a turn."
         raise InvalidValueError("--tilt", f"{tilt:g} rad", "0 to 180deg", step)
     robot = robot_with_payload(name, payload)
@@ -199,7 +199,7 @@ def workspace(
 
                 line.stage("drawing")
                 output.draw(plot.workspace(space))
-                if space.unit == "m³":  # for a plane the first figure is the slice
+                if space.unit == "m³":  # for a plane, the first figure is the slice
                     output.draw(plot.slice(space))
     output.report(lambda: _record(space, proof), lambda: _tell(space, proof), as_json=as_json)
     if space.nearest is not None:

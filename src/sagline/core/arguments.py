@@ -1,6 +1,6 @@
 """Checks of arguments that are not numbers: instances, words, texts, whole numbers, callbacks, paths.
 
-Numbers and arrays of them come through `sagline.core.arrays`.
+`sagline.core.arrays` checks numbers and arrays of numbers.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from sagline.core.errors import FileError, InvalidValueError, nearest, printable
 
 T = TypeVar("T")
 
-# How to get an object of each type; ends every message about a missing object.
+# instruction for each type to get an object; it ends every message about a missing object
 HOW_TO_GET: Final = MappingProxyType(
     {
         "AnchorErrors": "Give AnchorErrors(deviation), 0.01 m for instance, or None.",
@@ -58,8 +58,8 @@ HOW_TO_GET: Final = MappingProxyType(
         "Winch": "Give Winch(pulley_radius, dead_cable=...), or None.",
     }
 )
-LONGEST_TITLE: Final = 100  # characters of a name; it becomes part of file names
-LONGEST_NAME = 255  # bytes of a file name on common file systems
+LONGEST_TITLE: Final = 100  # largest number of characters of a name, which becomes part of file names
+LONGEST_NAME = 255  # largest number of bytes of a file name on common file systems
 _PARTS = ("state", "pose", "robot", "plan", "path", "cables", "cable", "model", "tension")
 
 
@@ -83,13 +83,13 @@ class _Brief(Repr):
 def brief(value: object) -> str:
     """Short text of a value for a message: one line, for any object.
 
-    Returns the type of the object where its text is too long or raises an error.
+    Returns the type of the object if its text is too long or raises an error.
     """
     if isinstance(value, type):
         return f"the class {value.__name__}"
     try:
         return printable(_Brief().repr(value))
-    except Exception:  # the text of a caller's object comes from the caller's code
+    except Exception:  # code of the caller creates the text of its object
         return f"one of type {type(value).__name__}"
 
 
@@ -150,8 +150,8 @@ def integer(value: Any) -> int | None:
 def whole_number(value: Any, item: str, low: int, high: int = sys.maxsize) -> int:
     """Check a whole number.
 
-    value: integer of Python or numpy; Booleans are refused; high: largest allowed number; default: the largest size of
-    a Python container.
+    value: integer of Python or numpy; Booleans are refused; high: largest allowed number, by default the largest size
+    of a Python container.
     """
     number = integer(value)
     if number is not None and low <= number <= high:

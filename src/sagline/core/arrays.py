@@ -21,13 +21,13 @@ Codes = NDArray[np.int8]
 Indices = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-LARGEST: Final = 1e50  # in any unit: larger than any machine value; its square and cube are still finite
+LARGEST: Final = 1e50  # larger than any value of a machine in any unit; its square and cube are still finite
 SMALLEST: Final = 1e-50  # smallest value of a quantity that must be positive
 _KINDS = {"c": "complex", "M": "dates", "m": "durations of a calendar", "V": "records"}
 
 
 def locked(array: NDArray[Any]) -> NDArray[Any]:
-    """Write-lock an array that sagline created, without a copy."""
+    """Write-lock, without a copy, an array that sagline created."""
     array.flags.writeable = False
     return array
 
@@ -45,10 +45,11 @@ def checked(
 ) -> Array:
     """Locked float64 copy of a caller's value; raises an error that names the problem.
 
-    unit: unit of the value, for the message; "" if dimensionless; shape: required trailing axes; None in it means any
-    length. Leading axes are free. None (the default) accepts every shape; above: every value must be strictly larger
-    than this; missing: True if NaN is allowed. Returns a float64 array, C-contiguous, write-locked, that owns its
-    memory. An array that already has all these properties, such as a result of sagline, is returned without a copy.
+    unit: unit of the value, for the message; "" if dimensionless; shape: required trailing axes; None in the shape
+    means any length, and leading axes are arbitrary; None as the shape (default) accepts every shape; above: every
+    value must be strictly larger than this; missing: True if NaN is allowed. Returns a float64 array, C-contiguous,
+    write-locked, that owns its memory. An array that already has all these properties, such as a result of sagline, is
+    returned without a copy.
     """
     array = value if _is_immutable(value) else numbers(value, item, unit)
     if shape is not None:
@@ -69,7 +70,7 @@ def numbers(value: ArrayLike, item: str, unit: str) -> Array:
     _refuse_masked_or_with_unit(value, item, unit)
     try:
         size = value.size if isinstance(value, np.ndarray) else len(value)  # type: ignore[arg-type]
-    except Exception:  # a number has no length, and a caller's object may raise anything
+    except Exception:  # a number has no length, and a caller's object may raise any error
         size = 1
     check_memory(item, 8.0 * size, "Give fewer numbers.")
     try:
@@ -79,7 +80,7 @@ def numbers(value: ArrayLike, item: str, unit: str) -> Array:
         return _from_other_kind(given, item)
     except InvalidValueError:
         raise
-    except Exception as error:  # a caller's object may raise anything during conversion
+    except Exception as error:  # a caller's object may raise any error during conversion
         reason = brief(error.args[0] if error.args else error).strip("'\"")
         raise InvalidValueError(item, brief(value), "numbers", f"Give {item} as plain numbers ({reason}).") from None
 
@@ -141,7 +142,7 @@ def _is_immutable(value: ArrayLike) -> TypeGuard[Array]:
 
 
 def _refuse_masked_or_with_unit(value: Any, item: str, unit: str) -> None:
-    """Refuse masked arrays and quantities with units: numpy would remove mask and unit silently."""
+    """Refuse masked arrays and quantities with units, because numpy would remove mask and unit silently."""
     if type(value) in (np.ndarray, int, list, tuple):
         return
     if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
@@ -176,7 +177,7 @@ def _is_real(entry: object) -> bool:
 
 
 def _is_within(array: Array, *, low: float, above: float) -> bool:
-    """True if all values are finite and in range; two reductions are enough because they propagate NaN."""
+    """True if all values are finite and in range; two reductions are sufficient, because they propagate NaN."""
     if array.size == 0:
         return True
     smallest, largest = float(array.min()), float(array.max())

@@ -11,8 +11,8 @@ from typing import Final
 _WORD: Final = 60  # number of leading characters of the given text that are compared with known words
 LONGEST: Final = 299  # largest number of characters of a terminal line; longer messages are shortened
 HEAD: Final = "Error: "  # prefix of a message
-MOST: Final = LONGEST - len(HEAD)  # characters of a message
-LEAST: Final = 30  # smallest number of characters kept of each part, regardless of the other parts
+MOST: Final = LONGEST - len(HEAD)  # largest number of characters of a message
+LEAST: Final = 30  # smallest number of characters that are kept of each part
 
 
 class SaglineError(Exception):
@@ -103,7 +103,7 @@ class FileError(SaglineError):
 
         Args:
             package: Name of the package.
-            needed: Reason for the package, "Meshes need it" for instance.
+            needed: Reason for the package, for example "Meshes need it".
             extra: The extra of sagline that installs it.
 
         Returns:
@@ -137,7 +137,7 @@ def printable(text: str, kept: str = "") -> str:
 def is_seen(character: str) -> bool:
     """True for a character that is visible, or a space of any width.
 
-    False for invisible formatting marks, such as U+200E and U+200B.
+    It is False for invisible formatting marks, such as U+200E and U+200B.
     """
     return character.isprintable() or unicodedata.category(character) == "Zs"
 
@@ -145,7 +145,7 @@ def is_seen(character: str) -> bool:
 def nearest(word: str, known: Iterable[str]) -> str | None:
     """The known word that was probably intended, for "Did you mean".
 
-    Returns the nearest known word; None if no word is similar.
+    Returns the nearest known word, or None if no word is similar.
 
     Examples:
         >>> from sagline.core.errors import nearest

@@ -30,7 +30,7 @@ def if_known(value: ArrayLike | None) -> Array | None:
 
 
 def given_or_none(value: ArrayLike | None) -> Array:
-    """Return a value or None unchanged: the converter of a field whose check supplies the missing value."""
+    """Return a value or None unchanged: the converter of a field whose check supplies a missing value."""
     return value  # type: ignore[return-value]
 
 
@@ -58,7 +58,7 @@ def check_fields(made: Any) -> None:
 
 
 class NumberFields:
-    """Base of dataclasses with single numbers as fields: fields with a `rule` as metadata are checked at construction.
+    """Base of dataclasses with single numbers as fields. Fields with a `rule` as metadata are checked at construction.
 
     A field whose rule has `most` is a whole number from 0 to `most`. None is allowed if it is the default.
     """

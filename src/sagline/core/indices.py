@@ -1,4 +1,4 @@
-"""Indices along the first axis of a batch: of poses, of cables, of equilibria."""
+"""Indices along the first axis of a batch of poses, cables or equilibria."""
 
 from __future__ import annotations
 

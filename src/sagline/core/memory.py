@@ -1,4 +1,4 @@
-"""Free memory, checked before large allocations: the system kills a process that takes too much, without a message."""
+"""Checks of free memory before large allocations, because the system kills a process that takes too much memory."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from typing import Final
 
 from sagline.core.errors import InvalidValueError
 
-UNASKED: Final = 1 << 26  # bytes: smaller allocations are not checked
-_POSE_BYTES, _CABLE_BYTES = 400.0, 64.0  # measured memory per pose during its solution, and per cable of the pose
-_BEHIND_BYTES = 72.0  # measured memory for the routing of each cable
-_GROUPS: Final = (  # limit and use of a container
+UNASKED: Final = 1 << 26  # smaller allocations are not checked [bytes]
+_POSE_BYTES, _CABLE_BYTES = 400.0, 64.0  # measured bytes per pose during its solution, and per cable of the pose
+_BEHIND_BYTES = 72.0  # measured memory for the routing of each cable [bytes]
+_GROUPS: Final = (  # files with limit and use of a container
     ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"),
     ("/sys/fs/cgroup/memory/memory.limit_in_bytes", "/sys/fs/cgroup/memory/memory.usage_in_bytes"),
 )
@@ -43,8 +43,8 @@ def check_poses(count: int, cable_count: int, behind: bool) -> None:
 def free_memory() -> float:
     """Memory that is still available to this process [bytes]; infinite if the system does not report it.
 
-    Returns the smallest of three values: free memory of the machine, and free memory within the limits of container and
-    process.
+    Returns the smallest of three values: free memory of the computer, within the limit of the container, and within the
+    limit of the process.
     """
     free = [float("inf")]
     with contextlib.suppress(OSError, ValueError, AttributeError):  # AttributeError: Windows has no sysconf

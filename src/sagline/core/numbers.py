@@ -1,4 +1,4 @@
-"""Numbers as text: unit prefixes instead of exponents; digits below the rounding error are omitted."""
+"""Numbers as text, with unit prefixes instead of exponents and without digits below the rounding error."""
 
 from __future__ import annotations
 
@@ -6,15 +6,16 @@ import re
 from math import floor, isfinite, log10
 from typing import SupportsFloat
 
-ROUNDING = 1e-12  # relative to the size of the operands: a smaller difference is rounding error
+ROUNDING = 1e-12  # a smaller difference, relative to the size of the operands, is a rounding error
 PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 POWERS = {prefix: power for power, prefix in PREFIXES.items()}
 HIGHEST = {"m": 3, "g": 3, "s": 0, "rad": 0}  # power of ten of the largest usual prefix; other units use all prefixes
-LONGEST_PLAIN = 1e7  # from this value on, a number without a prefix is written with a power of ten
+LONGEST_PLAIN = 1e7  # numbers from this value on, without a prefix, are written with a power of ten
 SPACE = "\N{NO-BREAK SPACE}"
 TIGHT = ("", "°")  # units written without a space before them
 
-# First unit of a product, with its prefix; a unit raised to a power gets no prefix because it reads badly.
+# first unit of a product, with its prefix; a unit raised to a power does not get a prefix, because it would be hard to
+# read
 _scaled = re.compile(r"([fpnµmkMG]?)(rad|Pa|m|g|s|N|J|W)(?![\w²³⁴⁻^])")
 _superscript = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -79,7 +80,7 @@ def plus_minus(value: SupportsFloat, error: SupportsFloat, unit: str = "", *, pr
 def counted(count: int, noun: str) -> str:
     """Count with its noun, "1 pose" or "1,200 poses".
 
-    noun: singular; the plural adds s or es.
+    noun: noun in the singular; the plural adds s or es.
     """
     return f"{count:,} {noun}{'' if count == 1 else 'es' if noun.endswith(('ch', 'x')) else 's'}"
 
@@ -109,7 +110,7 @@ def _digits(number: float, form: str) -> str:
     if exponent and abs(number) < LONGEST_PLAIN and int(exponent) > 0:
         mantissa, exponent = format(float(text.replace(",", "")), "+,.0f" if "+" in form else ",.0f"), ""
     if not any(digit in "123456789" for digit in mantissa):
-        mantissa = mantissa.lstrip("+-")  # a zero has no sign
+        mantissa = mantissa.lstrip("+-")  # a zero does not have a sign
     mantissa = mantissa.replace("-", "−")
     return f"{mantissa}{SPACE}×{SPACE}10{str(int(exponent)).translate(_superscript)}" if exponent else mantissa
 

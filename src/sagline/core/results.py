@@ -12,9 +12,9 @@ import numpy as np
 
 from sagline.core.arrays import locked
 
-# Imported by name at the first display: a normal import would be circular.
+# this module is imported by name at the first display, because a normal import would be circular
 _PAGES = "sagline.notebook.html"
-# The file formats import all results; a result imports them by name when it is saved, to avoid a circular import.
+# file formats import all results; to avoid a circular import, a result imports them by name when it is saved
 _FORMATS: Final = "sagline.files.format"
 
 
@@ -30,12 +30,12 @@ def set_fields(target: object, **values: Any) -> None:
 
 
 class Shown:
-    """Base class for display in Jupyter as a summary with a figure; elsewhere the ordinary text is displayed."""
+    """Base class for the display in Jupyter as a summary with a figure; other places show the ordinary text."""
 
     __slots__ = ()
 
     def _repr_html_(self) -> str | None:
-        """Summary and figure as HTML; None if not available: Jupyter then displays the ordinary text."""
+        """Summary and figure as HTML; None if not available, so that Jupyter displays the ordinary text."""
         with suppress(Exception):  # an error during display must not make a finished cell fail
             shown: str | None = import_module(_PAGES).html_of(self)
             return shown

@@ -16,7 +16,7 @@ from sagline.motion.segments import QUINTIC, SEPTIC, RestProfile, Segments
 from sagline.robot.pose import Pose
 
 LIMITS = ("speed", "acceleration", "angular_speed", "angular_acceleration")
-MOST_SAMPLES = 100_000_000  # 21 GB of path: with more samples, a duration or the rate probably has the wrong unit
+MOST_SAMPLES = 100_000_000  # 21 GB of path; with more samples, a duration or the rate probably has the wrong unit
 SAMPLE_BYTES = 300.0  # peak memory per sample during construction of the path
 
 
@@ -32,16 +32,16 @@ def quintic_path(
 ) -> Path:
     """Path through waypoints, with rest at each waypoint.
 
-    Within a segment of duration T the platform has covered the share 10 s^3 - 15 s^4 + 6 s^5 (s = time/T) of the
+    At the time s T of a segment of duration T, the platform has covered the share 10 s^3 - 15 s^4 + 6 s^5 of the
     segment. The position moves along a straight line and the orientation rotates about one fixed axis. Velocity and
     acceleration vanish at both ends; the jerk does not (see `septic_path`). A rotation of exactly 180 degrees has two
-    equally short directions; the path takes that of scipy's `Rotation.as_rotvec`.
+    equally short directions; the path takes the direction of scipy's `Rotation.as_rotvec`.
 
     Give either `durations` or limits. With limits, each segment takes the shortest time that satisfies all of them; the
     slower of translation and rotation determines it.
 
-    The samples are at 0, 1/rate, 2/rate, ... and at the end time, so the last step can be shorter. A waypoint can lie
-    between two samples.
+    The samples are at 0, 1/rate, 2/rate, ... and at the end time, so that the last step can be shorter. A waypoint can
+    lie between two samples.
 
     Args:
         waypoints: At least two poses, as a batch or a sequence; or positions [m] of shape (N, 3), orientation identity.
@@ -53,7 +53,7 @@ def quintic_path(
         rate: Samples per second [1/s], > 0.
 
     Returns:
-        Path that starts at time 0. Its jerk is discontinuous at every waypoint and has there the value of the next
+        Path that starts at time 0. Its jerk is discontinuous at every waypoint, where it has the value of the next
         segment.
 
     Raises:
@@ -87,9 +87,9 @@ def septic_path(
 ) -> Path:
     """Path through waypoints, with rest at each waypoint and continuous jerk.
 
-    Same as `quintic_path`, except that the share of the segment is 35 s^4 - 84 s^5 + 70 s^6 - 20 s^7: velocity,
-    acceleration and jerk vanish at both ends of each segment, so that cables and winches see no sudden change. For the
-    same duration, the peak speed is 7/6 and the peak acceleration 1.30 of that of the quintic.
+    Same as `quintic_path`, except that the share of the segment is 35 s^4 - 84 s^5 + 70 s^6 - 20 s^7. Velocity,
+    acceleration and jerk are zero at both ends of each segment, so that cables and winches have no sudden changes. For
+    the same duration, the peak speed is 7/6 and the peak acceleration 1.30 of that of the quintic.
 
     Args:
         waypoints: At least two poses, as a batch or a sequence; or positions [m] of shape (N, 3), orientation identity.
@@ -174,7 +174,7 @@ def _checked_durations(durations: ArrayLike, segments: int) -> Array:
 
 
 def _check_sampled(grid: Array, ends: Array, times: Array, moves: Flags) -> None:
-    """Refuse a segment that moves but has no sample between its ends: its motion would be missing in all results."""
+    """Refuse a moving segment without a sample between its ends, because its motion would be missing in all results."""
     rounding = 1e-9 * ends[-1]
     inside = np.searchsorted(grid, ends - rounding) - np.searchsorted(grid, ends - times + rounding)
     if (unseen := np.flatnonzero((inside < 1) & moves)).size:
@@ -204,20 +204,20 @@ def time_grid(total: float, rate: float) -> Array:
     check_memory(
         f"a path of {steps:.4g} samples", SAMPLE_BYTES * steps, "Check the units of durations, limits and rate."
     )
-    # A total within rounding of a multiple of 1/rate gets no extra sample.
+    # a total that is a multiple of 1/rate, except for rounding, does not get an extra sample
     last = round(steps) if abs(steps - round(steps)) <= 1e-9 * steps else int(np.ceil(steps))
     return np.append(np.arange(last) / rate, total)
 
 
-HEIGHT = 1.5  # m, as in the article
-STOPS = ((0.0, 0.0), (5.0, 3.5), (-5.0, 3.5), (-5.0, -3.5), (5.0, -3.5), (5.0, 3.5), (0.0, 0.0))  # x, y [m]
-DURATIONS = (9.0, 11.0, 10.0, 11.0, 10.0, 9.0)  # s
+HEIGHT = 1.5  # height [m], as in the article
+STOPS = ((0.0, 0.0), (5.0, 3.5), (-5.0, 3.5), (-5.0, -3.5), (5.0, -3.5), (5.0, 3.5), (0.0, 0.0))  # corner x, y [m]
+DURATIONS = (9.0, 11.0, 10.0, 11.0, 10.0, 9.0)  # durations [s]
 
 
 def article_path(rate: float = 100.0) -> Path:
     """The article's planar motion: at z = 1.5 m, without rotation, from rest to rest.
 
-    The article gives only the height and the zero angles (its Figure 18); the remaining values are our choice. The path
+    The article gives only the height and the zero angles (its Figure 18); the remaining values are assumed. The path
     leads from the center to the corner (+5, +3.5) m, counter-clockwise around the rectangle of x = +-5 m, y = +-3.5 m,
     and back to the center; 60 s in total, peak acceleration 0.48 m/s^2, peak speed 1.70 m/s.
 

@@ -17,8 +17,8 @@ def path_from_samples(time: ArrayLike, pose: Pose) -> Path:
 
     Position and quaternion are interpolated by cubic splines with continuous second derivatives; the path keeps the
     given poses and computes velocity and acceleration from the splines. At both ends the spline is the cubic through
-    the first (last) four samples (not-a-knot): the path need not start or end at rest. Two samples give constant
-    velocity, three a parabola.
+    the first (last) four samples (not-a-knot), so that the path need not start or end at rest. Two samples give a
+    constant velocity, and three samples give a parabola.
 
     Errors of the samples reduce the accuracy of the acceleration: position errors up to d [m] at time steps of h [s]
     cause acceleration errors up to 12 d/h^2, which is 0.06 m/s^2 for micrometers (d = 0.5e-6 m) at 100 samples/s.
@@ -81,8 +81,8 @@ def _angular_rates(time: Array, quaternion: Array) -> tuple[Array, Array]:
     With q' = (omega, 0) q / 2 for the normalized quaternion, and |q| = 1 at the samples, the spline's derivatives give
     omega = 2 vec(q' q*) and omega' = 2 vec(q'' q*) - 2 omega (q . q').
 
-    scipy's RotationSpline is not used: it starts and ends with the mean velocity of the outermost steps. This causes an
-    error of the acceleration there that does not decrease with smaller steps.
+    scipy's RotationSpline is not used, because it starts and ends with the mean velocity of the outermost steps. This
+    causes an error of the acceleration there that does not decrease with smaller steps.
     """
     rate, curvature = spline_rates(time, quaternion)
     velocity = 2.0 * _vector_of_product_with_conjugate(rate, quaternion)

@@ -77,7 +77,7 @@ QUINTIC: Final = RestProfile.of_order(2)  # 10 s^3 - 15 s^4 + 6 s^5
 SEPTIC: Final = RestProfile.of_order(3)  # 35 s^4 - 84 s^5 + 70 s^6 - 20 s^7
 
 
-STILL = 1e-9  # m and rad: a shorter motion is rounding of a waypoint
+STILL = 1e-9  # [m] and [rad], a shorter motion is a rounding error of a waypoint
 BLOCK = 1 << 16  # samples per block; limits the temporary arrays to a few MB
 
 
@@ -174,7 +174,7 @@ class Segments:
             move, turn, turned = self.move[k], self.turn[k], share * half_angle[k]
             position[block] = self.start[k] + share * move
             quaternion[block] = np.cos(turned) * self.start_quaternion[k] + np.sin(turned) * self.side_quaternion[k]
-            # The axis is fixed, so the derivatives of the rotation vector are exactly those of the orientation.
+            # because the axis is fixed, the derivatives of the rotation vector are exactly those of the orientation
             for order, by_share in enumerate(self.profile.rates(s)):
                 rate = by_share / T ** (order + 1)
                 rates[order, block, :3], rates[order, block, 3:] = rate * move, rate * turn

@@ -1,4 +1,4 @@
-"""Small figures of notebooks, each drawn in a second or less for results of any size."""
+"""Small figures of notebooks, which are drawn in at most a second for results of any size."""
 
 from __future__ import annotations
 
@@ -47,13 +47,13 @@ if TYPE_CHECKING:
     from sagline.core.arrays import Array, Flags, Indices
 
 STYLE: Final = replace(PLAIN, name="notebook", width=6.0, height=0.8, direct=True)
-MOST_SAMPLES: Final = 300  # of a line
+MOST_SAMPLES: Final = 300  # largest number of points of a line
 MOST_CABLES: Final = 16
-LEVELS: Final = 4  # slices of a workspace that are drawn
+LEVELS: Final = 4  # number of drawn slices of a workspace
 
-LARGEST: Final = 200_000  # bytes of a figure
-MOST_MARKS: Final = 1500  # points drawn as vectors; more are one picture in the figure
-DOTS: Final = 110  # per inch, of that picture
+LARGEST: Final = 200_000  # largest size of a figure [bytes]
+MOST_MARKS: Final = 1500  # largest number of points drawn as vectors; more points become one picture in the figure
+DOTS: Final = 110  # dots per inch of this picture
 FONT: Final = "'DejaVu Sans', Verdana, sans-serif"
 _remarks = re.compile(r"<metadata>.*?</metadata>|<!--.*?-->|<defs>\s*<style.*?</style>\s*</defs>", flags=re.DOTALL)
 _gray = re.compile(r"\b(fill|stroke): #([0-9a-f]{2})\2\2(?![0-9a-f])")
@@ -115,7 +115,7 @@ def _(path: Path) -> Figure | None:
 
 @figure_of.register
 def _(space: Workspace) -> Figure | None:
-    """Boundary at some heights, from above; of a flat workspace in its own plane."""
+    """Boundary at some heights, from above; for a flat workspace, in its own plane."""
     sides = [k for k, axis in enumerate(space.axes) if axis.size > 1]
     if space.volume <= 0.0 or len(sides) < 2:
         return None
@@ -201,7 +201,7 @@ def _ink(gray: re.Match[str]) -> str:
 def _themed(svg: str, description: str) -> str:
     """A drawing in the colors of the page: black becomes the text color, gray the text color with less opacity.
 
-    Its inner names become unique, so that several drawings can be on one page.
+    Its identifiers become unique, so that one page can contain several drawings.
     """
     svg = _family.sub("", _remarks.sub("", svg)).strip()
     svg = _gray.sub(_ink, svg)

@@ -17,7 +17,7 @@ from sagline.plc.blocks import CLAIM, FROM_PLC, TO_PLC, Block, Refusal, claim_bl
 from sagline.plc.wire import Address, LinkError, Wire, WireError, groups_at
 from sagline.robot.robot import Robot
 
-RETRY: Final = 0.2  # s between attempts to connect
+RETRY: Final = 0.2  # time between attempts to connect [s]
 
 
 class _Newest(NamedTuple):
@@ -53,14 +53,14 @@ class GroupThread(Thread):
 
     Attributes:
         number: Index of the group, from 0.
-        newest: Its newest valid block; None before the first.
+        newest: Newest valid block of the group; None before the first.
         discarded: Number of invalid blocks.
         trouble: Last error; None without an error.
-        settled: Set when the PLC has answered, validly or not.
+        settled: Event that is set when the PLC has answered, validly or not.
     """
 
     def __init__(self, number: int, winches: int, wire: Wire, clock: Callable[[], float]) -> None:
-        """Prepare the thread; clock of the link [s]."""
+        """Prepare the thread; clock: clock of the link [s]."""
         super().__init__(name=f"sagline group {number}", daemon=True)
         self.number = number
         self.newest: _Newest | None = None
@@ -120,7 +120,7 @@ class GroupThread(Thread):
             asked = self._clock()
             if self._outgoing:
                 outgoing = self._outgoing.popleft()
-                if asked - outgoing.since < HEARTBEAT:  # an older command, from before a connection, is obsolete
+                if asked - outgoing.since < HEARTBEAT:  # a command from before the connection is obsolete
                     asked = outgoing.since
                     self._wire.write(outgoing.block, outgoing.data)
             if self._ending.is_set():
@@ -141,7 +141,7 @@ class GroupThread(Thread):
 
     def _mismatch(self, values: dict[str, Any]) -> Refusal | None:
         """Reason why a valid block is not from the expected PLC; None if it is."""
-        group = values["group"] - 1  # block values start at 1
+        group = values["group"] - 1  # counters of blocks start at 1
         if group != self.number:
             who = f"is group {group}" if group >= 0 else "has no group number"
             step = "Give the addresses in the groups' order, and each PLC its number"
@@ -168,14 +168,14 @@ def _unexpected(error: Exception) -> Refusal:
     return Refusal(f"the exchange failed with {type(error).__name__} ({text})", "Report it, if it happens again")
 
 
-LONGEST: Final = 3600.0  # s, upper limit for the timeout of the first answers
+LONGEST: Final = 3600.0  # upper limit for the timeout of the first answers [s]
 
 
 class BlockLink:
     """Link (`sagline.control.link.Link`) over one wire for each group; base of `S7Link` and `ModbusLink`."""
 
     def __init__(self, addresses: Sequence[Address], robot: Robot | int, wires: Sequence[Wire], timeout: float) -> None:
-        """Connect to all groups together; timeout of the first answers [s]."""
+        """Connect to all groups together; timeout: of the first answers [s]."""
         patience = number(timeout, "timeout", "s", above=0.0)
         if patience > LONGEST:
             raise InvalidValueError(
@@ -210,13 +210,14 @@ class BlockLink:
     def exchange(self, command: Command | None) -> Sample | Missing:
         """Pass a command to the groups' threads and return their newest data, without waiting.
 
-        A group that `command.owner` does not control receives its claim, if the command has one, and no command.
+        A group that `command.owner` does not control receives the claim, if the command has one, instead of the
+        command.
 
         Args:
             command: Set points of all winches; None to read only.
 
         Returns:
-            The newest sample of all groups, or the groups whose data are missing.
+            The newest sample of all groups, or the groups with missing data.
         """
         now = self._clock()
         newest = [group.newest for group in self._exchanges]
@@ -240,7 +241,7 @@ class BlockLink:
         """Write the last command, and disconnect."""
         for group in self._exchanges:
             group.finish()
-        for patience in (0.5, 0.2):  # s: for writing, and for the end of waiting
+        for patience in (0.5, 0.2):  # time for writing and for the end of the threads [s]
             until = perf_counter() + patience
             for group in self._exchanges:
                 group.join(max(0.0, until - perf_counter()))
@@ -270,7 +271,7 @@ class BlockLink:
         return group.trouble or group.silence(waited)
 
     def _wait(self, timeout: float) -> None:
-        """Wait until every group has answered; close the link if one has not."""
+        """Wait until every group has answered; close the link if a group does not answer."""
         for group in self._exchanges:
             group.settled.wait(max(0.0, timeout - self._clock()))
         silent = [i for i, group in enumerate(self._exchanges) if group.newest is None]

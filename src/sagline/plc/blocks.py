@@ -13,13 +13,13 @@ import numpy as np
 from sagline.control.link import GROUP_SIZE, Command, Sample, Whole, groups_of
 from sagline.core.arrays import Array
 
-LAYOUT: Final = 1  # version of the blocks; incremented whenever anything below changes its offset
-TYPES: Final = {  # of SCL, as `struct` has them; big-endian and without gaps, as the PLC has them
+LAYOUT: Final = 1  # version of the blocks; incremented with every change of an offset below
+TYPES: Final = {  # types of SCL as `struct` formats; the PLC uses big-endian order without gaps
     "DInt": "i",
     "DWord": "I",
     "LReal": "d",
     "Real": "f",
-    "Time": "i",  # ms
+    "Time": "i",  # milliseconds per second
     "UDInt": "I",
     "UInt": "H",
 }
@@ -30,7 +30,7 @@ class Field(NamedTuple):
 
     Attributes:
         name: Name in packing and SCL.
-        type: One of `TYPES`; or the rows of a structure that is there once a winch, in an array from 1.
+        type: One of `TYPES`; or the rows of a structure for each winch, in an array from 1.
         offset: Offset from the start of the block, or of the structure [bytes].
         meaning: Meaning and unit.
     """
@@ -55,7 +55,7 @@ class Refusal(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Data block with standard (not optimized) access: every byte has the offset in the table.
+    """Data block with standard (not optimized) access, in which the table defines the offset of every byte.
 
     Attributes:
         number: Number of the data block in the PLC.
@@ -75,7 +75,7 @@ class Block:
 
     @cached_property
     def rows(self) -> tuple[tuple[str, str, int], ...]:
-        """Name, type and offset of every plain value; those of winches are `winch_row`'s."""
+        """Name, type and offset of every plain value; names of winch values are from `winch_row`."""
         rows: list[tuple[str, str, int]] = []
         for name, kind, offset, _ in self.fields:
             if isinstance(kind, str):
@@ -106,7 +106,7 @@ class Block:
         return self.packer.pack(*[known.get(name, 0) for name in self.names])
 
     def read(self, data: bytes) -> dict[str, Any] | Refusal:
-        """Values by name of the row; or the reason why the bytes are not this block."""
+        """Values by name of the row, or the reason why the bytes are not this block."""
         block = f"DB{self.number}"
         if len(data) != self.size:
             return Refusal(f"{block} has {len(data)} bytes instead of {self.size}", LOAD)
@@ -128,7 +128,7 @@ def winch_row(index: int, name: str) -> str:
 
 
 def _bytes(kind: str | tuple[Field, ...]) -> int:
-    assert isinstance(kind, str)  # no structure within a structure
+    assert isinstance(kind, str)  # structures are not nested
     return struct.calcsize(f">{TYPES[kind]}")
 
 
@@ -220,7 +220,7 @@ def claim_block(owner: int) -> bytes:
 
 
 def command_blocks(command: Command) -> list[bytes]:
-    """Blocks of a command, one per group; zeros for a winch that the last group does not have."""
+    """Blocks of a command, one per group; zeros for missing winches of the last group."""
     head = {
         "counter": command.counter,
         "mode": int(command.mode),
@@ -238,7 +238,7 @@ def command_blocks(command: Command) -> list[bytes]:
 def sample_of(
     groups: Sequence[Mapping[str, Any]], *, winches: int, time: float, age: Array, discarded: Whole
 ) -> Sample:
-    """Sample from valid blocks of all groups; time [s], age [s] (G,), discarded (G,)."""
+    """Sample from valid blocks of all groups; time: [s]; age: [s], (G,); discarded: (G,)."""
     heads = ("counter", "owner", "echo", "status", "fault")
     columns: dict[str, Any] = {name: np.array([group[name] for group in groups], dtype=np.int64) for name in heads}
     for name in ("length", "rate", "torque", "tension", "filtered", "counts", "state", "winch_fault"):

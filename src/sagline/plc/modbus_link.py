@@ -40,13 +40,14 @@ class ModbusLink(BlockLink):
         """Connect to all groups at once.
 
         Args:
-            addresses: "host" or "host:port" of each group's PLC, in their order; or one text with commas between.
+            addresses: "host" or "host:port" of each group's PLC, in the order of the groups, or one text with commas
+                between them.
             robot: The robot, or its number of winches.
             device: Id of the device behind each address.
             timeout: Longest time to the first answers [s].
 
         Raises:
-            InvalidValueError: If the addresses are not as many as groups, none at all, or two are the same.
+            InvalidValueError: If the number of addresses is not that of the groups, or two addresses are equal.
             LinkError: If a PLC does not answer with sagline's blocks.
             FileError: If pymodbus is not installed.
         """
@@ -56,7 +57,7 @@ class ModbusLink(BlockLink):
 
 
 class ModbusWire:
-    """A connection to one PLC whose blocks are in holding registers, two bytes each, the same bytes as over S7."""
+    """A connection to one PLC with its blocks in holding registers, two bytes each, the same bytes as over S7."""
 
     def __init__(self, host: str, port: int, device: int) -> None:
         """Keep the address; `open` connects."""
@@ -86,7 +87,7 @@ class ModbusWire:
             answer = self._client.read_holding_registers(block.register, count=count, device_id=self._device)
             registers = _good(answer, block).registers
             return struct.pack(f">{len(registers)}H", *registers)
-        except Exception as error:  # the library may raise anything on a foreign answer
+        except Exception as error:  # the library may raise any error for a foreign answer
             raise _failed(error) from error
 
     def write(self, block: Block, data: bytes) -> None:
@@ -99,7 +100,7 @@ class ModbusWire:
 
     def close(self) -> None:
         """Disconnect."""
-        with suppress(Exception):  # errors do not matter any more
+        with suppress(Exception):  # errors are irrelevant now
             self._client.close()  # type: ignore[no-untyped-call]
 
     def abort(self) -> None:

@@ -17,11 +17,11 @@ if TYPE_CHECKING:
     from snap7 import Client
 
 PORT: Final = 102
-PDU: Final = 240  # bytes, of an S7-1200: each block fits in one request
+PDU: Final = 240  # [bytes], of an S7-1200; each block fits in one request
 RACK: Final = 0
-FORBIDDEN: Final = 0x8104  # answer of a CPU to PUT or GET that its settings do not permit
+FORBIDDEN: Final = 0x8104  # answer of a CPU whose settings do not permit PUT or GET
 _CLOSED: Final = Refusal("the connection was closed", "Connect again")
-SLOT: Final = 1  # of every S7-1200 and S7-1500
+SLOT: Final = 1  # rack and slot of every S7-1200 and S7-1500
 
 logging.getLogger("snap7").addHandler(logging.NullHandler())  # the link reports errors
 
@@ -38,12 +38,13 @@ class S7Link(BlockLink):
         """Connect to all groups at once.
 
         Args:
-            addresses: "host" or "host:port" of each group's PLC, in their order; or one text with commas between.
+            addresses: "host" or "host:port" of each group's PLC, in the order of the groups, or one text with commas
+                between them.
             robot: The robot, or its number of winches.
             timeout: Longest time to the first answers [s].
 
         Raises:
-            InvalidValueError: If the addresses are not as many as groups, none at all, or two are the same.
+            InvalidValueError: If the number of addresses is not that of the groups, or two addresses are equal.
             LinkError: If a PLC does not answer with sagline's blocks.
             FileError: If python-snap7 is not installed.
         """
@@ -70,7 +71,7 @@ class S7Wire:
             client.set_param(self._library.type.Parameter.PDURequest, PDU)
             client.connect(self._host, RACK, SLOT, tcp_port=self._port)
             _socket(client).settimeout(ANSWER)
-        except Exception as error:  # the library may raise anything on a foreign answer
+        except Exception as error:  # the library may raise any error for a foreign answer
             raise WireError(refusal_of(error, "S7")) from error
 
     def read(self, block: Block) -> bytes:
@@ -90,7 +91,7 @@ class S7Wire:
     def close(self) -> None:
         """Disconnect."""
         client, self._client = self._client, None
-        with suppress(Exception):  # errors do not matter any more
+        with suppress(Exception):  # errors are irrelevant now
             if client is not None:
                 client.disconnect()
 
@@ -118,7 +119,7 @@ class S7Wire:
 
 
 def _socket(client: Client) -> socket.socket:
-    """Socket of the library, which has no setting for the time to wait."""
+    """Socket of the library, because the library has no setting for the waiting time."""
     connection = client.connection
     if connection is None or connection.socket is None:
         raise WireError(_CLOSED)

@@ -14,7 +14,7 @@ from sagline.plc.blocks import Block, Refusal
 from sagline.robot.robot import Robot
 
 LAST_PORT: Final = 65535
-MOST_ADDRESSES: Final = 10_000  # addresses, or characters of all of them
+MOST_ADDRESSES: Final = 10_000  # largest number of addresses, and of characters of all addresses
 
 
 class Address(NamedTuple):
@@ -55,7 +55,7 @@ def addresses_of(given: str | Sequence[str], port: int) -> tuple[Address, ...]:
 
 
 def groups_at(addresses: Sequence[Address], robot: Robot | int) -> tuple[tuple[int, ...], ...]:
-    """The winches of each group, where there are as many addresses as groups."""
+    """The winches of each group; an error if the number of addresses is not that of the groups."""
     known: Any = robot
     winches = known.cable_count if isinstance(known, Robot) else whole_number(known, "robot", 1, MOST_ADDRESSES)
     groups = groups_of(winches)
@@ -82,7 +82,7 @@ def _address(index: int, text: object, port: int) -> Address:
     return Address(host, int(number) if colon else port)
 
 
-ANSWER: Final = 0.5  # s without an answer, after which the connection is opened again
+ANSWER: Final = 0.5  # time without an answer, after which the connection is opened again [s]
 
 
 class LinkError(SaglineError):
@@ -90,8 +90,8 @@ class LinkError(SaglineError):
 
     Attributes:
         item: Group and address ("group 2 at 192.168.0.12:102").
-        reason: In words.
-        next_step: For the reader.
+        reason: Reason as text.
+        next_step: Next step for the reader.
     """
 
     def __init__(self, item: str, reason: str, next_step: str) -> None:
@@ -102,7 +102,7 @@ class LinkError(SaglineError):
         self.next_step = next_step
 
     def __str__(self) -> str:
-        """One line: which PLC, reason, next step."""
+        """One line: PLC, reason, next step."""
         item, reason, next_step = shortened((self.item, self.reason, self.next_step), room=MOST - len(": . "))
         return f"{item}: {reason}. {next_step}"
 
@@ -121,10 +121,10 @@ class WireError(Exception):
 
 
 class Wire(Protocol):
-    """A connection to one PLC; all but `abort` and `reached` belong to one thread, and raise `WireError`."""
+    """A connection to one PLC; all methods except `abort` and `reached` belong to one thread and raise `WireError`."""
 
     def open(self) -> None:
-        """Connect; waits as long as the protocol does."""
+        """Connect; waits for the time of the protocol."""
 
     def read(self, block: Block) -> bytes:
         """The bytes of a block."""
@@ -133,7 +133,7 @@ class Wire(Protocol):
         """Replace the bytes of a block."""
 
     def close(self) -> None:
-        """Disconnect; raises nothing."""
+        """Disconnect without errors."""
 
     def abort(self) -> None:
         """End all waiting, from another thread."""
@@ -144,7 +144,7 @@ class Wire(Protocol):
 
 @contextmanager
 def plc_packages() -> Iterator[None]:
-    """Context for imports of the packages that PLCs need."""
+    """Context manager for imports of the packages for PLCs."""
     try:
         yield
     except ModuleNotFoundError as error:

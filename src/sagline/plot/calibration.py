@@ -30,17 +30,17 @@ if TYPE_CHECKING:
     from sagline.core.arrays import Array
 
 PARTS: Final = ("all", "residuals", "correlation", "errors")
-BANDS: Final = ((2.0, 0.35), (1.0, 0.55))  # half widths in standard deviations, and opacity
-REACH: Final = 5.0  # standard deviations; larger residuals are drawn at the edge
+BANDS: Final = ((2.0, 0.35), (1.0, 0.55))  # half widths of the bands in standard deviations, and opacity
+REACH: Final = 5.0  # [standard deviations], larger residuals are drawn at the edge
 MOST_POSES: Final = 1500  # largest number of drawn poses; of more, evenly chosen ones and all outliers
 MOST_NAMED: Final = 8  # largest number of named outliers
 POINTS: Final = 25  # points along each side of a map
 MARKS: Final = ("o", "s", "^", "D")
-PANEL, MATRIX, BESIDE, MAP = 0.95, 3.2, 1.2, 2.7  # in: heights of a panel, of the matrix, beside a map; its width
+PANEL, MATRIX, BESIDE, MAP = 0.95, 3.2, 1.2, 2.7  # [in], heights of a panel, of the matrix, beside a map; its width
 LINE: Final = 0.048  # height of a name next to the matrix, as a share of its height
 LEADER: Final[dict[str, Any]] = {"arrowstyle": "-", "linewidth": 0.5, "relpos": (1.0, 0.5), "shrinkB": 0.0}
 ROUND: Final = FuncFormatter(lambda value, _: f"{value:g}")
-PER_METER: Final = 1e3  # mm
+PER_METER: Final = 1e3  # [mm]
 
 
 class _Kind(NamedTuple):
@@ -55,10 +55,11 @@ class _Kind(NamedTuple):
 def calibration(found: Calibration, part: str = "all", *, height: float | None = None) -> Figure:
     """Residuals, correlations and expected errors of a calibration.
 
-    Residuals are in standard deviations of their sensors, by rows of the log; the bands are one and two standard
-    deviations, outliers have a ring, and values off the scale are triangles at the edge. The correlations are those of
-    all estimated parameters, by kinds. The maps show the expected position error on a level slice, before (from the
-    priors) and after the calibration; without translations and rotations of the world if these are not observable.
+    Residuals are in standard deviations of their sensors, in the order of the rows of the log. The bands are one and
+    two standard deviations wide. Outliers have a ring, and values off the scale are triangles at the edge. The
+    correlations are those of all estimated parameters, grouped by kind. The maps show the expected position error on a
+    level slice, before (from the priors) and after the calibration. They exclude translations and rotations of the
+    world if these are not observable.
 
     Args:
         found: From `calibrate`.
@@ -248,7 +249,7 @@ def _before(found: Calibration) -> Calibration:
 
 
 def _slice(found: Calibration, at: float | None) -> tuple[Array, Array, float]:
-    """Coordinates of a level grid over the robot's poses, or those of the log."""
+    """Coordinates of a level grid over the robot's poses, or over the poses of the log."""
     low, high = found.poses.position.min(axis=0), found.poses.position.max(axis=0)
     box = found.robot.test_box
     if box is not None:

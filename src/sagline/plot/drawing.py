@@ -44,20 +44,20 @@ if TYPE_CHECKING:
 AZIMUTH, ELEVATION = np.radians(-60.0), np.radians(24.0)
 USUAL: Final = view_axes(float(AZIMUTH), float(ELEVATION))
 FRAME, GROUND, BODY, WHEEL = "0.45", (0.5, 0.5, 0.5, 0.12), (0.835, 0.369, 0.0, 0.16), "0.4"
-CABLE_WIDTH, FRAME_WIDTH, BODY_WIDTH, THIN, GAP = 1.2, 0.7, 1.1, 0.6, 1.3  # pt
-SPECK: Final = 1.5  # pt: shorter pieces of a line between two gaps are left out
+CABLE_WIDTH, FRAME_WIDTH, BODY_WIDTH, THIN, GAP = 1.2, 0.7, 1.1, 0.6, 1.3  # line widths [pt]
+SPECK: Final = 1.5  # shorter pieces of a line between two gaps are omitted [pt]
 SPARE: Final = 0.05  # margin as a share of the picture
-WIDTH, LEAST, MOST = 5.6, 0.35, 1.1  # in; smallest and largest ratio of height to width
+WIDTH, LEAST, MOST = 5.6, 0.35, 1.1  # [in]; smallest and largest ratio of height to width
 PLACES: Final = np.linspace(0.12, 0.72, 31)  # positions of the number along a cable, from the frame
 BESIDE, ROOM = 0.8, 0.8  # distances in text sizes: from a cable to its number, and from a number to other lines
 CLEAR = 1.15  # distance in text sizes from a number next to its cable to other lines
-FROM_ANCHOR = 1.6  # in text sizes: distance of a number from the frame end, which stays visible
+FROM_ANCHOR = 1.6  # distance in text sizes of a number from the frame end, which remains visible
 ARROW: Final = 0.16  # largest length of the axes, as a share of the picture's width
-END_ON: Final = 0.12  # share of its length: an axis that appears shorter has no name
+END_ON: Final = 0.12  # an axis that appears shorter than this share of its length has no name
 
 
 class _Stroke(NamedTuple):
-    """A line of the drawing: points in the world (P, 3) [m], style, width [pt], true if it hides lines behind it."""
+    """A line of the drawing: points in the world (P, 3) [m], style, width [pt], True if it hides lines behind it."""
 
     points: Array
     color: Any
@@ -75,9 +75,9 @@ def drawing(
 ) -> Axes:
     """The robot at rest as a line drawing for print, with hidden lines removed.
 
-    Hidden parts are computed, not painted over: a cable is interrupted where it passes behind another cable, the frame
-    or the platform. Every cable has its number and the color of its chord tension. The projection is parallel; the
-    three axes at the ground have equal lengths, and this length is written next to them.
+    Hidden parts are computed instead of painted over. A cable is interrupted where it passes behind another cable, the
+    frame or the platform. Every cable has its number and the color of its chord tension. The projection is parallel;
+    the three axes at the ground have equal lengths, and this length is written next to them.
 
     Args:
         robot: The robot.
@@ -176,7 +176,7 @@ def _draw(ax: Axes, scene: _Scene, view: Array) -> None:
     """Draw everything with the visible parts of its lines, at the size on paper."""
     figure: Any = ax.get_figure(root=True)
     figure.draw_without_rendering()
-    point = float(np.ptp(ax.get_xlim())) / (ax.bbox.width / figure.dpi * 72.0)  # m
+    point = float(np.ptp(ax.get_xlim())) / (ax.bbox.width / figure.dpi * 72.0)  # [m]
     look = current()
     strokes = [*scene.cables, *scene.others]
     lines = [

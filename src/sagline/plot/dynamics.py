@@ -49,8 +49,8 @@ if TYPE_CHECKING:
     from sagline.core.arrays import Array
 
 ENERGY_STYLES = ("-", DASHED, (0, (1.0, 1.2)), (0, (5.0, 1.5, 1.0, 1.5)), (0, (7.0, 2.0)))
-ROUNDING = 1e-12  # share of the energy; smaller errors are rounding errors
-THIN, WIDE = 0.6, 3.6  # pt: width of a mode of the cables only, and of the platform only
+ROUNDING = 1e-12  # smaller errors, relative to the energy, are rounding errors
+THIN, WIDE = 0.6, 3.6  # width of a mode of the cables only, and of the platform only [pt]
 FAINT = 0.4  # opacity of thin lines
 SHARES = (1.0, 0.5, 0.0)  # platform shares in the legend
 PANELS: Final = {6: 3, 4: 2, 3: 3, 2: 2, 1: 1}  # number of heights -> panels per row, so that no panel is empty
@@ -120,8 +120,7 @@ def frequencies(
 
     Args:
         vibrations: Vibrations of N successive states, from `vibration`.
-        time: Abscissae of the states, ascending, shape (N,), times of a path [s] for instance;
-            None for their numbers.
+        time: Ascending abscissae of the states, shape (N,), for example times of a path [s]; None for their indices.
         label: Label of the time axis, with its unit.
         ax: Axes to draw on; None for a new figure.
 
@@ -285,9 +284,9 @@ def response(
     Marks at the bottom are the modes with cable mass; darker marks have a larger platform share.
 
     Args:
-        vibration: Vibration of a stable state, from `vibration`; both curves have its damping. Or the result of
+        vibration: Vibration of a stable state, from `vibration`, whose damping both curves have; or the result of
             `frequency_response`, drawn at its own frequencies without marks of modes.
-        force: "x", "y", "z": a force along it; "about x", ...: a moment [N m].
+        force: "x", "y" or "z" for a force along this axis; "about x" and so on for a moment about it [N m].
         motion: Drawn motion, named like `force`; None for the motion along or about the force.
         ax: Axes to draw on; None for a new figure.
 

@@ -40,8 +40,8 @@ if TYPE_CHECKING:
 
     from sagline.core.arrays import Array
 
-PER_METER: Final = 1e3  # mm
-BESIDE: Final[dict[str, Any]] = {  # layout: the band of the states is low
+PER_METER: Final = 1e3  # [mm]
+BESIDE: Final[dict[str, Any]] = {  # relative heights of the panels; the band of the states is low
     "loc": "upper left", "bbox_to_anchor": (1.01, 1.6), "borderaxespad": 0.0, "frameon": False,
 }  # fmt: skip
 STATES: Final = {  # states with a separate color

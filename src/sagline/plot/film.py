@@ -23,9 +23,9 @@ from sagline.viewer.swing import PERIOD, Swing
 if TYPE_CHECKING:
     from sagline.core.progress import Progress
 
-SECONDS = 10.0  # s, duration of the film: whole periods, so that it repeats without a jump
+SECONDS = 10.0  # duration of the film [s], whole periods, so that it repeats without a jump
 PICTURES = 25  # pictures per period
-WIDTH, HEIGHT, DOTS = 6.4, 3.8, 100  # in, in, dots per inch
+WIDTH, HEIGHT, DOTS = 6.4, 3.8, 100  # width [in], height [in], dots per inch
 COLORS = 48
 LEAST_SHARE = 0.01  # smallest share of a cable in the energy that is written
 
@@ -37,7 +37,7 @@ def film(vibration: Vibration, number: int, file: os.PathLike[str] | str, *, pro
         vibration: Vibration, from `vibration`.
         number: Number of the mode, 1 for the lowest.
         file: The file, "mode.gif" for instance; an existing file is replaced.
-        progress: Function of the number of pictures drawn and their total.
+        progress: Function that is called with the number of drawn pictures and the total number.
 
     Raises:
         InvalidValueError: If the mode does not exist.

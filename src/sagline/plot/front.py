@@ -18,14 +18,14 @@ if TYPE_CHECKING:
     from sagline.core.arrays import Array
     from sagline.optimization.goals import Goal
 
-EACH = 3.2  # in, the height of a panel
+EACH = 3.2  # height of a panel [in]
 
 
 def front(front: Front) -> Figure:
     """The best robots found by `design`, and all candidates.
 
-    With one goal, the progress of the search: each candidate, and the best so far. With several goals, the first goal
-    against each other goal: the best robots are joined by a line, and the start is marked.
+    With one goal, the figure shows the progress of the search: each candidate, and the best one so far. With several
+    goals, it shows the first goal against each other goal. A line connects the best robots, and the start is marked.
 
     Args:
         front: Result of `design`.

@@ -35,13 +35,13 @@ LENGTHS = {
     "unstrained_length": (r"unstrained length $L$ [m]", 1.0),
     "adjusting_length": (r"adjusting length $d = L - D$ [mm]", 1e3),
 }
-POINT = 1.0 / 72.0  # in
+POINT = 1.0 / 72.0  # [in]
 WIDE = {SANS: 0.58, SERIF: 0.48}  # mean width of a letter in text sizes
 SHARE = 0.9  # largest width of a heading, as a share of the figure's width
 MOST = 0.3  # largest width of names next to the axes, as a share of the figure's width
 SPACING = 1.15  # distance of names in text sizes
-END = 0.02  # share of the axes' width: a line that ends farther from the right side has no name there
-LEADER = 8.0  # pt, distance from the end of a line to its name
+END = 0.02  # a line that ends farther from the right side than this share of the axes' width has no name there
+LEADER = 8.0  # distance from the end of a line to its name [pt]
 
 
 def name_lines(ax: Axes, title: str = "") -> None:
@@ -82,7 +82,7 @@ def legend_above(ax: Axes, labels: Sequence[str], title: str = "") -> dict[str, 
 
 
 def _legend_columns(labels: Sequence[str], width: float, size: float) -> int:
-    """Number of legend columns that fit, at least 1, none of them empty."""
+    """Number of legend columns that fit, at least 1, without empty columns."""
     widest = max((TextPath((0.0, 0.0), label, size=size).get_extents().width for label in labels if label), default=0.0)
     columns = max(1, min(len(labels), int((width / POINT + 1.2 * size) / (widest + 3.6 * size))))
     return ceil(len(labels) / ceil(len(labels) / columns))
@@ -134,7 +134,7 @@ def _ends(ax: Axes, handles: Sequence[Artist], labels: Sequence[str]) -> list[_E
     longest = max((len(label) for handle, label in zip(handles, labels, strict=True) if _is_line(handle)), default=0)
     if longest * WIDE[look.font] * look.tick * POINT > MOST * figure.get_figwidth():
         return []
-    figure.draw_without_rendering()  # the height of the axes is known after this
+    figure.draw_without_rendering()  # this computes the height of the axes
     found = []
     for handle, label in zip(handles, labels, strict=True):
         if not _is_line(handle):

@@ -1,7 +1,8 @@
-"""Hidden line removal in parallel projection: parts behind surfaces and behind nearer lines are cut away.
+"""Hidden line removal in parallel projection: parts behind surfaces and behind nearer lines are removed.
 
-Sorting by distance is not sufficient: each of three cables can pass in front of the next. In parallel projection all
-quantities are linear along a segment, so the ends of hidden parts are exact intersections of straight lines.
+Sorting by distance is not sufficient, because each of three cables can pass in front of the next one. In parallel
+projection all quantities are linear along a segment. The ends of hidden parts are therefore exact intersections of
+straight lines.
 """
 
 from __future__ import annotations
@@ -13,10 +14,10 @@ import numpy as np
 
 from sagline.core.arrays import Array, Indices
 
-FLAT = 1e-9  # share of the picture's size; a surface seen from its edge, or a line from its end, hides nothing
-TOUCHING = 1e-6  # share of the picture's size; a line closer than this to a surface lies on it, not behind it
-CHUNK = 2_000_000  # pairs of segments and limits at a time
-FAR = 1e3  # in picture sizes: in front of everything
+FLAT = 1e-9  # smallest extent of a surface or line that hides others, as a share of the picture's size
+TOUCHING = 1e-6  # a line closer to a surface than this share of the picture's size lies on it, not behind it
+CHUNK = 2_000_000  # number of pairs of segments and limits per block
+FAR = 1e3  # depth in front of everything, in picture sizes
 ALONG = 3.0  # limit for nearly parallel lines: ratio of hidden length along the line to the width of the strip
 
 
@@ -25,9 +26,9 @@ class FlatLine(NamedTuple):
 
     Attributes:
         points: Coordinates to the right, up, and toward the viewer [m], shape (P, 3).
-        half_width: Half of its width [m]; it hides lines behind it within this distance; 0 if it hides nothing.
-        gap: Additional distance at crossings [m]. Lines less than half_width + gap behind it are not hidden, such as
-            cables that meet at an anchor.
+        half_width: Half of its width [m], within which it hides lines behind it; 0 if it hides nothing.
+        gap: Additional distance at crossings [m]. Lines that are less than half_width + gap behind it, such as cables
+            that meet at an anchor, are not hidden.
     """
 
     points: Array

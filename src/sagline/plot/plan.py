@@ -38,24 +38,24 @@ if TYPE_CHECKING:
 
 OVERVIEW = ("unstrained_length", "adjusting_length", "horizontal_tension", "vertical_force")
 INFEASIBLE = "infeasible"
-LEAST_ERROR = 1e-3  # mm: rounding errors are drawn as a flat line
-FLAT = 0.01  # share of the axis: smaller errors look like a flat line
-UNCONFIRMED = "not confirmed"  # planned lengths without a stable equilibrium
-OTHER_CABLES = "0.82"  # color of the other cables behind each
-ROW_HEIGHT = 1.45  # in, height of a row of panels
+LEAST_ERROR = 1e-3  # [mm], rounding errors are drawn as a flat line
+FLAT = 0.01  # errors below this share of the axis look like a flat line
+UNCONFIRMED = "not confirmed"  # color of planned lengths without a stable equilibrium
+OTHER_CABLES = "0.82"  # color of the other cables behind each cable
+ROW_HEIGHT = 1.45  # height of a row of panels [in]
 LIMITED = {"chord_tension": "chord", "frame_end_tension": "frame_end"}
-START_COLOR = "#A84300"  # vermillion, dark enough for text
-MOST_ARROWS = 100  # arrows along a path
-LEVEL = 1e-9  # m: a path with a smaller change of height lies in a plane
+START_COLOR = "#A84300"  # vermilion, dark enough for text
+MOST_ARROWS = 100  # number of arrows along a path
+LEVEL = 1e-9  # a path with a smaller change of height is planar [m]
 
 
 def tensions(plan: Plan, quantity: str = "chord_tension", ax: Axes | None = None) -> Axes:
     """Tensions of all cables over time.
 
     Args:
-        plan: The plan; over the number of the pose where it follows no path.
+        plan: The plan; without a path, the abscissa is the index of the pose.
         quantity: One of "chord_tension", "horizontal_tension", "vertical_force", "frame_end_tension" and
-            "platform_end_tension", as `CableState` has them [N].
+            "platform_end_tension", as in `CableState` [N].
         ax: Axes to draw on; None for a new figure.
 
     Returns:
@@ -81,7 +81,7 @@ def lengths(plan: Plan, quantity: str = "unstrained_length", ax: Axes | None = N
     """Lengths of all cables over time.
 
     Args:
-        plan: The plan; over the number of the pose where it follows no path.
+        plan: The plan; without a path, the abscissa is the index of the pose.
         quantity: "unstrained_length", L [m], or "adjusting_length", d = L - D [mm].
         ax: Axes to draw on; None for a new figure.
 
@@ -108,7 +108,7 @@ def overview(plan: Plan) -> Figure:
     """Lengths, adjusting lengths, horizontal tensions and vertical forces of all cables: the article's figure 20.
 
     Args:
-        plan: The plan; over the number of the pose where it follows no path.
+        plan: The plan; without a path, the abscissa is the index of the pose.
 
     Returns:
         A figure of four panels.
@@ -193,7 +193,7 @@ def errors(*confirmations: Confirmation) -> Figure:
         confirmations: Confirmed plans.
 
     Returns:
-        A figure of one panel each, titled with the robot.
+        A figure with one panel per confirmation, with the robot as its title.
 
     Raises:
         InvalidValueError: If there are no confirmations, or one is of another type.
@@ -250,7 +250,7 @@ def small_multiples(plan: Plan, quantity: str = "chord_tension") -> Figure:
     quantity are dotted if they are in the range of the axis.
 
     Args:
-        plan: The plan; over the number of the pose where it follows no path.
+        plan: The plan; without a path, the abscissa is the index of the pose.
         quantity: A quantity of `sl.plot.tensions` or `sl.plot.lengths`: "chord_tension", "horizontal_tension",
             "vertical_force", "frame_end_tension" and "platform_end_tension" [N], "unstrained_length" [m] and
             "adjusting_length" [mm].

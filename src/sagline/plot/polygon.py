@@ -23,18 +23,18 @@ if TYPE_CHECKING:
     from sagline.core.arrays import Array
 
 MARKERS = "osD^v<>pPX*h"
-POINT = 1.0 / 72.0  # in
+POINT = 1.0 / 72.0  # [in]
 TRIES, SPARE = 5, 0.03  # largest number of iterations of the axes' size, and its extra growth (relative)
-SHORT = 1e-9  # share of the longest side; a shorter side has no direction
-GAP = 4.0  # pt between a side and its name
+SHORT = 1e-9  # a side shorter than this share of the longest side has no direction
+GAP = 4.0  # distance between a side and its name [pt]
 
 
 def polygon(shape: TensionPolygon, points: Mapping[str, ArrayLike] | None = None, ax: Axes | None = None) -> Axes:
-    """The feasible polygon in coordinates of the null space, each side named by its limit.
+    """The feasible polygon in coordinates of the null space, with the name of the limit at each side.
 
     Args:
-        shape: The polygon, of `tension_polygon`, for two redundant cables.
-        points: Name -> chord tensions (m,), drawn at their position in the polygon; NaN are left out. None: no points.
+        shape: The polygon from `tension_polygon`, for two redundant cables.
+        points: Chord tensions (m,) by name, drawn at their positions in the polygon; NaN are omitted. None: no points.
         ax: Axes to draw on; None for a new figure.
 
     Returns:
@@ -98,7 +98,7 @@ def _name_sides(ax: Axes, shape: TensionPolygon, corners: Array) -> None:
     """Write the names; the axes are enlarged until all names are inside."""
     figure = cast(Figure, ax.get_figure(root=True))
     for _ in range(TRIES):
-        figure.draw_without_rendering()  # the size of the polygon on the sheet is known after this
+        figure.draw_without_rendering()  # this computes the size of the polygon on the sheet
         scale = ax.bbox.width / (figure.dpi * POINT) / float(np.ptp(ax.get_xlim()))  # points per newton
         names = _names(shape, corners, scale)
         reach = np.array([name.middle + (name.offset + sign * name.half) / scale for name in names for sign in (-1, 1)])
@@ -124,7 +124,7 @@ def _name_sides(ax: Axes, shape: TensionPolygon, corners: Array) -> None:
 
 
 def _names(shape: TensionPolygon, corners: Array, scale: float) -> list[_Name]:
-    """Place each name outside of its side, where a convex polygon has no other line; overlapping names move outward."""
+    """Place each name outside of its side, where a convex polygon has no lines; overlapping names move outward."""
     names: list[_Name] = []
     size = current().tick
     normals = _normals(corners)

@@ -34,14 +34,14 @@ if TYPE_CHECKING:
     from sagline.kinematics.plan import Plan
 
 POINTS = 50  # points around each pulley
-FLAT = 1e-6  # share of the robot's size: the shadow of a thinner platform is a line
+FLAT = 1e-6  # a platform thinner than this share of the robot's size has a line as its shadow
 _SIGNS = np.array(list(product((-1.0, 1.0), repeat=3)))
 EDGES = tuple(  # edges of a box: between corners that differ in one direction
     (a, b) for a, b in combinations(range(8), 2) if np.count_nonzero(_SIGNS[a] != _SIGNS[b]) == 1
 )
 FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))  # seen from outside
 FRAME_COLOR, FLOOR_COLOR, SHADOW_COLOR, WHEEL_COLOR = "0.6", "0.955", "0.82", "0.35"
-SAME_PLACE = 0.04  # share of the robot's size: closer anchors have a common label
+SAME_PLACE = 0.04  # anchors closer than this share of the robot's size have a common label
 HALO = [patheffects.withStroke(linewidth=2.0, foreground="white")]
 LABEL_DISTANCE = 0.045  # distance of a label outward from its anchor, as a share of the robot's size
 
@@ -71,7 +71,7 @@ def straight_points(robot: Robot, pose: Pose) -> Array:
 
 
 def pulleys_and_drums(robot: Robot, pose: Pose) -> tuple[list[Array], list[tuple[Array, bool]]]:
-    """Circles of pulleys and known drums; runs behind pulleys, drawn by their rise, and True for vertical runs."""
+    """Circles of pulleys and known drums; cables behind pulleys, drawn by their rise, and True for vertical ones."""
     turn = np.linspace(0.0, 2.0 * np.pi, POINTS)[:, None]
     pulleys = np.swapaxes(points_on_pulleys(robot, pose, turn), 0, 1)[pulleys_of(robot).radius > 0.0]
     known = None if robot.winches is None else robot.winches.drum_radius
@@ -164,7 +164,7 @@ def robot(robot: Robot, pose: Pose | None = None, ax: Axes3D | None = None) -> A
 
 def draw_robot(ax: Axes3D, robot: Robot, where: Pose, color: str | None = None) -> tuple[Plan, Array]:
     """Frame, platform, cables and ground, without labels of the axes."""
-    ax.computed_zorder = False  # the computed order uses object centers and would draw the floor over objects on it
+    ax.computed_zorder = False  # matplotlib's own order uses object centers and would draw the floor over objects on it
     plan = inverse(robot, where)
     courses = catenary_points(robot, where, plan) if plan.feasible else straight_points(robot, where)
     colors = TensionScale.of(robot).colors(plan.chord_tension) / 255.0  # gray without a tension
@@ -185,7 +185,7 @@ def draw_robot(ax: Axes3D, robot: Robot, where: Pose, color: str | None = None) 
 
 
 def _draw_wheels(ax: Axes3D, robot: Robot, pose: Pose) -> Array:
-    """The pulleys, the runs behind them and the drums that are known; returns their points (n, 3)."""
+    """Draw pulleys, cables behind them, and known drums; returns their points (n, 3)."""
     circles, runs = pulleys_and_drums(robot, pose)
     for circle in circles:
         ax.plot(*circle.T, color=WHEEL_COLOR, linewidth=0.9, zorder=1.9)
@@ -200,7 +200,7 @@ def _draw_box(ax: Axes3D, corners: Array, color: str, width: float) -> None:
 
 
 def _draw_ground(ax: Axes3D, points: Array, platform: Array) -> None:
-    """The ground under everything, and the platform's shadow on it."""
+    """Draw the ground under everything, and the platform's shadow on it."""
     for flat, color in zip(ground(points, platform), (FLOOR_COLOR, SHADOW_COLOR), strict=True):
         ax.add_collection3d(Poly3DCollection([flat], facecolor=color, edgecolor="none", zorder=0.5))
 

@@ -43,8 +43,8 @@ DASHED: Final[Any] = (0, (4.0, 1.6))  # a line style of Matplotlib
 COMPONENT_STYLES: Final[Any] = ("-", DASHED, (0, (1.0, 1.2)))  # line styles of the x, y and z components
 MAP_COLORS: Final = "cividis"  # readable with all kinds of color vision
 MOST_POINTS: Final = 4000  # largest number of points of a line; a longer line is drawn through the extrema of its parts
-WIDTH = 7.0  # in, width of a page with margins
-LABEL, TICK = PLAIN.label, PLAIN.tick  # pt, text sizes in the documentation
+WIDTH = 7.0  # width of a page with margins [in]
+LABEL, TICK = PLAIN.label, PLAIN.tick  # text sizes in the documentation [pt]
 RESOLUTION = 200  # dots per inch
 
 
@@ -71,7 +71,7 @@ class Sheet(Figure):
             if not self._fitted:
                 self._fitted = True  # before the first drawing
                 _thicken(self, self.style.line)
-                self.draw_without_rendering()  # the length of the axes is known after this
+                self.draw_without_rendering()  # this computes the length of the axes
                 break_labels(self)
             super().draw(renderer)
 
@@ -179,7 +179,7 @@ def cable_look(cable: int) -> dict[str, Any]:
 
 
 def draw_series(ax: Axes, clock: Array, course: Array, **look: Any) -> None:
-    """A line over time; a sample without neighbors is a point."""
+    """Draw a line over time; a sample without neighbors is a point."""
     if clock.size > MOST_POINTS:
         few = 2 * -(-clock.size // MOST_POINTS)
         rows = np.arange(clock.size // few * few).reshape(-1, few)

@@ -12,7 +12,7 @@ import matplotlib
 from sagline.core.arguments import choice, whole_number
 
 SANS, SERIF = "DejaVu Sans", "STIXGeneral"  # fonts of Matplotlib, available on any computer; the second resembles Times
-SLIDE_HEIGHT, PAGE_HEIGHT = 6.0, 9.0  # in, largest heights of a figure
+SLIDE_HEIGHT, PAGE_HEIGHT = 6.0, 9.0  # largest heights of a figure [in]
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +66,7 @@ class Style:
             "figure.figsize": self.size(7.0, 3.0),
             "lines.linewidth": 1.1 * self.line,
             "axes.linewidth": 0.6 * self.line,
-            "pdf.fonttype": 42,  # TrueType, embedded: journals refuse Type 3
+            "pdf.fonttype": 42,  # embedded TrueType fonts, because journals refuse Type 3
             "ps.fonttype": 42,
             "svg.fonttype": "none",
         }
@@ -76,12 +76,12 @@ PLAIN: Final = Style("", None, 1.0, PAGE_HEIGHT, SANS, "dejavusans", 9.0, 8.0, 1
 _IEEE = Style("ieee", 3.5, 0.75, PAGE_HEIGHT, SERIF, "stix", 9.0, 8.0, 1.0, direct=True)
 _MDPI = Style("mdpi", 5.45, 0.85, PAGE_HEIGHT, SERIF, "stix", 10.0, 9.0, 1.0, direct=True)
 _SLIDES = Style("slides", 6.0, 1.5, SLIDE_HEIGHT, SANS, "dejavusans", 16.0, 14.0, 1.8, direct=True)
-STYLES: Final = {  # name -> style for one column, style for two columns
+STYLES: Final = {  # styles for one column and for two columns, by name
     # IEEE Author Center, "Size requirements for graphics": 3.5 in and 7.16 in
     "ieee": (_IEEE, replace(_IEEE, width=7.16, height=0.9)),
-    # the class mdpi.cls: text of 394.36 pt, with the margin beside it 525.5 pt, of 72.27 pt an inch
+    # the class mdpi.cls: text of 394.36 pt, with the margin beside it 525.5 pt, 72.27 pt per inch
     "mdpi": (_MDPI, replace(_MDPI, width=7.27, height=0.95)),
-    # 13.33 in by 7.5 in, half of it or all of it, with room for a heading
+    # 13.33 in by 7.5 in, half of the slide or the whole slide, with space for a heading
     "slides": (_SLIDES, replace(_SLIDES, width=12.4, height=1.9, label=18.0, tick=16.0, line=2.0)),
 }
 _current: ContextVar[Style] = ContextVar("style", default=PLAIN)
@@ -93,7 +93,7 @@ def current() -> Style:
 
 
 def style(name: str, columns: int = 1) -> Using:
-    """Style of figures for a journal or a slide: figures that are made inside its `with` statement keep it.
+    """Style of figures for a journal or a slide; figures that are created inside its `with` statement keep it.
 
     Figures have the width of the column, fonts of Matplotlib (available on any computer), and text sizes for print at
     this width; names are at the ends of lines if there is space. Figures created directly with Matplotlib inside the
@@ -105,7 +105,7 @@ def style(name: str, columns: int = 1) -> Using:
         columns: Width of the figure: 1 for a column, 2 for the width of the page.
 
     Returns:
-        Context manager for a `with` statement, also a decorator; it gives the `Style` with width and sizes.
+        Context manager for a `with` statement, also a decorator; its value is the `Style` with width and sizes.
 
     Raises:
         InvalidValueError: If the style does not exist, or `columns` is not 1 or 2.

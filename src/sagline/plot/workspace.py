@@ -33,18 +33,18 @@ if TYPE_CHECKING:
 
 POINTS: Final = 200  # grid points along the longer side
 LINES: Final = 5  # largest number of contour lines of the margin, approximately
-ROOM: Final = 11.0  # pt: a region whose largest width is below twice this has no name
+ROOM: Final = 11.0  # [pt], a region whose largest width is below twice this has no name
 OUTSIDE: Final = to_rgba(GAP_COLOR, 0.35)
 BESIDE: Final = 1e-6  # offset of the slice, as a share of the distance to the end of the box
 PALE: Final = 0.45  # share of a region's color, mixed with white
-Key = tuple[int, int]  # criterion, as an index, and cable
+Key = tuple[int, int]  # index of the criterion, and cable
 Color = tuple[float, float, float]
 HALO: Final = [patheffects.withStroke(linewidth=2.2, foreground="white")]
 NEAR_SIDE, FAR_SIDE = 0.5, 0.22  # opacity of the hull in front of and behind the robot
 FINEST: Final = 90  # cells along the longest side of the drawn hull; more are slow and not visible
-HEIGHT, ZOOM = 3.4, 1.0  # in; and size of the robot in its axes
+HEIGHT, ZOOM = 3.4, 1.0  # [in]; and size of the robot in its axes
 WHOLE, ROBOT, BARS = (0.0, 0.0, 1.0, 0.94), (-0.02, 0.0, 0.7, 0.96), (0.78, 0.2, 0.19, 0.6)  # axes in the sheet
-ABOVE, BELOW = (-0.05, 0.42, 1.1, 0.52), (0.2, 0.1, 0.75, 0.3)  # axes in a narrow sheet
+ABOVE, BELOW = (-0.05, 0.42, 1.1, 0.52), (0.2, 0.1, 0.75, 0.3)  # position of the axes in a narrow sheet
 MOST_LIMITS: Final = 10  # largest number of separate bars
 REST: Final = "others"
 
@@ -136,7 +136,7 @@ def limit_colors(space: Workspace) -> dict[Key, Color]:
 
 
 def _shade(color: tuple[int, int, int]) -> Color:
-    """As matplotlib has it."""
+    """Color in the form of matplotlib."""
     red, green, blue = color
     return red / 255.0, green / 255.0, blue / 255.0
 
@@ -172,7 +172,7 @@ def _name_region(ax: Axes, cut: Slice, within: Flags, free: Flags, name: str) ->
     """Write the name in the middle of each sufficiently large part, between lines if possible."""
     parts, count = label(within)
     figure: Any = ax.get_figure(root=True)
-    figure.draw_without_rendering()  # the size of the slice on the sheet is known after this
+    figure.draw_without_rendering()  # this computes the size of the slice on the sheet
     points = ax.bbox.width * 72.0 / figure.dpi / cut.across.size
     for part in range(1, count + 1):
         for area in ((parts == part) & free, parts == part):

@@ -1,4 +1,4 @@
-"""An HTML page of findings that needs no other file: chapters, verdicts, tables and drawings."""
+"""A self-contained HTML page of findings: chapters, verdicts, tables and drawings."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 from sagline.core.numbers import n
 from sagline.files.writing import atomic_files, create_folder, json_text
 
-SENTENCE = 40  # characters from which on a cell of a table is text
-NARROW = 3  # columns of a table beside the text
+SENTENCE = 40  # smallest number of characters in a table cell with text
+NARROW = 3  # largest number of columns of a table beside the text
 _subscript = re.compile(r"(?<=[A-Za-zα-ωΑ-Ω])_([A-Za-zα-ω0-9]{1,3}(?:,min)?)(?![A-Za-zα-ω0-9_])")
 
 
@@ -69,15 +69,15 @@ class Finding:
 
     Attributes:
         key: HTML id of the finding, and key of its numbers in the results: letters, digits and hyphens.
-        figures: Numbers of the article's figures that it redoes.
-        tables: Numbers of the article's tables that it redoes.
+        figures: Numbers of the article's figures that the finding repeats.
+        tables: Numbers of the article's tables that the finding repeats.
         title: A few words.
         statement: Statement of the article, with figure or equation; empty if there is none.
-        measured: Our result.
+        measured: The computed result.
         verdict: Verdict on the statement.
         panels: Drawings.
         data: Tables.
-        numbers: The numbers behind it, plain: they go into the JSON file.
+        numbers: The unformatted numbers of the finding, for the JSON file.
     """
 
     key: str
@@ -98,7 +98,7 @@ class Chapter:
 
     Attributes:
         key: Name of the chapter.
-        title: Its heading.
+        title: Heading of the chapter.
         lead: Topic of the chapter.
         findings: Findings of the chapter.
     """
@@ -109,7 +109,7 @@ class Chapter:
     findings: tuple[Finding, ...]
 
 
-MANY = {  # verdicts of more than one finding
+MANY = {  # verdicts on more than one finding
     Verdict.HOLDS: "hold",
     Verdict.HOLDS_WITHIN: "hold within limits",
     Verdict.FAILS: "do not hold",

@@ -26,9 +26,9 @@ from sagline.workspaces.space import Workspace
 if TYPE_CHECKING:
     from sagline.core.arrays import Array
 
-MOST_GAPS = 5  # that are listed
+MOST_GAPS = 5  # largest number of listed items
 MOST_MODES = 8
-LAST = 1.0  # s at the end of a simulation, of which the residual vibration is taken
+LAST = 1.0  # time at the end of a simulation for the residual vibration [s]
 
 
 class Row(NamedTuple):
@@ -36,9 +36,9 @@ class Row(NamedTuple):
 
     Attributes:
         key: Name in JSON, with the unit.
-        label: Words for people.
+        label: Label for readers.
         value: Value in JSON.
-        text: Value for people, with the unit; "" if only programs need it.
+        text: Text of the value for readers, with the unit; "" for values for programs only.
     """
 
     key: str
@@ -53,7 +53,7 @@ class Summary(NamedTuple):
     Attributes:
         title: Type and name of the object.
         verdict: Verdict in one line.
-        good: True or False if the verdict is one; None for neither.
+        good: True for a good verdict, False for a bad one; None for a neutral one.
         notes: Further lines.
         rows: Values.
     """

@@ -1,4 +1,4 @@
-"""Servers of the data blocks of a twin, one for each group; base class of all protocols."""
+"""Servers of the data blocks of a twin, one server per group; base class of all protocols."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LOOPBACK: Final = "127.0.0.1"
 
 
 class BlockServers(ABC):
-    """Data blocks of all PLCs, which any client may read and write.
+    """Servers of the data blocks of all PLCs, which any client may read and write.
 
     Attributes:
         addresses: "host:port" of each group.
@@ -35,14 +35,14 @@ class BlockServers(ABC):
             raise
 
     def publish(self, blocks: Sequence[bytes | None]) -> None:
-        """Replace DB101 of each group in one step; None leaves it as it is."""
+        """Replace DB101 of each group in one step; None does not change it."""
         for group, block in enumerate(blocks):
             if block is not None:
                 with self._locked(group, FROM_PLC):
                     self._memory[group][FROM_PLC][:] = block
 
     def written(self) -> list[tuple[bytes, bytes]]:
-        """Contents of DB102 and DB103 of each group; claims are erased, as a PLC does after reading."""
+        """Contents of DB102 and DB103 of each group; claims are then erased, as in a PLC."""
         found = []
         for group, memory in enumerate(self._memory):
             with self._locked(group, TO_PLC):
@@ -59,7 +59,7 @@ class BlockServers(ABC):
 
     @abstractmethod
     def _listen(self, group: int, host: str, port: int) -> int:
-        """Start the server of a group; its port."""
+        """Start the server of a group; returns its port."""
 
     @abstractmethod
     def _locked(self, group: int, block: Block) -> AbstractContextManager[object]:
@@ -74,7 +74,7 @@ def _check_free(host: str, port: int) -> str:
             number = socket.gethostbyname(host)
             probe.bind((number, port))
             probe.listen()
-        except (OSError, OverflowError, ValueError, TypeError) as error:  # the last two if it is not a name
+        except (OSError, OverflowError, ValueError, TypeError) as error:  # the last two are for invalid names
             reason = getattr(error, "strerror", None) or str(error)
             raise InvalidValueError(
                 "address of the twin",

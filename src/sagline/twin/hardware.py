@@ -13,7 +13,7 @@ from sagline.robot.drum import drum_lever
 from sagline.robot.robot import Robot
 from sagline.twin.start import Start
 
-FILTER: Final = 0.05  # s, time constant of the PLCs' filters of load cells
+FILTER: Final = 0.05  # time constant of the PLCs' filters of load cells [s]
 LENGTH, RATE, TORQUE, CELL, FILTERED = range(5)  # rows of the readings
 
 
@@ -21,9 +21,10 @@ class Hardware:
     """Drives, sensors and plant.
 
     Attributes:
-        read: Readings at the end of a period, shape (5, m). Rows: LENGTH, unstrained, off nominal drums at the encoder
-            counts [m]; RATE, its mean rate over the period [m/s]; TORQUE of the motors at their shafts, positive in the
-            direction that lets cable out [N m]; CELL, readings of the load cells [N]; FILTERED, the same, filtered [N].
+        read: Readings at the end of a period, shape (5, m). Rows: LENGTH, unstrained lengths off the nominal drums from
+            the encoder counts [m]; RATE, mean rates of these over the period [m/s]; TORQUE, torques of the motors at
+            their shafts, positive in the direction that lets cable out [N m]; CELL, readings of the load cells [N];
+            FILTERED, filtered readings [N].
         counts: Encoder counts, whole numbers as floats, shape (m,).
     """
 
@@ -37,7 +38,7 @@ class Hardware:
         self._full = np.full(m, np.inf) if winch.load_cell_range is None else winch.load_cell_range
         self._lever = drum_lever(robot, reading.length) / np.abs(winch.gear)
         self._weight, self._gravity, self._slip = np.zeros(6), robot.gravity, np.zeros(m)
-        self._wrong: dict[int, tuple[float, float]] = {}  # faulty load cells: factor of the reading, and offset [N]
+        self._wrong: dict[int, tuple[float, float]] = {}  # factor of the reading of faulty load cells, and offset [N]
         self._powered, self._torque_of_force = [False] * m, np.zeros(m)
         self._periods, self._shares = np.full(m, period), np.full(m, period / (FILTER + period))
         self._load_changed = True  # True if the simulator needs the new load
@@ -104,7 +105,7 @@ class Hardware:
         self._simulator.cut(cable)
 
     def shift_encoder(self, winch: int, length: float) -> None:
-        """Shift the count of an encoder by a length of cable [m]; its drive winds this length in."""
+        """Shift the count of an encoder by a length of cable [m]; the drive then winds in this length."""
         slip = np.rint(length * self._nominal.per_meter[winch])
         self._slip[winch] += slip
         self._simulator.shift(-slip / self._true.per_meter[winch], winch)

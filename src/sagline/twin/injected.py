@@ -17,15 +17,15 @@ class _FaultKind(NamedTuple):
     """One kind of fault."""
 
     item: str  # kind of part ("cell")
-    words: str  # fault text, with # in place of its value
+    words: str  # text of the fault, with # in place of its value
     sense: str  # meaning as text
     unit: str = ""  # unit of the value, in texts
-    scale: float = 1.0  # of the value, to SI
+    scale: float = 1.0  # factor from the unit of the value to SI
     for_good: bool = False  # True if the fault cannot end without a reset
 
     @property
     def numbered(self) -> bool:
-        """True if a machine has several such parts, distinguished by a number."""
+        """True if a machine has several parts of this kind, distinguished by a number."""
         return self.item in ("cell", "cable", "encoder", "servo", "group")
 
 
@@ -59,7 +59,7 @@ KINDS: Final = MappingProxyType(
         )
     }
 )
-TINY: Final = 1e-9  # s, of rounding
+TINY: Final = 1e-9  # tolerance for rounding of times [s]
 _TAIL: Final = re.compile(r"(?: at (?P<time>\S+) s)?(?: for (?P<duration>\S+) s)?$")
 _NUMBER: Final = r"(?P<value>\S+)"
 
@@ -95,9 +95,9 @@ def fault(text: str) -> Injected:
     """A fault from its text.
 
     Args:
-        text: Part with its number (from 0), fault and time: "cell 3 sticks at 40 s", "group 2 is silent at 12.5 s for
-            0.2 s". Without a time the fault begins at the start; without a duration it does not end. All kinds:
-            `sl.twin.KINDS`.
+        text: Part with its number (from 0), fault and time, for example "cell 3 sticks at 40 s" or "group 2 is silent
+            at 12.5 s for 0.2 s". Without a time, the fault begins at the start. Without a duration, it does not end.
+            `sl.twin.KINDS` lists all kinds.
 
     Returns:
         The fault.
@@ -133,7 +133,7 @@ def fault(text: str) -> Injected:
 
 
 def _unknown(text: str, what: str) -> InvalidValueError:
-    """Error for unknown words, which lists the words for that item, or the items."""
+    """Error for unknown words, with a list of the words for the item, or of the items."""
     items = sorted({kind.item for kind in KINDS.values()})
     first = what.split(" ")[0] if what else ""
     item = next((item for item in items if item.split(" ")[0] == first), None)

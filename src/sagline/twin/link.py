@@ -13,14 +13,14 @@ from sagline.core.arrays import Array, number
 from sagline.core.errors import InvalidValueError
 from sagline.twin.plc_program import Order
 
-TINY: Final = 1e-9  # s, of rounding
+TINY: Final = 1e-9  # tolerance for rounding of times [s]
 
 
 class Network:
     """Delay, jitter and losses of messages.
 
     Attributes:
-        ideal: Whether each message arrives at once.
+        ideal: True if each message arrives without delay.
     """
 
     def __init__(self, delay: float, jitter: float, loss: float, seed: int) -> None:
@@ -42,7 +42,7 @@ class Network:
 
 
 class DelayLine:
-    """Messages that have been sent in one direction and have not arrived."""
+    """Messages in one direction that have been sent but have not arrived."""
 
     def __init__(self, network: Network) -> None:
         """Begin without messages."""
@@ -50,7 +50,7 @@ class DelayLine:
         self._messages: list[tuple[float, int, Any]] = []
 
     def send(self, now: float, message: Any) -> None:
-        """Send a message; now [s]."""
+        """Send a message; now: time [s]."""
         if (arrival := self._network.arrival(now)) is not None:
             self._sent += 1
             heappush(self._messages, (arrival, self._sent, message))
@@ -64,10 +64,10 @@ class DelayLine:
         return found
 
 
-FIRST: Final = 2  # index of the first array of `PlcBlocks` with a column for each group rather than each winch
+FIRST: Final = 2  # index of the first array of `PlcBlocks` with one column per group instead of one per winch
 
-COUNTS, STATE, DRIVE_FAULT = range(3)  # rows of the second
-COUNTER, OWNER, ECHO, STATUS, FAULT = range(5)  # rows of the third
+COUNTS, STATE, DRIVE_FAULT = range(3)  # rows of the second array
+COUNTER, OWNER, ECHO, STATUS, FAULT = range(5)  # rows of the third array
 
 
 class PlcBlocks:
@@ -99,25 +99,25 @@ class PlcBlocks:
 
 
 class Report(NamedTuple):
-    """Content of the block of one group, for a server.
+    """Content of the block of one group, in the form for a server.
 
     Attributes:
         counter: Block counter, at the beginning of the block.
-        counter_again: The same at its end; it differs where the block is torn.
-        foreign: Whether the block is of another program.
+        counter_again: Block counter at the end of the block; it differs from `counter` in an incomplete block.
+        foreign: True if the block belongs to another program.
         plc_time: Clock of the PLC [s].
         owner: Owner of the grant.
         echo: Counter of the last accepted command.
         status: Bits of `GroupStatus`.
         fault: Code of `GroupFault`.
         length: Lengths of the group's winches [m].
-        rate: Their rates [m/s].
+        rate: Rates of these lengths [m/s].
         torque: Torques of the motors [N m].
         tension: Readings of the load cells [N].
-        filtered: The same, filtered [N].
+        filtered: Filtered readings of the load cells [N].
         counts: Encoder counts.
         state: Codes of `WinchState`.
-        winch_fault: The drives' own codes.
+        winch_fault: Fault codes of the drives.
     """
 
     counter: int
@@ -138,7 +138,7 @@ class Report(NamedTuple):
     winch_fault: list[int]
 
 
-HISTORY: Final = 100  # earlier blocks that the fault "goes back" can send
+HISTORY: Final = 100  # earlier blocks, which the fault "goes back" can send
 
 
 class _Driven(Protocol):
@@ -164,7 +164,7 @@ class _Driven(Protocol):
 
 
 class MachineLink:
-    """`Link` to a machine in the same process, without delays and threads of its own."""
+    """`Link` to a machine in the same process, without own delays and threads."""
 
     def __init__(self, machine: _Driven, network: Network, moves: bool) -> None:
         """Begin without data of any group; use `Machine.link`."""
@@ -190,7 +190,7 @@ class MachineLink:
 
     @property
     def period(self) -> float:
-        """Time between two commands [s], by which an exchange advances the machine."""
+        """Time between two commands [s]; each exchange advances the machine by this time."""
         return self._machine.period
 
     def exchange(self, command: Command | None) -> Sample | Missing:
@@ -232,7 +232,7 @@ class MachineLink:
                     self._machine.deliver(group, message)
 
     def after(self, now: float, snapshot: PlcBlocks, spoiled: dict[int, str]) -> None:
-        """Send the blocks of the PLCs after a scan; now [s]."""
+        """Send the blocks of the PLCs after a scan; now: time [s]."""
         if self._network.ideal and not spoiled:
             self._newest, self._owner = [snapshot] * len(self._groups), list(snapshot.owners)
             self._arrival.fill(now)
@@ -263,7 +263,7 @@ class MachineLink:
         return [snapshot, snapshot] if how == "doubles" else [snapshot, held] if held is not None else [snapshot]
 
     def _take(self, group: int, arrival: float, block: PlcBlocks | None) -> None:
-        """Accept a block, if it is valid and newer than the one before."""
+        """Accept a block, if it is valid and newer than the previous block."""
         known = self._newest[group]
         if block is None or (known is not None and not newer(block.counter(group), known.counter(group))):
             self._discarded[group] += 1
@@ -292,7 +292,7 @@ class MachineLink:
         )  # fmt: skip
 
     def _mixed(self, newest: list[PlcBlocks]) -> tuple[Any, ...]:
-        """Arrays composed of the newest block of each group."""
+        """Arrays with the newest block of each group."""
         found = tuple(array.copy() for array in newest[0].arrays)
         for group, (part, block) in enumerate(zip(self._parts, newest, strict=True)):
             for k, (array, own) in enumerate(zip(found, block.arrays, strict=True)):

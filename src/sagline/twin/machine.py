@@ -34,7 +34,7 @@ from sagline.twin.link import (
 from sagline.twin.plc_program import Order, PlcLimits, Program
 from sagline.twin.start import check_step, initial_state, winch_limits
 
-LOSSES: Final = Damping(loss_time=1e-3, air_damping=0.2)  # assumed; 2 N s/m of air damping on the prototype
+LOSSES: Final = Damping(loss_time=1e-3, air_damping=0.2)  # assumed damping; 2 N s/m of air damping on the prototype
 MOST_SEED: Final = 2**63 - 1
 LARGEST_ID: Final = 2**32 - 1
 RIVAL: Final = 2**31 - 2  # id of a controller that takes a grant without permission
@@ -45,17 +45,17 @@ class Machine:
     """Simulated machine in steps of one period, driven by a controller or through a server.
 
     A controller in the same process uses `link`; each exchange advances the machine by a period. A server for other
-    processes calls, in every period:
+    processes makes these calls in every period:
 
         machine.claim(group, owner)      # if a claim was written
         machine.take(group, command)     # command in the group's block, for its own winches only
         machine.advance()
         machine.report(group)            # present block of the group; None: leave the block unchanged
 
-    Each PLC runs its program at the beginning of a period and converts set points to counts with the nominal drums; its
-    drives move linearly until the end of the period; the true drums convert counts to cable. The inner control loops
-    act on the drum angles every millisecond, without the resolution of the encoders (nanometers), which only readings
-    have.
+    Each PLC runs its program at the beginning of a period, and converts set points to counts with the nominal drums.
+    Its drives move linearly until the end of the period, and the true drums convert counts to cable length. The inner
+    control loops use the drum angles every millisecond without quantization. Only readings have the resolution of the
+    encoders (nanometers).
 
     Attributes:
         robot: The true robot.
@@ -84,11 +84,12 @@ class Machine:
 
         Args:
             robot: The true robot, with all data of its winches and encoders.
-            nominal: The planned robot, with whose data the PLCs count and limit; None for the true one. The difference
-                of the two `length_zero` is the zero error of an encoder; without both of them there is none.
+            nominal: The planned robot, whose data the PLCs use for counts and limits; None for the true one. The
+                difference of the two values of `length_zero` is the zero error of an encoder, which is zero if one of
+                them is missing.
             start: Pose at which the encoders were set; None for the middle of the nominal robot's test_box. The
-                platform is where the nominal lengths at this pose put it; the lengths on pulleys and the dead
-                lengths that the true robot adds are not counted.
+                platform is at the equilibrium for the nominal lengths at this pose. Additional lengths of the true
+                robot on pulleys and dead lengths are not counted.
             surveyed: True if the true platform was at this pose when the encoders were set.
             seed: Seed of noise, clocks and the network.
             period: Period of controller and PLCs [s], a whole multiple of the step.
@@ -96,12 +97,12 @@ class Machine:
             delay: Delay of every message over `link`, in each direction [s].
             jitter: Largest additional delay, uniformly distributed [s].
             loss: Share of the messages that are lost.
-            damping: Damping of the cables; None for a loss time of 1 ms, and air.
-            faults: One or several faults, as texts for `fault`, or as its results.
+            damping: Damping of the cables; None for a loss time of 1 ms and air damping.
+            faults: One or several faults, as texts for `fault` or as results of `fault`.
 
         Raises:
-            InvalidValueError: If data are missing, the step is too coarse for the robot's modes, the robot does not
-                rest there, or an argument is of the wrong kind.
+            InvalidValueError: If data are missing, the step is too coarse for the robot's modes, the robot has no
+                equilibrium there, or an argument is of the wrong kind.
 
         Examples:
             >>> import sagline as sl
@@ -162,8 +163,8 @@ class Machine:
         """Link to the machine for a controller in this process.
 
         Args:
-            moves: True if its exchanges advance the machine by a period each. Among several links, only one should do
-                so.
+            moves: True if each exchange of the link advances the machine by a period. Among several links, only one
+                should do so.
 
         Returns:
             The link: a `sagline.control.link.Link`.
@@ -185,11 +186,11 @@ class Machine:
         self.deliver(self._group(group), whole_number(owner, "owner", 0, LARGEST_ID))
 
     def take(self, group: int, command: Command) -> None:
-        """Send a command to a PLC, which checks its counter and its owner.
+        """Send a command to a PLC, which checks the counter and the owner of the command.
 
         Args:
             group: Index of the group, from 0.
-            command: Command whose arrays are of the group's winches only.
+            command: Command with arrays for the winches of the group only.
 
         Raises:
             InvalidValueError: If the group does not exist, or the command is of another type or for other winches.
@@ -225,7 +226,7 @@ class Machine:
             self._programs[group].take(message)
 
     def advance(self) -> None:
-        """Simulate one period: due faults, scans of the PLCs, drives and plant, and readings at its end."""
+        """Simulate one period: due faults, scans of the PLCs, drives and plant, and readings at the end."""
         now = self.time
         if self._schedule.waiting:
             self._apply_due_faults()
@@ -301,7 +302,7 @@ class Machine:
         """Inject a fault.
 
         Args:
-            what: Text for `fault`, or its result. A fault whose time has passed begins immediately.
+            what: Text for `fault`, or a result of `fault`. A fault whose time has passed begins immediately.
 
         Raises:
             InvalidValueError: If the fault does not exist, or the machine has no such part.
@@ -314,7 +315,7 @@ class Machine:
         self._schedule.plan(found)
 
     def _apply_due_faults(self) -> None:
-        """Begin and end the faults that are due."""
+        """Begin and end the due faults."""
         for begins, what in self._schedule.due(self.time):
             self._apply_fault(what, begins)
 
@@ -365,7 +366,7 @@ class Machine:
 
 
 def _each_fault(faults: Any) -> Iterable[Any]:
-    """Iterable of faults, of one or several."""
+    """Iterable of one or several faults."""
     if isinstance(faults, str | Injected):
         return (faults,)
     if isinstance(faults, Iterable):

@@ -1,4 +1,4 @@
-"""Modbus servers of a twin, all in one thread, with the same data blocks as over S7."""
+"""Modbus servers of a twin, all in one thread, with the same data blocks as the S7 servers."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class ModbusServers(BlockServers):
             count: int,
             registers: list[int],
             values: list[int] | list[bool] | None,
-        ) -> ExcCodes | None:  # pymodbus calls it, by these names; values are to be written, None: read
+        ) -> ExcCodes | None:  # pymodbus calls this function with these names; values: data to write, None for reading
             with self._locks[group]:
                 for block, data in self._memory[group].items():
                     first, end = block.register, block.register + block.size // 2

@@ -1,6 +1,7 @@
 """Program in the PLC of one group: grant, heartbeat, ramp, limits, hold.
 
-The SCL source does the same, line by line. Numbers here are plain ones: a scan costs microseconds.
+The SCL source has the same statements in the same order. The program uses plain numbers, so that a scan takes
+microseconds.
 """
 
 from __future__ import annotations
@@ -20,11 +21,11 @@ from sagline.control.link import (
     newer,
 )
 
-FOLLOWING: Final = 0.01  # m, between set point and encoder: the controller stops at half of it
-TINY: Final = 1e-9  # m and s: rounding
-LEFT: Final = 0.1  # m: least free cable
+FOLLOWING: Final = 0.01  # largest distance between set point and encoder [m]; the controller stops at half of it
+TINY: Final = 1e-9  # tolerance for rounding [m] and [s]
+LEFT: Final = 0.1  # shortest free cable [m]
 
-# plain numbers: Python compares them ten times as fast as members of an enumeration
+# plain numbers, which Python compares ten times as fast as members of an enumeration
 _EMERGENCY: Final = int(GroupStatus.EMERGENCY | GroupStatus.LOCKED | GroupStatus.BRAKED)
 _LOCKED: Final = int(GroupStatus.READY | GroupStatus.LOCKED | GroupStatus.BRAKED)
 _READY, _BRAKED, _RAMPING = int(GroupStatus.READY), int(GroupStatus.BRAKED), int(GroupStatus.RAMPING)
@@ -62,13 +63,14 @@ class Program:
     Attributes:
         owner: Owner of the grant, 0 for none.
         echo: Counter of the last accepted command, 0 before the first.
-        fault: Reason of an automatic stop; a command to hold acknowledges it after the ramp and at least 100 ms.
-        powered: Whether each drive has power and its brake is released.
+        fault: Reason of an automatic stop. A command to hold acknowledges it after the end of the ramp, and after at
+            least 100 ms.
+        powered: True for each drive that has power and a released brake.
         length: Set points at the end of the scan's period [m].
         tension: Expected tensions at the drums [N].
         drive_fault: Fault codes of the drives, 0 for none.
-        emergency: Whether the emergency stop is pressed.
-        locked: Whether the drums are locked until the operator releases them.
+        emergency: True if the emergency stop is pressed.
+        locked: True if the drums are locked until the operator releases them.
     """
 
     def __init__(self, limits: PlcLimits, period: float) -> None:
@@ -78,39 +80,39 @@ class Program:
         self.winches = range(count)
         self.owner, self.echo, self.fault = 0, 0, GroupFault.NONE
         self.powered = [False] * count
-        self._loaded = [False] * count  # whether each drive has built up its tension
+        self._loaded = [False] * count  # True for each drive that has built up its tension
         self.length, self.tension = [0.0] * count, [0.0] * count
         self.drive_fault = [0] * count
         self.emergency = self.locked = False
         self._order: Order | None = None
         self._fresh = False
-        self._moved = -OWNER_TIMEOUT  # when the command counter moved last
+        self._moved = -OWNER_TIMEOUT  # time of the last change of the command counter [s]
         self._target = [0.0] * count  # set points of the last command, or lengths of the drives [m]
         self._rate = [0.0] * count
         self._ramp = 0.0  # remaining time of the ramp [s]
-        self._left = 0.0  # remaining time of the cycle after a command, at whose end its set points are reached [s]
+        self._left = 0.0  # remaining time [s] until the set points of the last command are reached
         self._now = self._since = 0.0  # times of this scan, and of the scan of the fault [s]
         self._mode = _LEAVE
 
     def claim(self, owner: int, now: float) -> None:
-        """Grant ownership if it is free, or the owner's counter has not changed for OWNER_TIMEOUT; now [s]."""
+        """Grant ownership if it is free, or if the owner's counter has not changed for OWNER_TIMEOUT; now: time [s]."""
         if owner > 0 and owner != self.owner and (not self.owner or now - self._moved >= OWNER_TIMEOUT - TINY):
             self.seize(owner, now)
 
     def seize(self, owner: int, now: float) -> None:
-        """Grant ownership in any case."""
+        """Grant ownership without conditions."""
         self.owner, self.echo, self._moved = owner, 0, now
         self._order, self._fresh = None, False
         if any(self._rate) and not self._ramp:
             self._stop(GroupFault.HEARTBEAT)
 
     def take(self, order: Order) -> None:
-        """Accept a command if it is the owner's and newer than the last one."""
+        """Accept a command if it is from the owner and newer than the last one."""
         if self.owner and order.owner == self.owner and (not self.echo or newer(order.counter, self.echo)):
             self.echo, self._order, self._fresh = order.counter, order, True
 
     def reset(self) -> None:
-        """Release the drums and clear the drive faults, as the operator does; the brakes stay on."""
+        """Release the drums and clear the drive faults, like the operator; the brakes remain on."""
         self.emergency = self.locked = False
         self.drive_fault = [0] * len(self.drive_fault)
         self.fault, self._order = GroupFault.NONE, None
@@ -128,7 +130,7 @@ class Program:
         self._stop(GroupFault.DRIVE)
 
     def scan(self, now: float, encoder: list[float], cell: list[float]) -> None:
-        """Set the drives for the next period; now [s], encoder [m], cell [N]."""
+        """Set the drives for the next period; now: time [s], encoder [m], cell [N]."""
         order, fresh, waited, self._now = self._order, self._fresh, now - self._moved, now
         if fresh and order is not None:
             self._fresh, self._moved = False, now
@@ -147,7 +149,7 @@ class Program:
             self._brake()
             return
         if self._lags(encoder):
-            if self.fault == GroupFault.FOLLOWING_ERROR:  # at its own position: it does not hold
+            if self.fault == GroupFault.FOLLOWING_ERROR:  # set point at the drive's own position: no hold
                 self.locked = True
                 self._brake()
                 return
@@ -222,7 +224,7 @@ class Program:
         self._slow_down(cell)
 
     def _valid_tensions(self, tension: list[float]) -> list[float]:
-        """Expected tensions; where one is outside its limits, the one before."""
+        """Expected tensions; a tension outside its limits is replaced by the previous one."""
         rows = zip(tension, self.tension, self.limits.tension, strict=True)
         return [new if 0.0 <= new <= most and isfinite(new) else old for new, old, most in rows]
 
@@ -231,7 +233,7 @@ class Program:
         least, most, speed, tightest = self.limits
         lengths, rates, tensions, before = order.length, order.rate, order.tension, self._target
         self._mode, self._ramp = _FOLLOW, 0.0
-        waited = max(waited, 0.0) + PERIOD  # the command before may have been late, and this one not
+        waited = max(waited, 0.0) + PERIOD  # the previous command may have been late, but not this one
         for i in self.winches:
             length, fastest = lengths[i], speed[i]
             if self.powered[i]:
@@ -254,7 +256,7 @@ class Program:
     def _drive(self, cell: list[float]) -> None:
         """Advance the set points by a scan, unless this winds in a cable beyond its tension limit.
 
-        They reach those of the last command linearly within one cycle, and continue at its rates.
+        They move linearly to those of the last command within one cycle, and then continue at its rates.
         """
         limit, length, powered, target, rate = self.limits.tension, self.length, self.powered, self._target, self._rate
         left, period, moved = self._left, self.period, []
@@ -268,7 +270,7 @@ class Program:
                     at += (target[i] - at) * period / left
                 else:
                     at = target[i] + rate[i] * beyond
-                if not cell[i] <= limit[i] and at < length[i]:  # NaN counts as too much
+                if not cell[i] <= limit[i] and at < length[i]:  # NaN counts as too large
                     self._stop(GroupFault.OVER_TENSION)
                     self._slow_down(cell)
                     return
@@ -298,7 +300,7 @@ class Program:
 
     @property
     def _was_reported(self) -> bool:
-        """True if the ramp is over, and the fault has been reported for a heartbeat."""
+        """True if the ramp has ended, and the fault has been reported for a heartbeat."""
         return not self._ramp and self._now - self._since >= HEARTBEAT - TINY
 
     @property
@@ -318,7 +320,7 @@ class Program:
         return ready | _FOLLOWING if self._mode == _FOLLOW else ready
 
     def states(self, saturated: list[float]) -> tuple[list[int], list[int]]:
-        """Codes of `WinchState`, from drives at a limit, and the drives' own codes."""
+        """Codes of `WinchState`, from flags of drives at a limit and the drives' fault codes."""
         states = [WinchState.SATURATED if full else WinchState.ENABLED for full in saturated]
         for i in self.winches:
             if self.drive_fault[i]:

@@ -17,7 +17,7 @@ from sagline.twin.block_servers import LOOPBACK, BlockServers
 
 
 class _S71200(Server):
-    """Server that grants no larger PDU than an S7-1200, and can close its connections."""
+    """Server that does not grant larger PDUs than an S7-1200, and can close its connections."""
 
     def __init__(self) -> None:
         """Begin without connections."""
@@ -44,7 +44,7 @@ class _S71200(Server):
 
 
 class S7Servers(BlockServers):
-    """Data blocks of all PLCs, by PUT and GET."""
+    """Servers of the data blocks of all PLCs for PUT and GET."""
 
     def __init__(self, blocks: Sequence[bytes], host: str = LOOPBACK, port: int = 0) -> None:
         """Start the servers; arguments of `BlockServers`."""

@@ -28,7 +28,7 @@ from sagline.twin.machine import Machine
 if TYPE_CHECKING:
     from sagline.dynamics.simulation.simulator import Reading
 
-SCAN: Final = 0.005  # s, of a twin's PLCs: half a control cycle, so that no cycle reads the same block twice
+SCAN: Final = 0.005  # scan period of a twin's PLCs [s]; half a control cycle, so that each cycle reads a new block
 SILENT: Final = bytes(FROM_PLC.size)
 HALF: Final = 2**31
 MODES: Final = frozenset(Mode)
@@ -36,7 +36,7 @@ ROWS: Final = ("length", "rate", "torque", "tension", "filtered", "counts", "sta
 
 
 class Server:
-    """PLCs of a machine, each with its own address; the plant runs in real time.
+    """Servers of a machine's PLCs, each with its own address; the plant runs in real time.
 
     Attributes:
         machine: The machine.
@@ -51,14 +51,14 @@ class Server:
         """Start the servers.
 
         Args:
-            machine: Machine of the PLCs; its period is that of their scans.
+            machine: Machine of the PLCs, whose period is the scan period.
             host: Address to listen at; by default this computer only.
-            port: Port of the first group; the others follow. 0 for any that are free.
-            modbus: Whether the servers use Modbus TCP instead of S7.
+            port: Port of the first group; the others follow. 0 for any free ports.
+            modbus: True if the servers use Modbus TCP instead of S7.
 
         Raises:
             InvalidValueError: If a port is in use, or the address is not one of this computer.
-            FileError: If the package for it is not installed.
+            FileError: If the package for the protocol is not installed.
         """
         self.machine = instance(machine, Machine, "machine")
         place, first_port = instance(host, str, "host"), whole_number(port, "port", 0, LAST_PORT)
@@ -78,8 +78,8 @@ class Server:
         """Serve until interrupted.
 
         Args:
-            watch: Function of the machine's time [s] and of the true state, called after every scan; the next scan
-                overwrites the state.
+            watch: Function that is called after every scan with the machine's time [s] and the true state, which the
+                next scan overwrites.
         """
         while True:
             self._pace.wait()
@@ -106,7 +106,7 @@ class Server:
         self._servers.close()
 
     def _command(self, group: int, data: bytes) -> Command | None:
-        """Command in DB102; None if it is empty or torn."""
+        """Command in DB102; None if the block is empty or incomplete."""
         values = TO_PLC.read(data)
         if isinstance(values, Refusal):
             return None
@@ -127,7 +127,7 @@ class Server:
         )
 
     def _block(self, group: int) -> bytes | None:
-        """Block of the PLC of a group; None where a fault keeps the one before."""
+        """Block of the PLC of a group; None if a fault keeps the previous block."""
         report = self.machine.report(group)
         return None if report is None else block_of(group, report)
 
@@ -163,7 +163,7 @@ def _block_servers(blocks: list[bytes], host: str, port: int, modbus: bool) -> B
         return S7Servers(blocks, host, port)
 
 
-SWITCHING_ON: Final = 60.0  # s, at most; kernels may have to be read from the disk
+SWITCHING_ON: Final = 60.0  # longest time of the start [s]; kernels may have to be read from the disk
 
 
 class _RemoteMachine(NamedTuple):
@@ -179,7 +179,7 @@ class _RemoteMachine(NamedTuple):
 
 @contextmanager
 def machine_in_process(robot: Robot, nominal: Robot, start: Pose, *, seed: int = 0) -> Iterator[_RemoteMachine]:
-    """Context of a machine in another process, in real time; it is killed at the end."""
+    """Context of a machine in another process, in real time; the process is killed at the end."""
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe()
     place = context.Array("d", 3)
@@ -208,7 +208,7 @@ def _receive_addresses(pipe: Connection) -> tuple[str, ...]:
 
 
 def _serve(robot: Robot, nominal: Robot, start: Pose, seed: int, pipe: Connection, place: Any) -> None:
-    """Run the machine until killed; SIGINT is ignored, as the controller stops the robot first."""
+    """Run the machine until killed; SIGINT is ignored, because the controller stops the robot first."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         machine = Machine(robot, nominal=nominal, start=start, seed=seed, period=SCAN)

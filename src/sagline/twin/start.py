@@ -26,7 +26,7 @@ from sagline.twin.plc_program import LEFT, PlcLimits
 
 
 class _EncoderScale:
-    """Conversion between lengths and encoder counts, (m,): by the turns of known drums, else by one radius each.
+    """Conversion between lengths and encoder counts, (m,), from the turns of known drums, else one radius each.
 
     Attributes:
         per_meter: Counts per meter of unstrained cable let out, at the reference lengths, (m,).
@@ -73,21 +73,21 @@ class _EncoderScale:
         return found
 
 
-SHARE: Final = 0.2  # rad: largest phase of the highest mode in a step
-NEAR: Final = 1e-6  # of a period: largest deviation from whole steps
-REACH: Final = 2.0  # of the largest distance between frame anchors: longest cable, where cable_length is not known
+SHARE: Final = 0.2  # largest phase of the highest mode in a step [rad]
+NEAR: Final = 1e-6  # largest deviation from whole steps, as a share of a period
+REACH: Final = 2.0  # longest cable if cable_length is unknown, relative to the largest distance of frame anchors
 
 
 class Start(NamedTuple):
     """Machine before it is switched on."""
 
-    state: Equilibrium  # of the true robot
-    nominal: _EncoderScale  # scale of the encoders in the PLCs
-    true: _EncoderScale  # true scale
+    state: Equilibrium  # equilibrium of the true robot
+    nominal: _EncoderScale  # conversion of the encoders in the PLCs
+    true: _EncoderScale  # true conversion of the encoders
 
 
 def initial_state(true: Robot, nominal: Robot, start: Any, surveyed: bool) -> Start:
-    """True equilibrium at the start, and encoder scales there."""
+    """True equilibrium at the start, and conversions of the encoders."""
     pose = _start_pose(nominal, start)
     plan = inverse(nominal, pose)
     planned = _feasible_lengths(plan.unstrained_length, nominal, "start")
@@ -101,7 +101,7 @@ def initial_state(true: Robot, nominal: Robot, start: Any, surveyed: bool) -> St
         state = inverse(true, pose).state
         _feasible_lengths(state.unstrained_length, true, "start")
     else:
-        routed = _routed_length(true, pose) - _routed_length(nominal, pose)  # on pulleys, and dead lengths: not counted
+        routed = _routed_length(true, pose) - _routed_length(nominal, pose)  # without wrapped and dead lengths
         state = _rest_at(true, planned + routed + _zero_errors(true, nominal), pose)
     return Start(state, scale, _EncoderScale(true, state.unstrained_length, counts))
 
