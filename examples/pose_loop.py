@@ -10,15 +10,11 @@ import sagline as sl
 
 PERIOD, GAIN = 0.01, 0.5  # [s], [1/s]
 planned = sl.load_robot("article-prototype")
-built = planned.replace(
-    mass=1.2 * planned.mass
-)  # the loop does not know this mass
+built = planned.replace(mass=1.2 * planned.mass)  # not in the plan
 goal = sl.Pose.from_euler([0.3, 0.2, 1.2], 0.0, 0.0, 0.0)
 plan = sl.inverse(planned, goal, tension=sl.MinimumNorm())
-start = sl.forward(
-    built, plan.unstrained_length, start=goal
-).state  # lower start
-rope = sl.Damping(loss_time=5e-3, air_damping=0.5)  # assumed weight
+start = sl.forward(built, plan.unstrained_length, start=goal).state  # lower
+rope = sl.Damping(loss_time=5e-3, air_damping=0.5)  # assumed losses
 
 
 def settle(gain: float) -> list[float]:
