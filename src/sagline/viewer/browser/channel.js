@@ -1,4 +1,4 @@
-// window.sagline: messages between page and server beside those of viser (server.py).
+// window.sagline: messages between page and server, besides those of viser (server.py).
 (() => {
   const showBanner = (lost) => {
     let banner = document.getElementById("sagline-lost");
@@ -12,14 +12,14 @@
     if (banner) banner.hidden = !lost;
   };
 
-  const handlers = new Map(); // of topics
+  const handlers = new Map(); // handlers by topic
   const latest = new Map(); // last value of each topic, for handlers that are added later
-  const topics = new Map(); // by the uuid of the element that carries them
-  const unsent = new Map(); // by topic: last message that has not been sent
+  const topics = new Map(); // topics by the uuid of their elements
+  const unsent = new Map(); // last unsent message of each topic
   let count = 0;
-  let worker, uuid; // worker that connects the client to its server; uuid of the field that carries our messages
+  let worker, uuid; // worker that connects the client to its server; uuid of the field for messages of the page
 
-  let welcome = false; // whether the server accepts messages: not before it knows our camera
+  let welcome = false; // true if the server accepts messages, that is, after it knows the camera
 
   const post = (value) =>
     worker.postMessage({ type: "send", message: { type: "GuiUpdateMessage", uuid, updates: { value } } });
@@ -41,7 +41,7 @@
       unsent.set(topic, text);
       flush();
     },
-    // Handle the values of a topic, beginning with the last one that has arrived.
+    // Handle the values of a topic, starting with the last one that has arrived.
     on(topic, handler) {
       handlers.set(topic, [...(handlers.get(topic) ?? []), handler]);
       if (latest.has(topic)) handler(latest.get(topic));

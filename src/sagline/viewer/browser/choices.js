@@ -1,9 +1,9 @@
-// Clicks on elements of our lists and figures with data-send="topic" and data-value.
+// Clicks on elements of lists and figures with data-send="topic" and data-value.
 (() => {
   const choiceAt = (element) => element?.closest?.("[data-send]")?.dataset;
   const choose = ({ send, value }) => window.sagline.send(send, value);
 
-  // Press and release on the same choice: a list that is replaced in between gives no click event.
+  // A choice is a press and a release on the same element, because a list that is replaced in between gives no click event.
   let pressed;
   document.addEventListener("pointerdown", (event) => {
     pressed = event.button === 0 ? choiceAt(event.target) : undefined;

@@ -1,4 +1,4 @@
-// Copies are shown in a dialog and written to the clipboard if the browser allows it; else the text is selected.
+// Copies: the text is shown in a dialog, and written to the clipboard if the browser allows it; else it is selected.
 (() => {
   const HEADS = { code: "Python code of this state", link: "Link to this state" };
 
@@ -11,7 +11,7 @@
       await navigator.clipboard.writeText(area.value);
       status.textContent = "Copied to the clipboard.";
     } catch {
-      const done = document.execCommand("copy"); // pages of other computers have no clipboard interface
+      const done = document.execCommand("copy"); // pages from other computers have no clipboard interface
       status.textContent = done ? "Copied to the clipboard." : "The browser refuses: copy the selected text.";
     }
   };

@@ -1,4 +1,4 @@
-// Our dialogs: sagline.dialog(name, head, make) opens a dialog, which is made at its first use, and returns it.
+// Dialogs: sagline.dialog(name, head, make) opens and returns a dialog, which is created at its first use.
 (() => {
   window.sagline.dialog = (name, head, make) => {
     let dialog = document.getElementById(`sagline-${name}`);

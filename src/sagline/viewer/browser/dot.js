@@ -1,6 +1,6 @@
 // The dot in the drawing of the feasible tensions (features/tensions.py), moved by mouse, finger and arrow keys.
 (() => {
-  const STEP = 0.01; // of the drawing; ten times as far with the shift key
+  const STEP = 0.01; // share of the drawing; ten times as far with the shift key
   const KEYS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
   const field = () => document.querySelector("svg[data-dot]");
   const handle = () => document.querySelector("svg[data-dot] .handle");
@@ -15,8 +15,8 @@
     waiting = undefined;
   };
 
-  // Coordinates of the null space under a pointer. The drawing is replaced while the dot moves, so the one at the start
-  // of the drag is kept.
+  // Coordinates of the null space under a pointer. The drawing is replaced while the dot moves; the coordinates therefore
+  // refer to the drawing at the start of the drag.
   let drag;
   const coordinates = (event) => {
     const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(drag.inverse);

@@ -1,4 +1,4 @@
-// Our changes of the page of viser: sagline.dress(work) calls work whenever the page has changed.
+// Changes to the page of viser: sagline.dress(work) calls work whenever the page has changed.
 (() => {
   const works = [];
   let due = false;
@@ -16,7 +16,7 @@
   };
   new MutationObserver(soon).observe(document, { subtree: true, childList: true });
 
-  // Send a request that the server answers under "topic-reply", to this page alone.
+  // Send a request, which the server answers to this page only, under "topic-reply".
   let count = 0;
   const page = Math.random().toString(36).slice(2);
   window.sagline.ask = (topic, text, answered) => {

@@ -2,7 +2,7 @@
 (() => {
   const { sagline } = window;
   let film; // the film that is being recorded
-  let clock; // of the next picture
+  let clock; // text of the clock in the next picture
 
   const panel = (about) => {
     const box = document.createElement("div");

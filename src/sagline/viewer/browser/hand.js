@@ -1,6 +1,6 @@
 // Clicks on the scene (features/cut.py), and drags of the platform with Ctrl or Cmd (features/push.py).
 (() => {
-  const SLIP = 4; // px: largest motion of a click
+  const SLIP = 4; // largest motion during a click [px]
   const scene = (event) => event.target instanceof HTMLCanvasElement;
   const place = ({ clientX, clientY }, canvas) => {
     const box = canvas.getBoundingClientRect();
@@ -8,7 +8,7 @@
   };
   const report = (phase, at, keep) => window.sagline.send("pull", { phase, at, keep });
 
-  let pull; // drag with Ctrl: pointer, canvas, position
+  let pull; // drag with Ctrl: pointer, canvas and position
   let press; // start of a possible click
   let drawn = 0;
 
@@ -31,7 +31,7 @@
       if (event.button !== 0 || !scene(event)) return;
       const canvas = event.target;
       if (event.ctrlKey || event.metaKey) {
-        swallow(event); // not for gizmo and camera
+        swallow(event); // the event does not reach gizmo and camera
         end("cancel", false);
         pull = { pointer: event.pointerId, canvas, at: place(event, canvas) };
         report("start", pull.at, false);
@@ -69,7 +69,7 @@
     },
     true,
   );
-  window.addEventListener("contextmenu", (event) => pull && swallow(event), true); // Ctrl and a click on a Mac
+  window.addEventListener("contextmenu", (event) => pull && swallow(event), true); // Ctrl-click on a Mac
   window.addEventListener("pointercancel", () => end("cancel", false));
   window.addEventListener("blur", () => end("cancel", false));
   window.addEventListener("keydown", (event) => event.key === "Escape" && end("cancel", false));

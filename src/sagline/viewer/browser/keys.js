@@ -1,4 +1,4 @@
-// Keys: they move the platform while the scene has the focus; "?" opens a list of all keys.
+// Keys that move the platform while the scene has the focus; "?" opens a list of all keys.
 (() => {
   const WAYS = {
     ArrowRight: [0, 1], ArrowLeft: [0, -1], ArrowUp: [1, 1], ArrowDown: [1, -1], PageUp: [2, 1], PageDown: [2, -1],
@@ -78,7 +78,7 @@
       event.preventDefault();
       help();
     } else if (TURNS_CAMERA.has(event.key) && event.target.closest?.("[role], button, summary, dialog")) {
-      event.stopImmediatePropagation(); // the key is for a slider or a tab
+      event.stopImmediatePropagation(); // the key belongs to a slider or a tab
     }
   });
   document.addEventListener("click", ({ target }) => {

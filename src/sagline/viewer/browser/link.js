@@ -1,6 +1,6 @@
-// The state in a link, after the number sign, is sent to the server once and removed from the address.
+// State in a link, after the number sign: it is sent to the server once and removed from the address.
 (() => {
-  const DEFAULT = "Readings"; // tab that is open if a link names none
+  const DEFAULT = "Readings"; // open tab if a link does not name a tab
   const open = () =>
     [...document.querySelectorAll('[role=tab][aria-selected="true"]')]
       .map((tab) => tab.textContent.trim())

@@ -1,4 +1,4 @@
-// A film as an MP4 file (ISO/IEC 14496-12 and -15): one track of H.264, all pictures equally long, in one chunk.
+// A film as an MP4 file (ISO/IEC 14496-12 and -15): one track of H.264 in one chunk, with pictures of equal duration.
 (() => {
   const big = (length) => (...numbers) => {
     const bytes = new Uint8Array(length * numbers.length);
@@ -25,12 +25,12 @@
   const full = (type, flags, ...parts) => box(type, u32(flags), ...parts); // version 0
 
   const MATRIX = u32(0x10000, 0, 0, 0, 0x10000, 0, 0, 0, 0x40000000);
-  const TICKS = 1000; // a picture
+  const TICKS = 1000; // ticks per picture
   const CODES = { bt709: 1, bt470bg: 5, smpte170m: 6, "iec61966-2-1": 13, "bt2020-ncl": 9 }; // ISO/IEC 23091-2
 
   const entry = ({ width, height }, { description, colorSpace }) => {
     const { primaries, transfer, matrix, fullRange } = colorSpace ?? {};
-    const codes = [primaries, transfer, matrix].map((name) => CODES[name] ?? 2); // 2: not said
+    const codes = [primaries, transfer, matrix].map((name) => CODES[name] ?? 2); // 2: not specified
     return box(
       "avc1", u16(0, 0, 0, 1), u32(0, 0, 0, 0), u16(width, height), u32(0x480000, 0x480000, 0), u16(1),
       new Uint8Array(32), u16(24, 0xffff),
@@ -71,7 +71,7 @@
     return box("moov", header, box("trak", track, media));
   };
 
-  // A file of samples { data, key } in the order of their times, as `config` of WebCodecs describes them.
+  // A file of samples { data, key } in the order of their times; `config` of WebCodecs describes them.
   window.sagline.mp4 = (about, samples, config) => {
     const head = box("ftyp", letters("isom"), u32(512), letters("isomiso2avc1mp41"));
     const before = head.length + movie(about, samples, config, 0).length + 8;

@@ -1,4 +1,4 @@
-// Names, roles and keys for elements of viser that have none, from adjacent labels, icons and figures.
+// Names, roles and keys for unnamed elements of viser, from adjacent labels, icons and figures.
 (() => {
   const ICONS = {
     adjustments: "Settings of the page",
@@ -28,7 +28,7 @@
       const several = AXES[row.querySelectorAll(".mantine-NumberInput-input").length] ?? [];
       for (const [i, field] of unnamed.entries()) {
         set(field, "aria-label", several[i] ? `${label.textContent}, ${several[i]}` : label.textContent);
-        field.sagline = true; // a name of ours, which follows the label
+        field.sagline = true; // a name from the label, which follows its changes
       }
     }
     for (const field of document.querySelectorAll(FIELDS)) {
@@ -45,7 +45,7 @@
       button.sagline = true;
     }
   };
-  // Make an element that reacts to clicks a button for the keyboard.
+  // Turn an element that reacts to clicks into a button for the keyboard.
   const press = (element, expanded) => {
     set(element, "role", "button");
     set(element, "tabindex", "0");
@@ -94,7 +94,7 @@
       set(canvas, "aria-hidden", "true"); // overlay of the scene during a selection of a rectangle
     }
   };
-  // Folded content has zero height, but could still be reached by keys.
+  // Folded content has zero height, but keys could still reach it.
   const folded = () => {
     for (const box of document.querySelectorAll('[style*="grid-template-rows"]')) {
       const hidden = /grid-template-rows:\s*0fr/.test(box.getAttribute("style"));

@@ -4,7 +4,7 @@
   const PIXEL =
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mP8z8BQDwAEhQGAhKmMIQAAAABJRU5ErkJggg==";
   const pixel = () => Uint8Array.from(atob(PIXEL), (character) => character.charCodeAt(0));
-  let keeper; // function of each picture, a blob; its promise ends when the picture is processed
+  let keeper; // function that is called with each picture (a blob); its promise ends when the picture is processed
 
   window.Worker = class extends window.Worker {
     postMessage(data, ...rest) {
@@ -17,7 +17,7 @@
       super.postMessage({ ...data, message: { ...data.message, payload: pixel() } });
     }
   };
-  // Set the function that keeps the pictures, or none.
+  // Set the function that keeps the pictures, or no function.
   window.sagline.keep = (handler) => {
     keeper = handler;
   };
@@ -37,7 +37,7 @@
     }
     return ~sum >>> 0;
   };
-  // PNG with its size on paper: a chunk pHYs, dots per meter, after its header.
+  // PNG with its size on paper: a chunk pHYs with dots per meter after the header.
   const sized = async (png, dots) => {
     const chunk = new DataView(new ArrayBuffer(21));
     const each = Math.round(dots / 0.0254);

@@ -22,7 +22,7 @@
     touched = false;
     window.sagline.ask("pose", input.value, ({ refused }) => {
       showRefusal(refused ?? "");
-      if (!refused && !touched) typing = false; // keep text that was typed since then
+      if (!refused && !touched) typing = false; // keep text that was typed after the request
       show();
     });
   };

@@ -1,13 +1,13 @@
-// Films from pictures. On pages of this computer or over HTTPS the browser has an encoder, which encodes each picture
-// as it arrives; else all pictures are kept and played to its recorder at the end.
+// Films from pictures. On pages from this computer or over HTTPS, the browser has an encoder, which encodes each
+// picture when it arrives. Otherwise all pictures are stored and played to the browser's recorder at the end.
 (() => {
   const { sagline } = window;
-  const BITS = 12e6; // bits per second: cables are thin
+  const BITS = 12e6; // bits per second, high because cables are thin
   const AVC = "avc1.42E028"; // H.264 without B-frames, level 4: 1080p at 30 pictures per second
   const KEY = 30; // pictures between two key frames
   const KINDS = ["video/mp4;codecs=avc1.640028", "video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm", "video/mp4"];
   const SLICE = 200; // ms of film in each part from the recorder
-  const REST = 500; // ms of repeated drawing of the last picture: a slow recorder skips some
+  const REST = 500; // repeated drawing of the last picture [ms], because a slow recorder skips pictures
 
   const painter = (about) => {
     const canvas = Object.assign(document.createElement("canvas"), { width: about.width, height: about.height });
@@ -62,11 +62,11 @@
     let stopped = false;
     const { canvas, paint } = painter(about);
 
-    // Show each picture at its time; a slow computer skips some.
+    // Show each picture at its time; a slow computer skips pictures.
     const show = async (recorder, at) => {
       let time = 0, last = performance.now(), before = -1;
       const pause = () => {
-        if (document.hidden) recorder.pause(); // hidden pages draw nothing
+        if (document.hidden) recorder.pause(); // hidden pages do not draw
         else recorder.resume();
         last = performance.now();
       };
@@ -96,14 +96,14 @@
         pictures.push(picture);
       },
       async finish(at) {
-        await paint(pictures[0]); // else the film begins black
+        await paint(pictures[0]); // otherwise the film begins with a black picture
         const recorder = new MediaRecorder(canvas.captureStream(), { mimeType: kind, videoBitsPerSecond: BITS });
         const parts = [];
         const first = fired(recorder, "dataavailable"), ended = fired(recorder, "stop");
         recorder.addEventListener("dataavailable", ({ data }) => parts.push(data));
         recorder.start(SLICE);
-        await paint(pictures[0]); // it may have missed the picture before
-        await first; // the film stays at its first picture until the recorder runs
+        await paint(pictures[0]); // the recorder may have missed the previous drawing
+        await first; // the first picture remains until the recorder runs
         await show(recorder, at);
         recorder.stop();
         await ended;
@@ -115,7 +115,7 @@
     };
   };
 
-  // Recorder of a film of pictures { blob, clock }: the better of two that this browser has.
+  // Recorder of a film of pictures { blob, clock }: the better one of the two that this browser supports.
   sagline.filming = async (about) => {
     const { width, height, rate } = about;
     const config = { codec: AVC, width, height, bitrate: BITS, framerate: rate, avc: { format: "avc" } };

@@ -1,10 +1,10 @@
-// Spoken verdict for screen readers: when it changes or has settled, not at every update.
+// Spoken verdict for screen readers, after it has changed or the numbers have become constant, not at every update.
 (() => {
-  const SOON = 400; // ms after a change of the verdict itself
-  const RESTED = 1200; // ms without a change of the numbers
-  const APART = 2500; // ms between two sentences
+  const SOON = 400; // delay after a change of the verdict [ms]
+  const RESTED = 1200; // time without a change of the numbers [ms]
+  const APART = 2500; // shortest time between two sentences [ms]
   let present, said, saidAt = 0, timer, urgent = false;
-  let keyed = false; // moved by a key: the position is spoken too
+  let keyed = false; // true after a motion by a key, for which the position is spoken too
 
   const hidden = (id, role) => {
     let element = document.getElementById(id);

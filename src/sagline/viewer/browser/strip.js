@@ -22,7 +22,7 @@
       const at = left + share * width;
       context.fillStyle = INK;
       context.fillRect(at - 0.04 * em, top + 2.05 * em, 0.08 * em, 0.25 * em);
-      const inside = measured(context, number, 0.8 * em); // numbers at the ends stay above the bar
+      const inside = measured(context, number, 0.8 * em); // numbers at the ends remain above the bar
       const middle = Math.min(Math.max(at, left + 0.5 * inside), left + width - 0.5 * inside);
       if (middle - 0.5 * inside < taken) continue; // no space for this number
       taken = middle + 0.5 * inside + 0.4 * em;
@@ -46,7 +46,7 @@
     context.fillRect(0, top, width, strip);
     context.fillStyle = LINE;
     context.fillRect(0, top, width, Math.max(1, Math.round(0.05 * em)));
-    const beside = clock ? 9 * em : 0; // of the legend
+    const beside = clock ? 9 * em : 0; // width beside the legend
     const bar = Math.min(0.42 * width, 24 * em);
     const left = clock ? 0.5 * (width - bar) : width - bar - em;
     const until = left - 2 * em;

@@ -1,13 +1,13 @@
 // The timeline at the bottom of the page (features/timeline.py): tracks with one clock, pointing and scrubbing.
 (() => {
   const { element, fixed, ticksOf, plotOf, send, on } = window.sagline;
-  const SETTLED = 1000; // ms: the page's own time is kept until the server confirms it
-  const ON_MARK = 8; // px
+  const SETTLED = 1000; // time during which the page keeps its own clock time until the server confirms it [ms]
+  const ON_MARK = 8; // largest distance of the pointer from a mark [px]
 
-  let data; // what is played; undefined for nothing
+  let data; // data of the played motion; undefined without one
   let clock = { time: 0, playing: false, speed: 1, following: true };
   let plots = [];
-  let strip, parts; // of the page
+  let strip, parts; // elements of the page
   let dragging = false;
   let requested; // last requested time, until the server confirms it
   let spoken = 0; // last update of the text for screen readers [ms]
@@ -139,7 +139,7 @@
   };
   const happened = (time) => plots.flatMap((plot) => plot.marksAt(time, (width() * ON_MARK) / (parts.slider.clientWidth || 1)));
 
-  // Move to another time: at once here, and on the server with at most one message per frame.
+  // Move to another time: without delay on this page, and on the server with at most one message per frame.
   let soon = 0;
   const scrub = (time) => {
     const round = Number(time.toFixed(Math.min(Math.max(6 - Math.floor(Math.log10(data.duration || 1)), 0), 20))); // exactly 1.2 s
@@ -153,7 +153,7 @@
     });
   };
 
-  // Show another part of the time, for which the server sends finer columns.
+  // Show another range of time, for which the server sends finer columns.
   let nextWindow; // requested window
   let looking = 0;
   const look = (start, end) => {
@@ -174,8 +174,8 @@
     look(start + by * (end - start), end + by * (end - start));
   };
 
-  // Pointing.
-  let pointed = null; // cable
+  // Pointing at a cable.
+  let pointed = null; // cable under the pointer
   const timeAt = (event) => {
     const box = parts.slider.getBoundingClientRect();
     return data.window[0] + width() * Math.min(Math.max((event.clientX - box.left) / box.width, 0), 1);
@@ -271,7 +271,7 @@
       const act = event.altKey || event.metaKey ? undefined : KEYS[event.key];
       if (!act) return;
       event.preventDefault();
-      event.stopPropagation(); // the camera also listens
+      event.stopPropagation(); // the camera also reacts to the key
       act(event);
     });
   };

@@ -1,13 +1,13 @@
 // window.sagline.plotOf: drawing of one track of the timeline, and its values at a time.
 (() => {
-  const WIDE = 1000; // of the drawing, in its own units
+  const WIDE = 1000; // width of the drawing in its own units
   const HIGH = 100;
-  const NEAR = 12; // px: largest distance of the pointer from a selected line
+  const NEAR = 12; // largest distance of the pointer from a selected line [px]
 
   const element = (tag, { text, ...attributes } = {}, ...children) => {
     const made = document.createElement(tag);
     for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
-    if (text !== undefined) made.textContent = text; // never HTML: texts of a log are not checked
+    if (text !== undefined) made.textContent = text; // never HTML, because texts of a log are not checked
     made.append(...children);
     return made;
   };
@@ -20,7 +20,7 @@
     const text = value.toFixed(decimals);
     return Number(text) === 0 ? text.replace("-", "") : text;
   };
-  // One, two or five times a power of ten apart, at most so many, all that there are from low to high.
+  // Ticks from low to high at distances of 1, 2 or 5 times a power of ten, about `most` of them.
   const ticksOf = (low, high, most) => {
     const coarse = Math.max(high - low, 1e-12) / most;
     const power = 10 ** Math.floor(Math.log10(coarse));
@@ -30,7 +30,7 @@
     const decimals = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
     return Array.from({ length: Math.max(count, 0) }, (_, k) => [step * (first + k), fixed(step * (first + k), decimals)]);
   };
-  // The last of increasing times that is not after another; 0 before the first.
+  // Index of the last of increasing times that is not after a given time; 0 before the first.
   const indexAt = (times, time) => {
     let low = 0;
     let high = times.length;
@@ -42,7 +42,7 @@
     return low;
   };
 
-  // A track from a time to another, with values from low to high; several are named, one has its name in the bar.
+  // Plot of a track between two times, with values from low to high; `named`: with the name of the track.
   const plotOf = (track, [start, end], [low, high], named) => {
     const x = (time) => (WIDE * (time - start)) / (end - start || 1);
     const y = (value) => (HIGH * (high - value)) / (high - low);
@@ -84,7 +84,7 @@
     return {
       root,
       track,
-      // What each line is at a time, in words; a column of many samples says from where to where.
+      // Value of each line at a time as text; a column of many samples has its range.
       valuesAt(time) {
         return valuesAt(time).map(([least, most], k) => {
           const [from, to] = [least, most].map((value) => (value === null ? "–" : fixed(value, track.decimals)));
@@ -92,7 +92,7 @@
           return { name, color, dashed, text: from === to ? from : `${from} … ${to}` };
         });
       },
-      // Number of the line at a height on the screen, at a time; -1 for none.
+      // Index of the line at a height on the screen and a time; -1 if there is none.
       lineAt(time, height) {
         const box = svg.getBoundingClientRect();
         const away = valuesAt(time).map(([least, most]) => {
