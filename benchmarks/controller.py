@@ -14,7 +14,7 @@ from sagline.control.link import Command, Missing, Sample
 from tests.control.rigs import HOME, Spy, imperfect, rig
 from tests.control.tours import OFF, tour
 
-SPEED, STAND = 0.047, 3.0  # [m/s], [s], fourteen minutes through the ten poses
+SPEED, STAND = 0.047, 3.0  # speed [m/s] and stop [s]: fourteen minutes through the ten poses
 
 
 class Timed(Spy):

@@ -17,7 +17,7 @@ class _Numbers(Formatter):
     """Formatter of numbers for readers: {extent:.3g mm}, {100*share:.1f %}, {errors[2]:.2f}; texts are unchanged."""
 
     def get_field(self, field_name: str, args: Sequence[Any], kwargs: Mapping[str, Any]) -> tuple[Any, Any]:
-        """Value of a name, times a factor before it."""
+        """Value of a name, multiplied by a factor if one precedes the name."""
         factor, _, name = field_name.rpartition("*")
         value, key = super().get_field(name, args, kwargs)
         return (float(factor) * value if factor else value), key

@@ -18,7 +18,7 @@ from sagline.robot.robot import Robot
 
 
 class CalibrationStatus(Status):
-    """Status of a calibration; `text` says what to do."""
+    """Status of a calibration; `text` states the next step."""
 
     FOUND = 0, "found"
     DOUBTFUL = (

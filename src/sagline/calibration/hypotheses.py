@@ -80,7 +80,7 @@ class _TrialResult(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trial:
-    """Trials of changes of a log.
+    """Tests of possible changes of a log.
 
     Attributes:
         robot: The robot before the calibration.

@@ -10,7 +10,7 @@ from sagline.cli.ending import INTERRUPTED, exit_code_of
 
 def app_entry() -> None:
     """Run the command and end the process."""
-    for descriptor in range(3):  # if one is closed, the next opened file would get its number
+    for descriptor in range(3):  # if a standard stream is closed, the next opened file would get its number
         try:
             os.fstat(descriptor)
         except OSError:

@@ -35,7 +35,7 @@ def lengths(
     file: RunArgument,
     out: FileOption = None,
 ) -> int:
-    """Write the planned lengths of a run as CSV: one row a sample, for `sagline forward` and controllers.
+    """Write the planned lengths of a run as CSV: one row per sample, for `sagline forward` and controllers.
 
     Only feasible samples are written; stderr has the number of the others (exit code 1).
 
@@ -59,7 +59,7 @@ def encoder(
     ] = _Winding.CONSTANT,
     out: FileOption = None,
 ) -> int:
-    """Write the encoder counts of a run as CSV: one row a sample, for the drives.
+    """Write the encoder counts of a run as CSV: one row per sample, for the drives.
 
     The robot needs drum_radius, groove_pitch, counts_per_turn and length_zero of its winches, and the diameter of its
     cables. Only feasible samples are written. Exit code 1 if others exist, or if winches exceed their speed_limit or

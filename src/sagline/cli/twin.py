@@ -118,7 +118,7 @@ class TwinMonitor:
         self._next = 0.0
 
     def __call__(self, time: float, reading: Reading) -> None:
-        """Record the true state after a scan at a time [s], and print what has changed."""
+        """Record the true state after a scan at a time [s], and print all changes."""
         if self.recorder is not None:
             self.recorder.truth(time, reading.position.copy(), reading.quaternion.copy())
         if time >= self._next:

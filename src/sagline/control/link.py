@@ -16,8 +16,8 @@ Whole: TypeAlias = NDArray[np.int64]
 PERIOD: Final = 0.01  # period of the controller's cycle [s]; the article uses 100 samples per second
 GROUP_SIZE: Final = 2  # number of winches per PLC
 COUNTERS: Final = 2**31 - 1  # counters of commands and blocks run from 1 to this value, then start at 1 again
-HEARTBEAT: Final = 0.1  # [s], without a change of the command counter, until a PLC ramps its winches down and holds
-OWNER_TIMEOUT: Final = 0.5  # [s], without a change of the command counter, until another controller may take over
+HEARTBEAT: Final = 0.1  # [s], a PLC ramps its winches down and holds if the command counter is unchanged for this time
+OWNER_TIMEOUT: Final = 0.5  # [s], another controller may take over if the command counter is unchanged for this time
 RAMP: Final = 0.2  # duration of the ramp of rates to zero, here and in a PLC [s]
 
 

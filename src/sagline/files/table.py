@@ -90,7 +90,7 @@ class CsvTable:
             raise line_error(self.path, self.header, "no rows below the columns' names; allowed: at least one")
 
     def refuse(self, wrong: NDArray[np.bool_], item: str, values: Array, unit: str, allowed: str) -> None:
-        """Refuse the first row that is wrong; the message gives its line, its value with unit, and what is allowed."""
+        """Refuse the first row that is wrong; the message gives line, value, unit, and allowed values."""
         if wrong.any():
             k = int(np.argmax(wrong))
             value = f"{values[k]:.12g} {unit}".rstrip()

@@ -52,9 +52,9 @@ def search(
     """Forward kinematics without initial poses; each sample has an independent search.
 
     With fixed orientation the platform has a single equilibrium, because the energy is convex in the position. This
-    equilibrium is found from any start. It is the start for all motions together. The first start orientation is level.
-    Samples without a stable equilibrium within the tension limits are repeated from tilted starts. The best result is
-    kept. It has the better status, then fewer cables outside their limits, then the lower energy.
+    equilibrium is found from any start. The search over all motions then starts from it. The first start orientation is
+    level. Samples without a stable equilibrium within the tension limits are repeated from tilted starts. The best
+    result is kept. It has the better status, then fewer cables outside their limits, then the lower energy.
 
     lengths: unstrained lengths (N, m), rows of NaN are skipped; wrenches: external plus inertial (1 or N, 6); progress:
     called after each block with the number of finished samples and the total number.

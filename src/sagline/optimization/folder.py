@@ -127,7 +127,7 @@ def _check_request(place: Path, digest: str, request: Request) -> None:
 
 
 def _read(file: Path, heads: list[str]) -> tuple[Array, int]:
-    """Rows of complete lines, and their size in bytes; an incomplete last line is ignored, another one refused."""
+    """Rows of complete lines, and their size in bytes; only the last line may be incomplete and is then ignored."""
     none = np.zeros((0, len(heads)))
     lines = read_text(check_file(file), LIMIT).splitlines(keepends=True)
     if not lines:

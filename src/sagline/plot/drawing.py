@@ -49,9 +49,9 @@ SPECK: Final = 1.5  # shorter pieces of a line between two gaps are omitted [pt]
 SPARE: Final = 0.05  # margin as a share of the picture
 WIDTH, LEAST, MOST = 5.6, 0.35, 1.1  # [in]; smallest and largest ratio of height to width
 PLACES: Final = np.linspace(0.12, 0.72, 31)  # positions of the number along a cable, from the frame
-BESIDE, ROOM = 0.8, 0.8  # distances in text sizes: from a cable to its number, and from a number to other lines
-CLEAR = 1.15  # distance in text sizes from a number next to its cable to other lines
-FROM_ANCHOR = 1.6  # distance in text sizes of a number from the frame end, which remains visible
+BESIDE, ROOM = 0.8, 0.8  # distances of a number from its cable and from other lines, in text sizes
+CLEAR = 1.15  # distance of a number beside its cable from other lines, in text sizes
+FROM_ANCHOR = 1.6  # distance of a number from the frame end, in text sizes
 ARROW: Final = 0.16  # largest length of the axes, as a share of the picture's width
 END_ON: Final = 0.12  # an axis that appears shorter than this share of its length has no name
 

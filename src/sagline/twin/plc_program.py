@@ -183,7 +183,7 @@ class Program:
         return True
 
     def _move_to_drives(self, encoder: list[float], cell: list[float]) -> None:
-        """Move set points that are too far from their drives to them, with the tensions of the load cells."""
+        """Set each set point that is too far from its drive to the position of the drive, and use the cell tensions."""
         read = self._valid_tensions([max(reading, 0.0) for reading in cell])
         self.length, self._rate, self.tension = list(self.length), list(self._rate), list(self.tension)
         for i in self.winches:

@@ -28,7 +28,7 @@ from sagline.workspaces.wrench_sets import WrenchSet, load_of
 
 
 class MarginStatus(Status):
-    """Status of one pose of a margin; `text` says what it means and what to do."""
+    """Status of one pose of a margin; `text` states its meaning and the next step."""
 
     FEASIBLE = codes.MARGIN_FEASIBLE, "the cables balance every load of the set within their limits, sag included"
     INFEASIBLE = (

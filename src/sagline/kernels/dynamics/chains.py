@@ -194,7 +194,7 @@ def run_chains(
     """Integrate some steps; a prepared run continues from the end of the last call, bit by bit identical.
 
     Args:
-        rules: See `Rules`; the loops of drums are closed every so many steps.
+        rules: See `Rules`; `stride` is the number of steps per control period of drums.
         numbers: See `Numbers`.
         body: Rows of the cable_table, with anchors in the platform's principal axes relative to its center of mass,
             which includes the chains' mass at node 0; inertia; a projection (6, 6) onto the free motions; and the

@@ -209,7 +209,7 @@ def run_massless(
 
     Args:
         model: See `ModelTerms`.
-        rules: See `Rules`; the loops of drums are closed every so many steps.
+        rules: See `Rules`; `stride` is the number of steps per control period of drums.
         numbers: See `Numbers`.
         robot: Rows of the cable_table, with anchors in the platform's principal axes relative to its center of mass;
             body with its center at zero; inertia; and free motions (n, 6).

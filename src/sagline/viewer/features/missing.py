@@ -167,7 +167,7 @@ class MissingFeature(Feature):
         )
 
     def _explain(self) -> None:
-        """Write the explanation, and draw the nearest feasible pose; the previous one until it is computed."""
+        """Write the explanation, and draw the nearest feasible pose (the previous one until it is computed)."""
         assert self._shown is not None
         snapshot, nearest = self._shown[0], self._found[1] if self._found[0] else None
         searching = self._found[0] != self._key
