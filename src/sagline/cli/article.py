@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 from sagline.cli.options import JsonOption, OutOption, argument
-from sagline.cli.terminal import counting, show_json, show_note
+from sagline.cli.terminal import show_json, show_note, working
 from sagline.files.writing import check_files
 
 
@@ -36,7 +36,13 @@ def article(
     from sagline.article.report import NAMES, write_article
 
     check_files(folder, NAMES)
-    with counting("redoing the article") as progress:
+    what = "redoing the article"
+    with working(what) as line:
+
+        def progress(done: int, total: int, name: str) -> None:
+            line.name(f"{what}: {name}")
+            line.progress(done, total)
+
         report = write_article(folder, parts or [], progress)
     if as_json:
         show_json(report.numbers)

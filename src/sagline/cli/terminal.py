@@ -36,18 +36,6 @@ def working(what: str) -> AbstractContextManager[ProgressLine]:
 
 
 @contextmanager
-def counting(what: str) -> Iterator[Callable[[int, int, str], None]]:
-    """Show progress of named parts; yields a function of the number done, the total and the name of the next part."""
-    with working(what) as line:
-
-        def tell(done: int, total: int, name: str) -> None:
-            line.name(f"{what}: {name}")
-            line.progress(done, total)
-
-        yield tell
-
-
-@contextmanager
 def notices() -> Iterator[None]:
     """Print the warnings of sagline as notes on stderr inside the `with` block."""
     with warnings.catch_warnings():

@@ -57,7 +57,7 @@ class ForwardSolver:
     """
 
     def __init__(self, robot: Robot, model: CableModel | None = None, start: Pose | None = None) -> None:
-        """Prepare the robot's arrays and compile the kernel.
+        """Prepare the robot's arrays and the kernel.
 
         Args:
             robot: The robot.
@@ -100,7 +100,7 @@ class ForwardSolver:
         self._place, self._turn = self._pose[0, :3], self._pose[0, 3:]
         self._loaded = False  # True if the last sample had a wrench
         self._start[0, 6] = 1.0
-        self._lengths[0] = np.nan  # compiles without solving
+        self._lengths[0] = np.nan  # loads the kernel without solving
         forward_poses(*self._arguments)
         self.reset(start)
 

@@ -73,7 +73,7 @@ class InverseSolver:
     """
 
     def __init__(self, robot: Robot, model: CableModel | None = None, tension: TensionMethod | None = None) -> None:
-        """Prepare the robot's arrays and compile the kernel.
+        """Prepare the robot's arrays and the kernel.
 
         Args:
             robot: The robot, with at least as many cables as degrees of freedom.
