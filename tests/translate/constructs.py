@@ -247,4 +247,39 @@ def whole_divisions(x: float, y: float, i: int, j: int, out: Any) -> None:
     out[1] = i % j
 
 
-KERNELS = (operators, extremes, comparisons, loops, assignments, views, records, order, functions)
+def limits(x: float, y: float, i: int, j: int, out: Any) -> None:
+    """Operations in which Python raises an exception, and compiled code does not."""
+    out[0] = x / y
+    out[1] = i / j
+    out[2] = math.sqrt(x)
+    out[3] = math.log(x)
+    out[4] = math.log1p(x)
+    out[5] = math.exp(8.0 * x)
+    out[6] = math.sinh(8.0 * x)
+    out[7] = math.cosh(8.0 * x)
+    out[8] = math.atanh(x)
+    out[9] = math.sin(x)
+    out[10] = math.hypot(x, y)
+    out[11] = x**-3
+    out[12] = x * y - x
+    out[13] = y
+    out[13] /= x
+    z = 1.0
+    z /= x
+    out[14] = z
+
+
+KERNELS = (
+    operators,
+    extremes,
+    comparisons,
+    loops,
+    assignments,
+    views,
+    records,
+    order,
+    functions,
+    remainders,
+    whole_divisions,
+    limits,
+)
