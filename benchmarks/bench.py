@@ -46,7 +46,7 @@ CABLE = sl.Cable(0.067, 44e3)
 
 
 def accuracy_of_cables() -> Iterator[Row]:
-    """Worst relative error on the 630 cables at 90 digits."""
+    """Worst relative errors of 630 cables, compared with solutions of 90 digits."""
     table = load_reference()
     state = sl.Catenary().from_length(table.cable, table.span, table.rise, table.p2_length)
     miss = np.hypot(state.horizontal_tension - table.p2_horizontal, state.vertical_force - table.p2_vertical)

@@ -38,7 +38,7 @@ def problem_of(log: sl.WinchLog) -> FitProblem:
 
 
 def plain_seconds(log: sl.WinchLog) -> float:
-    """Time of scipy's least squares with differences, unknowns and lengths together [s]."""
+    """Time of scipy's least squares with finite differences, for unknowns and lengths together [s]."""
     problem = problem_of(log)
     state = start_of(problem, log.commanded)
     width, deviation = len(problem.prior), log.sensors.tension_deviation

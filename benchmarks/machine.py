@@ -85,7 +85,7 @@ def course(robot: sl.Robot) -> sl.Path:
 
 
 def formula() -> Iterator[Row]:
-    """The straight cable's exit and wrap with the exact catenary from there, compared with the exact contact."""
+    """Error of catenaries from the exit points of straight cables, compared with exact cables over pulleys."""
     for dead in (0.0, 4.0):
         worst = 0.0
         for name in ROBOTS:

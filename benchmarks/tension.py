@@ -142,7 +142,7 @@ def continuity() -> Iterator[Row]:
 
 
 def _steepest(name: str, method: sl.TensionMethod, count: int) -> float:
-    """Slope along a line through the test box, beside its middle, without inertia; in upper limits per meter."""
+    """Largest slope of a tension along a line through the test box, beside its middle [upper limits per meter]."""
     robot = sl.load_robot(name)
     box = robot.test_box
     assert box is not None

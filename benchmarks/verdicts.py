@@ -31,7 +31,7 @@ def main() -> None:
 
 
 def in_the_open(name: str) -> Row:
-    """Random poses in and around a robot's test box, under random wrenches that exceed 1e-3 of its weight."""
+    """Random poses in and around a robot's test box, infeasible by more than 1e-3 of its weight."""
     robot, rng = sl.load_robot(name), np.random.default_rng(1)
     weight = robot.mass * robot.gravity
     poses = random_poses(robot, POSES, rng, stretch=1.5)

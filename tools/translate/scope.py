@@ -171,9 +171,9 @@ class Scope:
     def kept_in_order(self, values: list[Value], marks: list[int], written: list[int]) -> list[Value]:
         """Operands in Python's order from left to right, which C does not guarantee.
 
-        A value that reads or writes arrays gets a name if a later value writes arrays. A value that writes arrays also
-        gets a name if a later value reads them. The name is inserted at the mark of the value, the number of lines
-        after it.
+        A value that reads or writes arrays gets a name if a later value writes arrays. A value that writes arrays gets
+        a name if a later value reads arrays. The name is inserted at the mark of the value, the number of lines after
+        it.
         """
         for k in range(len(values) - 2, -1, -1):
             later = values[k + 1 :]

@@ -279,7 +279,7 @@ def duration() -> float:
 
 
 def points() -> Array:
-    """Home, the ten poses, home [m], shape (12, 3)."""
+    """Positions of the path [m], shape (12, 3): home, the ten poses, and home."""
     return np.vstack((HOME, table2().desired, HOME))
 
 

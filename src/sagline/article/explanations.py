@@ -88,7 +88,7 @@ def subsets(parameters: Sequence[Parameter], most: int) -> list[Model]:
 
 
 def tangents(error_of: ErrorOf, models: Sequence[Model], values: Sequence[Array]) -> list[_Tangent]:
-    """First-order model of each model about its values; finite differences are taken away from the limits."""
+    """First-order model of each model about its values; each finite difference steps away from the upper limit."""
     points, steps = [], []
     for model, x in zip(models, values, strict=True):
         high = limits(model)[1]

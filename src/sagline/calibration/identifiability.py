@@ -188,7 +188,7 @@ def _echelon(rows: Array) -> Array:
 
 
 def _named(shares: Array, known: Sequence[Generator]) -> tuple[str, str]:
-    """Name and step of a combination of symmetries: those of the first symmetry, and names of others except shifts."""
+    """Name and step of a combination of symmetries: step of the first one, names of it and of others except shifts."""
     size = np.abs(shares)
     taken = [known[index] for index in map(int, np.flatnonzero(size > _SAME * size.max()))]
     first = taken[0]

@@ -259,7 +259,7 @@ def _best_subset(
     """Most informative subset of some rows, for each number of rows with a text.
 
     rows: information of each measurement alone; beside: information that is added; instead: readings that the
-        measurements replace.
+    measurements replace.
     """
     found = Information(rows, situation.information)
     for _ in range(min(max(words), len(rows))):

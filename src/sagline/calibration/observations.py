@@ -181,8 +181,8 @@ def whitened_rows(
 ) -> WhitenedRows:
     """Readings near equilibria to first order; NaN where the platform is not stable.
 
-    slopes: derivatives of reported lengths (3, N, m), by `winch_slopes`. With a direction (P,), only slopes along it, P
-        = 1.
+    slopes: derivatives of reported lengths (3, N, m), by `winch_slopes`. With a direction (P,), only the
+    slopes along it, P = 1.
     """
     count, m = lengths.shape
     factor, width = machine.slopes, len(parameters.names)

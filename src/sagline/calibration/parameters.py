@@ -77,8 +77,8 @@ class Unknown:
         name: Name of a kind in `KINDS`.
         shared: True if the cables share one value; None for the default of the kind.
         deviation: Standard deviation of the robot's value, in the unit of the kind (a share of the value for drum
-            radius, linear density, axial stiffness and mass); infinite without a prior; None for the robot's tolerance,
-            or for the usual deviation of the kind.
+            radius, linear density, axial stiffness and mass); infinite without a prior; None for the robot's tolerance
+            if it has one, otherwise the usual deviation of the kind.
     """
 
     name: str

@@ -205,7 +205,7 @@ class Calibration(Findings, Saved):
         covariance = np.full((len(rows), 6, 6), np.nan)
         covariance[there] = self._covariance(*self._slopes(pose_rows(found.pose)[there], rows[there]))
         reach = np.reshape(found.pose.matrix @ self.robot.center_of_mass, (-1, 3))
-        of_center = np.tile(np.eye(6), (len(rows), 1, 1))  # center of mass by origin
+        of_center = np.tile(np.eye(6), (len(rows), 1, 1))  # motion of the center of mass per motion of the origin
         for axis, unit in enumerate(np.eye(3)):
             of_center[:, :3, 3 + axis] = np.cross(unit, reach)
         covariance = _transformed_covariance(of_center, covariance)

@@ -109,7 +109,7 @@ def _restart(problem: FitProblem, state: SearchState, which: Flags) -> SearchSta
 
 
 def _single_cable_outliers(problem: FitProblem, state: SearchState, which: Flags) -> Flags:
-    """Flags of the poses, among a few, that fit except for single cables, which are outliers with a small weight."""
+    """Flags of those of a few poses that do not fit only because of single cables; such cables are outliers."""
     rows, slipped = np.flatnonzero(which), np.zeros(len(which), dtype=np.bool_)
     if 0 < len(rows) <= min(EXAMINED, FEW * len(which)):
         found = outliers_in(problem, state, rows, rows, count=len(which))
@@ -118,7 +118,7 @@ def _single_cable_outliers(problem: FitProblem, state: SearchState, which: Flags
 
 
 def _other_equilibrium(problem: FitProblem, state: SearchState, which: Flags) -> Flags:
-    """Flags of the poses, among some, that are far from those by forward kinematics of the reported lengths, (N,)."""
+    """Flags of those of some poses that are far from the poses by forward kinematics of the reported lengths, (N,)."""
     reported = reported_lengths(problem, state.machine, slice(None))[which]
     found = search(state.machine.robot, problem.model, locked(reported), NO_LOAD, None)
     far = which.copy()

@@ -29,7 +29,7 @@ class Preparation(Monitor):
         """Run one cycle: exchange data, estimate the pose, check for faults, and prepare the next command.
 
         An exception in the cycle stops the winches. It becomes an event, a hold command is sent, and the exception is
-            raised again.
+        raised again.
         """
         self._loop.cycle()
 

@@ -13,7 +13,7 @@ from sagline.core.arrays import Array, locked
 from sagline.files.reading import read_text
 from sagline.files.table import TABLE_LIMIT, CsvTable
 
-# for each kind of column: the other kind, and the next step for a file with the other kind
+# for each kind of column: name of the other kind, and the next step if the file has that kind
 _OTHERS: Final = {"L": ("C", "these are counts: add --counts"), "C": ("L", "these are lengths: leave out --counts")}
 UNITS = {"span": "m", "rise": "m", "length": "m", "tension": "N"}
 

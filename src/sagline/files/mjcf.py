@@ -53,7 +53,7 @@ _THINNEST = 0.02  # ratio of the shortest to the longest edge of a box for displ
 _STEPS = 20.0  # time steps per period of the fastest motion
 _LONGEST_STEP = 0.002  # default time step of MuJoCo [s]
 _DOWN = Context(prec=2, rounding=ROUND_DOWN)  # the time step is rounded down to two digits
-_STRETCH_DAMPING = 4.0  # half the frequency bound, about the highest frequency, is damped critically
+_STRETCH_DAMPING = 4.0  # critical damping at half the frequency bound, which is about the highest frequency
 _SWING_DAMPING = 0.4  # a fifth of critical damping
 _ROUNDING = 1e-12
 _SHORTEST = 1e-6  # shortest cable [m]
@@ -253,7 +253,7 @@ def _add_platform(world: Element, robot: Robot, pose: Pose, radius: float, drag:
 def _inertia(robot: Robot, pose: Pose) -> Array:
     """The robot's inertia; if MuJoCo would refuse it, an inertia with the same effect on the free motions."""
     least, middle, most = np.linalg.eigvalsh(robot.inertia)
-    missing = most - (least + middle) + _ROUNDING * most  # of two moments to reach the third; zero for a body
+    missing = most - (least + middle) + _ROUNDING * most  # largest moment minus the two others; zero for a body
     if least > 0.0 and missing <= 0.0:
         return robot.inertia
     if robot.motion_pattern == "3R3T":  # a flat plate (rounding error), or an impossible inertia, which MuJoCo reports

@@ -130,7 +130,7 @@ class _RobotPart(YamlEntry):
         return in_si(getattr(self, key), _UNITS.get(item, "kg*m^2"), item)
 
     def only_way(self, item: str, ways: tuple[tuple[str, ...], ...], beside: tuple[str, ...]) -> tuple[str, ...]:
-        """The only set of keys of which some are given; it must be complete, and other keys must be in `beside`."""
+        """The set of all given keys except those in `beside`; an error if it is not one of the sets in `ways`."""
         found = self.model_fields_set.difference(beside)
         for way in ways:
             if found == set(way):

@@ -144,7 +144,7 @@ class Meshed:
         """Distance of a cable, by branch and bound over its pieces."""
         body, radius = self._object(number, at), float(row[shapes.RADIUS])
         enough += radius
-        nearest = (inf, 0.0, np.zeros(3), np.zeros(3))  # points of the cable itself
+        nearest = (inf, 0.0, np.zeros(3), np.zeros(3))  # points along the centerline of the cable
         waiting: list[tuple[float, int, float, float, float]] = []
         proved, looked = inf, 0
 

@@ -61,9 +61,10 @@ class Plan(Result, Saved):
             the cable wrench along y, the sum of y . (J_i tau_i - G_i pull_i(tau_i)), is less than y . (needed - the sag
             forces in it) for all chord tensions within their limits, on the exact catenaries; J is the structure
             matrix, pull_i the sag force and G_i its wrench matrix. Tensions below a tenth of a cable's weight are
-            excluded and, without an upper limit, tensions that stretch the cable to more than twice its length. The
-            force part of y has length 1, so that the difference is in newtons. It is also NaN if no single direction is
-            a proof, because tension ranges were narrowed or split. None for a plan from an old file without this field.
+            excluded. Without an upper limit, tensions that stretch the cable to more than twice its length are also
+            excluded. The force part of y has length 1, so that the difference is in newtons. It is also NaN if no
+            single direction is a proof, because tension ranges were narrowed or split. None for a plan from an old file
+            without this field.
         needed: The wrench J tau that the chord tensions must supply, shape (6,) or (N, 6): weight, given wrench and the
             cables' sag forces T_z - tau sin phi. Without a solution, the sag forces are those at the tensions that
             minimize the remaining wrench. None for a plan from an old file.

@@ -162,7 +162,7 @@ def _draw_cables(ax: Axes, plan: Plan, quantity: str, table: dict[str, tuple[str
 def error(confirmation: Confirmation, ax: Axes | None = None) -> Axes:
     """Position error along x, y and z over time: confirmed position minus planned position.
 
-        Poses without a plan, and poses for which no stable equilibrium was found, are shaded. Errors too small for the
+    Poses without a plan, and poses for which no stable equilibrium was found, are shaded. Errors too small for the
     axis are written as numbers.
 
     Args:

@@ -28,7 +28,7 @@ def cylinder_inertia(mass: float, radius: float, height: float) -> Array:
     """Inertia of a solid cylinder whose axis is along the z axis of the platform.
 
     mass: mass [kg]; radius: radius [m]; height: height [m]. Returns the inertia about the center of mass [kg m^2],
-        shape (3, 3).
+    shape (3, 3).
     """
     across = (3.0 * radius * radius + height * height) / 12.0
     return np.diag([across, across, 0.5 * radius * radius]) * mass

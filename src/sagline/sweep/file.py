@@ -103,7 +103,7 @@ def load_sweep(file: os.PathLike[str] | str) -> Request:
             moment_z: 5 N*m
         around: {force: 20 N, moment: 5 N*m}   # for the margin, of all loads up to that around each wrench
         quantities: [tension, margin]          # of sl.sweep.QUANTITIES
-        model: catenary                        # as of sagline track, and so is tension: minimum-norm
+        model: catenary                        # default of sagline track; also tension: minimum-norm
 
     Args:
         file: The file.

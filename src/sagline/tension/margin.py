@@ -55,8 +55,8 @@ def capacity_margin(state: Equilibrium) -> Array:
     """Largest additional force in any direction that tensions within the limits can balance at each pose.
 
     The moment does not change. The result is exact for weightless cables. For sagging cables, the sag forces of the
-    state are constant. The computing time is proportional to the number of faces, the binomial coefficient of m over n
-    - 1. Eight cables have 56 faces, which take about twenty microseconds per pose.
+    state are constant. The computing time is proportional to the number of faces, which is the binomial coefficient of
+    m over n - 1. Eight cables have 56 faces, which take about twenty microseconds per pose.
 
     Args:
         state: Robot or robots, poses, wrench and cables; `plan.state` for instance.

@@ -76,9 +76,9 @@ class Margin(Result):
             load of the set is proved feasible. Without sag, both bounds are equal to the value.
         high: Upper bound [N]; if it is negative, a load of the set is proved infeasible.
         direction: Normal of the facet whose distance is the value, shape (..., 6): force part, and moment part [1/m],
-            in world axes. Its length is 1 if the moment part is multiplied by the lever arm. A growing load against
-            this direction is the first that the cables cannot balance. A force part of zero means that this load is a
-            moment alone.
+            in world axes. Its length is 1 if the moment part is multiplied by the lever arm. Of additional loads of
+            equal size, the load opposite to this direction is the first that the cables cannot balance. A force part of
+            zero means that this load is a moment alone.
         limiting_cable: The cable whose limit changes the value fastest, -1 if there is none, with the shape of value.
         status: Codes of `MarginStatus`, with the shape of value.
     """

@@ -155,7 +155,7 @@ def components_of(grid: Grid, inner: Indices, faces: Indices, volumes: Array) ->
     """Components of a set, from its grid, the inner nodes and triangles of its net, and volumes (F,) [m^3]."""
     from scipy.ndimage import label  # the import takes a third of a second
 
-    nodes, count = label(grid.inside)  # neighbors along the axes, as in the net
+    nodes, count = label(grid.inside)  # nodes are connected along the axes, as in the net
     vertices = nodes[tuple(inner.T)] - 1
     volume = np.bincount(vertices[faces[:, 0]], volumes, minlength=count)
     order = np.argsort(-volume, kind="stable")

@@ -31,7 +31,7 @@ _INSTANTS: Final = 4001  # number of instants of a segment for the final check o
 # relative increase of the time after the first violation of a limit; it is four times as large after each further one
 _SLOWER: Final = 1e-6
 _TRIES: Final = 12
-_GENTLE: Final = 8  # number of first tries, in which the time grows by the cube root of the excess speed
+_GENTLE: Final = 8  # number of first tries that lengthen the time by the cube root of the excess speed
 _ROUNDING: Final = 1e-12
 
 

@@ -281,7 +281,7 @@ def _turned(force: Array, pulled: Array) -> Array:
     size = np.linalg.norm(force, axis=-1)[:, None, None]
     along = np.einsum("pi,pig->pg", force, pulled)
     both = np.einsum("pia,pib->pab", pulled, pulled)
-    mixed = along[:, :, None, None] * np.swapaxes(pulled, 1, 2)[:, None]  # force of mode a, component of mode b
+    mixed = along[:, :, None, None] * np.swapaxes(pulled, 1, 2)[:, None]  # along[a] times each component of pulled[b]
     straight = 3.0 * along[:, :, None] * along[:, None, :] / size**2 - both
     turned = straight[..., None] * force[:, None, None, :] - mixed - np.swapaxes(mixed, 1, 2)
     found: Array = turned / size[..., None] ** 3

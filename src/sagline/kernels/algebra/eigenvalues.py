@@ -15,7 +15,7 @@ STILL = 1e-16  # relative to the largest eigenvalue: a shorter step is below rou
 def _tridiagonalize(matrix: Array, diagonal: Array, beside: Array, vector: Array) -> None:
     """Householder: fill diagonal (n,) and beside (n,) of a similar tridiagonal matrix; matrix is overwritten."""
     n = matrix.shape[0]
-    product = diagonal  # work array here; the diagonal is filled at the end
+    product = diagonal  # used as work memory; the diagonal is filled at the end
     for k in range(n - 2):
         square = 0.0
         for i in range(k + 1, n):
@@ -72,7 +72,7 @@ def _lowest_eigenvalue(diagonal: Array, beside: Array, sign: float) -> float:
     size = max(abs(root), abs(_gershgorin_bound(diagonal, beside, -sign)))
     for _ in range(STEPS):
         first, second = 0.0, 0.0  # sums of 1/(l - root), 1/(l - root)^2 over the eigenvalues l
-        carried, slope, bend = 0.0, 0.0, 0.0  # b^2/q; q'/q and q''/q by the shift
+        carried, slope, bend = 0.0, 0.0, 0.0  # b^2/q, and derivatives with respect to the shift: q'/q, q''/q
         for k in range(n):
             pivot = sign * diagonal[k] - root - carried
             if not pivot > 0.0:

@@ -28,8 +28,8 @@ class Basis(NamedTuple):
     A limit that was finite must be finite in the next program too: a side at infinity cannot be active.
     """
 
-    # of the sides, and of the one that contradicts them if the bounds have nothing in common, (d + 1,); labels[0] is -1
-    # for no basis. From 2k on they are the sides of a box that replaces infinity.
+    # labels of the sides, and of the side that contradicts them if the bounds have no common point, (d + 1,); labels[0]
+    # is -1 without a basis. Labels from 2k on are sides of a box that replaces infinity.
     labels: Indices
     weights: Array  # multipliers of the infeasibility proof, (d + 1,), >= 0
     inverse: Array  # inverse of the matrix of the sides' normals, (d, d)
@@ -135,7 +135,7 @@ def lowest_point(rows: Array, bounds: Array, cost: Array, slack: float, basis: B
         far = 0.0
         for k in range(d):
             far = max(far, abs(point[k]))
-        seen = max(slack, ROUNDING * d * far)  # far out, rounding hides more than the slack
+        seen = max(slack, ROUNDING * d * far)  # far from the origin, rounding errors exceed the slack
         entering = most_violated_bound(rows, bounds, point, seen, careful)
         if entering < 0:
             _move_to_vertex(rows, bounds, cost, radius, basis, point)  # removes the rounding of many pivots

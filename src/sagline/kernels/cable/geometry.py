@@ -38,9 +38,9 @@ def tangent(radius: float, entry: float, span: float, rise: float) -> tuple[floa
     """Length, sin phi and cos phi of the tangent from a pulley to a point; NaN if no tangent exists.
 
     The pulley is in the cable's vertical plane. Span and rise are measured from the point where the cable enters the
-    pulley. entry is +1 for a cable that enters from below. No tangent leads to a point inside the pulley, or past its
-    near side: for a point straight below (above, for a cable from above), the exit is twice the radius away from the
-    entry.
+    pulley. entry is +1 for a cable that enters from below. A point inside the pulley, or past its near side, does not
+    have a tangent. For a point straight below (above, for a cable from above), the exit is twice the radius away from
+    the entry.
     """
     across = span - radius
     along = entry * rise

@@ -93,7 +93,7 @@ def robots_have_machine(robots: Array) -> bool:
 def free_span(pulley: Pulley, chord: Chord, cosine: float) -> float:
     """Horizontal distance from the exit point to the platform end [m]; cosine: of the wrap angle.
 
-    chord: that of the tangent from the platform end.
+    chord: chord of the tangent from the platform end.
     """
     return chord.length * chord.cosine + pulley.radius * (cosine - pulley.entry * chord.sine)
 

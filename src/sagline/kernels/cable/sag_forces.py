@@ -154,18 +154,18 @@ def most_along(curves: Curves, i: int, section: Section, along: float, hanging: 
     return bound
 
 
-TURN_PRECISION = 1e-4  # relative, of an extremum's tension; its sag force is exact to 1e-11 of the weight
+TURN_PRECISION = 1e-4  # relative error of an extremum's tension; the error of its sag force is 1e-11 of the weight
 STEPS = 30
 PEAK_STEPS = 40
-PEAK_PRECISION = 1e-3  # relative, of the tension at which the sag force rises fastest
+PEAK_PRECISION = 1e-3  # relative error of the tension at which the sag force rises fastest
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 # Start of the search, relative to first order. The first-order extrema are at X = |sin phi|/cos^2 phi and at the
 # tension sqrt(EA wD |sin phi|/6). On 200,000 random cables with X <= 1 and e <= 0.01, the exact extrema are at 0.28 to
 # 1.03 times this X and at 0.58 to 1.0 times this tension.
 START_OF_LEAST, START_OF_MOST = 1.25, 0.9
 # The growth of the sag force is negative everywhere if, at its first-order peak, it is below zero by more than this
-# share of the sum of its terms. It changes by less than this between that point and the exact peak, in all random
-# cables of the tests. Otherwise golden sections search the peak.
+# share of the sum of its terms. Between that point and the exact peak, the growth changes by a smaller share in all
+# random cables of the tests. Otherwise golden sections search the peak.
 FALLS_FOR_SURE = 0.3
 
 # Rows of the work array.

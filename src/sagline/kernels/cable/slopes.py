@@ -88,7 +88,7 @@ def force_by_length(
         return force_change(plane, end)
     if force.tension == 0.0:
         return PlaneVector(0.0, 0.0)
-    along = -material.stiffness / (length * length)  # of tau, over the chord's x and z
+    along = -material.stiffness / (length * length)  # derivative of tau, divided by x and z of the chord
     return PlaneVector(along * span, along * rise)
 
 

@@ -33,7 +33,7 @@ LIMIT_STEPS = 30
 LIMIT_PRECISION = 1e-13  # relative
 LIMIT_MISS = 1e-6  # relative: larger than the error that the passes leave for a slack cable
 SECANT = 1e-6  # relative step below which a secant slope is dominated by rounding
-TAUT = 1.25  # in units of wD/2: a chord tension above the one with the least tension at the frame end
+TAUT = 1.25  # in units of wD/2: chord tension, larger than that of the least tension at the frame end
 
 
 @glue
@@ -155,7 +155,8 @@ def frame_end_tension(model: Model, chord: Chord, material: Material, pulley: Pu
 def chord_tension_at_frame_end(model: Model, chord: Chord, material: Material, pulley: Pulley, tension: float) -> float:
     """Chord tension at which the tension at the frame end has a given value, on the taut side.
 
-    If no such cable exists, the result is the chord tension, if any, of the least frame-end tension of a parabola.
+    If the frame-end tension never has this value, the result is the chord tension, if any, at which the frame-end
+    tension of a parabola is least.
     """
     loosest = 0.5 * material.density * model.gravity * chord.length * chord.sine
     return taut_at_frame_end(model, chord, material, pulley, tension, max(loosest, 0.0))
@@ -171,7 +172,7 @@ def taut_at_frame_end(
     tension, with a slope of at most 1 + wD/EA. Secant steps from the taut side therefore descend to the root, or to the
     least value.
 
-    tension: at the frame end [N]; otherwise: the result if no cable has so small a tension.
+    tension: at the frame end [N]; otherwise: the result if the tension at the frame end is never so small.
     """
     weight = material.density * model.gravity
     if model.code == codes.STRAIGHT or model.code == codes.ELASTIC or weight == 0.0 or tension == math.inf:

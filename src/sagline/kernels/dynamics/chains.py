@@ -48,7 +48,7 @@ from sagline.kernels.dynamics.rigid_body import (
 )
 from sagline.kernels.jit import entry, glue, kernel
 
-ENDED = progress.COUNTERS  # one counter more than without cable mass; FAILED: cable that caused the end
+ENDED = progress.COUNTERS  # additional counter of cables with mass; FAILED: cable that ended the run
 DONE, LONG, SHORT, GROWN = range(4)
 FEWEST = 2  # smallest number of free nodes of a chain
 GROWTH = 0.5  # energy error relative to the energy convertible into motion; phase errors alone are smaller
@@ -92,7 +92,7 @@ def _sample_points(place: Array, count: int, row: Array, points: Array) -> None:
     element, rest = row[c.ELEMENT], row[c.REST]
     length = rest + count * element
     for p in range(points.shape[0]):
-        way = length * p / (points.shape[0] - 1) - rest  # behind the node next to the frame
+        way = length * p / (points.shape[0] - 1) - rest  # length from the node next to the frame
         passed = int(min(max(way / element, 0.0), count - 1.0)) if way > 0.0 else -1
         share = way / element - passed if way > 0.0 else 1.0 + way / rest
         for k in range(3):
@@ -199,15 +199,14 @@ def run_chains(
         body: Rows of the cable_table, with anchors in the platform's principal axes relative to its center of mass,
             which includes the chains' mass at node 0; inertia; a projection (6, 6) onto the free motions; and the
             reference point of the given wrench in these axes, (3,).
-        data: Of the drives, (DATA_ROWS, m).
-        courses: Of lengths, of wrenches and of the wind's velocity, as in `motion.run_massless`.
-        kept: As there, with one counter more, and ROOM numbers as work array plus two for every number of the length
-            table.
+        data: Data of the drives, (DATA_ROWS, m).
+        courses: Time tables of lengths, wrenches and wind velocity, as in `motion.run_massless`.
+        kept: As in `motion.run_massless`, with one more counter. The work array has ROOM numbers, and two for every
+            number of the length table.
         chain_arrays: `Chains`, in and out.
         stock: Initial energies that are convertible into motion, (2,), in and out; NaN before the first call.
         records: Filled as in `motion.run_massless`; and points of the cables (R, m, points, 3) at equal material steps
-        from the
-            exit on.
+            from the exit on.
         steps: Number of steps, fewer if the space for records ends. With 0 the present state is recorded.
         every: Number of steps per record; the first record is the start.
     """

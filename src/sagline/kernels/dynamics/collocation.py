@@ -180,7 +180,7 @@ def _transfer_stiffness(phi: Numbers, d: int, k: Numbers, moved: Numbers) -> Non
 
 @glue
 def _first_transfer(phi: Numbers, d: int, give: Numbers, lost: Any, k: Numbers, moved: Numbers) -> None:
-    """`_transfer_stiffness` of the first element; its start moves by give (d, d) times lost per force, give 0: held."""
+    """`_transfer_stiffness` of the first element, whose start moves by give (d, d) times lost per force; 0: fixed."""
     for a in range(d):
         for b in range(d):
             end, force = phi[a, d + b], phi[d + a, d + b]
@@ -207,10 +207,10 @@ def _stiffness_from_transfer(moved: Numbers, d: int, k: Numbers) -> None:
 
 @glue
 def _negative_pivots(phi: Numbers, d: int, clear: float, moved: Numbers) -> int:
-    """Number of negative eigenvalues of the pivot Phi_uf^-1 moved, a symmetric matrix; SINGULAR if it is close to that.
+    """Number of negative eigenvalues of the pivot, the symmetric matrix Phi_uf^-1 moved; SINGULAR if almost singular.
 
-    The determinant of moved is at least one at zero frequency, and zero if the joint is at a node of the cable up to
-    it.
+    The determinant of moved is at least one at zero frequency. It is zero if the joint is at a vibration node of the
+    cable between frame end and joint.
     """
     if d == 1:
         pivot = moved[0, 0].real * phi[0, 1].real

@@ -161,7 +161,7 @@ def splitting_step(run: MasslessRun, now: float) -> None:
     fill_forces(run, now + h)
     add_winch_energy(drives, run.cables, rows, h)
     kick_body(run.state, run.inertia, run.gradient, half)
-    if run.work & DAMPED:  # the adjoint of the first kick, with one correction
+    if run.work & DAMPED:  # adjoint of the first kick, with one correction of the damping
         fill_damping(run)
         for k in range(6):
             run.before[k] = run.damping[k]
@@ -213,8 +213,8 @@ def run_massless(
         numbers: See `Numbers`.
         robot: Rows of the cable_table, with anchors in the platform's principal axes relative to its center of mass;
             body with its center at zero; inertia; and free motions (n, 6).
-        data: Of the drives, (DATA_ROWS, m).
-        courses: Of lengths, of wrenches and of the wind's velocity. Lengths (K, m) are unstrained. For drums the table
+        data: Data of the drives, (DATA_ROWS, m).
+        courses: Time tables of lengths, wrenches and wind velocity. Lengths (K, m) are unstrained. For drums the table
             has lengths s along the path of winding, then expected tensions, (K, 2 m).
         kept: State of a run, in and out, and work arrays.
         records: Filled: states with the angular velocity in the momentum's place, tensions at the frame ends, lengths,

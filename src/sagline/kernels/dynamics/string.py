@@ -80,7 +80,7 @@ def shortest_wave(string: String, omega: float) -> float:
 
 @formula
 def _longest_element(string: String, start: float, end: float, omega: float, phase: float) -> float:
-    """Longest element [m] in an interval: C is smooth, and a transverse wave has at most the given phase [rad]."""
+    """Longest element [m] in an interval with smooth C and at most the given phase [rad] of a transverse wave."""
     force = _least_force(string, start, end)
     return min(SMOOTH * force / (string.weight + TINY), phase / (omega * slowness(string, force) + TINY))
 

@@ -165,7 +165,7 @@ def _store_sample(problem: PoseProblem, rows: Array, p: int, results: Array, sta
         statuses[p, i] = int(rows[g.STATUS, i])
         results[tables.SPAN, p, i] = rows[g.SPAN, i]
         results[tables.RISE, p, i] = rows[g.RISE, i]
-    for k in range(tables.WRAP - tables.LENGTH):  # length and forces follow each other in both
+    for k in range(tables.WRAP - tables.LENGTH):  # length and forces have the same order in both arrays
         for i in range(rows.shape[1]):
             results[tables.LENGTH + k, p, i] = rows[g.LENGTH + k, i]
     if problem.model.behind is not None:

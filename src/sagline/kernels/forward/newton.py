@@ -236,7 +236,7 @@ def polish(problem: PoseProblem, pose: Array, space: ForwardArrays, good: float)
 
 
 DESCENT_STEPS = 150
-FIRST_RADIUS = 0.5  # of the trust region, in these units
+FIRST_RADIUS = 0.5  # radius of the trust region, in the problem's units
 LARGEST_RADIUS = 1.0
 NOISE = 4e-15  # rounding error of an energy, relative to the sum of its parts
 

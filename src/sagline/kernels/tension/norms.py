@@ -43,7 +43,7 @@ def _is_tied(basis: Basis) -> bool:
 
 @kernel
 def share_lowest_sum(bounds: Array, null: Array, near: ReferencePoint, basis: Basis, memory: Memory) -> int:
-    """Fill the point (r,) of near whose tensions have the least sum; of several, the one nearest to the reference."""
+    """Fill the point (r,) of `near` whose tensions have the least sum; of several, the one nearest to the reference."""
     r, m = null.shape
     cost, memory = vector(memory, r)
     for k in range(r):
@@ -80,7 +80,7 @@ def share_lowest_sum(bounds: Array, null: Array, near: ReferencePoint, basis: Ba
 def share_lowest_maximum(
     bounds: Array, offset: Array, null: Array, near: ReferencePoint, basis: Basis, memory: Memory
 ) -> int:
-    """Fill the point (r,) of near whose largest tension is least; of several, the one nearest to the reference.
+    """Fill the point (r,) of `near` whose largest tension is least; of several, the one nearest to the reference.
 
     The program's last unknown is the largest tension.
     """
@@ -133,7 +133,7 @@ STILL = 1e-12  # relative to the largest tension: a shorter step ends the search
 def share_by_norm(
     p: float, bounds: Array, offset: Array, null: Array, near: ReferencePoint, known: Indices, memory: Memory
 ) -> int:
-    """Fill the point (r,) of near whose tensions have the least p-norm.
+    """Fill the point (r,) of `near` whose tensions have the least p-norm.
 
     known: True if the point is the result of the previous iteration, (1,); the search then starts from it.
     """
@@ -233,7 +233,7 @@ def _change_metric(null: Array, curve: Array, target: Array, turned: Array, goal
 def _lowest_p_norm(
     first: float, p: float, bounds: Array, offset: Array, null: Array, near: ReferencePoint, memory: Memory
 ) -> bool:
-    """Move the feasible point (r,) of near to the point of least p-norm; returns True if it was found.
+    """Move the feasible point (r,) of `near` to the point of least p-norm; returns True if it was found.
 
     The exponent starts small and doubles whenever the steps become short, until it is p. Each Newton iteration thus
     starts near its solution.

@@ -134,7 +134,7 @@ WALK_SUM, WALK_NORM, WALK_CENTROID = 0.0, 1.0, 2.0  # the optimum of the polygon
 def distribute_on_polygon(
     method: int, parameter: float, bounds: Array, null: Array, near: ReferencePoint, work: WorkArrays
 ) -> int:
-    """Fill the point (r,) of near by the centroid or the polygon walk; edges of the last polygon are tried first."""
+    """Fill the point (r,) of `near` by the centroid or the polygon walk; edges of the last polygon are tried first."""
     r, m = null.shape
     corners, labels, known = work.corners, work.labels, work.known
     count = known[0]

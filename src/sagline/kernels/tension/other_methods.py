@@ -18,7 +18,7 @@ from sagline.kernels.tension.norms import share_by_norm, share_lowest_maximum, s
 from sagline.kernels.tension.on_polygon import distribute_on_polygon
 from sagline.kernels.tension.polygon import WorkArrays
 
-DEPENDENT = 1e-10  # square of the remaining row of a cable, below which it depends on the cables already fixed
+DEPENDENT = 1e-10  # below this squared length of its remaining row, a cable depends on those already fixed
 
 
 @kernel

@@ -112,7 +112,7 @@ def _start_polygon(bounds: Array, null: Array, radius: float, corners: Array, la
     m = null.shape[1]
     a, b, area = widest_pair(null)
     for k in range(4):
-        # counter-clockwise where the area is positive: low a, low b, high a, high b each leave one corner
+        # the order is counter-clockwise if the area is positive; each corner is at one limit of a and one limit of b
         u = 2 * a + (0 if k == 0 or k == 3 else 1)
         v = 2 * b + (0 if k < 2 else 1)
         here = inward(u) * side_of(bounds, u) if bounds[HIGH, a] < math.inf or u == 2 * a else radius
@@ -121,7 +121,7 @@ def _start_polygon(bounds: Array, null: Array, radius: float, corners: Array, la
         corners[place, 0] = (here * null[1, b] - there * null[1, a]) / area
         corners[place, 1] = (there * null[0, a] - here * null[0, b]) / area
     for k in range(4):
-        # counter-clockwise, the sides follow each other as low b, high a, high b, low a; clockwise turned round
+        # order of the sides: low b, high a, high b, low a if counter-clockwise, otherwise reversed
         if area > 0.0:
             label = 2 * b if k == 0 else 2 * a + 1 if k == 1 else 2 * b + 1 if k == 2 else 2 * a
         else:

@@ -342,14 +342,14 @@ def _most_of_cable(place: CablesInBox, curves: Curves, ranges: Ranges, tau: floa
     low, high = ranges.lowest[i], ranges.highest[i]
     bend, spread, hanging = rows[BENT, i], rows[SPREAD, i], rows[HANGING, i]
     weight = abs(hanging)
-    # above tau: with the column of the largest contribution
+    # tensions above tau: the column of the structure matrix with the largest contribution
     slope = rows[VALUE, i] + spread + bend
     if slope > 0.0 and high == math.inf:
         return math.inf
     most = fall(curves, i, tau, high) if hanging > 0.0 else rise(curves, i, tau, high)
     rate = fall_rate(curves, i, tau) if hanging > 0.0 else rise_rate(curves, i, tau)
     gain = _most_of_run(slope, weight * rate, weight * most, max(high - tau, 0.0))
-    # below tau: with the column of the smallest contribution, piece by piece
+    # tensions below tau, in pieces: the column with the smallest contribution
     slope = -(rows[VALUE, i] - spread + bend)
     top = tau
     largest = 0.0
