@@ -61,7 +61,7 @@ def pairs_of_cables() -> Iterator[Row]:
 
 
 def brute_force() -> Iterator[Row]:
-    """The sixty nearest pairs of four robots against dense samples and simplex search."""
+    """The sixty nearest pairs of four robots, compared with dense samples and a simplex search."""
     worst = agreement(nearest_cable_pairs())
     yield Row("60 nearest cable pairs against 1,501 x 1,501 points and simplex", "1e-12 m", f"{worst:.0e} m")
 

@@ -19,7 +19,7 @@ from sagline.sweep.folder import make_folder
 from sagline.sweep.work import measured_size, task
 
 ROBOT = Path(__file__).parents[1] / "examples" / "own_planar.yaml"
-PUBLISHED = 5844.0  # time of the same number of requests on eight workers [s], of which 57,952 were lost
+PUBLISHED = 5844.0  # time of the same number of requests on eight workers [s]; 57,952 of them were lost
 POSES, LOADS = 31_000, 1_000
 SHARE = 10  # number of tasks for the comparison of a loop with workers
 

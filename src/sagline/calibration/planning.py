@@ -302,7 +302,7 @@ def _default_sensors(robot: Robot, tensions: Array) -> Sensors:
 
 
 def _scale(parameters: Parameters, slopes: Array) -> tuple[Array, Array]:
-    """Unit of each internal parameter, and the inverse of its prior deviation in this unit: 1, less, or 0."""
+    """Unit of each internal parameter, and the inverse of its prior deviation in this unit: 0 (no prior) to 1."""
     deviation = parameters.prior_deviation / np.abs(slopes)
     loose = np.array([LOOSE * KINDS[name].assumed for name in parameters.names])
     scale = np.fmin(deviation, loose)

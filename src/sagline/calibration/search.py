@@ -109,7 +109,7 @@ def _restart(problem: FitProblem, state: SearchState, which: Flags) -> SearchSta
 
 
 def _single_cable_outliers(problem: FitProblem, state: SearchState, which: Flags) -> Flags:
-    """Flags of those of a few poses that do not fit only because of single cables; such cables are outliers."""
+    """Flags of poses whose misfit single cables explain, if there are few; the cables are outliers of small weight."""
     rows, slipped = np.flatnonzero(which), np.zeros(len(which), dtype=np.bool_)
     if 0 < len(rows) <= min(EXAMINED, FEW * len(which)):
         found = outliers_in(problem, state, rows, rows, count=len(which))

@@ -274,7 +274,7 @@ def _lines(entity: SceneEntity, stamp: int, name: str, frame: str, color: tuple[
 
 
 def _corners(points: Array) -> Array:
-    """Lines between pairs of points (e, 2, 3), except for pairs with a third point that is closer to both."""
+    """Lines between pairs of points, (e, 2, 3); a pair has a line if no third point is closer to both of its points."""
     distance = np.linalg.norm(points[:, None] - points[None], axis=2)
     near = [
         (i, j)

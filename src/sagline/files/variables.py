@@ -109,7 +109,7 @@ def values_of(data: Dataset, name: str) -> Any:
 
 
 def fields_of(data: Dataset, quantities: Iterable[Quantity]) -> dict[str, Any]:
-    """Values of the quantities in a data set, by attribute of the result; attributes of its parts are nested."""
+    """Values of the quantities in a data set, by attribute of the result; a part of the result is a nested mapping."""
     found: dict[str, Any] = {}
     for one in quantities:
         if one.name in data.variables:

@@ -150,7 +150,7 @@ def _beaten(one: Array, others: Array) -> bool:
     return bool(((others <= one).all(axis=1) & (others < one).any(axis=1)).any())
 
 
-LONGEST: Final = 80  # number of letters of a robot's name that are kept before a suffix
+LONGEST: Final = 80  # number of letters of a robot's name before the added suffix; further letters are omitted
 
 
 class Ledger:
@@ -241,7 +241,7 @@ class Ledger:
         return costs_of(rows[:, self._width :], self._request.goals, self._first)
 
     def _recalled(self, values: Array) -> Array:
-        """Recorded rows of the leading candidates, up to the first unknown one."""
+        """Recorded rows of the candidates before the first one without a record."""
         if self.record is None:
             return np.zeros((0, self._rows.shape[1]))
         first = len(self._rows)

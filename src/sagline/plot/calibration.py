@@ -41,7 +41,7 @@ PANEL, MATRIX, BESIDE, MAP = (
     3.2,
     1.2,
     2.7,
-)  # [in], height of a panel, of the matrix, added to a map; width of a map
+)  # [in]: heights of panel and matrix, extra height and width of a map
 LINE: Final = 0.048  # height of a name next to the matrix, as a share of its height
 LEADER: Final[dict[str, Any]] = {"arrowstyle": "-", "linewidth": 0.5, "relpos": (1.0, 0.5), "shrinkB": 0.0}
 ROUND: Final = FuncFormatter(lambda value, _: f"{value:g}")

@@ -81,7 +81,7 @@ def sinh_excess(h: float) -> float:
 def atanhc(u: float) -> float:
     """The ratio atanh(u)/u for 0 <= u <= 0.5."""
     y = u * u
-    if y < 0.01:  # ten terms: below 1e-20
+    if y < 0.01:  # ten terms; the rest is below 1e-20
         s = 1 / 21
         s = s * y + 1 / 19
         s = s * y + 1 / 17

@@ -42,7 +42,7 @@ from sagline.kernels.tension.nearest import Distribution
 from sagline.kernels.tension.on_polygon import feasible_interval
 from sagline.kernels.tension.polygon import feasible_polygon
 
-SUPPORT = 1e-9  # a cable with a smaller share of the largest component along the proof does not oppose the wrench
+SUPPORT = 1e-9  # relative to the largest component along the proof: smaller components do not oppose the wrench
 AT_LIMIT = 1e-9  # relative to a limit: a value closer to the limit than this counts as at the limit
 PROVED, ENOUGH = 0, 1  # columns of the brackets
 

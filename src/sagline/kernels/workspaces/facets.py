@@ -42,7 +42,7 @@ class Facets(NamedTuple):
     # One row per column of the basis, (n, m + 7): components along the m columns, components in world axes, and the sum
     # of their absolute values with moments times the lever arm
     table: Array
-    others: Array  # the columns outside the basis along its rows, each with a largest entry of 1, (r, n)
+    others: Array  # components of the other columns along the rows, scaled to a largest entry of 1, (r, n)
     minors: Array  # minors of the present subset and its leading parts, by sets of rows, (n, 2^n)
     basis: Indices  # index of the basis column of each row, (n,)
     chosen: Indices  # present subset of the other columns, from index 1 on, (n + 1,)
