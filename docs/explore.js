@@ -1,5 +1,5 @@
 /* One cable, moved by sliders: docs/explore.md. Both cables are computed by the library's kernels, compiled to
-   WebAssembly; docs/hooks/explore.py describes their calls. SI units everywhere but in what is written on the page. */
+   WebAssembly; docs/hooks/explore.py describes their calls. All values are in SI units, except in the texts of the page. */
 "use strict";
 
 const cable = (() => {
@@ -41,9 +41,9 @@ const cable = (() => {
 /* The page. */
 (() => {
   const POINTS = 80;
-  const HIGH = 310; // px, of both pictures, 360 wide: about the width of a phone
+  const HIGH = 310; // [px], height of both pictures; they are 360 px wide, about as wide as a phone
   const PLACE = { left: 22, top: 88, meter: 23 }; // frame end in the first picture
-  const AXES = { left: 46, right: 344, top: 26, bottom: 272 }; // of the second
+  const AXES = { left: 46, right: 344, top: 26, bottom: 272 }; // edges of the second picture [px]
 
   const written = (value, digits = 0) => value.toFixed(digits).replace(/^-(?=[0.]*$)/, "").replace("-", "−");
   const path = (points) => points.map(([x, y], i) => `${i ? "L" : "M"}${x.toFixed(1)} ${y.toFixed(1)}`).join("");
@@ -65,16 +65,16 @@ const cable = (() => {
     ].join("");
   }
 
-  /** A step of 1, 2 or 5 times a power of ten that divides a length into some three to six. */
+  /** A step of 1, 2 or 5 times a power of ten that divides a length into about three to six parts. */
   function stepOf(length) {
     const ten = 10 ** Math.floor(Math.log10(length / 3));
     return ten * [5, 2, 1].find((each) => each * ten <= length / 3);
   }
 
-  /** The force on the platform end over its horizontal part: the article's line, and what the exact cable does. */
+  /** Vertical force on the platform end as a function of the horizontal one: the article's line, and the exact cable. */
   function plane(found, closed) {
     const most = 1.4 * Math.max(found.horizontal, 0.5 * found.weight * found.chord);
-    const least = 0.04 * found.weight * found.span; // where half the cable’s weight is some ten chord tensions
+    const least = 0.04 * found.weight * found.span; // here half the cable’s weight is about ten chord tensions
     const forces = Array.from({ length: POINTS + 1 }, (_, i) => least * (most / least) ** (i / POINTS));
     const many = cable.many(found, forces.map((force) => (force * found.chord) / found.span));
     const curve = many.map(({ vertical }, i) => [forces[i], vertical]), straight = [[0, closed.vertical - (found.rise / found.span) * found.horizontal]];
@@ -104,7 +104,7 @@ const cable = (() => {
     ].join("");
   }
 
-  /** What stands in the table: quantity, its unit's share and digits, and those of the difference. */
+  /** Rows of the table: quantity, factor and digits of its unit, and those of the difference. */
   const ROWS = [
     ["length", 1, 4, "mm", 1e3, 1], ["sag", 1e3, 1, "mm", 1e3, 1], ["vertical", 1, 2, "N", 1, 2],
     ["frameEnd", 1, 2, "N", 1, 2], ["platformEnd", 1, 2, "N", 1, 2],

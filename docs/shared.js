@@ -1,4 +1,4 @@
-/* Shared robots and runs within the pages are light or dark as these are. */
+/* Shared robots and runs in the pages have the light or dark theme of the pages. */
 "use strict";
 
 (() => {
@@ -8,6 +8,6 @@
   window.addEventListener("message", ({ source, data }) => {
     for (const frame of frames()) if (data?.theme === "asked" && frame.contentWindow === source) tell(frame);
   });
-  frames().forEach(tell); // those that asked before anybody listened
+  frames().forEach(tell); // frames that sent their request before this script was loaded
   new MutationObserver(() => frames().forEach(tell)).observe(document.body, { attributeFilter: ["data-md-color-scheme"] });
 })();
