@@ -18,13 +18,15 @@ help: ## show this list
 	@echo "  PYTHON=... names the interpreter (Python 3.11 or newer), OUT=... the folder of make run,"
 	@echo "  FOLDER=... one folder of tests for make test, test-extended and mutants: FOLDER=calibration"
 
-env: $(STAMP) ## create .venv with everything in it (again only when pyproject.toml changes)
+env: $(STAMP) ## create .venv with everything in it, and build the kernels (again only after changes)
+	@$(BIN)/python -m tools.build || true # without a compiler, numba compiles them at the first use
 
 $(STAMP): pyproject.toml
 	@test -n "$(PYTHON)" || { echo "sagline needs Python 3.11 or newer and found none; install it or name it: make env PYTHON=/path/to/python3" >&2; exit 2; }
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "$(PYTHON) is no Python 3.11 or newer; name another: make env PYTHON=/path/to/python3" >&2; exit 2; }
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check --editable '.[viewer,plc,log,workspace,design,sweep,dev]'
+	SAGLINE_BUILD=later $(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check \
+		--editable '.[viewer,plc,log,workspace,design,sweep,dev]'
 	@touch $@
 
 run: env ## the main job: the article's test, its table, runs and figures in OUT (default: output)
@@ -34,19 +36,26 @@ article: env ## the article's figures, tables and errata redone, as one page in 
 	$(BIN)/sagline article --out $(OUT)
 
 test test-extended coverage record mutants soak: export OPENBLAS_NUM_THREADS := 1 # a worker has a core
-PYTEST = $(BIN)/python -m pytest $(addprefix tests/,$(FOLDER))
+PYTEST = $(BIN)/python -m pytest
 PARALLEL := --numprocesses auto --dist worksteal
+INNER := kernels translate # tests of single kernels, which numba compiles; the others run the library
+OUTER = $(if $(FOLDER),$(addprefix tests/,$(filter-out $(INNER),$(FOLDER))),tests $(addprefix --ignore=tests/,$(INNER)))
+CHOSEN = $(addprefix tests/,$(if $(FOLDER),$(filter $(INNER),$(FOLDER)),$(INNER)))
+define run_tests
+	$(if $(OUTER),$(PYTEST) $(OUTER) -m "$(1)" $(PARALLEL))
+	$(if $(CHOSEN),SAGLINE_BACKEND=numba $(PYTEST) $(CHOSEN) -m "$(1)" $(PARALLEL))
+endef
 
 test: env ## the first tier of the tests: minutes
-	$(PYTEST) -m "not extended and not soak" $(PARALLEL)
+	$(call run_tests,not extended and not soak)
 
 test-extended: env ## the second tier: browsers, processes, wide parameters, other programs, documentation
-	$(PYTEST) -m "extended and not soak" $(PARALLEL)
+	$(call run_tests,extended and not soak)
 
 test-all: check test test-extended ## style and types, then both tiers
 
 coverage: env ## both tiers again, and which lines they run
-	$(PYTEST) --cov $(PARALLEL)
+	SAGLINE_BACKEND=numba $(PYTEST) --cov $(PARALLEL)
 
 messages: env ## renew the snapshots of messages; read the diff before you commit it
 	$(BIN)/python -m pytest --snapshot-update --quiet
@@ -75,8 +84,8 @@ bench: env ## one table of times and ratios, on one core
 	$(BIN)/python -m benchmarks.bench
 
 soak: env ## the long tests that test-all leaves out, then all others in a random order
-	$(BIN)/python -m pytest -m soak
-	$(PYTEST) --random-order=$(SEED) $(PARALLEL)
+	$(PYTEST) -m soak
+	SAGLINE_BACKEND=numba $(PYTEST) --random-order=$(SEED) $(PARALLEL)
 
 c: env ## C99 of all kernels, as OUT/kernels.c
 	$(BIN)/python -m tools.translate $(OUT)/kernels.c

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import random
 import re
+import sys
 from collections import defaultdict
 from collections.abc import Iterator
 from functools import cache
@@ -25,6 +26,11 @@ from tests.effort import slowness
 from tests.tiers import FILE_LIMIT, TEST_LIMIT
 from tools.translate import wasm
 
+# numba compiles the single kernels that the tests in these folders call; the others run the compiled library
+INNER: Final = re.compile(r"(^|/)tests/(kernels|translate)(/|$)")
+PATHS: Final = [each.partition("::")[0] for each in sys.argv[1:] if "tests/" in each and not each.startswith("-")]
+if PATHS and all(map(INNER.search, PATHS)):
+    os.environ.setdefault("SAGLINE_BACKEND", "numba")
 ALL_EXTENDED: Final = re.compile(r"^pytestmark = (extended|\[extended\b)", re.MULTILINE)
 EXAMPLES: Final = 40  # of a property, in the first tier
 CPU: Final = "cpu"  # property of a report: processor time of the test [s], compilation excluded

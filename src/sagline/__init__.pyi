@@ -92,6 +92,7 @@ from .interference.obstacles import Box as Box
 from .interference.obstacles import Capsule as Capsule
 from .interference.obstacles import Sphere as Sphere
 from .interference.obstacles import frame_beams as frame_beams
+from .kernels.jit import backend as backend
 from .kinematics.confirm import Confirmation as Confirmation
 from .kinematics.confirm import confirm as confirm
 from .kinematics.equilibria import Equilibria as Equilibria

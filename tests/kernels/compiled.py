@@ -1,4 +1,4 @@
-"""Inner kernels as Python can call them, and room for them to work in."""
+"""Inner kernels as Python can call them, compiled by numba, and room for them to work in."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from typing import Any, TypeVar, cast
 import numba
 import numpy as np
 
-from sagline.kernels.jit import folder_of, kept
 from sagline.kernels.memory import Memory
+from sagline.kernels.sources import folder_of
+from sagline.kernels.with_numba import kept
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -32,7 +33,7 @@ def from_python(inner: Callable[..., Any]) -> Callable[..., Any]:
 
     Names are spelled out because glue cannot take *arguments.
     """
-    kernel = cast("Any", inner).py_func
+    kernel = cast("Any", inspect.unwrap(inner))
     names, name = ", ".join(inspect.signature(kernel).parameters), f"call_{kernel.__name__}"
     code = compile(f"def {name}({names}): return _inner({names})", kernel.__code__.co_filename, "exec")
     space: dict[str, Any] = {"_inner": inner, "__name__": kernel.__module__}

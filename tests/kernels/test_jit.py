@@ -1,4 +1,4 @@
-"""Where compiled kernels are kept."""
+"""Where kernels compiled by numba are kept."""
 
 from __future__ import annotations
 
@@ -10,59 +10,60 @@ from typing import Any, cast
 import numba
 import pytest
 
-from sagline.kernels import jit
+from sagline.kernels import sources
+from sagline.kernels.with_numba import kept
 
 
 @pytest.fixture
 def copy(tmp_path: Path) -> Path:
     """The kernels' sources once more."""
     copy = tmp_path / "kernels"
-    shutil.copytree(jit.SOURCES, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(sources.SOURCES, copy, ignore=shutil.ignore_patterns("__pycache__"))
     return copy
 
 
 def test_the_cache_folder_follows_all_sources_that_are_compiled(copy: Path) -> None:
     """An edited callee in another file must not run stale machine code: its folder has another name."""
-    assert jit.cache_folder("inverse.poses", copy) == jit.cache_folder("inverse.poses")
+    assert sources.cache_folder("inverse.poses", copy) == sources.cache_folder("inverse.poses")
     for nested in ("codes.py", "jit.py", "algebra/functions.py", "tension/polygon.py", "inverse/poses.py"):
-        before = jit.cache_folder("inverse.poses", copy)
+        before = sources.cache_folder("inverse.poses", copy)
         with (copy / nested).open("a") as stream:
             stream.write("# edited\n")
-        assert jit.cache_folder("inverse.poses", copy) != before
+        assert sources.cache_folder("inverse.poses", copy) != before
 
 
 def test_the_cache_folder_stays_where_another_kernel_is_edited(copy: Path) -> None:
     for nested in ("forward/newton.py", "inverse/verdicts.py"):
         with (copy / nested).open("a") as stream:
             stream.write("# edited\n")
-    assert jit.cache_folder("inverse.poses", copy) == jit.cache_folder("inverse.poses")
-    assert jit.cache_folder("forward.forward", copy) != jit.cache_folder("forward.forward")
+    assert sources.cache_folder("inverse.poses", copy) == sources.cache_folder("inverse.poses")
+    assert sources.cache_folder("forward.forward", copy) != sources.cache_folder("forward.forward")
 
 
 def test_nothing_that_a_kernel_imports_is_overlooked() -> None:
     """By Python's own reading of the sources: every import of a kernel is a `from` at the beginning of a line."""
-    for file in jit.SOURCES.rglob("*.py"):
+    for file in set(sources.SOURCES.rglob("*.py")) - sources.BACK_ENDS:
         expected = {file}
         for node in ast.walk(ast.parse(file.read_text())):
             if isinstance(node, ast.Import):
                 assert not any(alias.name.startswith("sagline") for alias in node.names), file
-            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(jit.KERNELS):
-                module = (node.module or "").removeprefix(jit.KERNELS).lstrip(".")
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(sources.KERNELS):
+                module = (node.module or "").removeprefix(sources.KERNELS).lstrip(".")
                 for name in (module, *(f"{module}.{alias.name}".lstrip(".") for alias in node.names)):
-                    source = jit.SOURCES.joinpath(*name.split(".")).with_suffix(".py")
-                    expected |= {source} if source.is_file() else set()
+                    source = sources.SOURCES.joinpath(*name.split(".")).with_suffix(".py")
+                    expected |= {source} - sources.BACK_ENDS if source.is_file() else set()
             assert not (isinstance(node, ast.ImportFrom) and node.level), file
-        module = ".".join(file.relative_to(jit.SOURCES).with_suffix("").parts)
-        assert expected <= jit.sources_of(module, jit.SOURCES), file
+        module = ".".join(file.relative_to(sources.SOURCES).with_suffix("").parts)
+        assert expected <= sources.sources_of(module, sources.SOURCES), file
 
 
 def test_the_cache_folder_can_be_chosen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    assert jit.base_folder().parent == tmp_path
+    assert sources.base_folder().parent == tmp_path
 
 
 def test_other_users_of_numba_keep_their_cache_folder() -> None:
-    assert not str(getattr(numba.config, "CACHE_DIR")).startswith(str(jit.FOLDER))  # noqa: B009
+    assert not str(getattr(numba.config, "CACHE_DIR")).startswith(str(sources.FOLDER))  # noqa: B009
 
 
 def doubled(value: float) -> float:
@@ -71,7 +72,7 @@ def doubled(value: float) -> float:
 
 def cached_in(folder: Path) -> Any:
     """The function above as a new process would have it: compiled, or read from a folder."""
-    return jit.kept(numba.njit(doubled), folder)
+    return kept(numba.njit(doubled), folder)
 
 
 def test_machine_code_is_read_again_wherever_its_source_lies(tmp_path: Path) -> None:
@@ -109,19 +110,6 @@ def test_a_folder_that_cannot_be_written_costs_one_line(tmp_path: Path, capsys: 
     assert len(lines) == 1
     assert str(tmp_path / "file") in lines[0]
     assert "NUMBA_CACHE_DIR" in lines[0]
-
-
-def test_an_entry_is_compiled_when_its_own_machine_code_is_there(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from sagline.kernels.cable.batch import batch_end
-
-    monkeypatch.setattr(jit, "folder_of", lambda _: tmp_path)
-    (tmp_path / "batch.batch_from_length-9.py311.1.nbc").touch()  # another's
-    assert not jit.is_compiled(batch_end)
-    (tmp_path / "batch.batch_end-9.py311.1.nbc").touch()
-    assert jit.is_compiled(batch_end)
-    assert not jit.is_compiled(batch_end, versions=2)
 
 
 def test_inner_kernels_have_no_wrapper_for_python_and_entries_have() -> None:

@@ -107,6 +107,7 @@ def catching_test(copy: Path, mutant: Mutant, all_tiers: bool) -> tuple[str, str
 def failing_test(copy: Path, arguments: Sequence[str]) -> str:
     """Name of the first test that fails in a copy; empty if all pass."""
     environment = {**os.environ, "PYTHONPATH": str(copy / "src"), "NUMBA_CACHE_DIR": str(copy / "cache")}
+    environment["SAGLINE_BACKEND"] = "numba"  # compiles what a mistake changes, and nothing else
     command = [
         sys.executable,
         "-m",
@@ -133,7 +134,7 @@ def failing_test(copy: Path, arguments: Sequence[str]) -> str:
 
 def copy_project(copy: Path) -> None:
     """Copy the project, and its compiled kernels, so that only what a mistake changes is compiled again."""
-    from sagline.kernels.jit import FOLDER
+    from sagline.kernels.sources import FOLDER
 
     for name in COPIED:
         shutil.copytree(ROOT / name, copy / name, ignore=shutil.ignore_patterns("__pycache__"))

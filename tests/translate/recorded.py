@@ -8,6 +8,7 @@ import pkgutil
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -94,11 +95,11 @@ def recorded() -> Iterator[list[Call]]:
 
     names = {id(entry): name for name, entry in entries.items()}
 
-    def machine_code(entry: Any, arguments: tuple[Any, ...]) -> Any:
-        return listener(names[id(entry)], jit.machine_code(entry, arguments))
+    def bound(entry: Any, *arguments: Any, numbers: int = 0) -> Any:
+        return partial(listener(names[id(entry)], entry), *arguments[: len(arguments) - numbers])
 
     instead: dict[int, Any] = {id(entry): listener(name, entry) for name, entry in entries.items()}
-    instead[id(jit.machine_code)] = machine_code
+    instead[id(jit.bound)] = bound
     places = [(owner, name, value) for owner in _owners() for name, value in list(vars(owner).items())]
     places = [each for each in places if id(getattr(each[2], "__func__", each[2])) in instead]
     for owner, name, value in places:

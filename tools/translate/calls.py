@@ -35,7 +35,7 @@ class Calls(Indexing):
         if not callable(target):
             self.refuse(node, f"a call of {ast.unparse(node.func)}", SUBSET)
         arguments = self.listed(node.args)
-        function = getattr(target, "py_func", target)
+        function = inspect.unwrap(target) if callable(target) else target
         if inspect.isclass(function) and issubclass(function, tuple) and hasattr(function, "_fields"):
             return self._record(function, arguments, node)
         if isinstance(function, FunctionType):

@@ -135,9 +135,11 @@ class Program:
             self._functions[key] = translation
         return self._functions[key]
 
-    def export(self, function: Any, types: Sequence[Type], symbol: str) -> None:
+    def export(self, function: FunctionType, types: Sequence[Type], symbol: str) -> FunctionTranslation:
         """Add an entry with an exported name."""
-        self._entries.append((symbol, self.function(getattr(function, "py_func", function), types)))
+        translation = self.function(function, types)
+        self._entries.append((symbol, translation))
+        return translation
 
     def text(self) -> str:
         """The whole C text, with only the functions that entries use."""

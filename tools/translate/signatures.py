@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import importlib
+import inspect
 import pkgutil
 from collections.abc import Iterator
 from functools import cache
@@ -168,8 +169,7 @@ def functions() -> dict[str, FunctionType]:
     for each in pkgutil.walk_packages(package.__path__, "sagline.kernels."):
         module = importlib.import_module(each.name)
         for name in _marked(Path(module.__file__ or "").read_text(encoding="utf-8")):
-            function = getattr(module, name)
-            found[name] = getattr(function, "py_func", function)
+            found[name] = inspect.unwrap(getattr(module, name))
     return found
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import struct
-from functools import partial
 from math import hypot, isfinite, nan
 from typing import Any, NamedTuple
 
@@ -18,7 +17,7 @@ from sagline.core.errors import InvalidValueError
 from sagline.kernels import tables
 from sagline.kernels.inverse.feasibility import decide_poses
 from sagline.kernels.inverse.poses import inverse_poses
-from sagline.kernels.jit import machine_code
+from sagline.kernels.jit import bound
 from sagline.kernels.memory import memory_for
 from sagline.kinematics.caller import ARRAY, FLOAT, WHOLE, copy_in, copy_out
 from sagline.kinematics.inverse_rows import UNDECIDED, InverseRows, Verdicts, covers_all
@@ -109,12 +108,12 @@ class InverseSolver:
         memory, answers = memory_for(m), self._found.answers
         otherwise = None if takes_default_kernel(method) else True
         share = (*self._options, *given, self._reference, memory, otherwise, answers, 0, 1)
-        self._solve = partial(machine_code(inverse_poses, share), *share)
+        self._solve = bound(inverse_poses, *share)
         self._verdicts = Verdicts.empty(1, m, n)
         only = locked(np.zeros(1, dtype=np.int64))
         how = (only, covers_all(sharing_terms[0], m - n), memory, answers, self._verdicts.answers)
         decide = (model_terms, limit_terms, *given, *how)
-        self._decide = partial(machine_code(decide_poses, decide), *decide)
+        self._decide = bound(decide_poses, *decide)
         self.reset()
 
     def reset(self) -> None:

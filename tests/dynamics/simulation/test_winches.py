@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+
 import numpy as np
 import pytest
 
@@ -15,7 +17,6 @@ from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics.drives import BIN
 from tests.dynamics.let_go import LIFT
 from tests.dynamics.machines import prototype
-from tests.kernels.compiled import from_python
 from tests.refusal import refused
 from tests.tiers import wide
 
@@ -152,14 +153,14 @@ def test_cable_that_leaves_a_drum_takes_its_strain_and_its_weight_along() -> Non
     cables = np.zeros((2, tables.CABLE_COLUMNS))
     cables[:, tables.DENSITY], cables[:, tables.STIFFNESS] = 0.1, 5e4
     drives = d.Drives(d.DRUMS, False, data, now, np.zeros((2, 1)), np.zeros(d.AUDIT_SIZE))
-    from_python(d.turn_drums)(drives, cables, rows, 9.81, time)
+    inspect.unwrap(d.turn_drums)(drives, cables, rows, 9.81, time)
     let_out = time * speed / (1.0 + strain)
     np.testing.assert_allclose(rows[LENGTH], let_out, rtol=1e-14)
     energy = (0.5 * 5e4 * strain**2 - 0.1 * 9.81 * rise) * let_out
     assert drives.audit[d.ON_DRUMS] == pytest.approx(-energy.sum(), rel=1e-12)
     # H = T + T^2/(2 EA) - w z is the same at the frame end and at the drum
     whole, weight = 500.0, 0.1 * 9.81
-    tension = from_python(d.tension_at_drum)(whole, weight * 3.0, 5e4)
+    tension = inspect.unwrap(d.tension_at_drum)(whole, weight * 3.0, 5e4)
     assert tension + 0.5 * tension**2 / 5e4 + weight * 3.0 == pytest.approx(whole, rel=1e-14)
 
 

@@ -35,7 +35,7 @@ from sagline.kernels.dynamics import progress as k
 from sagline.kernels.dynamics import rigid_body as body
 from sagline.kernels.dynamics.massless import LOADED
 from sagline.kernels.dynamics.period import begin_period
-from sagline.kernels.jit import machine_code
+from sagline.kernels.jit import bound
 from sagline.kinematics.caller import copy_in
 from sagline.kinematics.inverse import inverse
 from sagline.robot.batch import dead_cable
@@ -138,18 +138,17 @@ class Simulator:
         numbers = (self._step, losses.loss_time, losses.air_damping, self._step / (lag + self._step))
         inputs = (self._length_table, self._wrench_table, TimeTable.constant(np.zeros(3)))
         self._records = Records(0, m).arrays
-        self._arguments = plant.arguments(rules, numbers, inputs)
-        self._run: Any = machine_code(motion.run_massless, (*self._arguments, self._records, 0, 0))
+        arguments = plant.arguments(rules, numbers, inputs)
+        self._run = bound(motion.run_massless, *arguments, self._records, 0, 0, numbers=2)
         self._cells = LoadCells(given.robot, whole_number(seed, "seed", 0, MOST_SEED), plant.now[d.FILTERED])
         stretch = 1.0 + plant.data[d.WINDING_STRAIN]
         places = (plant.now[d.WOUND], np.ones(m)) if kind == d.DRUMS else (plant.rows[LENGTH], stretch)
         self._encoders = Encoders(given.robot, *places) if Encoders.are_on(given.robot) else None
         frame = (locked(given.robot.center_of_mass @ plant.axes), plant.turn_back)
         self._platform = np.empty(body.STATE_COLUMNS)
-        self._seen: tuple[Any, ...] = (plant.state, locked(plant.inertia.view()), *frame, self._platform)
-        self._look: Any = machine_code(body.platform_state, self._seen)
+        self._look = bound(body.platform_state, plant.state, locked(plant.inertia.view()), *frame, self._platform)
         self._reading = self._new_reading()
-        self._run(*self._arguments, self._records, 0, 0)
+        self._run(0, 0)
         self._read()
 
     def _set_up_course(self, given: InitialConditions, m: int) -> None:
@@ -172,10 +171,10 @@ class Simulator:
         writable = (table.time, table.value, table.begin, table.end)
         read_only = tuple(locked(array.view()) for array in self._given)
         least = locked(dead_cable(given.robot) + np.zeros(m))
-        self._next: tuple[Any, ...] = (
+        period = (
             read_only, least, locked(stretch), lengths, writable, self._wrench_table.value[0], counters
         )  # fmt: skip
-        self._begin: Any = machine_code(begin_period, (*self._next, False, False, 1.0))
+        self._begin = bound(begin_period, *period, False, False, 1.0, numbers=3)
         self._counters = counters.data
 
     @property
@@ -220,9 +219,9 @@ class Simulator:
         if wrench is not None:
             copy_in(self._wrench, wrench, "wrench", "N or N m")
         end = (self._counters[k.STEPS] + count) * self._step
-        if not self._begin(*self._next, tension is not None, wrench is not None, end):
+        if not self._begin(tension is not None, wrench is not None, end):
             self._refuse(tension is not None)
-        self._run(*self._arguments, self._records, count, 0)
+        self._run(count, 0)
         if self._counters[k.FAILED]:
             raise energy_error(self._step, self.time, self._counters[k.FAILED] - 1)
         self._read()
@@ -343,7 +342,7 @@ class Simulator:
 
     def _read(self) -> None:
         """Fill in the sensor values."""
-        self._look(*self._seen)
+        self._look()
         self._cells.read()
         if self._encoders is not None:
             self._encoders.read()

@@ -13,7 +13,7 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.fields import NumberFields, rule
 from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics.period import read_cells, read_encoders
-from sagline.kernels.jit import machine_code
+from sagline.kernels.jit import bound
 from sagline.robot.drum import drum_lever, drums_of, not_given
 from sagline.robot.robot import Robot
 
@@ -120,8 +120,7 @@ class Encoders:
         self.counts = np.empty(m)
         offset = drums.winches.count_zero + zero * rate
         given = ((drums.table, drums.starts), wound, locked(stretch), locked(offset), locked(rate * 1.0))
-        self._arguments: tuple[Any, ...] = (*given, np.empty((3, 1, m)), self.counts)
-        self._read: Any = machine_code(read_encoders, self._arguments)
+        self._read = bound(read_encoders, *given, np.empty((3, 1, m)), self.counts)
 
     @staticmethod
     def are_on(robot: Robot) -> bool:
@@ -132,7 +131,7 @@ class Encoders:
 
     def read(self) -> None:
         """Fill in the counts."""
-        self._read(*self._arguments)
+        self._read()
 
 
 class LoadCells:
@@ -154,10 +153,9 @@ class LoadCells:
                 cells[3] = winch.load_cell_range
         self.generator, self.reading = np.random.default_rng(seed), np.empty(m)
         self._noise = np.empty(m)
-        self._arguments: tuple[Any, ...] = (tension, locked(cells), self._noise, self.reading)
-        self._read: Any = machine_code(read_cells, self._arguments)
+        self._read = bound(read_cells, tension, locked(cells), self._noise, self.reading)
 
     def read(self) -> None:
         """Fill in the measured tensions."""
         self.generator.standard_normal(out=self._noise)
-        self._read(*self._arguments)
+        self._read()

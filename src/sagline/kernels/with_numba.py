@@ -1,7 +1,8 @@
-"""Compiled kernels on disk: one file per kernel and argument types, written atomically and checked by a digest.
+"""Kernels compiled by numba, and their machine code on disk, whose content is checked by a digest.
 
-A damaged file is replaced after a new compilation. If the folder cannot be used, kernels are compiled again in every
-process, and one line on standard error reports it.
+There is one file per kernel and set of argument types, written whole. A damaged file is replaced after a new
+compilation. If the folder cannot be used, kernels are compiled again in every process, and one line on standard error
+reports it.
 """
 
 from __future__ import annotations
@@ -12,12 +13,15 @@ import pickle
 import sys
 import uuid
 from collections.abc import Callable
-from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Final, TypeVar, cast
 
 import numba
 from numba.core import compiler, serialize
+
+from sagline.kernels.sources import folder_of, say_once
+
+F = TypeVar("F", bound=Callable[..., object])
 
 _result: Any = compiler.CompileResult  # numba has no type annotations
 _dumps: Any = serialize.dumps
@@ -28,8 +32,9 @@ SUFFIX = ".nbc"
 class KernelCache:
     """Machine code of one kernel, in place of numba's own cache, which uses paths as keys and reads files unchecked."""
 
-    def __init__(self, function: Callable[..., object], folder: Path) -> None:
+    def __init__(self, function: Callable[..., object], folder: Path, *, announced: bool = False) -> None:
         """Use a folder for a function, without reading or writing."""
+        self._announced = announced
         self.cache_path = str(folder)
         self._folder, self._code = folder, function.__code__
         module = Path(self._code.co_filename).stem
@@ -59,6 +64,11 @@ class KernelCache:
         try:
             content = file.read_bytes()
         except OSError:
+            if self._announced:
+                say_once(
+                    f"sagline: numba compiles {self._code.co_name}, which takes some seconds; where a C compiler is "
+                    "available, the installation of sagline builds all kernels"
+                )
             return None  # no such file, or no access: `save_overload` reports the cause
         if hashlib.sha256(content[DIGEST:]).digest() != content[:DIGEST]:
             say_once(f"sagline: {file} is damaged; its kernel is compiled again")
@@ -66,7 +76,7 @@ class KernelCache:
         return _result._rebuild(target_context, *pickle.loads(content[DIGEST:]))
 
     def save_overload(self, signature: object, compiled: Any) -> None:
-        """Write machine code for argument types, if the folder can be written."""
+        """Write machine code for argument types, if it can be written."""
         if not self._enabled or compiled.lifted or compiled.library.has_dynamic_globals:
             return
         payload = _dumps(compiled._reduce())
@@ -92,7 +102,39 @@ class KernelCache:
         return self._folder / f"{self._name}.{hashlib.sha256(key.encode()).hexdigest()[:16]}{SUFFIX}"
 
 
-@cache
-def say_once(line: str) -> None:
-    """Write a line to standard error, but each line only once per process."""
-    print(line, file=sys.stderr, flush=True)
+INNER: Final = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # a third of the time to compile
+OPTIONS: Final[dict[str, dict[str, Any]]] = {
+    "entry": {"nogil": True},
+    "kernel": INNER,
+    "formula": {**INNER, "forceinline": True},
+    "glue": {"inline": "always"},
+}
+
+
+def compiled(function: F, kind: str) -> F:
+    """A kernel whose machine code is kept on disk; a division by zero gives inf or NaN as in NumPy.
+
+    Kernels allocate nothing (`sagline.kernels.memory`), and so need no counting of references (_nrt), which would take
+    a quarter of their time where arrays come in NamedTuples.
+    """
+    every: dict[str, Any] = {"error_model": "numpy", "_nrt": False, **OPTIONS[kind]}
+    return kept(cast("F", numba.njit(**every)(function)), folder_of(function.__module__), announced=kind == "entry")
+
+
+def kept(dispatcher: F, folder: Path, *, announced: bool = False) -> F:
+    """A compiled function whose machine code is kept in a folder; one line announces its compilation if asked for."""
+    numbas: Any = dispatcher
+    numbas._cache = KernelCache(numbas.py_func, folder, announced=announced)
+    return dispatcher
+
+
+def machine_code(function: Callable[..., object], arguments: tuple[object, ...]) -> Callable[..., object]:
+    """An entry's machine code for arguments of these types, compiled or read from disk.
+
+    Calling it saves the look at every argument's type, a microsecond for a dozen arrays: only arguments of these very
+    types may go in.
+    """
+    dispatcher: Any = function
+    signature = tuple(cast("Any", numba.typeof)(argument) for argument in arguments)
+    dispatcher.compile(signature)
+    return cast("Callable[..., object]", dispatcher.get_overload(signature))

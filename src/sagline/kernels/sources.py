@@ -1,0 +1,86 @@
+"""Sources of the kernels, their digest, and the folder in which numba keeps what it compiles from them.
+
+numba does not notice that a function called from another file was edited and would go on running stale machine code.
+What a file's kernels become is therefore kept in a folder named by a hash of that file and of all that it imports.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import sys
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+
+from platformdirs import user_cache_path
+
+KERNELS = __name__.rpartition(".")[0]
+SOURCES = Path(__file__).parent
+BACK_ENDS = frozenset(SOURCES / f"{name}.py" for name in ("jit", "library", "plain", "sources", "with_numba"))
+# `from sagline.kernels.algebra import angle, cholesky`, names in parentheses too
+IMPORT = re.compile(rf"^from {re.escape(KERNELS)}\.?([\w.]*) import (\([^)]*\)|.*)$", re.MULTILINE)
+
+
+def base_folder() -> Path:
+    """Folder of all compiled kernels: below NUMBA_CACHE_DIR if set, else below the user's cache folder."""
+    chosen = os.environ.get("NUMBA_CACHE_DIR")
+    return (Path(chosen) if chosen else user_cache_path("sagline")) / "kernels"
+
+
+FOLDER = base_folder()
+
+
+def digest(folder: Path, sources: Iterable[Path]) -> str:
+    """Digest of files below a folder: their names and contents."""
+    found = hashlib.sha256()
+    for source in sorted(sources):
+        found.update(source.relative_to(folder).as_posix().encode() + b"\0" + source.read_bytes())
+    return found.hexdigest()[:16]
+
+
+def digest_of_kernels() -> str:
+    """Digest of all kernels, without the back ends that run them."""
+    return digest(SOURCES, set(SOURCES.rglob("*.py")) - BACK_ENDS)
+
+
+def sources_of(module: str, sources: Path) -> frozenset[Path]:
+    """Source files on which a kernel's machine code depends, below the folder of the kernels."""
+    waiting, found = {module, "with_numba"}, set[Path]()
+    while waiting:
+        name = waiting.pop()
+        file = sources.joinpath(*name.split(".")).with_suffix(".py")
+        if file not in found and file.is_file():
+            found.add(file)
+            waiting.update(_imported(file.read_text(encoding="utf-8")))
+    return frozenset(found)
+
+
+@cache
+def _imported(source: str) -> frozenset[str]:
+    """Names of what a file imports of the kernels: modules, and what is in them, which is no file."""
+    names = set()
+    for match in IMPORT.finditer(source):
+        package = match[1]
+        names.add(package)
+        names.update(f"{package}.{name}".lstrip(".") for name in re.findall(r"(\w+)(?: as \w+)?", match[2]))
+    return frozenset(names)
+
+
+def cache_folder(module: str, sources: Path = SOURCES) -> Path:
+    """Folder of the machine code of a module's kernels."""
+    # a kernel from elsewhere, a benchmark's, may call any
+    return FOLDER / digest(sources, sources_of(module, sources) or sources.rglob("*.py"))
+
+
+@cache
+def folder_of(function_module: str) -> Path:
+    """`cache_folder` of a function's module, which does not change while the program runs."""
+    return cache_folder(function_module.removeprefix(f"{KERNELS}."))
+
+
+@cache
+def say_once(line: str) -> None:
+    """Write a line to standard error, but each line only once per process."""
+    print(line, file=sys.stderr, flush=True)

@@ -1,0 +1,115 @@
+"""`python -m tools.build`: build what the package contains besides Python, if it is not up to date.
+
+Building needs a C compiler: the one that the environment variable CC names, `cc`, or that of the package ziglang.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Final
+
+ROOT: Final = Path(__file__).parents[1]
+FLAGS: Final = (
+    "-std=c99", "-O3", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=off", "-fvisibility=hidden", "-shared",
+)  # fmt: skip
+LEVEL_3: Final = ("-march=x86-64-v3", "-mno-fma")  # gcc 12 contracts one expression in spite of -ffp-contract=off
+
+
+class BuildError(Exception):
+    """The kernels cannot be built; the text gives the reason."""
+
+
+def compilers() -> list[list[str]]:
+    """Commands of the C compilers that can be used, the preferred one first."""
+    named = [shlex.split(os.environ["CC"])] if os.environ.get("CC") else []
+    found = [[path] for name in ("cc", "gcc", "clang") if (path := shutil.which(name))]
+    return named + found[:1] + ([[sys.executable, "-m", "ziglang", "cc"]] if find_spec("ziglang") else [])
+
+
+def build() -> None:
+    """Build the library of the kernels, for every processor and for x86-64-v3, and the module for pages.
+
+    Raises:
+        BuildError: If no compiler is found, or none compiles.
+    """
+    sys.path[:0] = [str(ROOT), str(ROOT / "src")]
+    os.environ["SAGLINE_BACKEND"] = "python"  # the translator reads the sources
+    from sagline.kernels.library import FILES, FOLDER
+    from sagline.kernels.sources import digest, digest_of_kernels
+    from tools.translate import wasm
+    from tools.translate.library import library_text
+
+    files = [FOLDER / name for name in FILES[: 2 if is_x86() else 1]]
+    stamp = FOLDER / "stamp"
+    translator = [Path(__file__), *(ROOT / "tools" / "translate").glob("*.[pc]*")]
+    state = f"{digest_of_kernels()} {digest(ROOT, translator)} {[shlex.join(each) for each in compilers()]}"
+    made = [*files, ROOT / wasm.MODULE]
+    if stamp.is_file() and stamp.read_text(encoding="utf-8") == state and all(file.is_file() for file in made):
+        return
+    FOLDER.mkdir(exist_ok=True)
+    stamp.unlink(missing_ok=True)
+    with tempfile.TemporaryDirectory() as folder:
+        source = Path(folder) / "kernels.c"
+        source.write_text(library_text(digest_of_kernels()), encoding="utf-8")
+        _compile(source, files)
+    if find_spec("ziglang"):
+        wasm.build(ROOT)
+    stamp.write_text(state, encoding="utf-8")
+
+
+def is_x86() -> bool:
+    """True if the processor is of the family x86-64."""
+    return platform.machine().lower() in ("x86_64", "amd64")
+
+
+def _compile(source: Path, files: list[Path]) -> None:
+    """Compile the files at the same time, with the first compiler that can."""
+    reasons = []
+    for command in compilers():
+        start = time.monotonic()
+        print(f"building the kernels with {shlex.join(command)} (about half a minute) ...", flush=True)
+        made = [source.with_suffix(f".{k}{file.suffix}") for k, file in enumerate(files)]
+        levels = [(), LEVEL_3][: len(files)]
+        position = () if sys.platform == "win32" else ("-fPIC",)
+        calls = [
+            subprocess.Popen(
+                [*command, *FLAGS, *position, *level, str(source), "-o", str(out), *(() if not position else ("-lm",))],
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                text=True,
+            )
+            for level, out in zip(levels, made, strict=True)
+        ]
+        outputs = [call.communicate()[0] for call in calls]
+        if all(call.returncode == 0 for call in calls):
+            for out, file in zip(made, files, strict=True):
+                unfinished = file.with_name(f"{file.name}.{os.getpid()}")
+                shutil.copyfile(out, unfinished)
+                os.replace(unfinished, file)
+            print(f"built {', '.join(file.name for file in files)} in {time.monotonic() - start:.0f} s", flush=True)
+            return
+        reasons.append(f"{shlex.join(command)}: {next(text for text in outputs if text)[:1000]}")
+    raise BuildError("\n".join(reasons) or "no C compiler is found: install one (gcc or clang), or set CC")
+
+
+def main() -> int:
+    """Build; 2 with the reason on standard error if that is not possible."""
+    try:
+        build()
+    except BuildError as error:
+        print(f"The kernels were not built; numba compiles them at the first use. {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
