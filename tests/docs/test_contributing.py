@@ -124,7 +124,7 @@ def test_a_page_has_ten_steps(page: Path) -> None:
 @extended
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_the_steps_lead_to_what_they_say(page: Path, tmp_path: Path) -> None:
-    follow(page, copy_of_the_source(tmp_path), {"NUMBA_DISABLE_JIT": "1"})
+    follow(page, copy_of_the_source(tmp_path), {"SAGLINE_BACKEND": "python"})
 
 
 @pytest.mark.soak
