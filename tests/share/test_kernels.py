@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import sagline as sl
 from sagline.robot.reach import bounds
@@ -28,18 +29,30 @@ def frame_end_limited() -> sl.Robot:
     return robot.replace(name="frame-end", tension_limits_of="frame_end")
 
 
-ROBOTS = {name: sl.load_robot(name) for name in sl.robot_names()} | {"frame-end": frame_end_limited()}
-CHOSEN = ("falcon-7", "cogiro", "fast", "ipanema-2-pulleys", "frame-end")
+def planar() -> sl.Robot:
+    """Three freedoms, four cables, no upper limits."""
+    frame = [[-3.0, 0.0, 0.0], [3.0, 0.0, 0.0], [-3.0, 0.0, 4.0], [3.0, 0.0, 4.0]]
+    platform = [[-0.2, 0.0, 0.1], [0.2, 0.0, 0.1], [-0.2, 0.0, -0.1], [0.2, 0.0, -0.1]]
+    return sl.Robot(
+        name="planar", frame_anchors=frame, platform_anchors=platform, cables=sl.Cable(0.05, 1e5), mass=10.0,
+        inertia=np.eye(3),
+        motion_pattern="1R2T", plane_normal=[0.0, 1.0, 0.0], tension_min=[20.0, 20.0, 20.0, 20.0],
+    )  # fmt: skip
+
+
+ROBOTS = {name: sl.load_robot(name) for name in sl.robot_names()}
+ROBOTS |= {"frame-end": frame_end_limited(), "planar": planar()}
+CHOSEN = ("falcon-7", "cogiro", "fast", "ipanema-2-pulleys", "frame-end", "planar")
 
 
 def poses(robot: sl.Robot, count: int) -> sl.Pose:
     """Within the box that the robot stands in, half of them where it is meant to work; a little turned."""
     rng = np.random.default_rng(7)
     low, high = bounds(robot)
-    assert robot.test_box is not None
-    inside = rng.uniform(robot.test_box.low, robot.test_box.high, (count // 2, 3))
-    position = np.concatenate((rng.uniform(low, high, (count - count // 2, 3)), inside))
-    pose = sl.Pose.from_euler(position, *rng.normal(0.0, 0.1, (3, count)))
+    inside = (low, high) if robot.test_box is None else (robot.test_box.low, robot.test_box.high)
+    position = np.concatenate([rng.uniform(*box, (count // 2, 3)) for box in ((low, high), inside)])
+    moved = np.hstack((position, rng.normal(0.0, 0.1, position.shape))) @ robot.freedom.T @ robot.freedom
+    pose = sl.Pose(moved[:, :3], Rotation.from_rotvec(moved[:, 3:]).as_matrix())
     return pose[np.flatnonzero(np.isfinite(chord_geometry(robot, pose)[:, 2]).all(axis=1))]
 
 
