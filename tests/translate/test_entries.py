@@ -14,7 +14,9 @@ from typing import Any
 import pytest
 
 import sagline as sl
+from sagline.kernels.algebra.functions import sinhc_polynomial
 from sagline.kernels.inverse.poses import inverse_poses
+from sagline.kernels.plain import plain
 from tests.tiers import extended
 from tests.translate import inputs
 from tests.translate.library import Entry, compiled_c, copied, library_of
@@ -54,6 +56,12 @@ def agrees(annotation: ast.expr, type_: Type) -> bool:
         inner = annotation.slice.elts if isinstance(annotation.slice, ast.Tuple) else [annotation.slice]
         return len(inner) == len(getattr(type_, "types", ()))
     return True
+
+
+@pytest.mark.parametrize("function", [sinhc_polynomial, functions()["inverse_poses"]])
+def test_a_kernel_of_the_back_end_python_has_the_same_definition(function: Any) -> None:
+    own = getattr(function, "py_func", function)
+    assert ast.dump(definition(plain(own))) == ast.dump(definition(own))
 
 
 @pytest.fixture(scope="module")

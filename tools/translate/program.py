@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import inspect
-import textwrap
 from collections.abc import Iterable, Sequence
 from functools import cache
 from types import FunctionType
@@ -39,12 +38,18 @@ ELEMENTS: Final = {
 
 @cache
 def definition(function: FunctionType) -> ast.FunctionDef:
-    """Syntax tree of a function, with the lines of its file."""
-    lines, first = inspect.getsourcelines(function)
-    node = ast.parse(textwrap.dedent("".join(lines))).body[0]
-    ast.increment_lineno(node, max(first, 1) - 1)
-    assert isinstance(node, ast.FunctionDef)
-    return node
+    """Syntax tree of a function, with its decorators and the lines of its file."""
+    lines, _ = inspect.findsource(function)
+    first = function.__code__.co_firstlineno  # that of the first decorator; of `def` where a back end removed them
+    named = (node for node in ast.walk(_tree("".join(lines))) if getattr(node, "name", "") == function.__name__)
+    definitions = (node for node in named if isinstance(node, ast.FunctionDef))
+    return next(each for each in definitions if first in (each.lineno, *(line.lineno for line in each.decorator_list)))
+
+
+@cache
+def _tree(source: str) -> ast.Module:
+    """Syntax tree of a file."""
+    return ast.parse(source)
 
 
 class Program:
