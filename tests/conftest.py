@@ -24,7 +24,7 @@ from typer.main import get_command
 from sagline.share.calls import MODULE
 from tests.effort import slowness
 from tests.tiers import FILE_LIMIT, TEST_LIMIT
-from tools.translate import wasm
+from tools.translate import portable, wasm
 
 # numba compiles the single kernels that the tests in these folders call; the others run the compiled library
 INNER: Final = re.compile(r"(^|/)tests/(kernels|translate)(/|$)")
@@ -33,6 +33,7 @@ if PATHS and all(map(INNER.search, PATHS)):
     os.environ.setdefault("SAGLINE_BACKEND", "numba")
 ALL_EXTENDED: Final = re.compile(r"^pytestmark = (extended|\[extended\b)", re.MULTILINE)
 EXAMPLES: Final = 40  # of a property, in the first tier
+ROOT: Final = Path(__file__).parents[1]
 CPU: Final = "cpu"  # property of a report: processor time of the test [s], compilation excluded
 
 
@@ -46,8 +47,11 @@ def pytest_configure(config: pytest.Config) -> None:
     settings.register_profile("first tier", max_examples=EXAMPLES)
     if first_tier_alone(config):
         settings.load_profile("first tier")
-    if not MODULE.is_file() and not hasattr(config, "workerinput"):
-        wasm.build(Path(__file__).parents[1])
+    if not hasattr(config, "workerinput"):
+        if not MODULE.is_file():
+            wasm.build(ROOT)
+        if portable.is_stale(ROOT):
+            portable.build(ROOT)
 
 
 @pytest.fixture(scope="session", autouse=True)

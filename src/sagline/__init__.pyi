@@ -66,9 +66,9 @@ from .dynamics.vibration.vibration import Vibration as Vibration
 from .dynamics.vibration.vibration import VibrationStatus as VibrationStatus
 from .dynamics.vibration.vibration import to_shape as to_shape
 from .dynamics.vibration.vibration import vibration as vibration
+from .files.c_source import export_c as export_c
 from .files.calibration_file import load_calibration as load_calibration
 from .files.caspr import load_caspr as load_caspr
-from .files.controller_source import export_c as export_c
 from .files.controller_source import export_scl as export_scl
 from .files.execution_file import load_execution as load_execution
 from .files.log_file import load_log as load_log

@@ -12,7 +12,27 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from tests.files.test_controller_source_c import any_cables, reference
+from sagline.core.arrays import Array
+
+CABLES = 4_000
+
+
+def any_cables(rng: np.random.Generator) -> tuple[Array, ...]:
+    """Span, rise, tension, weight and stiffness: every slope, upright ones too, to the borders of what is covered."""
+    chord = 10.0 ** rng.uniform(-0.5, 1.5, CABLES)
+    angle = rng.uniform(-np.pi / 2, np.pi / 2, CABLES)
+    weight, stiffness = 10.0 ** rng.uniform(-2, 1, CABLES), 10.0 ** rng.uniform(3.5, 6.5, CABLES)
+    slackness = 10.0 ** rng.uniform(-5, np.log10(1.999), CABLES)
+    tension = np.minimum(weight * chord / (2 * slackness), 0.0999 * stiffness)
+    span, rise = chord * np.cos(angle), chord * np.sin(angle)
+    span[:100], rise[:100] = 0.0, np.where(rise[:100] < 0, -1.0, 1.0) * chord[:100]
+    keep = weight * chord <= 1.999 * 2 * tension
+    return tuple(x[keep] for x in (span, rise, tension, weight, stiffness))
+
+
+def reference(cables: tuple[Array, ...]) -> sl.CableState:
+    span, rise, tension, weight, stiffness = cables
+    return sl.Catenary().from_tension(sl.Cable(weight, stiffness), span, rise, tension, gravity=1.0)
 
 
 def as_python(scl: str) -> Callable[..., dict[str, Any]]:

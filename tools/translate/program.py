@@ -146,6 +146,14 @@ class Program:
         self._entries.append((symbol, translation))
         return translation
 
+    def parts(self) -> list[tuple[str, str]]:
+        """All structs, tables, functions and exported entries with their names, in the order in which C needs them."""
+        wrappers = [(symbol, self._wrapper(symbol, each)) for symbol, each in self._entries]
+        found = [(name, f"{text}\n") for name, text in self._structs.values()]
+        found += [(name, text) for name, text, _, _ in self._tables.values()]
+        found += [(each.name, each.text()) for each in self._functions.values()]
+        return [*found, *((symbol, f"static {head} {{\n{body}}}\n") for symbol, (head, body) in wrappers)]
+
     def text(self) -> str:
         """The whole C text, with only the functions that entries use."""
         wrappers = [self._wrapper(symbol, each) for symbol, each in self._entries]

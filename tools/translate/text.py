@@ -26,7 +26,6 @@ _HEAD: Final = """\
    With -DSL_CHECK every index is tested, and one outside its array ends the program with a message.
    An entry returns 0, or SAGLINE_SHORT_MEMORY if a work array is too small for the sizes of the others. */
 
-#include <complex.h>
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -34,8 +33,12 @@ _HEAD: Final = """\
 
 #define SAGLINE_SHORT_MEMORY 1
 
-#ifdef __GNUC__
+#if defined __GNUC__ && defined __OPTIMIZE_SIZE__
+#define SL_FORMULA inline __attribute__((unused))
+#elif defined __GNUC__
 #define SL_FORMULA inline __attribute__((always_inline, unused))
+#endif
+#ifdef __GNUC__
 #define SL_INLINE inline __attribute__((unused))
 #define SL_HELPER static inline __attribute__((unused))
 #else
@@ -116,6 +119,7 @@ SL_HELPER int64_t sl_power_int(int64_t base, int64_t exponent) {
 }
 
 /* Complex numbers as in Python: no rules for infinities, division by the larger part. */
+#include <complex.h>
 SL_HELPER double _Complex sl_complex(double real, double imaginary) {
     double _Complex number;
     ((double *)&number)[0] = real;
@@ -154,7 +158,8 @@ def _elements() -> str:
     return "\n".join(lines) + "\n"
 
 
-HEAD: Final = _HEAD + _elements() + _HELPERS
+HELPERS: Final = _elements() + _HELPERS
+HEAD: Final = _HEAD + HELPERS
 
 
 def array_name(element: Element, rank: int, strided: bool, constant: bool) -> str:

@@ -5,7 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from sagline.cli.options import RobotArgument, flag, option
+from sagline.cli.options import (
+    RobotArgument,
+    Tension,
+    TensionVariable,
+    VariableOption,
+    choice_option,
+    flag,
+    option,
+)
 from sagline.cli.terminal import show_note, show_text
 
 
@@ -14,29 +22,37 @@ def export_c(
     out: Annotated[
         Path, option("FILE", "The source, sagline.c; header and SCL file are written to the same folder.", "--out")
     ] = Path("sagline.c"),
+    tension: Annotated[
+        list[Tension] | None,
+        choice_option("METHOD", "Tension distribution method, repeated for several", Tension),
+    ] = None,
+    variable: VariableOption = TensionVariable.CHORD,
+    forward: Annotated[bool, flag("Write the forward kinematics too.", "--forward")] = False,
     single_precision: Annotated[
         bool, flag("Single precision, for controllers without double precision in hardware.", "--float")
     ] = False,
 ) -> None:
-    """Write C99 for tensions and lengths of a robot on a microcontroller, and SCL for a cable's length on a PLC.
+    """Write C99 for the kinematics of a robot on a microcontroller, and SCL for a cable's length on a PLC.
 
-    The source needs no heap, and every call returns a status; tensions are those of Closest or MinimumNorm. The robot
-    must have two redundant cables and no routing beyond its frame anchors.
+    The source has the same kernels as sagline: tensions and lengths of a pose, and on request the pose of given
+    lengths, over pulleys too. It needs no heap, and every call returns a status.
 
     For example:
 
         sagline export-c article-prototype --out sagline.c
-        sagline export-c own_robot.yaml --out robot.c --float
+        sagline export-c own_robot.yaml --out robot.c --float --forward
+        sagline export-c cogiro --tension minimum-norm --tension centroid
     """
-    from sagline.files.controller_source import export_c
+    from sagline.files.c_source import export_c
     from sagline.files.robot_file import load_robot
 
     loaded = load_robot(robot)
-    source, header, scl = export_c(loaded, out, single_precision=single_precision)
+    methods = [each.build(variable) for each in tension or [Tension.CLOSEST]]
+    source, header, scl = export_c(loaded, out, tension=methods, forward=forward, single_precision=single_precision)
     precision = "single" if single_precision else "double"
     show_note(f"{loaded.name}: ", f"{loaded.cable_count} cables, {loaded.motion_pattern}, {precision} precision")
-    show_text(f"{source}: C99, the same for every robot; cc -std=c99 -O2 -c {source.name}", whole=True)
-    show_text(f"{header}: this robot's constants, and the declarations", whole=True)
+    show_text(f"{source}: C99; cc -std=c99 -O2 -ffp-contract=off -c {source.name}", whole=True)
+    show_text(f"{header}: the declarations", whole=True)
     show_text(f"{scl}: P3 in SCL for a Siemens PLC, not compiled yet", whole=True)
 
 

@@ -41,7 +41,7 @@ from sagline.statics.balance import external_wrench
 from sagline.statics.tables import pose_rows
 
 _TILTS = (25.0, 60.0)  # tilts that are tried if the level start fails [degree]
-_DEPTH = 0.1  # depth of the first position below the center, relative to the mean length
+DEPTH = 0.1  # depth of the first position below the center, relative to the mean length
 _LIMIT_SLACK = 0.01  # a measured tension may be outside its limits by this share
 _POOR = np.array([0, 1, 2, 3, 4, 5, 6, 0])  # rank of each status; a fitted sample has the rank of a solved one
 
@@ -112,7 +112,7 @@ def starting_positions(robot: Robots, lengths: Array, quaternion: Array) -> Arra
     of the platform origin [m], shape (N, 3).
     """
     freedom = first_of(robot).freedom
-    depth = _DEPTH * np.nan_to_num(lengths.mean(axis=1, keepdims=True), nan=1.0)
+    depth = DEPTH * np.nan_to_num(lengths.mean(axis=1, keepdims=True), nan=1.0)
     position: Array = centered_positions(robot, quaternion) - depth * (freedom[:, 2] @ freedom[:, :3])
     return position
 

@@ -30,6 +30,7 @@ STEPS = 80
 # Relative steps after which the next step is below rounding: Newton's method squares the error, Halley's cubes it.
 SMALL_NEWTON_STEP = 1e-9
 SMALL_HALLEY_STEP = 1e-6
+SPLIT = 134217729.0  # 2^27 + 1: halves of a mantissa
 
 
 @kernel
@@ -172,7 +173,7 @@ def ordinary_sag_force_ratio(half_weight: float, sine: float, strain: float, rat
 @formula
 def _product_error(a: float, product: float) -> float:
     """a*a - product exactly; product is a*a with rounding (Dekker)."""
-    split = 134217729.0 * a  # 2^27 + 1
+    split = SPLIT * a
     high = split - (split - a)
     low = a - high
     return ((high * high - product) + 2.0 * high * low) + low * low

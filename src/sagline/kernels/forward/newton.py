@@ -238,6 +238,7 @@ def polish(problem: PoseProblem, pose: Array, space: ForwardArrays, good: float)
 DESCENT_STEPS = 150
 FIRST_RADIUS = 0.5  # radius of the trust region, in the problem's units
 LARGEST_RADIUS = 1.0
+SMALLEST_RADIUS = 1e-14
 NOISE = 4e-15  # rounding error of an energy, relative to the sum of its parts
 
 
@@ -275,7 +276,7 @@ def descend(problem: PoseProblem, pose: Array, space: ForwardArrays, known: floa
             if not fresh:
                 radius = 0.3 * min(length, radius)
                 tensions = 0.0
-                if not radius > 1e-14:
+                if not radius > SMALLEST_RADIUS:
                     steps = iteration
                     break
             else:

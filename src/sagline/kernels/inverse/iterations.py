@@ -46,7 +46,8 @@ def linearize_ends(model: Model, distribution: Distribution, cables: Cables, bal
 
 ITERATIONS = 30
 FREE_ITERATIONS = 8  # iterations after which the reference is fixed; rounding then cannot change a tie
-CONVERGED = 1e-10  # [N]; sag forces that change by less, or by 1e-15 of the largest tension, have converged
+CONVERGED = 1e-10  # [N]; sag forces that change by less, or by this share of the largest tension, have converged:
+SAG_ROUNDING = 1e-15
 
 
 @glue
@@ -88,7 +89,7 @@ def distribute_and_solve_cables(
             status = codes.POSE_TOO_SLACK if gravest == codes.CABLE_TOO_SLACK else codes.POSE_NOT_CONVERGED
             break
         status = codes.POSE_NOT_CONVERGED
-        converged = model.code != codes.CATENARY or sag_force_change(cables) <= CONVERGED + 1e-15 * largest
+        converged = model.code != codes.CATENARY or sag_force_change(cables) <= CONVERGED + SAG_ROUNDING * largest
         if work is None or distribution.variable != codes.FRAME_END_TENSION:
             if converged:
                 status = codes.POSE_SOLVED

@@ -1,0 +1,217 @@
+"""C99 of a robot's inverse and forward kinematics, for microcontrollers: the kernels of this package, translated.
+
+`tools/translate/portable.py` writes the translated kernels, in parts, when the package is built. The source of a robot
+contains the parts that it needs, its data, and functions to call.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Sequence
+from importlib.resources import files
+from itertools import count
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from sagline.cables.models import Catenary
+from sagline.core.arguments import file_path, instance
+from sagline.core.arrays import Array
+from sagline.core.errors import FileError, InvalidValueError
+from sagline.files.controller_source import checked_name, filled, origin
+from sagline.files.writing import atomic_files
+from sagline.kernels import codes, tables
+from sagline.kernels.cable.geometry import CABLE_ROWS
+from sagline.kernels.forward.problem import FORWARD_NUMBERS, LAST_COLUMNS
+from sagline.kernels.memory import memory_for
+from sagline.kinematics.forward import DEPTH, centered_positions
+from sagline.kinematics.status import ForwardStatus, PoseStatus
+from sagline.kinematics.winding import without_guides
+from sagline.robot.batch import has_routing
+from sagline.robot.pattern import ROTATING
+from sagline.robot.reach import LEVEL
+from sagline.robot.robot import Robot
+from sagline.statics.tables import body_table, cable_table
+from sagline.tension.method import Options, TensionMethod, kernel_options, takes_default_kernel
+from sagline.tension.methods import Closest
+
+KERNELS: Final = "c/kernels.json"
+BAD_INPUT: Final = 9
+FORWARD_STATUS: Final = 10  # added to the codes of the forward kernel
+COMMENT: Final = re.compile(r"/\*.*?\*/", re.DOTALL)
+_CLOSEST = Closest()
+
+
+def export_c(
+    robot: Robot,
+    file: str | os.PathLike[str],
+    *,
+    tension: TensionMethod | Sequence[TensionMethod] = _CLOSEST,
+    forward: bool = False,
+    single_precision: bool = False,
+) -> tuple[Path, Path, Path]:
+    """Write C99 for a robot's kinematics on a microcontroller, and SCL of one function for a PLC.
+
+    NAME.c has the kernels of `inverse` and, on request, of `forward`, translated, with the data of the robot. It has no
+    heap and no recursion, its loops are bounded, and each function returns a status. NAME.h declares the functions.
+    NAME.scl is P3 of "The model" in SCL for a Siemens PLC; it has not been compiled yet.
+
+    Args:
+        robot: The robot; its winches may have pulleys and dead lengths, but no guides.
+        file: Path of the source, sagline.c; the other files are in the same folder. Existing files are replaced.
+        tension: Tension distribution method, or several of them, of which each call selects one.
+        forward: If true, the source has the forward kinematics too.
+        single_precision: If true, numbers are `float`, for controllers whose hardware has single precision only.
+
+    Returns:
+        Paths of the source, the header and the SCL text.
+
+    Raises:
+        InvalidValueError: If the winches have guides, a method does not support the robot, or a number exceeds single
+            precision.
+        FileError: If the name does not end in .c, a file cannot be written, or the package was not built.
+
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("article-prototype")
+        >>> source, header, scl = sl.export_c(robot, "sagline.c")
+    """
+    instance(robot, Robot, "robot")
+    instance(forward, bool, "forward")
+    real = np.float32 if instance(single_precision, bool, "single_precision") else np.float64
+    methods = (tension,) if isinstance(tension, TensionMethod) else tuple(tension)
+    for index, method in enumerate(methods):
+        instance(method, TensionMethod, f"tension[{index}]")
+    path = checked_name(file_path(file), ".c", "C source", "sagline")
+    source, header = source_of(without_guides(robot, "export_c", "inverse"), methods, forward, real, path.stem)
+    texts = {path: source, path.with_suffix(".h"): header, path.with_suffix(".scl"): filled("c/sagline.scl", {})}
+    with atomic_files(path.parent, [place.name for place in texts]) as partials:
+        for partial, text in zip(partials, texts.values(), strict=True):
+            partial.write_text(text, encoding="utf-8", newline="\n")
+    source_path, beside, scl = texts
+    return source_path, beside, scl
+
+
+def source_of(
+    robot: Robot, methods: Sequence[TensionMethod], forward: bool, real: type[np.floating], stem: str
+) -> tuple[str, str]:
+    """Source and header in C99 of a robot, with numbers of float64 or float32."""
+    options = [kernel_options(robot, Catenary(), method) for method in methods]
+    words = _words(robot, methods, options, real, stem)
+    asked = ["inverse_nearest" if all(map(takes_default_kernel, methods)) else "inverse_by_method"]
+    if forward:
+        asked.append("forward_over_pulleys" if has_routing(robot) else "forward_bare")
+    words |= {
+        "inverse": asked[0],
+        "otherwise": "" if asked[0] == "inverse_nearest" else "true, ",
+        "solve": asked[-1],
+        "behind": "true, " if has_routing(robot) else "",
+        "forward": filled("c/forward.h", {}) if forward else "",
+    }
+    functions = ["c/inverse.c", *(["c/forward.c"] if forward else [])]
+    body = "".join(filled(name, words) for name in functions)
+    return f"{filled('c/head.c', words)}{_reached(asked, words['real'])}\n{body}", filled("c/sagline.h", words)
+
+
+def _reached(asked: Sequence[str], real: str) -> str:
+    """The translated kernels that some entries need, in their order."""
+    place = files("sagline.files").joinpath(KERNELS)
+    try:
+        parts: list[tuple[list[str], str]] = json.loads(place.read_text(encoding="utf-8"))[real]
+    except FileNotFoundError:
+        step = "Build the package: python -m tools.build, in the folder of the source code."
+        raise FileError(Path(str(place)), "is missing: the package was not built", step) from None
+    owner = {name: index for index, (names, _) in enumerate(parts) for name in names}
+    waiting, reached = [owner[name] for name in asked], {index for index, (names, _) in enumerate(parts) if not names}
+    while waiting:
+        index = waiting.pop()
+        if index not in reached:
+            reached.add(index)
+            used = re.findall(r"[A-Za-z_]\w*", COMMENT.sub("", parts[index][1]))
+            waiting += {owner[word] for word in used if word in owner}
+    return "\n".join(parts[index][1] for index in sorted(reached))
+
+
+def _words(
+    robot: Robot, methods: Sequence[TensionMethod], options: Sequence[Options], real: type[np.floating], stem: str
+) -> dict[str, str]:
+    """Words of the robot's functions: data and sizes."""
+    freedom, m, n = robot.freedom, robot.cable_count, robot.degrees_of_freedom
+    turning = freedom[:, 3:].any(axis=1) if robot.motion_pattern in ROTATING else np.zeros(n, dtype=bool)
+    rows = tables.RESULT_ROWS if has_routing(robot) else tables.BARE_ROWS
+    numbers, counters = memory_for(m)
+    data: dict[str, Array | float] = {
+        "freedom": freedom,
+        "body": body_table(robot).ravel(),
+        "table": cable_table(robot)[0],
+        "translations": freedom[~turning],
+        "middle": centered_positions(robot, LEVEL),
+        "depth": DEPTH,
+    }
+    return {
+        **origin(robot),
+        **{name: _constant(np.asarray(value), name, real) for name, value in data.items()},
+        "header": f"{stem}.h",
+        "real": "float" if real is np.float32 else "double",
+        "cables": str(m),
+        "freedoms": str(n),
+        "translations_count": str(n - int(turning.sum())),
+        "methods": ", ".join(_method_names(methods)),
+        "rules": ",\n    ".join(_rule(each, real) for each in options),
+        "limits_of": str(options[0].limits[0]),
+        "statuses": _statuses(),
+        "numbers": str(numbers.size),
+        "counters": str(counters.size),
+        "rows": str(rows),
+        "results": str(rows * m),
+        "others": str(CABLE_ROWS * m + n * n + LAST_COLUMNS + tables.POSE_COLUMNS + FORWARD_NUMBERS),
+        "cable_rows": str(CABLE_ROWS),
+        "not_converged": str(codes.FORWARD_NOT_CONVERGED),
+        "offset": str(FORWARD_STATUS),
+    }
+
+
+def _method_names(methods: Sequence[TensionMethod]) -> list[str]:
+    """Name in C of each method: that of its class, with a number if it is repeated."""
+    found: list[str] = []
+    for method in methods:
+        name = "SAGLINE" + re.sub(r"(?=[A-Z])", "_", type(method).__name__).upper()
+        found.append(next(each for k in count(1) if (each := name if k == 1 else f"{name}_{k}") not in found))
+    return found
+
+
+def _rule(options: Options, real: type[np.floating]) -> str:
+    """Data of a method in C."""
+    code, parameter, variable, weights, targets = options.sharing
+    numbers = (_constant(np.asarray(value), "tension", real) for value in (parameter, options.limits[1]))
+    lists = (_constant(np.asarray(value), "tension", real) for value in (weights, targets))
+    return f"{{{code}, {', '.join(numbers)}, {variable}, {', '.join(lists)}}}"
+
+
+def _statuses() -> str:
+    """Members of the list of statuses in C, with their meaning."""
+    rows = [(status.name, int(status), status.text) for status in PoseStatus if int(status) < BAD_INPUT]
+    rows.append(("BAD_INPUT", BAD_INPUT, "a number is not finite, a length too short, a quaternion not of length 1"))
+    forward = [(f"FORWARD_{each.name}", FORWARD_STATUS + int(each), each.text) for each in ForwardStatus]
+    rows += forward[codes.FORWARD_LOOSE : codes.FORWARD_NO_LENGTHS]
+    return "\n".join(f"    SAGLINE_{name} = {code}, /* {text} */" for name, code, text in rows)
+
+
+def _constant(values: Array, name: str, real: type[np.floating]) -> str:
+    """A constant in C, or a list in braces; each is read back as the same number."""
+    if values.ndim:
+        separator = ", " if values.ndim == 1 else ",\n    "
+        return f"{{{separator.join(_constant(value, name, real).strip('{}') for value in values)}}}"
+    with np.errstate(over="ignore", under="ignore"):
+        number = real(values)
+    if np.isnan(values) or np.isinf(values):
+        return "NAN" if np.isnan(values) else "INFINITY" if number > 0.0 else "-INFINITY"
+    if not np.isfinite(number) or (number == 0.0) != (values == 0.0):
+        step = "Export it in double precision."
+        raise InvalidValueError(
+            name, f"{float(values):g}", f"{np.finfo(real).tiny:.0e} to {np.finfo(real).max:.0e}", step
+        )
+    return f"{number!s}{'F' if real is np.float32 else ''}"
