@@ -1,28 +1,31 @@
-"""The C99 of `sagline export-c`, compiled by the system's compiler with -O2; one core."""
+"""The C99 of `sagline export-c`: times on one core of this machine, and sizes for ARM microcontrollers."""
 
 from __future__ import annotations
 
-import re
+import shutil
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any, Final
 
 from rich.console import Console
 
 import sagline as sl
 from benchmarks.measure import Row, one_core, show
-from tests.files.c_programs import compiled
+from sagline.tension.methods import METHODS
+from tests.files.c_programs import arm_sizes, compiled
 
-# best of many runs over 4096 cables of 0.5 to 5 m; strain of at most tau_max/EA
+# best of many runs over 256 poses; forward from 1 cm away
 PROGRAM = """\
 #define _POSIX_C_SOURCE 199309L
 #include <stdio.h>
 #include <time.h>
 #include "sagline.h"
 
-enum { COUNT = 4096, RUNS = 300 };
-static double span[COUNT], rise[COUNT], tau[COUNT], length[COUNT], sum;
+enum { COUNT = 256, RUNS = 100 };
+static sagline_work work;
+static sagline_real sum;
 
 static double seconds(void)
 {
@@ -31,84 +34,82 @@ static double seconds(void)
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-static double random_number(void)
-{
-    static unsigned long state = 1;
-    state = (state * 6364136223846793005UL + 1442695040888963407UL) & 0xffffffffffffffffUL;
-    return (double)(state >> 11) / 9007199254740992.0;
-}
-
-static void cables(double stiffness)
-{
-    double best[2] = {1.0, 1.0}, force[2], value;
-    for (int run = 0; run < RUNS; run++) {
-        double start = seconds();
-        for (int i = 0; i < COUNT; i++) {
-            sagline_length(span[i], rise[i], tau[i], 0.8829, stiffness, &length[i], &value);
-            sum += value;
-        }
-        double middle = seconds();
-        for (int i = 0; i < COUNT; i++) {
-            sagline_tension(span[i], rise[i], length[i], 0.8829, stiffness, force, &value);
-            sum += value;
-        }
-        double end = seconds();
-        best[0] = middle - start < best[0] ? middle - start : best[0];
-        best[1] = end - middle < best[1] ? end - middle : best[1];
-    }
-    printf("%.1f %.1f ", 1e9 * best[0] / COUNT, 1e9 * best[1] / COUNT);
-}
-
 int main(void)
 {
-    const double rotation[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
-    double position[3] = {0.2, -0.4, 1.4}, tension[SAGLINE_CABLES], best = 1.0;
-    for (int i = 0; i < COUNT; i++) {
-        span[i] = 0.5 + 4.0 * random_number();
-        rise[i] = -2.5 + 2.0 * random_number();
-        tau[i] = 25.0 + 675.0 * random_number();
-    }
-    cables(70e3);
-    cables(14e3);
-    for (int run = 0; run < RUNS; run++) {
+    sagline_real pose[7] = {0, 0, 0, 0, 0, 0, 1}, length[COUNT][SAGLINE_CABLES], tension[SAGLINE_CABLES];
+    double best[3] = {1, 1, 1};
+    for (int run = 0; run < 3 * RUNS; run++) {
         double start = seconds();
-        for (int i = 0; i < 256; i++) {
-            position[0] = 0.2 + 1e-4 * i;
-            sum += sagline_inverse(position, rotation, 0, 0, tension, length);
+        for (int i = 0; i < COUNT; i++) {
+            pose[0] = (sagline_real)(0.2 + 1e-3 * i + (run % 3 ? 0.01 : 0));
+            pose[1] = (sagline_real)-0.4;
+            pose[2] = (sagline_real)1.4;
+            pose[3] = pose[4] = pose[5] = 0;
+            pose[6] = 1;
+            if (run % 3 == 0)
+                sum += sagline_inverse(&work, 0, pose, 0, 0, length[i], tension);
+            else if (run % 3 == 1)
+                sum += sagline_forward(&work, length[i], 0, pose, tension);
+            else
+                sum += sagline_search(&work, length[i], 0, pose, tension);
         }
-        double took = (seconds() - start) / 256;
-        best = took < best ? took : best;
+        double took = (seconds() - start) / COUNT;
+        best[run % 3] = took < best[run % 3] ? took : best[run % 3];
     }
-    printf("%.2f\\n", 1e6 * best);
-    return sum < 0.0;
+    printf("%.1f %.1f %.1f\\n", 1e6 * best[0], 1e6 * best[1], 1e6 * best[2]);
+    return sum != 0;
 }
 """
+EVERY: Final = [make() for make in METHODS.values()]
+CASES: Final[tuple[tuple[str, str, dict[str, Any]], ...]] = (
+    ("inverse", "article-prototype", {}),
+    ("inverse, forward", "article-prototype", {"forward": True}),
+    ("inverse, forward over pulleys", "ipanema-3-pulleys", {"forward": True}),
+    ("the same, all methods", "ipanema-3-pulleys", {"forward": True, "tension": EVERY}),
+)
 
 
-def c_source() -> Iterator[Row]:
-    """Times per cable and per pose, and sizes."""
+def times() -> Iterator[Row]:
+    """Times of a pose and of a sample."""
     with TemporaryDirectory() as name:
         folder = Path(name)
-        source, header, _ = sl.export_c(sl.load_robot("article-prototype"), folder / "sagline.c")
-        (folder / "bench.c").write_text(PROGRAM.replace("sagline.h", header.name))
-        made = compiled(folder / "bench.c", folder / "bench", str(source))
-        numbers = subprocess.run([made], check=True, capture_output=True, text=True).stdout.split()
-        object_file = compiled(source, folder / "sagline.o", "-c", "-fstack-usage")
-        sizes = subprocess.run(["size", "-A", object_file], check=True, capture_output=True, text=True).stdout
-        size = sum(int(found) for found in re.findall(r"^\.text\s+(\d+)", sizes, re.MULTILINE))
-        stack = {
-            line.split()[0].rpartition(":")[2]: int(line.split()[1])
-            for line in object_file.with_suffix(".su").read_text().splitlines()
-        }
-    yield Row("sagline.c, -O2: P3, P2, strain to 1 %", "<= 150, <= 150 ns a cable", f"{numbers[0]}, {numbers[1]} ns")
-    yield Row("the same, strain to 5 %", "", f"{numbers[2]}, {numbers[3]} ns")
-    yield Row("sagline.c: a pose of eight cables, MinimumNorm", "", f"{numbers[4]} us")
-    deepest = stack["sagline_inverse"] + max(stack["sagline_length"], stack.get("place", 0))
-    yield Row("sagline.c: machine code; stack of a pose", "<= 8 kB", f"{size / 1024:.1f} kB; {deepest / 1024:.1f} kB")
+        (folder / "bench.c").write_text(PROGRAM)
+        for single in (False, True):
+            robot = sl.load_robot("article-prototype")
+            source, _, _ = sl.export_c(robot, folder / "sagline.c", forward=True, single_precision=single)
+            made = compiled(folder / "bench.c", folder / "bench", "-O2", str(source))
+            numbers = subprocess.run([made], check=True, capture_output=True, text=True).stdout.split()
+            kind = "float" if single else "double"
+            yield Row(f"C, {kind}: inverse, forward, search", "", f"{', '.join(numbers)} us")
 
 
-PARTS = (c_source,)
+def sizes() -> Iterator[Row]:
+    """Sizes for microcontrollers."""
+    if shutil.which("arm-none-eabi-gcc") is None:
+        yield Row("C on ARM", "", "not measured: arm-none-eabi-gcc is not installed")
+        return
+    with TemporaryDirectory() as name:
+        for what, preset, asked in CASES:
+            for core, single in (("Cortex-M4F", True), ("Cortex-M7", False)):
+                robot, file = sl.load_robot(preset), Path(name) / "sagline.c"
+                source, _, _ = sl.export_c(robot, file, single_precision=single, **asked)
+                found = arm_sizes(source, core)
+                kind = "float" if single else "double"
+                work = arm_sizes(_work_of(source), core).variables
+                numbers = (found.code + found.constants, work, found.stack)
+                yield Row(f"{core}, {kind}: {what}", "", " ".join(f"{number / 1000:.1f}" for number in numbers) + " kB")
+
+
+def _work_of(source: Path) -> Path:
+    """A source with the work memory alone."""
+    file = source.with_name("work.c")
+    file.write_text('#include "sagline.h"\nextern sagline_work work;\nsagline_work work;\n')
+    return file
+
+
+PARTS = (times, sizes)
 
 if __name__ == "__main__":
     one_core()
-    show("C99 for a microcontroller", [row for part in PARTS for row in part()], Console())
+    title = "C99 for a microcontroller; on ARM: code and constants, work memory, stack"
+    show(title, [row for part in PARTS for row in part()], Console())

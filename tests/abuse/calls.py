@@ -796,7 +796,13 @@ def _files(given: _Given) -> dict[str, Call]:
         "dump_robot": Call(sl.dump_robot, _all(robot=("one", given.robot))),
         "export_c": Call(
             sl.export_c,
-            _all(robot=("one", given.robot), file=("file", str(folder / "sagline.c")), single_precision=("one", True)),
+            _all(
+                robot=("one", given.robot),
+                file=("file", str(folder / "sagline.c")),
+                tension=("one", sl.Closest()),
+                forward=("one", False),
+                single_precision=("one", True),
+            ),
         ),
         "export_scl": Call(
             sl.export_scl,

@@ -269,7 +269,7 @@ FIRST_TIER = """
 2 convert cogiro --at 1 '' 2
 2 convert cogiro --out ''
 2 convert cogiro --at 1 2 3
-2 export-c own_planar.yaml
+2 export-c cogiro --out c.h
 2 export-scl cogiro
 2 view nothing-like-it --no-browser
 2 view cogiro missing.nc --no-browser

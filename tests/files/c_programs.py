@@ -135,4 +135,4 @@ def deepest_stack(graph: str) -> int:
     def depth(name: str) -> int:
         return frames.get(name, 0) + max(map(depth, calls.get(name, ())), default=0)
 
-    return max(map(depth, frames))
+    return max(map(depth, frames), default=0)
