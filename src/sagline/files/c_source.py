@@ -82,11 +82,12 @@ def export_c(
     instance(robot, Robot, "robot")
     instance(forward, bool, "forward")
     real = np.float32 if instance(single_precision, bool, "single_precision") else np.float64
-    methods = (tension,) if isinstance(tension, TensionMethod) else tuple(tension)
-    for index, method in enumerate(methods):
-        instance(method, TensionMethod, f"tension[{index}]")
+    methods = tuple(tension) if isinstance(tension, list | tuple) else (tension,)
+    if not methods:
+        raise InvalidValueError("tension", "empty", "a method or several", "Give one, Closest() for instance.")
+    chosen = [instance(method, TensionMethod, "tension") for method in methods]
     path = checked_name(file_path(file), ".c", "C source", "sagline")
-    source, header = source_of(without_guides(robot, "export_c", "inverse"), methods, forward, real, path.stem)
+    source, header = source_of(without_guides(robot, "export_c", "inverse"), chosen, forward, real, path.stem)
     texts = {path: source, path.with_suffix(".h"): header, path.with_suffix(".scl"): filled("c/sagline.scl", {})}
     with atomic_files(path.parent, [place.name for place in texts]) as partials:
         for partial, text in zip(partials, texts.values(), strict=True):
