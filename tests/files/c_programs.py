@@ -118,10 +118,10 @@ def arm_sizes(source: Path, core: str, *options: str) -> Sizes:
     compiled(source, target, *flags, command=["arm-none-eabi-gcc"])
     printed = subprocess.run(["size", "-A", str(target)], check=True, capture_output=True, text=True).stdout
     sections = [(name, int(size)) for name, size in re.findall(r"^\.(\w+)\S*\s+(\d+)", printed, re.MULTILINE)]
-    totals = [
-        sum(size for name, size in sections if name in kinds) for kinds in (["text"], ["rodata"], ["data", "bss"])
-    ]
-    return Sizes(*totals, deepest_stack(target.with_suffix(".ci").read_text()))
+    code, constants, data, zeros = (
+        sum(size for name, size in sections if name == kind) for kind in ("text", "rodata", "data", "bss")
+    )
+    return Sizes(code, constants, data + zeros, deepest_stack(target.with_suffix(".ci").read_text()))
 
 
 def deepest_stack(graph: str) -> int:
