@@ -12,13 +12,33 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Final
+from types import FunctionType
+from typing import Any, Final
 
+from sagline.kernels import codes, tables
+from sagline.kernels.cable.geometry import CABLE_ROWS
+from sagline.kernels.forward.problem import FORWARD_NUMBERS, LAST_COLUMNS
 from tools.translate import signatures as s
+from tools.translate.bounds import Bounds
+from tools.translate.extents import (
+    CABLES,
+    FLAG,
+    FLOAT,
+    FREEDOMS,
+    NOTHING,
+    Array,
+    Int,
+    Other,
+    Polynomial,
+    Record,
+    Value,
+    exactly,
+)
 from tools.translate.program import Program
 from tools.translate.text import HEAD, HELPERS, MATH
 from tools.translate.types import NONE, ArrayType, Type, plain_tuple
 
+Terms = list[tuple[int, int, int]]  # powers of freedoms and redundant cables, coefficient
 KERNELS: Final = "sagline.kernels."
 COMMENT: Final = re.compile(r"/\*.*?\*/", re.DOTALL)
 NUMBER: Final = re.compile(r"(?<![\w.])(\d+\.\d*(?:e[+-]?\d+)?|\d+e[+-]?\d+)")
@@ -116,15 +136,60 @@ def is_stale(root: Path) -> bool:
     return not file.exists() or file.stat().st_mtime < max(each.stat().st_mtime for each in sources)
 
 
+def bounds() -> dict[str, dict[int, dict[str, Terms]]]:
+    """Operations and work memory of each entry by the code of the method (0 for forward), as polynomials."""
+    free, cables, one = exactly(FREEDOMS), exactly(CABLES), exactly(1)
+    robot = (_floats(free, exactly(6)), _floats(one, exactly(5)), _floats(one, cables, exactly(tables.CABLE_COLUMNS)))
+    pose, wrench, body = _floats(one, exactly(tables.POSE_COLUMNS)), _floats(one, exactly(6)), _floats(cables)
+    memory = _record(Array((Int(),), True, "numbers"), Array((Int(),), False, "counters"))
+    codes_, results = Array((one, cables), False), _floats(exactly(tables.RESULT_ROWS), one, cables)
+    answers = _record(results, codes_, _floats(one, exactly(2)), _floats(one, free), Array((one,), False))
+    model, limits = (exactly(codes.CATENARY), FLOAT, FLOAT), _record(Int(), FLOAT)
+    chain = _record(_floats(exactly(CABLE_ROWS), cables), _floats(free, free), _floats(exactly(LAST_COLUMNS)))
+    samples = _record(*robot, _floats(one, cables), pose, wrench)
+    found = _record(pose, results, codes_, _floats(one, exactly(FORWARD_NUMBERS)), Array((one,), False))
+    inverse, forward = s.functions()["inverse_poses"], s.functions()["forward_poses"]
+    every: dict[str, dict[int, dict[str, Terms]]] = {}
+    for symbol, last, otherwise in (("inverse_nearest", 2, NOTHING), ("inverse_by_method", 11, FLAG)):
+        for code in range(last + 1):
+            method = _record(exactly(code), FLOAT, Int(), body, body)
+            given = (_record(*model), method, limits, _record(*robot), pose, wrench, body, memory, otherwise, answers)
+            every.setdefault(symbol, {})[code] = _bounds_of(inverse, (*given, exactly(0), one))
+    for symbol, behind in (("forward_bare", NOTHING), ("forward_over_pulleys", Other("flag", True))):
+        given_ = (_record(*model, behind), Other("flag", False), samples, chain, memory, found)
+        every[symbol] = {0: _bounds_of(forward, given_)}
+    return every
+
+
+def _bounds_of(entry: FunctionType, arguments: tuple[Value, ...]) -> dict[str, Terms]:
+    """Bounds of one entry in the form of the data."""
+    found = Bounds()
+    _, operations = found.call(entry, arguments)
+    return {name: _terms(each) for name, each in {**found.memory, "operations": operations}.items()}
+
+
+def _terms(bound: Polynomial) -> Terms:
+    return [(i, j, value) for (i, j), value in bound.terms]
+
+
+def _floats(*sizes: Int) -> Array:
+    return Array(sizes, True)
+
+
+def _record(*items: Value) -> Record:
+    return Record(("",) * len(items), items)
+
+
 def build(root: Path) -> None:
     """Write the data of the package below a source tree."""
     double = list(parts())
     with single_constants():
         single = [(names, in_single(text)) for names, text in parts()]
-    found = {
+    found: dict[str, Any] = {
         name: [(names, text.replace("int64_t", "int32_t")) for names, text in part]
         for name, part in (("double", double), ("float", single))
     }
+    found["bounds"] = bounds()
     (root / FILE).write_text(json.dumps(found, indent=0), encoding="utf-8")
 
 

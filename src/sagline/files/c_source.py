@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from importlib.resources import files
 from itertools import count
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -26,7 +26,6 @@ from sagline.files.writing import atomic_files
 from sagline.kernels import codes, tables
 from sagline.kernels.cable.geometry import CABLE_ROWS
 from sagline.kernels.forward.problem import FORWARD_NUMBERS, LAST_COLUMNS
-from sagline.kernels.memory import memory_for
 from sagline.kinematics.forward import DEPTH, centered_positions
 from sagline.kinematics.status import ForwardStatus, PoseStatus
 from sagline.kinematics.winding import without_guides
@@ -56,8 +55,8 @@ def export_c(
     """Write C99 for a robot's kinematics on a microcontroller, and SCL of one function for a PLC.
 
     NAME.c has the kernels of `inverse` and, on request, of `forward`, translated, with the data of the robot. It has no
-    heap and no recursion, its loops are bounded, and each function returns a status. NAME.h declares the functions.
-    NAME.scl is P3 of "The model" in SCL for a Siemens PLC; it has not been compiled yet.
+    heap and no recursion, its loops are bounded, and each function returns a status. NAME.h declares the functions and
+    states their bounds. NAME.scl is P3 of "The model" in SCL for a Siemens PLC; it has not been compiled yet.
 
     Args:
         robot: The robot; its winches may have pulleys and dead lengths, but no guides.
@@ -101,30 +100,47 @@ def source_of(
 ) -> tuple[str, str]:
     """Source and header in C99 of a robot, with numbers of float64 or float32."""
     options = [kernel_options(robot, Catenary(), method) for method in methods]
+    kernels = _kernels()
     words = _words(robot, methods, options, real, stem)
     asked = ["inverse_nearest" if all(map(takes_default_kernel, methods)) else "inverse_by_method"]
     if forward:
         asked.append("forward_over_pulleys" if has_routing(robot) else "forward_bare")
+    inverse = [_evaluated(kernels["bounds"][asked[0]][str(each.sharing[0])], robot) for each in options]
+    solve = [_evaluated(kernels["bounds"][each]["0"], robot) for each in asked[1:]]
+    words |= {name: str(max(each.get(name, 1) for each in inverse + solve)) for name in ("numbers", "counters")}
     words |= {
+        "inverse_operations": f"{max(each['operations'] for each in inverse):,}",
+        "forward_operations": f"{max((each['operations'] for each in solve), default=0):,}",
         "inverse": asked[0],
         "otherwise": "" if asked[0] == "inverse_nearest" else "true, ",
         "solve": asked[-1],
         "behind": "true, " if has_routing(robot) else "",
-        "forward": filled("c/forward.h", {}) if forward else "",
     }
+    words["forward"] = filled("c/forward.h", words) if forward else ""
     functions = ["c/inverse.c", *(["c/forward.c"] if forward else [])]
     body = "".join(filled(name, words) for name in functions)
-    return f"{filled('c/head.c', words)}{_reached(asked, words['real'])}\n{body}", filled("c/sagline.h", words)
+    return f"{filled('c/head.c', words)}{_reached(kernels[words['real']], asked)}\n{body}", filled("c/sagline.h", words)
 
 
-def _reached(asked: Sequence[str], real: str) -> str:
-    """The translated kernels that some entries need, in their order."""
+def _kernels() -> dict[str, Any]:
+    """Translated kernels in both precisions, and their bounds."""
     place = files("sagline.files").joinpath(KERNELS)
     try:
-        parts: list[tuple[list[str], str]] = json.loads(place.read_text(encoding="utf-8"))[real]
+        found: dict[str, Any] = json.loads(place.read_text(encoding="utf-8"))
     except FileNotFoundError:
         step = "Build the package: python -m tools.build, in the folder of the source code."
         raise FileError(Path(str(place)), "is missing: the package was not built", step) from None
+    return found
+
+
+def _evaluated(bounds: dict[str, list[tuple[int, int, int]]], robot: Robot) -> dict[str, int]:
+    """Bounds of a kernel for a robot, from polynomials in its degrees of freedom and redundant cables."""
+    n, r = robot.degrees_of_freedom, robot.cable_count - robot.degrees_of_freedom
+    return {name: sum(value * n**i * r**j for i, j, value in terms) for name, terms in bounds.items()}
+
+
+def _reached(parts: list[tuple[list[str], str]], asked: Sequence[str]) -> str:
+    """The parts that some entries need, in their order."""
     owner = {name: index for index, (names, _) in enumerate(parts) for name in names}
     waiting, reached = [owner[name] for name in asked], {index for index, (names, _) in enumerate(parts) if not names}
     while waiting:
@@ -143,7 +159,6 @@ def _words(
     freedom, m, n = robot.freedom, robot.cable_count, robot.degrees_of_freedom
     turning = freedom[:, 3:].any(axis=1) if robot.motion_pattern in ROTATING else np.zeros(n, dtype=bool)
     rows = tables.RESULT_ROWS if has_routing(robot) else tables.BARE_ROWS
-    numbers, counters = memory_for(m)
     data: dict[str, Array | float] = {
         "freedom": freedom,
         "body": body_table(robot).ravel(),
@@ -164,8 +179,6 @@ def _words(
         "rules": ",\n    ".join(_rule(each, real) for each in options),
         "limits_of": str(options[0].limits[0]),
         "statuses": _statuses(),
-        "numbers": str(numbers.size),
-        "counters": str(counters.size),
         "rows": str(rows),
         "results": str(rows * m),
         "others": str(CABLE_ROWS * m + n * n + LAST_COLUMNS + tables.POSE_COLUMNS + FORWARD_NUMBERS),

@@ -9,6 +9,7 @@ static int solve(sagline_work *work, const sagline_real *freedom, int count, con
     sagline_real *rows = work->others, *factor = rows + @cable_rows@ * M, *last = factor + count * count;
     sagline_real *found = last + 13, *values = found + 7;
     int8_t *status = &work->statuses[M];
+    *status = @not_converged@;
     @solve@(4, 0, 0, @behind@false, freedom, count, 6, BODY, 1, 5, CABLES, 1, M, 14, length, 1, M, pose, 1, 7, wrench, 1, 6,
             rows, @cable_rows@, M, factor, count, count, last, 13, work->numbers, @numbers@, work->counters, @counters@,
             found, 1, 7, work->results, @rows@, 1, M, work->statuses, 1, M, values, 1, 5, status, 1);

@@ -40,6 +40,7 @@ int sagline_inverse(sagline_work *work, int method, const sagline_real pose[7], 
         return SAGLINE_BAD_INPUT;
     for (int i = 0; i < M; i++)
         nearby[i] = previous != NULL ? previous[i] : NAN;
+    *status = SAGLINE_NOT_CONVERGED; /* if the work memory were too small, the kernel would leave it so */
     @inverse@(4, 0, 0, METHODS[method].code, METHODS[method].parameter, METHODS[method].variable,
               METHODS[method].weights, M, METHODS[method].targets, M, @limits_of@, METHODS[method].validity, FREEDOM, N, 6,
               BODY, 1, 5, CABLES, 1, M, 14, pose, 1, 7, load, 1, 6, nearby, M, work->numbers, @numbers@, work->counters,

@@ -32,7 +32,8 @@ typedef struct {
 /* Tensions that balance the platform at a pose within their limits, and the unstrained lengths of cable off the drums.
  * method: one of the list above; wrench: NULL for none; previous: NULL, or the tensions of the pose before in the
  * variable of the method [N], which SAGLINE_CLOSEST stays near to and replaces by the new ones; NAN for none;
- * length: [m]; tension: chord tensions [N]. */
+ * length: [m]; tension: chord tensions [N]. At most @inverse_operations@ floating-point operations: the product of the
+ * bounds of all loops, which no pose comes near. */
 int sagline_inverse(sagline_work *work, int method, const sagline_real pose[7], const sagline_real *wrench,
                     sagline_real *previous, sagline_real length[SAGLINE_CABLES], sagline_real tension[SAGLINE_CABLES]);
 @forward@
