@@ -36,7 +36,7 @@ def compilers() -> list[list[str]]:
 
 
 def build() -> None:
-    """Build the library of the kernels, for every processor and for x86-64-v3, and the module for pages.
+    """Build the library of the kernels, for every processor and x86-64-v3, the module for pages, and C for controllers.
 
     Raises:
         BuildError: If no compiler is found, or none compiles.
@@ -45,14 +45,14 @@ def build() -> None:
     os.environ["SAGLINE_BACKEND"] = "python"  # the translator reads the sources
     from sagline.kernels.library import FILES, FOLDER
     from sagline.kernels.sources import digest, digest_of_kernels
-    from tools.translate import wasm
+    from tools.translate import portable, wasm
     from tools.translate.library import library_text
 
     files = [FOLDER / name for name in FILES[: 2 if is_x86() else 1]]
     stamp = FOLDER / "stamp"
     translator = [Path(__file__), *(ROOT / "tools" / "translate").glob("*.[pc]*")]
     state = f"{digest_of_kernels()} {digest(ROOT, translator)} {[shlex.join(each) for each in compilers()]}"
-    made = [*files, ROOT / wasm.MODULE]
+    made = [*files, ROOT / wasm.MODULE, ROOT / portable.FILE]
     if stamp.is_file() and stamp.read_text(encoding="utf-8") == state and all(file.is_file() for file in made):
         return
     FOLDER.mkdir(exist_ok=True)
@@ -61,6 +61,7 @@ def build() -> None:
         source = Path(folder) / "kernels.c"
         source.write_text(library_text(digest_of_kernels()), encoding="utf-8")
         _compile(source, files)
+    portable.build(ROOT)
     if find_spec("ziglang"):
         wasm.build(ROOT)
     stamp.write_text(state, encoding="utf-8")
