@@ -200,6 +200,9 @@ def test_wrong_input_has_a_status_and_leaves_the_last_result(tmp_path: Path) -> 
     assert program.inverse(here, np.array([[0.0, 0.0, np.nan, 0.0, 0.0, 0.0]])).status[0] == BAD_INPUT
     assert program.inverse(here, None, 1).status[0] == BAD_INPUT
     lengths = program.inverse(here).found
+    short = sl.forward(robot, 0.8 * lengths, sl.Pose([[0.0, 0.0, 1.5]], np.eye(3)[None]))
+    assert short.status[0] == codes.FORWARD_OVERSTRETCHED
+    assert program.forward(0.8 * lengths, here).status[0] == FORWARD + codes.FORWARD_OVERSTRETCHED
     for wrong in (np.nan, -1.0, 0.0, np.inf):
         found = program.forward(np.where(np.arange(8) == 3, wrong, lengths), here)
         assert found.status[0] == BAD_INPUT
