@@ -140,10 +140,10 @@ def test_other_tools_read_cycles_events_transforms_and_scenes(tmp_path: Path) ->
 
 @extended
 def test_a_chunk_is_closed_every_second_and_is_in_the_file_at_once(tmp_path: Path) -> None:
-    reader = LogReader(tmp_path / "run.mcap")
+    reader, cycles = LogReader(tmp_path / "run.mcap"), cycles_of(plan_of(), 7)
     with mcap_writer.Recorder(tmp_path / "run.mcap", ROBOT, epoch=0) as recorder:
         handed = time.monotonic()
-        for cycle in cycles_of(plan_of(), 7):
+        for cycle in cycles:
             recorder.cycle(cycle)
         while not reader.log.blocks:
             assert time.monotonic() < handed + 5.0
