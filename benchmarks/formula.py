@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 
+from numba import njit
+
 from sagline.core.arrays import Array
-from sagline.kernels.jit import entry
 
 K_H, K_P = 4.845, 4.385
 
 
-@entry
+@njit(error_model="numpy")
 def as_printed(span: Array, rise: Array, horizontal: Array, density: float, stiffness: float, length: Array) -> None:
     """(26)-(28) and (48) with the angle beta, its tangent and the fourth power of its cosine."""
     for i in range(length.shape[0]):
@@ -22,7 +23,7 @@ def as_printed(span: Array, rise: Array, horizontal: Array, density: float, stif
         length[i] = (sag + stiffness * d * t_x**2) / (t_x**2 * (stiffness + math.sqrt(t_x**2 + t_z**2)))
 
 
-@entry
+@njit(error_model="numpy")
 def algebraic(span: Array, rise: Array, horizontal: Array, density: float, stiffness: float, length: Array) -> None:
     """Equations (26)-(28) and (48) without an angle: tan = z/x, cos^2 = x^2/D^2."""
     for i in range(length.shape[0]):

@@ -13,6 +13,8 @@ import numpy as np
 from rich.console import Console
 from rich.progress import track
 
+os.environ["SAGLINE_BACKEND"] = "numba"  # compiles the loop over poses below
+
 import sagline as sl
 from benchmarks.measure import Row, best_seconds, one_core, show
 from sagline.core.arrays import Array

@@ -49,16 +49,17 @@ def build() -> None:
     from tools.translate.library import library_text
 
     files = [FOLDER / name for name in FILES[: 2 if is_x86() else 1]]
-    stamp = FOLDER / "stamp"
+    stamp = ROOT / "build" / "kernels.stamp"
     translator = [Path(__file__), *(ROOT / "tools" / "translate").glob("*.[pc]*")]
     state = f"{digest_of_kernels()} {digest(ROOT, translator)} {[shlex.join(each) for each in compilers()]}"
     made = [*files, ROOT / wasm.MODULE, ROOT / portable.FILE]
     if stamp.is_file() and stamp.read_text(encoding="utf-8") == state and all(file.is_file() for file in made):
         return
-    FOLDER.mkdir(exist_ok=True)
+    for folder in (FOLDER, stamp.parent):
+        folder.mkdir(exist_ok=True)
     stamp.unlink(missing_ok=True)
-    with tempfile.TemporaryDirectory() as folder:
-        source = Path(folder) / "kernels.c"
+    with tempfile.TemporaryDirectory() as temporary:
+        source = Path(temporary) / "kernels.c"
         source.write_text(library_text(digest_of_kernels()), encoding="utf-8")
         _compile(source, files)
     portable.build(ROOT)
