@@ -288,11 +288,11 @@ def test_what_is_asked_for_is_understood(words: list[str], keys: list[str]) -> N
     ("words", "item", "value", "allowed", "next_step"),
     [
         (["erata"], "part", "'erata'", None, "Did you mean errata?"),
-        (["figure", "16"], "figures 16", "not redone here", None, None),
-        (["figures", "23-24"], "figures 23-24", "not redone here", None, None),
+        (["figure", "16"], "figures 16", "not repeated here", None, None),
+        (["figures", "23-24"], "figures 23-24", "not repeated here", None, None),
         (["figures"], "figures", "without numbers", "figures 6-9", None),
-        (["table", "1"], "tables 1", "not redone here", "2; Table 1 is in the presets", None),
-        (["figures", "3-999999999"], "figures 3-999999999", "not redone here", None, None),
+        (["table", "1"], "tables 1", "not repeated here", "2; Table 1 is in the presets", None),
+        (["figures", "3-999999999"], "figures 3-999999999", "not repeated here", None, None),
     ],
 )
 def test_what_cannot_be_redone_is_refused(

@@ -101,8 +101,8 @@ def _table(study: TenPoses) -> Table:
     found = [("nothing off", rms, worst, rms, corrected_aic(rms, rest.size, 0))]
     found += [(_values(one), one.rms, one.worst, one.left_out, one.aicc) for group in shown for one in group]
     return Table(
-        f"Nothing, one parameter, and the best {SHOWN} by two and by three; standard uncertainties in parentheses",
-        ("off by", "left, rms [mm]", "left, worst pose [mm]", "left-out pose, rms [mm]", "AICc"),
+        f"No parameter, one parameter, and the best {SHOWN} with two and with three; in parentheses: uncertainty",
+        ("off by", "remaining, rms [mm]", "remaining, worst pose [mm]", "left-out pose, rms [mm]", "AICc"),
         [
             (text, n(1e3 * left, ".2f"), n(1e3 * far, ".1f"), n(1e3 * out, ".2f"), n(aicc, ".1f"))
             for text, left, far, out, aicc in found
@@ -188,7 +188,7 @@ def single_causes(study: TenPoses) -> Finding:
         fall=-measured,
         falling=_listed(falling),
         pulley=alone[PULLEY],
-        anchors_name=ANCHORS.capitalize(),
+        anchors_name=ANCHORS,
         anchors=alone[ANCHORS],
         names=names,
         no_cause=_listed(none),
@@ -198,8 +198,16 @@ def single_causes(study: TenPoses) -> Finding:
 def _table_of_classes(study: TenPoses, alone: dict[str, Explanation], slopes: dict[str, float]) -> Table:
     trends = {trend.parameter.name: trend for trend in study.trends}
     return Table(
-        "One imperfection at a time; best alone: the value that fits Table 2 best, none beyond what we think plausible",
-        ("off", "for example", "moves, mean [mm]", "best alone", "its slope [mm/m]", "leaves, rms [mm]", "so"),
+        "One imperfection at a time; best value: the value within the plausible range that fits Table 2 best",
+        (
+            "off",
+            "for example",
+            "mean displacement [mm]",
+            "best value",
+            "slope [mm/m]",
+            "remaining error, rms [mm]",
+            "remark",
+        ),
         [_row(trends[name], found, slopes[name], _so(study, found, slopes[name])) for name, found in alone.items()]
         + [
             (
@@ -233,12 +241,16 @@ def _so(study: TenPoses, found: Explanation, slope: float) -> str:
     if found.rms > NOTHING * study.measured_rms:
         return "explains nothing"
     if abs(slope - measured) <= AS_MEASURED * abs(measured):
-        return "falls with height as measured"
+        return "decreases with height as measured"
     if found.at_limit[0]:
         return "too small, even at the limit"
     if abs(slope) <= ALIKE * abs(measured):
-        return "lifts every pose alike"
-    return "grows with height: the wrong way" if slope * measured < 0.0 else "falls with height, by another slope"
+        return "raises all poses equally"
+    return (
+        "increases with height: opposite to the measurement"
+        if slope * measured < 0.0
+        else "decreases with height, with another slope"
+    )
 
 
 def _slope(study: TenPoses, found: Explanation) -> float:

@@ -125,8 +125,8 @@ def _range(study: ConstantsStudy, draw: Drawings) -> Finding:
             "over_highest": [c._asdict() for c in study.over_highest],
         },
         panels=(
-            draw.panel(figure, f"k_p over the lowest tension, up to {n(found.highest, '.3g', 'N')}."),
-            draw.panel(second, f"|k_h| over the highest tension, from {n(found.lowest, '.3g', 'N')}."),
+            draw.panel(figure, f"k_p as a function of the lowest tension, up to {n(found.highest, '.3g', 'N')}."),
+            draw.panel(second, f"|k_h| as a function of the highest tension, from {n(found.lowest, '.3g', 'N')}."),
         ),
         k_h=abs(found.k_h_frame),
         least_k_p=min(all_k_p),
@@ -147,7 +147,7 @@ def _limit(study: ConstantsStudy, draw: Drawings) -> Finding:
     return finding(
         "taut-limit",
         numbers={"scaled": [c._asdict() for c in study.scaled], "factors": FACTORS, "g_squared_over_24": SHALLOW_K_P},
-        panels=(draw.panel(figure, "How far the constants are from g/2 and g²/24."),),
+        panels=(draw.panel(figure, "Deviation of the constants from g/2 and g²/24."),),
         data=(
             table_of(
                 "The constants by the article's regressions",

@@ -48,8 +48,8 @@ def sign_of_intercept() -> Finding:
     intercept = state.vertical_force - np.tan(angle) * state.horizontal_tension
     published = sl.Empirical()
     numbers: list[Number] = [
-        ("b_π at the platform end over wD/2", float((intercept / half_weight)[0]), ""),
-        ("b_π at the frame end over wD/2", float(((intercept - state.cable_weight) / half_weight)[0]), ""),
+        ("b_π at the platform end divided by wD/2", float((intercept / half_weight)[0]), ""),
+        ("b_π at the frame end divided by wD/2", float(((intercept - state.cable_weight) / half_weight)[0]), ""),
     ]
     for name in ROBOTS:
         for sign, model in (("right", published), ("printed", sl.Empirical(-published.k_h, published.k_p))):
@@ -66,8 +66,8 @@ def gravity_twice() -> Finding:
     numbers: list[Number] = [("weight of the platform", weight, "N")]
     for label, force in (
         ("gravity counted once", 0.0),
-        ("read literally, g pointing down", -weight),
-        ("read literally, g pointing up", weight),
+        ("as printed, g pointing down", -weight),
+        ("as printed, g pointing up", weight),
     ):
         numbers.append((f"cables lift, {label}", _lifted(force), "N", weight))
     return _erratum(2, numbers)
@@ -86,12 +86,12 @@ def euler_rates() -> Finding:
     return _erratum(
         3,
         (
-            ("largest component of ω less Euler rates", _largest(spin - _reversed(rates)), "rad/s"),
-            ("largest component of ω̇ less their rates", _largest(spin_rate - _reversed(curvatures)), "rad/s²"),
+            ("largest component of ω minus Euler rates", _largest(spin - _reversed(rates)), "rad/s"),
+            ("largest component of ω̇ minus their rates", _largest(spin_rate - _reversed(curvatures)), "rad/s²"),
             ("error of the moment", float(np.linalg.norm(right - printed)), "N m"),
             ("moment", float(np.linalg.norm(right)), "N m"),
             (
-                "force of M W ẋ at 1 m/s, where there is none",
+                "force of M W ẋ at 1 m/s; the correct value is 0",
                 float(robot.mass * np.linalg.norm(np.cross(_reversed(rates), velocity))),
                 "N",
             ),
@@ -112,7 +112,7 @@ def rank_of_h() -> Finding:
         (
             ("rows of HᵀH", float(len(square)), ""),
             ("rank of HᵀH", float(np.linalg.matrix_rank(square)), ""),
-            ("its smallest singular value over its largest", float(singular[-1] / singular[0]), "", 1.0),
+            ("its smallest singular value divided by its largest", float(singular[-1] / singular[0]), "", 1.0),
             ("condition of HHᵀ", float(np.linalg.cond(h @ h.T)), ""),
             (
                 "residual of Hᵀ(HHᵀ)⁻¹",
@@ -171,10 +171,10 @@ def stretch_by_end_tension() -> Finding:
         5,
         (
             ("error of (36), simulation's cable at 15 m", 1e3 * excess, "mm"),
-            ("the same over sin φ", 1e3 * excess / float(np.sin(ANGLE)), "mm"),
+            ("the same divided by sin φ", 1e3 * excess / float(np.sin(ANGLE)), "mm"),
             ("wL² sin φ/(2EA)", 1e3 * formula, "mm"),
             (
-                "left of d after the mean tension is taken out, against the unstretchable cable",
+                "d minus d of the unstretchable cable, after removal of the stretch by the mean tension",
                 1e3 * float((study.relieved_exactly - study.unstretchable)[0]),
                 "mm",
             ),
@@ -191,7 +191,7 @@ def sag_constant() -> Finding:
         (
             ("g²/24", SHALLOW_K_P, "m²/s⁴"),
             ("k_p by the article's regressions, taut cables", taut.k_p, "m²/s⁴"),
-            ("what the published value adds to the sag term", 100.0 * (PUBLISHED_K_P / SHALLOW_K_P - 1.0), "%"),
+            ("increase of the sag term by the published value", 100.0 * (PUBLISHED_K_P / SHALLOW_K_P - 1.0), "%"),
         ),
     )
 
@@ -297,7 +297,7 @@ def printed_formulas() -> Finding:
             ("|b_π|/√(1 + a_π²)", float(intercept / np.hypot(1.0, slope)), "N"),
             ("|b_π|/√(a_π² + b_π²), as printed", float(intercept / np.hypot(slope, intercept)), "N"),
             (
-                "anchor misplaced by the transpose, turned by (0.3, 0.2, 0.1) rad",
+                "error of an anchor by the transpose, at a rotation of (0.3, 0.2, 0.1) rad",
                 1e3 * float(np.linalg.norm(turned.T @ anchor - turned @ anchor)),
                 "mm",
             ),

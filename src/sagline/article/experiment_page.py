@@ -18,8 +18,11 @@ from sagline.plot.sheet import BLUE, VERMILLION
 from sagline.present.page import Chapter, Finding, Panel, Table, page, table_of, write_page
 
 NAMES = ("experiment.html", "experiment.json")
-TITLE = "The experiment, done again"
-NOTATION = "Errors are true less desired positions. A twin's true position is known; a prototype's has to be measured."
+TITLE = "The experiment, repeated"
+NOTATION = (
+    "An error is the true position minus the desired position. "
+    "The true position of a twin is known; the true position of a prototype must be measured."
+)
 JERK = 2.0  # duration of the jerk in the article [s]
 AREA = 600.0  # circle area of the largest error of a figure [pt^2]
 
@@ -94,13 +97,13 @@ def _cells(result: Experiment, draw: Drawings) -> Finding:
             "off_plan_at_first_N": np.abs(off[early]).max(),
             "off_plan_at_stops_N": np.abs(at_stops).max(),
         },
-        panels=(_courses(result, cells, "load cells [N]", "Load cells; dashed: the ten stops, left out.", draw),),
+        panels=(_courses(result, cells, "load cells [N]", "Load cells; dashed: the ten stops, omitted.", draw),),
     )
 
 
 def _lengths(result: Experiment, draw: Drawings) -> Finding:
     lengths = result.lengths
-    caption = "Lengths by the encoders, less those at home; dashed: the ten stops, left out."
+    caption = "Lengths from the encoders, minus the lengths at home; dashed: the ten stops, omitted."
     return finding(
         "encoders",
         numbers={"least_m": lengths.min(), "largest_m": lengths.max()},
@@ -120,7 +123,7 @@ def _space(result: Experiment, draw: Drawings) -> Finding:
         (f"{who}, largest {n(1e3 * errors.max(), '.2g', 'mm')}", errors, AREA / errors.max(), color)
         for who, errors, color in (("article", table.distance, VERMILLION), ("ours", result.distance, BLUE))
     ]
-    caption = "The points in the {}-z plane; areas are errors, each on its own scale."
+    caption = "The points in the {}-z plane; areas show the errors, on separate scales."
     panels = error_panels(table.points, table.desired, series, caption, draw)
     height = table.desired[:, 2]
     slopes = [float(np.polyfit(height, 1e3 * error[:, 2], 1)[0]) for error in (table.error, result.error)]
@@ -130,7 +133,7 @@ def _space(result: Experiment, draw: Drawings) -> Finding:
 def _run(result: Experiment) -> Finding:
     told = [event for event in result.events if event.kind is not control.EventKind.STATE]
     rows = [
-        ("how long it took", "about 14 min", n(result.duration / 60.0, ".1f", "min")),
+        ("duration", "about 14 min", n(result.duration / 60.0, ".1f", "min")),
         ("samples", "100 a second", "100 a second"),
         (
             "speed of the platform, stop at each point",
@@ -138,10 +141,10 @@ def _run(result: Experiment) -> Finding:
             f"{SPEED:g} m/s at most, {STOP:g} s",
         ),
         ("the fastest winch", "", n(1e3 * result.winch_speed, ".0f", "mm/s")),
-        ("true position from the set point under way, at most", "", n(1e3 * result.farthest, ".2f", "mm")),
-        ("true position from the estimate, at most", "", n(1e3 * result.misjudged, ".2f", "mm")),
-        ("the tension loop acted, of the time at stops", "", n(100.0 * result.acting, ".1f", "%")),
-        ("lengths it had changed at the stops, at most", "", n(1e3 * np.abs(result.correction).max(), ".2f", "mm")),
+        ("largest distance of true position and set point in motion", "", n(1e3 * result.farthest, ".2f", "mm")),
+        ("largest distance of true position and estimate", "", n(1e3 * result.misjudged, ".2f", "mm")),
+        ("share of the time at stops with an active tension loop", "", n(100.0 * result.acting, ".1f", "%")),
+        ("largest change of a length at the stops", "", n(1e3 * np.abs(result.correction).max(), ".2f", "mm")),
         ("faults and notes", "", "; ".join(event.text for event in told) or "none"),
     ]
     return finding(

@@ -75,7 +75,7 @@ def explanations(error_of: ErrorOf, measured: Array, models: Sequence[Model]) ->
         raise sl.InvalidValueError(
             f"the fit of {names}",
             f"still moving after {ITERATIONS} steps",
-            "fits that settle",
+            "fits that converge",
             "Leave this model out.",
         )
     found = error_of([_errors(*of) for of in zip(models, values, strict=True)])

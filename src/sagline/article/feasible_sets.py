@@ -141,7 +141,9 @@ def _psi(studies: list[_FeasibleSets], draw: Drawings) -> Finding:
         },
         panels=(
             draw.panel(figure, f"ψ for L = {n(length, '.5g', 'm')} and three tolerances."),
-            draw.panel(second, "The same sets from their middle, along and across the chord: mind the scales."),
+            draw.panel(
+                second, "The same sets relative to their middle, along and across the chord; the scales differ."
+            ),
         ),
         extents=", ".join(
             (f"{n(x, '.3g', 'N')} at {n(1000.0 * e, unit='mm')}" for x, e in zip(extents, TOLERANCES, strict=True))
@@ -202,7 +204,7 @@ def _line(study: _FeasibleSets, draw: Drawings) -> Finding:
         },
         panels=(
             draw.panel(figure, "The projection of Ψ and the fitted line."),
-            draw.panel(second, "What is left: the exact T_z less the line."),
+            draw.panel(second, "The remainder: the exact T_z minus the line."),
         ),
     )
 

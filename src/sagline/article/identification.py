@@ -58,7 +58,7 @@ def _constants(fit: EmpiricalFit, draw: Drawings) -> Finding:
         panels=(
             draw.panel(
                 figure,
-                f"Position error of (20), largest over the rises, between {len(fit.spans)} spans and "
+                f"Position error of (20), largest value of all rises, between {len(fit.spans)} spans and "
                 f"{len(fit.tensions)} tensions.",
             ),
         ),
@@ -83,7 +83,7 @@ def _limits(fit: EmpiricalFit, draw: Drawings) -> Finding:
     return finding(
         "validity-limits",
         numbers={"limits": limits},
-        panels=(draw.panel(figure, "Heaviest cable over the lowest tension, for four tolerances."),),
+        panels=(draw.panel(figure, "Heaviest cable as a function of the lowest tension, for four tolerances."),),
         data=(
             table_of(
                 "Limits that keep the position error of (20) below a tolerance",
@@ -134,7 +134,7 @@ def _measured() -> Finding:
         },
         data=(
             Table(
-                "What was found; in parentheses the standard uncertainty of the last digits",
+                "Results; in parentheses: standard uncertainty of the last digits",
                 ("chord tensions", "ρ", "EA", "offset", "χ² per freedom", "warnings"),
                 rows,
             ),

@@ -24,8 +24,8 @@ TOO_CLOSE = 0.95  # correlation above which two values cannot be separated
 ITERATIONS = 30  # iterations to compute the chord tension from the tension at an end
 WEIGHTINGS = 3  # iterations of the weights, which depend slightly on the solution
 _ADVICE = {
-    "linear_density": "measure at lower tensions or longer spans, where the cable sags more",
-    "axial_stiffness": "measure at higher tensions, where it stretches more",
+    "linear_density": "measure at lower tensions or longer spans, to increase the sag",
+    "axial_stiffness": "measure at higher tensions, to increase the stretch",
 }
 
 
@@ -164,7 +164,7 @@ class _Measured:
                 "the measurements",
                 f"of shapes {sorted(sizes)}",
                 f"four arrays of one length, at least {unknowns}",
-                "Give span, rise, length and tension of every measurement, and at least one a value sought.",
+                "Give span, rise, length and tension of at least one measurement per unknown value.",
             )
 
     def predicted(self, cable: Cable, tension: Array) -> Array:

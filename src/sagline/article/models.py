@@ -241,7 +241,7 @@ def _examples() -> Finding:
     return finding(
         "model-examples",
         numbers={"angle_below_level_deg": -np.degrees(REFERENCE["angle"]), "examples": numbers},
-        data=(Table("Length less the exact one", ("cable", *names), rows),),
+        data=(Table("Length minus exact length", ("cable", *names), rows),),
     )
 
 

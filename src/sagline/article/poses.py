@@ -95,7 +95,7 @@ def _tour(draw: Drawings) -> Finding:
 
 def _space(study: TenPoses, draw: Drawings) -> Finding:
     table = study.table
-    caption = "The poses in the {}-z plane; the area is the positioning error."
+    caption = "The poses in the {}-z plane; areas show the positioning errors."
     panels = error_panels(table.points, table.desired, [("", table.distance, AREA, BLUE)], caption, draw)
     line, height = study.height_line, table.desired[:, 2]
     figure, ax = axes("$z$ desired [m]", "vertical error [mm]")
@@ -103,7 +103,7 @@ def _space(study: TenPoses, draw: Drawings) -> Finding:
     ends = np.array([height.min(), height.max()])
     ax.plot(ends, 1e3 * (line.slope * ends + line.intercept), color="black", linewidth=0.9, label="line")
     legend_above(ax)
-    panels.append(draw.panel(figure, "Actual less desired height."))
+    panels.append(draw.panel(figure, "Actual minus desired height."))
     tension = study.plan.horizontal_tension.mean(axis=1)
     against = float(np.corrcoef(tension, table.distance)[0, 1])
     return finding(

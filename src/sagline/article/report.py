@@ -22,15 +22,15 @@ from sagline.plot.sheet import BLUE, VERMILLION
 from sagline.present.page import Chapter, Panel, page, write_page
 
 NAMES = ("article.html", "article.json")  # both files are written, or none
-TITLE = "The article, redone"
+TITLE = "The article, reproduced"
 LEAD = (
     "Gia Luan & Truong Thinh, “Empirical Quasi-Static and Inverse Kinematics of Cable-Driven Parallel Manipulators "
-    "Including Presence of Sagging”, Appl. Sci. 2020, 10(15), 5318, doi:10.3390/app10155318, beside what sagline "
-    "computes with exact elastic catenaries."
+    "Including Presence of Sagging”, Appl. Sci. 2020, 10(15), 5318, doi:10.3390/app10155318, compared with "
+    "computations of sagline with exact elastic catenaries."
 )
 NOTATION = (
-    "Notation: z up, T acts on the cable at its platform end, φ is the article's β. Every number on the computed side "
-    "was computed when this page was made; rounding errors are marked."
+    "Notation: z up, T acts on the cable at its platform end, φ is the article's β. All numbers of sagline "
+    "were computed when this page was made; rounding errors are marked."
 )
 
 Progress = Callable[[int, int, str], None]
@@ -148,7 +148,7 @@ def _checked_range(kind: str, word: str, first: int, last: int) -> set[int]:
     numbers = set(range(first, last + 1)) if last < 100 else set()
     if not numbers & known:
         allowed = REDONE if kind == "figures" else "2; Table 1 is in the presets"
-        raise sl.InvalidValueError(f"{kind} {word}", "not redone here", allowed, "Ask for one of these.")
+        raise sl.InvalidValueError(f"{kind} {word}", "not repeated here", allowed, "Ask for one of these.")
     return numbers & known
 
 
@@ -184,5 +184,5 @@ def _picture(chapters: Sequence[Chapter]) -> Panel | None:
     ax.set_ylim(len(models) - 0.5, -0.5)
     legend_above(ax)
     return Drawings("result").panel(
-        figure, "Lengths planned with each cable model, wound onto exact cables along the article's path."
+        figure, "Lengths planned with each cable model, applied to exact cables along the article's path."
     )

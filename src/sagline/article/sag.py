@@ -66,7 +66,9 @@ def _with_stretch(study: StretchStudy, draw: Drawings) -> Finding:
         "last_stretchable_m": study.stretchable[-1],
         "share_of_hooke": -study.stretchable[-1] / hooke,
     }
-    return finding("d-over-tension", numbers=numbers, panels=(draw.panel(figure, "Adjusting length over T_x."),))
+    return finding(
+        "d-over-tension", numbers=numbers, panels=(draw.panel(figure, "Adjusting length as a function of T_x."),)
+    )
 
 
 def _relieved(study: StretchStudy, draw: Drawings) -> Finding:
@@ -163,7 +165,7 @@ def _density(study: SagStudy, draw: Drawings) -> Finding:
         },
         panels=(
             draw.panel(figure, "p_q with its parabola."),
-            draw.panel(second, "p_q over ρ² should not depend on ρ."),
+            draw.panel(second, "p_q/ρ² should not depend on ρ."),
         ),
         heaviest=each[-1],
     )

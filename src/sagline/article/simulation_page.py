@@ -107,10 +107,9 @@ def _courses(study: PathStudy, draw: Drawings) -> Finding:
         texts.append(
             f"{robot.capitalize()}: L {n(found.length_min, '.2f')} to {n(found.length_max, '.2f', 'm')}, d "
             f"{n(1e3 * found.adjusting_min, '.3g')} to {n(1e3 * found.adjusting_max, '.3g', 'mm')}, T_x "
-            f"{n(found.tension_min, '.3g')} to {n(found.tension_max, '.3g', 'N')}, changing by at most "
-            f"{n(found.step_max, '.2g', 'N')} from sample to sample, its slope of up to "
-            f"{n(found.slope_max, '.2g', 'N/s')} "
-            f"by at most {n(found.slope_jump, '.2g', 'N/s')}"
+            f"{n(found.tension_min, '.3g')} to {n(found.tension_max, '.3g', 'N')}. Between two samples T_x changes "
+            f"by at most {n(found.step_max, '.2g', 'N')}. Its slope is at most {n(found.slope_max, '.2g', 'N/s')}. "
+            f"Between two samples the slope changes by at most {n(found.slope_jump, '.2g', 'N/s')}"
         )
     return finding("courses", numbers=numbers, panels=panels, courses=".\n\n".join(texts))
 
@@ -210,7 +209,7 @@ def _models(study: PathStudy, draw: Drawings) -> Finding:
             ax.plot(study.path.time[part], distance, color=color, linewidth=1.1, label=type(model).__name__)
         logarithmic_with_floor(ax, 1e3 * FLOOR, f"below {n(FLOOR, '.3g', 'm')}")
         legend_above(ax)
-        panels.append(draw.panel(figure, f"Position error of four models, {robot}; the exact one is the zero."))
+        panels.append(draw.panel(figure, f"Position error of four models, {robot}; the exact model is the reference."))
     shallow = [figures(run).error_max for run in study.of(sl.Parabolic)]
     return finding(
         "five-models",
@@ -261,7 +260,7 @@ def _low_tension(low: LowTension, draw: Drawings) -> Finding:
             "bound_54_mm": [1e3 * f.axis_error_max for f in bound],
             "bound_54_lowest_N": [f.tension_min for f in bound],
         },
-        panels=(draw.panel(figure, "Empirical model, over the lowest tension limit."),),
+        panels=(draw.panel(figure, "Error of the empirical model as a function of the lower tension limit."),),
         good_from=good.min(),
     )
 
