@@ -60,6 +60,12 @@ WORDS: Final = {  # pattern, without regard to case -> suggestion
     r"knows? (of|nothing)": "contains, neglects",
     r"wants?": "needs, requests",
     r"speaks? of": "describes",
+    r"(ones?|us|µs|ns|values?|rows?|samples?) an? (cable|pose|row|sample|count|second|group|direction)": "per",
+    r"of which (its|their|one)": "name the subject",
+    r"(?<!there )(is|are) no (?!longer|more|other|larger|smaller|greater|less|one)[a-z]+": "is not a",
+    r"alike": "equal",
+    r"besides": "in addition to",
+    r"from where (it|they)": "name the place",
     r"(?<!there )(is|are) none of": "is not one of",
     r"(?:^|(?<=[.;:] ))(?-i:[A-Z])[a-z]+(?:ed|est|wn|ost|eft) (is|are|was|were)": "subject first",
 }
