@@ -89,7 +89,7 @@ def speed_of_cables() -> Iterator[Row]:
         bare = best_seconds(kernel_of(batch, given)) * to_ns
         yield Row(
             f"catenary from {name}, 10^6 cables",
-            f"<= {reach} ns a cable, <= 1.15 x the kernel alone",
+            f"<= {reach} ns per cable, <= 1.15 x the kernel alone",
             f"{public:.0f} ns, {public / bare:.2f} x the kernel alone ({bare:.0f} ns), "
             f"which is {bare / printed:.1f} x the formula as printed, {bare / plain:.1f} x algebraic",
         )
@@ -123,7 +123,7 @@ def inverse_kinematics() -> Iterator[Row]:
     exact, empirical, elastic = (microseconds(model) for model in (sl.Catenary(), sl.Empirical(), sl.Elastic()))
     yield Row(
         "inverse, 8 cables, exact, 10^5 poses",
-        "<= 5 us a pose, <= 4 x empirical",
+        "<= 5 us per pose, <= 4 x empirical",
         f"{exact:.1f} us; {exact / empirical:.1f} x empirical ({empirical:.1f} us), elastic {elastic:.1f} us",
     )
     for name in ("article-mixed", "cogiro", "ipanema-1"):

@@ -131,7 +131,7 @@ def large() -> Iterator[Row]:
         yield Row(
             f"one iteration over {rows:,} rows; memory of the process",
             f"<= {45.0 * rows / MILLION:g} s; <= 500 MB",
-            f"{seconds:.1f} s, {1e6 * seconds / rows:.0f} us a row; {memory:.0f} MB",
+            f"{seconds:.1f} s, {1e6 * seconds / rows:.0f} us per row; {memory:.0f} MB",
         )
 
 

@@ -48,8 +48,10 @@ def cycles() -> Iterator[Row]:
     half, rare = 1e3 * np.quantile(own, (0.5, 0.999))
     real = control.period * len(own) / whole
     yield Row("compute of a cycle: forward, law, faults", "p50 0.2, p99.9 0.5 ms", f"{half:.3f}, {rare:.3f} ms")
-    yield Row("controller and machine, of real time", ">= 80", f"{real:.0f} ({1e6 * whole / len(own):.0f} us a cycle)")
-    yield Row("of that the machine", "", f"{1e6 * link.seconds / len(own):.0f} us a cycle")
+    yield Row(
+        "controller and machine, of real time", ">= 80", f"{real:.0f} ({1e6 * whole / len(own):.0f} us per cycle)"
+    )
+    yield Row("of that the machine", "", f"{1e6 * link.seconds / len(own):.0f} us per cycle")
     yield Row(f"planning and checking {path.duration:.0f} s", "", f"{planning:.2f} s, {path.duration / planning:.0f} x")
 
 

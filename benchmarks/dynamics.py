@@ -76,7 +76,9 @@ def speed() -> Iterator[Row]:
             call = partial(machine.step, given, period)
             seconds = best_of_calls(call)
             what = f"prototype {name}, 1 kHz loops, sensors every {1e3 * period:g} ms, times real time"
-            yield Row(what, reach if period == 1e-2 else "", f"{period / seconds:.0f} ({1e6 * seconds:.1f} us a call)")
+            yield Row(
+                what, reach if period == 1e-2 else "", f"{period / seconds:.0f} ({1e6 * seconds:.1f} us per call)"
+            )
 
 
 def energies() -> Iterator[Row]:

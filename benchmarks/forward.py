@@ -110,7 +110,7 @@ def speed(share: float) -> Iterator[Row]:
     lengths = plan.unstrained_length
     assert plan.feasible.all()
     time = best_seconds(lambda: sl.forward(robot, lengths, start=pose[0])) / len(lengths)
-    yield Row("tracking CoGiRo (2 mm, 1 mrad steps), batch", "≤ 25 µs a solve", f"{1e6 * time:.1f} µs")
+    yield Row("tracking CoGiRo (2 mm, 1 mrad steps), batch", "≤ 25 µs per solve", f"{1e6 * time:.1f} µs")
     plan = plan_of(robot, TIMED_POSES, seed=4)
     start = moved(plan.state.pose, 1.0, 20.0, seed=5)
     time = best_seconds(lambda: sl.forward(robot, plan.unstrained_length, start=start)) / len(start)

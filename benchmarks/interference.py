@@ -53,11 +53,11 @@ def pairs_of_cables() -> Iterator[Row]:
             seconds, value, low = measured(rows, pairs, precision)
             yield Row(
                 f"two sagging cables of {name}, certified to {1e3 * precision:g} mm",
-                f"<= {reach} us a pair" + (", 28 pairs <= 60 us" if precision == 1e-4 else ""),
-                f"{1e6 * seconds / 28:.2f} us, {1e6 * seconds:.1f} us a pose, {1e3 * (value - low).max():.3g} mm",
+                f"<= {reach} us per pair" + (", 28 pairs <= 60 us" if precision == 1e-4 else ""),
+                f"{1e6 * seconds / 28:.2f} us, {1e6 * seconds:.1f} us per pose, {1e3 * (value - low).max():.3g} mm",
             )
         seconds, _, _ = measured(rows, pairs, 1e-4, together=True)
-        yield Row(f"the nearest of all 28 pairs of {name}", "", f"{1e6 * seconds:.1f} us a pose")
+        yield Row(f"the nearest of all 28 pairs of {name}", "", f"{1e6 * seconds:.1f} us per pose")
 
 
 def brute_force() -> Iterator[Row]:

@@ -107,7 +107,7 @@ def times() -> Iterator[Row]:
         to_us = 1e6 / POSES
         yield Row(
             f"{name}, 8 cables",
-            f"<= {ALONE.get(name, 1.5):g} us a pose; sag <= {SAG.get(name, 2):g} us more",
+            f"<= {ALONE.get(name, 1.5):g} us per pose; sag <= {SAG.get(name, 2):g} us more",
             f"{alone * to_us:.2f} us; whole inverse, straight cables {straight * to_us:.1f} us, "
             f"exact {exact * to_us:.1f} us, sag {(exact - straight) * to_us:+.1f} us",
         )
@@ -139,7 +139,7 @@ def continuity() -> Iterator[Row]:
         yield Row(
             f"{name}: largest slope of a tension, and at steps ten times smaller",
             "the same" if method.continuous else "",
-            f"{figures[0]:.3g}, {figures[1]:.3g} upper limits a meter",
+            f"{figures[0]:.3g}, {figures[1]:.3g} upper limits per meter",
         )
 
 

@@ -42,7 +42,7 @@ def in_the_open(name: str) -> Row:
     seconds = decision_seconds(robot, poses[beyond], loads[beyond])
     return Row(
         f"{name}: {beyond.size:,} infeasible poses, overload above 1e-3 of the weight",
-        "<= 40 us a pose",
+        "<= 40 us per pose",
         f"{seconds / beyond.size * 1e6:.0f} us",
     )
 

@@ -115,7 +115,7 @@ def margins() -> Iterator[Row]:
         known = best_seconds(partial(sl.capacity_margin, state)) * 1e6 / int(np.isfinite(state.pull).all(axis=-1).sum())
         yield Row(
             f"signed margin with bracket, 8 cables, {name}",
-            "<= 4 us a pose",
+            "<= 4 us per pose",
             f"{sagging:.2f} us ({sagging / known:.2f} of the capacity margin); of a wrench box {box:.2f}; "
             f"straight {straight:.2f}",
         )

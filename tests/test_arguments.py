@@ -50,8 +50,8 @@ ANY: Any = sl  # for calls that no type allows
         (lambda: ANY.tension_polygon([ROBOT], POSE), ("robot", "[a Robot]", "a Robot")),
         (lambda: ANY.inverse(ROBOT, POSE, progress=True), ("progress", "True")),
         (lambda: ANY.InverseSolver(ROBOT, 0), ("model", "0", "a CableModel")),
-        (lambda: ANY.CableModel(), ("CableModel()", "the interface alone")),
-        (lambda: ANY.TensionMethod(), ("TensionMethod()", "the interface alone")),
+        (lambda: ANY.CableModel(), ("CableModel()", "the abstract base class")),
+        (lambda: ANY.TensionMethod(), ("TensionMethod()", "the abstract base class")),
     ],
 )
 def test_what_is_of_the_wrong_kind_is_named_with_the_way_to_the_right_one(call: Any, parts: tuple[str, ...]) -> None:

@@ -1,4 +1,4 @@
-"""`python -m tools.build`: build what the package contains besides Python, if it is not up to date.
+"""`python -m tools.build`: build what the package contains in addition to Python, if it is not up to date.
 
 Building needs a C compiler: the one that the environment variable CC names, `cc`, or that of the package ziglang.
 """

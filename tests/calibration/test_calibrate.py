@@ -35,7 +35,7 @@ ALL = {  # of 63 numbers: what an honest drawing may be off
     "center_of_mass": 0.02,
 }
 SLIP = 0.02  # m
-NO_POSE = ("without a pose at which this robot reads so", "one at least")
+NO_POSE = ("without a pose at which this robot can give such readings", "one at least")
 
 
 def unknowns(errors: dict[str, float]) -> list[sl.Unknown]:
@@ -215,7 +215,7 @@ def test_a_log_of_which_no_pose_fits_is_refused() -> None:
 
 def test_too_few_readings_are_refused() -> None:
     log = log_of(true_robot(COGIRO, ALL), 7).log
-    with refused("log", "56 readings in 7 rows", ">= 63, one an unknown", kind=InvalidValueError):
+    with refused("log", "56 readings in 7 rows", ">= 63, one per unknown", kind=InvalidValueError):
         sl.calibrate(COGIRO, log, unknowns(ALL))
 
 
@@ -249,7 +249,7 @@ def test_readings_that_are_too_few_are_counted_with_the_reason() -> None:
     slack = np.array(log.load_cells)
     slack[2:, 3] = 0.0
     value = f"16 readings in 2 rows; 7 rows left out: {sl.Omission.SLACK.text}"
-    with refused("log", value, ">= 63, one an unknown", kind=InvalidValueError):
+    with refused("log", value, ">= 63, one per unknown", kind=InvalidValueError):
         sl.calibrate(COGIRO, log.replace(load_cells=slack), unknowns(ALL))
 
 

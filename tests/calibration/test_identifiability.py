@@ -29,8 +29,8 @@ SHIFT = tuple(f"the world shifted along {axis}" for axis in "xyz")
 YAW = ("the world turned about the vertical",)
 TURNS = tuple(f"the platform's frame turned about its {axis}" for axis in "xyz")
 SHIFTS = tuple(f"the platform's frame shifted along its {axis}" for axis in "xyz")
-SCALE = ("the scale: all larger, of lighter cable",)
-FORCE = ("all forces larger, and load cells of less gain",)
+SCALE = ("the scale: a larger robot with lighter cables",)
+FORCE = ("larger forces, and load cells with a smaller gain",)
 BOTH = tuple(f"both anchors of cable {cable} shifted along {axis}" for cable in range(4) for axis in "xyz")
 
 

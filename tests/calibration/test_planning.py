@@ -398,7 +398,7 @@ REFUSED = [
     Refused({"unknowns": ()}, "unknowns", "none"),
     Refused({"unknowns": ("color",)}, "unknown", "'color'", "frame_anchors"),
     Refused({"unknowns": {"mass": 1.0}}, "unknowns", r"\{'mass': 1.0\}"),
-    Refused({"robot": with_drums(cable_length=5.0)}, "box", "without a pose .*not so much cable"),
+    Refused({"robot": with_drums(cable_length=5.0)}, "box", "without a pose .*not have enough cable"),
 ]
 
 

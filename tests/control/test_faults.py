@@ -31,7 +31,7 @@ def since(alter: Callable[[int, Cycle], Cycle], start: int = START, end: int = 1
 
 
 def silent(group: int, count: int, start: int = START) -> Change:
-    """A group says nothing new for so many cycles."""
+    """A group sends no new data for so many cycles."""
     last: list[Sample] = []
 
     def alter(k: int, cycle: Cycle) -> Cycle:

@@ -25,13 +25,13 @@ def page() -> str:
 
 def test_how_far_off_a_chain_of_twenty_elements_rests() -> None:
     off = chains_at_rest(cogiro(), 20).pose.position - cogiro().pose.position
-    assert f"(CoGiRo, 20 elements: {1e6 * np.linalg.norm(off):.1f} µm)" in page()
+    assert f"For CoGiRo with 20 elements the difference is {1e6 * np.linalg.norm(off):.1f} µm." in page()
 
 
 def test_how_well_the_energy_closes_along_a_path() -> None:
     energy = moved().energy
     turned_over, error = np.ptp(energy.supplied), np.abs(energy.error).max()
-    told = f"A path of 4 s on CoGiRo on which winches supply and take back {turned_over:,.0f} J closes to"
+    told = f"the winches supply and take back {turned_over:,.0f} J. The residual of the energy balance is"
     assert f"{told} ${1e6 * error:.0f} \\cdot 10^{{-6}}$ J" in page()
 
 
@@ -42,6 +42,6 @@ def test_how_well_steps_agree_after_a_break() -> None:
         run = sl.simulate(cogiro(), cable_mass="lumped", duration=0.5, step=share * 5e-5, events=sl.Break(0, 0.0))
         after.append(run.events[0].tension_after)
     off = max(abs(one / after[-1] - 1.0) for one in after)
-    found = re.search(r"0\.45, 0\.2 and 0\.1 agree to (\S+) %", page())
+    found = re.search(r"0\.45 \\, h_0\$, \$0\.2 \\, h_0\$ and \$0\.1 \\, h_0\$ agree to (\S+) %", page())
     assert found is not None
     assert found[1] == f"{100 * off:.2f}"

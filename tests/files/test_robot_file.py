@@ -320,7 +320,7 @@ def test_ways_to_give_the_inertia(inertia: object, expected: object) -> None:
         ),
         (
             {"winches": {"pulley_radius": "50 mm", "dead_cable": [1, 2]}},
-            ("winches: dead_cable", "2 values", "one value, or 3, one a cable"),
+            ("winches: dead_cable", "2 values", "one value, or 3, one per cable"),
         ),
         (
             {"winches": {"pulley_radius": [0.05, 0.05, 0.05], "dead_cable": [1, 2]}},
@@ -342,7 +342,7 @@ def test_ways_to_give_the_inertia(inertia: object, expected: object) -> None:
                 "winches: gear[1]",
                 "0",
                 "not 0",
-                "Give the encoder's turns for one of the drum; negative where counts fall as cable is let out.",
+                "Give the encoder turns per drum turn; negative if counts decrease when cable is paid out.",
             ),
         ),
         ({"winches": {"counts_per_turn": 0}}, ("winches: counts_per_turn", "0", "> 0, finite")),
@@ -373,7 +373,7 @@ def test_ways_to_give_the_inertia(inertia: object, expected: object) -> None:
         ({"inertia": ...}, ("inertia", "missing")),
         ({"tension_min": "2 kN"}, ("tension_min[0]", "2000 N", "<= tension_max[0], 1000 N")),
         ({"motion_pattern": 3}, ("motion_pattern", "3", "text", 'Put it in quotes: motion_pattern: "..."')),
-        ({"name": ""}, ("name", "empty", "a text to call it by")),
+        ({"name": ""}, ("name", "empty", "a non-empty text")),
         ({"name": 12}, ("name", "12", "text", 'Put it in quotes: name: "..."')),
         ({"assumed": {"masss": "x"}}, ("assumed: field", "'masss'")),
         ({"test_box": {"low": [0, 0, 0], "high": [1, 1, "1 kg"]}}, ("test_box.high[2]", "'1 kg'")),

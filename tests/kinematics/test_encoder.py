@@ -206,7 +206,7 @@ def test_poses_without_an_answer_have_no_counts(robot: sl.Robot) -> None:
         ({"drum_width": None}, ("winches: drum_width", "not given"), ""),
         ({"cable_length": None}, ("winches: cable_length", "not given"), ""),
         ({"layers": None, "cable_length": None}, ("winches: cable_length", "not given"), ""),
-        ({"counts_per_turn": None}, ("winches: counts_per_turn", "not given", "one value, or one a cable"), ""),
+        ({"counts_per_turn": None}, ("winches: counts_per_turn", "not given", "one value, or one per cable"), ""),
         ({"length_zero": None}, ("winches: length_zero", "not given"), "home(robot, pose, frame_end"),
         ({"drum_width": 0.003}, ("winches: drum_width[0]", "0.003 m", ">= 0.004 m, its groove_pitch"), ""),
         ({"layers": 5000}, ("winches: layers[0]", "5000", "1 to 1000"), ""),

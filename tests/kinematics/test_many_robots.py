@@ -1,4 +1,4 @@
-"""N robots, one a pose, against N single calls: the same answers to the last bit."""
+"""N robots, one per pose, against N single calls: the same answers to the last bit."""
 
 from typing import Any
 
@@ -249,7 +249,7 @@ def test_a_plan_of_many_robots_is_not_saved_by_halves(tmp_path: object) -> None:
 
     file = Path(str(tmp_path)) / "run.nc"
     plan = sl.inverse(perturbed(COGIRO, 2, seed=20), box_poses(COGIRO, 2, seed=21))
-    with refused("robot", "a sequence of 2 robots, one a pose"):
+    with refused("robot", "a sequence of 2 robots, one per pose"):
         plan.save(file)
     assert not file.exists()
 

@@ -223,7 +223,7 @@ def wrong_guides() -> list[tuple[Any, str, *tuple[str, ...]]]:
         ([[1.0, 2.0]], "guides", "of shape (1, 2)"),
         (np.empty((0, 3)), "guides", "of shape (0, 3)"),
         (good[None], "guides", "of shape (1, 8, 3, 3)"),
-        (good[:7], "guides", "7 values", "one value, or 8, one a cable"),
+        (good[:7], "guides", "7 values", "one value, or 8, one per cable"),
         (7.0, "guides", "of shape ()"),
         ("drum", "guides", "'drum'", "numbers"),
         ([[0, 0, 0], [0, 0, 0]], "guides[1]", "at the guide before it"),

@@ -274,7 +274,7 @@ def test_a_robot_that_nothing_holds_says_so(snapshot: SnapshotAssertion) -> None
 
 
 def test_a_robot_needs_one_pose() -> None:
-    with refused("pose", "missing", "a single pose, where the robot has no test box", kind=InvalidValueError):
+    with refused("pose", "missing", "a single pose, because the robot has no test box", kind=InvalidValueError):
         plot.robot(SUSPENDED.replace(test_box=None))
     with refused("pose", "a batch of 301", kind=InvalidValueError):
         plot.robot(SUSPENDED, PATH.pose)

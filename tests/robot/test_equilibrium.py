@@ -103,7 +103,7 @@ def test_several_robots_are_taken_along_and_not_mistaken_for_one() -> None:
     assert batch[-1].one_robot is robots[3]
     assert batch.cables.cable.linear_density.shape == (4, 8)
     assert batch[1].cables.cable.linear_density.shape == (8,)
-    with refused("robot", "a sequence of 4 robots, one a pose", kind=sl.InvalidValueError):
+    with refused("robot", "a sequence of 4 robots, one per pose", kind=sl.InvalidValueError):
         _ = batch.one_robot
     with refused("robot", "an empty sequence", kind=sl.InvalidValueError):
         sl.stiffness(batch[np.zeros(4, dtype=bool)])

@@ -180,7 +180,7 @@ def test_the_inertia_of_any_body_is_taken() -> None:
 def test_moments_that_no_body_has_are_refused_whatever_the_axes(moments: tuple[float, float, float]) -> None:
     turn = Rotation.from_rotvec([0.3, -1.0, 0.4]).as_matrix()
     small, middle, large = sorted(moments)
-    with refused("inertia", allowed="none larger than the other two together", kind=InvalidValueError) as caught:
+    with refused("inertia", allowed="none larger than the sum of the other two", kind=InvalidValueError) as caught:
         tripod(inertia=turn @ np.diag(moments) @ turn.T)
     assert f"{small:g}, {middle:g}, {large:g} kg m^2" in caught.value.value
 

@@ -40,7 +40,7 @@ UNKNOWN = (
     *("cable_length", "inertia", "torque_limit", "speed_limit", "position_gain", "speed_gain", "integral_gain"),
     "load_cell_range",
 )
-ONE_OR_8 = "one value, or 8, one a cable"
+ONE_OR_8 = "one value, or 8, one per cable"
 NOTHING = object()
 
 
@@ -205,7 +205,7 @@ def test_one_winch_is_spread_over_the_cables() -> None:
     assert spread.per_cable(3) is spread
     assert_same(Winch([0.05], drum_radius=0.06, swivel_axis=[0, 0, -1]).per_cable(3), spread)
     for count in (2, 4):
-        with refused("winches", "3 values", f"one value, or {count}, one a cable", kind=InvalidValueError):
+        with refused("winches", "3 values", f"one value, or {count}, one per cable", kind=InvalidValueError):
             spread.per_cable(count)
     for wrong in (0, -1, 2.5, True):
         with refused("count", f"{wrong}", kind=InvalidValueError):

@@ -84,7 +84,7 @@ class Creep:
         force = checked(tension, "tension", "N", missing=True)
         if clock.ndim != 1 or force.ndim not in (1, 2) or len(force) != len(clock):
             shapes = f"of shapes {clock.shape} and {force.shape}"
-            raise InvalidValueError("time and tension", shapes, "(N,) and (N,) or (N, m)", "Give a row a sample.")
+            raise InvalidValueError("time and tension", shapes, "(N,) and (N,) or (N, m)", "Give one row per sample.")
         if (late := np.diff(clock) <= 0.0).any():
             k = int(np.argmax(late)) + 1
             allowed = f"more than {clock[k - 1]:g} s"

@@ -68,7 +68,7 @@ class CableModel:
         """Refuse direct use of the interface, which is not a cable model."""
         if type(self) is CableModel:
             step = "Choose one of the models, Catenary() for instance."
-            raise InvalidValueError("CableModel()", "the interface alone", "a cable model", step)
+            raise InvalidValueError("CableModel()", "the abstract base class", "a cable model", step)
 
     @property
     def parameters(self) -> tuple[float, float]:

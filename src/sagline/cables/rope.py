@@ -59,7 +59,7 @@ def _steel(name: str, construction: str, mass: float, section: float, strength: 
         stiffness_factor=_STEEL_MODULUS * section,
         strength_factor=1.77e9 * strength,
         source=f"EN 12385-4, calculation factors of {construction}: W = {mass}, C = {section}, K = {strength}",
-        assumed="modulus 100 GPa on the metallic section, a usual value for a bedded-in rope; makers give their own",
+        assumed="modulus 100 GPa on the metallic section, usual after run-in; manufacturers state their own values",
     )
 
 
@@ -74,7 +74,7 @@ def _braid(name: str, fiber: str, modulus: float, strength: float, source: str) 
         strength_factor=0.55 * strength * section,
         source=source,
         assumed="fiber fills two thirds of the rope's circle, and the braid keeps 50 % of its modulus and 55 % of its "
-        "strength: usual values for a bedded-in braid; makers give their own",
+        "strength: usual values for a braid after run-in; manufacturers state their own values",
     )
 
 

@@ -130,7 +130,7 @@ def _check_model(robot: Robot, model: CableModel) -> None:
         step = "Use Catenary()."
         raise InvalidValueError("model", type(model).__name__, "Catenary() or Elastic(), which are exact", step)
     if robot.winches is not None and robot.winches.guides is not None:
-        step = "Give dead_cable instead of guides, their whole length."
+        step = "Give dead_cable, the whole guided length, instead of guides."
         raise InvalidValueError("winches: guides", "given", "None for calibrate", step)
 
 
@@ -148,7 +148,9 @@ def _refuse(sentences: Iterable[str]) -> None:
     for sentence in sentences:
         what, _, step = sentence.partition("; " if "; " in sentence else ": ")
         step = f"{step[:1].upper()}{step[1:]}."
-        raise InvalidValueError("log", f"not what this robot reads: {what}", "what one nearly like it may read", step)
+        raise InvalidValueError(
+            "log", f"not what this robot reads: {what}", "readings that a similar robot can give", step
+        )
 
 
 def _check_count(log: WinchLog, parameters: Parameters, left_out: Mapping[Omission, Indices]) -> None:
@@ -157,6 +159,6 @@ def _check_count(log: WinchLog, parameters: Parameters, left_out: Mapping[Omissi
         return
     gone = "".join(f"; {counted(len(rows), 'row')} left out: {reason.text}" for reason, rows in left_out.items())
     shown = f"{counted(readings, 'reading')} in {counted(len(log), 'row')}{gone}"
-    allowed = f">= {wanted}, one an unknown"
-    step = "Log more poses with load cells or measured positions, or look for fewer unknowns."
+    allowed = f">= {wanted}, one per unknown"
+    step = "Log more poses with load cells or measured positions, or estimate fewer unknowns."
     raise InvalidValueError("log", shown, allowed, step)

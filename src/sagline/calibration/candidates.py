@@ -163,10 +163,12 @@ def _none_feasible(robot: Robot, statuses: Codes) -> InvalidValueError:
     """Error of a box without a feasible pose, with the most frequent reason."""
     codes, counts = np.unique(statuses, return_counts=True)
     reason = PoseStatus(int(codes[np.argmax(counts)]))
-    beyond = "the winches have not so much cable, or their load cells do not read so much"
+    beyond = "the winches do not have enough cable, or the tensions are outside the range of the load cells"
     why = beyond if reason is PoseStatus.SOLVED else reason.text.split(";")[0]
     value = f"without a pose that {robot.name} can hold among {len(statuses):,} tried ({why})"
-    return InvalidValueError("box", value, "a box with feasible poses", "Give box=PoseBox(low, high, tilt) of others.")
+    return InvalidValueError(
+        "box", value, "a box with feasible poses", "Give box=PoseBox(low, high, tilt) with other poses."
+    )
 
 
 PASSES: Final = 50  # passes over all pairs of edges; a tour of a hundred places takes fewer than ten

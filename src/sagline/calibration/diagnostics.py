@@ -112,7 +112,7 @@ def frame_mismatch(log: WinchLog, left_out: Indices, asked: Collection[str]) -> 
     more = " and ".join(name for name in ("measuring_frame", "target") if name not in asked)
     yield (
         f"{lost} of {count} measured poses disagree with the lengths: they seem to have other axes; "
-        f"{f'ask for {more} too' if more else 'correct them'}, or write '# frame: ...' above the columns"
+        f"{f'add the unknowns {more}' if more else 'correct them'}, or write '# frame: ...' above the columns"
     )
 
 

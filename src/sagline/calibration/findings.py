@@ -23,21 +23,24 @@ class CalibrationStatus(Status):
     FOUND = 0, "found"
     DOUBTFUL = (
         1,
-        "found, but chi squared says that the model or the deviations are wrong: see residuals and outliers, "
+        "found, but chi squared shows that the model or the deviations are wrong: see residuals and outliers, "
         "and do not trust the standard errors",
     )
-    NOT_CONVERGED = 2, "not converged: is it this robot's log? begin nearer, or with fewer unknowns"
+    NOT_CONVERGED = (
+        2,
+        "not converged: check the log, and give better values or fewer unknowns",
+    )
 
 
 class Omission(Status):
     """Reason for the omission of a row of a log; `text` describes it for one row."""
 
-    NOT_A_NUMBER = 0, "a reading is missing that the rest of the log has"
-    REPEATED = 1, "the readings of an earlier row again"
+    NOT_A_NUMBER = 0, "a reading is missing"
+    REPEATED = 1, "the readings repeat an earlier row"
     MOVING = 2, "the platform moved"
     SLACK = 3, "a cable was slack"
-    NO_EQUILIBRIUM = 4, "the platform finds no equilibrium at its lengths"
-    OTHER_EQUILIBRIUM = 5, "the lengths put the platform elsewhere than its other readings do"
+    NO_EQUILIBRIUM = 4, "the platform has no equilibrium at these lengths"
+    OTHER_EQUILIBRIUM = 5, "the lengths and the other readings give different poses"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

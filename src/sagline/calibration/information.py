@@ -207,9 +207,9 @@ def most_helpful(situation: Situation) -> str:
         if fall > most / (1.0 if best is None else NEARLY):
             best, most = option, fall
     if best is None:
-        return "No further measurement known here lowers the errors by more than a hundredth."
+        return "No additional measurement of the list reduces the errors by more than 1 %."
     return (
-        f"Most helpful beside the poses: {best[0]}; it leaves {n(np.exp(-most), '.2f')} of the errors on average, "
+        f"Best additional measurement: {best[0]}. It multiplies the errors by {n(np.exp(-most), '.2f')} on average; "
         f"{_largest_reduction(situation, before, _deviations(best[1]))}."
     )
 

@@ -88,7 +88,7 @@ class Sensors(_Replaceable):
                 own = checked(value, about.name, **about.metadata)
                 axes = 3 if about.name in ("position_deviation", "rotation_deviation") else None
                 if own.ndim > 1 or (own.ndim == 1 and axes not in (None, own.size)) or own.size == 0:
-                    allowed, step = f"shape () or ({axes or 'm'},)", "Give one number, or one each."
+                    allowed, step = f"shape () or ({axes or 'm'},)", "Give one number, or one number per entry."
                     raise InvalidValueError(about.name, f"of shape {own.shape}", allowed, step)
                 object.__setattr__(self, about.name, own)
         if instance(self.frame, Pose, "frame").shape:
@@ -231,7 +231,7 @@ def _lengths_or_counts(counts: ArrayLike | None, lengths: ArrayLike | None) -> t
     """Name, unit and values of the given counts or lengths."""
     if (counts is None) == (lengths is None):
         value = "neither given" if counts is None else "both given"
-        step = "Give what the drives report: counts, or lengths that they computed from them."
+        step = "Give the counts, or the lengths that the drives computed from them."
         raise InvalidValueError("counts or unstrained_length", value, "one of the two", step)
     return ("counts", "", counts) if counts is not None else ("unstrained_length", "m", lengths)  # type: ignore[return-value]
 
@@ -245,7 +245,7 @@ def _table(value: ArrayLike, item: str, unit: str, rows: int | None, columns: in
         n, m = ("N" if rows is None else rows), ("m" if columns is None else columns)
         step = "Give a row for each pose, and in it a column for each cable."
         if columns in (3, 4) and item in ("position", "rotation"):
-            step = "Give a row for each row of the log, NaN where nothing was measured."
+            step = "Give one row per row of the log, NaN for a missing measurement."
         raise InvalidValueError(item, f"of shape {array.shape}", f"shape ({n}, {m})", step)
     return array
 
@@ -270,14 +270,14 @@ def _quaternions(given: Array) -> Array:
 def _times(value: ArrayLike, rows: int) -> Array:
     time = checked(value, "time", "s")
     if time.shape != (rows,):
-        raise InvalidValueError("time", f"of shape {time.shape}", f"shape ({rows},)", "Give one a row.")
+        raise InvalidValueError("time", f"of shape {time.shape}", f"shape ({rows},)", "Give one per row.")
     return time
 
 
 def _check_poses(pose: Pose | None, rows: int) -> None:
     if pose is not None and pose.shape != (rows,):
         value = f"a batch of {len(pose)}" if pose.shape else "a single pose"
-        raise InvalidValueError("commanded", value, f"a batch of {rows}", "Give one a row of the log.")
+        raise InvalidValueError("commanded", value, f"a batch of {rows}", "Give one per row of the log.")
 
 
 def _check_sensors(log: WinchLog, cables: int) -> None:
@@ -294,7 +294,7 @@ def _check_sensors(log: WinchLog, cables: int) -> None:
         item = f"sensors: {name}"
         if read is not None and deviation is None:
             step = f"Give sensors=Sensors({name}=...), or leave {names[name]} out."
-            raise InvalidValueError(item, "None", f"the standard deviation of what {names[name]} has", step)
+            raise InvalidValueError(item, "None", f"the standard deviation of {names[name]}", step)
         if deviation is not None and deviation.shape not in ((), (size,)):
-            step = "Give one for all, or one each."
+            step = "Give one value for all, or one value per entry."
             raise InvalidValueError(item, f"of shape {deviation.shape}", f"shape () or ({size},)", step)

@@ -176,7 +176,7 @@ def _as_list(unknowns: Any) -> list[Any]:
             return list(unknowns)
         raise TypeError
     except TypeError:
-        step = 'Give ("frame_anchors", "mass"), say.'
+        step = 'Give ("frame_anchors", "mass"), for example.'
         raise InvalidValueError("unknowns", brief(unknowns), "names of unknowns", step) from None
 
 
@@ -192,7 +192,7 @@ def _value(robot: Robot, sensors: Sensors, name: str, counted: bool) -> Array:
     value = _field(robot, name)
     if value is None:
         begin = _NOTHING.get(name, "..., as drawn")
-        step = f"Begin with {kind.owner}: {{{name}: {begin}}} in the robot file, or leave it out."
+        step = f"Add {kind.owner}: {{{name}: {begin}}} to the robot file, or leave the unknown out."
         raise InvalidValueError(f"unknown: {name}", f"no number of {robot.name}", "a number that the robot has", step)
     if kind.owner == "robot":
         return np.asarray(value, dtype=np.float64).reshape(-1, len(kind.axes))
@@ -231,8 +231,11 @@ def _is_shared(unknown: Unknown, kind: _Kind, own: Array, width: Array) -> bool:
     if unknown.shared is None:
         return kind.shared and alike
     if unknown.shared and kind.each and not alike:
-        allowed, step = "equal and as well known for all cables", "Leave shared out, so that each has its own."
-        raise InvalidValueError(f"unknown: {unknown.name}", "shared", f"{allowed} where shared", step)
+        allowed, step = (
+            "equal, with the same deviation, for all cables",
+            "Leave shared out; each cable then has its own value.",
+        )
+        raise InvalidValueError(f"unknown: {unknown.name}", "shared", f"{allowed} if shared", step)
     return unknown.shared
 
 

@@ -173,13 +173,13 @@ def _advice(plan: CalibrationPoses, width: int) -> Iterator[str]:
     share, times = plan.share_of_random, plan.share_of_random**-2
     yield from wrap(
         f"In the directions that readings observe, the errors are {n(share, '.2f')} of those of random poses; "
-        f"{n(times, '.2g')} times as many random poses have the same errors.",
+        f"{n(times, '.2g')} times this number of random poses has the same errors.",
         width,
     )
     if plan.enough < len(plan):
-        text = f"From {counted(plan.enough, 'pose')} on, another one lowers no error by more than 1{SPACE}%."
+        text = f"With {counted(plan.enough, 'pose')}, an additional pose reduces no error by more than 1{SPACE}%."
     else:
-        text = f"More poses still help: each lowers some error by more than 1{SPACE}%."
+        text = f"More poses still help: an additional pose reduces an error by more than 1{SPACE}%."
     yield from wrap(text, width)
     yield from wrap(plan.most_helpful, width)
 
@@ -248,7 +248,7 @@ def calibration_poses(
     read = sensors or _default_sensors(robot, standing.tensions)
     if read.tension_deviation is None and read.position_deviation is None and read.rotation_deviation is None:
         step = "Give Sensors(tension_deviation=...), or leave sensors out."
-        raise InvalidValueError("sensors", "lengths alone", "load cells, positions or rotations beside them", step)
+        raise InvalidValueError("sensors", "lengths alone", "load cells, positions or rotations in addition", step)
     parameters = parameters_of(robot, unknowns, read, counted=has_drum_data(robot))
     check_memory(
         f"{tried:,} candidates",
@@ -283,7 +283,7 @@ def calibration_poses(
 
 def _box(robot: Robot, box: PoseBox | None) -> PoseBox:
     if box is None and robot.test_box is None:
-        step = "Give box=PoseBox(low, high, tilt), where its platform may stand."
+        step = "Give box=PoseBox(low, high, tilt) with the allowed poses."
         raise InvalidValueError("box", f"missing, and {robot.name} has no test_box", "a PoseBox", step)
     found = optional(box, PoseBox, "box") or robot.test_box
     assert found is not None
@@ -319,7 +319,7 @@ def _refuse(robot: Robot, parameters: Parameters, count: int, tried: int, rows: 
     """Reject too few poses, and unknowns without observations and prior."""
     if len(rows) < count:
         value = f"{count}, with {len(rows)} of {tried} candidates feasible and stable"
-        step = "Ask for fewer, raise candidates, or give a box of which more is feasible."
+        step = "Give a smaller count, more candidates, or a box with more feasible poses."
         raise InvalidValueError("count", value, f"1 to {len(rows)}", step)
     names, observed = np.array(parameters.names), np.abs(rows).max(axis=(0, 1)) > 0.0
     for name in dict.fromkeys(parameters.names):

@@ -52,7 +52,7 @@ class PoseError(Result):
             for one, unit in ((self.position, "m"), (self.own_position, "m"), (self.rotation, "rad"))
         )
         poses = counted(int(np.count_nonzero(held)), "pose")
-        return f"Errors to expect of {poses}: {world} in the world, {own} for itself, {turn}"
+        return f"Expected errors of {poses}: {world} in the world, {own} in its own frame, {turn}"
 
     @property
     def position(self) -> Array:

@@ -79,8 +79,10 @@ def search_from_priors(
             left_out[Omission.OTHER_EQUILIBRIUM] = locked(np.flatnonzero(elsewhere))
             kept &= ~elsewhere
             if not kept.any():
-                step = "Check that it is this robot's log, its lengths and load cells, or begin with better anchors."
-                raise InvalidValueError("log", "without a pose at which this robot reads so", "one at least", step)
+                step = "Check that the log is of this robot, check lengths and load cells, or give better anchors."
+                raise InvalidValueError(
+                    "log", "without a pose at which this robot can give such readings", "one at least", step
+                )
             current = evaluate_step(problem, fit.state, None, kept)
             fit = solve(problem, current, kept, robust=robust, progress=progress)
     return SearchResult(fit, kept, left_out)

@@ -26,7 +26,7 @@ def calibration_text(found: Findings, width: int = WIDTH) -> str:
         _verdict(found, width),
         _rows(found, width),
         _values(found, width),
-        _directions(found.gauge, "Unobservable, kept as the robot had it:", width),
+        _directions(found.gauge, "Unobservable; the values of the robot file are kept:", width),
         _directions(found.cannot_tell_apart, "Weakly identifiable:", width),
         _outliers(found, width),
         _cross_validation(found, width),
@@ -91,7 +91,7 @@ def _verdict(found: Findings, width: int) -> Iterator[str]:
         yield from _wrapped(f"Found: {what}{when}", width)
         yield from _wrapped(f"{chi_squared_text(found)}; {iterations}", width, "  ")
     elif found.status is CalibrationStatus.DOUBTFUL:
-        text = found.status.text.removeprefix("found, but ").removeprefix("chi squared says that ")
+        text = found.status.text.removeprefix("found, but ").removeprefix("chi squared shows that ")
         yield from _wrapped(f"DOUBTFUL: {chi_squared_text(found)}: {text}", width)
         yield from _wrapped(f"{what}{when}; {iterations}", width, "  ")
     else:
@@ -170,7 +170,7 @@ def _coordinates(found: Findings, name: Anchors, columns: int) -> Iterator[str]:
         own = relative_covariance(anchors, covariance, name).reshape(where.size, where.size)
         error = float(np.sqrt(np.trace(own) / where.size))
         if np.isfinite(error):
-            yield f"    relative to one another ±{SPACE}{n(error, '.2g', 'm')} a coordinate"
+            yield f"    relative to one another ±{SPACE}{n(error, '.2g', 'm')} per coordinate"
 
 
 def _cell(found: Findings, k: int) -> str:
@@ -219,7 +219,7 @@ def _outliers(found: Findings, width: int) -> Iterator[str]:
         return
     place = {int(row): k for k, row in enumerate(found.rows)}
     less = (found.weights < 1.0).any()  # no pose has less weight with robust=False
-    yield f"Outliers, {len(found.outliers)}{'; their poses count less' if less else ''}:"
+    yield f"Outliers, {len(found.outliers)}{'; their poses have less weight' if less else ''}:"
     for outlier in found.outliers[:MOST_OUTLIERS]:
         at = ""
         if outlier.row in place:
@@ -235,9 +235,7 @@ def _cross_validation(found: Findings, width: int) -> Iterator[str]:
     check = found.cross_validation
     if check is None:
         return
-    yield from _wrapped(
-        f"At poses left out of the calibration, in turn by {check.folds} folds (root mean square):", width
-    )
+    yield from _wrapped(f"At poses left out of the calibration, in {check.folds} folds (root mean square):", width)
     pairs = (("position", check.position_before, check.position, "m"),
              ("load cells", check.tension_before, check.tension, "N"))  # fmt: skip
     for name, before, after, unit in pairs:

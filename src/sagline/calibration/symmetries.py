@@ -158,7 +158,7 @@ def _scale(robot: Robot, sensors: Sensors) -> Generator:
     change[kinds.CENTER : kinds.CENTER + 3] = robot.center_of_mass[:, None]
     change[kinds.SHIFT : kinds.SHIFT + 3] = sensors.frame.position[:, None]
     change[kinds.TARGET : kinds.TARGET + 3] = sensors.target[:, None]
-    return Generator("the scale: all larger, of lighter cable", _SCALE, change, lengths=1.0)
+    return Generator("the scale: a larger robot with lighter cables", _SCALE, change, lengths=1.0)
 
 
 def _force(robot: Robot) -> Generator:
@@ -166,4 +166,4 @@ def _force(robot: Robot) -> Generator:
     change = _empty(robot)
     change[[kinds.DENSITY, kinds.STIFFNESS, kinds.MASS]] = 1.0
     change[kinds.GAIN] = -1.0 if robot.winches is None else -robot.winches.load_cell_gain
-    return Generator("all forces larger, and load cells of less gain", _FORCE, change)
+    return Generator("larger forces, and load cells with a smaller gain", _FORCE, change)

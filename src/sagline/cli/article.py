@@ -36,7 +36,7 @@ def article(
     from sagline.article.report import NAMES, write_article
 
     check_files(folder, NAMES)
-    what = "redoing the article"
+    what = "repeating the studies of the article"
     with working(what) as line:
 
         def progress(done: int, total: int, name: str) -> None:

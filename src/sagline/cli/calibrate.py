@@ -51,7 +51,7 @@ class _Request(NamedTuple):
                 kinds = ", ".join(allowed)
                 raise FileError(file, f"the suffix is {file.suffix or 'missing'}; allowed: {kinds}", "Choose one.")
             if file.resolve() == Path(self.robot).resolve():
-                raise FileError(file, "is the robot that is read; its comments would be lost", "Give another name.")
+                raise FileError(file, "is the input robot file; its comments would be lost", "Give another name.")
             check_files(file.parent, [file.name])
 
 
@@ -64,7 +64,7 @@ def calibrate(
     log: Annotated[
         Path | None,
         argument(
-            "LOG", "CSV: one row a pose; count_0, ... or length_0, ..., load_cell_0, ..., and x, y, z if measured."
+            "LOG", "CSV: one row per pose; count_0, ... or length_0, ..., load_cell_0, ..., and x, y, z if measured."
         ),
     ] = None,
     out: Annotated[
@@ -136,7 +136,9 @@ def _fit(request: _Request, log: Path | None, model: CableModel, folds: int, *, 
         step = "Give the readings, or choose poses with --plan 40."
         raise InvalidValueError("LOG", "missing", "a CSV file, or --plan", step)
     if log.suffix.lower() in (*ROBOTS, WHOLE):
-        raise FileError(log, "is no CSV file of readings", "Give the readings of encoders and load cells, winches.csv.")
+        raise FileError(
+            log, "is not a CSV file of readings", "Give the readings of encoders and load cells, winches.csv."
+        )
     request.check_files((*ROBOTS, WHOLE))
     robot, readings = load_robot(request.robot), _log(log, request.deviations)
     with working(f"{robot.name}: calibrating from {len(readings):,} rows") as line:
@@ -242,7 +244,7 @@ def _tell_offset(found: Calibration, files: list[Path]) -> None:
     if robots and found.length_offset.any():
         whole = next((file.name for file in files if file.suffix.lower() == WHOLE), None)
         kept = f"{whole} keeps it" if whole else "--out found.nc does"
-        text = "has no length_zero for read lengths; it is to be added to the lengths of the machine"
+        text = "has no length_zero for measured lengths; add it to the lengths of the machine"
         show_note("Note: ", f"{robots[0]} {text}; {kept}.", style="bold")
 
 

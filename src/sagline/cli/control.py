@@ -27,7 +27,8 @@ def control(
 
     The commands are lines: home, goto 0.2,-0.4,1.4, run path.yaml, jog 3 +5mm, pause, resume, stop, state, ack, off,
     help. Lines from a pipe are executed one after the other; the first error ends the session. Ctrl-C stops all winches
-    and releases the machine, exit code 130. Software is no safety function: have an emergency stop wired in hardware.
+    and releases the machine, exit code 130. Software is not a safety function: have an emergency stop wired in
+    hardware.
 
     For example:
 

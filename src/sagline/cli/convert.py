@@ -73,7 +73,9 @@ def convert(
         raise FileError(out, "is the file to convert", "Name another file with --out.")
     if out is not None and out.suffix.lower() not in ENDINGS[form]:
         kind = "a robot file" if form is _Format.ROBOT else "a MuJoCo model"
-        raise FileError(out, f"is no name for {kind}", f"Let it end in {ENDINGS[form][0]}, or choose another --format.")
+        raise FileError(
+            out, f"is not a valid name for {kind}", f"Let it end in {ENDINGS[form][0]}, or choose another --format."
+        )
     if at is not None and form is _Format.ROBOT:
         raise InvalidValueError(
             "--at", "given for a robot file", "--format mjcf", "A robot file has no pose: leave it out."

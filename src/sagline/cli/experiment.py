@@ -32,7 +32,7 @@ def experiment(
         str | None,
         option(
             "ROBOT",
-            "The real robot if it differs; the controller still knows article-prototype.",
+            "File of the real robot if it differs. The controller uses article-prototype.",
         ),
     ] = None,
     seed: SeedOption = "1",
@@ -105,7 +105,7 @@ def apart_over_s7(true: Robot, nominal: Robot, seed: int, tell: Tell) -> Experim
 def _how(true: str | None, waits: bool) -> str:
     machine = "a twin of the prototype as planned" if true is None else f"a twin of {true}"
     way = "in one process, not in real time" if waits else "over four S7 connections, in real time"
-    return f"The controller drove {machine}, {way}; it knew the prototype of Table 1, with our anchors."
+    return f"The controller drove {machine}, {way}; its model was the prototype of Table 1, with our anchors."
 
 
 def _tell(result: Experiment) -> None:

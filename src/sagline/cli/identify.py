@@ -86,8 +86,8 @@ def identify(
         f"chi-squared per degree of freedom: {number_text(cable.chi_squared, '.3g')} (about 1 if the errors are right)"
     )
     show_text(
-        f"The empirical model with k_h, k_p keeps a position error of {n(1e3 * TOLERANCE, 'g', 'mm')} in the "
-        f"measured range from T_x = {n(model.tension_min(TOLERANCE), '.3g', 'N')} on."
+        f"The empirical model with k_h, k_p has position errors below {n(1e3 * TOLERANCE, 'g', 'mm')} in the "
+        f"measured range if T_x is above {n(model.tension_min(TOLERANCE), '.3g', 'N')}."
     )
     for warning in cable.warnings:
         show_note("Warning: ", warning, style="bold yellow")

@@ -53,8 +53,8 @@ def encoder(
         _Winding,
         option(
             "WINDING",
-            "Cable on the drums: constant, wound at the winches' winding_tension; remembered, wound along the run at "
-            "its tension there.",
+            "Tension of the cable on the drums. constant: winding_tension of the winches; remembered: tension at "
+            "which the path wound the cable.",
         ),
     ] = _Winding.CONSTANT,
     out: FileOption = None,

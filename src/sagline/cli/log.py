@@ -71,7 +71,7 @@ def log(
 def _tell(done: Execution) -> None:
     duration = _since(done, done.time[-1]) if len(done) else 0.0
     silent = int(np.count_nonzero(~done.answered))
-    show_text(f"{done.robot.name}: {len(done):,} cycles in {n(duration, '.4g', 's')}, {silent:,} without an answer.")
+    show_text(f"{done.robot.name}: {len(done):,} cycles in {n(duration, '.4g', 's')}, {silent:,} without a response.")
     show_text(f"{done.status.name}: {done.reason or done.status.text}")
     show_table(TextTable(["state", "time [s]", "cycles"], _states(done)))
     largest = [

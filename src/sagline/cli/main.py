@@ -29,7 +29,7 @@ MODULES = {"encoder": "lengths", "show": "robots", "export-c": "export", "export
 DEBUG = "--debug"
 MOST_NAMES = 6  # largest number of files listed after an error
 START = """\
-Cable robots whose cables sag: from a robot and a path to proven cable lengths.
+Cable robots with sagging cables: from a robot and a path to proven cable lengths.
 
 Start here:
 

@@ -101,7 +101,7 @@ def new(
 
 def _check_file(file: Path, *, force: bool) -> None:
     if file.suffix not in (".yaml", ".yml"):
-        raise FileError(file, "is no name for a robot file", "Let it end in .yaml.")
+        raise FileError(file, "is not a valid name for a robot file", "Let it end in .yaml.")
     if file.exists() and not force:
         raise FileError(file, "exists", "Choose another name, or replace it with --force.")
 
@@ -224,8 +224,8 @@ def _explained(robot: Robot, design: Design, middle: Plan) -> tuple[list[str], f
         f"{robot.name}: {robot.cable_count} cables, {ROPES[design.rope].description}, "
         f"{n(1e3 * design.diameter, 'g', 'mm')}: {n(1e3 * density, '.3g', 'g/m')}, EA {n(stiffness, unit='N')}",
         f"Tensions allowed: {n(robot.tension_min[0], '.3g', 'N')} ({100 * SLACK_LIMIT:g} % of the weight) to "
-        f"{n(robot.tension_max[0], unit='N')} (the breaking force over a safety of {SAFETY:g})",
-        f"Of the middle half of the frame, {100 * share:.0f} % of the level poses are feasible",
+        f"{n(robot.tension_max[0], unit='N')} (the breaking force divided by a safety factor of {SAFETY:g})",
+        f"In the middle half of the frame, {100 * share:.0f} % of the level poses are feasible",
     ]
     if share > 0.0:
         tension = middle.chord_tension[middle.feasible]

@@ -132,7 +132,7 @@ WrenchOption = Annotated[
     Any,
     converted_option(
         "FX,FY,FZ[,MX,MY,MZ]",
-        "Force [N] and moment [N m] on the platform besides its weight, about its center of mass, along the world's "
+        "Force [N] and moment [N m] on the platform in addition to its weight, about its center of mass, in world "
         "axes.",
         "wrench_of_text",
     ),
@@ -141,7 +141,7 @@ PayloadOption = Annotated[
     float | None,
     quantity_option(
         "MASS",
-        "Mass that the platform carries besides its own, 20 or '20 kg'. The inertia grows in proportion.",
+        "Additional mass on the platform, 20 or '20 kg'. The inertia increases in proportion.",
         "kg",
         low=0.0,
     ),

@@ -53,7 +53,7 @@ def share(
     check_module()
     source = Path(what)
     if out is not None and out.suffix.lower() not in ENDINGS:
-        raise FileError(out, "is no name for a page", "Let it end in .html.")
+        raise FileError(out, "is not a valid name for a page", "Let it end in .html.")
     with working(f"reading {source.name}"):
         found = _found(source)
     robot = found if isinstance(found, Robot) else found.robot
@@ -111,5 +111,5 @@ def _free(file: Path) -> Path:
 
     check_file(file)
     if file.exists() and MADE.encode() not in file.read_bytes()[:HEAD]:
-        raise FileError(file, "exists, and is no page of sagline", "Name the page with --out; it may be this one.")
+        raise FileError(file, "exists, and is not a page of sagline", "Name the page with --out; it may be this one.")
     return file

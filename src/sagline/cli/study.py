@@ -38,7 +38,7 @@ ROWS = {  # rows of a summary: label and number format
     "adjusting_length_min_mm": ("adjusting length, smallest [mm]", ".1f"),
     "adjusting_length_max_mm": ("adjusting length, largest [mm]", ".1f"),
     "feasible_share_percent": ("feasible poses [%]", ".4g"),
-    "inverse_us_per_pose": ("inverse kinematics [µs a pose]", ".2f"),
+    "inverse_us_per_pose": ("inverse kinematics [µs per pose]", ".2f"),
 }
 NARROW, WIDE = 10, 30  # width of a column's head in characters; four narrow columns fit a line of 80
 MOST_GAPS = 5  # largest number of printed gaps
@@ -114,10 +114,10 @@ def _gap_text(gap: Gap, plan: Plan) -> str:
     count = plan.state.one_robot.cable_count
     cables = "all cables" if len(gap.cables) == count else f"cables {', '.join(map(str, gap.cables))}"
     if np.isinf(gap.shortfall):
-        return f"{when}: no additional force alone helps; limits of {cables}"
+        return f"{when}: no additional force alone is sufficient; limits of {cables}"
     short = f"short by up to {n(gap.shortfall, '.3g', 'N')}"
     if gap.hopeless:
-        short += f", and at {gap.hopeless} of {gap.last - gap.first + 1} poses no additional force alone helps"
+        short += f", and at {gap.hopeless} of {gap.last - gap.first + 1} poses no additional force alone is sufficient"
     return f"{when}: {short}; limits of {cables}"
 
 
@@ -149,9 +149,9 @@ def _complaints(run: ConfirmedRun) -> int:
         show_note(f"{name}: ", f"and {len(gaps) - MOST_GAPS} more times", style="bold red")
     if gaps:
         limits = all(gap.status is PoseStatus.INFEASIBLE for gap in gaps)
-        show_note("", "The file has the feasible part and marks the rest." + WIDEN * limits)
+        show_note("", "The file contains the feasible part and marks the rest." + WIDEN * limits)
     if run.lost:
-        what = f"{run.lost} of the planned poses are no stable equilibria: the platform would leave its path"
+        what = f"{run.lost} of the planned poses are not stable equilibria: the platform would leave its path"
         show_note(f"{name}: ", f"{what}; move the path, or raise the tensions", style="bold red")
     return OUTSIDE if gaps or run.lost else 0
 

@@ -37,7 +37,7 @@ def sweep(
     workers: Annotated[str | None, option("COUNT", "Processes on this machine. Default: one per processor.")] = None,
     scheduler: Annotated[
         str | None,
-        option("tcp://HOST:PORT", "Use the workers of this Dask scheduler; all of them must see the folder."),
+        option("tcp://HOST:PORT", "Use the workers of this Dask scheduler; all workers need access to the folder."),
     ] = None,
     as_json: JsonOption = False,
 ) -> int:

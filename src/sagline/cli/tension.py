@@ -122,7 +122,7 @@ def _reason(robot: Robot, pose: Pose, plan: Plan) -> str:
         cables = "blocking cables " + ", ".join(str(i) for i in np.flatnonzero(plan.blocking))
         if np.isfinite(plan.shortfall):
             return f"{status.text}. Shortfall {n(plan.shortfall, unit='N')}; {cables}"
-        no_force = "No change of the force alone would do; " if np.isinf(plan.shortfall) else ""
+        no_force = "No change of the force alone is sufficient; " if np.isinf(plan.shortfall) else ""
         return f"{status.text}. {no_force}{cables}"
     return status.text
 

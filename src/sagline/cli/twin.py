@@ -34,11 +34,18 @@ STATUS: Final = {  # the first applicable text, by the names of `GroupStatus`
 
 def twin(
     name: RobotArgument,
-    true: Annotated[str | None, option("ROBOT", "The real robot if it differs; the PLCs still know ROBOT.")] = None,
+    true: Annotated[str | None, option("ROBOT", "File of the real robot if it differs. The PLCs use ROBOT.")] = None,
     port: Annotated[
-        int, converted_option("NUMBER", "Port of the first group, the others follow; 0 takes free ones.", "port_of")
+        int,
+        converted_option(
+            "NUMBER",
+            "Port of the first group; the next ports are for the other groups. 0 selects free ports.",
+            "port_of",
+        ),
     ] = 11021,
-    host: Annotated[str, option("ADDRESS", "Address to listen on; 0.0.0.0 is all of this machine.")] = "127.0.0.1",
+    host: Annotated[
+        str, option("ADDRESS", "Address to listen on; 0.0.0.0 means all addresses of this machine.")
+    ] = "127.0.0.1",
     modbus: ModbusOption = False,
     seed: SeedOption = "0",
     faults: Annotated[
@@ -127,7 +134,7 @@ class TwinMonitor:
 
     def _look(self) -> list[str]:
         reports = [self._machine.report(group) for group in range(len(self._machine.groups))]
-        return ["says nothing new" if report is None else _doing(report) for report in reports]
+        return ["sends no new data" if report is None else _doing(report) for report in reports]
 
     def _tell(self, time: float) -> None:
         now = self._look()

@@ -61,14 +61,16 @@ _PointsOption = Annotated[
     Any,
     converted_option(
         "NXxNYxNZ",
-        "Map lowest frequency and largest response at so many poses of the test box, instead of one pose.",
+        "Map the lowest frequency and the largest response at this number of poses of the test box.",
         "points_of",
         "--map",
     ),
 ]
 _DampingOption = Annotated[
     float,
-    converted_option("RATIO", "Damping ratio of every mode, 0.01 or '1 %', besides that of the cables.", "ratio"),
+    converted_option(
+        "RATIO", "Damping ratio of every mode, 0.01 or '1 %', in addition to that of the cables.", "ratio"
+    ),
 ]
 
 
@@ -213,7 +215,7 @@ def _tell(found: Vibration, modes: list[ListedMode], state: Equilibrium) -> None
         higher = ", ".join(number_text(frequency, ".3f") for frequency in beyond)
         show_text(f"Massless modes above this frequency: {higher} Hz")
     elif swinging:
-        show_text("Each massless frequency is beside the mode that has most of its motion.")
+        show_text("Each massless frequency is in the row of the mode with most of its motion.")
 
 
 def _numbers(mode: ListedMode) -> tuple[Any, ...]:

@@ -59,7 +59,8 @@ _TruthOption = Annotated[
     Path | None, option("TWIN.mcap", "With a log: the log of the twin, with the true pose of the platform.")
 ]
 _HostOption = Annotated[
-    str, option("ADDRESS", "Address to listen on; 0.0.0.0 is all of this machine, so that others can look.")
+    str,
+    option("ADDRESS", "Address to listen on; 0.0.0.0 means all addresses of this machine, so that others can look."),
 ]
 
 
@@ -70,11 +71,13 @@ def view(
     live: Annotated[bool, flag("Follow a log that is still being written.", "--live")] = False,
     truth: _TruthOption = None,
     pose: PoseOption = None,
-    mode: Annotated[str | None, option("NUMBER", "Natural mode that moves at first: 1, 2, ...; 'massless 1'.")] = None,
+    mode: Annotated[
+        str | None, option("NUMBER", "Natural mode to animate at the start: 1, 2, ...; 'massless 1'.")
+    ] = None,
     wrench: WrenchOption = None,
     payload: PayloadOption = None,
     host: _HostOption = "127.0.0.1",
-    port: Annotated[int, converted_option("NUMBER", "Port to listen on; 0 takes any free one.", "port_of")] = 8080,
+    port: Annotated[int, converted_option("NUMBER", "Port to listen on; 0 selects a free port.", "port_of")] = 8080,
     browser: Annotated[bool, flag("Open it in a browser here.", "--browser/--no-browser")] = True,
 ) -> int:
     """Show a robot in the browser; its platform can be dragged, and the cables follow.

@@ -37,8 +37,8 @@ LoadsOption = Annotated[
     Any,
     converted_option(
         "LOADS",
-        "Loads besides the weight at all poses: '±100 N, ±20 N m', accelerations '±2 m/s^2, ±1 rad/s^2', both, or one "
-        "wrench FX,FY,FZ[,MX,MY,MZ].",
+        "Loads in addition to the weight, at all poses: '±100 N, ±20 N m', accelerations '±2 m/s^2, ±1 rad/s^2', both, "
+        "or one wrench FX,FY,FZ[,MX,MY,MZ].",
         "wrenches_of",
     ),
 ]

@@ -167,7 +167,7 @@ def _check_feasible(plan: Plan, path: Path) -> None:
     more = f" and {len(gaps) - 1} more stretches" if len(gaps) > 1 else ""
     reason = f"at {path.time[gap.first]:.2f} s, ({place}) m,{more} its status is {PoseStatus(gap.status).name}"
     cables = f", cables {', '.join(map(str, gap.cables))} at their limits" if gap.cables else ""
-    raise RefusedError("the path", reason + cables, "Lead it elsewhere, make it slower, or check it with inverse().")
+    raise RefusedError("the path", reason + cables, "Change its course, make it slower, or check it with inverse().")
 
 
 def _check_winches(robot: Robot, path: Path, length: Array, rate: Array, drum: Array) -> None:
@@ -204,10 +204,12 @@ def _check_steps(time: Array, length: Array, rate: Array) -> None:
         return
     k, i = (int(index) for index in np.unravel_index(np.argmax(off / allowed), off.shape))
     reason = (
-        f"from {time[k]:g} s to {time[k + 1]:g} s the length of cable {i} is off its rate by "
+        f"from {time[k]:g} s to {time[k + 1]:g} s the length of cable {i} differs from its rate by "
         f"{1e3 * off[k, i]:.3g} mm; allowed: {1e3 * allowed[k, i]:.3g} mm"
     )
-    raise RefusedError("the path", reason, "Its poses jump, or its twist is not theirs: use path_from_samples.")
+    raise RefusedError(
+        "the path", reason, "Its poses jump, or its twist does not match its poses: use path_from_samples."
+    )
 
 
 def _refuse_beyond(path: Path, verb: str, values: Array, limit: Array | None, unit: str) -> None:

@@ -199,7 +199,7 @@ class Context:
         lost = self.estimator.locate(length, wrench)
         if lost is None:
             return ""
-        line = f"the pose of the platform is lost: {lost.text}. Check where it is, acknowledge, and home again."
+        line = f"the pose of the platform is lost: {lost.text}. Check its position, acknowledge, and home again."
         self.say(EventKind.FAULT, "estimate", line)
         return line
 

@@ -21,7 +21,7 @@ class OverTension(Fault):
     """Cable tension too large."""
 
     name = "over-tension"
-    rule = f"T_A above its upper limit in 1 sample, or above {NEAR:g} of it in {NEAR_SAMPLES}"
+    rule = f"T_A above its upper limit in 1 sample, or above {NEAR:g} of this limit in {NEAR_SAMPLES} samples"
     reaction = Reaction.STOPPING
     within = "10 to 50 ms"
 
@@ -55,8 +55,8 @@ class CableBroken(Fault):
 
     name = "cable broken"
     rule = (
-        f"slack from one sample to the next after more than {SUDDEN:g} of its planned tension, and the others leave "
-        f"what they were off the plan by > {SIGMAS:g} sigma of their noise"
+        f"slack from one sample to the next after more than {SUDDEN:g} of its planned tension, while the deviations of "
+        f"the other cables from the plan change by > {SIGMAS:g} sigma of their noise"
     )
     reaction = Reaction.EMERGENCY
     within = "30 ms"
@@ -90,9 +90,9 @@ class Slack(Fault):
 
     name = "slack"
     rule = (
-        f"T_A < {SLACK_SHARE:g} of its lower limit ({SIGMAS:g} sigma where that is 0) in {SLACK_SAMPLES} samples where "
-        f"the plan has {PLANNED_SHARE:g} of it or more (the limit may be one along the chord, which T_A is not; "
-        f"{2 * SIGMAS:g} sigma), and its motor does not pull either"
+        f"T_A < {SLACK_SHARE:g} of its lower limit ({SIGMAS:g} sigma if the limit is 0) in {SLACK_SAMPLES} samples, "
+        f"while the plan has at least {PLANNED_SHARE:g} of the limit and its motor does not pull either (if the limit "
+        f"is a chord tension, which differs from T_A: 2 x {SIGMAS:g} sigma)"
     )
     reaction = Reaction.STOPPING
     within = "30 ms"
@@ -188,7 +188,7 @@ class CellOff(Fault):
     """Load cell that contradicts the force balance of the platform."""
 
     name = "cell wrong"
-    rule = f"parity of the cells > {SIGMAS:g} sigma names it for {ODD_TIME:g} s, for any weight of the load"
+    rule = f"for {ODD_TIME:g} s the parity of the cells is > {SIGMAS:g} sigma and names this cell, for any load"
     reaction = Reaction.DEGRADED
     within = "0.5 s"
     lasting = True
@@ -218,7 +218,7 @@ class CellOff(Fault):
         seen.ignore_cells(np.arange(error.size) == cell)
         visible = float(cycle.gains.parity[cell, cell]) if cycle.gains is not None else 1.0
         return (
-            f"cell {cell} differs by about {error[cell] / visible:.0f} N from the balance of the platform; "
+            f"cell {cell} differs by about {error[cell] / visible:.0f} N from the force balance of the platform; "
             f"allowed: {limit / visible:.0f} N. "
             f"It reads {cycle.sample.tension[cell]:.4g} N, planned: {cycle.tension[cell]:.4g} N. {_STEP}"
         )

@@ -30,9 +30,9 @@ class EncoderJump(Fault):
 
     name = "encoder jump"
     rule = (
-        f"|change of length - rate x time| > {1e3 * JUMP:g} mm a cycle between two samples, by the rate in the first "
-        "and by that of the set points, of a drive that has power and is not at its limit, whose PLC got "
-        f"its commands in time for the last {CATCHING_UP} cycles; or no number"
+        f"|change of length - rate x time| > {1e3 * JUMP:g} mm per cycle between two samples, for the rate in "
+        "the first sample and for the rate of the set points, if the drive has power and is not at its limit, and its "
+        f"PLC got its commands in time for the last {CATCHING_UP} cycles; or the length is not a number"
     )
     reaction = Reaction.STOPPING
     within = "10 ms"
@@ -91,7 +91,7 @@ class FollowingError(Fault):
     """Fault: a drum is too far from its set point."""
 
     name = "following error"
-    rule = f"|set point - length| > {1e3 * FOLLOWING:g} mm, set points being those that the PLC has taken and follows"
+    rule = f"|set point - length| > {1e3 * FOLLOWING:g} mm, for set points that the PLC has accepted"
     reaction = Reaction.STOPPING
     within = "10 ms"
     homing = True
@@ -146,8 +146,8 @@ class NotFollowing(Fault):
 
     name = "group does not follow"
     rule = (
-        f"a group has taken none of the last {BEHIND} commands to follow, or does not report in {IDLE + 1} samples in "
-        "a row that it follows those it took"
+        f"a group has accepted none of the last {BEHIND} follow commands, or {IDLE + 1} samples in succession do not "
+        "report that the group follows them"
     )
     reaction = Reaction.STOPPING
     within = "40 or 100 ms"
@@ -226,7 +226,7 @@ class CorrectionAtLimit(Fault):
     """Fault: a correction of the tension loop is larger than the error of any good encoder."""
 
     name = "correction at its limit"
-    rule = "the tension loop has changed a length by as much as it may, 5 mm unless set otherwise"
+    rule = "the tension loop has changed a length by the allowed maximum, 5 mm by default"
     reaction = Reaction.STOPPING
     within = "1 cycle"
     homing = True

@@ -44,7 +44,9 @@ class GroupStale(_Old):
     """Fault: a group is late; the tension loop is off until the group answers again."""
 
     name = "group stale"
-    rule = f"newest sample of a group {STALE} cycles old: it is silent, or its blocks are repeated, late or invalid"
+    rule = (
+        f"the newest sample of a group is {STALE} cycles old: it is silent, or its blocks are repeated, late or invalid"
+    )
     reaction = Reaction.DEGRADED
     within = "30 ms"
     quiet = 1.0
@@ -56,7 +58,7 @@ class GroupSilent(_Old):
     """Silent group."""
 
     name = "group silent"
-    rule = f"newest sample of a group {SILENT} cycles old"
+    rule = f"the newest sample of a group is {SILENT} cycles old"
     reaction = Reaction.STOPPING
     within = "100 ms"
     cycles = SILENT
@@ -67,7 +69,7 @@ class BlockDiscarded(Fault):
     """Fault: a group sends invalid blocks; without valid ones, it becomes stale."""
 
     name = "block discarded"
-    rule = "torn or foreign, by counters at both ends, magic, version or size; repeated, or older than one before"
+    rule = "torn or foreign (by its counters, magic, version or size), repeated, or older than an earlier block"
     reaction = Reaction.EVENT
     within = "1 cycle"
 
@@ -94,7 +96,7 @@ class OwnerLost(Fault):
     """Grant lost."""
 
     name = "owner lost"
-    rule = "grant of a group differs, once the connection had all of them"
+    rule = "the grant of a group changes after the connection had all grants"
     reaction = Reaction.STOPPING
     within = "1 cycle"
 

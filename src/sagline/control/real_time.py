@@ -29,7 +29,7 @@ from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 
 BIN: Final = 1e-4  # width of a bin [s]
-BINS: Final = 1000  # number of bins, besides one for all longer durations
+BINS: Final = 1000  # number of bins, in addition to one for all longer durations
 
 
 class Histogram:

@@ -127,7 +127,7 @@ def text(value: Any, item: str) -> str:
 def label(value: Any, item: str) -> str:
     """Check a name: one line of text that a terminal, a figure and a file name can contain."""
     if isinstance(value, str) and not value.strip():
-        raise InvalidValueError(item, "empty" if not value else "blank", "a text to call it by", f"Give a {item}.")
+        raise InvalidValueError(item, "empty" if not value else "blank", "a non-empty text", f"Give a {item}.")
     if not isinstance(value, str) or len(value) > LONGEST_TITLE or value != printable(value):
         allowed = f"one line of printable text, at most {LONGEST_TITLE} letters"
         raise InvalidValueError(item, brief(value), allowed, f"Choose another {item}.")
@@ -166,7 +166,9 @@ def callback(value: Any, item: str) -> Any:
     """Check a callback: a function, or None."""
     if value is None or (callable(value) and not isinstance(value, type)):
         return value
-    raise InvalidValueError(item, brief(value), "a function of two numbers: done, of how many", "Give one, or None.")
+    raise InvalidValueError(
+        item, brief(value), "a function of two numbers: completed steps and all steps", "Give one, or None."
+    )
 
 
 def file_path(file: Any, item: str = "file", *, folder: bool = False) -> Path:
@@ -178,7 +180,7 @@ def file_path(file: Any, item: str = "file", *, folder: bool = False) -> Path:
     if not isinstance(given, str):
         raise InvalidValueError(item, brief(file), "the path of a file, a text or a Path", f"Give {item} as a text.")
     if not given.strip():
-        raise FileError(".", f"is the meaning of an empty {item}", "Give the name of a file.")
+        raise FileError(".", f"is the folder that an empty {item} means", "Give the name of a file.")
     path = Path(given)
     if not path.name and not folder:
         raise FileError(path, "is a folder", "Give the name of a file in it.")
@@ -187,7 +189,7 @@ def file_path(file: Any, item: str = "file", *, folder: bool = False) -> Path:
     except UnicodeEncodeError:
         longest = -1
     if "\0" in given or not 0 <= longest <= LONGEST_NAME:
-        raise FileError(path, f"is no name that a file can have, of up to {LONGEST_NAME} bytes", "Correct it.")
+        raise FileError(path, f"is not a valid file name of up to {LONGEST_NAME} bytes", "Correct it.")
     return path
 
 

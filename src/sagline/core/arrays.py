@@ -147,13 +147,13 @@ def _refuse_masked_or_with_unit(value: Any, item: str, unit: str) -> None:
         return
     if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
         where = ", ".join(str(int(i)) for i in np.argwhere(np.ma.getmaskarray(value))[0])
-        step = "Fill or leave out what is masked."
+        step = "Fill or remove the masked values."
         raise InvalidValueError(f"{item}[{where}]" if where else item, "masked", "a number", step)
     for name in ("units", "unit"):
         own = getattr(value, name, None)
         if own is not None and not callable(own) and str(own) != unit:
             step = f"Convert it, and give the bare number{' in ' + unit if unit else ''}."
-            raise InvalidValueError(item, f"in {own}, a unit of its own", f"numbers in {unit or '1'}", step)
+            raise InvalidValueError(item, f"in {own}, another unit", f"numbers in {unit or '1'}", step)
 
 
 def _from_other_kind(given: NDArray[Any], item: str) -> Array:
@@ -164,7 +164,9 @@ def _from_other_kind(given: NDArray[Any], item: str) -> Array:
     shown = next((entry for entry in given.flat if not _is_real(entry)), given) if given.dtype.kind == "O" else given
     kind = _KINDS.get(given.dtype.kind, "")
     value = f"{kind}: {_listed(shown)}" if kind else _listed(shown)
-    raise InvalidValueError(item, value, "numbers, real ones" if kind else "numbers", f"Give {item} as plain numbers.")
+    raise InvalidValueError(
+        item, value, "numbers, not complex" if kind else "numbers", f"Give {item} as plain numbers."
+    )
 
 
 def _listed(value: object) -> str:
@@ -212,7 +214,7 @@ def _check_range(
         return
     index = tuple(int(i) for i in np.argwhere(wrong | beyond)[0])
     where = item if not index else f"{item}[{', '.join(map(str, index))}]"
-    size = f"{SMALLEST:g} to {LARGEST:g} {unit}" if above == 0.0 else f"up to {LARGEST:g} {unit} either way"
+    size = f"{SMALLEST:g} to {LARGEST:g} {unit}" if above == 0.0 else f"up to {LARGEST:g} {unit}, of either sign"
     bounds = [
         f">= {low:g} {unit}".rstrip() if low > -np.inf else "",
         f"> {above:g} {unit}".rstrip() if above > -np.inf else "",

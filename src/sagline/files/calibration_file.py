@@ -46,32 +46,32 @@ P: Final = ("parameter",)
 N: Final = ("pose",)
 PARAMETERS: Final = (
     Quantity("parameter_name", P, "", "kind of each number", "names", values=str),
-    Quantity("parameter_label", P, "", "what each number is called", "labels", values=str),
+    Quantity("parameter_label", P, "", "name of each number", "labels", values=str),
     Quantity("parameter_unit", P, "", "unit of each number, 1 for none", "units", values=str),
-    Quantity("parameter_cable", P, "", "cable of each number, -1 for one of all", "cables", values=int),
+    Quantity("parameter_cable", P, "", "cable of each number, -1 for a number of all cables", "cables", values=int),
     Quantity("parameter_place", ("kind_row", "cable"), "", "number of each row of kinds, -1", "where", values=int),
     Quantity("prior", P, "", "prior values, in the units of the numbers"),
     Quantity("prior_deviation", P, "", "its standard deviation", infinite=True),
-    Quantity("prior_stated", P, "", "whether tolerances or the caller said so", "stated", values=bool),
-    Quantity("logarithmic", P, "", "whether the logarithm was looked for", values=bool),
+    Quantity("prior_stated", P, "", "source of the prior: tolerances or caller", "stated", values=bool),
+    Quantity("logarithmic", P, "", "whether the logarithm was estimated", values=bool),
 )
 FOUND: Final = (
-    Quantity("length_offset", ("cable",), "m", "to be added to lengths that the machine believes"),
-    Quantity("status", (), "", "how the calibration ended", codes=CalibrationStatus),
-    Quantity("value", P, "", "what was found, in the units of the numbers", "values"),
+    Quantity("length_offset", ("cable",), "m", "to be added to the lengths of the machine"),
+    Quantity("status", (), "", "status of the calibration", codes=CalibrationStatus),
+    Quantity("value", P, "", "estimated values, in the units of the numbers", "values"),
     Quantity("covariance", (*P, "other_parameter"), "", "covariance of the values", known=SOMEWHERE, infinite=True),
     Quantity("chi_squared", (), "1", "sum of squares of residuals in deviations", low=0.0),
     Quantity("degrees_of_freedom", (), "", "what chi_squared is compared with", values=int),
     Quantity("iterations", (), "", "iterations of the least squares", values=int),
     Quantity("row", N, "", "rows of the log that were used", "rows", values=int),
-    Quantity("position", (*N, "axis"), "m", "where the platform stood", "poses.position"),
+    Quantity("position", (*N, "axis"), "m", "position of the platform", "poses.position"),
     Quantity("quaternion", (*N, "quaternion_part"), "1", "rotation from platform to world", "poses.quaternion"),
     Quantity("unstrained_length", (*N, "cable"), "m", "true lengths of the cables", low=0.0),
     Quantity(
         "residual",
         (*N, "reading"),
         "",
-        "readings less predictions: lengths [m], load cells [N], position [m], rotation [rad]",
+        "readings minus predictions: lengths [m], load cells [N], position [m], rotation [rad]",
         "residuals",
         SOMEWHERE,
     ),
@@ -85,7 +85,7 @@ SENSORS: Final = {  # name in the file -> attribute, unit; one number, or one pe
     "rotation_deviation": ("axis", "rad"),
 }
 PLACED: Final = (
-    Quantity("measuring_position", ("axis",), "m", "where the measuring system stands", "frame.position"),
+    Quantity("measuring_position", ("axis",), "m", "position of the measuring system", "frame.position"),
     Quantity("measuring_quaternion", ("quaternion_part",), "1", "its rotation to the world", "frame.quaternion"),
     Quantity("target", ("axis",), "m", "the measured point of the platform"),
 )
@@ -96,19 +96,19 @@ LEFT_OUT: Final = (
 OUTLIERS: Final = (
     Quantity("outlier_row", ("outlier",), "", "row of the log", "row", values=int),
     Quantity("outlier_cable", ("outlier",), "", "its cable, -1 for the whole pose", "cable", SOMEWHERE, values=int),
-    Quantity("outlier_quantity", ("outlier",), "", "what does not fit", "quantity", values=str),
-    Quantity("outlier_size", ("outlier",), "", "by how much [m, N or rad]", "size"),
+    Quantity("outlier_quantity", ("outlier",), "", "quantity that does not fit", "quantity", values=str),
+    Quantity("outlier_size", ("outlier",), "", "size of the deviation [m, N or rad]", "size"),
     Quantity("outlier_deviations", ("outlier",), "1", "the same in standard deviations", "deviations"),
 )
 CROSS_VALIDATION: Final = (
-    Quantity("folds", (), "", "parts of the poses that were predicted from the others", values=int),
+    Quantity("folds", (), "", "folds of the cross-validation", values=int),
     *(
         Quantity(f"left_out_{name}", (), unit, f"root mean square {what}", name, SOMEWHERE, 0.0)
         for name, unit, what in (
             ("tension", "N", "of load cells at poses left out"),
             ("position", "m", "of positions at poses left out"),
-            ("tension_before", "N", "of load cells with the robot as it was"),
-            ("position_before", "m", "of positions with the robot as it was"),
+            ("tension_before", "N", "of load cells with the original robot"),
+            ("position_before", "m", "of positions with the original robot"),
         )
     ),
 )
@@ -118,8 +118,8 @@ DIRECTIONS: Final = {  # unobservable or weakly observable directions in paramet
     group: (
         Quantity(f"{group}_name", (group,), "", "what each is", "name", values=str),
         Quantity(f"{group}_vector", (group, *P), "", "combination of the numbers, in their units", "vector"),
-        Quantity(f"{group}_known", (group,), "1", "share of its prior deviation that is left", "known", low=0.0),
-        Quantity(f"{group}_step", (group,), "", "what to do about it", "step", values=str),
+        Quantity(f"{group}_known", (group,), "1", "remaining share of the prior deviation", "known", low=0.0),
+        Quantity(f"{group}_step", (group,), "", "next step", "step", values=str),
     )
     for group in ("gauge", "cannot_tell_apart")
 }
@@ -258,7 +258,7 @@ FORMAT: Final = Format(
     name="calibration",
     made="calibration of sagline",
     give="Give the .nc file that sagline calibrate wrote, or a calibration's save.",
-    again="Save the calibration again, or take the file from where it came.",
+    again="Save the calibration again, or get the original file.",
     key="sagline_calibration_format",
     version=1,
     pack=_pack,

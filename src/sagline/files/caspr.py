@@ -107,7 +107,7 @@ def _files(source: Path) -> tuple[Path, Path]:
     beside = sorted((*folder.glob("*.xml"), *folder.glob("cables/*.xml")))
     if not source.is_dir() and _kind(read_xml(source)) is None:
         raise FileError(
-            source, "holds neither <link_rigid> nor <cables>", "Check that this is the CASPR file you mean."
+            source, "contains neither <link_rigid> nor <cables>", "Check that this is the CASPR file you mean."
         )
     found: dict[str, list[Path]] = {"bodies": [], "cables": []}
     for file in beside if source.is_dir() else [source, *beside]:
@@ -200,7 +200,7 @@ def _columns(chosen: Element, center: Array, lost: list[str]) -> dict[str, Any]:
             lost.append(f"{item}: no cable on a winch, left out; the balance of forces changes with it.")
             continue
         if element.tag not in ("cable_ideal", "cable_linear_spring"):
-            lost.append(f"{item}: its law of stiffness; only its ends and its limits are taken.")
+            lost.append(f"{item}: its law of stiffness; only its ends and its limits are converted.")
         rows.append(_row(element, item, center, lost))
     return {name: [row[k] for row in rows] for k, name in enumerate(_COLUMNS)}
 

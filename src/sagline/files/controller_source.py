@@ -143,7 +143,9 @@ def checked_name(file: str | os.PathLike[str], ending: str, what: str, usual: st
     """Path of a source file; FileError if its suffix is wrong."""
     path = file_path(file)
     if path.suffix != ending:
-        raise FileError(path, f"is no name for {what}", f"Let it end in {ending}: {path.stem or usual}{ending}.")
+        raise FileError(
+            path, f"is not a valid name for {what}", f"Let it end in {ending}: {path.stem or usual}{ending}."
+        )
     return path
 
 

@@ -61,7 +61,7 @@ def load_execution(file: os.PathLike[str] | str, plan: int | None = None) -> Exe
     """
     log = read_log(file)
     if not log.complete:
-        text = f"{log.path} was cut off: what was recorded in its last second is not there."
+        text = f"{log.path} was cut off: the data of its last second are missing."
         warnings.warn(text, SaglineWarning, stacklevel=2)
     return execution_of_log(log, plan)
 
@@ -79,7 +79,7 @@ def execution_of_log(log: RecordedLog, plan: int | None = None) -> Execution:
         step = "Give it as: sagline view ROBOT RUN.mcap --truth FILE."
         raise FileError(log.path, "is the log of a twin with true poses, not an execution", step)
     if log.robot is None or not blocks:
-        raise FileError(log.path, "has no cycle", "Nothing was recorded in it, or it was cut off at once.")
+        raise FileError(log.path, "has no cycle", "It contains no data, or it was cut off at its start.")
     try:
         return _execution(log, log.robot, blocks, number)
     except (InvalidValueError, ValueError, KeyError) as error:
@@ -95,7 +95,7 @@ def _execution(log: RecordedLog, robot: Robot, blocks: list[dict[str, NDArray[An
     whole = len(blocks) == len(log.blocks)
     ending = log.endings.get(NONE if number is None else number)
     if ending is None:
-        ending = Ending(ExecutionStatus.UNKNOWN.name, "the log does not say how it ended")
+        ending = Ending(ExecutionStatus.UNKNOWN.name, "the log does not contain the end of the execution")
     return Execution(
         robot=robot,
         plan=None if number is None else plan_of_log(log, number),
@@ -164,7 +164,7 @@ def save(execution: Execution, file: os.PathLike[str] | str) -> None:
     path = file_path(file)
     ways = {".mcap": save_execution, ".nc": save_dataset}
     if path.suffix.lower() not in ways:
-        raise FileError(path, "is no name for an execution", "Let it end in .mcap, or in .nc.")
+        raise FileError(path, "is not a valid name for an execution", "Let it end in .mcap, or in .nc.")
     ways[path.suffix.lower()](execution, path)
 
 

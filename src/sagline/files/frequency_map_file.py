@@ -21,8 +21,8 @@ QUANTITIES: Final = (
     Quantity("frequency", (), "Hz", "lowest frequency with cable mass", known=SOMEWHERE),
     Quantity("massless_frequency", (), "Hz", "lowest frequency, massless cables"),
     Quantity("platform_share", (), "1", "platform's share of the lowest mode with cable mass"),
-    Quantity("peak", (), "m/N", "strongest answer to a force, with cable mass"),
-    Quantity("peak_frequency", (), "Hz", "where that is"),
+    Quantity("peak", (), "m/N", "largest response to a force, with cable mass"),
+    Quantity("peak_frequency", (), "Hz", "frequency of the largest response"),
 )
 
 
@@ -43,7 +43,7 @@ FORMAT: Final = Format(
     name="map of frequencies",
     made="map of sagline",
     give="Give the .nc file that a map's save wrote.",
-    again="Make the map again, or take the file from where it came.",
+    again="Make the map again, or get the original file.",
     key="sagline_frequency_map_format",
     version=1,
     pack=_pack,

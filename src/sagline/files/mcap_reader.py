@@ -27,7 +27,7 @@ from sagline.files.robot_file import parse_robot
 from sagline.robot.robot import Robot
 
 MAGIC: Final = bytes((137, 77, 67, 65, 80, 48, 13, 10))
-AGAIN: Final = "Take the file from where it came."
+AGAIN: Final = "Get the original file."
 _HEAD: Final = 9  # bytes of a record before its content: type and length
 _CHUNK, _ATTACHMENT, _DATA_END = 0x06, 0x09, 0x0F
 _NEEDED: Final = {quantity.name for quantity in EVERY} | {"plan", "zero", "epoch"}  # columns required in every chunk
@@ -120,7 +120,7 @@ class LogReader:
         if data[: len(MAGIC)] == MAGIC:
             return
         if MAGIC.startswith(data):  # the file is empty, or has only the first few bytes
-            raise FileError(self.log.path, "is empty", "Nothing was recorded in it, or it was cut off at once.")
+            raise FileError(self.log.path, "is empty", "It contains no data, or it was cut off at its start.")
         step = "Give the .mcap file that was recorded, or that an execution's save wrote."
         raise FileError(self.log.path, "is not a log in MCAP", step)
 
@@ -175,7 +175,7 @@ class LogReader:
         if chunk.compression == "zstd":
             sizes.append(get_frame_parameters(chunk.data).content_size)
         if max(sizes) > _LARGEST:
-            raise ValueError("a chunk that says to be larger than any")
+            raise ValueError("a chunk with an impossible size")
 
     def _attached(self, name: str, epoch: int, data: bytes) -> None:
         if name == HEAD:

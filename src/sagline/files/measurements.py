@@ -70,7 +70,7 @@ def _samples(table: CsvTable, names: list[str]) -> tuple[Array | None, Array]:
     time = table.columns.get("time")
     if time is not None:
         late = np.diff(time, prepend=-np.inf) <= 0.0
-        table.refuse(late, "time", time, "s", "a time after that of the row before")
+        table.refuse(late, "time", time, "s", "a time later than in the row before")
     return time, locked(np.stack([table.columns[name] for name in names], axis=-1))
 
 

@@ -59,7 +59,7 @@ def load_mesh(file: str | os.PathLike[str], unit: str = "m", name: str | None = 
     vertices, faces = _triangles(path, data)
     if len(faces) > MOST:
         raise FileError(
-            path, f"has {len(faces):,} triangles; allowed: {MOST:,}", "Simplify it in the program it is from."
+            path, f"has {len(faces):,} triangles; allowed: {MOST:,}", "Simplify it in the program that made it."
         )
     try:
         mesh = Mesh(vertices * factor, faces, called)
@@ -68,7 +68,7 @@ def load_mesh(file: str | os.PathLike[str], unit: str = "m", name: str | None = 
     if len(faces) <= CHECKED and (crossing := first_crossing(mesh)) is not None:
         where = ", ".join(f"{value:.4g}" for value in crossing)
         reason = f"crosses itself at ({where}) m, {extent_text(mesh.vertices)}; allowed: a simple surface"
-        raise FileError(path, reason, "Unite its parts in the program it is from, or load them one by one.")
+        raise FileError(path, reason, "Unite its parts in the program that made it, or load them one by one.")
     return mesh
 
 
@@ -102,7 +102,7 @@ def _triangles(path: Path, data: bytes) -> tuple[Array, Indices]:
             path, f"cannot be read as {kind.upper()} ({reason})", "Check that it is the file you mean."
         ) from None
     if not len(faces) or not np.isfinite(vertices).all():
-        reason = "holds no triangles" if not len(faces) else "holds coordinates that are no numbers"
+        reason = "contains no triangles" if not len(faces) else "contains coordinates that are not numbers"
         raise FileError(path, reason, "Check that it is the file you mean.")
     distinct = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
     return (vertices @ _UPRIGHT.T if kind == "glb" else vertices), faces[distinct]

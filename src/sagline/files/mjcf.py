@@ -144,7 +144,7 @@ def dump_mjcf(robot: Robot, pose: Pose, unstrained_length: ArrayLike | None = No
     """
     instance(robot, Robot, "robot")
     if instance(pose, Pose, "pose").shape:
-        raise InvalidValueError("pose", f"a batch of {len(pose)}", "a single pose", "Write one model a pose.")
+        raise InvalidValueError("pose", f"a batch of {len(pose)}", "a single pose", "Write one model per pose.")
     lengths = _lengths_at_rest(robot, pose) if unstrained_length is None else _check_lengths(robot, unstrained_length)
     stiffness = robot.cables.axial_stiffness / lengths
     lead, over_pulley = _lead_of(robot, pose), pulleys_of(robot).radius > 0.0
@@ -219,7 +219,10 @@ def _check_lengths(robot: Robot, lengths: ArrayLike) -> Array:
     array = checked(lengths, "unstrained_length", "m", low=_SHORTEST)
     if array.shape != (robot.cable_count,):
         raise InvalidValueError(
-            "unstrained_length", f"of shape {array.shape}", f"shape ({robot.cable_count},)", "Give one length a cable."
+            "unstrained_length",
+            f"of shape {array.shape}",
+            f"shape ({robot.cable_count},)",
+            "Give one length per cable.",
         )
     dead = dead_cable(robot)
     if ((array <= dead) & (dead > 0.0)).any():

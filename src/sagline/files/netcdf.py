@@ -198,7 +198,7 @@ def _load(path: Path, content: Content) -> Dataset:
             dict(file.attrs)
         with open_dataset(path.absolute(), engine="h5netcdf", decode_times=False, mask_and_scale=False) as data:
             if data.nbytes > INFLATION * size:
-                raise ValueError(f"{size} bytes that say to hold {data.nbytes:.2g}")
+                raise ValueError(f"{size} bytes for {data.nbytes:.2g} bytes of data")
             return data.load()
     except Exception as error:  # h5py, h5netcdf and xarray have no common error class for a damaged file
         raise FileError(path, *_cause(path, content)) from error

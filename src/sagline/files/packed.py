@@ -79,7 +79,7 @@ def unpack(data: bytes) -> dict[str, NDArray[Any]]:
         size = get_frame_parameters(data).content_size
     except ZstdError as error:
         raise ValueError(f"no packed columns ({error})") from None
-    check_memory("what is packed", 3.0 * size, "Take the file from where it came.")
+    check_memory("what is packed", 3.0 * size, "Get the original file.")
     try:
         plain = ZstdDecompressor().decompress(data, allow_extra_data=False)
         start = 4 + int.from_bytes(plain[:4], "little")
@@ -95,7 +95,7 @@ def unpack(data: bytes) -> dict[str, NDArray[Any]]:
         found[column.name] = _values(column, plain[start:end])
         start = end
     if start != len(plain):
-        raise ValueError("more is packed than its head says")
+        raise ValueError("the data are longer than the header states")
     return found
 
 
@@ -105,7 +105,7 @@ def _count(column: _Column) -> int:
     if not (
         column.type in TYPES and sizes and column.order in range(MOST_ORDER + 1) and column.decimals in range(-1, 16)
     ):
-        raise ValueError(f"a column has a head that is none: {column}")
+        raise ValueError(f"a column has an invalid header: {column}")
     return prod(column.shape)
 
 

@@ -42,7 +42,7 @@ def _path_from_table(path: FilePath, text: str) -> Path:
     _check_columns(table)
     time, *place = (table.columns[name] for name in PLACE)
     late = np.diff(time, prepend=-np.inf) < _LEAST_STEP
-    table.refuse(late, "time", time, "s", "a time after that of the row before")
+    table.refuse(late, "time", time, "s", "a time later than in the row before")
     if time.size < 2:
         step = "Add the samples of the path."
         raise FileError.of(path, InvalidValueError("number of samples", time.size, "at least two", step))

@@ -53,8 +53,8 @@ QUANTITIES = (
     ),
     Quantity("span", CABLE, "m", "horizontal distance from frame end to platform end", "state.cables.span", low=0.0),
     Quantity("rise", CABLE, "m", "height of the platform end above the frame end", "state.cables.rise"),
-    Quantity("cable_status", CABLE, "", "how each cable's calculation ended", "state.cables.status", codes=CableStatus),
-    Quantity("pose_status", (), "", "how each pose's calculation ended", "status", codes=PoseStatus),
+    Quantity("cable_status", CABLE, "", "status of each cable's calculation", "state.cables.status", codes=CableStatus),
+    Quantity("pose_status", (), "", "status of each pose's calculation", "status", codes=PoseStatus),
     Quantity(
         "shortfall",
         (),
@@ -93,7 +93,7 @@ MACHINE = (
         "free_chord_tension",
         CABLE,
         "N",
-        "tension along the chord of the free cable, from where it leaves its pulley",
+        "tension along the chord of the free cable, from its exit point",
         "state.cables.chord_tension",
         SOLVED,
         0.0,
@@ -131,7 +131,7 @@ PROOF = (
         "farkas",
         ("wrench_part",),
         "1, 1/m",
-        "vector y that proves a pose infeasible: along it the cables give less than is needed, at any tensions",
+        "vector y that proves a pose infeasible: along y the cables provide too little force, at any tensions",
         known=SOMEWHERE,
     ),
     Quantity("needed", ("wrench_part",), "N, N m", "wrench J tau that the chord tensions must supply", known=SOMEWHERE),
@@ -139,7 +139,7 @@ PROOF = (
         "bracket",
         ("bracket_part",),
         "N",
-        "what is proved and what suffices of the smallest change of the force that would make the pose feasible",
+        "proved lower bound and sufficient value of the smallest change of the force that would make the pose feasible",
         known=SOMEWHERE,
         low=0.0,
         infinite=True,
@@ -243,7 +243,7 @@ def load_plan(file: os.PathLike[str] | str) -> Plan:
 
 def _warn_of_damage(path: FilePath) -> None:
     """Warn that damage of a file without a digest may be undetected; the warning names the caller of `load_plan`."""
-    text = f"{path} is from before plans carried a digest: damage to it need not show. Save it again to have one."
+    text = f"{path} has no digest, so damage may remain undetected. Save it again to add a digest."
     warnings.warn(text, SaglineWarning, stacklevel=4)
 
 
@@ -255,7 +255,7 @@ def plan_dataset(plan: Plan) -> Dataset:
     variables = variables_of_result(plan, (*QUANTITIES, *machine, WINDING, *PROOF, *MOTION, JERK), rows)
     coordinates = {"cable": index_coordinate("cable", cables), **variables_of_result(plan, (TIME,), rows)}
     if plan.path is not None and plan.path.rests is not None:
-        variables[RESTS] = (("rest",), plan.path.rests, {"units": "s", "long_name": "when the platform stands"})
+        variables[RESTS] = (("rest",), plan.path.rests, {"units": "s", "long_name": "times of rest of the platform"})
     data = labeled_dataset(variables, _attributes(plan), coordinates)
     _check_plan(data, cables)
     return data
@@ -308,7 +308,7 @@ FORMAT: Final = Format(
     name="plan",
     made="run of sagline track",
     give="Give the .nc file that sagline track wrote.",
-    again="Run sagline track again, or take the file from where it came.",
+    again="Run sagline track again, or get the original file.",
     key="sagline_format",
     version=2,  # version 2 added the digest
     pack=plan_dataset,

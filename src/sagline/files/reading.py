@@ -70,7 +70,7 @@ def read_text(path: Path, limit: float) -> str:
         step = "Check that this is the file you mean, or save it as UTF-8."
         raise error_at_line(path, f"is not UTF-8 text (line {line})", step) from None
     if "\0" in text:
-        raise FileError(path, "is not text, it holds zero bytes", "Check that this is the file you mean.")
+        raise FileError(path, "is not text: it contains zero bytes", "Check that this is the file you mean.")
     return text
 
 

@@ -47,8 +47,8 @@ SAMPLES: Final = (
     Quantity("potential_energy", (), "J", "energy of weight and strain", "energy.potential"),
     Quantity("energy_supplied", (), "J", "work done on the robot since the start", "energy.supplied"),
     Quantity("energy_lost", (), "J", "work of damping and friction since the start", "energy.lost"),
-    Quantity("energy_removed", (), "J", "energy that left with broken cables and dropped loads", "energy.removed"),
-    Quantity("energy_error", (), "J", "what the integrator has invented since the start", "energy.error"),
+    Quantity("energy_removed", (), "J", "energy of broken cables and dropped loads", "energy.removed"),
+    Quantity("energy_error", (), "J", "error of the integrator since the start", "energy.error"),
 )
 # one value per cable, if known
 LARGEST: Final = Quantity("largest_tension", ("cable",), "N", "largest tension at the frame end at any step", low=0.0)
@@ -146,7 +146,7 @@ def _check_events(data: Dataset, time: Array, cables: int) -> Array:
             allowed = f"{low} to {high} for {kind!r}" if low < high else f"{low} for {kind!r}"
             raise InvalidValueError(f"event_cable[{k}]", cable, allowed, STEP)
         if cable != NONE and broken[cable] < np.inf:
-            allowed = f"a cable that is there: {cable} broke at {broken[cable]:g} s"
+            allowed = f"an unbroken cable: {cable} broke at {broken[cable]:g} s"
             raise InvalidValueError(f"event_cable[{k}]", f"{cable} at {at:g} s", allowed, STEP)
         if kind == "break":
             broken[cable] = at
@@ -171,7 +171,7 @@ def _check_balance(data: Dataset) -> None:
     total = kinetic + potential - supplied + lost + removed
     size = max(float(np.abs(part).max()) for part in (kinetic, potential, supplied, lost, removed))
     for k in np.flatnonzero(~(np.abs(total - total[0] - error) <= ROUNDING * size))[:1].tolist():
-        allowed = f"{total[k] - total[0]:g} J, what the other energies leave"
+        allowed = f"{total[k] - total[0]:g} J, from the other energies"
         raise InvalidValueError(f"energy_error[{k}]", f"{error[k]:g} J", allowed, STEP)
 
 
@@ -256,7 +256,7 @@ FORMAT: Final = Format(
     name="simulation",
     made="simulation of sagline",
     give="Give the .nc file that a simulation's save wrote.",
-    again="Save the simulation again, or take the file from where it came.",
+    again="Save the simulation again, or get the original file.",
     key="sagline_simulation_format",
     version=1,
     pack=_pack,

@@ -178,10 +178,10 @@ def _winches(root: Element, chains: list[Element]) -> tuple[Winch | None, tuple[
     found = root.findall("winch")
     drive = _drive(found[0]) if len(found) == 1 else {}
     if len(found) == 1:
-        taken = "; its largest force, drum and motor's inertia are taken, where they are given"
-        lost.append(f"The winch's gear, speeds, power and sensors{taken}.")
+        taken = "; its largest force, its drum and the inertia of its motor are used if they are given"
+        lost.append(f"The gear, speeds, power and sensors of the winch{taken}.")
     elif found:
-        lost.append("The winches, for the file does not say which cable has which; the first one's force is taken.")
+        lost.append("The winches, because the file does not assign them to cables; the force of the first one is used.")
     if not any(radii) and not drive:
         return None, tuple(lost)
     return Winch(radii, swivel_axis=axes, **drive), tuple(lost)
@@ -216,7 +216,7 @@ def _pattern(robot: Element, assumed: dict[str, str]) -> MotionPattern:
         step = "sagline has no other; correct it in the file."
         raise InvalidValueError("motionpattern", repr(given), ", ".join(MOTION_PATTERNS), step)
     if given in PLANAR:
-        assumed["plane_normal"] = "z: the file names no plane; taken as that of x and y"
+        assumed["plane_normal"] = "z: the file names no plane; the x-y plane is assumed"
     return cast(MotionPattern, given)
 
 

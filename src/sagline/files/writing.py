@@ -162,7 +162,7 @@ def write_text(file: os.PathLike[str] | str, text: str) -> None:
         content = text.encode()
     except UnicodeEncodeError as error:
         found = f"U+{ord(text[error.start]):04X} in {text[max(0, error.start - 20) : error.start]!r}…"
-        step = "Correct the name or note it comes from."
+        step = "Correct the name or note that contains it."
         raise FileError(
             Path(file), f"cannot be written: the text has an incomplete character ({found})", step
         ) from None

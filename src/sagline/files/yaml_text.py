@@ -122,12 +122,12 @@ def _cause(error: yaml.MarkedYAMLError, text: str) -> tuple[str, str]:
     if isinstance(error, yaml.scanner.ScannerError | yaml.parser.ParserError):
         line = text.splitlines()[mark.line] if mark is not None and mark.line < len(text.splitlines()) else ""
         if "\t" in line[: len(line) - len(line.lstrip())] or text[index : index + 1] == "\t":
-            return f"is not YAML ({place}a tab stands where blanks must)", "Indent by blanks, not by tabs."
+            return f"is not YAML ({place}a tab is used instead of blanks)", "Indent by blanks, not by tabs."
         if not text[index:].strip():
             return f"is not complete YAML ({place}{problem})", "Correct its end; it may have been cut off."
         return f"is not YAML ({place}{problem})", "Correct this line, or the indentation and the quotes before it."
     if tag := re.search(r"constructor for the tag '(?:tag:yaml\.org,2002:)?(.*)'", problem):
-        return f"{place}the tag {tag[1]} stands before a value; tags are not read", "Write the value without it."
+        return f"{place}the tag {tag[1]} precedes a value; tags are not allowed", "Write the value without it."
     if "unhashable" in problem:
         return f"{place}a key is a list or a mapping; allowed: a word", "Give it a word as its key."
     if "another document" in problem:
@@ -139,7 +139,7 @@ def _cause(error: yaml.MarkedYAMLError, text: str) -> tuple[str, str]:
 def _reason(error: Exception, text: str) -> str:
     if isinstance(error, yaml.reader.ReaderError):
         line = text.count("\n", 0, error.position) + 1
-        return f"line {line} holds the character {chr(int(error.character))!r}"
+        return f"line {line} contains the character {chr(int(error.character))!r}"
     return str(error).splitlines()[0]
 
 

@@ -315,6 +315,6 @@ def _check_size(mesh: Mesh, robot: Robot) -> None:
 def _radius(given: ArrayLike, cables: int) -> Array:
     radius = checked(given, "cable_radius", "m", low=0.0)
     if radius.shape not in ((), (cables,)):
-        step = "Give one value a cable, or one for all."
+        step = "Give one value per cable, or one value for all cables."
         raise InvalidValueError("cable_radius", f"of shape {radius.shape}", f"shape () or ({cables},)", step)
     return radius

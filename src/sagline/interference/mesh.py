@@ -134,7 +134,7 @@ def _faces(given: Any, corners: int) -> Indices:
     values = numbers(given, "faces", "")
     if values.ndim != 2 or values.shape[1] != 3 or not 4 <= len(values) <= MOST:
         allowed = f"shape (F, 3) with 4 to {MOST:,} triangles"
-        raise InvalidValueError("faces", f"of shape {values.shape}", allowed, "Give three corners a triangle.")
+        raise InvalidValueError("faces", f"of shape {values.shape}", allowed, "Give three corners per triangle.")
     wrong = ~((values >= 0) & (values < corners) & (values == np.floor(values)))
     if wrong.any():
         i, k = (int(n) for n in np.argwhere(wrong)[0])

@@ -102,7 +102,7 @@ Obstacle = Box | Capsule | Sphere | Mesh
 
 PLATFORM: Final = "platform"
 _SAME = 1e-9  # anchors closer than this, relative to the robot's extent, count as one anchor
-_NO_LENGTH = "cables and platform: give from_anchor, how much of a cable next to its anchor may be near"
+_NO_LENGTH = "cables and platform: give from_anchor, the length of cable at its anchor to exclude"
 
 
 class Pairs(NamedTuple):

@@ -59,7 +59,7 @@ def sources_of(module: str, sources: Path) -> frozenset[Path]:
 
 @cache
 def _imported(source: str) -> frozenset[str]:
-    """Names of what a file imports of the kernels: modules, and what is in them, which is no file."""
+    """Names of what a file imports of the kernels: modules, and what is in them, which is not a file."""
     names = set()
     for match in IMPORT.finditer(source):
         package = match[1]

@@ -315,5 +315,7 @@ def start_rows(start: Pose, lengths: Array) -> Array:
     """
     if start.shape and start.shape != lengths.shape[:-1]:
         allowed = f"one pose, or {len(lengths)}" if lengths.ndim == 2 else "one pose, for one sample"
-        raise InvalidValueError("start", f"{len(start)} poses", allowed, "Give one start a sample, or a single one.")
+        raise InvalidValueError(
+            "start", f"{len(start)} poses", allowed, "Give one start pose per sample, or a single one."
+        )
     return pose_rows(start)

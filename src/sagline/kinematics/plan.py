@@ -168,8 +168,8 @@ class Plan(Result, Saved):
         if not (away > ROUNDING).any():
             return ()
         return (
-            f"the cables leave the plane of the robot by up to {np.nanmax(away):.6g} m, and only what guides the "
-            "platform can hold it against them there; correct the poses, or give the robot another motion_pattern",
+            f"the cables leave the plane of the robot by up to {np.nanmax(away):.6g} m, and only a guide of the "
+            "platform can balance their forces there; correct the poses, or give the robot another motion_pattern",
         )
 
     def _at_the_border(self) -> tuple[str, ...]:
@@ -177,8 +177,8 @@ class Plan(Result, Saved):
         if not count:
             return ()
         return (
-            f"{count} of {self.status.size} poses are at the border of what the limits allow: their tensions "
-            f"balance the platform, but {type(self.tension).__name__} had no say in them; widen the limits there",
+            f"{count} of {self.status.size} poses are at the border of feasibility: their tensions "
+            f"balance the platform, but {type(self.tension).__name__} did not select them; widen the limits there",
         )
 
     def _below_validity(self) -> tuple[str, ...]:

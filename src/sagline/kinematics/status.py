@@ -62,7 +62,7 @@ class ForwardStatus(Status):
     )
     OVERSTRETCHED = (
         codes.FORWARD_OVERSTRETCHED,
-        "a cable is stretched by more than 10 %: the lengths are too short to meet, real cables would break; "
+        "a cable is stretched by more than 10 %: the lengths are too short, real cables would break; "
         "lengthen the cables of highest tension",
     )
     UNSTABLE = (
@@ -80,7 +80,7 @@ class ForwardStatus(Status):
     )
     NO_LENGTHS = (
         codes.FORWARD_NO_LENGTHS,
-        "all lengths of the sample are NaN, as a plan leaves them at an infeasible pose",
+        "all lengths of the sample are NaN, as in a plan at an infeasible pose",
     )
     FITTED = (
         codes.FORWARD_FITTED,

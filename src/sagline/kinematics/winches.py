@@ -125,7 +125,7 @@ def lengths_from_counts(
     if (winding == "remembered") != (drum_tension is not None):
         given = "not given" if drum_tension is None else "given"
         allowed = 'given with winding="remembered", and only then'
-        step = "Give those of the plan, winch_rates(plan).drum_tension, or what was measured; or leave both out."
+        step = "Give the tensions of the plan, winch_rates(plan).drum_tension, or measured ones; or leave both out."
         raise InvalidValueError("drum_tension", given, allowed, step)
     if drum_tension is None:
         length = path / (1.0 + drums.rest_strain)
@@ -133,7 +133,7 @@ def lengths_from_counts(
         tension = _rows(robot, drum_tension, "drum_tension", "N")
         if tension.shape != rows.shape:
             shapes = f"of shape {tension.shape}"
-            raise InvalidValueError("drum_tension", shapes, f"shape {rows.shape}, as counts", "Give one a count.")
+            raise InvalidValueError("drum_tension", shapes, f"shape {rows.shape}, as counts", "Give one per count.")
         length = _remembered_lengths(drums, robot, path, tension, unstrained=False)
     return locked((length * longer).reshape(rows.shape))
 
@@ -162,7 +162,7 @@ def _remembered_lengths(drums: Drums, robot: Robot, given: Array, tension: Array
 def _creep_strain(plan: Plan, creep: Creep) -> Array:
     if plan.path is None:
         step = "Plan along a Path, or leave creep out."
-        raise InvalidValueError("creep", "given for a plan without a path", "times to creep in", step)
+        raise InvalidValueError("creep", "given for a plan without a path", "a path with times", step)
     return creep.strain(plan.path.time, plan.chord_tension)
 
 

@@ -148,7 +148,7 @@ class Segments:
             raise InvalidValueError(
                 f"waypoints[{k + 1}]",
                 f"the same as waypoints[{k}]",
-                "a different pose, where limits give the time",
+                "a different pose, because limits give the time",
                 "Remove it, or give durations=... to dwell there.",
             )
         moving = self._least_time(distance, "moves", "speed", "m", speed, acceleration)

@@ -113,7 +113,7 @@ def _check_request(place: Path, digest: str, request: Request) -> None:
     file = place / REQUEST
     if not exists(file):
         if exists(place / EVALUATIONS):
-            raise FileError(place / EVALUATIONS, f"has no {REQUEST} beside it, so its search is not known", ANOTHER)
+            raise FileError(place / EVALUATIONS, f"has no {REQUEST} in its folder, so its search is not known", ANOTHER)
         return
     try:
         stored = json.loads(read_text(file, 1.0))
@@ -122,7 +122,7 @@ def _check_request(place: Path, digest: str, request: Request) -> None:
         raise FileError(file, "is not a request of a search", ANOTHER) from None
     if own != digest:
         asked = f"{request.robot.name} with {request.optimizer} and seed {request.seed}"
-        reason = f"holds another search, {own[:8]}, than is asked for, {digest[:8]}: {asked}"
+        reason = f"contains another search ({own[:8]}) than the requested one ({digest[:8]}): {asked}"
         raise FileError(place, reason, "Ask for the same, or name another folder.", item="request")
 
 

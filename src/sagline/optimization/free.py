@@ -185,7 +185,9 @@ class FreeCable(Free):
         density, stiffness = own.linear_density[0], own.axial_stiffness[0]
         value = f"{1e3 * density:g} g/m, {stiffness:g} N, up to {robot.tension_max[0]:g} N"
         step = "Add the robot's own cable: the search begins with it."
-        raise InvalidValueError(f"{item}: the robot's cable 0", value, "all cables alike, in the catalogue", step)
+        raise InvalidValueError(
+            f"{item}: the robot's cable 0", value, "equal for all cables, and in the catalogue", step
+        )
 
 
 def _write_cables(catalogue: tuple[CableChoice, ...], cables: Array, values: Array) -> None:

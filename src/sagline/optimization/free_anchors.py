@@ -80,7 +80,7 @@ def _mirrored(symmetry: str, anchors: Array, along: Array, bounds: tuple[Array, 
         room = float(np.abs(away[side != 0.0]).min(initial=np.inf))
         if inward >= room:
             name = "xyz"[axis]
-            value, allowed = f"up to {inward:g} m inward", f"< {room:g} m, where the plane {name} = {plane:g} m is"
+            value, allowed = f"up to {inward:g} m inward", f"< {room:g} m, because the plane {name} = {plane:g} m is"
             step = f"Anchors would pass through those that mirror them: narrow the bounds along {name}."
             raise InvalidValueError(f"{item}: the shift along {name}", value, allowed, step)
     return shifts
@@ -149,7 +149,7 @@ class FreeAnchors(Free):
         lower, upper = (_shifts(value, name, len(directions)) for value, name in ((low, "low"), (high, "high")))
         check_order(lower, upper, "m")
         for k in np.flatnonzero((lower > 0.0) | (upper < 0.0)):
-            step = "Shifts count from where the robot has its anchors: give low <= 0 <= high."
+            step = "Shifts are relative to the robot's anchors: give low <= 0 <= high."
             raise InvalidValueError(f"low[{k}] to high[{k}]", f"{lower[k]:g} to {upper[k]:g} m", "0 m inside", step)
         if not (upper > lower).any():
             raise InvalidValueError("high", "the same as low", "> low in a direction", "Widen the bounds.")
@@ -184,7 +184,7 @@ class FreeAnchors(Free):
                 rates.append(rate)
         if not parts:
             step = "Leave out the symmetry, or the directions across its planes."
-            raise InvalidValueError(f"{item}: symmetry", "one that holds all anchors", "one that lets some move", step)
+            raise InvalidValueError(f"{item}: symmetry", "one that fixes all anchors", "one that permits a shift", step)
 
         def write(tables_of_cables: Array, values: Array) -> None:
             for k, rate in enumerate(rates):  # the order of the sum does not depend on the number of candidates
@@ -204,7 +204,7 @@ def _directions(along: ArrayLike) -> Array:
 def _shifts(value: ArrayLike, item: str, count: int) -> Array:
     given = checked(value, item, "m")
     if given.shape not in ((), (count,)):
-        allowed = f"a number, or {count} of them, one a direction"
+        allowed = f"a number, or {count} of them, one per direction"
         raise InvalidValueError(item, f"of shape {given.shape}", allowed, "Give one for x, y and z, or use along.")
     return np.array(np.broadcast_to(given, (count,)))
 

@@ -244,6 +244,6 @@ class Rating:
         found = distribute(self._candidates.robot, self._model, each, self.rows, self._wrench, stiffness=False)
         held = ~np.isnan(found[0])
         if not held.any():
-            value, step = "held at none of the poses", "Choose other poses, wrenches or tension limits."
-            raise InvalidValueError(self._candidates.robot.name, value, "one that is held somewhere", step)
+            value, step = "feasible at none of the poses", "Choose other poses, wrenches or tension limits."
+            raise InvalidValueError(self._candidates.robot.name, value, "feasible at one pose at least", step)
         return held

@@ -162,7 +162,7 @@ def _refuse_weights(goals: tuple[Goal, ...]) -> None:
     for goal in goals:
         if goal.weight != 1.0:
             step = 'Leave it out, or choose the optimizer "cma".'
-            allowed = "1: a front of robots weighs no goals"
+            allowed = "1: a front of robots has no weights"
             raise InvalidValueError(f"weight of {goal.kind}", f"{goal.weight:g}", allowed, step)
 
 
@@ -184,4 +184,4 @@ def _check_platform(request: Request) -> None:
         item = f"{'the frame anchor' if which == 0 else name + ': the frame anchor'} of cable {cable}, at {where} m"
         value = f"inside the platform at pose {int(poses[which, cable])}"
         step = "Narrow low and high, or leave the pose out." if which else "Leave the pose out, or correct the robot."
-        raise InvalidValueError(item, value, "outside of it at all poses", step)
+        raise InvalidValueError(item, value, "outside the platform at all poses", step)

@@ -144,7 +144,7 @@ class GroupThread(Thread):
         group = values["group"] - 1  # counters of blocks start at 1
         if group != self.number:
             who = f"is group {group}" if group >= 0 else "has no group number"
-            step = "Give the addresses in the groups' order, and each PLC its number"
+            step = "Give the addresses in the groups' order, and give each PLC its number"
             return Refusal(f"the PLC there {who}, not {self.number}", step)
         if values["winches"] != self._winches:
             return Refusal(

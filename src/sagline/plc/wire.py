@@ -47,7 +47,7 @@ def addresses_of(given: str | Sequence[str], port: int) -> tuple[Address, ...]:
             raise InvalidValueError(
                 f"address of group {i}",
                 f"{address}, as that of group {addresses.index(address)}",
-                "one PLC a group",
+                "one PLC per group",
                 "Give each group its own address.",
             )
         addresses.append(address)
@@ -63,8 +63,8 @@ def groups_at(addresses: Sequence[Address], robot: Robot | int) -> tuple[tuple[i
         raise InvalidValueError(
             "number of PLC addresses",
             len(addresses),
-            f"{len(groups)}: two winches a group, {winches} winches",
-            "Give one address a group, in the groups' order, with commas between.",
+            f"{len(groups)}: two winches per group, {winches} winches",
+            "Give one address per group, in the groups' order, with commas between.",
         )
     return groups
 

@@ -118,7 +118,7 @@ def draw_at_rest(robot: Robot, where: Pose, plan: Plan | None, view: Array = USU
     if held:
         tension_bar(ax, scale, tension, "right")
     elif plan is not None:
-        ax.set_title("no tensions within the limits carry it here", fontsize=current().label)
+        ax.set_title("no tensions within the limits balance the platform here", fontsize=current().label)
     _draw(ax, scene, view)
     return ax
 

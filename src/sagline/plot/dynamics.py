@@ -81,10 +81,10 @@ def energy(simulation: Simulation) -> Figure:
     figure = sheet(height=4.2)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.4, 1.0))
     rise = balance.potential - balance.potential[0]
-    courses = {"kinetic": balance.kinetic, "potential, less its start": rise}
+    courses = {"kinetic": balance.kinetic, "potential, minus its initial value": rise}
     courses |= {"supplied": balance.supplied, "lost": balance.lost}
     if balance.removed.any():
-        courses["left with cables and loads"] = balance.removed
+        courses["removed cables and loads"] = balance.removed
     for (name, course), color, style in zip(courses.items(), COLORS, ENERGY_STYLES, strict=False):
         above.plot(time, course, color=color, linestyle=style, linewidth=1.2, label=name)
     format_clock(above, time, "energy [J]")
@@ -217,8 +217,8 @@ MAP_QUANTITIES: Final = {
     "frequency": _MapQuantity("frequency", "lowest frequency with cable mass [Hz]", False),
     "massless_frequency": _MapQuantity("massless_frequency", "lowest frequency, massless [Hz]", False),
     "platform_share": _MapQuantity("platform_share", "platform's share of the lowest mode with cable mass", False),
-    "peak": _MapQuantity("peak", "strongest answer with cable mass [m/N]", True),
-    "peak_frequency": _MapQuantity("peak_frequency", "frequency of the strongest answer, with cable mass [Hz]", False),
+    "peak": _MapQuantity("peak", "largest response with cable mass [m/N]", True),
+    "peak_frequency": _MapQuantity("peak_frequency", "frequency of the largest response, with cable mass [Hz]", False),
 }
 
 

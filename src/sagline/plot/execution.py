@@ -184,7 +184,7 @@ def place_errors(done: Execution, ax: Axes | None = None) -> Axes:
     ax = axes_or_new(ax, height=2.6)
     clock = _clock(done)
     draw_components(ax, clock, PER_METER * position_error(done))
-    return _finished(ax, clock, "estimated less\nplanned [mm]")
+    return _finished(ax, clock, "estimated minus\nplanned [mm]")
 
 
 def _clock(done: Execution) -> Array:

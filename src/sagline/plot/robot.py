@@ -52,7 +52,7 @@ def drawn_pose(robot: Robot, pose: Pose | None) -> Pose:
         return Pose(0.5 * (robot.test_box.low + robot.test_box.high), np.eye(3))
     if pose is None or pose.shape:
         value = "missing" if pose is None else f"a batch of {len(pose)}"
-        raise InvalidValueError("pose", value, "a single pose, where the robot has no test box", "Give one pose.")
+        raise InvalidValueError("pose", value, "a single pose, because the robot has no test box", "Give one pose.")
     return pose
 
 
@@ -155,7 +155,9 @@ def robot(robot: Robot, pose: Pose | None = None, ax: Axes3D | None = None) -> A
         ax = sheet(height=4.0, width=5.6).add_subplot(projection="3d")
     plan, points = draw_robot(ax, robot, where)
     format_space_axes(
-        ax, points, robot.name if plan.feasible else f"{robot.name}: no tensions within the limits carry it here"
+        ax,
+        points,
+        robot.name if plan.feasible else f"{robot.name}: no tensions within the limits balance the platform here",
     )
     if plan.feasible:
         tension_bar(ax, TensionScale.of(robot), plan.chord_tension, "left")

@@ -52,7 +52,7 @@ def check_count(robot: Robots, poses: int | None) -> None:
     if isinstance(robot, Robot) or len(robot) == poses:
         return
     allowed = "one robot" if poses is None else f"one robot, or a sequence of {poses}"
-    step = "Give one robot a pose; where the pose is the same for all, repeat it."
+    step = "Give one robot per pose; repeat the pose if it is the same for all robots."
     raise InvalidValueError("robot", f"a sequence of {len(robot)} robots", allowed, step)
 
 

@@ -167,7 +167,7 @@ class Design:
                 "cables": f"{rope.source}; {rope.assumed}",
                 "inertia": "a solid box of the platform's size",
                 "tension_min": f"{100 * SLACK_LIMIT:g} % of the platform's weight, so that no cable is slack",
-                "tension_max": f"breaking force {SAFETY * strongest:,.0f} N over a safety of {SAFETY:g}",
+                "tension_max": f"breaking force {SAFETY * strongest:,.0f} N divided by a safety factor of {SAFETY:g}",
             },
         )
 

@@ -24,7 +24,9 @@ def anchors(frame: ArrayLike, platform: ArrayLike) -> tuple[Array, Array]:
     for value, item in ((frame, "frame_anchors"), (platform, "platform_anchors")):
         array = checked(value, item, "m", shape=(None, 3))
         if array.ndim != 2 or len(array) == 0:
-            raise InvalidValueError(item, f"of shape {array.shape}", "shape (m, 3), m >= 1", "Give one point a cable.")
+            raise InvalidValueError(
+                item, f"of shape {array.shape}", "shape (m, 3), m >= 1", "Give one point per cable."
+            )
         pair.append(array)
     if len(pair[0]) != len(pair[1]):
         raise InvalidValueError(
@@ -106,7 +108,7 @@ def inertia(given: ArrayLike | None, pattern: str, normal: Array | None) -> Arra
             "inertia",
             f"a matrix with {about:g} kg m^2 about plane_normal",
             "> 0 kg m^2",
-            "Give the moment about the axis the platform turns about.",
+            "Give the moment about the platform's axis of rotation.",
         )
     return matrix
 
@@ -125,7 +127,7 @@ def _check_moments(moments: Array, *, everywhere: bool) -> None:
         raise InvalidValueError(
             "inertia",
             f"a matrix with the principal moments {', '.join(f'{moment:g}' for moment in moments)} kg m^2",
-            "none larger than the other two together",
+            "none larger than the sum of the other two",
             "No body has these; give the inertia about the center of mass, in the platform frame.",
         )
 
@@ -165,7 +167,7 @@ def limits_of_each_cable(low: ArrayLike, high: ArrayLike, count: int) -> tuple[A
 def per_cable(array: Array, item: str, count: int) -> Array:
     """One value per cable, (m,), from one value per cable or one value for all."""
     if array.shape not in ((), (1,), (count,)):
-        raise InvalidValueError(item, f"of shape {array.shape}", f"shape () or ({count},)", "Give one value a cable.")
+        raise InvalidValueError(item, f"of shape {array.shape}", f"shape () or ({count},)", "Give one value per cable.")
     return array if array.shape == (count,) else locked(np.full(count, array))
 
 

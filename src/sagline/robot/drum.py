@@ -121,7 +121,7 @@ class Drums:
     def _refusal(self, item: str, value: str, allowed: str, turns: Array, wrong: tuple[int, int]) -> InvalidValueError:
         cable = wrong[1]
         whole = _given(self.winches, "cable_length")[cable]
-        step = f"There are {whole:g} m of cable, winches: cable_length; correct that, or what was given."
+        step = f"There are {whole:g} m of cable (winches: cable_length); correct this or the given value."
         if turns[wrong] > self.most[cable]:
             count = int(self.winches.layers[cable])
             full = f"{count} layer{'s' * (count > 1)}, {self.most[cable]:g} turns"
@@ -146,7 +146,7 @@ def drums_of(robot: Robot) -> Drums:
         missing.append("cables: diameter")
     if winches is None or diameter is None or missing:
         step = "Give them in the robot file, or with robot.replace(winches=Winch(...), cables=Cable(...))."
-        raise InvalidValueError(*not_given(missing), "known, to say what lies on a drum", step)
+        raise InvalidValueError(*not_given(missing), "known, because drums need it", step)
     return Drums(winches, *_tables(winches, diameter), *_limits(winches, robot))
 
 
@@ -243,23 +243,27 @@ def warmth(robot: Robot, temperature: Any) -> Array | float:
     difference = checked(temperature, "temperature", "K")
     if difference.shape not in ((), (robot.cable_count,)):
         allowed = f"shape () or ({robot.cable_count},)"
-        raise InvalidValueError("temperature", f"of shape {difference.shape}", allowed, "Give one, or one a cable.")
+        raise InvalidValueError(
+            "temperature", f"of shape {difference.shape}", allowed, "Give one value, or one value per cable."
+        )
     if not difference.any():
         return 1.0
     if robot.cables.expansion is None:
         step = "Give it in the robot file or with Cable(..., expansion=...), or leave temperature out."
-        raise InvalidValueError("cables: expansion", "not given", "known where a temperature is given", step)
+        raise InvalidValueError("cables: expansion", "not given", "known if a temperature is given", step)
     factor: Array = 1.0 + robot.cables.expansion * difference
     if not (factor > 0.0).all():
         shown = f"{np.ravel(difference)[0]:g} K"
-        raise InvalidValueError("temperature", shown, "at which cables have a length", "Correct it, or expansion.")
+        raise InvalidValueError(
+            "temperature", shown, "a temperature at which cables have a positive length", "Correct it, or expansion."
+        )
     return factor
 
 
 def _given(winches: Winch, name: str, step: str = "Give it in the robot's winches.") -> Array:
     value: Array | None = getattr(winches, name)
     if value is None:
-        raise InvalidValueError(f"winches: {name}", "not given", "one value, or one a cable", step)
+        raise InvalidValueError(f"winches: {name}", "not given", "one value, or one per cable", step)
     return value
 
 
@@ -270,7 +274,7 @@ def _check_width(winches: Winch, pitch: Array) -> None:
             f"winches: drum_width[{i}]",
             f"{winches.drum_width[i]:g} m",
             f">= {pitch[i]:g} m, its groove_pitch",
-            "A layer has a turn at least; correct one of the two.",
+            "A layer has at least one turn; correct one of the two.",
         )
 
 
@@ -287,7 +291,7 @@ def drum_lever(robot: Robot, length: Array) -> Array:
     winch = robot.winches
     if winch is None or winch.drum_radius is None:
         step = "Give it in the robot file, or with robot.replace(winches=Winch(drum_radius=...))."
-        raise InvalidValueError("winches: drum_radius", "not given", "known where the speed of winches counts", step)
+        raise InvalidValueError("winches: drum_radius", "not given", "known if winch speeds are computed", step)
     if winch.groove_pitch is not None and robot.cables.diameter is not None:
         drums = drums_of(robot)
         travel: Array = drums.turns(np.atleast_2d(length) * (1.0 + drums.rest_strain))[1] / (2.0 * np.pi)

@@ -126,7 +126,7 @@ class Equilibrium(Result):
             return self.robot
         raise InvalidValueError(
             "robot",
-            f"a sequence of {len(self.robot)} robots, one a pose",
+            f"a sequence of {len(self.robot)} robots, one per pose",
             "one robot for all poses",
             "Take the poses one by one: state[i].",
         )

@@ -282,7 +282,10 @@ def _refuse(wrong: NDArray[np.bool_], item: str, measure: str, values: Array, al
     index = tuple(int(i) for i in np.argwhere(wrong)[0])
     where = item if not index else f"{item} {index[0]}"
     raise InvalidValueError(
-        f"{where}: {measure}", f"{values[index]:.12g}", allowed, "Build it with scipy's Rotation, which checks itself."
+        f"{where}: {measure}",
+        f"{values[index]:.12g}",
+        allowed,
+        "Build it with scipy's Rotation, which checks the matrix.",
     )
 
 

@@ -70,7 +70,7 @@ def deviations(
         if array.shape not in ((), shape, shape[-1:] if what.axes else ()):
             ways = " or ".join(str(way) for way in dict.fromkeys(((), shape[-1:] if what.axes else (), shape)))
             raise InvalidValueError(
-                label, f"of shape {array.shape}", f"shape {ways}", "Give one for all, or every one."
+                label, f"of shape {array.shape}", f"shape {ways}", "Give one value for all, or one value per entry."
             )
         found[name] = locked(np.array(np.broadcast_to(array, shape)))
     return MappingProxyType(found)
@@ -151,6 +151,6 @@ def _date(value: Any) -> str:
     try:
         datetime.fromisoformat(value)
     except (TypeError, ValueError):
-        step = 'Give it as "2026-03-01", with a time of the day behind it if need be.'
+        step = 'Give it as "2026-03-01", optionally followed by a time of day.'
         raise InvalidValueError("calibration: date", brief(value), "a date in ISO 8601", step) from None
     return str(value)

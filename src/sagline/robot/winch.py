@@ -167,7 +167,7 @@ class Winch:
         count = whole_number(count, "count", 1)
         check_memory("winches", 8.0 * (len(_FIELDS) - len(_AXES)) * count, "Give fewer cables.")
         if self.shape not in ((), (1,), (count,)):
-            allowed = f"one value, or {count}, one a cable"
+            allowed = f"one value, or {count}, one per cable"
             raise InvalidValueError(self._long(), f"{self.shape[0]} values", allowed, "Give every cable its own.")
         if self.shape == (count,):
             return self
@@ -238,7 +238,7 @@ class Winch:
                 f"winches: guides[{i}, {self.guides.shape[1] - 1}]",
                 "at the frame anchor",
                 "points before it",
-                "List the guides from the drum on, without the frame anchor.",
+                "List the guides in order, starting at the drum, without the frame anchor.",
             )
         # at most the length, despite rounding
         rise = np.clip(frame_anchors[:, 2] - self.guides[:, 0, 2], -length, length)
@@ -248,8 +248,8 @@ class Winch:
                 raise InvalidValueError(
                     f"winches: {name}[{i}]",
                     f"{own[i]:.9g} m",
-                    f"{follows[i]:.9g} m, as the guides have it, or 0",
-                    "Leave it out where guides are given.",
+                    f"{follows[i]:.9g} m, from the guides, or 0",
+                    "Leave it out if guides are given.",
                 )
         return evolve(self, dead_cable=length, dead_rise=rise)
 
@@ -279,9 +279,11 @@ def _checked(value: ArrayLike, about: Attribute[Any]) -> Array:
             return _points(array)
         case "layers" if (wrong := array != np.floor(array)).any():
             item, index = _element(item, wrong)
-            raise InvalidValueError(item, f"{array[index]:g}", "whole numbers", "Give how many layers the drum takes.")
+            raise InvalidValueError(
+                item, f"{array[index]:g}", "whole numbers", "Give the number of layers on the drum."
+            )
         case "gear" if (wrong := array == 0.0).any():
-            step = "Give the encoder's turns for one of the drum; negative where counts fall as cable is let out."
+            step = "Give the encoder turns per drum turn; negative if counts decrease when cable is paid out."
             raise InvalidValueError(_element(item, wrong)[0], "0", "not 0", step)
     return array
 
@@ -296,7 +298,7 @@ def _points(points: Array) -> Array:
     """The guides, (k, 3) for all cables or (m, k, 3) for each."""
     if points.ndim not in (2, 3) or points.shape[-1] != 3 or 0 in points.shape:
         allowed = "shape (k, 3) or (m, k, 3), k >= 1"
-        step = "Give the points from the drum on, or None."
+        step = "Give the points in order, starting at the drum, or None."
         raise InvalidValueError("winches: guides", f"of shape {points.shape}", allowed, step)
     same = np.linalg.norm(np.diff(points, axis=-2), axis=-1) < SMALLEST
     if same.any():
@@ -316,11 +318,11 @@ def _shape(shapes: dict[str, tuple[int, ...]]) -> tuple[int, ...]:
     longest = max(shapes, key=lambda name: shapes[name])
     for name, shape in shapes.items():
         if len(shape) > 1 or 0 in shape:
-            step = "Give one value, or one a cable."
+            step = "Give one value, or one value per cable."
             raise InvalidValueError(f"winches: {name}", f"of shape {shape}", "shape () or (m,)", step)
         if shape not in ((), (1,), shapes[longest]):
             allowed = f"one value, or {shapes[longest][0]}, as {longest} has"
-            raise InvalidValueError(f"winches: {name}", f"{shape[0]} values", allowed, "Give one value a cable.")
+            raise InvalidValueError(f"winches: {name}", f"{shape[0]} values", allowed, "Give one value per cable.")
     return shapes[longest]
 
 
@@ -375,5 +377,5 @@ def _check_whole(dead_cable: Array, cable_length: Array | None) -> None:
             f"winches: cable_length[{i}]",
             f"{cable_length.flat[i]:g} m",
             f">= {dead_cable.flat[i]:g} m, its dead_cable",
-            "A cable reaches from the drum to the pulley at least; correct one of the two.",
+            "The cable must be longer than the distance from drum to pulley; correct one of the two.",
         )

@@ -74,8 +74,8 @@ class WinchDrive:
         }
         for field in fields:
             if field in given or field not in Winch.__slots__:
-                allowed = f"a field of Winch beside {', '.join(given)}"
-                step = "Give Winch(...) by hand where the drive is another."
+                allowed = f"a field of Winch in addition to {', '.join(given)}"
+                step = "Give Winch(...) by hand if the drive differs."
                 raise InvalidValueError("field", brief(field), allowed, step)
         radius = number(drum_radius, "drum_radius", "m", above=0.0)
         return Winch(drum_radius=radius, **given, **fields)
@@ -86,8 +86,8 @@ _GEARED_SOURCE: Final = (
     "standard backlash gears, page 3-7"
 )
 _GEARED_ASSUMED: Final = (
-    "torques at the output over the gear ratio, so that losses in the gear count as torque that is missing; speed: "
-    "that of the motor, 4000 min^-1; backlash and torsion of the gear left out"
+    "torques: output torque divided by the gear ratio, so that losses in the gear reduce the torque; speed: "
+    "that of the motor, 4000 min^-1; backlash and torsion of the gear neglected"
 )
 # model: turns of the motor per output turn, rated and peak torque at the output [N m], inertia of motor and gear [1e-4
 # kg m^2]

@@ -74,7 +74,7 @@ def described_calls(calls: Mapping[str, Call], names: Mapping[str, AnyArray]) ->
 
 
 def _leaves(value: Any) -> Iterator[Any]:
-    """Arrays and numbers of nested tuples, in order; None is no argument in C."""
+    """Arrays and numbers of nested tuples, in order; None is not an argument in C."""
     if isinstance(value, tuple):
         for each in value:
             yield from _leaves(each)

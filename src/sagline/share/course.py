@@ -81,7 +81,7 @@ def of_plan(plan: Plan) -> SharedMotion:
     for gap in plan.gaps:
         which[gap.first : gap.last + 1] = len(verdicts)
         verdicts.append(_SampleVerdict(False, _why(gap)))
-    notes = ["Poses without times: one a second."] * (plan.path is None)
+    notes = ["The poses have no times; the page shows one per second."] * (plan.path is None)
     if not isinstance(plan.state.cables.model, Catenary):
         name = type(plan.state.cables.model).__name__.lower()
         notes.append(f"Planned with the {name} model; cables are drawn as catenaries with these tensions.")

@@ -76,7 +76,7 @@ def external_wrench(wrench: ArrayLike | None, count: int | None) -> Array:
     if array.ndim == 1 or array.shape == (count, 6):
         return array
     allowed = "shape (6,)" if count is None else f"shape (6,) or ({count}, 6)"
-    raise InvalidValueError("wrench", f"of shape {array.shape}", allowed, "Give one wrench, or one a pose.")
+    raise InvalidValueError("wrench", f"of shape {array.shape}", allowed, "Give one wrench, or one wrench per pose.")
 
 
 class ArticleBalance(NamedTuple):

@@ -121,7 +121,7 @@ def _inside_pulley(item: str, robot: Robot, pose: Pose, cable: int, radius: floa
     half = np.sqrt(max(radius**2 - max(ahead, 0.0) ** 2, 0.0))
     near = f"< {radius - half:.6g} m or " if ahead > 0.0 else ""
     return CableGeometryError(
-        f"{item}: its platform end is inside its pulley or past the near side, its distance from the swivel axis",
+        f"{item}: distance of its platform end from the swivel axis, inside the pulley or on its near side,",
         f"{float(np.hypot(away[0], away[1])):.9g} m",
         f"{near}> {radius + half:.6g} m there",
         f"Move the platform away, or correct its pulley_radius, {radius:g} m.",

@@ -147,7 +147,7 @@ def run_tasks(client: Any, job: Job, numbers: Iterable[int], finish: Finish, tel
             send()
     except BaseException as error:
         if isinstance(error, KeyboardInterrupt):
-            tell("Stopping when the tasks that run are done; Ctrl-C again leaves them.")
+            tell("Stopping after the running tasks; Ctrl-C again abandons them.")
         if client.status == "running":
             for future in ahead:
                 with suppress(Exception):
@@ -175,12 +175,14 @@ def _result(future: Any) -> tuple[float, tuple[int, ...]]:
     from distributed import KilledWorker
 
     if future.status == "cancelled":
-        raise SaglineError("The scheduler is gone. What was done is kept: run the same again to go on.")
+        raise SaglineError(
+            "The scheduler does not respond. Finished tasks are kept: run the same command again to continue."
+        )
     try:
         found: tuple[float, tuple[int, ...]] = future.result()
     except KilledWorker as error:
-        text = f"A task ended every worker that took it ({_first_line(error)[:80]})"
-        raise SaglineError(f"{text}. Look at the memory of the workers; then run the same again.") from None
+        text = f"A task stopped every worker that ran it ({_first_line(error)[:80]})"
+        raise SaglineError(f"{text}. Check the memory of the workers; then run the same command again.") from None
     return found
 
 

@@ -207,7 +207,7 @@ def _axis(given: Any, item: str, unit: str) -> Array:
     low, high = (_one(given[key], f"{item}.{key}", unit) for key in KEYS[:2])
     count = whole_number(given["count"], f"{item}.count", 1, MOST)
     if high < low or (high > low) != (count > 1):
-        allowed = f"{count} points from low up to high" if count > 1 else "one value, where there is one point"
+        allowed = f"{count} points from low up to high" if count > 1 else "one value, because there is one point"
         raise InvalidValueError(item, f"{low:g} to {high:g} {unit}", allowed, f"Correct {item}.")
     return np.linspace(low, high, count)
 

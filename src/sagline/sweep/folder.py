@@ -155,13 +155,13 @@ def open_folder(path: Path) -> SweepFolder:
 
     check_package("zarr", "sweeps")
     if not path.is_dir():
-        raise FileError(path, "is no folder", CONTENT.give)
+        raise FileError(path, "is not a folder", CONTENT.give)
     try:
         group = zarr.open_group(path / GROUP, mode="r+", zarr_format=3)
         attributes: dict[str, Any] = dict(group.attrs)
         given: dict[str, Any] = {name: group[name] for name in GIVEN}
     except (OSError, ValueError, KeyError, TypeError):
-        raise FileError(path, "is no folder of a sweep", CONTENT.give) from None
+        raise FileError(path, "is not a folder of a sweep", CONTENT.give) from None
     CONTENT.format_of(path, attributes)
     try:
         texts = list(attributes["robots"])
@@ -182,7 +182,7 @@ def open_folder(path: Path) -> SweepFolder:
             raise FileError.of(path, error) from None
         raise FileError(path, f"is damaged ({type(error).__name__}: {error})", CONTENT.again) from None
     if digest != request_digest(request) or min(size) < 1:
-        raise FileError(path, "is not as it was made: its digest is another", CONTENT.again)
+        raise FileError(path, "has changed since it was made: its digest differs", CONTENT.again)
     return SweepFolder(path, group, request, digest, size, made_by)
 
 

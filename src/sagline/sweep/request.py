@@ -54,8 +54,10 @@ class SweepArray(NamedTuple):
         return "int8" if self.whole or self.codes is not None else "float64"
 
 
-_STATUS: Final = SweepArray("status", "", "how each request ended", codes=PoseStatus)
-_PROOF: Final = SweepArray("proof", "N", "proved least change of the force that makes it feasible, 0 if it is")
+_STATUS: Final = SweepArray("status", "", "status of each request", codes=PoseStatus)
+_PROOF: Final = SweepArray(
+    "proof", "N", "proved lower bound of the change of force that makes it feasible, 0 if it is feasible"
+)
 
 QUANTITIES: Final = MappingProxyType(
     {
@@ -71,10 +73,10 @@ QUANTITIES: Final = MappingProxyType(
         ),
         "shortfall": (_STATUS, _PROOF, SweepArray("enough", "N", "change of the force that suffices")),
         "margin": (
-            SweepArray("margin_status", "", "what the margin's bracket says", codes=MarginStatus),
-            SweepArray("margin", "N", "how much more load the pose can take, below zero how much too much it is"),
-            SweepArray("margin_low", "N", "lower end of the margin's bracket; feasible where it is not below zero"),
-            SweepArray("margin_high", "N", "upper end of the margin's bracket; infeasible where it is below zero"),
+            SweepArray("margin_status", "", "verdict of the margin's bracket", codes=MarginStatus),
+            SweepArray("margin", "N", "additional load that the pose can carry; if negative, load to be removed"),
+            SweepArray("margin_low", "N", "lower end of the margin's bracket; feasible if it is not negative"),
+            SweepArray("margin_high", "N", "upper end of the margin's bracket; infeasible if it is negative"),
             SweepArray("limiting_cable", "", "cable whose limit moves the margin fastest, -1 for none", whole=True),
         ),
     }

@@ -189,7 +189,7 @@ class Sweep(Result):
             step = f"Give whole numbers and slices ({error})."
             raise InvalidValueError("index", brief(index), allowed, step) from None
         except (ValueError, RuntimeError, OSError) as error:
-            step = "Run the sweep again: what is damaged is done again."
+            step = "Run the sweep again: it repeats the damaged part."
             raise FileError(self.folder, f"{name} cannot be read ({error})", step) from None
 
     @property

@@ -115,7 +115,7 @@ def open_matching_folder(path: Path, request: Request) -> SweepFolder:
     opened = open_folder(path)
     if opened.digest != request_digest(request):
         step = "Give this one another folder, or remove that one."
-        raise FileError(path, f"holds another sweep, of {len(opened.request):,} requests", step)
+        raise FileError(path, f"contains another sweep, of {len(opened.request):,} requests", step)
     return opened
 
 

@@ -168,8 +168,8 @@ def _opened(folder: str, digest: str) -> SweepFolder:
     """Open folder, which is kept from task to task."""
     found = open_folder(Path(folder))
     if found.digest != digest:
-        step = "Let all workers see the same folder under the same name."
-        raise FileError(folder, "holds another sweep where a worker sees it", step)
+        step = "Give all workers access to the same folder under the same name."
+        raise FileError(folder, "contains another sweep on the machine of a worker", step)
     check_made_here(found)
     return found
 

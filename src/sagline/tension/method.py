@@ -57,7 +57,7 @@ class TensionMethod:
         """Check the options."""
         if type(self) is TensionMethod:
             step = "Choose one of the methods, MinimumNorm() for instance."
-            raise InvalidValueError("TensionMethod()", "the interface alone", "a tension distribution method", step)
+            raise InvalidValueError("TensionMethod()", "the abstract base class", "a tension distribution method", step)
         object.__setattr__(self, "variable", choice(self.variable, "variable", VARIABLES))
         if self.lowest_point_margin is not None:
             margin = number(self.lowest_point_margin, "lowest_point_margin", "N", low=0.0)
@@ -156,7 +156,7 @@ def check_sharing(robot: Robot, tension: TensionMethod, name: str | None = None)
     method = type(tension).__name__
     most = tension.most_redundant
     if most is not None and m > n + most:
-        step = "Choose AnalyticCenter or MinimumNorm, which share among any number."
+        step = "Choose AnalyticCenter or MinimumNorm, which accept any number of cables."
         raise InvalidValueError(item, m, f"{n} to {n + most} for {robot.motion_pattern} with {method}", step)
     unlimited = np.isinf(robot.tension_max)
     if tension.needs_upper_limits and unlimited.any():

@@ -95,7 +95,7 @@ class QuadraticProgram(TensionMethod):
             (GOAL, "target", np.asarray(self.target)),
         ):
             if values.shape not in ((), (cables,)):
-                raise InvalidValueError(name, f"of shape {values.shape}", f"() or ({cables},)", "Give one a cable.")
+                raise InvalidValueError(name, f"of shape {values.shape}", f"() or ({cables},)", "Give one per cable.")
             rows[row] = values
         return locked(rows)
 

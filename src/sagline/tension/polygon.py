@@ -72,7 +72,7 @@ class TensionPolygon(Result):
         given = checked(chord_tension, "chord_tension", "N", missing=True)
         if given.ndim == 0 or given.shape[-1] != self.scale.size:
             allowed = f"shape (..., {self.scale.size})"
-            raise InvalidValueError("chord_tension", f"of shape {given.shape}", allowed, "Give one tension a cable.")
+            raise InvalidValueError("chord_tension", f"of shape {given.shape}", allowed, "Give one tension per cable.")
         shared = self.scale * given + self.offset
         found: Array = (shared - self.origin) @ self.basis.T
         return found

@@ -74,7 +74,7 @@ def _in_words(robot: Robot, pose: Pose, twist: Array, *, turns: bool) -> str:
     center = pose.position + pose.matrix @ robot.center_of_mass
     through = center + np.cross(axis, twist[:3])
     pitch = float(axis @ twist[:3])
-    slide = f", sliding {pitch:.3g} m a radian along it" if abs(pitch) > 1e-6 else ""
+    slide = f", sliding {pitch:.3g} m per radian along it" if abs(pitch) > 1e-6 else ""
     return f"rotation about the axis {_vector(axis)} through {_vector(through)} m{slide}"
 
 

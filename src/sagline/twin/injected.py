@@ -36,9 +36,9 @@ KINDS: Final = MappingProxyType(
             _FaultKind("cell", "sticks", "repeats its last reading"),
             _FaultKind("cell", "reads #", "reads this value, whatever the tension is", "N"),
             _FaultKind("cell", "saturates", "reads its full scale"),
-            _FaultKind("cell", "is wrong by #", "reads this much more", "N"),
-            _FaultKind("cable", "breaks", "has neither tension nor weight any more", for_good=True),
-            _FaultKind("encoder", "jumps by #", "counts this much more cable than there is", "mm", 1e-3, True),
+            _FaultKind("cell", "is wrong by #", "reads too much, by this value", "N"),
+            _FaultKind("cable", "breaks", "has no tension and no weight", for_good=True),
+            _FaultKind("encoder", "jumps by #", "counts this additional length of cable", "mm", 1e-3, True),
             _FaultKind("servo", "is limited to #", "limits its force at the cable to this value", "N", 1.0, True),
             _FaultKind("servo", "trips", "has no power until the operator resets the machine", for_good=True),
             _FaultKind("load", "grows by #", "is added at the center of mass; removed if less than 0", "kg"),
@@ -46,7 +46,7 @@ KINDS: Final = MappingProxyType(
             _FaultKind("group", "is silent", "its blocks do not arrive"),
             _FaultKind("group", "repeats", "its last block arrives again and again"),
             _FaultKind("group", "doubles", "each of its blocks arrives twice"),
-            _FaultKind("group", "swaps", "of two blocks the later one arrives first"),
+            _FaultKind("group", "swaps", "two of its blocks arrive in the wrong order"),
             _FaultKind("group", "goes back", "older and older blocks arrive"),
             _FaultKind("group", "is torn", "the counters at the two ends of its blocks differ"),
             _FaultKind("group", "is foreign", "its blocks are of another program"),
@@ -126,7 +126,7 @@ def fault(text: str) -> Injected:
         if match := re.fullmatch(f"{kind.item}{number} {happens}".strip(), what, re.ASCII):
             found = match.groupdict()
             if kind.for_good and duration < math.inf:
-                raise _refused(text, f"no duration: what {kind.words or 'is pressed'} does not recover by itself")
+                raise _refused(text, "no duration, because this fault does not recover by itself")
             value = _number(text, found.get("value"), 0.0, kind.unit) * kind.scale
             return Injected(name, int(found.get("which") or 0), value, time, duration)
     raise _unknown(text, what)

@@ -37,7 +37,7 @@ class _EncoderScale:
         winch = robot.winches
         if winch is None or winch.counts_per_turn is None:
             step = "Give it in the robot file, or with robot.replace(winches=Winch(counts_per_turn=...))."
-            raise InvalidValueError("winches: counts_per_turn", "not given", "known where encoders count", step)
+            raise InvalidValueError("winches: counts_per_turn", "not given", "known if encoder counts are used", step)
         stretch = 1.0 + winch.winding_tension / robot.cables.axial_stiffness
         each = winch.gear * winch.counts_per_turn
         self.per_meter = each * stretch / (2.0 * np.pi * drum_lever(robot, length))

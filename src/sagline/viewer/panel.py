@@ -170,7 +170,7 @@ class ControlPanel:
                 gui.add_slider("Error drawn ×", 1.0, 200.0, 1.0, 1.0, hint="Position error of the orange platform.")
             )
             self._ghost = self.watched(
-                gui.add_checkbox("Straight cables beside", False, hint="Drawn where the sag of a cable is visible.")
+                gui.add_checkbox("Straight cables beside", False, hint="Drawn if the sag of a cable is visible.")
             )
 
 

@@ -36,7 +36,7 @@ from sagline.viewer.timeline import (
 
 PER_METER = 1e3  # mm per m
 MOST_EVENTS = 8  # largest number of listed events, the newest
-NO_CHOICE = "Tensions of a log are not chosen: they are those that the load cells read."
+NO_CHOICE = "Tensions of a log are not chosen: they are the readings of the load cells."
 WRONG = (State.FAULT, State.EMERGENCY)
 
 
@@ -99,9 +99,9 @@ class PlayedLog:
         rest, truth = self._pose(self.position, self.quaternion, k), self._pose(self.true, self.true_quaternion, k)
         rows = [("Time", f"{self.time[k]:.2f} s"), ("Cycle late", n(self.late[k], ".2g", "s"))]
         for name, pose, other in (
-            ("Estimated less planned", rest, self.planned[k]),
-            ("True less planned", truth, self.planned[k]),
-            ("True less estimated", truth, None if rest is None else rest.position),
+            ("Estimated minus planned", rest, self.planned[k]),
+            ("True minus planned", truth, self.planned[k]),
+            ("True minus estimated", truth, None if rest is None else rest.position),
         ):
             if pose is not None and other is not None and np.isfinite(other).all():
                 rows.append((name, n(PER_METER * float(np.linalg.norm(pose.position - other)), ".3g", "mm")))
@@ -109,7 +109,7 @@ class PlayedLog:
             rows.append(("Tensions", f"{unit.bare(np.nanmin(tension))} to {unit.written(np.nanmax(tension))}"))
         past = [event for event in self.events if event.time <= self.began + self.time[k]]
         rows += [(f"{event.time - self.began:.2f} s", f"{event.name}: {event.text}") for event in past[-MOST_EVENTS:]]
-        heads = ("cable", f"tension<br>[{unit.name}]", "less planned<br>[N]", "set less read<br>[mm]")
+        heads = ("cable", f"tension<br>[{unit.name}]", "minus planned<br>[N]", "set minus read<br>[mm]")
         columns = (
             [unit.bare(each) for each in tension],
             [number_text(each, ".1f") for each in tension - self.planned_tension[k]],
@@ -172,13 +172,13 @@ class PlayedLog:
         name, decimals, newtons = unit.name, unit.decimals, unit.newtons
         charts = [
             Chart("Tension, measured", name, decimals, cables, lambda rows: self.tension[rows] / newtons, limits),
-            Chart("Tension less the planned one", "N", 1, cables, error(self.tension, self.planned_tension, 1.0)),
-            Chart("Length set less measured", "mm", 2, cables, error(self.set_length, self.length)),
-            Chart("Estimated less planned", "mm", 2, axes, error(self.position, self.planned)),
+            Chart("Tension minus planned tension", "N", 1, cables, error(self.tension, self.planned_tension, 1.0)),
+            Chart("Set length minus measured length", "mm", 2, cables, error(self.set_length, self.length)),
+            Chart("Estimated minus planned", "mm", 2, axes, error(self.position, self.planned)),
         ]
         paths = [("planned", WANTED), ("estimated", ACTUAL)]
         if self.true is not None:
-            charts.append(Chart("True less planned", "mm", 2, axes, error(self.true, self.planned)))
+            charts.append(Chart("True minus planned", "mm", 2, axes, error(self.true, self.planned)))
             paths.append(("true", TRUTH))
         marks = tuple(
             TimelineMark(event.time - self.began, f"{event.name}: {event.text}", bad=event.kind is EventKind.FAULT)

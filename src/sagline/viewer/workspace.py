@@ -187,7 +187,7 @@ def _hull_text(found: Outline, query: WorkspaceQuery, region: Region) -> str:
 def _empty_text(found: Outline, query: WorkspaceQuery, region: Region, rough: bool) -> str:
     """HTML for an empty region, with the best position; for a rough search, with the remark that it continues."""
     if rough:
-        return "<b>Region</b> none is seen at a rough look"
+        return "<b>Region</b> none found on the coarse grid"
     reason = nearest_to(query.levels(), found.grid, region.box.low, region.box.high).reason
     return f"<b>Region</b> empty, {escape(str(query.wrenches))}<br>{escape(reason)}"
 

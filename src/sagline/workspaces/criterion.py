@@ -128,7 +128,7 @@ class Criterion:
         """Check the limit, and reject an instance of the interface itself."""
         if type(self) is Criterion:
             step = "Choose one of the criteria, MaximumSag(0.05) for instance."
-            raise InvalidValueError("Criterion()", "the interface alone", "a criterion", step)
+            raise InvalidValueError("Criterion()", "the abstract base class", "a criterion", step)
         if self._limit_range:
             value, item = getattr(self, "limit", None), f"{type(self).__name__}: limit"
             object.__setattr__(self, "limit", number(value, item, self.unit, **self._limit_range))

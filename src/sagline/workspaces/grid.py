@@ -71,12 +71,12 @@ def level_values(level: Level, positions: Array) -> Array:
         return np.zeros(0)
     values = np.asarray(level(locked(np.ascontiguousarray(positions))), dtype=np.float64)
     if values.shape != (len(positions),):
-        allowed = f"shape ({len(positions)},), a value a position"
+        allowed = f"shape ({len(positions)},), one value per position"
         raise InvalidValueError("level", f"of shape {values.shape}", allowed, "Correct the function.")
     missing = np.isnan(values)
     if missing.any():
         where = ", ".join(f"{v:.6g}" for v in positions[missing.argmax()])
-        step = "Give -inf where a position is outside for a reason of its own."
+        step = "Give -inf at a position that is outside for another reason."
         raise InvalidValueError(f"level at ({where}) m", "nan", "a number, or infinite", step)
     return values
 

@@ -34,11 +34,11 @@ class MarginStatus(Status):
     INFEASIBLE = (
         codes.MARGIN_INFEASIBLE,
         "the cables cannot balance a load of the set within their limits, whatever their sag; move the "
-        "platform, widen the limits of the limiting cable, or ask for less load",
+        "platform, widen the limits of the limiting cable, or reduce the load",
     )
     OPEN = (
         codes.MARGIN_OPEN,
-        "within the bracket that the cables' sag leaves: neither is proved; call inverse at single loads, or move the "
+        "zero is within the bracket of the margin, so nothing is proved; call inverse at single loads, or move the "
         "platform by a millimeter",
     )
     SINGULAR = (

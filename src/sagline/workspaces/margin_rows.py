@@ -106,7 +106,7 @@ class MarginRows:
         rows = np.ascontiguousarray(poses, dtype=np.float64).view()
         count = len(rows)
         if count % self.robot_count:
-            step = f"Give every one of the {self.robot_count} robots as many poses."
+            step = f"Give every one of the {self.robot_count} robots the same number of poses."
             raise InvalidValueError("poses", f"{count} of them", f"a multiple of {self.robot_count}", step)
         numbers, counters = memory_for(self.cable_count)
         memory = np.empty(numbers.size + FACET_SIZE), counters, np.empty(self.cable_count, dtype=np.int8)

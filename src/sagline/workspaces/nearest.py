@@ -135,11 +135,11 @@ def _reason(levels: Levels, pose: Pose, details: Details) -> tuple[tuple[int, ..
     here = pose.position[None]
     bare = levels.margins_of(NO_LOAD, here, details.rotation)
     if not bare[0] > 0.0:
-        return cables, f"{at} the weight alone is too much by {n(-margin, '.3g', 'N')}{_of(cables)}"
+        return cables, f"{at} the weight alone exceeds the limits by {n(-margin, '.3g', 'N')}{_of(cables)}"
     share = 100.0 * float(_share(bare, details.margin)[0])
-    text = f"{at} the cables bear {n(share, '.2g')} % of the loads, {n(-margin, '.3g', 'N')} are missing{_of(cables)}"
+    text = f"{at} the cables bear {n(share, '.2g')} % of the loads; {n(-margin, '.3g', 'N')} are missing{_of(cables)}"
     if levels.margins_of(_moments_of(levels.wrenches), here, details.rotation)[0] < 0.0:
-        text += "; their moments alone are too much there"
+        text += "; the moments of the loads alone are infeasible there"
     return cables, text
 
 

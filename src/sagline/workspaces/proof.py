@@ -31,9 +31,9 @@ from sagline.workspaces.wrench_sets import WrenchSet, load_of
 class ProofVerdict(Status):
     """Verdict on a box of poses, or on a part of one."""
 
-    OPEN = OPEN, "neither is proved for the whole box: see the shares; a longer budget decides more"
+    OPEN = OPEN, "the whole box is proved neither inside nor outside: see the shares; a longer budget decides more"
     PROVED_INSIDE = INSIDE, "at every pose every load is balanced by tensions within the limits"
-    PROVED_OUTSIDE = OUTSIDE, "at no position is every load balanced by tensions within the limits"
+    PROVED_OUTSIDE = OUTSIDE, "at every position, at least one load cannot be balanced by tensions within the limits"
 
 
 BLOCK: Final = 1 << 11  # boxes per block, some hundredths of a second; interrupts are handled between blocks
@@ -324,7 +324,7 @@ def prove(
     check_tilt(robot, instance(box, PoseBox, "box").tilt, "box: tilt")
     if box.tilt > 0.0 and load.accelerations[1] > 0.0:
         step = "Give their moments as WrenchBox(moment=...), or prove the level poses."
-        raise InvalidValueError("wrenches: angular accelerations", "given", "none where the box is tilted", step)
+        raise InvalidValueError("wrenches: angular accelerations", "given", "none if the box is tilted", step)
     seconds = number(budget, "budget", "s", above=0.0)
     least = 0.0 if smallest is None else number(smallest, "smallest", "m", above=0.0)
     report = callback(progress, "progress")

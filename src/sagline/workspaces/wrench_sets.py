@@ -195,7 +195,7 @@ class WrenchPolytope(WrenchSet):
         """
         given = checked(corners, "corners", "N, N m", shape=(6,))
         if given.ndim != 2 or not len(given):
-            step = "Give a wrench a row: force x, y, z, then moment x, y, z."
+            step = "Give one wrench per row: force x, y, z, then moment x, y, z."
             raise InvalidValueError("corners", f"of shape {given.shape}", "shape (C, 6), C >= 1", step)
         self._fill(corners=given, sizes=np.array([len(given)], dtype=np.int64))
 

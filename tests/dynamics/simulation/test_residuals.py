@@ -35,7 +35,7 @@ def test_the_page_tells_what_is_left(name: str) -> None:
 
 @extended
 def test_the_page_tells_what_straight_lengths_between_samples_leave() -> None:
-    told = f"that alone leaves {1e3 * residual('plan'):.2f} micrometers at {1000:,} samples a second"
+    told = f"causes a residual of {1e3 * residual('plan'):.2f} micrometers at {1000:,} samples per second"
     assert told in " ".join(PAGE.read_text(encoding="utf-8").split())
 
 

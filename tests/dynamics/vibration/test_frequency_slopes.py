@@ -201,7 +201,7 @@ def test_what_is_refused() -> None:
 def test_cables_over_pulleys_are_refused() -> None:
     over = one_pose(sl.load_robot("ipanema-2-pulleys"), sl.Catenary())
     for given in (over, sl.vibration(over, up_to=1.0)):
-        with refused("state", "one of cables with something behind them"):
+        with refused("state", "one with pulleys or dead length"):
             sl.frequency_slopes(given)
 
 

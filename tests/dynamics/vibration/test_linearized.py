@@ -159,12 +159,12 @@ def test_names_and_units_go_with_the_columns() -> None:
 def test_what_is_refused() -> None:
     state = tilted()
     plan = sl.inverse(COGIRO, sl.Pose([[0, 0, 1.5], [0, 0, 90.0]], np.tile(np.eye(3), (2, 1, 1))))
-    unbounded = '0 with inputs="lengths", at whose steps tensions would be infinite'
+    unbounded = '0 with inputs="lengths": a step of a length would cause infinite tensions'
     cases: tuple[tuple[tuple[Any, ...], *tuple[str, ...]], ...] = (
         ((plan.state,), "state", "a batch of 2", "a single state"),
         ((plan.state[1],), "state", "one without lengths or stiffness", "a state that was solved"),
         ((plan,), "state", "a Plan", "an Equilibrium", "Give plan.state."),
-        ((state, sl.Damping(air_damping=0.1)), "air_damping", "0.1 N s/m^2", "0, for cables without mass"),
+        ((state, sl.Damping(air_damping=0.1)), "air_damping", "0.1 N s/m^2", "0 for massless cables"),
         ((state, sl.Damping(1e-3)), "loss_time", "0.001 s", unbounded),
         ((state, sl.Damping(), "currents"), "inputs", "'currents'", "lengths, speeds"),
     )
@@ -175,5 +175,5 @@ def test_what_is_refused() -> None:
 
 @extended
 def test_losses_of_cables_over_pulleys_are_refused() -> None:
-    with refused("loss_time", "0.001 s", "0 where cables run over pulleys or have dead length"):
+    with refused("loss_time", "0.001 s", "0 for cables with pulleys or dead length"):
         sl.linearized(one_pose(OVER_PULLEYS, sl.Catenary()), sl.Damping(1e-3), "speeds")

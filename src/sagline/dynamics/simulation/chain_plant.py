@@ -218,7 +218,7 @@ class ChainPlant(Plant):
         cable, how = int(self.cables[int(self.counters[FAILED]) - 1]), self.counters[ends.ENDED]
         if how == ends.GROWN:
             return super().failure(time, step)
-        value = f"{'too long' if how == ends.LONG else 'all but wound in'} at {time:.6g} s"
+        value = f"{'too long' if how == ends.LONG else 'almost completely wound in'} at {time:.6g} s"
         element = self._chains[0][int(self.counters[FAILED]) - 1, c.ELEMENT]
         low, high = (ends.FEWEST + 1) * element, self._chains[1].shape[2] * element
         advice = 'Correct the lengths, give more nodes, or cable_mass="none".'
@@ -254,7 +254,7 @@ def check_lumped(given: InitialConditions) -> None:
     light = np.flatnonzero(~(given.robot.cables.linear_density > 0.0))
     if light.size:
         step = 'Give a density, or cable_mass="none".'
-        raise InvalidValueError(f"cable {light[0]}: linear_density", "0 kg/m", "> 0 kg/m where it has mass", step)
+        raise InvalidValueError(f"cable {light[0]}: linear_density", "0 kg/m", "> 0 kg/m if it has mass", step)
 
 
 def wave_frequency(given: InitialConditions, nodes: int) -> float:

@@ -136,11 +136,13 @@ def checked_time_table(given: Any, item: str, unit: str, columns: int, begin: fl
         raise InvalidValueError(f"{item}: {error.item}", error.value, error.allowed, error.next_step) from None
     rows = checked(given[1], item, unit, shape=(None, columns))
     if rows.shape != (time.size, columns):
-        allowed, step = f"shape ({time.size}, {columns})", "Give one row a time, or one row alone."
+        allowed, step = f"shape ({time.size}, {columns})", "Give one row per time, or a single row."
         raise InvalidValueError(item, f"of shape {rows.shape}", allowed, step)
     if time[0] > begin:
         allowed = f"a time <= {begin:g} s, the start"
-        raise InvalidValueError(f"{item}: time[0]", f"{time[0]:g} s", allowed, "Begin the table where the run begins.")
+        raise InvalidValueError(
+            f"{item}: time[0]", f"{time[0]:g} s", allowed, "Begin the table at the start of the simulation."
+        )
     return TimeTable.linear(time, rows) if time.size > 1 else TimeTable.constant(rows[0])
 
 
@@ -203,9 +205,9 @@ def _from_plan(plan: Plan) -> InitialConditions:
         k = int(lost[0])
         why = PoseStatus(plan.status[k]).text
         step = "Plan a path that is feasible throughout."
-        raise InvalidValueError(f"start: sample {k}, {path.time[k]:g} s", f"without an answer ({why})", "solved", step)
+        raise InvalidValueError(f"start: sample {k}, {path.time[k]:g} s", f"without a solution ({why})", "solved", step)
     if plan.state.contact is not None and differs(robot, plan.state.contact.winding):
-        step = "Plan without winding: a simulation knows no friction of pulleys."
+        step = "Plan without winding: a simulation neglects friction of pulleys."
         raise InvalidValueError("start: winding", "given", "None", step)
     inertial = inertial_wrench(robot, path.pose, path.twist, path.twist_rate)
     given = plan.state.wrench - inertial
@@ -235,7 +237,7 @@ def _from_equilibrium(state: Equilibrium, table: Any) -> InitialConditions:
     robot, length = state.one_robot, state.unstrained_length
     if np.isnan(length).any():
         step = "Give a pose that is feasible."
-        raise InvalidValueError("start", "a state without lengths", "one with an answer", step)
+        raise InvalidValueError("start", "a state without lengths", "one with a solution", step)
     tension, end = TimeTable.constant(np.nan_to_num(drum_tension(state))), 0.0
     lengths = TimeTable.constant(length)
     if table is not None:

@@ -186,7 +186,7 @@ def _check(given: InitialConditions) -> None:
         raise InvalidValueError("start", "a robot with pulleys or dead length", 'none for cable_mass="modal"', step)
     if given.model.code != codes.CATENARY:
         step = 'Plan with Catenary(), or give cable_mass="none".'
-        raise InvalidValueError("start: model", type(given.model).__name__, "Catenary() where cables have mass", step)
+        raise InvalidValueError("start: model", type(given.model).__name__, "Catenary() for cables with mass", step)
     if np.abs(given.twist).max() > 0.0 or np.abs(given.rate).max() > 0.0:
         step = 'Give plan.state[0], or cable_mass="lumped".'
         raise InvalidValueError("start", "in motion", 'at rest for cable_mass="modal"', step)
@@ -197,7 +197,7 @@ def _check_small_changes(most: Array, state: Equilibrium) -> None:
     if (share > SMALL).any():
         i = int(np.argmax(share))
         value, allowed = f"{most[i]:.3g} m from its own", f'<= {SMALL * state.free_length[i]:.3g} m for "modal"'
-        step = 'Give cable_mass="lumped", which knows large motions.'
+        step = 'Give cable_mass="lumped", which is valid for large motions.'
         raise InvalidValueError(f"unstrained_length: cable {i}", value, allowed, step)
 
 

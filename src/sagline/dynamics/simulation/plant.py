@@ -207,5 +207,5 @@ def _principal_axes(robot: Robot, pose: Pose) -> tuple[Array, Array]:
 
 def energy_error(step: float, time: float, cable: int) -> InvalidValueError:
     """Error for a run with energy drift; step and time in s."""
-    value = f"{step:g} s, at which energy grows or fades by itself: at {time:.6g} s most of it is in cable {cable}"
-    return InvalidValueError("step", value, "one that keeps the energy", f"Give step={0.2 * step:.3g}.")
+    value = f"{step:g} s, with which the energy grows or fades without a cause: at {time:.6g} s mostly in cable {cable}"
+    return InvalidValueError("step", value, "a step that keeps the energy", f"Give step={0.2 * step:.3g}.")

@@ -191,7 +191,7 @@ def _infeasible_error(item: str, plan: Plan) -> InvalidValueError:
     return InvalidValueError(
         f"the move {item}",
         value,
-        "tensions within the limits less the margin",
+        "tensions within the limits reduced by the margin",
         "Give a smaller margin, or other poses.",
     )
 

@@ -136,7 +136,7 @@ def _arc_lengths(time: Array, twist: Array, twist_rate: Array) -> Array:
         k = int(np.argmax(inside)) + 1
         raise InvalidValueError(
             f"the path at {time[k]:g} s",
-            "without speed in the middle of a curve, where it turns around",
+            "with zero speed in the middle of a curve",
             "moves along a straight line, or without stops",
             "Make it of two paths, each from rest to rest.",
         )

@@ -203,7 +203,7 @@ def _several(frequency: ArrayLike, option: ArrayLike, name: str, make: Callable[
         raise InvalidValueError(name, f"{options.max():g}", ">= 0, < 1", "Give a share, 0.05 for 5 %.")
     shape = broadcast_shape(f"frequency and {name}", frequencies.shape, options.shape, (1,))
     if len(shape) > 1 or shape == (0,):
-        step = "Give what is to be left at rest."
+        step = "Give the frequencies to suppress."
         raise InvalidValueError("frequency", f"of shape {frequencies.shape}", "one number, or shape (F,), F >= 1", step)
     each = zip(np.broadcast_to(frequencies, shape), np.broadcast_to(options, shape), strict=True)
     return reduce(mul, (make(float(f), float(o)) for f, o in each))

@@ -150,7 +150,7 @@ def check_counts(counts: NDArray[np.int64], frequency: Array) -> None:
         value = f"{frequency[high[0]]:g} Hz, which would cut a cable into more than {collocation.MOST_ELEMENTS:,} waves"
         raise InvalidValueError("frequency", value, "a lower one", "Give one nearer to the robot's own.")
     if (lost := np.flatnonzero((counts < 0).any(axis=(0, 2, 3)))).size:
-        text = f"at {frequency[lost[0]]:g} Hz a cable has no elements whose joints are clear of its nodes"
+        text = f"at {frequency[lost[0]]:g} Hz a cable cannot be divided into elements with joints away from its nodes"
         raise SaglineError(f"{text}. Ask for another frequency, and report the robot and its pose.")
 
 

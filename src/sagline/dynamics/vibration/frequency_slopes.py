@@ -125,7 +125,7 @@ def _with_cable_mass(vibration: Vibration, together: float) -> FrequencySlopes:
 def _rest(state: Equilibrium) -> StateSlopes:
     check_model(single_state(state))
     if state.contact is not None:
-        value, allowed = "one of cables with something behind them", "cables that start at their frame anchors"
+        value, allowed = "one with pulleys or dead length", "cables that start at their frame anchors"
         raise InvalidValueError("state", value, allowed, "Take the robot without winches: robot.replace(winches=None).")
     check_solved(state)
     return state_slopes(state)

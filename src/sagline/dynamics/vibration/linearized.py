@@ -129,15 +129,15 @@ def _check(state: Equilibrium, damping: Damping, inputs: Inputs) -> None:
     single_state(state)
     if damping.air_damping:
         value = f"{damping.air_damping:g} N s/m^2"
-        raise InvalidValueError("air_damping", value, "0, for cables without mass", "See vibration, or leave it out.")
+        raise InvalidValueError("air_damping", value, "0 for massless cables", "See vibration, or leave it out.")
     if not damping.loss_time:
         return
     item, value = "loss_time", f"{damping.loss_time:g} s"
     if state.contact is not None:
-        allowed, step = "0 where cables run over pulleys or have dead length", "Give modal_damping instead."
+        allowed, step = "0 for cables with pulleys or dead length", "Give modal_damping instead."
         raise InvalidValueError(item, value, allowed, step)
     if inputs == "lengths":
-        allowed = '0 with inputs="lengths", at whose steps tensions would be infinite'
+        allowed = '0 with inputs="lengths": a step of a length would cause infinite tensions'
         raise InvalidValueError(item, value, allowed, 'Take inputs="speeds", or give modal_damping.')
 
 

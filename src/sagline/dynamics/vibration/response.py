@@ -97,8 +97,8 @@ def frequency_response(state: Equilibrium, frequency: ArrayLike, damping: Dampin
     check_solved(state)
     check_mode_count(modes_below(model, 0, max(float(given.max()), LOWEST)), float(given.max()), "frequency")
     if massless_modes(model, 0)[1].shape[1]:
-        step = "Simulate it; vibration() names the directions in which it leaves."
-        raise InvalidValueError("state", "an unstable equilibrium", "a stable one, which has an answer", step)
+        step = "Simulate it; vibration() names the unstable directions."
+        raise InvalidValueError("state", "an unstable equilibrium", "a stable one, which has a response", step)
     slopes = cable_slopes(state)
     receptance = Receptance(model, slopes.matrix, slopes.blocks, known)
     compliance, still = receptance.by_modes(given, receptance.fixed_end_modes(float(given.max())))

@@ -44,8 +44,8 @@ class VibrationStatus(IntEnum):
 
 
 _TEXTS = {
-    VibrationStatus.SOLVED: "all modes up to the frequency asked for are found",
-    VibrationStatus.UNSTABLE: "the equilibrium is unstable: it leaves in its negative_directions; simulate it",
+    VibrationStatus.SOLVED: "all modes up to the requested frequency are found",
+    VibrationStatus.UNSTABLE: "the equilibrium is unstable along its negative_directions; simulate the motion",
     VibrationStatus.NO_LENGTHS: "the pose has no solution: see the status of the plan",
     VibrationStatus.FOLDED: "a cable is folded or slack and has no linear vibration: its index is in slack_cables; "
     "the modes are those of the others",

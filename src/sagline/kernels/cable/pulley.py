@@ -180,7 +180,7 @@ def _length_behind_by(
     """Derivatives of wrap angle and unstrained length behind P at a fixed force on the platform end.
 
     weight: weight per length [N/m]; stiffness: EA [N]; free: unstrained length of the free span [m]; change: changes of
-    the parameters, of which the length has no effect here; grown: increase of the free span's unstrained length.
+    the parameters (the length has no effect here); grown: increase of the free span's unstrained length.
     Returns the changes of psi and of the length behind P.
     """
     radius, entry, dead, rise = pulley

@@ -230,7 +230,7 @@ def decide_feasibility(
     n, m = demand.matrix.shape
     tops, rest = vector(memory, m)  # largest contribution of each cable along a direction [N]
     waiting, rest = block(rest, DEPTH, RANGE_ROWS * m)
-    ranges = waiting.reshape((DEPTH, RANGE_ROWS, m))  # waiting ranges, of which the last one is examined next
+    ranges = waiting.reshape((DEPTH, RANGE_ROWS, m))  # waiting ranges; the last one is examined next
     sag_force, rest = vector(rest, m)
     tau, rest = block(rest, 3, max(m, n))
     trial = TensionChange(tau[0, :m], sag_force, tau[1, :n], tau[2, :n])

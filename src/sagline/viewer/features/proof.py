@@ -226,7 +226,9 @@ class ProofFeature(Feature):
         self._page, self._nodes = page, Nodes(page.server.scene)
         with page.panel.readings.add_tab("Proof"):
             self._wanted: Any = page.server.gui.add_checkbox(
-                "Forces in the scene", False, hint="As arrows at the platform, the longest always of the same length."
+                "Forces in the scene",
+                False,
+                hint="Arrows at the platform; the longest arrow always has the same length.",
             )
             self._html = page.server.gui.add_html("")
         page.refresh_on(self._wanted)

@@ -190,7 +190,7 @@ class StateFeature(Feature):
             return lambda: self._page.go(target)
         if player.played is None:
             step = "Open it with the same run: sagline view ROBOT RUN."
-            raise InvalidValueError("the link", "with a time of a run", "a pose, where nothing is played", step)
+            raise InvalidValueError("the link", "with a time of a run", "a pose, because nothing is played", step)
         moment = float(numbers_of(time or "", "the time of the link", "s", 1, player.clock.duration)[0])
         return lambda: player.scrub_to(max(moment, 0.0))
 

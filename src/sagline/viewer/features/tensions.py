@@ -245,7 +245,7 @@ def _key(snapshot: Snapshot, marks: tuple[_MethodMark, ...], back: str) -> str:
     remark = ""
     if by_hand:
         again = f" <button {chosen_by(SHARING, back)}>Back to {escape(back)}</button>" if back else ""
-        kept = "at other poses the tensions stay as close to these as force balance and limits allow"
+        kept = "at other poses, the feasible tensions that are nearest to these are used"
         remark = f'<div class="hand"><b>{BY_HAND.capitalize()}</b>: {kept}.{again}</div>'
     return html_block(f'{remark}<div class="ways">{"".join(parts)}</div>')
 
