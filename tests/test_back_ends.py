@@ -121,6 +121,18 @@ def test_too_few_arguments_are_refused() -> None:
         batch_end(*ends()[:-1])
 
 
+def test_arrays_that_state_the_byte_order_of_the_processor_are_taken() -> None:
+    """Such an array comes from unpickled data, in a sweep for instance."""
+    expected = ends()
+    stated = [each.astype(each.dtype.newbyteorder(sys.byteorder)) for each in ends()]
+    assert stated[0].data.format != expected[0].data.format
+    batch_end(*expected)
+    batch_end(*stated)
+    assert np.any(stated[5])
+    for one, other in zip(stated, expected, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
 def test_a_bound_entry_sees_new_values_of_its_arrays() -> None:
     arguments = ends()
     call = bound(batch_end, *arguments)

@@ -38,8 +38,14 @@ typedef struct {
 
 enum { CONTIGUOUS_WITH_FORMAT = 0x20 | 0x10 | 0x08 | 0x04 }; /* PyBUF_C_CONTIGUOUS | PyBUF_FORMAT */
 
+static bool is_little_endian(void) {
+    const int32_t one = 1;
+    return *(const char *)&one == 1;
+}
+
 static bool is_element(const Buffer *buffer, char kind) {
     const char *format = buffer->format ? buffer->format : "B";
+    format += *format == (is_little_endian() ? '<' : '>'); /* numbers of a stated byte order, that of the processor */
     switch (kind) {
     case 'D': return format[0] == 'd' && format[1] == 0;
     case 'L': return (format[0] == 'l' || format[0] == 'q') && format[1] == 0 && buffer->itemsize == 8;
