@@ -21,10 +21,8 @@ from hypothesis import settings, strategies
 from numba.core import event
 from typer.main import get_command
 
-from sagline.share.calls import MODULE
 from tests.effort import slowness
 from tests.tiers import FILE_LIMIT, TEST_LIMIT
-from tools.translate import portable, wasm
 
 # numba compiles the single kernels that the tests in these folders call; the others run the compiled library
 INNER: Final = re.compile(r"(^|/)tests/(kernels|translate)(/|$)")
@@ -48,7 +46,9 @@ def pytest_configure(config: pytest.Config) -> None:
     if first_tier_alone(config):
         settings.load_profile("first tier")
     if not hasattr(config, "workerinput"):
-        if not MODULE.is_file():
+        from tools.translate import portable, wasm  # imports kernels, whose back end is decided above
+
+        if not (ROOT / wasm.MODULE).is_file():
             wasm.build(ROOT)
         if portable.is_stale(ROOT):
             portable.build(ROOT)

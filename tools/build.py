@@ -58,11 +58,11 @@ def build() -> None:
     for folder in (FOLDER, stamp.parent):
         folder.mkdir(exist_ok=True)
     stamp.unlink(missing_ok=True)
+    portable.build(ROOT)
     with tempfile.TemporaryDirectory() as temporary:
         source = Path(temporary) / "kernels.c"
         source.write_text(library_text(digest_of_kernels()), encoding="utf-8")
         _compile(source, files)
-    portable.build(ROOT)
     if find_spec("ziglang"):
         wasm.build(ROOT)
     stamp.write_text(state, encoding="utf-8")
