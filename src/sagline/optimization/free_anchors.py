@@ -80,7 +80,10 @@ def _mirrored(symmetry: str, anchors: Array, along: Array, bounds: tuple[Array, 
         room = float(np.abs(away[side != 0.0]).min(initial=np.inf))
         if inward >= room:
             name = "xyz"[axis]
-            value, allowed = f"up to {inward:g} m inward", f"< {room:g} m, because the plane {name} = {plane:g} m is"
+            value, allowed = (
+                f"up to {inward:g} m inward",
+                f"< {room:g} m, the distance to the plane {name} = {plane:g} m",
+            )
             step = f"Anchors would pass through those that mirror them: narrow the bounds along {name}."
             raise InvalidValueError(f"{item}: the shift along {name}", value, allowed, step)
     return shifts

@@ -99,7 +99,7 @@ class PlayedPlan:
         lines = [f"plan = {source}", f"index = {index}"]
         lines += ["robot, pose = plan.state.one_robot, plan.state.pose[index]", "tension = plan.chord_tension[index]"]
         if self.plan.feasible[index]:
-            lines.append("rest = sl.confirm(plan).pose[index]  # where it really rests")
+            lines.append("rest = sl.confirm(plan).pose[index]  # true equilibrium")
         return lines
 
     def track(self) -> Track:

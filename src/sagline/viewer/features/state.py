@@ -242,7 +242,7 @@ def _planned(snapshot: Snapshot, view: View) -> list[str]:
         *("plan = sl.inverse(", "    robot,", "    pose,"),
         *(f"    {argument}," for argument in arguments),
         *(")", "tension = plan.chord_tension"),
-        *([] if snapshot.rest is None else ["rest = sl.confirm(plan).pose  # where it really rests"]),
+        *([] if snapshot.rest is None else ["rest = sl.confirm(plan).pose  # true equilibrium"]),
     ]
 
 
