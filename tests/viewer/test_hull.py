@@ -49,7 +49,7 @@ def test_a_hull_that_is_empty_says_what_is_nearest(monkeypatch: pytest.MonkeyPat
     assert found.by_cable == []
     assert "empty" in found.text
     assert "are missing" in found.text
-    assert "rough" in region_hull(asked, True, lambda *_: None).text
+    assert "coarse" in region_hull(asked, True, lambda *_: None).text
 
 
 @extended
