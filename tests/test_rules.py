@@ -98,8 +98,8 @@ def stop():
     raise ValueError(f"the dead cable of {name} hangs\\nbeforehand")
 '''
     found = [(line, words) for text in prose.python(code) for line, words, _ in prose.faults(text)]
-    expected = [(3, "What"), (3, "of who"), (4, "settled"), (5, "dead cable"), (5, "hangs"), (6, "beforehand")]
-    assert sorted(found) == expected
+    first = [(3, "What"), (3, "lets go"), (3, "of who"), (4, "settled")]
+    assert sorted(found) == [*first, (5, "dead cable"), (5, "hangs"), (6, "beforehand")]
     text = "Smallest is the first; `told` and $told$ are skipped.\n\n```sh\ntold\n```\n\nAll is\nanew."
     assert [each[:2] for part in prose.page(text) for each in prose.faults(part)] == [(1, "Smallest is"), (8, "anew")]
 

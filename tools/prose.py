@@ -69,7 +69,15 @@ WORDS: Final = {  # pattern, without regard to case -> suggestion
     r"(?<!there )(is|are) none of": "is not one of",
     r"(?:^|(?<=[.;:] ))(?-i:[A-Z])[a-z]+(?:ed|est|wn|ost|eft) (is|are|was|were)": "subject first",
 }
+INSIDE: Final = {  # as WORDS, for docstrings and comments of modules only
+    r"(by|every|of|for|after) so (many|much)": "name the number",
+    r"whatever": "independent of",
+    r"as of(?= `)": "the same as that of",
+    r"at hand": "available",
+    r"lets? go": "release",
+}
 FORBIDDEN: Final = [(re.compile(rf"\b(?:{pattern})\b", re.I | re.M), words) for pattern, words in WORDS.items()]
+COMMENTED: Final = [(re.compile(rf"\b(?:{pattern})\b", re.I | re.M), words) for pattern, words in INSIDE.items()]
 FIRST: Final = [(re.compile(rf"\s*(?:{pattern})\b"), words) for pattern, words in OPENINGS.items()]
 SKIPPED: Final = re.compile(
     r"`[^`]*`|\$\$[^$]*\$\$|\$[^$]*\$|\]\([^)]*\)|<[^>]*>|https?://\S+|^\s*(>>>|\.\.\.) .*$|^ {4,}\w+(?=: )",
@@ -84,6 +92,7 @@ class Text(NamedTuple):
     line: int
     text: str
     docstring: bool = False
+    comment: bool = False
 
 
 def page(text: str) -> Iterator[Text]:
@@ -115,7 +124,7 @@ def python(source: str) -> Iterator[Text]:
                 yield Text(node.lineno, text, id(node) in docstrings)
     for token in tokenize.generate_tokens(io.StringIO(source).readline):
         if token.type == tokenize.COMMENT:
-            yield Text(token.start[0], token.string)
+            yield Text(token.start[0], token.string, comment=True)
 
 
 def prose(file: Path) -> Iterator[Text]:
@@ -131,7 +140,8 @@ def faults(text: Text) -> Iterator[tuple[int, str, str]]:
     """Line, words and suggestion of each forbidden opening and word of a text."""
     read = SKIPPED.sub(lambda found: "`" + "\n" * found[0].count("\n"), text.text)
     found = [(match, words) for pattern, words in FIRST if text.docstring and (match := pattern.match(read))]
-    found += [(match, words) for pattern, words in FORBIDDEN for match in pattern.finditer(read)]
+    forbidden = FORBIDDEN + COMMENTED if text.docstring or text.comment else FORBIDDEN
+    found += [(match, words) for pattern, words in forbidden for match in pattern.finditer(read)]
     for match, words in found:
         yield text.line + read.count("\n", 0, match.start()), match[0].strip(), words
 

@@ -45,7 +45,7 @@ class TenPoses:
     """The ten poses, their errors, and possible explanations."""
 
     table: Table2
-    plan: sl.Plan  # the prototype's plan for them, with the empirical model
+    plan: sl.Plan  # the prototype's plan for the ten poses, with the empirical model
     home: sl.Plan  # the plan of its home pose
     model_error: Array  # error of the empirical model at the ten poses [m], shape (10, 3)
     height_line: FittedLine  # least-squares line of the measured vertical error over the height of the pose

@@ -103,7 +103,7 @@ class RefusedError(SaglineError):
         self.next_step = next_step
 
     def __str__(self) -> str:
-        """One line: what, reason, next step."""
+        """One line: request, reason, next step."""
         what, reason, next_step = shortened(
             (self.what, self.reason, self.next_step), room=MOST - len(" is refused: . ")
         )
