@@ -8,8 +8,8 @@ const { module: text, machine, rows, repeat } = JSON.parse(readFileSync(0, "utf-
 
 /** Memory of the kernels after each call, for each row. */
 async function images() {
-  const of = await kernels.made(text, machine.kernels), place = machine.kernels.arrays.pose[1], found = [];
-  const memory = new Uint8Array(of.pose.buffer, of.pose.byteOffset - place, machine.kernels.size);
+  const of = await kernels.made(text, machine.kernels), found = [], [[array, [, place]]] = Object.entries(machine.kernels.arrays);
+  const memory = new Uint8Array(of[array].buffer, of[array].byteOffset - place, machine.kernels.size);
   for (const row of rows) {
     for (const [name, numbers] of Object.entries(row)) of[name].set(numbers);
     for (const name of Object.keys(machine.kernels.calls)) {

@@ -1,29 +1,53 @@
-"""Calls of entries, recorded while the package runs, and repeated in C."""
+"""Calls of entries, recorded while the package runs, and repeated in other back ends."""
 
 from __future__ import annotations
 
 import ctypes
 import importlib
+import os
 import pkgutil
 import sys
-from collections.abc import Iterator
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from functools import partial
+from functools import cache, partial
+from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, NamedTuple
+from unittest.mock import patch
 
 import numpy as np
 
+import sagline
 from sagline.kernels import jit
+from sagline.share.calls import described_calls
+from tests.share.programs import in_node
 from tests.translate.library import Entry, copied
+from tools.translate import wasm
 from tools.translate.signatures import SIGNATURES, functions
 from tools.translate.types import NONE, ArrayType, Scalar, Type, plain_tuple
 
-CALLERS = ("statics", "tension", "kinematics", "calibration", "dynamics", "interference", "workspaces", "cables")
+CALLERS = (
+    "article",
+    "cables",
+    "calibration",
+    "dynamics",
+    "interference",
+    "kinematics",
+    "motion",
+    "optimization",
+    "robot",
+    "share",
+    "statics",
+    "tension",
+    "workspaces",
+)
 
 
 class Call(NamedTuple):
-    """A call of an entry: its name in C, the types of its arguments, and copies of them before and after."""
+    """A call of an entry: its name, that in C, the types of its arguments, and copies of them before and after."""
 
+    name: str
     symbol: str
     types: tuple[Type, ...]
     before: tuple[Any, ...]
@@ -36,12 +60,28 @@ class Call(NamedTuple):
         return None if self.result is None else Scalar.BOOL if isinstance(self.result, bool) else Scalar.INT
 
 
-class Difference(NamedTuple):
-    """Numbers that were compared, how many are not equal to the last bit, and the largest relative difference."""
+Run = Callable[[Call, tuple[Any, ...]], Any]  # runs a call with arguments, which it writes to
 
-    compared: int
-    different: int
-    largest: float
+
+class Difference(NamedTuple):
+    """Comparison of calls.
+
+    Attributes:
+        calls: Number of calls.
+        compared: Numbers that were written.
+        different: Numbers that are not equal to the last bit.
+        largest: Largest difference, relative for numbers above 1; infinite if a code, an integer or NaN differs.
+    """
+
+    calls: int = 0
+    compared: int = 0
+    different: int = 0
+    largest: float = 0.0
+
+    def joined(self, other: Difference) -> Difference:
+        """Both together."""
+        calls, compared, different = (one + two for one, two in zip(self[:3], other[:3], strict=True))
+        return Difference(calls, compared, different, max(self.largest, other.largest))
 
 
 def arrays_of(value: Any) -> Iterator[np.ndarray[Any, Any]]:
@@ -74,32 +114,42 @@ def signature_of(name: str, arguments: tuple[Any, ...]) -> tuple[str, tuple[Type
     raise AssertionError(f"tools/translate/signatures.py has no set of types for these arguments of {name}")
 
 
-@contextmanager
-def recorded() -> Iterator[list[Call]]:
-    """Record the calls of all entries from outside the kernels."""
+@cache
+def load_callers() -> None:
+    """Load all modules that may call entries."""
     for folder in CALLERS:
         package = importlib.import_module(f"sagline.{folder}")
         for each in pkgutil.walk_packages(package.__path__, f"sagline.{folder}."):
             importlib.import_module(each.name)
-    calls: list[Call] = []
-    entries = {name: getattr(importlib.import_module(each.__module__), name) for name, each in functions().items()}
 
-    def listener(name: str, compiled: Any) -> Any:
+
+@contextmanager
+def recorded() -> Iterator[list[Call]]:
+    """Record the calls of all entries from outside the kernels."""
+    load_callers()
+    calls: list[Call] = []
+    entries: dict[int, tuple[str, Any]] = {}  # by their identity and that of their listeners
+
+    def listener(name: str, entry: Any) -> Any:
         def call(*arguments: Any) -> Any:
             before = copied(arguments)
-            result = compiled(*arguments)
-            calls.append(Call(*signature_of(name, arguments), before, copied(arguments), result))
+            result = entry(*arguments)
+            calls.append(Call(name, *signature_of(name, arguments), before, copied(arguments), result))
             return result
 
         return call
 
-    names = {id(entry): name for name, entry in entries.items()}
-
     def bound(entry: Any, *arguments: Any, numbers: int = 0) -> Any:
-        return partial(listener(names[id(entry)], entry), *arguments[: len(arguments) - numbers])
+        return partial(listener(*entries[id(entry)]), *arguments[: len(arguments) - numbers])
 
-    instead: dict[int, Any] = {id(entry): listener(name, entry) for name, entry in entries.items()}
-    instead[id(jit.bound)] = bound
+    instead: dict[int, Any] = {id(jit.bound): bound}
+    for name, function in functions().items():
+        module = sys.modules[function.__module__]
+        entry = getattr(module, name)
+        instead[id(entry)] = listener(name, entry)
+        instead.setdefault(id(module), SimpleNamespace(**vars(module)))
+        setattr(instead[id(module)], name, instead[id(entry)])
+        entries[id(entry)] = entries[id(instead[id(entry)])] = name, entry
     places = [(owner, name, value) for owner in _owners() for name, value in list(vars(owner).items())]
     places = [each for each in places if id(getattr(each[2], "__func__", each[2])) in instead]
     for owner, name, value in places:
@@ -120,26 +170,116 @@ def _owners() -> Iterator[Any]:
             yield from (each for each in vars(module).values() if isinstance(each, type) and each.__module__ == key)
 
 
-def difference(expected: Any, found: Any) -> Difference:
-    """Compare all arrays of two sets of arguments; codes and integers that differ count as infinite."""
+def difference(before: Any, expected: Any, found: Any) -> Difference:
+    """Compare what two back ends wrote to the arrays of one call."""
     count, different, largest = 0, 0, 0.0
-    for one, other in zip(arrays_of(expected), arrays_of(found), strict=True):
-        with np.errstate(invalid="ignore"):  # memory that nobody has written
-            unequal = ~((one == other) | ((one != one) & (other != other)))
-        count += one.size
+    for old, one, other in zip(*map(arrays_of, (before, expected, found)), strict=True):
+        unequal = ~equal(one, other)
+        count += int((unequal | ~equal(old, one)).sum())
         different += int(unequal.sum())
-        if one.dtype.kind not in "fc":
-            largest = np.inf if unequal.any() else largest
-        elif unequal.any():
-            a, b = one[unequal], other[unequal]
-            error = np.abs(a - b) / np.maximum(np.maximum(np.abs(a), np.abs(b)), 1.0)
-            largest = max(largest, float(np.where(np.isnan(error), np.inf, error).max()))
-    return Difference(count, different, largest)
+        if unequal.any():
+            largest = max(largest, relative(one[unequal], other[unequal]))
+    return Difference(1, count, different, largest)
 
 
-def repeat(call: Call, library: ctypes.CDLL) -> Difference:
-    """Repeat a call in C and compare what it wrote with what the compiled Python wrote."""
+def relative(one: Any, other: Any) -> float:
+    """Largest difference of numbers, relative above 1; infinite for integers, inf and NaN."""
+    if one.dtype.kind not in "fc":
+        return np.inf
+    with np.errstate(invalid="ignore"):
+        error = np.abs(one - other) / np.maximum(np.maximum(np.abs(one), np.abs(other)), 1.0)
+    return float(np.where(np.isfinite(error), error, np.inf).max())
+
+
+def equal(one: Any, other: Any) -> Any:
+    """True where numbers are equal with the sign of zero; NaN equals NaN."""
+    if one.dtype.kind == "c":
+        return equal(one.real, other.real) & equal(one.imag, other.imag)
+    with np.errstate(invalid="ignore"):  # memory that nobody has written
+        same = one == other
+        if one.dtype.kind == "f":
+            same &= np.signbit(one) == np.signbit(other)
+            same |= np.isnan(one) & np.isnan(other)
+    return same
+
+
+def repeat(call: Call, run: Run) -> Difference:
+    """Repeat a call in a back end and compare what it wrote and returned."""
     arguments = copied(call.before)
-    code, returned = Entry(library, call.symbol, call.types, call.returned).code(*arguments)
-    assert (code, returned) == (0, call.result)
-    return difference(call.after, arguments)
+    assert run(call, arguments) == call.result, call.symbol
+    return difference(call.before, call.after, arguments)
+
+
+def compare(inputs: Callable[[], object], runs: Mapping[str, Run]) -> dict[tuple[str, str], Difference]:
+    """Record the calls of inputs and repeat them; differences by back end and name of the entry in C."""
+    found: dict[tuple[str, str], Difference] = defaultdict(Difference)
+    with recorded() as calls:
+        inputs()
+    for call in calls:
+        for backend, run in runs.items():
+            key = backend, call.symbol
+            found[key] = found[key].joined(repeat(call, run))
+    return dict(found)
+
+
+def from_library(library: ctypes.CDLL) -> Run:
+    """Calls of the C of the translator."""
+
+    def run(call: Call, arguments: tuple[Any, ...]) -> Any:
+        return Entry(library, call.symbol, call.types, call.returned)(*arguments)
+
+    return run
+
+
+def from_kernels(backend: str) -> Run:
+    """Calls of the package's entries in a back end: of a second copy of the kernels, which stands beside the first."""
+    own: dict[str, Any] = {}
+    places = {name: each.__module__ for name, each in functions().items()}
+    with in_the_place_of_the_kernels(own), patch.dict(os.environ, {"SAGLINE_BACKEND": backend}):
+        entries = {name: getattr(importlib.import_module(module), name) for name, module in places.items()}
+
+    def run(call: Call, arguments: tuple[Any, ...]) -> Any:
+        with in_the_place_of_the_kernels(own):  # numba looks for types by the names of their modules
+            return entries[call.name](*arguments)
+
+    return run
+
+
+@contextmanager
+def in_the_place_of_the_kernels(modules: dict[str, Any]) -> Iterator[None]:
+    """Modules of `sagline.kernels` in the place of the present ones; those that are loaded now are added to them."""
+    package = sagline.kernels
+    present = removed_kernels()
+    sys.modules.update(modules)
+    try:
+        yield
+    finally:
+        modules.update(removed_kernels())
+        sys.modules.update(present)
+        sagline.kernels = package
+
+
+def removed_kernels() -> dict[str, Any]:
+    """Modules of the kernels, which are no longer loaded."""
+    return {key: sys.modules.pop(key) for key in list(sys.modules) if f"{key}.".startswith("sagline.kernels.")}
+
+
+def from_wasm(folder: Path) -> Run:
+    """Calls of the module of shared pages, each in a process of node."""
+
+    def run(call: Call, arguments: tuple[Any, ...]) -> Any:
+        arrays = {str(k): each for k, each in enumerate(arrays_of(arguments))}
+        kept = [each.flags.writeable for each in arrays.values()]
+        for each in arrays.values():
+            each.flags.writeable = False  # such arrays keep their numbers
+        entry = call.symbol.removeprefix(wasm.PREFIX)
+        kernels = described_calls({"entry": (entry, arguments)}, arrays)
+        memory = in_node({"kernels": kernels}, [{}], folder)
+        for (name, each), flag in zip(arrays.items(), kept, strict=True):
+            kind, place, count = kernels["arrays"][name]
+            each.flags.writeable = True
+            each.reshape(-1)[:] = np.frombuffer(memory, kind, count, place)
+            each.flags.writeable = flag
+        return call.result
+
+    return run
