@@ -68,6 +68,7 @@ def bad_values(kind: str, valid: Any, optional: bool) -> Iterator[Bad]:
         ("an ellipsis", ...),
         ("a set", {"a", "b"}),
         ("nested lists", [[[["a"]]]]),
+        ("an array without axes", np.array("a")),
         ("a long text", "nothing" * 100),
         ("a text that does not print", "\x1b[31m\n\ud800"),
     ):
@@ -131,6 +132,12 @@ def _array(valid: Any) -> Iterator[Bad]:
     )
 
 
+def _tensions(valid: Any) -> Iterator[Bad]:
+    """Numbers that are not negative."""
+    for bad in _array(valid):
+        yield bad._replace(verdict=REFUSED) if bad.label == "negative" else bad
+
+
 def _sample(valid: Any) -> Iterator[Bad]:
     """Numbers of a control loop: what is out of range is told by a status."""
     for bad in _array(valid):
@@ -176,6 +183,117 @@ def _whole(valid: Any) -> Iterator[Bad]:
     same: tuple[Any, ...] = (np.int64(valid), np.uint8(valid), np.array(valid))
     for value in same:
         yield Bad(f"a whole number of numpy: {value!r}", value, SAME)
+
+
+def _flag(valid: Any) -> Iterator[Bad]:
+    """True or False."""
+    wrong: tuple[Any, ...] = ("no", "", 0, 1, 0.0, [], [valid], np.array(valid), np.array([valid]), np.nan)
+    for value in wrong:
+        yield Bad(f"{value!r}", value, REFUSED)
+    yield Bad("a truth value of numpy", np.bool_(valid), SAME)
+
+
+def _flag_or_whole(valid: Any) -> Iterator[Bad]:
+    """True or False, or a whole number."""
+    wrong: tuple[Any, ...] = ("no", "", 2.5, 0.0, -1, [], [valid], np.array(valid), np.array([valid]), np.nan, 10**9)
+    for value in wrong:
+        yield Bad(f"{value!r}", value, REFUSED)
+
+
+def _wholes(valid: Any) -> Iterator[Bad]:
+    """As many whole numbers as this, all positive."""
+    first = list(valid)
+    wrong: tuple[Any, ...] = (
+        3, "9x7x5", np.array(3), [], first[:-1], [*first, 1], [-1, *first[1:]], [0, *first[1:]], [2.5, *first[1:]],
+        ["2", *first[1:]], [True, *first[1:]], [first] * 3, {1: 2, 2: 3, 3: 4}, [10**9] * len(first), [None] * 3,
+        [np.nan, *first[1:]],
+    )  # fmt: skip
+    for value in wrong:
+        yield Bad(f"{value!r:.40}", value, REFUSED)
+    same: tuple[Any, ...] = (first, np.array(first))
+    for value in same:
+        yield Bad(f"the same: {value!r}", value, SAME)
+
+
+def _cables(valid: Any) -> Iterator[Bad]:
+    """Indices of cables, each once."""
+    wrong: tuple[Any, ...] = (
+        3,
+        "0",
+        np.array(0),
+        [],
+        [-1],
+        [0, 0],
+        [0.0],
+        ["0"],
+        [True],
+        [[0]],
+        {0: 1},
+        [10**30],
+        [None],
+    )
+    for value in wrong:
+        yield Bad(f"{value!r}", value, REFUSED)
+    for value in (tuple(valid), np.array(valid)):
+        yield Bad(f"the same: {value!r}", value, SAME)
+
+
+def _groups(valid: Any) -> Iterator[Bad]:
+    """Indices of cables in groups."""
+    wrong: tuple[Any, ...] = (
+        3,
+        "01",
+        np.array(0),
+        (),
+        ((),),
+        ((0, 1),),
+        (*valid, (0,)),
+        ((0, 0),),
+        (("0",),),
+        ((0.0,),),
+    )
+    for value in (*wrong, ((9,),), ((-1,),), (None,), {0: 1}, ([[0]],)):
+        yield Bad(f"{value!r}", value, REFUSED)
+
+
+def _several(valid: Any) -> Iterator[Bad]:
+    """Objects of one kind in a sequence."""
+    yield from (bad for bad in _object(list(valid)) if bad.label not in ("its class", "its name", "an empty list"))
+    yield Bad("one", valid[0], EITHER)
+    for other in ([*valid, 3], [None], [[valid[0]]], {0: valid[0]}, type(valid[0]), [type(valid[0])]):
+        yield Bad(f"{other!r:.40}", other, REFUSED)
+    yield Bad("a tuple", tuple(valid), SAME)
+
+
+def _texts(valid: Any) -> Iterator[Bad]:
+    """One text of a small language, or several."""
+    for value in (3, True, "nothing", [3], [None], {"a": 1}, [[valid]], np.array(3.0), [valid, "nothing"]):
+        yield Bad(f"{value!r}", value, REFUSED)
+
+
+def _address(_: Any) -> Iterator[Bad]:
+    """The address of a scheduler."""
+    for value in (3, True, "", "host", "tcp://", "tcp://host", "tcp://host:0", "tcp://host:99999", ["tcp://host:1"]):
+        yield Bad(f"{value!r}", value, REFUSED)
+
+
+def _table(valid: Any) -> Iterator[Bad]:
+    """A table in time: instants and rows of values."""
+    time, rows = (np.asarray(part, dtype=np.float64) for part in valid)
+    wrong: tuple[Any, ...] = (
+        3.0, "a", np.array(3.0), (time,), (time, rows, rows), (rows, time), (time[::-1], rows), (time, rows[:-1]),
+        (time, rows[:, :-1]), (np.full(2, np.nan), rows), (time, np.full(rows.shape, np.inf)), ([], []),
+        (time, "a"), {"time": time}, (time, None), (0.0 * time, rows), (time[:, None], rows),
+    )  # fmt: skip
+    for value in wrong:
+        yield Bad(f"{value!r:.40}", value, REFUSED)
+
+
+def _recorder(_: Any) -> Iterator[Bad]:
+    """A receiver of cycles."""
+    wrong: tuple[Any, ...] = (3, True, "log", [], np.array(3.0))
+    for value in wrong:
+        yield Bad(f"{value!r}", value, REFUSED)
 
 
 def _cable(valid: Any) -> Iterator[Bad]:
@@ -247,6 +365,11 @@ def _file(valid: Any) -> Iterator[Bad]:
     yield Bad("a path", Path(valid), SAME)
 
 
+def _folder(valid: Any) -> Iterator[Bad]:
+    """A folder's name; it is made with the folders above it."""
+    yield from (bad for bad in _file(valid) if not isinstance(bad.value, Path) and "." not in bad.label)
+
+
 def _callback(_: Any) -> Iterator[Bad]:
     """A function that is told of the progress."""
     for value in (True, 3, "print", [print], 0):
@@ -273,6 +396,10 @@ def _object(valid: Any) -> Iterator[Bad]:
     yield Bad("False", False, REFUSED)
     yield Bad("(1, 1, 2)", (1, 1, 2), REFUSED)
     yield Bad("an array", np.ones((3, 3)), REFUSED)
+    yield Bad("a number of numpy", np.float64(3.0), REFUSED)
+    hollow = np.empty((), dtype=object)
+    hollow[()] = valid
+    yield Bad("an object in an array without axes", hollow, REFUSED)
     for other in strangers():
         related = {*type(other).__bases__} & {*kind.__bases__} - {object, Result}  # another model or method
         if not isinstance(other, kind) and not related:
@@ -353,6 +480,8 @@ _STRANGERS: list[Any] = []
 KINDS = {
     name.removeprefix("_"): function
     for name, function in globals().items()
-    if function in (_array, _number, _whole, _cable, _seed, _index, _word, _words, _text, _file, _callback, _mapping,
+    if function in (_flag, _flag_or_whole, _wholes, _cables, _groups, _several, _texts, _address, _table,
+                    _recorder, _tensions, _folder,
+                    _array, _number, _whole, _cable, _seed, _index, _word, _words, _text, _file, _callback, _mapping,
                     _object, _objects, _one, _place, _motion, _out, _ax, _points, _sample)
 }  # fmt: skip

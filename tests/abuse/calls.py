@@ -64,6 +64,15 @@ def public_names() -> set[str]:
     return found
 
 
+def arguments_of(name: str) -> list[str]:
+    """Names of the arguments of a public callable; those of `**changes` are fields of the type, tried there."""
+    value: Any = sl
+    for part in name.split("."):
+        value = getattr(value, part)
+    arguments = inspect.signature(value).parameters.values()
+    return [each.name for each in arguments if each.kind is not each.VAR_KEYWORD and each.name != "self"]
+
+
 def _of_value(name: str, value: Any) -> set[str]:
     if inspect.isclass(value):
         return _of_class(name, value)
@@ -272,15 +281,24 @@ def _motions(given: _Given) -> dict[str, Call]:
     size = len(given.path)
     rates = {name: ("array", np.ones((size, 6))) for name in ("twist", "twist_rate")}
     time, rate, durations = ("array", given.path.time), ("number", 8.0), ("array", 1.0)
-    limits = dict.fromkeys(("speed", "acceleration", "angular_speed"), ("number", 2.0, True))
+    names = ("speed", "acceleration", "angular_speed", "angular_acceleration")
+    limits = dict.fromkeys(names, ("number", 2.0, True))
     return {
         "Path": Call(
-            sl.Path, _all(time=time, pose=("one", given.path.pose), **rates, jerk=("array", np.ones((size, 6)), True))
+            sl.Path,
+            _all(
+                time=time,
+                pose=("one", given.path.pose),
+                **rates,
+                jerk=("array", np.ones((size, 6)), True),
+                rests=("array", [0.0, given.path.time[-1]], True),
+            ),
         ),
         "path_from_samples": Call(sl.path_from_samples, _all(time=time, pose=("one", given.path.pose))),
         "quintic_path": Call(sl.quintic_path, _all(waypoints=stops, durations=(*durations, True), rate=rate)),
         "septic_path": Call(sl.septic_path, _all(waypoints=stops, durations=(*durations, True), rate=rate)),
         "quintic_path: limits": Call(sl.quintic_path, _all(waypoints=stops, **limits, rate=rate)),
+        "septic_path: limits": Call(sl.septic_path, _all(waypoints=stops, **limits, rate=rate)),
         "article_path": Call(sl.article_path, _all(rate=rate)),
     }
 
@@ -340,6 +358,10 @@ def _kinematics(given: _Given) -> dict[str, Call]:
             ),
         ),
         "inverse: a path": Call(sl.inverse, _all(robot=robot, motion=("motion", given.path), wrench=wrench)),
+        "inverse: previous tensions": Call(
+            partial(sl.inverse, given.robot, given.pose, tension=sl.Closest()),
+            _all(previous=("tensions", given.plan.chord_tension, True)),
+        ),
         "inverse: winding": Call(partial(sl.inverse, guided, given.pose), _all(winding=winding)),
         "forward: winding": Call(
             partial(sl.forward, guided, sl.inverse(guided, given.pose).unstrained_length, given.pose),
@@ -434,7 +456,7 @@ def _winding(given: _Given) -> dict[str, Call]:
         "Creep": Call(sl.Creep, _all(axial_stiffness=("array", [1e6, 4e5]), time=("array", [30.0, 1200.0]))),
         "Creep.strain": Call(
             creep.strain,
-            _all(time=("array", [0.0, 1.0, 2.5]), tension=("array", [10.0, 20.0, 15.0])),
+            _all(time=("array", [0.0, 1.0, 2.5]), tension=("array", [10.0, 20.0, 15.0]), settled=("flag", True)),
         ),
     }
 
@@ -567,20 +589,13 @@ def _workspaces(given: _Given) -> dict[str, Call]:
         "Accelerations": Call(sl.Accelerations, _all(linear=("number", 2.0), angular=("number", 3.0))),
         "Orientations": Call(sl.Orientations, _all(rotations=("array", turned), need=("word", "any"))),
         "Tilts": Call(sl.Tilts, _all(angle=("number", 0.25))),
-        "Clearance": Call(
-            lambda limit, obstacle: sl.Clearance(limit, [obstacle]),
-            _all(limit=limit, obstacle=("one", sl.Sphere([3.0, 2.0, 4.0], 0.5))),
-        ),
+        "Clearance": Call(sl.Clearance, _all(limit=limit, obstacles=("objects", sl.Sphere([3.0, 2.0, 4.0], 0.5)))),
         "LeastMargin": Call(sl.LeastMargin, _all(limit=limit)),
         "MaximumSag": Call(sl.MaximumSag, _all(limit=limit)),
         "PositionError": Call(sl.PositionError, _all(model=model, limit=limit)),
         "LeastStiffness": Call(sl.LeastStiffness, _all(limit=limit)),
         "LeastFrequency": Call(sl.LeastFrequency, _all(limit=limit)),
         "InFrame": Call(sl.InFrame, _all(limit=limit)),
-        "workspace: criteria": Call(
-            lambda criterion: sl.workspace(given.robot, criteria=[criterion], cells=4),
-            _all(criterion=("one", sl.MaximumSag(0.5))),
-        ),
         "workspace": Call(
             sl.workspace,
             _all(
@@ -591,6 +606,8 @@ def _workspaces(given: _Given) -> dict[str, Call]:
                 model=("one", sl.Catenary()),
                 tension=("one", sl.MinimumNorm()),
                 cells=("whole", 4),
+                criteria=("several", [sl.MaximumSag(0.5)]),
+                refine=("flag_or_whole", True),
                 moment_arm=("number", 0.25, True),
                 progress=("callback", lambda done, of: None, True),
             ),
@@ -643,6 +660,12 @@ def _designs(given: _Given) -> dict[str, Call]:
     thin, thick = (sl.CableChoice(name, sl.Cable(*of)) for name, of in (("a", (0.05, 3e5)), ("b", (0.1, 6e5))))
     asked = given.folder / "design.yaml"
     asked.write_text("free: [{tension_max: {low: 1 kN, high: 5 kN}}]\ngoals: [least_margin]\n")
+    boxed = {
+        "poses": ("one", None, True),
+        "box": ("one", sl.PoseBox([0.0, 0.0, 1.0], [1.0, 1.0, 2.0]), True),
+        "grid": ("wholes", (2, 1, 1)),
+    }
+    inner = sl.FreeAnchors("platform", -0.125, 0.125, along=[0, 0, 1], symmetry="together")
     shifts = ("array", [-0.5, -0.25, -0.125]), ("array", [0.5, 0.25, 0.125])
     return {
         "AnchorErrors": Call(
@@ -665,16 +688,31 @@ def _designs(given: _Given) -> dict[str, Call]:
                 low=shifts[0],
                 high=shifts[1],
                 along=("array", np.eye(3)[::-1], True),
+                cables=("cables", [0, 3], True),
                 symmetry=("word", "xy", True),
             ),
         ),
         "FreeCable": Call(sl.FreeCable, _all(catalogue=("object", [thin, thick]))),
         "FreeLimit": Call(
-            sl.FreeLimit, _all(which=("word", "tension_min"), low=("number", 8.0), high=("number", 1024.0))
+            sl.FreeLimit,
+            _all(
+                which=("word", "tension_min"),
+                low=("number", 8.0),
+                high=("number", 1024.0),
+                cables=("cables", [0, 3], True),
+            ),
         ),
-        "Goal": Call(sl.Goal, _all(kind=("word", "cable_cost"), weight=("number", 2.0), scale=("number", 64.0, True))),
+        "Goal": Call(
+            sl.Goal,
+            _all(
+                kind=("word", "cable_cost"),
+                weight=("number", 2.0),
+                scale=("number", 64.0, True),
+                maximize=("flag", False, True),
+            ),
+        ),
         "plot.front": Call(lambda **a: (sl.plot.front(**a), None)[1], _all(front=("one", front))),
-        "Front.save": Call(partial(front.save, given.folder / "front"), {}),
+        "Front.save": Call(front.save, _all(folder=("folder", given.folder / "front"))),
         "design": Call(
             sl.design,
             _all(
@@ -688,6 +726,11 @@ def _designs(given: _Given) -> dict[str, Call]:
                 seed=("seed", 3),
             ),
         ),
+        "design: box": Call(
+            partial(sl.design, given.robot, [posts], ["mean_margin"], evaluations=16),
+            _all(**boxed, inner=("several", [inner]), folder=("folder", given.folder / "search", True)),
+        ),
+        "moving_anchors: box": Call(partial(sl.moving_anchors, given.robot, [posts]), _all(**boxed)),
         "load_design": Call(sl.load_design, _all(file=("file", asked))),
         "moving_anchors": Call(sl.moving_anchors, _all(**common, **names, moving=("object", [posts]))),
     }
@@ -800,8 +843,8 @@ def _files(given: _Given) -> dict[str, Call]:
                 robot=("one", given.robot),
                 file=("file", str(folder / "sagline.c")),
                 tension=("one", sl.Closest()),
-                forward=("one", False),
-                single_precision=("one", True),
+                forward=("flag", False),
+                single_precision=("flag", True),
             ),
         ),
         "export_scl": Call(
@@ -857,7 +900,10 @@ def _calibrations(given: _Given) -> dict[str, Call]:
     return {
         "Sensors": Call(sl.Sensors, _all(**sensors)),
         "Sensors.replace": Call(log.sensors.replace, _all(**sensors)),
-        "Unknown": Call(sl.Unknown, _all(name=("word", "mass"), deviation=("number", 0.1, True))),
+        "Unknown": Call(
+            sl.Unknown,
+            _all(name=("word", "linear_density"), deviation=("number", 0.1, True), shared=("flag", True, True)),
+        ),
         "calibrate": Call(
             sl.calibrate,
             _all(
@@ -866,6 +912,7 @@ def _calibrations(given: _Given) -> dict[str, Call]:
                 unknowns=("one", ("mass",)),
                 model=("one", sl.Catenary()),
                 folds=("whole", 2),
+                robust=("flag", True),
                 progress=("callback", lambda done, of: None, True),
             ),
         ),
@@ -923,9 +970,6 @@ def _figures(given: _Given) -> dict[str, Call]:
     def draw_all(confirmation: Any) -> None:
         sl.plot.errors(confirmation)
 
-    def draw_two(vibration: Any, **others: Any) -> None:
-        sl.plot.frequencies([vibration, vibration], **others)
-
     def draw(function: Callable[..., Any]) -> Callable[..., Any]:
         def call(**arguments: Any) -> None:
             flat.clear()
@@ -964,13 +1008,23 @@ def _figures(given: _Given) -> dict[str, Call]:
             {"vibration": ("one", swing), "force": ("word", "about z"), "motion": ("word", "x", True), "ax": ax},
         ),
         "frequencies": (
-            draw_two,
-            {"vibration": ("one", swing), "time": ("array", np.array([0.0, 1.0]), True), "ax": ax},
+            sl.plot.frequencies,
+            {
+                "vibrations": ("several", [swing, swing]),
+                "time": ("array", np.array([0.0, 1.0]), True),
+                "label": ("text", "x [m]"),
+                "ax": ax,
+            },
         ),
         "frequency_map": (sl.plot.frequency_map, {"found": ("one", mapped), "quantity": ("word", "peak")}),
         "film": (
             sl.plot.film,
-            {"vibration": ("one", swing), "number": ("whole", 1), "file": ("file", str(given.folder / "mode.gif"))},
+            {
+                "vibration": ("one", swing),
+                "number": ("whole", 1),
+                "file": ("file", str(given.folder / "mode.gif")),
+                "progress": ("callback", lambda done, of: None, True),
+            },
         ),
         "energy": (sl.plot.energy, {"simulation": ("one", made.simulation(20))}),
         "save": (sl.plot.save, {"drawing": ("one", flat), "file": ("file", str(given.folder / "figure.svg"))}),
@@ -993,8 +1047,11 @@ def _sweeps(given: _Given) -> dict[str, Call]:
                 quantities=("words", ["tension", "length"]),
                 model=("one", sl.Catenary()),
                 tension=("one", sl.MinimumNorm()),
+                around=("one", sl.WrenchBox(force=2.0), True),
+                moment_arm=("number", 0.25, True),
             ),
         ),
+        "sweep.run: scheduler": Call(partial(sl.sweep.run, request, folder), _all(scheduler=("address", None, True))),
         "sweep.run": Call(
             sl.sweep.run,
             _all(
@@ -1006,7 +1063,7 @@ def _sweeps(given: _Given) -> dict[str, Call]:
             ),
         ),
         "sweep.load": Call(sl.sweep.load, _all(folder=("file", folder))),
-        "sweep.Sweep.values": Call(found.values, _all(name=("word", "status"))),
+        "sweep.Sweep.values": Call(found.values, _all(name=("word", "status"), index=("index", 0))),
         "load_sweep": Call(sl.load_sweep, _all(file=("file", file))),
     }
 
@@ -1032,9 +1089,11 @@ def _twins(given: _Given) -> dict[str, Call]:
                 jitter=("number", 0.01),
                 loss=("number", 0.25),
                 damping=("one", sl.Damping(1e-3), True),
+                surveyed=("flag", False),
+                faults=("texts", "cell 3 sticks at 40 s"),
             ),
         ),
-        "twin.Machine.link": Call(lambda: (machine.link(), None)[1], {}),
+        "twin.Machine.link": Call(lambda moves: (machine.link(moves=moves), None)[1], _all(moves=("flag", True))),
         "twin.Machine.claim": Call(machine.claim, _all(group=group, owner=("whole", 7))),
         "twin.Machine.take": Call(machine.take, _all(group=group, command=("object", command))),
         "twin.Machine.report": Call(lambda group: (machine.report(group), None)[1], _all(group=group)),
@@ -1095,6 +1154,9 @@ def _controls(given: _Given) -> dict[str, Call]:
                 model=("one", sl.Catenary(), True),
                 tension=("one", sl.Closest(), True),
                 loop=("one", settings, True),
+                pace=("one", sl.control.Pace(0.01), True),
+                record=("recorder", None, True),
+                shadow=("flag", False),
                 seed=("seed", 3, True),
             ),
         ),
@@ -1106,6 +1168,7 @@ def _controls(given: _Given) -> dict[str, Call]:
                 cell_deviation=("number", 1.0, True),
                 cell_bias=("number", 2.0, True),
                 largest_correction=("number", 5e-3),
+                groups=("groups", ((0, 1, 2, 3), (4, 5, 6, 7)), True),
             ),
         ),
         "control.gains_along": Call(
@@ -1136,7 +1199,9 @@ def _controls(given: _Given) -> dict[str, Call]:
         "control.null_space_error": Call(
             sl.control.null_space_error, _all(execution=("one", done), filter_time=("number", 0.5, True))
         ),
-        "load_execution": Call(lambda **a: (sl.load_execution(**a), None)[1], _all(file=("file", kept))),
+        "load_execution": Call(
+            lambda **a: (sl.load_execution(**a), None)[1], _all(file=("file", kept), plan=("whole", 0, True))
+        ),
         "plot.execution": Call(lambda done: (sl.plot.execution(done), None)[1], _all(done=("one", done))),
         **{
             f"plot.{name}": Call(drawn(name), _all(done=("one", done), ax=("ax", flat, True)))
@@ -1169,6 +1234,8 @@ def _in_time(given: _Given) -> dict[str, Call]:
     driven = given.robot.replace(winches=sl.Winch(drum_radius=0.05, **drive))
     driven_state = sl.inverse(driven, given.pose).state
     machine = sl.Simulator(driven, driven_state)
+    thick = given.robot.replace(cables=given.robot.cables.replace(diameter=0.004))
+    in_wind = sl.inverse(thick, given.pose).state
 
     def moved(**arguments: Any) -> Any:
         return sl.simulate(**{"start": state, "duration": 0.02, **arguments})
@@ -1189,7 +1256,12 @@ def _in_time(given: _Given) -> dict[str, Call]:
                 wrench=("array", [0.0, 0.0, -10.0, 0.0, 1.0, 0.0], True),
                 damping=("one", sl.Damping(1e-3), True),
                 record=("number", 0.01, True),
+                events=("objects", sl.Break(3, 0.02)),
             ),
+        ),
+        "simulate: wind": Call(
+            partial(sl.simulate, in_wind, duration=0.02),
+            _all(wind=("table", ([0.0, 1.0], np.ones((2, 3))), True)),
         ),
         "Simulator": Call(
             lambda **a: (sl.Simulator(**a), None)[1],
@@ -1214,15 +1286,16 @@ def _in_time(given: _Given) -> dict[str, Call]:
                 wrench=("sample", [0.0, 0.0, -10.0, 0.0, 1.0, 0.0], True),
             ),
         ),
-        "Simulator.hold": Call(lambda winch: machine.hold(winch), _all(winch=("cable", 3))),
+        "Simulator.hold": Call(lambda winches: machine.hold(winches), _all(winches=("cable", 3))),
         "Simulator.shift": Call(
-            lambda length, winch: machine.shift(length, winch), _all(length=("number", 1e-3), winch=("cable", 3))
+            lambda length, winches: machine.shift(length, winches), _all(length=("number", 1e-3), winches=("cable", 3))
         ),
         "Simulator.cut": Call(lambda cable: sl.Simulator(driven, driven_state).cut(cable), _all(cable=("cable", 3))),
         "Simulator.limit_force": Call(
-            lambda force, winch: machine.limit_force(force, winch), _all(force=("number", 1e3), winch=("cable", 3))
+            lambda force, winches: machine.limit_force(force, winches),
+            _all(force=("number", 1e3), winches=("cable", 3)),
         ),
-        "Simulator.release": Call(lambda winch: machine.release(winch), _all(winch=("cable", 3))),
+        "Simulator.release": Call(lambda winches: machine.release(winches), _all(winches=("cable", 3))),
         "SecondOrder": Call(sl.SecondOrder, _all(bandwidth=("number", 10.0), damping_ratio=("number", 0.75))),
         "Break": Call(sl.Break, _all(cable=("whole", 3), time=("number", 0.5))),
         "Stall": Call(sl.Stall, _all(winch=("whole", 3), time=("number", 0.5))),

@@ -21,7 +21,7 @@ import pytest
 import sagline as sl
 from sagline.core.errors import printable
 from tests.abuse.bad_values import REFUSED, SAME, Bad, bad_values
-from tests.abuse.calls import INTERNAL, LINKS, Call, calls, public_names
+from tests.abuse.calls import INTERNAL, LINKS, Call, arguments_of, calls, public_names
 from tests.effort import least_seconds
 from tests.tiers import extended
 
@@ -49,6 +49,18 @@ def answers(table: dict[str, Call]) -> dict[str, Any]:
 
 def test_every_public_callable_is_in_the_table(table: dict[str, Call]) -> None:
     assert {name.split(":")[0] for name in table} == public_names() - INTERNAL - LINKS
+
+
+def test_every_argument_is_in_the_table(table: dict[str, Call]) -> None:
+    found = []
+    for name in sorted(public_names() - INTERNAL - LINKS):
+        given = {argument for key, call in table.items() if key.split(":")[0] == name for argument in call.arguments}
+        found += [
+            f"{name}: {argument}"
+            for argument in arguments_of(name)
+            if not given & {argument, argument.removesuffix("s")}
+        ]
+    assert found == []
 
 
 def test_every_call_succeeds_as_it_is(answers: dict[str, Any], table: dict[str, Call]) -> None:

@@ -54,6 +54,15 @@ def test_a_sweep_tells_how_its_requests_ended_and_is_done_once(folder: Path) -> 
     assert marked(Path("output/own_sweep")) == before
 
 
+def test_without_a_scheduler_nothing_is_written(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sagline.sweep.cluster.PATIENCE", 0.5)
+    before = sorted(folder.iterdir())
+    found = ended("own_sweep.yaml", "--scheduler", "tcp://127.0.0.1:9")
+    assert found.exit_code == 2
+    assert "tcp://127.0.0.1:9" in found.stderr
+    assert sorted(folder.iterdir()) == before
+
+
 def test_the_folder_of_another_sweep_is_refused(folder: Path) -> None:
     assert ended("own_sweep.yaml", "--out", "out", "--workers", "1").exit_code == 0
     text = Path("own_sweep.yaml").read_text()

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -49,6 +50,46 @@ def test_meshes_of_every_kind_are_read_in_meters_with_z_up(tmp_path: Path, kind:
     tall = 1 if kind == "glb" else 2  # y is up in a GLB, which was not told so here
     assert np.ptp(found.bounds, axis=0)[tall] == pytest.approx(0.03, abs=1e-8)
     assert found.encloses([0.0, 0.0, 0.0]) == np.False_
+
+
+@pytest.mark.parametrize("kind", ["stl", "ply", "obj", "glb"])
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e38, -1e10, 1.001e7])
+def test_corners_that_are_nowhere_are_refused_without_a_warning(tmp_path: Path, kind: str, value: float) -> None:
+    import trimesh
+
+    box = trimesh.creation.box((1.0, 1.0, 1.0))
+    for corners in (np.where(np.arange(8)[:, None] == 3, value, box.vertices), value * box.vertices):
+        with warnings.catch_warnings():  # of the writer
+            warnings.simplefilter("ignore")
+            file = written(tmp_path, trimesh.Trimesh(corners, box.faces, process=False), f"box.{kind}")
+        with pytest.raises(
+            sl.FileError, match=r"coordinates that are not numbers|m away; allowed: up to 1e\+06 m"
+        ):
+            sl.load_mesh(file)
+
+
+def test_the_unit_decides_what_is_too_far_away(tmp_path: Path) -> None:
+    import trimesh
+
+    file = written(tmp_path, trimesh.creation.box((3e6, 1.0, 1.0)), "box.stl")
+    assert np.ptp(sl.load_mesh(file, unit="mm").bounds, axis=0)[0] == 3000.0
+    with pytest.raises(sl.FileError, match=r"up to 1\.5e\+06 m away"):
+        sl.load_mesh(file)
+
+
+@pytest.mark.parametrize(
+    ("face", "line"),
+    [("f 0 1 2", 9), ("f 1/1 2/2 0/3", 9), (" f\t3 00 1", 9), ("f 1 2 -0", 9), ("f 1 2 3\r\nf 0 2 3", 10)],
+)
+def test_faces_of_an_obj_count_corners_from_one(tmp_path: Path, face: str, line: int) -> None:
+    corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
+    faces = "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 -1\n"
+    file = tmp_path / "wedge.obj"
+    file.write_text(corners + faces, newline="")
+    assert sl.load_mesh(file).volume == pytest.approx(1.0 / 6.0)
+    file.write_text(corners + faces + face, newline="")
+    with pytest.raises(sl.FileError, match=f"corner 0 in line {line};"):
+        sl.load_mesh(file)
 
 
 def test_a_glb_is_read_with_its_y_axis_up(tmp_path: Path) -> None:

@@ -439,3 +439,11 @@ def test_a_folder_of_the_name_of_a_tilde_is_a_folder(tmp_path: FilePath, monkeyp
     plan.save("~/run.nc")
     assert [str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*.nc")] == ["~/run.nc"]
     np.testing.assert_array_equal(sl.load_plan("~/run.nc").unstrained_length, plan.unstrained_length)
+
+
+def test_hdf5_of_other_programs_is_refused_without_a_warning(tmp_path: FilePath) -> None:
+    with h5py.File(tmp_path / "foreign.nc", "w") as file:
+        file["a"], file["b"] = np.ones((3, 4)), np.ones((3, 3))
+    for load in (sl.load_plan, sl.load_simulation, sl.load_workspace, sl.load_calibration):
+        with pytest.raises(sl.FileError, match=r"foreign\.nc: is not a "):
+            load(tmp_path / "foreign.nc")

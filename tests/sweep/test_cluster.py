@@ -145,6 +145,7 @@ def test_where_nobody_listens_a_sentence_says_so(tmp_path: Path, monkeypatch: py
     with pytest.raises(sl.SaglineError, match=r"tcp://127\.0\.0\.1:9") as error:
         sl.sweep.run(planar(3, 2), tmp_path / "sweep", scheduler="tcp://127.0.0.1:9")
     assert len(str(error.value)) < 300
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.soak

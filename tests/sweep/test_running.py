@@ -223,6 +223,26 @@ def test_a_disk_that_is_full_loses_nothing(
     assert bits(sl.sweep.run(planar(), folder, workers=1)) == reference
 
 
+@pytest.mark.parametrize("same", [True, False])
+def test_of_two_that_begin_at_once_the_later_one_takes_the_folder_of_the_earlier(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, same: bool
+) -> None:
+    fill, folder = sweep_folder._fill, tmp_path / "sweep"
+
+    def late(*arguments: Any) -> None:
+        monkeypatch.setattr(sweep_folder, "_fill", fill)
+        sl.sweep.run(planar(3, 2) if same else planar(4, 2), folder, workers=1)
+        fill(*arguments)
+
+    monkeypatch.setattr(sweep_folder, "_fill", late)
+    if same:
+        assert sl.sweep.run(planar(3, 2), folder, workers=1).complete
+    else:
+        with pytest.raises(sl.FileError, match="holds another sweep"):
+            sl.sweep.run(planar(3, 2), folder, workers=1)
+    assert [path.name for path in tmp_path.iterdir()] == ["sweep"]
+
+
 def test_without_dask_tasks_are_done_one_after_the_other(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, reference: dict[str, bytes]
 ) -> None:

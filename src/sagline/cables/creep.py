@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from sagline.core.arguments import flag
 from sagline.core.arrays import Array, broadcast_shape, checked, locked
 from sagline.core.errors import InvalidValueError
 from sagline.kernels.cable.batch import creep_strains
@@ -89,11 +90,16 @@ class Creep:
             k = int(np.argmax(late)) + 1
             allowed = f"more than {clock[k - 1]:g} s"
             raise InvalidValueError(f"time[{k}]", f"{clock[k]:g} s", allowed, "Give the samples in order of time.")
-        if not isinstance(settled, bool | np.bool_):
-            raise InvalidValueError("settled", repr(settled)[:40], "True or False", "Give one of the two.")
         rows = force.reshape(len(clock), -1)
         found = np.empty(rows.shape)
-        creep_strains(clock, rows, self.axial_stiffness, self.time, locked(np.array([settled], dtype=np.bool_)), found)
+        creep_strains(
+            clock,
+            rows,
+            self.axial_stiffness,
+            self.time,
+            locked(np.array([flag(settled, "settled")], dtype=np.bool_)),
+            found,
+        )
         return locked(found.reshape(force.shape))
 
     def __reduce__(self) -> tuple[Any, tuple[Array, Array]]:

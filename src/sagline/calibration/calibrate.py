@@ -19,7 +19,7 @@ from sagline.calibration.problem import FitProblem, readings_table
 from sagline.calibration.result import Calibration
 from sagline.calibration.screening import reading_count, screen
 from sagline.calibration.search import cross_validate, search_from_priors
-from sagline.core.arguments import callback, instance, whole_number
+from sagline.core.arguments import callback, flag, instance, whole_number
 from sagline.core.arrays import Indices
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import counted
@@ -89,6 +89,7 @@ def calibrate(
     instance(log, WinchLog, "log")
     _check_model(robot, instance(model, CableModel, "model"))
     callback(progress, "progress")
+    robust = flag(robust, "robust")
     if (folds := whole_number(folds, "folds", 0, MOST_FOLDS)) == 1:
         raise InvalidValueError("folds", "1", "0 for none, or >= 2", "Give 5, say.")
     checked = checked_unknowns(unknowns)  # before any other work

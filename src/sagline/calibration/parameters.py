@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from sagline.calibration.log import Sensors
-from sagline.core.arguments import brief, choice, instance
+from sagline.core.arguments import choice, elements, flag, instance
 from sagline.core.arrays import Array, Flags, Indices, exactly, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.results import Result
@@ -86,12 +86,14 @@ class Unknown:
     deviation: float | None = None
 
     def __post_init__(self) -> None:
-        """Check name and deviation.
+        """Check name, shared and deviation.
 
         Raises:
             InvalidValueError: If the kind does not exist, or the deviation is not positive.
         """
         object.__setattr__(self, "name", str(choice(self.name, "unknown", KINDS)))
+        if self.shared is not None:
+            object.__setattr__(self, "shared", flag(self.shared, f"{self.name}: shared"))
         if self.deviation is not None:
             item, unit = f"{self.name}: deviation", KINDS[self.name].unit
             deviation = exactly(self.deviation, item, unit, (), above=0.0, infinite=True)
@@ -160,7 +162,7 @@ def parameters_of(robot: Robot, unknowns: Sequence[str | Unknown], sensors: Sens
 
 def checked_unknowns(unknowns: Sequence[str | Unknown]) -> list[Unknown]:
     """Checked list of unknowns without repetitions."""
-    items = [unknowns] if isinstance(unknowns, str | Unknown) else _as_list(unknowns)
+    items = elements(unknowns, str | Unknown, "unknowns", 'Give ("frame_anchors", "mass"), for example.')
     if not items:
         raise InvalidValueError("unknowns", "none", "one at least", f"Name some of {', '.join(KINDS)}.")
     found = [Unknown(one) if isinstance(one, str) else instance(one, Unknown, "unknown") for one in items]
@@ -168,16 +170,6 @@ def checked_unknowns(unknowns: Sequence[str | Unknown]) -> list[Unknown]:
     if twice := [name for name in names if names.count(name) > 1]:
         raise InvalidValueError("unknowns", f"{twice[0]} twice", "each once", "Leave one out.")
     return found
-
-
-def _as_list(unknowns: Any) -> list[Any]:
-    try:
-        if not isinstance(unknowns, Mapping):  # the values of a mapping would be lost
-            return list(unknowns)
-        raise TypeError
-    except TypeError:
-        step = 'Give ("frame_anchors", "mass"), for example.'
-        raise InvalidValueError("unknowns", brief(unknowns), "names of unknowns", step) from None
 
 
 def _value(robot: Robot, sensors: Sensors, name: str, counted: bool) -> Array:

@@ -66,7 +66,8 @@ def convert(
             --linear-density "20 g/m" --axial-stiffness "50 kN"
         sagline convert cogiro --format mjcf --out cogiro.xml
     """
-    from sagline.files.pose_text import FARTHEST, decimal_numbers
+    from sagline.core.arrays import FARTHEST
+    from sagline.files.pose_text import decimal_numbers
     from sagline.files.robot_file import dump_robot
 
     if out is not None and Path(source).exists() and out.resolve() == Path(source).resolve():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Annotated
@@ -52,21 +53,18 @@ def sweep(
         sagline sweep own_sweep.yaml --workers 1 --out results/sweep
     """
     from sagline.cli.values import whole_of
-    from sagline.sweep.cluster import check_address
     from sagline.sweep.file import load_sweep
     from sagline.sweep.running import MOST_WORKERS, open_matching_folder, run
 
     count = None if workers is None else whole_of(workers, "--workers", 1, MOST_WORKERS)
-    if scheduler is not None:
-        if count is not None:
-            raise InvalidValueError(
-                "--workers", "given with --scheduler", "one of both", "A cluster has its own workers."
-            )
-        check_address(scheduler)
+    if scheduler is not None and count is not None:
+        raise InvalidValueError("--workers", "given with --scheduler", "one of both", "A cluster has its own workers.")
     request = load_sweep(file)
     folder = Path("output") / file.stem if out is None else out
     check_folder(folder)
-    create_folder(folder.absolute().parent)
+    parent = folder.absolute().parent
+    made = [place for place in (parent, *parent.parents) if not place.exists()]
+    create_folder(parent)
     if (folder / "done").exists():  # another sweep is an error here, without the advice to continue it
         open_matching_folder(folder, request)
     again = _again(file, folder, workers, scheduler)
@@ -80,6 +78,9 @@ def sweep(
     except SaglineError as error:
         if (folder / "done").exists():
             error.add_note(f"The finished tasks are kept. To continue: {again}")
+        with suppress(OSError):  # not empty
+            for place in made:
+                place.rmdir()
         raise
     if as_json:
         show_json(_record(found))

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
 
-from sagline.core.arrays import checked
+from sagline.core.arrays import FARTHEST, checked
 from sagline.core.errors import InvalidValueError
-from sagline.files.pose_text import FARTHEST, wrench_of_text
 from sagline.files.pose_text import pose_of_text as pose_of_text
+from sagline.files.pose_text import wrench_of_text
 from sagline.files.quantity import in_si
 from sagline.robot.inertia import with_mass
 from sagline.robot.pose import Pose, PoseBox

@@ -23,7 +23,7 @@ from sagline.control.recording import Event, EventKind, Journal, Recorded, Recor
 from sagline.control.set_points import Along, Standing, standing_at
 from sagline.control.states import MOTION, RefusedError, State, check_transition
 from sagline.control.tension_loop import TensionLoop, TensionSettings
-from sagline.core.arguments import brief, instance, optional, whole_number
+from sagline.core.arguments import brief, flag, instance, optional, whole_number
 from sagline.core.arrays import Array, number
 from sagline.core.errors import InvalidValueError
 from sagline.kinematics.forward_solver import ForwardSolver
@@ -142,7 +142,7 @@ class Context:
         self.model = optional(model, CableModel, "model") or Catenary()
         self.method = optional(method, TensionMethod, "tension") or Closest()
         self.settings = optional(settings, TensionSettings, "loop") or TensionSettings()
-        self.shadow = shadow
+        self.shadow = flag(shadow, "shadow")
         self.random = np.random.default_rng(None if seed is None else whole_number(seed, "seed", 0, MOST_SEED))
         self.sender = Sender(m, self.random)
         self.estimator = Estimator(robot, self.model)

@@ -85,7 +85,7 @@ class Controller(Preparation):
             >>> print(done.status.name, done.position[-1].round(3))
             DONE [0.1 0.  1.5]
         """
-        super().__init__(Context(robot, link, pace, model, tension, loop, record, bool(shadow), seed))
+        super().__init__(Context(robot, link, pace, model, tension, loop, record, shadow, seed))
         if pace is not None:
             load_kernels(robot, self.period, self._context.model, self._context.method)
 

@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from enum import StrEnum
 from math import nan
-from typing import Any, Final, NamedTuple, Protocol
+from typing import Any, Final, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sagline.control.link import Command, Missing, Sample
 from sagline.control.states import State
+from sagline.core.arguments import brief
 from sagline.core.arrays import Array, Indices
+from sagline.core.errors import InvalidValueError
 from sagline.core.status import Status
 from sagline.kinematics.plan import Plan
 
@@ -90,6 +92,7 @@ class Recorded(NamedTuple):
     correction: Array
 
 
+@runtime_checkable
 class Recorder(Protocol):
     """Receiver of cycles and events, such as a log or a status line. It must never block; the loop waits for it."""
 
@@ -206,6 +209,10 @@ class Journal:
 
     def __init__(self, record: Recorder | None) -> None:
         """Begin without events."""
+        given: object = record  # a caller without type checks may give anything
+        if given is not None and not isinstance(given, Recorder):
+            step = "Give an object with the methods of control.Recorder, or None."
+            raise InvalidValueError("record", brief(given), "a receiver of cycles and events", step)
         self.events: list[Event] = []
         self._record = record
 

@@ -9,7 +9,7 @@ import operator
 import os
 import re
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from reprlib import Repr
 from types import MappingProxyType
@@ -160,6 +160,33 @@ def whole_number(value: Any, item: str, low: int, high: int = sys.maxsize) -> in
     if number is None:
         allowed = f"a whole number, {allowed}"
     raise InvalidValueError(item, brief(value), allowed, f"Correct {item}.")
+
+
+def flag(value: Any, item: str) -> bool:
+    """Check a Boolean of Python or numpy."""
+    if isinstance(value, bool | np.bool_):
+        return bool(value)
+    raise InvalidValueError(item, brief(value), "True or False", f"Correct {item}.")
+
+
+def elements(value: Any, single: Any, item: str, step: str) -> tuple[Any, ...]:
+    """Elements of an iterable; one object of the type `single` counts as one element.
+
+    Texts, mappings and arrays without axes are not iterables here.
+    """
+    if isinstance(value, single):
+        return (value,)
+    if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable) or getattr(value, "ndim", 1) == 0:
+        raise InvalidValueError(item, brief(value), "one or several in a list", step)
+    return tuple(value)
+
+
+def listed(value: Any, kind: type[T], item: str) -> tuple[T, ...]:
+    """Check objects of one type, one or several in an iterable, and return them as a tuple."""
+    given = elements(value, kind, item, _step_to(value, kind))
+    if not given:
+        raise InvalidValueError(item, "empty", f"{_a(kind.__name__)}, or several in a list", _step_to(value, kind))
+    return tuple(instance(one, kind, f"{item}[{k}]") for k, one in enumerate(given))
 
 
 def callback(value: Any, item: str) -> Any:

@@ -22,6 +22,7 @@ Indices = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
 LARGEST: Final = 1e50  # larger than any value of a machine in any unit; its square and cube are still finite
+FARTHEST: Final = 1e6  # m: largest coordinate of a point, larger than on any machine
 SMALLEST: Final = 1e-50  # smallest value of a quantity that must be positive
 _KINDS = {"c": "complex", "M": "dates", "m": "durations of a calendar", "V": "records"}
 

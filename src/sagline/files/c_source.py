@@ -18,7 +18,7 @@ from typing import Any, Final
 import numpy as np
 
 from sagline.cables.models import Catenary
-from sagline.core.arguments import file_path, instance
+from sagline.core.arguments import file_path, flag, instance
 from sagline.core.arrays import Array
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.controller_source import checked_name, filled, origin
@@ -79,8 +79,8 @@ def export_c(
         >>> source, header, scl = sl.export_c(robot, "sagline.c")
     """
     instance(robot, Robot, "robot")
-    instance(forward, bool, "forward")
-    real = np.float32 if instance(single_precision, bool, "single_precision") else np.float64
+    forward = flag(forward, "forward")
+    real = np.float32 if flag(single_precision, "single_precision") else np.float64
     methods = tuple(tension) if isinstance(tension, list | tuple) else (tension,)
     if not methods:
         raise InvalidValueError("tension", "empty", "a method or several", "Give one, Closest() for instance.")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from importlib.util import find_spec
 from io import BytesIO
 from pathlib import Path
@@ -17,11 +18,13 @@ from sagline.core.errors import FileError, InvalidValueError, SaglineError
 from sagline.files.quantity import in_si
 from sagline.files.reading import read_bytes
 from sagline.files.writing import atomic_file, check_file
-from sagline.interference.mesh import MOST, Mesh, extent_text
+from sagline.interference.mesh import MOST, Mesh, check_coordinates, extent_text
 from sagline.workspaces.surface import Surface
 
 LIMIT: Final = 200.0  # largest size of a file [MB]
 CHECKED: Final = 20_000  # largest number of triangles for which self-intersections are searched
+_MEANT: Final = "Check that it is the file you mean."
+_CORNER_ZERO: Final = re.compile(rb"^[ \t]*f[ \t](?:.*[ \t])?[+-]?0+(?=[/\s]|\Z)", re.MULTILINE)
 KINDS: Final = (".stl", ".ply", ".obj", ".glb")
 _CONTACTS: Final = 40  # contacts per triangle; most are with its own neighbors
 _UPRIGHT: Final = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])  # from z up to y up, as in glTF
@@ -56,13 +59,13 @@ def load_mesh(file: str | os.PathLike[str], unit: str = "m", name: str | None = 
     if path.suffix.lower() not in KINDS:
         raise FileError(path, f"is not a mesh file; allowed: {', '.join(KINDS)}", "Save it as one of these.")
     data = read_bytes(path, LIMIT)
-    vertices, faces = _triangles(path, data)
+    vertices, faces = _triangles(path, data, factor)
     if len(faces) > MOST:
         raise FileError(
             path, f"has {len(faces):,} triangles; allowed: {MOST:,}", "Simplify it in the program that made it."
         )
     try:
-        mesh = Mesh(vertices * factor, faces, called)
+        mesh = Mesh(vertices, faces, called)
     except InvalidValueError as error:
         raise FileError.of(path, error) from None
     if len(faces) <= CHECKED and (crossing := first_crossing(mesh)) is not None:
@@ -83,29 +86,41 @@ def meters(unit: str, item: str) -> float:
     return factor
 
 
-def _triangles(path: Path, data: bytes) -> tuple[Array, Indices]:
-    """Distinct vertices and non-degenerate triangles of a file."""
+def _triangles(path: Path, data: bytes, unit: float) -> tuple[Array, Indices]:
+    """Distinct vertices [m] and non-degenerate triangles of a file with coordinates in a unit [m]."""
     try:
         import trimesh
     except ImportError:
         raise FileError.not_installed("trimesh", "Meshes need it", "workspace") from None
     kind = path.suffix.lower()[1:]
+    if kind == "obj" and (zero := _CORNER_ZERO.search(data)):
+        line = data.count(b"\n", 0, zero.end()) + 1
+        raise FileError(path, f"has a face with corner 0 in line {line}; allowed: from 1, or from -1 back", _MEANT)
     try:
-        read: Any = trimesh.load(BytesIO(data), file_type=kind, force="mesh", process=False, skip_materials=True)
-        read.merge_vertices(merge_tex=True, merge_norm=True)
-        vertices, faces = np.array(read.vertices, dtype=np.float64), np.array(read.faces, dtype=np.int64)
+        with np.errstate(all="ignore"):  # coordinates that are no numbers are refused below
+            read: Any = trimesh.load(BytesIO(data), file_type=kind, force="mesh", process=False, skip_materials=True)
+            _check_vertices(path, np.asarray(read.vertices, dtype=np.float64) * unit)
+            read.merge_vertices(merge_tex=True, merge_norm=True)
+        vertices, faces = unit * np.array(read.vertices, dtype=np.float64), np.array(read.faces, dtype=np.int64)
     except SaglineError:
         raise
     except Exception as error:  # the readers of the formats raise many kinds of errors for a wrong file
         reason = " ".join(str(error).split())[:80] or type(error).__name__
-        raise FileError(
-            path, f"cannot be read as {kind.upper()} ({reason})", "Check that it is the file you mean."
-        ) from None
-    if not len(faces) or not np.isfinite(vertices).all():
-        reason = "contains no triangles" if not len(faces) else "contains coordinates that are not numbers"
-        raise FileError(path, reason, "Check that it is the file you mean.")
+        raise FileError(path, f"cannot be read as {kind.upper()} ({reason})", _MEANT) from None
+    if not len(faces):
+        raise FileError(path, "contains no triangles", _MEANT)
     distinct = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
     return (vertices @ _UPRIGHT.T if kind == "glb" else vertices), faces[distinct]
+
+
+def _check_vertices(path: Path, vertices: Array) -> None:
+    """Refuse vertices [m] that are no numbers or far beyond all machines."""
+    if not np.isfinite(vertices).all():
+        raise FileError(path, "contains coordinates that are not numbers", _MEANT)
+    try:
+        check_coordinates(vertices)
+    except InvalidValueError as error:
+        raise FileError.of(path, error) from None
 
 
 def first_crossing(mesh: Mesh) -> Array | None:

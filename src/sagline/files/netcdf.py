@@ -196,7 +196,9 @@ def _load(path: Path, content: Content) -> Dataset:
     try:
         with File(path) as file:  # h5netcdf would write to stderr if the file cannot be opened
             dict(file.attrs)
-        with open_dataset(path.absolute(), engine="h5netcdf", decode_times=False, mask_and_scale=False) as data:
+        with open_dataset(
+            path.absolute(), engine="h5netcdf", phony_dims="sort", decode_times=False, mask_and_scale=False
+        ) as data:
             if data.nbytes > INFLATION * size:
                 raise ValueError(f"{size} bytes for {data.nbytes:.2g} bytes of data")
             return data.load()

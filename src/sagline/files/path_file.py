@@ -9,8 +9,9 @@ from typing import Any, Literal
 import numpy as np
 
 from sagline.core.arguments import file_path
+from sagline.core.arrays import FARTHEST
 from sagline.core.errors import FileError, InvalidValueError
-from sagline.files.pose_text import FARTHEST, QUATERNION_TOLERANCE, PoseEntry, pose_of_entry
+from sagline.files.pose_text import QUATERNION_TOLERANCE, PoseEntry, pose_of_entry
 from sagline.files.quantity import in_si
 from sagline.files.reading import read_text
 from sagline.files.table import TABLE_LIMIT, CsvTable, line_error

@@ -7,13 +7,13 @@ from typing import Any, Final
 
 import numpy as np
 
-from sagline.core.arrays import Array, checked
+from sagline.core.arrays import FARTHEST, Array, checked
 from sagline.core.errors import InvalidValueError
 from sagline.files.quantity import in_si, plain_number
 from sagline.files.yaml_text import YamlEntry
 from sagline.robot.pose import Pose
 
-FARTHEST, STRONGEST = 1e6, 1e12  # [m]; [N] and [N m]: larger than on any machine, far below overflow
+STRONGEST: Final = 1e12  # N and N m: larger than on any machine, far below overflow
 QUATERNION_TOLERANCE: Final = 1e-3  # largest deviation of a quaternion's length from 1, for three decimals
 POSE_STEP: Final = "Give meters, and degrees about z, y and x: --pose 1,0,1.5 or --pose 1,0,1.5,10,0,0."
 WRENCH_STEP: Final = (

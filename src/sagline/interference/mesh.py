@@ -9,7 +9,7 @@ from attrs import field, frozen
 from numpy.typing import ArrayLike
 
 from sagline.core.arguments import instance, label
-from sagline.core.arrays import Array, Flags, Indices, checked, locked, numbers
+from sagline.core.arrays import FARTHEST, Array, Flags, Indices, checked, locked, numbers
 from sagline.core.errors import InvalidValueError
 from sagline.core.fields import check_fields, checked_by, given, reduced
 from sagline.core.memory import check_memory
@@ -61,6 +61,7 @@ class Mesh(Result):
         if corners.ndim != 2:
             step = "Give one mesh at a time."
             raise InvalidValueError("vertices", f"of shape {corners.shape}", "shape (any, 3)", step)
+        check_coordinates(corners)
         triangles = _faces(self.faces, len(corners))
         check_fields(self)
         if wrong := _open_edges(triangles):
@@ -151,6 +152,13 @@ def _open_edges(faces: Indices) -> int:
     sign = np.repeat((1, -1), len(start))
     _, place = np.unique(ways, return_inverse=True)
     return int(np.count_nonzero(np.bincount(place, weights=sign)) // 2)
+
+
+def check_coordinates(corners: Array) -> None:
+    """Refuse corners [m] that are far beyond all machines."""
+    if (far := float(np.abs(corners).max(initial=0.0))) > FARTHEST:
+        step = "Correct them, or the unit of their file."
+        raise InvalidValueError("vertices", f"up to {far:g} m away", f"up to {FARTHEST:g} m", step)
 
 
 def extent_text(corners: Array) -> str:

@@ -176,7 +176,7 @@ def _reference(robot: Robot, previous: Plan | ArrayLike | None, variable: Variab
     if previous is None:
         return np.full(robot.cable_count, np.nan)
     if not isinstance(previous, Plan):
-        return exactly(previous, "previous", "N", (robot.cable_count,)).copy()
+        return exactly(previous, "previous", "N", (robot.cable_count,), low=0.0).copy()
     cables = previous.state.cables
     if cables.shape[-1] != robot.cable_count:
         raise InvalidValueError(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -11,7 +12,7 @@ import numpy as np
 from attrs import field, frozen
 
 from sagline.cables.cable import Cable
-from sagline.core.arguments import brief, choice, instance, integer, label
+from sagline.core.arguments import brief, choice, elements, instance, integer, label
 from sagline.core.arrays import Array, Indices, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.fields import check_fields, checked_by, reduced
@@ -85,10 +86,9 @@ def cable_numbers(cables: Any) -> tuple[int, ...]:
     """Checked cable indices without repetitions; empty for None, which means all cables."""
     if cables is None:
         return ()
-    given = list(cables) if isinstance(cables, Sequence | np.ndarray) and not isinstance(cables, str) else []
-    found = [integer(one) for one in given]
-    if not found or any(one is None or one < 0 for one in found) or len(set(found)) < len(found):
-        step = "Number the cables from 0, or leave cables out for all."
+    step = "Number the cables from 0, or leave cables out for all."
+    found = [integer(one) for one in elements(cables, (), "cables", step)]
+    if not found or any(one is None or not 0 <= one <= sys.maxsize for one in found) or len(set(found)) < len(found):
         raise InvalidValueError("cables", brief(cables), "numbers of cables that differ", step)
     return tuple(one for one in found if one is not None)
 

@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from sagline.cables.model import CableModel
-from sagline.core.arguments import brief, choice, instance, optional, whole_number
+from sagline.core.arguments import brief, choice, elements, instance, optional, whole_number
 from sagline.core.errors import InvalidValueError
 from sagline.kernels import tables
 from sagline.optimization.candidates import AnchorErrors, Candidates, PlatformBox, free_parts
@@ -28,6 +28,7 @@ MOST: Final = 100_000  # largest number of poses
 
 def poses_of(robot: Robot, poses: Pose | None, box: PoseBox | None, grid: Sequence[int]) -> Pose:
     """Poses as a batch, or a grid of level poses over a box, by default the robot's test box."""
+    counts = _counts(grid)
     if poses is not None:
         if box is not None:
             raise InvalidValueError("box", "given beside poses", "one of the two", "Leave one of them out.")
@@ -36,7 +37,7 @@ def poses_of(robot: Robot, poses: Pose | None, box: PoseBox | None, grid: Sequen
         if not 0 < len(batch) <= MOST:
             raise InvalidValueError("poses", f"{len(batch):,} of them", f"1 to {MOST:,}", "Give some of them.")
     else:
-        batch = _grid(_box(robot, box), _counts(grid))
+        batch = _grid(_box(robot, box), counts)
     check_reach(robot, batch, "poses")
     return batch
 
@@ -54,9 +55,10 @@ def _box(robot: Robot, box: PoseBox | None) -> PoseBox:
 
 
 def _counts(grid: Any) -> tuple[int, ...]:
-    if not isinstance(grid, Sequence | np.ndarray) or isinstance(grid, str) or len(grid) != 3:
-        raise InvalidValueError("grid", brief(grid), "three whole numbers", "Give (9, 7, 5) for instance.")
-    counts = tuple(whole_number(count, f"grid[{k}]", 1, MOST) for k, count in enumerate(grid))
+    step = "Give (9, 7, 5) for instance."
+    if len(given := elements(grid, (), "grid", step)) != 3:
+        raise InvalidValueError("grid", brief(grid), "three whole numbers", step)
+    counts = tuple(whole_number(count, f"grid[{k}]", 1, MOST) for k, count in enumerate(given))
     if (total := counts[0] * counts[1] * counts[2]) > MOST:
         raise InvalidValueError("grid", f"of {total:,} poses", f"up to {MOST:,}", "Take fewer.")
     return counts

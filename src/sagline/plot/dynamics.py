@@ -13,7 +13,7 @@ from matplotlib.colors import LogNorm, Normalize, to_rgb
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
-from sagline.core.arguments import choice, instance
+from sagline.core.arguments import choice, instance, listed, text
 from sagline.core.arrays import checked
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
@@ -138,9 +138,10 @@ def frequencies(
         >>> found = [sl.vibration(state, up_to=8.0) for state in states]
         >>> axes = sl.plot.frequencies(found, path.time[::100])
     """
-    states = tuple(instance(each, Vibration, f"vibrations[{k}]") for k, each in enumerate(vibrations))
+    states = listed(vibrations, Vibration, "vibrations")
     if len(states) < 2:
         raise InvalidValueError("vibrations", f"{len(states)} of them", "two at least", "Take more states of the path.")
+    label = text(label, "label")
     clock = np.arange(len(states), dtype=np.float64)
     if time is not None:
         clock = checked(time, "time", "s", shape=(len(states),))

@@ -11,7 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 from PIL import Image
 
-from sagline.core.arguments import file_path, instance, whole_number
+from sagline.core.arguments import callback, file_path, instance, whole_number
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.dynamics.vibration.mode_list import WITH_MASS, ListedMode, listed_modes
 from sagline.dynamics.vibration.vibration import Vibration
@@ -58,7 +58,7 @@ def film(vibration: Vibration, number: int, file: os.PathLike[str] | str, *, pro
     if not 1 <= whole_number(number, "number", 1) <= len(modes):
         step = "Raise up_to for more."
         raise InvalidValueError("number", number, f"1 to {len(modes)}, modes with cable mass", step)
-    pictures = _pictures(Swing.of(vibration, modes[number - 1]), progress)
+    pictures = _pictures(Swing.of(vibration, modes[number - 1]), callback(progress, "progress"))
     rounds = round(SECONDS / PERIOD)
     buffer = BytesIO()
     pictures[0].save(

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sagline.cables.cable import Cable
-from sagline.core.arguments import brief
+from sagline.core.arguments import brief, listed
 from sagline.core.arrays import Array, locked
 from sagline.core.errors import InvalidValueError
 from sagline.robot.pose import Pose
@@ -32,15 +32,7 @@ def together(robot: Robot | Sequence[Robot]) -> Robots:
     """
     if isinstance(robot, Robot):
         return robot
-    given: Any = robot  # a caller without type checks may pass anything
-    robots: tuple[Any, ...] = ()
-    if isinstance(given, Sequence | np.ndarray) and not isinstance(given, str):
-        robots = tuple(given)
-    wrong = [index for index, one in enumerate(robots) if not isinstance(one, Robot)]
-    if wrong or not robots:
-        item, value = (f"robot[{wrong[0]}]", robots[wrong[0]]) if wrong else ("robot", given)
-        step = 'Load one by its name or file: load_robot("cogiro").'
-        raise InvalidValueError(item, brief(value), "a Robot, or a sequence of them", step)
+    robots = listed(robot, Robot, "robot")
     first = first_of(robots)
     for index, other in enumerate(robots):
         _check_alike(first, other, index)

@@ -15,8 +15,9 @@ from contextlib import contextmanager, suppress
 from itertools import islice
 from typing import Any, Final
 
+from sagline.core.arguments import brief
 from sagline.core.errors import InvalidValueError, SaglineError
-from sagline.sweep.folder import is_installed
+from sagline.sweep.folder import check_package, is_installed
 from sagline.sweep.work import task
 
 HERE: Final = "127.0.0.1"  # not reachable from other computers
@@ -81,6 +82,7 @@ def local_workers(workers: int, tell: Callable[[str], None]) -> Iterator[Any]:
 def remote_workers(address: str) -> Iterator[Any]:
     """The workers of a scheduler at an address, "tcp://10.0.0.1:8786"; SaglineError if there are none."""
     check_address(address)
+    check_package("distributed", "a scheduler")
     with _silence_dask():
         import distributed
 
@@ -88,7 +90,7 @@ def remote_workers(address: str) -> Iterator[Any]:
 
         try:
             client = api.Client(address, timeout=PATIENCE, set_as_default=False)
-        except (OSError, ValueError, RuntimeError) as error:
+        except (OSError, ValueError, RuntimeError, MemoryError) as error:  # the last if another program answers
             step = "Start one: dask scheduler; and workers: dask worker ADDRESS."
             raise SaglineError(f"No scheduler answers at {address} ({_first_line(error)}). {step}") from None
         with client:
@@ -107,7 +109,7 @@ def check_address(address: object) -> str:
         host, _, port = address.removeprefix(scheme or "").rpartition(":")
         if scheme and host and " " not in host and port.isdecimal() and 0 < int(port) < 1 << 16:
             return address
-    raise InvalidValueError("scheduler", repr(address), "an address, tcp://HOST:PORT", "Take the one it prints.")
+    raise InvalidValueError("scheduler", brief(address), "an address, tcp://HOST:PORT", "Take the one it prints.")
 
 
 def run_tasks(client: Any, job: Job, numbers: Iterable[int], finish: Finish, tell: Callable[[str], None]) -> None:

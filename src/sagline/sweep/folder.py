@@ -6,6 +6,7 @@ Each chunk contains a checksum, which detects incomplete chunks.
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import math
@@ -145,6 +146,8 @@ def make_folder(path: Path, request: Request, size: TaskSize) -> None:
             _fill(place / path.name / GROUP, request, size, attributes)
             os.replace(place / path.name, path)
     except OSError as error:
+        if error.errno in (errno.ENOTEMPTY, errno.EEXIST):
+            return  # another process has made it in the meantime; it is checked like any other when it is opened
         reason = f"cannot be made ({error.strerror or error})"
         raise FileError(path, reason, "Check its name, the permissions and the space on the disk.") from None
 

@@ -6,14 +6,14 @@ from collections.abc import Iterable, Iterator, Sequence, Sized
 from dataclasses import dataclass
 from enum import IntEnum
 from types import MappingProxyType
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary
-from sagline.core.arguments import brief, choice, instance
+from sagline.core.arguments import brief, choice, elements, instance, listed
 from sagline.core.arrays import Array, checked, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import counted
@@ -146,15 +146,14 @@ class Request(Result):
             InvalidValueError: If an argument is of the wrong kind or empty, the tension distribution method does not
                 support a robot, or a pose is outside the motions of a robot.
         """
-        machines = (robots,) if isinstance(robots, Robot) else _sequence(robots, "robots", "a Robot, or a list of them")
-        machines = tuple(instance(one, Robot, f"robots[{k}]") for k, one in enumerate(machines))
+        machines = listed(robots, Robot, "robots")
         batch = instance(poses, Pose, "poses")
         if not batch.shape:
             batch = Pose.from_quaternion(batch.position[None], batch.quaternion[None])
         loads = np.atleast_2d(checked(np.zeros(6) if wrenches is None else wrenches, "wrenches", "N, N m", shape=(6,)))
         if loads.ndim > 2:
             raise InvalidValueError("wrenches", f"of shape {loads.shape}", "shape (6,) or (W, 6)", "Flatten the axes.")
-        words = (quantities,) if isinstance(quantities, str) else _sequence(quantities, "quantities", "a list of words")
+        words = elements(quantities, str, "quantities", "Give quantities as a list.")
         chosen = {choice(word, f"quantities[{k}]", QUANTITIES) for k, word in enumerate(words)}
         if len(chosen) < len(words):
             raise InvalidValueError("quantities", brief(list(words)), "each once", "Leave out what is there twice.")
@@ -199,12 +198,6 @@ class Request(Result):
         """Number of requests."""
         robots, poses, wrenches = self.shape
         return robots * poses * wrenches
-
-
-def _sequence(value: Any, item: str, allowed: str) -> tuple[Any, ...]:
-    if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes):
-        return tuple(value)
-    raise InvalidValueError(item, brief(value), allowed, f"Give {item} as a list.")
 
 
 class RequestBox(NamedTuple):

@@ -6,7 +6,7 @@ import multiprocessing
 import os
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
 from typing import Any, Final
 
@@ -81,11 +81,13 @@ def run(
         if workers is not None:
             step = "Leave one of them out."
             raise InvalidValueError("workers", "given with scheduler", "one of the two", step)
-        check_package("distributed", "a scheduler")
     report, say = callback(progress, "progress"), callback(tell, "tell") or (lambda text: None)
     check_package("zarr", "sweeps")
-    opened = _open_or_make_folder(path, request)
-    with open_marks(opened) as marks:
+    with ExitStack() as entered:
+        # before the folder is made: without a scheduler nothing is written
+        remote = None if scheduler is None else entered.enter_context(remote_workers(scheduler))
+        opened = _open_or_make_folder(path, request)
+        marks = entered.enter_context(open_marks(opened))
         waiting = _waiting(opened, marks)
         start, done = 0.0, 0
 
@@ -100,7 +102,7 @@ def run(
         if report is not None:
             report(len(marks.marks), opened.tasks)
         job = (str(path.absolute()), opened.digest)
-        with _workers(count, scheduler, len(waiting), say) as client:
+        with nullcontext(remote) if remote is not None else _workers(count, len(waiting), say) as client:
             start = time.monotonic()
             if client is not None:
                 run_tasks(client, job, waiting, finish, say)
@@ -146,12 +148,9 @@ def _waiting(folder: SweepFolder, marks: TaskMarks) -> list[int]:
 
 
 @contextmanager
-def _workers(count: int, scheduler: str | None, tasks: int, tell: Tell) -> Iterator[Any]:
-    """Client of Dask; None if tasks are computed one after the other."""
-    if scheduler is not None and tasks:
-        with remote_workers(scheduler) as client:
-            yield client
-    elif count > 1 and tasks > FEW and is_installed("distributed"):
+def _workers(count: int, tasks: int, tell: Tell) -> Iterator[Any]:
+    """Client of Dask on this machine; None if tasks are computed one after the other."""
+    if count > 1 and tasks > FEW and is_installed("distributed"):
         _check_not_imported()
         with local_workers(min(count, tasks), tell) as client:
             yield client

@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from sagline.control.link import COUNTERS, PERIOD, Command, groups_of
-from sagline.core.arguments import brief, choice, instance, optional, whole_number
+from sagline.core.arguments import brief, choice, elements, flag, instance, optional, whole_number
 from sagline.core.arrays import number
 from sagline.core.errors import InvalidValueError
 from sagline.dynamics.simulation.simulator import Reading
@@ -121,7 +121,7 @@ class Machine:
         losses = optional(damping, Damping, "damping") or LOSSES
         noise = whole_number(seed, "seed", 0, MOST_SEED)
         self._network = Network(delay, jitter, loss, noise)
-        begin = initial_state(robot, self.nominal, start, bool(surveyed))
+        begin = initial_state(robot, self.nominal, start, flag(surveyed, "surveyed"))
         self._hardware = Hardware(robot, begin, losses, size, self.period, noise)
         check_step(robot, begin.state, size, self.period)
         self._parts = [slice(winches[0], winches[-1] + 1) for winches in self.groups]
@@ -169,7 +169,7 @@ class Machine:
         Returns:
             The link: a `sagline.control.link.Link`.
         """
-        link = MachineLink(self, self._network, moves)
+        link = MachineLink(self, self._network, flag(moves, "moves"))
         self._links.append(link)
         return link
 
@@ -367,9 +367,4 @@ class Machine:
 
 def _each_fault(faults: Any) -> Iterable[Any]:
     """Iterable of one or several faults."""
-    if isinstance(faults, str | Injected):
-        return (faults,)
-    if isinstance(faults, Iterable):
-        return faults
-    step = 'Give texts: faults=["cell 3 sticks at 40 s"].'
-    raise InvalidValueError("faults", brief(faults), "faults, or none", step)
+    return elements(faults, str | Injected, "faults", 'Give texts: faults=["cell 3 sticks at 40 s"].')

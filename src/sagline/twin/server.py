@@ -14,7 +14,7 @@ import numpy as np
 
 from sagline.control.link import Command, Mode
 from sagline.control.real_time import Pace
-from sagline.core.arguments import instance, whole_number
+from sagline.core.arguments import flag, instance, whole_number
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.plc.blocks import AGAIN, CLAIM, FROM_PLC, TO_PLC, Refusal, winch_row, winch_rows
@@ -66,7 +66,7 @@ class Server:
         self._groups = range(len(machine.groups))
         self._seen = [b""] * len(machine.groups)  # last commands that were read
         first = [self._block(group) or SILENT for group in self._groups]
-        self._servers = _block_servers(first, place, first_port, instance(modbus, bool, "modbus"))
+        self._servers = _block_servers(first, place, first_port, flag(modbus, "modbus"))
         self.addresses = self._servers.addresses
 
     @property

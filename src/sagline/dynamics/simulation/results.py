@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, Final, TypeAlias
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from sagline.core.arguments import brief
+from sagline.core.arguments import brief, elements
 from sagline.core.arrays import Array, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.fields import NumberFields, rule
@@ -105,13 +104,8 @@ def event_cable(event: Event) -> int | None:
 
 def checked_events(events: Any, robot: Robot, begin: float, end: float) -> tuple[Event, ...]:
     """Checked events in order of time, between begin and end [s]."""
-    given = (events,) if isinstance(events, Event) else events
-    if not isinstance(given, Iterable) or isinstance(given, str):
-        step = "Give sl.Break(cable=3, time=2.5), or several in a list."
-        raise InvalidValueError("events", brief(events), "events, or none", step)
     found: list[Event] = []
-    listed: list[Any] = list(given)
-    for k, event in enumerate(listed):
+    for k, event in enumerate(elements(events, Event, "events", "Give sl.Break(cable=3, time=2.5), or several.")):
         if not isinstance(event, Event):
             names = ", ".join(kind.__name__ for kind in KINDS)
             step = "Give sl.Break(cable=3, time=2.5) for instance."

@@ -24,7 +24,7 @@ from sagline.dynamics.simulation.plant import Plant
 from sagline.dynamics.simulation.results import Drop, Event, PickUp, Simulation, checked_events
 from sagline.dynamics.simulation.run import SimulationRun
 from sagline.dynamics.simulation.steps import checked_step, frequency_with_winches, platform_frequency
-from sagline.dynamics.simulation.winches import Winches, Winding, check_winding, drive_data, winch_kind
+from sagline.dynamics.simulation.winches import Winches, Winding, checked_winding, drive_data, winch_kind
 from sagline.dynamics.vibration.dynamic_stiffness import Damping
 from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics import massless as k
@@ -159,7 +159,7 @@ def started_run(
         check_lumped(given)
     kind, losses = winch_kind(winches), checked_damping(damping)
     code = integrator_code(integrator, kind, elements)
-    check_winding(winding, kind)
+    winding = checked_winding(winding, kind)
     air = TimeTable.constant(np.zeros(3)) if wind is None else checked_time_table(wind, "wind", "m/s", 3, given.begin)
     happening = checked_events(events, given.robot, given.begin, given.end)
     plant = initial_plant(given, winches, wind is not None, elements, losses)

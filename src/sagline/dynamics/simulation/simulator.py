@@ -26,7 +26,7 @@ from sagline.dynamics.simulation.simulate import (
     load_bits,
     time_step,
 )
-from sagline.dynamics.simulation.winches import Encoders, LoadCells, Winches, Winding, check_winding, winch_kind
+from sagline.dynamics.simulation.winches import Encoders, LoadCells, Winches, Winding, checked_winding, winch_kind
 from sagline.dynamics.vibration.dynamic_stiffness import Damping
 from sagline.kernels.cable.geometry import LENGTH
 from sagline.kernels.dynamics import drives as d
@@ -125,7 +125,7 @@ class Simulator:
         given: InitialConditions = initial_conditions(_at_rest(instance(robot, Robot, "robot"), start), None, None, 1.0)
         kind, losses = winch_kind(winches), checked_damping(damping)
         code = integrator_code(integrator, kind)
-        check_winding(winding, kind)
+        winding = checked_winding(winding, kind)
         self._plant: Plant = initial_plant(given, winches, False)
         if winding == "remembered" and kind == d.DRUMS:
             self._plant.remember_winding(2.0 * float(given.lengths.value.max()))

@@ -35,6 +35,9 @@ def platform_frequency(robot: Robot, poses: Pose, lengths: Array) -> float:
     taut = np.maximum(distance[..., 0], 1e-300)
     springs = robot.cables.axial_stiffness / (np.minimum(lengths.min(axis=0), taut) if len(poses) == 1 else taut)
     stiffness = np.swapaxes(rows, 1, 2) @ (springs[..., None] * rows)
+    if not np.isfinite(stiffness).all():
+        value = f"down to {lengths.min():g} m"
+        raise InvalidValueError("unstrained_length", value, "longer cables", "Correct unstrained_length.")
     mass = np.zeros((len(poses), 6, 6))
     mass[:, :3, :3] = robot.mass * np.eye(3)
     mass[:, 3:, 3:] = rotation @ robot.inertia @ np.swapaxes(rotation, 1, 2)

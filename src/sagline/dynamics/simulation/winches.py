@@ -54,11 +54,13 @@ def winch_kind(winches: Any) -> int:
     raise InvalidValueError("winches", brief(winches), allowed, "Choose one of them as winches.")
 
 
-def check_winding(winding: Any, kind: int) -> None:
-    """Reject remembered winding for winches without drums."""
-    if choice(winding, "winding", get_args(Winding)) == "remembered" and kind != d.DRUMS:
+def checked_winding(winding: Any, kind: int) -> Winding:
+    """The checked winding; remembered winding is rejected for winches without drums."""
+    found: Winding = choice(winding, "winding", get_args(Winding))
+    if found == "remembered" and kind != d.DRUMS:
         step = 'Give winches="robot" too, or leave winding out.'
         raise InvalidValueError("winding", '"remembered"', '"constant" for winches without drums', step)
+    return found
 
 
 def drive_data(robot: Robot, winches: Winches, length: Array, with_wind: bool) -> Array:
