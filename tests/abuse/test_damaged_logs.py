@@ -5,12 +5,16 @@ import struct
 import time
 import tracemalloc
 import warnings
+from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+import lz4.frame
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from mcap.writer import CompressionType, Writer
 from syrupy.assertion import SnapshotAssertion
 from zstandard import compress
@@ -177,16 +181,56 @@ def test_a_missing_chunk_is_noticed(whole: bytes, tmp_path: Path, which: int) ->
             sl.load_execution(tmp_path / "run.mcap")
 
 
+def of_lz4(data: bytes) -> bytes:
+    return lz4.frame.compress(data)  # type: ignore[no-any-return]
+
+
+SQUEEZERS: dict[str, Callable[[bytes], bytes]] = {"zstd": compress, "lz4": of_lz4, "": bytes}
+
+
 @extended
-@pytest.mark.parametrize("said", [3, 1 << 28])
-def test_a_chunk_that_is_larger_than_any_takes_no_memory(whole: bytes, tmp_path: Path, said: int) -> None:
-    data = compress(bytes(1 << 28))
-    body = struct.pack("<QQQII", 0, 1, said, 0, 4) + b"zstd" + struct.pack("<Q", len(data)) + data
+@pytest.mark.parametrize("kind", ["zstd", "lz4"])
+@pytest.mark.parametrize("said", [3, 1 << 16, 1 << 28])
+def test_a_chunk_that_is_larger_than_its_bytes_allow_takes_no_memory(
+    whole: bytes, tmp_path: Path, said: int, kind: str
+) -> None:
+    assert_refused_at_once(whole, tmp_path, said, kind, SQUEEZERS[kind](bytes(1 << 28)))
+
+
+MANY = struct.pack("<BQHIQQ", 5, 22, 0, 0, 0, 0)  # an empty message
+ZEROS = bytes(1 << 20)
+
+
+@pytest.mark.parametrize("kind", wide(list(SQUEEZERS)))
+@pytest.mark.parametrize("content", [ZEROS, b"\x05" + ZEROS, MANY * 30_000, bytes(range(256)) * 4000], ids=range(4))
+def test_a_chunk_of_nothing_ends_at_once(whole: bytes, tmp_path: Path, kind: str, content: bytes) -> None:
+    assert_refused_at_once(whole, tmp_path, len(content), kind, SQUEEZERS[kind](content))
+
+
+@extended
+def test_chunks_of_another_size_than_they_say_are_refused(whole: bytes, tmp_path: Path) -> None:
+    @given(st.binary(max_size=300), st.integers(0, 1 << 40), st.sampled_from([*SQUEEZERS, "gzip"]))
+    @settings(max_examples=60, deadline=None)
+    def refused(content: bytes, said: int, kind: str) -> None:
+        data = SQUEEZERS.get(kind, bytes)(content)
+        assert_refused_at_once(whole, tmp_path, said if said != len(content) else said + 1, kind, data)
+
+    refused()
+
+
+def assert_refused_at_once(whole: bytes, tmp_path: Path, said: int, kind: str, data: bytes) -> None:
+    """Whether a log whose first chunk is replaced is refused, without much memory or time."""
+    head = struct.pack("<QQQII", 0, 1, said, 0, len(kind))
+    body = head + kind.encode() + struct.pack("<Q", len(data)) + data
     before = whole[: whole.index(b"plan-0.sagline") - 29]  # what stands before the plan's record
     (tmp_path / "run.mcap").write_bytes(before + b"\x06" + struct.pack("<Q", len(body)) + body)
+    start = time.process_time()
     tracemalloc.start()
-    with pytest.raises(sl.FileError, match="is damaged"):
-        sl.load_execution(tmp_path / "run.mcap")
-    peak = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    assert peak < 5e7
+    try:
+        with pytest.raises(sl.FileError, match="is damaged"):
+            sl.load_execution(tmp_path / "run.mcap")
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 5e7 + 4 * len(data)
+    assert time.process_time() - start < SLOWEST

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import struct
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -31,7 +32,11 @@ AGAIN: Final = "Get the original file."
 _HEAD: Final = 9  # bytes of a record before its content: type and length
 _CHUNK, _ATTACHMENT, _DATA_END = 0x06, 0x09, 0x0F
 _NEEDED: Final = {quantity.name for quantity in EVERY} | {"plan", "zero", "epoch"}  # columns required in every chunk
-_LARGEST: Final = 1 << 27  # largest chunk [bytes]; one second of a sagline log has about a thousandth of it
+_INFLATION: Final = 100  # largest ratio of a chunk to its compressed bytes, of which it has 1.5 to 10 times as many
+_SMALL: Final = 1 << 16  # bytes of a chunk that are always allowed
+_LARGEST: Final = 1 << 24  # bytes of the packed cycles of a chunk; a sagline log has about a hundredth of it
+_SCHEMA, _CHANNEL, _MESSAGE = 0x03, 0x04, 0x05
+_MESSAGE_HEAD: Final = struct.Struct("<HIQQ")  # channel, sequence number, two times
 _PLAN_NAME, _END_NAME = (re.compile(name.replace(".", r"\.").format(r"(\d+|none)")) for name in (PLAN, END))
 
 
@@ -151,8 +156,8 @@ class LogReader:
     def _take(self, code: int, record: bytes) -> None:
         if code not in (_CHUNK, _ATTACHMENT) or (code == _CHUNK and self.log.robot is None):
             return  # a sagline log begins with its robot
-        from mcap.records import Attachment, Channel, Chunk, Message
-        from mcap.stream_reader import StreamReader, breakup_chunk
+        from mcap.records import Attachment, Chunk
+        from mcap.stream_reader import StreamReader
 
         found = next(iter(StreamReader(BytesIO(record), skip_magic=True, emit_chunks=True).records))
         if isinstance(found, Attachment):
@@ -160,22 +165,25 @@ class LogReader:
                 raise ValueError("wrong digest")
             self._attached(found.name, found.log_time, found.data)
         elif isinstance(found, Chunk):
-            self._check_size(found)
-            for part in breakup_chunk(found, validate_crc=True):
-                if isinstance(part, Channel):
-                    self._topics[part.id] = part.topic
-                elif isinstance(part, Message):
-                    self._message(self._topics[part.channel_id], part.log_time, part.sequence, part.data)
+            self._take_chunk(_content_of(found))
 
-    @staticmethod
-    def _check_size(chunk: Any) -> None:
-        from zstandard import get_frame_parameters
+    def _take_chunk(self, data: bytes) -> None:
+        """Take the channels and messages of a chunk."""
+        from mcap.data_stream import ReadDataStream
+        from mcap.records import Channel
 
-        sizes = [chunk.uncompressed_size]
-        if chunk.compression == "zstd":
-            sizes.append(get_frame_parameters(chunk.data).content_size)
-        if max(sizes) > _LARGEST:
-            raise ValueError("a chunk with an impossible size")
+        place = 0
+        while place < len(data):
+            code, first = data[place], place + _HEAD
+            place = first + int.from_bytes(data[place + 1 : first], "little")
+            if code not in (_SCHEMA, _CHANNEL, _MESSAGE) or place > len(data):
+                raise ValueError("a chunk with a record that none has")
+            if code == _CHANNEL:
+                channel = Channel.read(ReadDataStream(BytesIO(data[first:place])))
+                self._topics[channel.id] = channel.topic
+            elif code == _MESSAGE:
+                identity, number, stamp, _ = _MESSAGE_HEAD.unpack_from(data, first)
+                self._message(self._topics[identity], stamp, number, data[first + _MESSAGE_HEAD.size : place])
 
     def _attached(self, name: str, epoch: int, data: bytes) -> None:
         if name == HEAD:
@@ -203,7 +211,7 @@ class LogReader:
         if topic == RECORD:
             if number != len(log.blocks):
                 raise ValueError("a chunk is missing")
-            log.blocks.append(block := unpack(data))
+            log.blocks.append(block := unpack(data, _LARGEST))
             if lacking := _NEEDED - block.keys():
                 raise FileError(self.log.path, f"is inconsistent (no {min(lacking)})", AGAIN)
         elif topic == EVENT:
@@ -214,6 +222,27 @@ class LogReader:
 
     def _damaged(self) -> FileError:
         return FileError(self.log.path, f"is damaged at byte {self._offset:,}", AGAIN)
+
+
+def _content_of(chunk: Any) -> bytes:
+    """Uncompressed records of a chunk; ValueError if they are more than its own size allows."""
+    from lz4.frame import LZ4FrameDecompressor
+    from zstandard import ZstdDecompressor, get_frame_parameters
+
+    data, said = chunk.data, chunk.uncompressed_size
+    if said > _INFLATION * len(data) + _SMALL:
+        raise ValueError("a chunk that says to be larger than its bytes allow")
+    if chunk.compression == "zstd":
+        if get_frame_parameters(data).content_size != said:  # the libraries reserve as much before they decompress
+            raise ValueError("a chunk with two sizes")
+        data = ZstdDecompressor().decompress(data, allow_extra_data=False)
+    elif chunk.compression == "lz4":
+        data = LZ4FrameDecompressor().decompress(data, max_length=said + 1)
+    elif chunk.compression:
+        raise ValueError("a chunk compressed in an unknown way")
+    if len(data) != said or (chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc):
+        raise ValueError("a chunk of another size, or with a wrong digest")
+    return bytes(data)
 
 
 def read_log(file: os.PathLike[str] | str) -> RecordedLog:

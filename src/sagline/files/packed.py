@@ -71,14 +71,16 @@ def pack(
     return compress(b"".join((len(head).to_bytes(4, "little"), head, *parts)), LEVEL)
 
 
-def unpack(data: bytes) -> dict[str, NDArray[Any]]:
-    """Columns packed by `pack`, equal to the last bit."""
+def unpack(data: bytes, most: int = 1 << 62) -> dict[str, NDArray[Any]]:
+    """Columns packed by `pack`, equal to the last bit; at most so many bytes."""
     from zstandard import ZstdDecompressor, ZstdError, get_frame_parameters
 
     try:
         size = get_frame_parameters(data).content_size
     except ZstdError as error:
         raise ValueError(f"no packed columns ({error})") from None
+    if size > most:
+        raise ValueError(f"more than {most} bytes are packed")
     check_memory("what is packed", 3.0 * size, "Get the original file.")
     try:
         plain = ZstdDecompressor().decompress(data, allow_extra_data=False)
