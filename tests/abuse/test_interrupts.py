@@ -1,4 +1,4 @@
-"""Ctrl-C and kill at any moment: exit code 130 after Ctrl-C, one line, and nothing half written.
+"""Signals at any moment: exit code 130, 143 or 129 after Ctrl-C, SIGTERM or SIGHUP, one line, and nothing half written.
 
 The moments are random, from a seed, over all that a command does: loading, solving, drawing, writing, ending.
 """
@@ -17,6 +17,7 @@ from pathlib import Path
 import pytest
 
 from sagline.cli.examples import examples
+from tests.cli.interrupts import heard
 from tests.tiers import extended
 
 pytestmark = extended
@@ -52,6 +53,7 @@ COMMANDS: tuple[tuple[str, ...], ...] = (  # the last three test_killed_commands
 INTERRUPTED = "Interrupted. All written files are complete.\n"
 
 # Ctrl-C comes from a thread of the process itself, so that the moment is counted from where the command begins
+HEARD = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 TIMED = """
 import os, signal, sys, threading, time
 from sagline.cli.__main__ import app_entry
@@ -77,7 +79,7 @@ def started(
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        preexec_fn=heard,
     )
 
 
@@ -125,7 +127,8 @@ def check(
         left = files(place) - before
         assert left == made, f"{what}: {left ^ made}"
     else:
-        assert process.returncode == 130, what
+        assert process.returncode == 128 + number, what
+        assert not any(place.rglob(".sagline*")), what
         assert errors.endswith(INTERRUPTED), what
         told = errors.splitlines()
         assert told[-1] == INTERRUPTED.strip(), what
@@ -144,20 +147,23 @@ def each(count: int, seed: int, number: int, whole: Whole, top: Path) -> None:
         check(words, *whole(words), place, draw, number)
 
 
-def test_ctrl_c_at_any_moment(whole: Whole, tmp_path: Path) -> None:
-    each(SHARE, 12, signal.SIGINT, whole, tmp_path)
+@pytest.mark.parametrize("number", HEARD)
+def test_signals_at_any_moment(number: int, whole: Whole, tmp_path: Path) -> None:
+    each(SHARE, 12 + number, number, whole, tmp_path)
 
 
 @pytest.mark.soak
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+@pytest.mark.parametrize("number", [*HEARD, signal.SIGKILL])
 def test_ctrl_c_and_kill_at_many_moments(number: int, whole: Whole, tmp_path: Path) -> None:
     each(ALL, 13, number, whole, tmp_path)
 
 
-def test_ctrl_c_that_the_shell_told_to_ignore_is_ignored(tmp_path: Path) -> None:
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP])
+def test_a_signal_that_the_shell_told_to_ignore_is_ignored(number: int) -> None:
     """As of a command in the background, or behind nohup."""
-    code = TIMED.replace("threading.Thread", "signal.signal(signal.SIGINT, signal.SIG_IGN); threading.Thread", 1)
-    done = subprocess.run([sys.executable, "-c", code, "0.3", "2", "robots"], capture_output=True, text=True)
+    code = TIMED.replace("threading.Thread", f"signal.signal({int(number)}, signal.SIG_IGN); threading.Thread", 1)
+    words = [sys.executable, "-c", code, "0.3", str(int(number)), "robots"]
+    done = subprocess.run(words, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
 
 

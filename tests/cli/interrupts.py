@@ -1,8 +1,9 @@
-"""Processes that hear Ctrl-C, whoever runs the tests."""
+"""Processes that hear signals, whoever runs the tests."""
 
 import signal
 
 
 def heard() -> None:
     """What a child does before it starts: a shell that runs the tests in the background tells it to ignore Ctrl-C."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)

@@ -1,11 +1,11 @@
-"""Entry point of the shell and of `python -m sagline.cli`; it handles Ctrl-C before any import."""
+"""Entry point of the shell and of `python -m sagline.cli`; it handles signals before any import."""
 
 from __future__ import annotations
 
 import os
 import sys
 
-from sagline.cli.ending import INTERRUPTED, exit_code_of
+from sagline.cli.ending import SIGNALS, exit_code_of
 
 
 def app_entry() -> None:
@@ -19,7 +19,7 @@ def app_entry() -> None:
                 sys.stdout = os.fdopen(1, "w", encoding="utf-8", closefd=False)
     debug = "--debug" in sys.argv
     code = exit_code_of(lambda: _command(debug), debug=debug, last=True)
-    if code == INTERRUPTED:  # Python's finalization can abort in an extension whose import was interrupted
+    if code - 128 in SIGNALS:  # Python's finalization can abort in an extension whose import was interrupted
         os._exit(code)
     sys.exit(code)
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from threading import ExceptHookArgs
 
 OUTSIDE, BAD_INPUT, UNEXPECTED, INTERRUPTED, CUT_OFF = 1, 2, 70, 130, 141  # the last one is that of SIGPIPE
+SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 REPORT = "the authors of sagline"
 
 
@@ -29,7 +30,8 @@ def exit_code_of(command: Callable[[], object], *, debug: bool = False, last: bo
 
     Returns:
         The exit code: BAD_INPUT for an error of sagline or the system, UNEXPECTED for a mistake in the program,
-        INTERRUPTED for Ctrl-C, even if Python lost it, CUT_OFF if the output no longer has a reader.
+        INTERRUPTED for Ctrl-C, even if Python lost it, 143 and 129 for SIGTERM and SIGHUP, CUT_OFF if the output no
+        longer has a reader.
     """
     interrupts = _Interrupts()
     code = UNEXPECTED
@@ -43,7 +45,7 @@ def exit_code_of(command: Callable[[], object], *, debug: bool = False, last: bo
         if not interrupts.received:
             code = _report(error, debug)
     if interrupts.received or code == INTERRUPTED:
-        code = _interrupted()
+        code = _interrupted(interrupts.received or signal.SIGINT)
     if not last:
         interrupts.restore()
     return code
@@ -128,14 +130,14 @@ def _usage(error: BaseException) -> str:
     return f"{text} See: {command} --help"
 
 
-def _interrupted() -> int:
+def _interrupted(number: int) -> int:
     _give_up_unwritable()
     # clears an interrupt inside another exec, after which Python would end itself by the signal
     exec("")
     with suppress(OSError, ValueError, AttributeError):  # plain text, because the output library may be partly loaded
         sys.stderr.write("Interrupted. All written files are complete.\n")
         sys.stderr.flush()
-    return INTERRUPTED
+    return 128 + number
 
 
 def _give_up_unwritable() -> None:
@@ -151,30 +153,38 @@ def _give_up_unwritable() -> None:
 
 
 class _Interrupts:
-    """Handler of Ctrl-C in the main thread; not installed if the process was started with SIGINT ignored."""
+    """Handler of Ctrl-C, SIGTERM and SIGHUP in the main thread; not installed for signals that the process ignores.
+
+    SIGTERM and SIGHUP do what Ctrl-C does at that moment: a controller, for instance, stops its robot first.
+    """
 
     def __init__(self) -> None:
         """Install the handler."""
-        self.received = False
-        main = threading.current_thread() is threading.main_thread()
-        self._before: Any = signal.getsignal(signal.SIGINT) if main else None
-        self._handles = main and self._before is signal.default_int_handler
+        self.received = 0  # number of the signal
+        self._before: dict[int, Any] = {}
         self._hook = sys.unraisablehook
-        if self._handles:
-            signal.signal(signal.SIGINT, self._receive)
+        if threading.current_thread() is threading.main_thread():
+            for number in SIGNALS:
+                before = signal.getsignal(number)
+                if before is signal.default_int_handler or (before is signal.SIG_DFL and number != signal.SIGINT):
+                    self._before[number] = before
+                    signal.signal(number, self._receive)
 
     def _receive(self, number: int, frame: FrameType | None) -> None:
-        self.received = True
+        self.received = self.received or number
         sys.unraisablehook = lambda _: None  # messages of unfinished objects are not useful
-        signal.default_int_handler(number, frame)
+        pressed = signal.getsignal(signal.SIGINT)
+        if number == signal.SIGINT or pressed == self._receive or not callable(pressed):
+            pressed = signal.default_int_handler
+        pressed(signal.SIGINT, frame)
 
     def ignore(self) -> None:
-        """Ignore Ctrl-C from now on."""
-        if self._handles:
-            signal.signal(signal.SIGINT, signal.SIG_IGN)
+        """Ignore these signals from now on."""
+        for number in self._before:
+            signal.signal(number, signal.SIG_IGN)
 
     def restore(self) -> None:
         """Restore the previous handlers."""
         sys.unraisablehook = self._hook
-        if self._handles:
-            signal.signal(signal.SIGINT, self._before)
+        for number, before in self._before.items():
+            signal.signal(number, before)
