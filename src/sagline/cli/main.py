@@ -169,7 +169,7 @@ def _help(text: str | None) -> str:
 @app.callback(
     help=_help(START),
     epilog="Exit codes: 0 success; 1 the path is not feasible everywhere; 2 bad input, nothing written; "
-    "70 a mistake in sagline; 130 Ctrl-C.",
+    "70 a mistake in sagline; 130 Ctrl-C, 143 SIGTERM, 129 SIGHUP.",
 )
 def sagline(
     show_version: Annotated[
