@@ -56,4 +56,5 @@ SHOWN: Final = {
     "control": driven("control"),
     "experiment": drawn("experiment article --in-process"),
     "log": driven("log"),
+    "cache": told("cache"),
 }

@@ -36,6 +36,7 @@ LINES = {
     # nobody listens there
     "control": ["control", "article-prototype", "--plc", "127.0.0.1:1,127.0.0.1:2,127.0.0.1:3,127.0.0.1:4"],
     "log": ["log", "run.mcap"],
+    "cache": ["cache"],
     "design": ["design", "own_robot.yaml", "design.yaml", "--evaluations", "40", "--no-figures"],
     "view": ["view", "cogiro", "--no-browser"],
     "share": ["share", "cogiro"],

@@ -62,9 +62,7 @@ def test_corners_that_are_nowhere_are_refused_without_a_warning(tmp_path: Path, 
         with warnings.catch_warnings():  # of the writer
             warnings.simplefilter("ignore")
             file = written(tmp_path, trimesh.Trimesh(corners, box.faces, process=False), f"box.{kind}")
-        with pytest.raises(
-            sl.FileError, match=r"coordinates that are not numbers|m away; allowed: up to 1e\+06 m"
-        ):
+        with pytest.raises(sl.FileError, match=r"coordinates that are not numbers|m away; allowed: up to 1e\+06 m"):
             sl.load_mesh(file)
 
 

@@ -23,7 +23,7 @@ from sagline.files.writing import finished_files
 NAMES = (
     *("track", "lengths", "encoder", "run", "article", "identify", "forward", "tension", "vibrate", "simulate"),
     *("workspace", "sweep", "design", "calibrate", "robots", "show", "examples", "new", "convert", "export-c"),
-    *("export-scl", "view", "share", "twin", "control", "experiment", "log"),
+    *("export-scl", "view", "share", "twin", "control", "experiment", "log", "cache"),
 )
 MODULES = {"encoder": "lengths", "show": "robots", "export-c": "export", "export-scl": "export"}  # or their names
 DEBUG = "--debug"
@@ -50,6 +50,7 @@ Start here:
     sagline twin article-prototype       a simulated machine, over S7
     sagline control article-prototype --plc ADDRESSES  a controller, line by line
     sagline log run.mcap                 contents of a log, also after a crash
+    sagline cache                        kernels compiled by numba
     sagline new my_robot.yaml            a robot of your own, by questions
     sagline design cogiro design.yaml    a better robot, by search
     sagline calibrate winches_robot.yaml winches.csv  parameters from a log

@@ -97,7 +97,7 @@ def _triangles(path: Path, data: bytes, unit: float) -> tuple[Array, Indices]:
         line = data.count(b"\n", 0, zero.end()) + 1
         raise FileError(path, f"has a face with corner 0 in line {line}; allowed: from 1, or from -1 back", _MEANT)
     try:
-        with np.errstate(all="ignore"):  # coordinates that are no numbers are refused below
+        with np.errstate(all="ignore"):  # coordinates that are not numbers are refused below
             read: Any = trimesh.load(BytesIO(data), file_type=kind, force="mesh", process=False, skip_materials=True)
             _check_vertices(path, np.asarray(read.vertices, dtype=np.float64) * unit)
             read.merge_vertices(merge_tex=True, merge_norm=True)
@@ -114,7 +114,7 @@ def _triangles(path: Path, data: bytes, unit: float) -> tuple[Array, Indices]:
 
 
 def _check_vertices(path: Path, vertices: Array) -> None:
-    """Refuse vertices [m] that are no numbers or far beyond all machines."""
+    """Refuse vertices [m] that are not numbers or far beyond all machines."""
     if not np.isfinite(vertices).all():
         raise FileError(path, "contains coordinates that are not numbers", _MEANT)
     try:

@@ -19,6 +19,8 @@ from platformdirs import user_cache_path
 KERNELS = __name__.rpartition(".")[0]
 SOURCES = Path(__file__).parent
 BACK_ENDS = frozenset(SOURCES / f"{name}.py" for name in ("jit", "library", "plain", "sources", "with_numba"))
+DIGEST = hashlib.sha256().digest_size  # bytes at the beginning of a file of machine code
+SUFFIX = ".nbc"
 # `from sagline.kernels.algebra import angle, cholesky`, names in parentheses too
 IMPORT = re.compile(rf"^from {re.escape(KERNELS)}\.?([\w.]*) import (\([^)]*\)|.*)$", re.MULTILINE)
 
@@ -43,6 +45,11 @@ def digest(folder: Path, sources: Iterable[Path]) -> str:
 def digest_of_kernels() -> str:
     """Digest of all kernels, without the back ends that run them."""
     return digest(SOURCES, set(SOURCES.rglob("*.py")) - BACK_ENDS)
+
+
+def is_whole(content: bytes) -> bool:
+    """True if a file of machine code begins with the digest of the rest."""
+    return hashlib.sha256(content[DIGEST:]).digest() == content[:DIGEST]
 
 
 def sources_of(module: str, sources: Path) -> frozenset[Path]:

@@ -19,14 +19,12 @@ from typing import Any, Final, TypeVar, cast
 import numba
 from numba.core import compiler, serialize
 
-from sagline.kernels.sources import folder_of, say_once
+from sagline.kernels.sources import DIGEST, SUFFIX, folder_of, is_whole, say_once
 
 F = TypeVar("F", bound=Callable[..., object])
 
 _result: Any = compiler.CompileResult  # numba has no type annotations
 _dumps: Any = serialize.dumps
-DIGEST = hashlib.sha256().digest_size
-SUFFIX = ".nbc"
 
 
 class KernelCache:
@@ -70,7 +68,7 @@ class KernelCache:
                     "available, the installation of sagline builds all kernels"
                 )
             return None  # no such file, or no access: `save_overload` reports the cause
-        if hashlib.sha256(content[DIGEST:]).digest() != content[:DIGEST]:
+        if not is_whole(content):
             say_once(f"sagline: {file} is damaged; its kernel is compiled again")
             return None
         return _result._rebuild(target_context, *pickle.loads(content[DIGEST:]))
