@@ -21,8 +21,11 @@ _CATENARY = Catenary()
 UNIT: Final = 50.0  # ratio to the expected value above which a unit is wrong; between 1 and 1000
 GOOD: Final = 5.0  # largest sum of squares per reading for a good fit; slips and rope errors raise it above 1
 POOR: Final = 50.0  # larger limit in place of GOOD if the sum is also at most a hundredth of the previous one
-NEAR: Final = 0.25  # largest departure from the priors; with anchors 0.25 m off, swapped cables may fit by chance
-ROUGH: Final = 10.0  # relative to the robot's size: lengths with a larger deviation are not informative
+# largest mean square of the departures from the priors, in prior deviations; if the anchors are wrong by 0.25 m, a fit
+# with swapped cables may agree with the readings by chance
+NEAR: Final = 0.25
+# smallest ratio of the robot's size to the deviation of lengths or positions; below it, they are not informative
+ROUGH: Final = 10.0
 FAR: Final = 0.25  # error of a zero relative to a cable's length; a larger one exceeds that of any tape measure
 SHIFTS: Final = 5  # largest tested number of rows by which load cells are early or late
 _FULLY: Final = 3  # number of most promising changes that are fitted to convergence

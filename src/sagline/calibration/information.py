@@ -126,7 +126,7 @@ def _exchange(found: Information) -> None:
 def deviations_of(rows: Array, held: Array) -> Array:
     """Standard deviations (P,) from whitened slopes (..., P) and inverse prior deviations (P,); infinite if open."""
     whole = np.concatenate((rows.reshape(-1, len(held)), np.diag(held)))
-    _, size, vectors = np.linalg.svd(np.linalg.qr(whole, mode="r"))  # avoids squaring of the information
+    _, size, vectors = np.linalg.svd(np.linalg.qr(whole, mode="r"))  # without J^T J, whose condition number is squared
     there = size > OPEN * size[0]
     variance = ((vectors[there] / size[there, None]) ** 2).sum(axis=0)
     left = (vectors[~there] ** 2).sum(axis=0)

@@ -49,7 +49,7 @@ ROUNDING: Final = 1e-12  # relative rounding error of the sum of squares
 QUANTILE: Final = 0.99  # quantile of the chi squared of a pose, above which the pose has less weight
 NEARLY: Final = 1e-3  # sufficient relative decrease of the sum of squares if rounding hides further decrease
 GROSS: Final = 0.1  # weight of a pose that would spoil the first step
-LESS: Final = 0.9  # the weights are computed again if the misfit scale falls below this share
+LESS: Final = 0.9  # the weights are computed again if the misfit scale falls below this share of its last value
 
 
 def whitened_at(

@@ -155,7 +155,7 @@ def machine_of(
     robot: Robot, model: CableModel, parameters: Parameters, sensors: Sensors, offset: Array
 ) -> MachineTerms:
     """A robot and its sensors in the form of the kernel; an error if counts are read and drum data are missing."""
-    # unknown pulley radii and dead lengths have slopes, even if those of the robot are zero
+    # pulley radii and dead lengths that are unknowns have slopes, even if their values in the robot are zero
     routed = has_routing(robot) or bool((parameters.where[[kinds.RADIUS, kinds.DEAD]] >= 0).any())
     return MachineTerms(
         robot,

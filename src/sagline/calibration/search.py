@@ -111,7 +111,10 @@ def _restart(problem: FitProblem, state: SearchState, which: Flags) -> SearchSta
 
 
 def _single_cable_outliers(problem: FitProblem, state: SearchState, which: Flags) -> Flags:
-    """Flags of poses whose misfit single cables explain, if there are few; the cables are outliers of small weight."""
+    """Flags of the poses of `which` with a misfit due to a single cable; none are flagged if `which` has many poses.
+
+    Such a cable is an outlier. The pose remains in the fit, with a small weight.
+    """
     rows, slipped = np.flatnonzero(which), np.zeros(len(which), dtype=np.bool_)
     if 0 < len(rows) <= min(EXAMINED, FEW * len(which)):
         found = outliers_in(problem, state, rows, rows, count=len(which))

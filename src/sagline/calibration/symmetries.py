@@ -48,7 +48,7 @@ class Generator(NamedTuple):
 
 
 class Symmetries(NamedTuple):
-    """g symmetries of a robot, including the free parameters of its drums.
+    """The symmetries of a robot, g in number, including the free parameters of its drums.
 
     Attributes:
         each: Symmetries with a name, which come first.
@@ -81,7 +81,8 @@ def symmetries(robot: Robot, sensors: Sensors, turn: Array, *, counted: bool) ->
     shift, share = (np.einsum("rm,rmg->mg", term, table) for term in _length_terms(robot, counted))
     matters = np.ones((kinds.KIND_ROWS, m), dtype=np.bool_)
     matters[kinds.PER_CABLE :, 1:] = False
-    matters[kinds.SHIFT :] = False  # with few measured points, more directions are unobservable than with many
+    # the measuring system and the target may change: few measured points leave more directions unobservable than many
+    matters[kinds.SHIFT :] = False
     if sensors.tension_deviation is None:
         matters[[kinds.GAIN, kinds.BIAS]] = False
     if not turning:  # without rotations, the center of mass has no effect

@@ -15,7 +15,7 @@ def app_entry() -> None:
             os.fstat(descriptor)
         except OSError:
             os.open(os.devnull, os.O_RDONLY if descriptor == 1 else os.O_RDWR)
-            if descriptor == 1:  # every write fails, so that no output is lost silently
+            if descriptor == 1:  # it is read-only: every write raises an error, so that no output is lost silently
                 sys.stdout = os.fdopen(1, "w", encoding="utf-8", closefd=False)
     debug = "--debug" in sys.argv
     code = exit_code_of(lambda: _command(debug), debug=debug, last=True)

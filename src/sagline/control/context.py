@@ -266,7 +266,7 @@ class Context:
         self.garbage.go_on()
 
     def keep(self, cycle: Recorded) -> None:
-        """Pass a cycle to the tape and the recorder."""
+        """Add a cycle to the table of the motion, and pass it to the recorder."""
         run = self.run
         if run.recording and run.tape is not None:
             run.tape.add(cycle)

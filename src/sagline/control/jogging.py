@@ -157,7 +157,7 @@ class PlatformJog:
 
 
 def checked_displacement(by: ArrayLike) -> Array:
-    """Checked displacement of the platform with a rotation vector, zero if not given, shape (6,)."""
+    """Checked displacement and rotation vector of the platform, shape (6,); a rotation that is not given is zero."""
     given = checked(by, "by", "m or rad")
     if given.shape not in ((3,), (6,)):
         step = "Give a displacement, or that and a rotation vector."

@@ -183,7 +183,11 @@ def _tables(winches: Winch, diameter: Array) -> tuple[Array, Array]:
 
 
 def _layer_starts(winches: Winch, table: Array) -> Array:
-    """Lengths at which layers begin: cable length minus the length on the layers below and the slant to the pulley."""
+    """Lengths off the drum at which the layers begin.
+
+    Each is the cable length, minus the length on the layers below, minus the extra length of the slanted cable between
+    drum and pulley.
+    """
     count = np.arange(int(winches.layers.max()) + 1)
     known = winches.cable_length if winches.cable_length is not None else winches.length_zero
     whole = np.zeros(len(table)) if known is None else known  # without cable_length, turns are counted from length_zero

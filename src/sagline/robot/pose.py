@@ -25,10 +25,10 @@ _ROUNDING = 4.0 * np.finfo(np.float64).eps
 
 
 def unit(vectors: Array) -> Array:
-    """Normalize vectors along the last axis; vectors of length 1, except for rounding, do not change in any bit.
+    """Normalize vectors along the last axis.
 
-    Files, pickles and copies normalize again, and their values must not drift. Zero vectors give NaN; check lengths
-    first.
+    A vector whose length differs from 1 only by rounding errors is returned unchanged, bit for bit. Files, pickles and
+    copies normalize again, and their values must not drift. Zero vectors give NaN; check lengths first.
 
     vectors: shape (..., k). Returns array of the same shape; the given array itself if all lengths are 1.
     """

@@ -106,7 +106,7 @@ class Report(NamedTuple):
         counter_again: Block counter at the end of the block; it differs from `counter` in an incomplete block.
         foreign: True if the block belongs to another program.
         plc_time: Clock of the PLC [s].
-        owner: Owner of the grant.
+        owner: Id of the controller that owns the group, 0 for none.
         echo: Counter of the last accepted command.
         status: Bits of `GroupStatus`.
         fault: Code of `GroupFault`.

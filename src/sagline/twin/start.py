@@ -135,7 +135,10 @@ def winch_limits(robot: Robot, scale: _EncoderScale) -> PlcLimits:
 
 
 def check_step(robot: Robot, state: Equilibrium, step: float, period: float) -> None:
-    """Refuse a step [s] too coarse for the robot's modes, and a period [s] that does not fit."""
+    """Refuse a step [s] that is too coarse for the robot's modes, and a period [s] out of range.
+
+    The period must be a whole multiple of the step, and at most the heartbeat.
+    """
     if not (parts := period / step) >= 0.5 or abs(parts - round(parts)) > NEAR * parts:
         raise InvalidValueError("period", f"{period:g} s", f"a whole multiple of {step:g} s, the step", "Correct it.")
     if period > HEARTBEAT:

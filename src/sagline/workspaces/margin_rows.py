@@ -36,7 +36,7 @@ class Bracket(NamedTuple):
         high: Upper bound [N], (N,).
         cable: Cable whose limit changes the value most, -1 for none, (N,).
         status: Codes of `MarginStatus`, (N,).
-        direction: Normal of the facet of the value, (N, 6).
+        direction: Normal of the facet whose distance is the value, (N, 6).
     """
 
     value: Array

@@ -169,9 +169,9 @@ class SpeedProfile:
 def fastest_speed_profile(place: Array, planes: HalfPlanes) -> SpeedProfile | None:
     """Rest-to-rest profile with the largest speed within the bounds at each position; place (K,)."""
     # The backward pass computes squared speeds from which the end can be reached. The forward pass takes the largest
-    # acceleration that stays within them. A bound at both ends of a step also holds within the step, except for the
-    # curvature of the bounds. Source: Pham & Pham, A new approach to time-optimal path parameterization based on
-    # reachability analysis, 2018
+    # acceleration that stays within them. A bound that is met at both ends of a step is also met within the step, apart
+    # from a small error due to the curvature of the bound. Source: Pham & Pham, A new approach to time-optimal path
+    # parameterization based on reachability analysis, 2018
     steps, last = np.diff(place), len(place) - 1
     reach = np.zeros((len(place), 2))
     for i in range(last - 1, -1, -1):
@@ -202,7 +202,10 @@ def _rows(planes: HalfPlanes, i: int, step: float, reach: Array) -> tuple[Array,
 
 
 def _range(rates: Array, bound: Array) -> tuple[float, float]:
-    """Smallest and largest second variable with a feasible first variable; if none exists, the smallest is larger."""
+    """Smallest and largest value of the second variable for which the first variable has a feasible value.
+
+    If the bounds have no solution, the first result is larger than the second.
+    """
     flat = np.abs(rates[:, 0]) <= _FLAT * np.abs(rates[:, 0]).max()
     up, down = ~flat & (rates[:, 0] > 0.0), ~flat & (rates[:, 0] < 0.0)
     slope, level = rates[:, 1] / np.where(flat, 1.0, rates[:, 0]), bound / np.where(flat, 1.0, rates[:, 0])

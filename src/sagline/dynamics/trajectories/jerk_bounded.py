@@ -49,7 +49,10 @@ class JerkProfile:
 
 
 def _integration_matrices(pieces: int) -> Array:
-    """Matrices from piece jerks to parameter and its first two derivatives at the knots, shape (3, P + 1, P)."""
+    """Matrices that map the jerks of the P pieces to the parameter and its first two derivatives at the knots.
+
+    Returns an array of shape (3, P + 1, P).
+    """
     h = 1.0 / pieces
     # time since the start of each piece
     since = np.maximum(np.arange(pieces + 1)[:, None] - np.arange(pieces), 0.0) * h

@@ -174,7 +174,10 @@ def _motions(matrix: Array, rest: Array, free: Flags, first: int) -> PlaneModes:
 
 
 def _still(mass: Array, axes: Array, taut: Indices, count: int) -> Array:
-    """Masses xx, xz, zz, yy of the taut cables in their axes as matrices in the world, (m, 3, 3)."""
+    """Mass matrices of all cables in world axes, (m, 3, 3), zero for slack cables.
+
+    mass: elements xx, xz, zz, yy of the mass matrix of each taut cable, in the axes of the cable.
+    """
     own = np.zeros((taut.size, 3, 3))
     own[:, 0, 0], own[:, 0, 2], own[:, 2, 0], own[:, 2, 2], own[:, 1, 1] = mass[:, [0, 1, 1, 2, 3]].T
     still = np.zeros((count, 3, 3))

@@ -127,7 +127,7 @@ class ResponseCurves(NamedTuple):
 
 
 def response_curves(vibration: Vibration, force: str = "x", motion: str | None = None) -> ResponseCurves:
-    """Platform motion per force at its center of mass over frequency, up to the limit of known modes."""
+    """Motion of the platform per force at its center of mass, for frequencies up to the limit of the known modes."""
     # Both curves are from `frequency_response`; air damping acts only on cables with mass, so the massless curve does
     # not include it
     state = instance(vibration, Vibration, "vibration").state

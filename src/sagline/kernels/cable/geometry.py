@@ -39,8 +39,8 @@ def tangent(radius: float, entry: float, span: float, rise: float) -> tuple[floa
 
     The pulley is in the cable's vertical plane. Span and rise are measured from the point where the cable enters the
     pulley. entry is +1 for a cable that enters from below. A point inside the pulley, or past its near side, does not
-    have a tangent. For a point straight below (above, for a cable from above), the exit is twice the radius away from
-    the entry.
+    have a tangent. If the cable is vertical again after half a turn on its pulley, the exit is twice the radius away
+    from the entry; the point is then straight below the exit, or above it if the cable enters from above.
     """
     across = span - radius
     along = entry * rise

@@ -205,7 +205,7 @@ def fill_ends(model: Model, cables: Array, space: CalibrationArrays) -> None:
 
 @glue
 def fill_readings_by_wrench(sensing: Sensing, free: Array, m: int, reach: Triple, space: CalibrationArrays) -> None:
-    """Fill the change of every reading per wrench on the platform, which moves it; requires the factored stiffness."""
+    """Fill the change of every reading when a unit wrench moves the platform; requires the factored stiffness."""
     for j in range(space.moved.shape[0]):
         six = space.six
         if j < m:

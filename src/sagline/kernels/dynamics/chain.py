@@ -39,7 +39,7 @@ GRAVITY = 12  # [m/s^2]
 REST, RATE = 13, 14  # unstrained length of the element at the frame [m], and rate of the cable that is let out [m/s]
 CHAIN_COLUMNS = 15
 
-LEAST, MOST = 0.4, 1.6  # shortest and longest element at the frame, relative to the other elements
+LEAST, MOST = 0.4, 1.6  # limits of the length of the element at the frame, relative to the other elements
 TINY = 1e-300
 
 

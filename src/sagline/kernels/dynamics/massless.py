@@ -168,8 +168,9 @@ def damp_cables(
 
     The strain rate is the same along a whole cable, including the part behind the free span. Cable that is let out
     lengthens the span by its strained length. The damping force is proportional to EA/L times the rate of the chord
-    minus this length. The stretch takes a share of the rate given by its compliance: 1 in a taut cable, 0 in a slack
-    one. In the air, a cable moves like its chord.
+    minus this length. A share of this rate stretches the cable, and the rest changes its sag. The share is the elastic
+    compliance divided by the total compliance: 1 for a taut cable, 0 for a slack cable. In the air, a cable moves like
+    its chord.
 
     losses: loss_time [s], and air damping [N s/m^2]; weight_of: gravity if the cables have weight, else 0 [m/s^2];
     turning: velocity of the center of mass, and angular velocity, (6,); now: state of the drives, in which the damping

@@ -159,7 +159,7 @@ def copy_pose(source: Array, target: Array) -> None:
 
 @glue
 def clear_solution(found: Solutions, p: int, status: int, cable_status: int) -> None:
-    """Fill NaN and zero steps for a sample without a result."""
+    """Fill the arrays for a sample without a result: NaN, zero as the number of iterations, and the statuses."""
     for k in range(tables.POSE_COLUMNS):
         found.poses[p, k] = math.nan
     for i in range(found.statuses.shape[1]):

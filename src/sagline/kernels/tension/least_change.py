@@ -210,10 +210,12 @@ def _find_step(demand: Demand, ranges: Array, change: TensionChange, step: _Tang
 
 @glue
 def _point_along(soft: int, change: TensionChange, step: _Tangents) -> float:
-    """Fill the direction of the step's residual, with a soft part of length 1; returns the residual's length [N].
+    """Fill the direction of the step's residual, scaled so that its soft rows have length 1.
 
-    It is perpendicular to the tangents of cables between their limits. For a cable at a limit, it points beyond that
-    limit.
+    Returns the length of the soft rows before this scaling [N].
+
+    The direction is perpendicular to the tangents of cables between their limits. For a cable at a limit, it points
+    beyond that limit.
     """
     n, m = step.matrix.shape
     hard = n - soft

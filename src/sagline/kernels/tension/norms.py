@@ -43,7 +43,10 @@ def _is_tied(basis: Basis) -> bool:
 
 @kernel
 def share_lowest_sum(bounds: Array, null: Array, near: ReferencePoint, basis: Basis, memory: Memory) -> int:
-    """Fill the point (r,) of `near` whose tensions have the least sum; of several, the one nearest to the reference."""
+    """Fill `near.point` (r,) with the null-space point whose tensions have the least sum.
+
+    If several points have the least sum, the point nearest to the reference is selected.
+    """
     r, m = null.shape
     cost, memory = vector(memory, r)
     for k in range(r):

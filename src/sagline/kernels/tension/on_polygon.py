@@ -193,7 +193,7 @@ def feasible_interval(bounds: Array, null: Array) -> tuple[float, float]:
 def feasible_corners(bounds: Array, null: Array, corners: Array, labels: Indices) -> int:
     """Corners of the feasible polygon, or for r = 1 the two ends of the interval on the first axis; 0 if empty.
 
-    An end at infinity is replaced by the polygon's box, and has the label of the box.
+    An infinite end of the interval is replaced by the edge of the box around the polygon, and has the label of the box.
     """
     if null.shape[0] == 2:
         return feasible_polygon(bounds, null, corners, labels)

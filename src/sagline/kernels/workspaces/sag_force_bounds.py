@@ -24,7 +24,7 @@ BEFORE_LEAST, AFTER_LEAST = 0.25, 1.05  # relative to |sin phi|/cos^2 phi: anoth
 
 # Rows of the bands (BAND_ROWS, m).
 LOW, HIGH = 0, 1  # chord tensions [N]; the upper one may be infinite
-TAUT = 2  # upper end for sagging cables [N]; without a limit, the tension that doubles their length
+TAUT = 2  # HIGH, or the chord tension that doubles the length of a sagging cable if HIGH is infinite [N]
 SAG_FORCE_LOW, SAG_FORCE_HIGH = 3, 4  # sag forces at LOW and TAUT [N]
 LEAST, MOST = 5, 6  # least and largest sag force between them [N]
 BAND_ROWS = 7

@@ -108,7 +108,7 @@ def _mark(plan: Plan, name: str, letter: str, solver: InverseSolver | None) -> _
     return _MethodMark(name, letter, tension, "" if status is PoseStatus.SOLVED else status.text)
 
 
-MOST_REDUNDANT: Final = 2  # numbers of redundant cables with a drawing
+MOST_REDUNDANT: Final = 2  # largest number of redundant cables for which the feasible tensions are drawn
 SHARING: Final = "sharing"  # topic of a chosen tension distribution method
 
 
