@@ -55,7 +55,7 @@ test-extended: env ## the second tier: browsers, processes, wide parameters, oth
 test-all: check test test-extended ## style and types, then both tiers
 
 coverage: env ## both tiers again, and which lines they run
-	SAGLINE_BACKEND=numba $(PYTEST) --cov $(PARALLEL)
+	SAGLINE_BACKEND=numba $(PYTEST) --ignore tests/test_back_ends.py --cov $(PARALLEL)
 
 messages: env ## renew the snapshots of messages; read the diff before you commit it
 	$(BIN)/python -m pytest --snapshot-update --quiet
@@ -85,7 +85,7 @@ bench: env ## one table of times and ratios, on one core
 
 soak: env ## the long tests that test-all leaves out, then all others in a random order
 	$(PYTEST) -m soak
-	SAGLINE_BACKEND=numba $(PYTEST) --random-order=$(SEED) $(PARALLEL)
+	SAGLINE_BACKEND=numba $(PYTEST) --ignore tests/test_back_ends.py --random-order=$(SEED) $(PARALLEL)
 
 c: env ## C99 of all kernels, as OUT/kernels.c
 	$(BIN)/python -m tools.translate $(OUT)/kernels.c

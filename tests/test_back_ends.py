@@ -50,7 +50,7 @@ def ends(count: int = 4) -> tuple[Array, ...]:
 
 
 def test_the_tests_run_the_compiled_library() -> None:
-    """Without a C compiler this test fails, and the others run by numba: `python -m tools.build` names the reason."""
+    """Else all other tests of this run were made by another back end: `python -m tools.build` names the reason."""
     assert backend() == "c"
     assert sl.backend() == "c"
 
@@ -68,7 +68,7 @@ def test_an_unknown_back_end_is_refused_in_one_line() -> None:
     assert all(word in last for word in ("SAGLINE_BACKEND", "'fortran'", "c, numba or python"))
 
 
-@pytest.mark.skipif(len(list(FOLDER.glob("kernels*"))) < 2, reason="the library for x86-64-v3 exists on x86-64 only")
+@pytest.mark.skipif(len(list(FOLDER.glob("kernels*"))) < 2, reason="only gcc and clang on x86-64 make two builds")
 def test_both_builds_give_the_same_numbers() -> None:
     robot = sl.load_robot("ipanema-3-pulleys")
     with recorded() as calls:

@@ -13,15 +13,19 @@ import subprocess
 import sys
 import tempfile
 import time
+from concurrent.futures import ThreadPoolExecutor
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Final
 
 ROOT: Final = Path(__file__).parents[1]
 FLAGS: Final = (
-    "-std=c99", "-O3", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=off", "-fvisibility=hidden", "-shared",
+    "-std=c99", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=off", "-fvisibility=hidden", "-shared",
 )  # fmt: skip
-LEVEL_3: Final = ("-march=x86-64-v3", "-mno-fma")  # gcc 12 contracts one expression in spite of -ffp-contract=off
+# flags of the two files; gcc 12 contracts one expression in spite of -ffp-contract=off
+LEVELS: Final = (("-O2",), ("-O3", "-march=x86-64-v3", "-mno-fma"))
+ZIG: Final = [sys.executable, "-m", "ziglang", "cc", "-mcpu=baseline", "-s"]
+ZIG_LEVELS: Final = (("-O3",),)  # only the file for every processor: zig cannot ask for the kind of processor
 
 
 class BuildError(Exception):
@@ -32,7 +36,7 @@ def compilers() -> list[list[str]]:
     """Commands of the C compilers that can be used, the preferred one first."""
     named = [shlex.split(os.environ["CC"])] if os.environ.get("CC") else []
     found = [[path] for name in ("cc", "gcc", "clang") if (path := shutil.which(name))]
-    return named + found[:1] + ([[sys.executable, "-m", "ziglang", "cc"]] if find_spec("ziglang") else [])
+    return named + found[:1] + ([ZIG] if find_spec("ziglang") else [])
 
 
 def build() -> None:
@@ -41,7 +45,6 @@ def build() -> None:
     Raises:
         BuildError: If no compiler is found, or none compiles.
     """
-    sys.path[:0] = [str(ROOT), str(ROOT / "src")]
     os.environ["SAGLINE_BACKEND"] = "python"  # the translator reads the sources
     from sagline.kernels.library import FILES, FOLDER
     from sagline.kernels.sources import digest, digest_of_kernels
@@ -52,19 +55,22 @@ def build() -> None:
     stamp = ROOT / "build" / "kernels.stamp"
     translator = [Path(__file__), *(ROOT / "tools" / "translate").glob("*.[pc]*")]
     state = f"{digest_of_kernels()} {digest(ROOT, translator)} {[shlex.join(each) for each in compilers()]}"
-    made = [*files, ROOT / wasm.MODULE, ROOT / portable.FILE]
+    made = [files[0], ROOT / portable.FILE, *([ROOT / wasm.MODULE] if find_spec("ziglang") else [])]
     if stamp.is_file() and stamp.read_text(encoding="utf-8") == state and all(file.is_file() for file in made):
         return
     for folder in (FOLDER, stamp.parent):
         folder.mkdir(exist_ok=True)
+    for old in FOLDER.iterdir():
+        old.unlink()
     stamp.unlink(missing_ok=True)
-    portable.build(ROOT)
-    with tempfile.TemporaryDirectory() as temporary:
+    with tempfile.TemporaryDirectory() as temporary, ThreadPoolExecutor(1) as pool:
         source = Path(temporary) / "kernels.c"
         source.write_text(library_text(digest_of_kernels()), encoding="utf-8")
+        others = [portable.build, *([wasm.build] if find_spec("ziglang") else [])]
+        waiting = [pool.submit(each, ROOT) for each in others]  # one after the other, while the compiler runs
         _compile(source, files)
-    if find_spec("ziglang"):
-        wasm.build(ROOT)
+        for each in waiting:
+            each.result()
     stamp.write_text(state, encoding="utf-8")
 
 
@@ -78,37 +84,48 @@ def _compile(source: Path, files: list[Path]) -> None:
     reasons = []
     for command in compilers():
         start = time.monotonic()
-        print(f"building the kernels with {shlex.join(command)} (about half a minute) ...", flush=True)
-        made = [source.with_suffix(f".{k}{file.suffix}") for k, file in enumerate(files)]
-        levels = [(), LEVEL_3][: len(files)]
-        position = () if sys.platform == "win32" else ("-fPIC",)
-        calls = [
-            subprocess.Popen(
-                [*command, *FLAGS, *position, *level, str(source), "-o", str(out), *(() if not position else ("-lm",))],
-                stdout=subprocess.PIPE,
-                stderr=subprocess.STDOUT,
-                text=True,
-            )
-            for level, out in zip(levels, made, strict=True)
-        ]
-        outputs = [call.communicate()[0] for call in calls]
-        if all(call.returncode == 0 for call in calls):
-            for out, file in zip(made, files, strict=True):
+        print(f"building the kernels with {shlex.join(command)} (about a minute) ...", flush=True)
+        levels = ZIG_LEVELS if command is ZIG else LEVELS if len(files) > 1 else (("-O3",),)
+        made = {source.with_suffix(f".{k}{file.suffix}"): file for k, file in enumerate(files[: len(levels)])}
+        around = ((), ()) if sys.platform == "win32" else (("-fPIC",), ("-lm",))
+        try:
+            calls = [
+                subprocess.Popen(
+                    [*command, *FLAGS, *around[0], *level, str(source), "-o", str(out), *around[1]],
+                    stdout=subprocess.PIPE,
+                    stderr=subprocess.STDOUT,
+                    text=True,
+                )
+                for level, out in zip(levels, made, strict=True)
+            ]
+        except OSError as error:
+            reasons.append(f"{shlex.join(command)}: {error}")
+            continue
+        texts = [call.communicate()[0] for call in calls]
+        failed = [text[:1000] or "no message" for text, call in zip(texts, calls, strict=True) if call.returncode]
+        if not failed:
+            for out, file in made.items():
                 unfinished = file.with_name(f"{file.name}.{os.getpid()}")
                 shutil.copyfile(out, unfinished)
                 os.replace(unfinished, file)
-            print(f"built {', '.join(file.name for file in files)} in {time.monotonic() - start:.0f} s", flush=True)
+            names = ", ".join(file.name for file in made.values())
+            print(f"built {names} in {time.monotonic() - start:.0f} s", flush=True)
             return
-        reasons.append(f"{shlex.join(command)}: {next(text for text in outputs if text)[:1000]}")
+        reasons.append(f"{shlex.join(command)}: {failed[0]}")
     raise BuildError("\n".join(reasons) or "no C compiler is found: install one (gcc or clang), or set CC")
 
 
 def main() -> int:
     """Build; 2 with the reason on standard error if that is not possible."""
+    sys.path[:0] = [str(ROOT), str(ROOT / "src")]
+    from tools.translate.types import TranslationError
+
     try:
         build()
-    except BuildError as error:
-        print(f"The kernels were not built; numba compiles them at the first use. {error}", file=sys.stderr)
+    except (BuildError, TranslationError, subprocess.CalledProcessError) as error:
+        lines = [str(error), *getattr(error, "__notes__", ())]
+        text = "The kernels were not built; numba or, about 500 times slower, plain Python runs them."
+        print("\n".join([text, *lines]), file=sys.stderr)
         return 2
     return 0
 

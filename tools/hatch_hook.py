@@ -6,7 +6,6 @@ import os
 import subprocess
 import sys
 import sysconfig
-from pathlib import Path
 from typing import Any, Final
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
@@ -27,6 +26,3 @@ class Hook(BuildHookInterface[Any]):
             build_data["pure_python"] = False
             platform = sysconfig.get_platform().replace("-", "_").replace(".", "_")
             build_data["tag"] = f"py3-none-{platform}"
-        elif version != "editable":
-            folder = Path(self.root) / "src" / "sagline" / "kernels" / "compiled"
-            assert not any(folder.glob("kernels*")), "an old library would be part of the wheel"

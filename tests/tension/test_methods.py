@@ -443,10 +443,11 @@ def test_a_batch_of_no_poses_is_answered_by_none() -> None:
         (None, "robot", "None"),
         (5, "robot", "5"),
         ("cogiro", "robot", "'cogiro'"),
-        ([], "robot", "[]"),
+        ([], "robot", "empty"),
         (["cogiro"], "robot[0]", "'cogiro'"),
     ],
 )
 def test_what_is_no_robot_is_named(robot: Any, item: str, value: str) -> None:
-    with refused(item, value, "a Robot, or a sequence of them", kind=InvalidValueError):
+    allowed = "a Robot, or several in a list" if item == "robot" else "a Robot"
+    with refused(item, value, allowed, kind=InvalidValueError):
         inverse(robot, Pose.from_euler([0.0, 0.0, 2.0], 0.0, 0.0, 0.0))

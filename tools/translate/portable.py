@@ -7,6 +7,7 @@ a robot needs. Sizes and indices have 32 bits, and the data of the robot and of 
 from __future__ import annotations
 
 import json
+import os
 import re
 import sys
 from collections.abc import Iterator
@@ -190,7 +191,10 @@ def build(root: Path) -> None:
         for name, part in (("double", double), ("float", single))
     }
     found["bounds"] = bounds()
-    (root / FILE).write_text(json.dumps(found, indent=0), encoding="utf-8")
+    file = root / FILE
+    unfinished = file.with_name(f"{file.name}.{os.getpid()}")
+    unfinished.write_text(json.dumps(found, indent=0), encoding="utf-8")
+    os.replace(unfinished, file)
 
 
 if __name__ == "__main__":

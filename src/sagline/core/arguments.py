@@ -169,7 +169,9 @@ def flag(value: Any, item: str) -> bool:
     raise InvalidValueError(item, brief(value), "True or False", f"Correct {item}.")
 
 
-def elements(value: Any, single: Any, item: str, step: str) -> tuple[Any, ...]:
+def elements(
+    value: Any, single: Any, item: str, step: str, allowed: str = "one or several in a list"
+) -> tuple[Any, ...]:
     """Elements of an iterable; one object of the type `single` counts as one element.
 
     Texts, mappings and arrays without axes are not iterables here.
@@ -177,15 +179,16 @@ def elements(value: Any, single: Any, item: str, step: str) -> tuple[Any, ...]:
     if isinstance(value, single):
         return (value,)
     if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable) or getattr(value, "ndim", 1) == 0:
-        raise InvalidValueError(item, brief(value), "one or several in a list", step)
+        raise InvalidValueError(item, brief(value), allowed, step)
     return tuple(value)
 
 
 def listed(value: Any, kind: type[T], item: str) -> tuple[T, ...]:
     """Check objects of one type, one or several in an iterable, and return them as a tuple."""
-    given = elements(value, kind, item, _step_to(value, kind))
+    allowed, step = f"{_a(kind.__name__)}, or several in a list", _step_to(value, kind)
+    given = elements(value, kind, item, step, allowed)
     if not given:
-        raise InvalidValueError(item, "empty", f"{_a(kind.__name__)}, or several in a list", _step_to(value, kind))
+        raise InvalidValueError(item, "empty", allowed, step)
     return tuple(instance(one, kind, f"{item}[{k}]") for k, one in enumerate(given))
 
 

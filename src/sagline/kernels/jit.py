@@ -42,22 +42,25 @@ def backend() -> str:
     chosen = os.environ.get(VARIABLE, "")
     if chosen and chosen not in BACKENDS:
         raise InvalidValueError(VARIABLE, repr(chosen), "c, numba or python", "Correct the variable, or unset it.")
+    reason, step = "", INSTALL
     if chosen in ("", "c"):
         try:
             _library()
         except LibraryError as error:
+            reason, step = f"{error}; ", "Run `make env` in the clone." if error.stale else INSTALL
             if chosen:
-                raise InvalidValueError(VARIABLE, "c", "numba or python here", f"{error}. {INSTALL}") from error
-            if error.stale:
-                say_once(f"sagline: {error}, so it is not used. `python -m tools.build` builds it again.")
+                raise InvalidValueError(VARIABLE, "c", "numba or python here", f"{error}. {step}") from error
         else:
             return "c"
     if chosen in ("", "numba"):
         if find_spec("numba") is not None:
+            if not chosen:
+                say_once(f"sagline: {reason}numba compiles the kernels at their first use. {step}")
             return "numba"
         if chosen:
             raise InvalidValueError(VARIABLE, "numba", "c or python here", "Install numba, or unset the variable.")
-        say_once(f"sagline: the kernels run as plain Python, which is about 500 times slower. {INSTALL}")
+    if not chosen:
+        say_once(f"sagline: {reason}the kernels run as plain Python, which is about 500 times slower. {step}")
     return "python"
 
 
@@ -70,7 +73,12 @@ def entry(function: F) -> F:
     """A kernel that Python calls; it runs without Python's global lock."""
     if backend() == "c":
         found = _library().entry(function)
-        return function if found is None else cast("F", found)
+        if found is not None:
+            return cast("F", found)
+        from sagline.kernels.plain import plain
+
+        say_once(f"sagline: the library has no entry {function.__name__}, which runs as plain Python")
+        return plain(function)
     return _compiled(function, "entry")
 
 
@@ -107,8 +115,8 @@ def bound(function: Callable[..., object], *arguments: object, numbers: int = 0)
 
     The arrays may change between calls. The last `numbers` arguments are numbers that each call gives again.
     """
-    if backend() == "c":
-        return cast("Entry", function).bind(arguments, numbers)
+    if isinstance(function, Entry):
+        return function.bind(arguments, numbers)
     fixed = arguments[: len(arguments) - numbers]
     if backend() == "numba":
         from sagline.kernels.with_numba import machine_code

@@ -6,8 +6,10 @@
 from __future__ import annotations
 
 import ctypes
+import operator
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final
 
@@ -30,6 +32,14 @@ FUNCTIONS: Final = (  # of Python's stable interface, in the order of `Python` i
     "PyEval_SaveThread",
     "PyEval_RestoreThread",
 )
+
+
+# conversion of a number and member of its slot, by the kind in a format
+CONVERSIONS: Final[dict[str, tuple[Callable[[Any], Any], str]]] = {
+    "f": (float, "f"),
+    "i": (operator.index, "i"),
+    "?": (bool, "i"),
+}
 
 
 class LibraryError(Exception):
@@ -75,6 +85,7 @@ class Entry:
         self.__module__ = function.__module__
         self._rows = [(row, ctypes.addressof(row)) for row in rows]
         self._call, self._fill, self._python = library.sagline_call, library.sagline_fill, ctypes.addressof(python)
+        self._kept = python
 
     def __call__(self, *arguments: object) -> object:
         """Run the kernel."""
@@ -111,12 +122,13 @@ class Bound:
         self._result = Slot()
         self._slots, self._kept = ctypes.addressof(slots), (arguments, slots)
         kinds = row.format.decode()[-1 - numbers : -1]
-        self._last = [(slots[row.slots - numbers + k], "f" if kind == "f" else "i") for k, kind in enumerate(kinds)]
+        last = slots[row.slots - numbers : row.slots]
+        self._last = [(slot, *CONVERSIONS[kind]) for slot, kind in zip(last, kinds, strict=True)]
 
     def __call__(self, *numbers: float) -> object:
         """Run the kernel with new last numbers."""
-        for (slot, member), number in zip(self._last, numbers, strict=True):
-            setattr(slot, member, number)
+        for (slot, convert, member), number in zip(self._last, numbers, strict=True):
+            setattr(slot, member, convert(number))
         if self._call(self._slots, ctypes.addressof(self._result)):
             raise short_memory(self._name)
         return value_of(self._result, self._kind)
@@ -148,7 +160,7 @@ class Library:
             built_from = ctypes.string_at(ctypes.addressof(ctypes.c_char.in_dll(self._library, "sagline_digest")))
         except (OSError, ValueError) as error:
             raise LibraryError(f"the library of compiled kernels, {file.name}, cannot be loaded ({error})") from error
-        if built_from.decode() != digest_of_kernels():
+        if built_from != digest_of_kernels().encode():
             raise LibraryError("the library of compiled kernels is not built from the present sources", stale=True)
         pointers = [ctypes.cast(getattr(ctypes.pythonapi, name), ctypes.c_void_p).value for name in FUNCTIONS]
         self._python = (ctypes.c_void_p * (len(FUNCTIONS) + 1))(*pointers, id(None))
@@ -170,7 +182,10 @@ class Library:
         """
         everywhere, newer = (folder / name for name in FILES)
         library = cls(everywhere)
-        return cls(newer) if library._library.sagline_is_v3() and newer.is_file() else library
+        if library._library.sagline_is_v3():
+            with suppress(LibraryError):
+                return cls(newer)
+        return library
 
     def entry(self, function: Callable[..., object]) -> Entry | None:
         """The compiled version of a function; None if the library has none."""

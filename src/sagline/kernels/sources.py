@@ -42,9 +42,10 @@ def digest(folder: Path, sources: Iterable[Path]) -> str:
     return found.hexdigest()[:16]
 
 
+@cache
 def digest_of_kernels() -> str:
-    """Digest of all kernels, without the back ends that run them."""
-    return digest(SOURCES, set(SOURCES.rglob("*.py")) - BACK_ENDS)
+    """Digest of all kernels and of the module that loads their library, without the other back ends."""
+    return digest(SOURCES, set(SOURCES.rglob("*.py")) - BACK_ENDS | {SOURCES / "library.py"})
 
 
 def is_whole(content: bytes) -> bool:
