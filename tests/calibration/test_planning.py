@@ -313,7 +313,7 @@ def test_what_would_help_most_does(unknowns: tuple[str, ...], position: float | 
     known = changed(robot, plan.most_helpful)
     held = [sl.Unknown(name, deviation=known.get(name, 1.0 if name == "mass" else None)) for name in unknowns]
     ratio = np.exp(np.log(_errors_at(plan, held) / plan.expected_error).mean())
-    said = float(re.search(r"leaves ([\d.]+) of", plan.most_helpful)[1])  # type: ignore[index]
+    said = float(re.search(r"errors by ([\d.]+)", plan.most_helpful)[1])  # type: ignore[index]
     assert said == pytest.approx(ratio, abs=0.02)
 
 

@@ -31,7 +31,7 @@ from tests.tiers import extended, wide
 WIDTHS = (60, 80, 120)
 SHORT = "durations: 1\nrate: 4\nwaypoints: [{position: [0, 0, 1.5]}, {position: [1, 0, 1.5]}]\n"
 # paths, or on stderr
-WHOLE = r"In |Try: |Written: |Look at it: |Every value: |Advice: |[\w-]+: the path|The file has|Empty workspace: "
+WHOLE = r"In |Try: |Written: |Look at it: |Every value: |Advice: |[\w-]+: the path|The file contains|Empty workspace: "
 COMMANDS = (
     ["forward", "cogiro", "lengths.csv"],
     ["show", "many.yaml"],

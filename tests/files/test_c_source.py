@@ -13,7 +13,7 @@ import sagline as sl
 from sagline.core.arrays import Array
 from sagline.files import c_source
 from sagline.kernels import codes
-from sagline.tension.methods import METHODS
+from sagline.tension import methods as tension_methods
 from tests.files.c_programs import BAD_INPUT, FORWARD, INFEASIBLE, NO_CHORD, SINGULAR, SOLVED, Program, compiled
 from tests.refusal import refused
 from tests.tiers import extended, wide
@@ -119,7 +119,7 @@ def test_every_method_and_the_forward_solution_over_pulleys_too(name: str, tmp_p
     rng = np.random.default_rng(7)
     robot = robot_of(name)
     redundant = robot.cable_count - robot.degrees_of_freedom
-    every = [make() for make in METHODS.values()]
+    every = [make() for make in tension_methods.METHODS.values()]
     methods = [each for each in every if each.most_redundant is None or redundant <= each.most_redundant]
     ends = [sl.MinimumNorm("frame_end"), sl.Centroid("horizontal")][: 2 if redundant <= 2 else 1]
     methods += ends if redundant else []
@@ -231,7 +231,7 @@ def test_a_pose_without_full_rank_is_singular(tmp_path: Path) -> None:
 
 
 def test_the_source_has_no_recursion_heap_or_loop_without_a_bound(tmp_path: Path) -> None:
-    methods = [make() for make in METHODS.values()]
+    methods = [make() for make in tension_methods.METHODS.values()]
     source, _, _ = sl.export_c(sl.load_robot("ipanema-3-pulleys"), tmp_path / "s.c", tension=methods, forward=True)
     text = re.sub(r"/\*.*?\*/|^#.*?$", "", source.read_text(), flags=re.DOTALL | re.MULTILINE)
     heads = list(

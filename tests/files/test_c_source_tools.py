@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.tension.methods import METHODS
+from sagline.tension import methods as tension_methods
 from tests.files.c_programs import CORES, Program, arm_sizes, compiled
 from tests.tiers import extended
 
 pytestmark = extended
 
 PAGE = Path(__file__).parents[2] / "docs" / "howto" / "microcontroller.md"
-EVERY = [make() for make in METHODS.values()]
+EVERY = [make() for make in tension_methods.METHODS.values()]
 # every method at poses inside and outside, then forward from there and without a start
 MAIN = """\
 #include <stdio.h>

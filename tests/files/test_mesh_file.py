@@ -62,7 +62,7 @@ def test_corners_that_are_nowhere_are_refused_without_a_warning(tmp_path: Path, 
         with warnings.catch_warnings():  # of the writer
             warnings.simplefilter("ignore")
             file = written(tmp_path, trimesh.Trimesh(corners, box.faces, process=False), f"box.{kind}")
-        with pytest.raises(sl.FileError, match=r"coordinates that are not numbers|m away; allowed: up to 1e\+06 m"):
+        with pytest.raises(sl.FileError, match=r"numbers|1e\+06"):
             sl.load_mesh(file)
 
 
@@ -71,7 +71,7 @@ def test_the_unit_decides_what_is_too_far_away(tmp_path: Path) -> None:
 
     file = written(tmp_path, trimesh.creation.box((3e6, 1.0, 1.0)), "box.stl")
     assert np.ptp(sl.load_mesh(file, unit="mm").bounds, axis=0)[0] == 3000.0
-    with pytest.raises(sl.FileError, match=r"up to 1\.5e\+06 m away"):
+    with pytest.raises(sl.FileError, match=r"1\.5e\+06"):
         sl.load_mesh(file)
 
 
@@ -86,7 +86,7 @@ def test_faces_of_an_obj_count_corners_from_one(tmp_path: Path, face: str, line:
     file.write_text(corners + faces, newline="")
     assert sl.load_mesh(file).volume == pytest.approx(1.0 / 6.0)
     file.write_text(corners + faces + face, newline="")
-    with pytest.raises(sl.FileError, match=f"corner 0 in line {line};"):
+    with pytest.raises(sl.FileError, match=f"corner 0 .* {line};"):
         sl.load_mesh(file)
 
 

@@ -121,4 +121,4 @@ def test_an_index_outside_raises_an_error_at_its_line() -> None:
         plain(outside)(np.zeros(3))
     last = traceback.extract_tb(error.tb)[-1]
     assert last.filename == __file__
-    assert last.line == "return values[0] + values[values.size]"
+    assert "values[values.size]" in str(last.line)

@@ -238,7 +238,7 @@ def test_of_two_that_begin_at_once_the_later_one_takes_the_folder_of_the_earlier
     if same:
         assert sl.sweep.run(planar(3, 2), folder, workers=1).complete
     else:
-        with pytest.raises(sl.FileError, match="contains another sweep"):
+        with pytest.raises(sl.FileError, match="another sweep"):
             sl.sweep.run(planar(3, 2), folder, workers=1)
     assert [path.name for path in tmp_path.iterdir()] == ["sweep"]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -14,6 +14,8 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.statics.slopes import cable_slopes, motions_of_ends
 from sagline.statics.stiffness import Modes, modes
 from sagline.statics.strings import Strings, strings_of
+
+EQUAL: Final = 1e-6  # relative difference of shares of the energy that count as equal
 
 _TINY = np.finfo(float).tiny
 
@@ -108,7 +110,9 @@ class ListedMode(NamedTuple):
 
 def listed_modes(vibration: Vibration) -> list[ListedMode]:
     """All modes with cable mass, then the massless ones, each in ascending order."""
-    most = np.argmax(vibration.cable_share, axis=0) if vibration.frequency.size else ()
+    share = vibration.cable_share
+    # the first of equal cables, which differ by rounding
+    most = np.argmax(share >= (1.0 - EQUAL) * share.max(axis=0), axis=0) if vibration.frequency.size else ()
     swinging = [
         ListedMode(
             k + 1,
