@@ -37,9 +37,9 @@ print(sl.backend(), [each.hex() for each in plan.unstrained_length])
 """
 
 
-def run(chosen: str) -> subprocess.CompletedProcess[str]:
+def run(chosen: str, **variables: str) -> subprocess.CompletedProcess[str]:
     """One pose in a new process with a back end."""
-    environment = {**os.environ, "SAGLINE_BACKEND": chosen}
+    environment = {**os.environ, "SAGLINE_BACKEND": chosen, **variables}
     return subprocess.run([sys.executable, "-c", POSITION], capture_output=True, text=True, env=environment)
 
 
@@ -59,6 +59,11 @@ def test_every_back_end_gives_the_same_lengths() -> None:
     lengths = {name: run(name).stdout.split(maxsplit=1) for name in ("c", "python")}
     assert [name for name, _ in lengths.values()] == list(lengths)
     assert lengths["c"][1] == lengths["python"][1]
+
+
+def test_the_library_needs_no_home() -> None:
+    done = run("c", HOME="/nonexistent", XDG_CACHE_HOME="/nonexistent")
+    assert (done.stdout.split(maxsplit=1)[0], done.stderr) == ("c", "")
 
 
 def test_an_unknown_back_end_is_refused_in_one_line() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import errno
 import shutil
 from pathlib import Path
 from typing import Any, cast
@@ -110,6 +111,20 @@ def test_a_folder_that_cannot_be_written_costs_one_line(tmp_path: Path, capsys: 
     assert len(lines) == 1
     assert str(tmp_path / "file") in lines[0]
     assert "NUMBA_CACHE_DIR" in lines[0]
+
+
+def test_a_full_disk_costs_one_line_and_leaves_no_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def full(file: Path, content: bytes) -> None:
+        with file.open("wb") as stream:
+            stream.write(content[:100])
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    assert cached_in(tmp_path)(2.0) == 4.0
+    assert "No space left" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
 
 
 def test_inner_kernels_have_no_wrapper_for_python_and_entries_have() -> None:
