@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import errno
+import os
 import shutil
 from pathlib import Path
 from typing import Any, cast
@@ -119,11 +120,11 @@ def test_a_full_disk_costs_one_line_and_leaves_no_file(
     def full(file: Path, content: bytes) -> None:
         with file.open("wb") as stream:
             stream.write(content[:100])
-        raise OSError(errno.ENOSPC, "No space left on device")
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(Path, "write_bytes", full)
     assert cached_in(tmp_path)(2.0) == 4.0
-    assert "No space left" in capsys.readouterr().err
+    assert os.strerror(errno.ENOSPC) in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 
 
