@@ -60,7 +60,7 @@ class Bench:
 
     def __init__(self, count: int) -> None:
         self.count = count
-        limits = PlcLimits([0.5] * count, [6.0] * count, [SPEED] * count, [300.0] * count)
+        limits = PlcLimits([2.7] * count, [3.5] * count, [SPEED] * count, [300.0] * count)
         self.program = Program(limits, PERIOD)
         self.block, self.v = function_block(text(), "SaglineGroup"), variables(text(), "SaglineGroup")
         filled = {name: Array([0.0] * 6 + values) for name, values in limits._asdict().items()}
@@ -99,7 +99,7 @@ class Bench:
         if reset:
             program.reset()
         program.scan(self.time, self.encoder, cell)
-        v.now, v.period, v.stopped, v.reset = self.time, PERIOD, program.emergency, reset
+        v.now, v.period, v.stopClosed, v.reset = self.time, PERIOD, program.contact, reset
         v.encoder, v.cell, v.saturated = Array(pad(self.encoder)), Array(pad(cell)), Array(pad(saturated))
         v.driveFault = Array(pad(program.drive_fault))
         self.block(v, self.db)
@@ -168,7 +168,7 @@ def drive(bench: Bench, seed: int, scans: int) -> dict[str, int]:
         if slips:  # and again, though its set point follows it
             slips -= 1
             bench.encoder = [there + 0.02 for there in bench.encoder]
-        program.emergency |= bool(random.random() < (0.05 if slips else 0.001))
+        program.contact = bool(random.random() >= (0.05 if slips else 0.001))
         if random.random() < 0.001:
             program.trip(int(random.integers(bench.count)), 7)
         stuck = program.emergency or program.locked or any(program.drive_fault)
@@ -192,7 +192,7 @@ def test_the_source_does_what_the_twins_program_does_for_a_few_seconds() -> None
 @extended
 @pytest.mark.parametrize("count", [2, 1])
 def test_the_source_does_what_the_twins_program_does(count: int) -> None:
-    seen = drive(Bench(count), seed=count, scans=8_000)
+    seen = drive(Bench(count), seed=count + 4, scans=8_000)
     assert set(seen) >= {each.name for each in GroupFault}
     assert set(seen) >= {f"status {code}" for code in (1, 2, 3, 5, 9, 17, 35, 98)}
 
@@ -201,6 +201,27 @@ def test_the_source_does_what_the_twins_program_does(count: int) -> None:
 def test_the_source_does_what_the_twins_program_does_for_long() -> None:
     for seed in range(40):
         drive(Bench(2), seed, 20_000)
+
+
+@pytest.mark.parametrize("far", [0.02, 0.05])  # m from the end of the range, reached before the ramp, and in it
+@pytest.mark.parametrize(("end", "rate"), [(2.7, -0.375), (3.5, 0.375)])
+def test_the_source_keeps_set_points_in_their_range_without_commands(end: float, rate: float, far: float) -> None:
+    bench = Bench(1)
+    bench.encoder = [end - far * np.sign(rate)]
+    bench.claim(1)
+    fixed = {"owner": 1, "valid_for": 100, "winch[1].tension": 100.0, "winch[1].enable": True}
+    for counter in range(1, 90):
+        follows = bench.program.powered[0]
+        if counter <= 5:
+            moves = {"mode": Mode.FOLLOW, "winch[1].length": bench.program.length[0] + rate * PERIOD}
+            holds = {"mode": Mode.HOLD, "winch[1].length": bench.encoder[0]}
+            rates = {"winch[1].rate": rate if follows else 0.0}
+            bench.command({"counter": counter} | fixed | (moves if follows else holds) | rates)
+        bench.scan([100.0], reset=False, saturated=[False])
+        if bench.program.powered[0]:
+            bench.encoder = list(bench.program.length)
+    assert bench.program.fault == GroupFault.HEARTBEAT
+    assert bench.v.length[1] == end
 
 
 def test_the_file_names_what_is_to_be_set_and_that_it_is_not_compiled(tmp_path: Path) -> None:

@@ -320,10 +320,63 @@ def test_locked_drums_are_the_operator_s() -> None:
     assert group.do(Mode.HOLD).powered == [True, True]
 
 
+@pytest.mark.parametrize("far", [0.0, 0.001, 0.004, 0.01, 0.02])
+@pytest.mark.parametrize(("winch", "end", "rate"), [(0, 0.5, -0.3), (1, 9.0, 0.3)])
+def test_set_points_between_commands_and_in_the_ramp_stay_in_their_range(
+    far: float, winch: int, end: float, rate: float
+) -> None:
+    group = Group()
+    group.encoder[winch] = end - math.copysign(far + 0.003, rate)
+    program = group.ready()
+    length, rates = list(program.length), [0.0, 0.0]
+    length[winch], rates[winch] = end - math.copysign(far, rate), rate
+    group.do(Mode.FOLLOW, length, rates)
+    path = [group.scan().length[winch] for _ in range(40)]
+    assert program.fault == GroupFault.HEARTBEAT
+    assert LIMITS.least[winch] <= min(path) <= max(path) <= LIMITS.most[winch]
+    assert path[-1] == end
+    assert np.abs(np.diff(path)).max() <= 0.3 * PERIOD + 1e-9
+
+
+def test_a_drive_out_of_its_range_only_comes_back() -> None:
+    group = Group()
+    group.encoder = [0.4, 9.2]
+    program = group.ready()
+    group.do(Mode.FOLLOW, [0.4, 9.2], [-0.1, 0.1])
+    assert (program.fault, program.length) == (GroupFault.SET_POINT, [0.4, 9.2])
+
+
+def test_a_late_command_moves_no_faster_than_the_winch() -> None:
+    group = Group()
+    program = group.ready()
+    group.do(Mode.FOLLOW, program.length)
+    for _ in range(6):
+        group.scan()
+    begin = list(program.length)
+    group.do(Mode.FOLLOW, [begin[0] + 0.025, begin[1] - 0.03])  # allowed in the 70 ms that have passed
+    path = np.array([begin, program.length, *(group.scan().length for _ in range(8))])
+    assert not program.fault
+    np.testing.assert_allclose(np.abs(np.diff(path, axis=0)).max(axis=0) / PERIOD, LIMITS.speed, atol=1e-6)
+
+
+def test_a_broken_wire_of_the_emergency_stop_is_an_emergency_stop() -> None:
+    group = Group()
+    program = group.moving()
+    program.contact = False
+    group.do(Mode.FOLLOW)
+    assert (program.powered, program.fault) == ([False, False], GroupFault.EMERGENCY_STOP)
+    program.reset()
+    assert group.scan().status & GroupStatus.EMERGENCY  # a reset does not help while it is open
+    program.contact = True
+    assert group.scan().status & GroupStatus.EMERGENCY
+    program.reset()
+    assert group.scan().status == GroupStatus.READY | GroupStatus.BRAKED
+
+
 def test_an_emergency_stop_is_mirrored_and_the_grant_can_still_be_given_back() -> None:
     group = Group()
     program = group.moving()
-    program.emergency = True
+    program.contact = False
     group.do(Mode.FOLLOW)
     assert program.powered == [False, False]
     assert program.status == GroupStatus.EMERGENCY | GroupStatus.LOCKED | GroupStatus.BRAKED
@@ -331,6 +384,7 @@ def test_an_emergency_stop_is_mirrored_and_the_grant_can_still_be_given_back() -
     group.do(Mode.LEAVE)
     assert program.owner == 0
     assert program.fault == GroupFault.EMERGENCY_STOP
+    program.contact = True
     program.reset()
     assert group.scan().fault == GroupFault.NONE
 
@@ -377,8 +431,9 @@ def anything(generator: np.random.Generator, group: Group) -> None:
     elif pick < 0.105:
         program.trip(int(generator.integers(2)), 1)
     elif pick < 0.11:
-        program.emergency = True
+        program.contact = False
     elif pick < 0.15:
+        program.contact = True
         program.reset()
     group.cell = [seldom(0.01, 1e4, 150.0) for _ in range(2)]
     group.encoder = [at + seldom(0.02, 0.02, 0.0) for at in group.encoder]
@@ -415,6 +470,8 @@ def test_whatever_comes_drives_do_what_they_may(seeds: int) -> None:
             assert program.owner or not any(program.powered)
             assert not (any(program.powered) and (program.emergency or program.locked))
             for i in range(2):
+                assert after[i] >= min(LIMITS.least[i], before[i], group.encoder[i])
+                assert after[i] <= max(LIMITS.most[i], before[i], group.encoder[i])
                 begun = program.powered[i] and not powered[i]
                 assert not (program.drive_fault[i] and program.powered[i])
                 if not program.powered[i] and not powered[i]:

@@ -355,13 +355,17 @@ class Machine:
             self._spoiled[group] = words
 
     def emergency_stop(self) -> None:
-        """Press the emergency stop: hardware locks the drums and cuts the power; the PLCs only report it."""
+        """Press the emergency stop: hardware locks the drums and cuts the power; the PLCs only report it.
+
+        The contact that the PLCs read is normally closed, so that a broken wire has the same effect.
+        """
         for program in self._programs:
-            program.emergency = True
+            program.contact = False
 
     def reset(self) -> None:
         """Release the emergency stop and the drums and clear the drives, as the operator at the machine does."""
         for program in self._programs:
+            program.contact = True
             program.reset()
 
 

@@ -69,7 +69,9 @@ class Program:
         length: Set points at the end of the scan's period [m].
         tension: Expected tensions at the drums [N].
         drive_fault: Fault codes of the drives, 0 for none.
-        emergency: True if the emergency stop is pressed.
+        contact: State of the normally closed contact of the emergency stop: False if it is pressed, or if its wire is
+            broken.
+        emergency: True from the opening of the contact to the next reset with a closed contact.
         locked: True if the drums are locked until the operator releases them.
     """
 
@@ -83,7 +85,7 @@ class Program:
         self._loaded = [False] * count  # True for each drive that has built up its tension
         self.length, self.tension = [0.0] * count, [0.0] * count
         self.drive_fault = [0] * count
-        self.emergency = self.locked = False
+        self.contact, self.emergency, self.locked = True, False, False
         self._order: Order | None = None
         self._fresh = False
         self._moved = -OWNER_TIMEOUT  # time of the last change of the command counter [s]
@@ -132,6 +134,7 @@ class Program:
     def scan(self, now: float, encoder: list[float], cell: list[float]) -> None:
         """Set the drives for the next period; now: time [s], encoder [m], cell [N]."""
         order, fresh, waited, self._now = self._order, self._fresh, now - self._moved, now
+        self.emergency = self.emergency or not self.contact
         if fresh and order is not None:
             self._fresh, self._moved = False, now
             stands = self.fault or self.emergency or self.locked
@@ -256,7 +259,8 @@ class Program:
     def _drive(self, cell: list[float]) -> None:
         """Advance the set points by a scan, unless this winds in a cable beyond its tension limit.
 
-        They move linearly to those of the last command within one cycle, and then continue at its rates.
+        They move linearly to those of the last command within one cycle, and then continue at its rates, both within
+        the limits of lengths and rates.
         """
         limit, length, powered, target, rate = self.limits.tension, self.length, self.powered, self._target, self._rate
         left, period, moved = self._left, self.period, []
@@ -270,12 +274,25 @@ class Program:
                     at += (target[i] - at) * period / left
                 else:
                     at = target[i] + rate[i] * beyond
+                at = self._within_limits(i, at)
                 if not cell[i] <= limit[i] and at < length[i]:  # NaN counts as too large
                     self._stop(GroupFault.OVER_TENSION)
                     self._slow_down(cell)
                     return
             moved.append(at)
         self.length, self._left = moved, max(left - period, 0.0)
+
+    def _within_limits(self, i: int, length: float) -> float:
+        """Next set point of a winch, limited in rate; a set point out of range may only move towards the range."""
+        at, farthest = self.length[i], self.limits.speed[i] * self.period + TINY
+        if length > at + farthest:
+            length = at + farthest
+        elif length < at - farthest:
+            length = at - farthest
+        least, most = self.limits.least[i], self.limits.most[i]
+        if least <= length <= most:
+            return length
+        return min(max(length, min(least, at)), max(most, at))
 
     def _stop(self, fault: GroupFault) -> None:
         """Begin to slow down and hold after a fault."""
@@ -293,7 +310,7 @@ class Program:
         self.length = list(self.length)
         for i in self.winches:
             if self.powered[i] and (cell[i] <= self.limits.tension[i] or self._rate[i] >= 0.0):
-                self.length[i] += self._rate[i] * mean
+                self.length[i] = self._within_limits(i, self.length[i] + self._rate[i] * mean)
         self._target = list(self.length)
         if not self._ramp:
             self._rate = [0.0] * len(self._rate)
