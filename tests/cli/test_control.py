@@ -33,6 +33,19 @@ def test_lines_from_a_pipe_are_done_one_after_the_other(
     assert abs(machine.reading.position - [0.05, 0.0, 1.495]).max() < 3e-3
 
 
+def test_an_operator_confirms_a_pose_that_the_lengths_contradict(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    control, _ = rig(home=False)
+    monkeypatch.setattr(sys, "stdin", io.StringIO("home --confirm\nhome 0.1,0,1.5\nhome --confirm\nquit\n"))
+    assert OperatorSession(control, alone=False, shadow=False).run() == 0
+    said = capsys.readouterr()
+    changed = re.search(r"IDLE: .*confirmed.* by up to (\S+) mm", said.out)
+    assert changed is not None
+    assert float(changed[1]) == pytest.approx(49.4, abs=0.1)
+    assert re.findall(r"Error: (\w+) is", said.err) == ["confirming", "homing"]
+
+
 @pytest.mark.parametrize(
     "line",
     wide(

@@ -286,10 +286,14 @@ def test_homing_names_a_jog_where_tensions_are_off_and_ends_where_they_agree() -
         moved = control.sample.length - before.length
         assert moved[winch] == pytest.approx(-by, abs=2e-4)
         assert np.abs(np.delete(moved, winch)).max() < 1e-5
+    with refused("homing", kind=RefusedError) as caught:
+        control.home(HOME)
+    lengths = re.findall(r"(\S+) mm", caught.value.reason)[:2]
+    assert [float(length) for length in lengths] == [3612.9, 3609.9]  # in the machine, from homing
     jogs = [command for command in sent(control) if command.mode is Mode.FOLLOW]
     assert {command.enable.sum() for command in jogs} == {1}
     assert max(np.abs(command.rate).max() for command in jogs) <= 0.01 + 1e-12
-    control.home(HOME)
+    control.confirm_homing()
     assert state_of(control) is State.IDLE
     assert control.zero == pytest.approx(tight, abs=2e-4)
 

@@ -27,6 +27,7 @@ PROMPT: Final = "> "
 FAILED: Final = 1  # exit code after a fault
 LATE: Final = 0.02  # delay above which a note is printed at the end [s]
 AXES: Final = ("x", "y", "z")
+CONFIRM: Final = "--confirm"
 
 
 class StatusLine:
@@ -103,10 +104,10 @@ class OperatorSession:
         # arguments, help, parser of the arguments, and action of each command
         self._words: dict[str, tuple[str, str, Callable[[str], Any], Callable[..., object]]] = {
             "home": (
-                "[X,Y,Z[,A,B,C]]",
-                "set lengths and start at this pose, by default the middle of the test box",
+                "[X,Y,Z[,A,B,C]] | --confirm",
+                "set lengths and start at this pose, by default the middle of the test box; or confirm it",
                 self._home_pose,
-                control.home,
+                self._home,
             ),
             "goto": ("X,Y,Z[,A,B,C]", "move straight to a pose [m, degrees]", partial(_pose, "goto"), self._go_to),
             "run": ("FILE", "follow a path, path.yaml", load_path, control.start),
@@ -230,8 +231,17 @@ class OperatorSession:
     def _go_to(self, pose: Pose) -> None:
         self.control.start(self.control.path_to(pose))
 
-    def _home_pose(self, text: str) -> Pose:
+    def _home_pose(self, text: str) -> Pose | None:
+        """Pose to home at; None to confirm the last one."""
+        if text == CONFIRM:
+            return None
         return _pose("home", text) if text else middle_pose(self.control.robot)
+
+    def _home(self, pose: Pose | None) -> None:
+        if pose is None:
+            self.control.confirm_homing()
+        else:
+            self.control.home(pose)
 
     def _jog(self, text: str) -> Callable[[], None]:
         which, _, far = text.partition(" ")

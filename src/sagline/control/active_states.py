@@ -203,7 +203,8 @@ class HomingState(ActiveState):
         if c.sample is None or self.source is not None:
             raise RefusedError("the jog", "another winch is being jogged", "Wait until it stands.")
         self._largest_tension = jog_tension_limits(self.homing, c.sample)
-        begin = SetPoint(c.sample.length, np.zeros(len(c.zero)), c.unknown, c.sender.tension, None, None, np.nan, False)
+        length, still = c.sample.length + c.zero, np.zeros(len(c.zero))
+        begin = SetPoint(length, still, c.unknown, c.sender.tension, None, None, np.nan, False)
         self.source = HomingJog(begin, winch, by, c.period)
         c.say(EventKind.NOTE, "jog", f"winch {winch} by {1e3 * by:+g} mm")
 
@@ -221,13 +222,13 @@ class HomingState(ActiveState):
                 return self
             self.source = None
             c.sender.stand_at(sample)
-            homing.rest()
+            homing.moved()
         elif homing.look(sample):
             c.zero, c.homed = homing.zero, True
             c.estimator.begin_at(homing.state.pose)
             c.previous_plan = homing.plan
-            largest = 1e3 * float(np.abs(c.zero).max())
-            reason = f"the tensions agree; lengths set to the plan's, by up to {largest:.2f} mm"
+            basis = "the operator confirmed the pose" if homing.confirmed else "the tensions agree"
+            reason = f"{basis}; lengths set to the plan's, by up to {1e3 * np.abs(homing.apart).max():.2f} mm"
             return Following(c, State.IDLE, reason, None, homing.standing).next(answer)
         self.rest(Mode.HOLD, enabled=True)
         return self

@@ -8,6 +8,7 @@ import numpy as np
 
 from sagline.cables.model import CableModel
 from sagline.control.jogging import winch_lengths
+from sagline.control.known_lengths import length_tolerance, place_of
 from sagline.control.link import Sample
 from sagline.control.null_space import SIGMAS, cell_sigma
 from sagline.control.set_points import SetPoint, Standing
@@ -24,7 +25,7 @@ MOST: Final = 1.2  # largest ratio to the plan's tension; a larger tension ends 
 
 
 class Homing:
-    """Plan at the named pose, and comparison of tensions with it.
+    """Plan at the named pose, and comparison of tensions and lengths with it.
 
     Attributes:
         plan: Plan of the robot at that pose.
@@ -33,12 +34,18 @@ class Homing:
         tension: T_A at the pose [N], shape (m,).
         sigma: Standard deviation of the load cells [N], shape (m,).
         off: Mean of the measured minus the planned tensions [N], shape (m,).
-        zero: Offset added to the lengths of samples [m], shape (m,).
+        tolerance: Largest difference of a length without confirmation [m], shape (m,); infinite if the machine has no
+            valid lengths.
+        apart: Lengths of the machine minus those of the plan [m], shape (m,).
+        zero: Offset added to the lengths of samples after homing [m], shape (m,).
         agrees: True if every tension is within 5 sigma.
+        confirmed: True if the operator has confirmed the pose against the lengths of the machine.
     """
 
-    def __init__(self, robot: Robot, pose: Pose, model: CableModel, method: TensionMethod) -> None:
-        """Plan the named pose."""
+    def __init__(
+        self, robot: Robot, pose: Pose, model: CableModel, method: TensionMethod, zero: Array | float = 0.0
+    ) -> None:
+        """Plan the named pose; zero: present offset of the lengths, not zero after an earlier homing [m], (m,)."""
         self.plan = inverse(robot, pose, model, method)
         if not self.plan.feasible:
             gap = self.plan.gaps[0]
@@ -48,14 +55,33 @@ class Homing:
         self.standing = Standing.at(self.state)
         self.tension = self.state.cables.frame_end_tension
         self.sigma = cell_sigma(robot)
-        self._pose, self._robot = pose, robot
-        m = robot.cable_count
+        self._pose, self._robot, self._model = pose, robot, model
+        m, winches = robot.cable_count, robot.winches
+        self._present = zero + np.zeros(m)
+        known = self._present.any() or (winches is not None and winches.length_zero is not None)
+        self.tolerance = length_tolerance(robot, self.state, model) if known else np.full(m, np.inf)
         self._lengths, self._tensions = np.zeros(m), np.zeros(m)
         self._count, self._counter = 0, np.zeros(0, dtype=np.int64)
-        self.off, self.zero, self.agrees = np.full(m, np.nan), np.zeros(m), False
+        self.off, self.apart, self.zero = np.full(m, np.nan), np.full(m, np.nan), np.zeros(m)
+        self.agrees = self.confirmed = False
 
-    def rest(self) -> None:
-        """Discard the samples after a winch has moved."""
+    @property
+    def conflicts(self) -> bool:
+        """True if the tensions agree, but a length of the machine does not, and the operator has not confirmed this."""
+        return self.agrees and not self._accepted
+
+    @property
+    def _accepted(self) -> bool:
+        known = self.confirmed and bool(np.isfinite(self.apart).all())
+        return self.agrees and (known or bool((np.abs(self.apart) <= self.tolerance).all()))
+
+    def moved(self) -> None:
+        """Discard samples and findings after a winch has moved."""
+        self._rest()
+        self.agrees = self.confirmed = False
+
+    def _rest(self) -> None:
+        """Begin a new mean."""
         self._count = 0
         self._lengths[:] = self._tensions[:] = 0.0
 
@@ -71,20 +97,43 @@ class Homing:
             return False
         self.off = self._tensions / WINDOW - self.tension
         self.zero = self.state.unstrained_length - self._lengths / WINDOW
+        self.apart = self._present - self.zero
         self.agrees = bool((np.abs(self.off) <= SIGMAS * self.sigma).all())
-        self.rest()
-        return self.agrees
+        self._rest()
+        return self._accepted
 
     def refusal(self) -> RefusedError:
-        """Error with the deviating tensions, and a jog that reduces them."""
+        """Error with the deviating lengths or tensions, and the next step."""
+        if self.conflicts:
+            return self._conflict()
         off, beyond = self.off, np.abs(self.off) - SIGMAS * self.sigma
         named = ", ".join(f"{i} by {off[i]:+.1f} N" for i in np.argsort(-beyond)[:3] if beyond[i] > 0.0)
         allowed = f"{SIGMAS * float(self.sigma.max()):.3g} N"
         winch, by = self._jog(off)
-        step = f"jog {winch} {1e3 * by:+.1f}mm, one winch at a time, or place the platform; then home again."
-        return RefusedError(
-            "homing", f"tensions differ from the plan: cables {named}; allowed: {allowed}", f"Try {step}"
+        step = f"Try jog {winch} {1e3 * by:+.1f}mm, one winch at a time, or place the platform; then home again"
+        if (np.abs(self.apart) > self.tolerance).any():
+            step += f"; {self._place}"
+        reason = f"tensions differ from the plan: cables {named}; allowed: {allowed}"
+        return RefusedError("homing", reason, f"{step}.")
+
+    @property
+    def _place(self) -> str:
+        """Pose of the platform by the lengths of the machine."""
+        return place_of(self._robot, self.state.unstrained_length + self.apart, self._pose, self._model)
+
+    def _conflict(self) -> RefusedError:
+        """Error with both values of the length that differs most, and the pose for the lengths of the machine."""
+        ratio = np.abs(self.apart) / self.tolerance
+        i = int(np.argmax(np.where(np.isfinite(self.apart), ratio, np.inf)))
+        there, planned = self.state.unstrained_length + self.apart, self.state.unstrained_length
+        if not np.isfinite(self.apart[i]):
+            return RefusedError("homing", f"encoder {i} reads {there[i]:g} m", "Check encoder and plug; home again.")
+        reason = (
+            f"cable {i}: {1e3 * there[i]:.1f} mm in the machine, {1e3 * planned[i]:.1f} mm from homing, allowed "
+            f"difference {1e3 * self.tolerance[i]:.1f} mm; {self._place}"
         )
+        step = "Measure the pose; home there, or confirm: home --confirm, confirm_homing() in Python."
+        return RefusedError("homing", reason, step)
 
     def _jog(self, off: Array) -> tuple[int, float]:
         """Winch and length [m] of the jog that reduces the error most."""

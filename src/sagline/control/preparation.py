@@ -6,8 +6,6 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Final, TypeVar
 
-import numpy as np
-
 from sagline.control.active_states import Connecting, Holding, HomingState, Off, idle_at
 from sagline.control.commands import Disagreement
 from sagline.control.homing import Homing
@@ -73,8 +71,9 @@ class Preparation(Monitor):
         elif active.source is not None:
             raise RefusedError("homing", "a winch is being jogged", "Wait until it stands.")
         place = instance(pose, Pose, "pose")
-        homing = self._result_of(lambda: Homing(c.robot, place, c.model, c.method))
-        c.zero, c.homed = np.zeros(c.robot.cable_count), False
+        present = c.zero - c.correction  # the tension loop has corrected the lengths, too
+        homing = self._result_of(lambda: Homing(c.robot, place, c.model, c.method, present))
+        c.zero, c.homed = present, False
         c.reset_tension_loop()
         active = self._loop.active
         if isinstance(active, HomingState):
@@ -83,19 +82,46 @@ class Preparation(Monitor):
             self._loop.active = HomingState(c, homing)
 
     def home(self, pose: Pose) -> None:
-        """State the pose of the platform at rest, and wait until the tensions agree.
+        """State the pose of the platform at rest, and wait until tensions and lengths agree.
+
+        Lengths are compared if the robot has `length_zero`, or if the controller was homed before.
 
         Args:
             pose: A single pose.
 
         Raises:
-            RefusedError: If the tensions do not agree. The state remains HOMING, and the message recommends a jog.
+            RefusedError: If the tensions do not agree, and the message recommends a jog; or if they agree, but the
+                lengths of the machine do not. The state remains HOMING, and no length changes.
         """
         self.begin_homing(pose)
+        self._compare()
+
+    def confirm_homing(self) -> None:
+        """Confirm the pose of `home` against the lengths of the machine, and wait until the tensions agree again.
+
+        Raises:
+            RefusedError: If the last call of `home` did not report a difference of lengths, a winch has moved since, or
+                the tensions do not agree any more.
+        """
+        active = self._loop.active
+        if not isinstance(active, HomingState) or not active.homing.conflicts:
+            reason = "no difference of lengths was reported, or a winch has moved since"
+            raise RefusedError("confirming", reason, "Home first: home(pose).")
+        active.homing.confirmed, active.homing.agrees = True, False
+        self._compare()
+
+    def _compare(self) -> None:
+        """Wait until homing ends; raise an error if it does not."""
         last = self._context.number + round(SETTLING / self.period)
-        self._run_while(lambda: self.state is State.HOMING and self._context.number < last)
-        if isinstance(self._loop.active, HomingState):
-            raise self._loop.active.homing.refusal()
+
+        def waits() -> bool:
+            active = self._loop.active
+            return isinstance(active, HomingState) and not active.homing.conflicts and self._context.number < last
+
+        self._run_while(waits)
+        active = self._loop.active
+        if isinstance(active, HomingState):
+            raise self._result_of(active.homing.refusal)
         if self.state is not State.IDLE:
             reason = f"it ended in {self.state.name}: {self._context.run.reason}"
             raise RefusedError("homing", reason, "Read the events.")

@@ -14,7 +14,7 @@ class State(Status):
     OFF = 0, "brakes on, no grant held; connect() begins"
     CONNECTING = 1, "the controller claims the groups and waits until all of them agree; brakes on"
     READY = 2, "the drives hold; home(pose) sets the pose of the platform"
-    HOMING = 3, "one winch at a time is jogged until every tension is that of the plan at home"
+    HOMING = 3, "one winch at a time is jogged until tensions and lengths are those of the plan at home"
     IDLE = 4, "the platform stands and its pose is known; a path, a pose or a jog may begin"
     MOVING = 5, "set points follow the plan"
     JOGGING = 6, "set points follow the operator"
@@ -48,7 +48,7 @@ TABLE: Final[dict[State, tuple[str, dict[State, str]]]] = {
     ),
     State.HOMING: (
         "jog, one at a time",
-        {State.IDLE: "every tension within 5 sigma of the plan at home", **_OFF, **_STOP, **_EMERGENCY},
+        {State.IDLE: "tensions and lengths within 5 sigma of the plan at home", **_OFF, **_STOP, **_EMERGENCY},
     ),
     State.IDLE: (
         "hold, tension loop on",

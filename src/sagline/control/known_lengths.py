@@ -1,0 +1,108 @@
+"""Lengths that a machine has, as evidence in homing: their tolerance, and the pose that they give."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any, Final
+
+import numpy as np
+
+from sagline.cables.model import CableModel
+from sagline.control.null_space import SIGMAS, cell_sigma
+from sagline.core.arrays import Array
+from sagline.kinematics.forward import forward
+from sagline.kinematics.home import home
+from sagline.robot.drum import drum_lever
+from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.robot.tolerances import UNCERTAIN
+from sagline.robot.winch import Winch
+
+_SHARE: Final = 1e-3  # step of the derivatives, as a share of a standard deviation
+_READING: Final = ("length_zero", "drum_radius")  # quantities that determine the length for a count
+
+
+def length_tolerance(robot: Robot, state: Equilibrium, model: CableModel) -> Array:
+    """Largest difference between the lengths of a machine and those of homing, 5 sigma [m], shape (m,).
+
+    Sources of the difference: the load cells, the encoders' resolution, and the tolerances of the robot, or the
+    standard errors of its calibration if they are smaller. Each error is propagated to the length at the pose of the
+    state for the tensions of the state.
+    """
+    winches = robot.winches
+    assert winches is not None  # a controller needs the drums
+    length, lever = state.unstrained_length, drum_lever(robot, state.unstrained_length)  # lever: [m/rad]
+    variance = sum((part**2 for part in _at_pose(robot, state, model)), np.zeros(robot.cable_count))
+    errors = _standard_errors(robot)
+    if winches.length_zero is not None:
+        variance += np.square(errors.get("length_zero", 0.0))
+        variance += np.square(errors.get("drum_radius", 0.0) * (length - winches.length_zero) / lever)
+    if winches.counts_per_turn is not None:
+        count = 2.0 * np.pi * lever / np.abs(winches.gear * winches.counts_per_turn)
+        variance += count**2 / 12.0  # a rounded value is distributed uniformly over one count
+    return np.asarray(SIGMAS * np.sqrt(variance))
+
+
+def _at_pose(robot: Robot, state: Equilibrium, model: CableModel) -> Iterator[Array]:
+    """Standard deviations of the lengths at the pose [m], one array (m,) for each source."""
+    winches = robot.winches
+    assert winches is not None
+    reading = state.cables.frame_end_tension * winches.load_cell_gain + winches.load_cell_bias
+    stretch = 1.0 + winches.winding_tension / robot.cables.axial_stiffness
+
+    def change(other: Robot, more: Array | float = 0.0) -> Array:
+        """Change of the lengths of homing, for another robot or larger readings [N], per `_SHARE`."""
+        there, here = (
+            _zeros(home(some, state.pose, read, model=model).winches)
+            for some, read in ((other, reading + more), (robot, reading))
+        )
+        return np.asarray((there - here) / (stretch * _SHARE))
+
+    yield change(robot, _SHARE * cell_sigma(robot))
+    for name, error in _standard_errors(robot).items():
+        if name in _READING or not UNCERTAIN[name].each:  # the load has no influence at known tensions
+            continue
+        if not np.isfinite(error).all():
+            yield np.full(robot.cable_count, math.inf)
+            continue
+        for axis in np.eye(3) if UNCERTAIN[name].axes else np.ones(1):
+            yield change(_varied(robot, name, _SHARE * error * axis))
+
+
+def _zeros(winches: Winch | None) -> Array:
+    """Length zeros of winches after homing."""
+    assert winches is not None
+    assert winches.length_zero is not None
+    return winches.length_zero
+
+
+def _standard_errors(robot: Robot) -> dict[str, Array]:
+    """Tolerances by name, or standard errors of the calibration where they are smaller."""
+    errors = dict(robot.tolerances)
+    for name, error in {} if robot.calibration is None else robot.calibration.standard_error.items():
+        errors[name] = np.minimum(error, errors.get(name, np.inf))
+    return errors
+
+
+def _varied(robot: Robot, name: str, change: Array) -> Robot:
+    """Robot with a changed quantity."""
+    owner, _, field = UNCERTAIN[name].place.rpartition(".")
+    part: Any = getattr(robot, owner) if owner else robot
+    if getattr(part, field) is None:
+        return robot
+    new: Any = part.replace(**{field: getattr(part, field) + change})
+    return robot.replace(**{owner: new}) if owner else new
+
+
+def place_of(robot: Robot, length: Array, stated: Pose, model: CableModel) -> str:
+    """Pose for given lengths [m] (m,), and its distance from the stated pose, as text."""
+    found = forward(robot, length, start=stated, model=model)
+    if not found.stable:
+        return "by its lengths the platform has no equilibrium near the stated pose"
+    x, y, z = np.round(found.pose.position, 3) + 0.0  # no negative zero
+    apart = 1e3 * float(np.linalg.norm(found.pose.position - stated.position))
+    turn = 2.0 * math.acos(min(abs(float(found.pose.quaternion @ stated.quaternion)), 1.0))
+    away = f"{apart:.1f} mm and {math.degrees(turn):.1f} degrees away"
+    return f"by its lengths the platform is at ({x:.3f}, {y:.3f}, {z:.3f}) m, {away}"
