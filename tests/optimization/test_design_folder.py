@@ -185,7 +185,7 @@ def test_a_full_disk_loses_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 @extended
 def test_robots_and_table_are_saved(tmp_path: Path) -> None:
     front = search(None, optimizer="nsga2", evaluations=240)
-    files = front.save(tmp_path / "new" / "front")
+    files = front.save(tmp_path / "front")
     with files[0].open(newline="") as table:
         heads, start, *rows = list(csv.reader(table))
     assert heads == ["robot", "least_margin [N]", "largest_sag [m]", "frame_anchors x [m]", "frame_anchors z [m]"]
@@ -198,6 +198,19 @@ def test_robots_and_table_are_saved(tmp_path: Path) -> None:
         np.testing.assert_array_equal([float(x) for x in row[1:]], [*values, *changed])
         again = sl.load_robot(file)
         assert again.frame_anchors.tobytes() == robot.frame_anchors.tobytes()
+
+
+def test_a_folder_is_created_but_not_the_one_around_it(tmp_path: Path) -> None:
+    inside = tmp_path / "missing" / "front"
+    step = f"Create the folder {inside.parent} first, or name another."
+    with refused(next_step=step, kind=FileError, file=inside):
+        search(inside)
+    front = search(None)
+    with refused(next_step=step, kind=FileError, file=inside):
+        front.save(inside)
+    assert not inside.parent.exists()
+    inside.parent.mkdir()
+    assert search(inside).save(inside)[0].is_file()
 
 
 def test_what_is_refused_leaves_no_folder(tmp_path: Path) -> None:

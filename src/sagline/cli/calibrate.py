@@ -16,6 +16,8 @@ from sagline.cli.options import (
     RobotArgument,
     argument,
     flag,
+    only_with,
+    only_without,
     option,
     quantity_option,
 )
@@ -66,6 +68,7 @@ def calibrate(
         argument(
             "LOG", "CSV: one row per pose; count_0, ... or length_0, ..., load_cell_0, ..., and x, y, z if measured."
         ),
+        only_without("--plan"),
     ] = None,
     out: Annotated[
         list[Path] | None,
@@ -88,12 +91,14 @@ def calibrate(
     tension_deviation: Annotated[float | None, _deviation_option("a load cell's reading, '5 N'", "N")] = None,
     position_deviation: Annotated[float | None, _deviation_option("a measured coordinate, '1 mm'", "m")] = None,
     rotation_deviation: Annotated[float | None, _deviation_option("a measured rotation, '1 mrad'", "rad")] = None,
-    folds: Annotated[int, option("NUMBER", "Folds of the cross-validation; 0 for none.")] = 5,
-    robust: Annotated[bool, flag("Give outliers less weight.", "--robust/--no-robust")] = True,
-    model: ModelOption = ModelName.CATENARY,
-    plot: Annotated[Path | None, option("FILE", "Figure of the fit: .png, .svg or .pdf.")] = None,
+    folds: Annotated[int, option("NUMBER", "Folds of the cross-validation; 0 for none."), only_without("--plan")] = 5,
+    robust: Annotated[bool, flag("Give outliers less weight.", "--robust/--no-robust"), only_without("--plan")] = True,
+    model: Annotated[ModelOption, only_without("--plan")] = ModelName.CATENARY,
+    plot: Annotated[
+        Path | None, option("FILE", "Figure of the fit: .png, .svg or .pdf."), only_without("--plan")
+    ] = None,
     plan: Annotated[int | None, option("NUMBER", "Choose this number of poses to measure, instead of a LOG.")] = None,
-    seed: Annotated[int, option("NUMBER", "Seed of the candidate poses of --plan.")] = 0,
+    seed: Annotated[int, option("NUMBER", "Seed of the candidate poses of --plan."), only_with("--plan")] = 0,
     as_json: JsonOption = False,
 ) -> int:
     """Estimate anchors, zeros and cables of a robot from its own readings.
@@ -121,7 +126,7 @@ def calibrate(
     known = {name: value for name, value in deviations.items() if value is not None}
     request = _Request(robot, names, known, tuple(out or ()), plot)
     if plan is not None:
-        return _plan_poses(request, plan, seed, log, as_json=as_json)
+        return _plan_poses(request, plan, seed, as_json=as_json)
     return _fit(request, log, model.build(), folds, robust=robust, as_json=as_json)
 
 
@@ -160,17 +165,13 @@ def _fit(request: _Request, log: Path | None, model: CableModel, folds: int, *, 
     return OUTSIDE
 
 
-def _plan_poses(request: _Request, count: int, seed: int, log: Path | None, *, as_json: bool) -> int:
+def _plan_poses(request: _Request, count: int, seed: int, *, as_json: bool) -> int:
     """Choose poses, write and print them; returns the exit code."""
     from sagline.calibration import planning
     from sagline.calibration.log import Sensors
     from sagline.calibration.planning import calibration_poses
     from sagline.files.robot_file import load_robot
 
-    for item, value in (("LOG", log), ("--plot", request.plot)):
-        if value is not None:
-            step = f"Leave out --plan, or {item}."
-            raise InvalidValueError(item, f"given with --plan: {str(value)!r}", "one of the two", step)
     request.check_files(ROBOTS)
     robot = load_robot(request.robot)
     with working(f"{robot.name}: choosing {count:,} poses") as line:

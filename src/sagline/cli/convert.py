@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
-from sagline.cli.options import FileOption, argument, option, quantity_option
+from sagline.cli.options import (
+    FileOption,
+    argument,
+    only_with,
+    option,
+    quantity_option,
+)
 from sagline.cli.terminal import show_data, show_note
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.core.numbers import n
@@ -44,10 +50,14 @@ def convert(
         _Format, option("FORMAT", "robot: a robot file in YAML; mjcf: a MuJoCo model with straight cables.", "--format")
     ] = _Format.ROBOT,
     linear_density: Annotated[
-        float | None, quantity_option("QUANTITY", "Linear density of all cables, for instance '65 g/m'.", "kg/m")
+        float | None,
+        quantity_option("QUANTITY", "Linear density of all cables, for instance '65 g/m'.", "kg/m"),
+        only_with("--axial-stiffness"),
     ] = None,
     axial_stiffness: Annotated[
-        float | None, quantity_option("QUANTITY", "Axial stiffness EA of all cables, for instance '700 kN'.", "N")
+        float | None,
+        quantity_option("QUANTITY", "Axial stiffness EA of all cables, for instance '700 kN'.", "N"),
+        only_with("--linear-density"),
     ] = None,
     cable_set: Annotated[str | None, option("NAME", "CASPR: set of cables. Default: that of the file.")] = None,
     at: Annotated[
@@ -118,12 +128,7 @@ def _read(source: str, cables: Cable | None, cable_set: str | None) -> Imported:
 def _material(density: float | None, stiffness: float | None) -> Cable | None:
     from sagline.cables.cable import Cable
 
-    if density is None and stiffness is None:
-        return None
-    if density is None or stiffness is None:
-        missing = "--linear-density" if density is None else "--axial-stiffness"
-        raise InvalidValueError(missing, "missing", "both or none of the two", f"Add {missing}.")
-    return Cable(density, stiffness)
+    return None if density is None or stiffness is None else Cable(density, stiffness)
 
 
 def _mjcf(robot: Robot, at: list[float] | None) -> tuple[str, str]:

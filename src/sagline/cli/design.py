@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 from sagline.cli.options import JsonOption, RobotArgument, argument, figures_flag, option
 from sagline.cli.output import Output, TextTable, number_text, show_table
 from sagline.cli.terminal import show_note, show_text, working
+from sagline.files.writing import create_folder
 
 if TYPE_CHECKING:
     from sagline.optimization.front import Front
@@ -58,6 +59,7 @@ def design(
             line.progress(done, total)
 
         try:
+            create_folder(out.absolute().parent)
             front = search(first, **request, folder=out, progress=show_progress)
         except KeyboardInterrupt:
             show_note("", f"{rated[0]:,} evaluated robots are in {out}: the same command continues.")

@@ -10,7 +10,7 @@ from importlib import import_module
 from importlib.metadata import version
 from inspect import cleandoc
 from pathlib import Path
-from typing import Annotated, Any, cast
+from typing import Annotated, Any, cast, get_type_hints
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -18,6 +18,7 @@ from typer.main import get_command_from_info
 from typer.models import CommandInfo
 
 from sagline.cli.ending import exit_code_of
+from sagline.cli.options import Condition
 from sagline.files.writing import finished_files
 
 NAMES = (
@@ -58,7 +59,13 @@ Start here:
 
 
 class _Command(TyperCommand):
-    """A subcommand that rejects empty texts; its help names arguments without braces."""
+    """A subcommand that rejects empty texts and options without effect; its help names arguments without braces.
+
+    Attributes:
+        conditions: Conditions of the options that have an effect only with or without others, by parameter.
+    """
+
+    conditions: Mapping[str, Sequence[Condition]]
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse the arguments; an empty text is an error, because as a path it would mean the current folder."""
@@ -70,7 +77,17 @@ class _Command(TyperCommand):
                 for text in value if isinstance(value, list | tuple) else (value,):
                     if isinstance(text, str) and not text.strip():
                         raise typer.BadParameter(f"it is empty. Give {parameter.metavar}.", ctx, parameter)
+            self._check_conditions(given)
         return super().parse_args(ctx, args)
+
+    def _check_conditions(self, given: Mapping[str, Any]) -> None:
+        """Reject an option that has no effect because another one is missing or given."""
+        by_label: dict[str, Any] = {_label(parameter): parameter for parameter in self.params}
+        for label, parameter in by_label.items():
+            for condition in self.conditions.get(parameter.name, ()) if given.get(parameter.name) is not None else ():
+                other = by_label[condition.other]
+                if (given.get(other.name, other.default) in (None, False)) == condition.given:
+                    raise condition.error(label)
 
     def get_help(self, ctx: Any) -> str:
         """The help."""
@@ -145,7 +162,16 @@ def _load_command(name: str) -> _Command:
     text = _help(function.__doc__)
     info = CommandInfo(name=name, cls=_Command, callback=function, help=text, short_help=text.partition("\n\n")[0])
     made: Any = get_command_from_info(info, pretty_exceptions_short=False, rich_markup_mode=None)
+    made.conditions = {
+        parameter: [note for note in getattr(hint, "__metadata__", ()) if isinstance(note, Condition)]
+        for parameter, hint in get_type_hints(function, include_extras=True).items()
+    }
     return cast(_Command, made)
+
+
+def _label(parameter: Any) -> str:
+    """Name of an option or argument for the user: "--prove", "PATH"."""
+    return str(parameter.opts[0] if parameter.param_type_name == "option" else parameter.metavar)
 
 
 def _before(finished: Sequence[Path]) -> str:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+from sagline.core.errors import InvalidValueError
 
 if TYPE_CHECKING:
     from sagline.cables.model import CableModel
@@ -111,6 +114,37 @@ def flag(text: str, *names: str) -> Any:
 def figures_flag(text: str) -> Any:
     """`--figures/--no-figures`."""
     return flag(text, "--figures/--no-figures")
+
+
+@dataclass(frozen=True)
+class Condition:
+    """Condition, beside an option in `Annotated`: the option has an effect only with, or only without another one.
+
+    Attributes:
+        other: The other option, "--prove", or the name of an argument in the help, "PATH".
+        given: False if the option has an effect only without the other one.
+    """
+
+    other: str
+    given: bool
+
+    def error(self, option: str) -> InvalidValueError:
+        """Error of an option that would have no effect."""
+        if self.given:
+            step = f"Add {self.other}, or leave out {option}."
+            return InvalidValueError(option, f"given without {self.other}", "both", step)
+        step = f"Leave out {option}, or {self.other}."
+        return InvalidValueError(option, f"given with {self.other}", "one of both", step)
+
+
+def only_with(other: str) -> Condition:
+    """Condition: the option has an effect only together with the other one."""
+    return Condition(other, given=True)
+
+
+def only_without(other: str) -> Condition:
+    """Condition: the option has an effect only without the other one."""
+    return Condition(other, given=False)
 
 
 def _unchanged(value: Any) -> Any:

@@ -20,6 +20,7 @@ from sagline.cli.options import (
     argument,
     choice_option,
     figures_flag,
+    only_with,
     option,
     quantity_option,
 )
@@ -65,6 +66,9 @@ _PathOption = Annotated[
     Path | None,
     argument("PATH", "Waypoints in .yaml, or time and pose in .csv. Default: at rest in the middle of the test box."),
 ]
+_ShaperOption = Annotated[
+    _ShaperKind, choice_option("SHAPER", "Input shaper of the path", _ShaperKind), only_with("PATH")
+]
 _BreaksOption = Annotated[
     list[str] | None, option("CABLE@TIME", "A cable breaks: 3@2.5s. The option can be repeated.", "--break")
 ]
@@ -78,7 +82,7 @@ _OutOption = Annotated[Path | None, option("FILE", "File to write. Default: ROBO
 def simulate(
     name: RobotArgument,
     path: _PathOption = None,
-    shaper: Annotated[_ShaperKind, choice_option("SHAPER", "Input shaper of the path", _ShaperKind)] = _ShaperKind.NONE,
+    shaper: _ShaperOption = _ShaperKind.NONE,
     cable_mass: Annotated[_CableMass, choice_option("KIND", "Model of the cable mass", _CableMass)] = _CableMass.NONE,
     breaks: _BreaksOption = None,
     after: Annotated[float, quantity_option("TIME", "Simulated time after the end of the path [s].", "s", low=0.0)] = 3,
@@ -117,9 +121,6 @@ def simulate(
         raise FileError(file, "does not end in .nc", "Name a NetCDF file: --out sim.nc.")
     drawing = f"{file.stem}-energy"
     output = Output(file.parent, [file.name], [drawing] * figures)
-    if path is None and shaper is not _ShaperKind.NONE:
-        advice = "Give a path, or leave --shaper out."
-        raise InvalidValueError("--shaper", f"{shaper.value} without a path", "none without a path", advice)
     way = None if path is None else load_path(path)
     if path is not None and way is not None:
         check_unit(path, way, robot)

@@ -8,10 +8,15 @@ from shlex import quote
 from typing import TYPE_CHECKING, Annotated
 
 from sagline.cli.ending import OUTSIDE
-from sagline.cli.options import JsonOption, argument, option
+from sagline.cli.options import (
+    JsonOption,
+    argument,
+    only_without,
+    option,
+)
 from sagline.cli.output import TextTable, number_text, show_table
 from sagline.cli.terminal import show_json, show_note, show_text, working
-from sagline.core.errors import InvalidValueError, SaglineError
+from sagline.core.errors import SaglineError
 from sagline.core.numbers import counted
 from sagline.files.writing import check_folder, create_folder
 
@@ -35,7 +40,11 @@ def sweep(
             "DIR", "Folder of the sweep; an unfinished sweep in it is continued. Default: SWEEP in output.", "--out"
         ),
     ] = None,
-    workers: Annotated[str | None, option("COUNT", "Processes on this machine. Default: one per processor.")] = None,
+    workers: Annotated[
+        str | None,
+        option("COUNT", "Processes on this machine. Default: one per processor."),
+        only_without("--scheduler"),
+    ] = None,
     scheduler: Annotated[
         str | None,
         option("tcp://HOST:PORT", "Use the workers of this Dask scheduler; all workers need access to the folder."),
@@ -57,8 +66,6 @@ def sweep(
     from sagline.sweep.running import MOST_WORKERS, open_matching_folder, run
 
     count = None if workers is None else whole_of(workers, "--workers", 1, MOST_WORKERS)
-    if scheduler is not None and count is not None:
-        raise InvalidValueError("--workers", "given with --scheduler", "one of both", "A cluster has its own workers.")
     request = load_sweep(file)
     folder = Path("output") / file.stem if out is None else out
     check_folder(folder)

@@ -22,6 +22,8 @@ from sagline.cli.options import (
     choice_option,
     converted_option,
     figures_flag,
+    only_with,
+    only_without,
     option,
     quantity_option,
 )
@@ -72,19 +74,27 @@ _DampingOption = Annotated[
         "RATIO", "Damping ratio of every mode, 0.01 or '1 %', in addition to that of the cables.", "ratio"
     ),
 ]
+_ForceOption = Annotated[
+    _Direction,
+    choice_option("AXIS", "Force of the response figure", _Direction),
+    only_with("--figures"),
+    only_without("--map"),
+]
 
 
 def vibrate(
     name: RobotArgument,
-    pose: PoseOption = None,
+    pose: Annotated[PoseOption, only_without("--map")] = None,
     points: _PointsOption = None,
     up_to: Annotated[float, quantity_option("HZ", "All modes below this frequency are found.", "Hz", above=0.0)] = 20,
     damping: _DampingOption = 0.01,
     loss_time: LossTimeOption = 0,
     air_damping: AirDampingOption = 0,
-    force: Annotated[_Direction, choice_option("AXIS", "Force of the response figure", _Direction)] = _Direction.X,
-    film: Annotated[int | None, option("MODE", "Write a film of this mode, ten seconds, as GIF.")] = None,
-    wrench: WrenchOption = None,
+    force: _ForceOption = _Direction.X,
+    film: Annotated[
+        int | None, option("MODE", "Write a film of this mode, ten seconds, as GIF."), only_without("--map")
+    ] = None,
+    wrench: Annotated[WrenchOption, only_without("--map")] = None,
     payload: PayloadOption = None,
     folder: OutOption = Path("output"),
     figures: Annotated[bool, figures_flag("Draw the response, as PNG and SVG.")] = True,
@@ -113,9 +123,6 @@ def vibrate(
     losses = Damping(loss_time, air_damping, damping)
     robot = robot_with_payload(name, payload)
     if points is not None:
-        for item, value in (("--pose", pose), ("--film", film), ("--wrench", wrench)):
-            if value is not None:
-                raise InvalidValueError(item, "given with --map", "one of both", "A map covers the whole test box.")
         return _vibrate_in_box(robot, points, up_to, losses, folder, figures=figures, as_json=as_json)
     table, drawing = (file_stem(robot.name, what) for what in ("modes", "response"))
     reel = f"{file_stem(robot.name, f'mode-{film}')}.gif"

@@ -18,6 +18,7 @@ from sagline.cli.options import (
     converted_option,
     figures_flag,
     flag,
+    only_with,
     option,
     quantity_option,
 )
@@ -63,9 +64,6 @@ def _criteria(robot: str, limits: dict[str, float | None], scene: str | None, *,
         "clearance": lambda limit: Clearance(limit, _obstacles(robot, scene)),
     }
     found = [kinds[name](limit) for name, limit in limits.items() if limit is not None]
-    if scene is not None and limits["clearance"] is None:
-        step = 'Give the least distance: --clearance "3 cm".'
-        raise InvalidValueError("--scene", f"{scene!r} without --clearance", "both", step)
     return found + [InFrame()] * in_frame
 
 
@@ -112,9 +110,13 @@ _ClearanceOption = Annotated[
 _SceneOption = Annotated[
     str | None,
     option("FILE", "With --clearance: a robot file with a scene, or a mesh in meters. Default: the robot's scene."),
+    only_with("--clearance"),
 ]
 _ToProveOption = Annotated[
     Any, converted_option("BOX", "Prove that all poses of this box are feasible.", "box_of", "--prove")
+]
+_BudgetOption = Annotated[
+    float, quantity_option("TIME", "With --prove: time for the proof [s].", "s", above=0.0), only_with("--prove")
 ]
 
 
@@ -132,7 +134,7 @@ def workspace(
     scene: _SceneOption = None,
     in_frame: Annotated[bool, flag("The whole platform stays within the frame.", "--in-frame")] = False,
     to_prove: _ToProveOption = None,
-    budget: Annotated[float, quantity_option("TIME", "Time for the proof [s].", "s", above=0.0)] = 10,
+    budget: _BudgetOption = 10,
     cells: Annotated[int, option("NUMBER", "Cells of the grid along the longest edge of the box.")] = 32,
     model: ModelOption = ModelName.CATENARY,
     folder: OutOption = Path("output"),

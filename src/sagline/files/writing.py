@@ -223,13 +223,14 @@ def check_folder(folder: os.PathLike[str] | str) -> None:
             raise FileError(path, f"cannot be created ({_reason(error)})", "Name another folder.") from None
 
 
-def create_folder(folder: os.PathLike[str] | str) -> Path:
-    """The folder; it and its parent folders are created if missing."""
+def create_folder(folder: os.PathLike[str] | str, *, parents: bool = True) -> Path:
+    """The folder, created if missing; its parent folders too, or an error if they are missing."""
     path = Path(folder)
     try:
-        path.mkdir(parents=True, exist_ok=True)
+        path.mkdir(parents=parents, exist_ok=True)
     except (OSError, ValueError) as error:
-        raise FileError(path, f"cannot be created ({_reason(error)})", "Name another folder.") from None
+        step = "Name another folder." if path.parent.is_dir() or parents else _next_step(path)
+        raise FileError(path, f"cannot be created ({_reason(error)})", step) from None
     return path
 
 

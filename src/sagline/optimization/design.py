@@ -67,7 +67,7 @@ def design(
         evaluations: Largest number of robots that are rated.
         seed: Seed of all random numbers.
         folder: Folder of the rated robots, from which an interrupted search, or a search with more evaluations,
-            continues. None: no folder.
+            continues; created if missing, in a folder that exists. None: no folder.
         progress: Called after each generation with the number of rated robots and the largest number.
 
     Returns:

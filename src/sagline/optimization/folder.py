@@ -65,7 +65,7 @@ def open_record(folder: Path | str, request: Request) -> Iterator[DesignFolder]:
     """Open the record of a search in a folder, new or continued; an error for another search or process."""
     place = file_path(folder, "folder", folder=True)
     check_files(place, [REQUEST, EVALUATIONS])
-    create_folder(place)
+    create_folder(place, parents=False)
     heads = [heading(part.name, part.unit) for part in request.candidates.parts]
     heads += [heading(goal.kind, goal.unit) for goal in request.goals]
     digest = digest_of(request)

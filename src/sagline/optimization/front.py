@@ -84,7 +84,7 @@ class Front(Result):
         """Write the robots as robot files, and a table of them.
 
         Args:
-            folder: The folder; created if missing. Files of the same names are replaced.
+            folder: The folder; created if missing, in a folder that exists. Files of the same names are replaced.
 
         Returns:
             The files: front.csv, and one .yaml file per robot with its name.
@@ -92,7 +92,7 @@ class Front(Result):
         Raises:
             FileError: If a file cannot be written.
         """
-        place = create_folder(file_path(folder, "folder", folder=True))
+        place = create_folder(file_path(folder, "folder", folder=True), parents=False)
         robots = self.robots if self.better else ()
         names = [FRONT, *(f"{file_stem(robot.name)}.yaml" for robot in robots)]
         heads = ["robot", *(heading(goal.kind, goal.unit) for goal in self.goals)]
