@@ -42,6 +42,27 @@ LINES = {
     "share": ["share", "cogiro"],
 }
 
+WITH = {  # lines of options that have an effect only with, or without, something else
+    "workspace --scene": [*LINES["workspace"], "--clearance", "3 cm"],
+    "workspace --budget": [*LINES["workspace"], "--prove", "0..1, 0..1, 1..2 m"],
+    "view --truth": [*LINES["view"], "run.mcap"],
+    "view --beside": [*LINES["view"], "run.nc"],
+    "calibrate --seed": ["calibrate", "winches_robot.yaml", "--plan", "8"],
+    "calibrate --plan": ["calibrate", "winches_robot.yaml"],
+    "convert --at": [*LINES["convert"], "--format", "mjcf"],
+    "convert --linear-density": [*LINES["convert"], "--axial-stiffness", "50 kN"],
+    "convert --axial-stiffness": [*LINES["convert"], "--linear-density", "20 g/m"],
+    "simulate --shaper": ["simulate", "cogiro", "short.yaml", "--after", "0.1", "--no-figures"],
+    "sweep --scheduler": ["sweep", "own_sweep.yaml"],
+    "vibrate --force": ["vibrate", "cogiro", "--up-to", "4"],
+}
+
+
+def line_of(name: str, option: str) -> list[str]:
+    """A command line to which an option can be added."""
+    return list(WITH.get(f"{name} {option}", LINES[name]))
+
+
 VALUES = (
     # no text, or more than anybody reads
     "", " ", "\t", "\n", "x" * 300, "x" * 5000, "1" * 400, "é" * 200,
@@ -96,12 +117,12 @@ def _options() -> list[Case]:
                 continue
             for value in VALUES:
                 if parameter.is_flag:
-                    words = [*LINES[name], f"{option}={value}"]
+                    words = [*line_of(name, option), f"{option}={value}"]
                 else:
-                    words = [*LINES[name], option, *[value] * parameter.nargs]
+                    words = [*line_of(name, option), option, *[value] * parameter.nargs]
                 found.append(Case(f"{name} {option}", words))
             if not parameter.is_flag:
-                found.append(Case(f"{name} {option}", [*LINES[name], option]))
+                found.append(Case(f"{name} {option}", [*line_of(name, option), option]))
     return found
 
 

@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
-from tests.abuse.command_lines import LINES, Case, commands
+from tests.abuse.command_lines import LINES, Case, commands, line_of
 from tests.abuse.test_command_lines import Bench, short_of_work, stocked
 from tests.tiers import extended
 
@@ -17,14 +17,6 @@ pytestmark = extended
 MISSING = ("nothere", "nothere.stl", "nothere.yaml", "nothere/nothere.nc", "folder", "folder.yaml", "/dev/null")
 WRITTEN = frozenset({"--out", "--plot", "--log", "--to"})  # name what is made
 ANY = frozenset({"new file", "view --host", "twin --host"})  # a name to be given, and names of machines
-WITH = {  # what an option needs beside it
-    "workspace --scene": ["--clearance", "3 cm"],
-    "workspace --budget": ["--prove", "0..1, 0..1, 1..2 m"],
-    "view --truth": ["run.mcap"],
-    "view --beside": ["run.nc"],
-    "calibrate --seed": ["--plan", "8"],
-    "convert --at": ["--format", "mjcf"],
-}
 NUMBERED = (  # what is counted: one more than there are
     "simulate cogiro --after 0.1 --no-figures --break 8@0.05s",
     "vibrate cogiro --up-to 4 --no-figures --film 999",
@@ -48,7 +40,7 @@ def cases() -> Iterator[Case]:
                 continue
             for value in MISSING:
                 if option.startswith("--"):
-                    words = [*LINES[name], *WITH.get(place, ()), option, *[value] * parameter.nargs]
+                    words = [*line_of(name, option), option, *[value] * parameter.nargs]
                 else:
                     words, k = list(LINES[name]), places.index(parameter) + 1
                     words[k : k + 1] = [value]
