@@ -1,8 +1,7 @@
-"""Where the platform stands: what is worked out beside the cycles, and what the encoders say of it."""
+"""Where the platform stands: what the encoders say of it, and kernels that are loaded in advance."""
 
 from __future__ import annotations
 
-import threading
 from typing import Any
 
 import numpy as np
@@ -12,80 +11,13 @@ import sagline as sl
 from sagline.control import real_time
 from sagline.control.controller import Controller
 from sagline.control.execution import ExecutionStatus
-from sagline.control.link import Mode
-from sagline.control.real_time import Pace
-from sagline.control.set_points import standing_at as found
 from sagline.control.states import RefusedError, State
 from sagline.twin.injected import Injected
-from tests.control.rigs import HOME, at, prototype, rig, spy_of, state_of, with_zero_errors
-
-
-class Instant(Pace):
-    """Real time that passes at once: what takes long is worked out beside the cycles, and nobody sleeps."""
-
-    def wait(self) -> float:
-        return 0.0
+from tests.control.rigs import HOME, at, prototype, rig, state_of, with_zero_errors
 
 
 def is_degraded(control: Controller) -> bool:
     return control.degraded
-
-
-def slow(monkeypatch: pytest.MonkeyPatch) -> tuple[threading.Event, list[bool]]:
-    """Let it take long to find out where the platform stands, until an event; whether that was in the main thread."""
-    go, where = threading.Event(), list[bool]()
-
-    def standing_at(*arguments: Any) -> Any:
-        where.append(threading.current_thread() is threading.main_thread())
-        assert go.wait(10.0)
-        return found(*arguments)
-
-    monkeypatch.setattr("sagline.control.context.standing_at", standing_at)
-    return go, where
-
-
-def test_set_points_stay_until_it_is_known_where_it_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
-    """To work it out took 54 ms within one cycle of 10 ms."""
-    control, _ = rig(pace=Instant())
-    go, where = slow(monkeypatch)
-    control.start(control.path_to(at(0.1, 0.0, 1.5)))
-    for _ in range(80):
-        control.cycle()
-    control.stop()
-    for _ in range(50):
-        control.cycle()
-    assert state_of(control) is State.STOPPING
-    last = [command for command in spy_of(control).commands[-20:] if command is not None]
-    assert {command.mode for command in last} == {Mode.FOLLOW}
-    assert not any(command.rate.any() for command in last)
-    assert np.ptp([command.length for command in last], axis=0).max() == 0.0
-    go.set()
-    done = control.wait()
-    assert (done.status, state_of(control)) == (ExecutionStatus.STOPPED, State.IDLE)
-    assert where == [False]
-    assert control.go_to(HOME).status is ExecutionStatus.DONE
-
-
-def test_cycles_go_on_while_an_acknowledgement_is_worked_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    control, machine = rig(pace=Instant())
-    machine.inject(Injected("group is silent", 1, 0.0, machine.time, 0.3))
-    for _ in range(90):
-        control.cycle()
-    assert state_of(control) is State.FAULT
-    go, where = slow(monkeypatch)
-    commands, good = spy_of(control).commands, control.cycle
-    began = len(commands)
-
-    def cycle() -> None:
-        good()
-        if len(commands) == began + 7:
-            go.set()
-
-    monkeypatch.setattr(control, "cycle", cycle)
-    control.acknowledge()
-    assert len(commands) >= began + 7
-    assert state_of(control) is State.IDLE
-    assert where == [False]
 
 
 def test_what_the_tension_loop_added_is_not_taken_for_a_way_of_the_platform() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 from contextlib import ExitStack, closing
 from pathlib import Path
@@ -50,6 +51,8 @@ def control(
 
             record = stack.enter_context(Recorder(log, robot))
         controller = Controller(robot, link, pace=Pace(), record=record, shadow=shadow)
+        gc.collect()
+        gc.freeze()  # the garbage collector skips all existing objects, because the loop is in real time
         session = OperatorSession(controller, alone=not sys.stdin.isatty(), shadow=shadow)
         return session.run()
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from concurrent.futures import Future
 from typing import Final
 
 import numpy as np
@@ -37,7 +36,6 @@ class ActiveState(ABC):
     def __init__(self, context: Context, point: SetPoint | None = None, source: SetPointSource | None = None) -> None:
         """Take over set points from the previous state."""
         self.context, self.point, self.source = context, point, source
-        self._equilibrium: Future[Standing | ForwardStatus] | None = None
 
     @abstractmethod
     def next(self, answer: Sample | Missing) -> ActiveState:
@@ -71,14 +69,9 @@ class ActiveState(ABC):
         c.sender.follow(length, point.rate, point.drum_tension, point.enable)
 
     def settle(self, length: Array, status: ExecutionStatus, reason: str) -> ActiveState | None:
-        """IDLE at lengths [m] if the pose is known, this state until then; None if no pose is found."""
-        c = self.context
-        if self._equilibrium is None:
-            self._equilibrium = c.find_equilibrium(length)
-        if not self._equilibrium.done():
-            return self
-        c.end_run(status, reason)
-        return idle_at(c, self._equilibrium.result(), reason)
+        """IDLE at the equilibrium of lengths [m]; None if no pose is found."""
+        self.context.end_run(status, reason)
+        return idle_at(self.context, self.context.find_equilibrium(length), reason)
 
 
 class Off(ActiveState):
@@ -268,9 +261,7 @@ class Following(ActiveState):
         """Command the next set point; IDLE at the end of the source."""
         point = self.point
         if self.context.state is not State.IDLE and point is not None and point.done:
-            after = self._finish(point)
-            if after is not self:
-                return after.next(answer)
+            return self._finish(point).next(answer)
         self.follow(self._followed)
         return self
 
@@ -318,9 +309,7 @@ class Stopping(ActiveState):
     def next(self, answer: Sample | Missing) -> ActiveState:
         """Command the next set point of the ramp; IDLE, READY or FAULT at its end."""
         if self.point is None or self.point.done:
-            after = self._finish()
-            if after is not self:
-                return after.next(answer)
+            return self._finish().next(answer)
         if self.source is not None:
             self.follow(self.source)
         return self

@@ -71,9 +71,9 @@ def plan_motion(
     period: float,
     model: CableModel,
     method: TensionMethod,
-    previous: Plan | None = None,
+    previous: Plan | Array | None = None,
 ) -> Motion:
-    """Plan a path and check it completely; period [s]."""
+    """Plan a path and check it completely; period [s]; previous as in `inverse`."""
     _check_rest(path)
     ticked = _at_ticks(path, period)
     plan = inverse(robot, ticked, model, method, previous=previous)

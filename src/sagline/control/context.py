@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
-from concurrent.futures import Future
-from functools import partial
 from math import nan
 from typing import Final
 
@@ -18,7 +17,8 @@ from sagline.control.evidence import Cycle, Fault, Reaction
 from sagline.control.execution import Execution, ExecutionStatus, execution_of
 from sagline.control.faults import faults_of
 from sagline.control.link import PERIOD, Link, Sample
-from sagline.control.real_time import Garbage, Pace, in_background
+from sagline.control.planner import Planner, planner_of
+from sagline.control.real_time import Garbage, Pace
 from sagline.control.recording import Event, EventKind, Journal, Recorded, Recorder, Tape
 from sagline.control.set_points import Along, Standing, standing_at
 from sagline.control.states import MOTION, RefusedError, State, check_transition
@@ -105,6 +105,7 @@ class Context:
     """Data and services that the states of a controller share.
 
     Attributes:
+        planner: Process for planning; None on a lockstep clock, which waits for a plan.
         state: State of the controller.
         sample: Newest sample; None before the first.
         zero: Offset from homing, added to lengths of samples [m], shape (m,).
@@ -143,6 +144,7 @@ class Context:
         self.method = optional(method, TensionMethod, "tension") or Closest()
         self.settings = optional(settings, TensionSettings, "loop") or TensionSettings()
         self.shadow = flag(shadow, "shadow")
+        self.planner: Planner | None = None if pace is None or shadow else planner_of(os.getpid())
         self.random = np.random.default_rng(None if seed is None else whole_number(seed, "seed", 0, MOST_SEED))
         self.sender = Sender(m, self.random)
         self.estimator = Estimator(robot, self.model)
@@ -233,10 +235,9 @@ class Context:
         self.tension_loop = TensionLoop(m, self.settings, self.period) if m > n else None
         self.correction = np.zeros(m)
 
-    def find_equilibrium(self, length: Array) -> Future[Standing | ForwardStatus]:
-        """Begin to compute the equilibrium at these lengths [m], shape (m,)."""
-        work = partial(standing_at, self.robot, length, self.estimator.pose, self.model)
-        return in_background(work, self.pace is not None)
+    def find_equilibrium(self, length: Array) -> Standing | ForwardStatus:
+        """Equilibrium at these lengths [m], shape (m,); takes 1 ms, with an unknown pose up to 10 ms."""
+        return standing_at(self.robot, length, self.estimator.pose, self.model)
 
     # the running motion
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -23,6 +24,7 @@ from sagline.control.tension_loop import TensionSettings
 from sagline.core.arguments import instance
 from sagline.core.arrays import number
 from sagline.core.errors import InvalidValueError
+from sagline.kinematics.inverse import last_tensions
 from sagline.motion.path import Path
 from sagline.motion.rest_to_rest import septic_path
 from sagline.robot.pose import Pose
@@ -87,7 +89,12 @@ class Controller(Preparation):
         """
         super().__init__(Context(robot, link, pace, model, tension, loop, record, shadow, seed))
         if pace is not None:
-            load_kernels(robot, self.period, self._context.model, self._context.method)
+            c = self._context
+            work = partial(load_kernels, robot, c.period, c.model, c.method)
+            begun = None if c.planner is None else c.planner.submit(robot, work)
+            work()
+            if begun is not None:
+                begun.result()
 
     def plan(self, path: Path) -> Motion:
         """Plan a path and check it completely; nothing is sent.
@@ -102,8 +109,10 @@ class Controller(Preparation):
             RefusedError: If a check fails; the message names the check, the location and the next step.
         """
         c, given = self._context, instance(path, Path, "path")
-        arguments = c.robot, given, c.period, c.model, c.method, c.previous_plan
-        return self._result_of(lambda: plan_motion(*arguments))
+        # of the previous plan only the tensions, because a whole plan takes long to send
+        tensions = None if c.previous_plan is None else last_tensions(c.previous_plan, c.method.variable)
+        arguments = c.robot, given, c.period, c.model, c.method, tensions
+        return self._result_of(partial(plan_motion, *arguments))
 
     def start(self, path: Path | Motion) -> None:
         """Begin to follow a path.
@@ -163,7 +172,8 @@ class Controller(Preparation):
         points = self.robot.platform_anchors
         if float(np.abs(pose.transform(points) - here.transform(points)).max()) < 1e-6:
             raise RefusedError("the way", "the platform is there already", "Name another pose.")
-        return septic_path(
+        work = partial(
+            septic_path,
             [here, pose],
             speed=limits[0],
             acceleration=limits[0] / SPEEDING_UP,
@@ -171,6 +181,7 @@ class Controller(Preparation):
             angular_acceleration=limits[1] / SPEEDING_UP,
             rate=round(1.0 / self.period),
         )
+        return self._result_of(work)
 
     def go_to(self, pose: Pose, speed: float = SPEED, angular_speed: float = TURNING) -> Execution:
         """Move straight to a pose.
@@ -187,7 +198,7 @@ class Controller(Preparation):
             RefusedError: For the same reasons as `start`.
         """
         check_transition(self.state, State.MOVING, "the way")
-        return self.execute(self._result_of(lambda: self.path_to(pose, speed, angular_speed)))
+        return self.execute(self.path_to(pose, speed, angular_speed))
 
     def start_jog(self, winch: int, by: float) -> None:
         """Begin to jog one winch.
@@ -207,7 +218,7 @@ class Controller(Preparation):
         check_transition(self.state, State.JOGGING, "the jog")
         c.check_agreement("the jog")
         here, length = self._here(), self._set_point("the jog").length
-        motion = self._result_of(lambda: winch_jog(c.robot, length, here, chosen, far, c.period, c.model))
+        motion = self._result_of(partial(winch_jog, c.robot, length, here, chosen, far, c.period, c.model))
         check_transition(self.state, State.JOGGING, "the jog")
         source = Along(motion, c.period, np.zeros(len(length)))
         self._begin(State.JOGGING, source, motion, f"winch {chosen} by {1e3 * far:+g} mm")
@@ -238,8 +249,7 @@ class Controller(Preparation):
         check_transition(self.state, State.JOGGING, "the jog")
         c.check_agreement("the jog")
         here, point = self._here(), self._set_point("the jog")
-        source = self._result_of(lambda: PlatformJog(c.robot, point, here, far, c.period, c.model, c.method))
-        check_transition(self.state, State.JOGGING, "the jog")
+        source = PlatformJog(c.robot, point, here, far, c.period, c.model, c.method)
         self._begin(State.JOGGING, source, None, "the platform")
 
     def jog_platform(self, by: ArrayLike) -> None:

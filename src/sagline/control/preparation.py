@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import Future
+from functools import partial
 from typing import Final, TypeVar
 
 from sagline.control.active_states import Connecting, Holding, HomingState, Off, idle_at
 from sagline.control.commands import Disagreement
 from sagline.control.homing import Homing
 from sagline.control.monitor import Monitor
-from sagline.control.real_time import in_background, interrupt_calls
+from sagline.control.real_time import interrupt_calls
 from sagline.control.recording import EventKind
 from sagline.control.states import RefusedError, State, check_transition
 from sagline.core.arguments import instance
@@ -72,7 +72,7 @@ class Preparation(Monitor):
             raise RefusedError("homing", "a winch is being jogged", "Wait until it stands.")
         place = instance(pose, Pose, "pose")
         present = c.zero - c.correction  # the tension loop has corrected the lengths, too
-        homing = self._result_of(lambda: Homing(c.robot, place, c.model, c.method, present))
+        homing = self._result_of(partial(Homing, c.robot, place, c.model, c.method, present))
         c.zero, c.homed = present, False
         c.reset_tension_loop()
         active = self._loop.active
@@ -146,13 +146,10 @@ class Preparation(Monitor):
         if self.state is not State.FAULT:
             raise RefusedError(what, f"the state is {self.state.name}", "There is nothing to acknowledge.")
         sample = c.check_agreement(what)
-        begun = c.find_equilibrium(sample.length + c.zero - c.correction) if c.homed else None
-        found = None if begun is None else self._wait_for(begun)
-        c.check_agreement(what)  # after the cycles that ran at the same time
-        check_transition(self.state, State.READY, what)
         c.clear_faults()
         self._loop.active = Holding(c, State.READY, "the operator acknowledged")
-        if found is not None and c.homed:
+        if c.homed:
+            found = c.find_equilibrium(sample.length + c.zero - c.correction)
             self._loop.active = idle_at(c, found, "the pose is still known") or self._loop.active
 
     def off(self) -> None:
@@ -182,15 +179,18 @@ class Preparation(Monitor):
         finally:
             self._context.garbage.go_on()
 
-    def _wait_for(self, begun: Future[T]) -> T:
-        """Run cycles until a result is available."""
-        while not begun.done():
-            self.cycle()
-        return begun.result()
-
     def _result_of(self, work: Callable[[], T]) -> T:
         """Result of long work; in real time, cycles continue during the work, because the PLCs would hold otherwise."""
-        if self.pace is None or self.state is State.OFF:
+        planner = self._context.planner
+        if planner is None or self.state is State.OFF:
             return work()
-        with interrupt_calls(self.stop):
-            return self._wait_for(in_background(work, threaded=True))
+
+        def stop() -> None:
+            self.stop()
+            planner.end()
+
+        with interrupt_calls(stop):
+            begun = planner.submit(self.robot, work)
+            while not begun.done():
+                self.cycle()
+        return begun.result()

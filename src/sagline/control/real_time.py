@@ -1,4 +1,4 @@
-"""Real time: ticks, planning in the background, garbage collection, Ctrl-C, and loading of kernels in advance."""
+"""Real time: ticks, garbage collection, Ctrl-C, and loading of kernels in advance."""
 
 from __future__ import annotations
 
@@ -7,11 +7,10 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from math import inf
 from types import FrameType
-from typing import Final, TypeVar
+from typing import Final
 
 import numpy as np
 
@@ -114,24 +113,6 @@ class Pace:
         return late
 
 
-T = TypeVar("T")
-
-
-def in_background(work: Callable[[], T], threaded: bool) -> Future[T]:
-    """Run work in its own thread; without threads, as on a lockstep clock, complete it immediately."""
-    if threaded:
-        pool = ThreadPoolExecutor(1, "sagline planning")
-        begun = pool.submit(work)
-        pool.shutdown(wait=False)
-        return begun
-    done: Future[T] = Future()
-    try:
-        done.set_result(work())
-    except Exception as error:
-        done.set_exception(error)
-    return done
-
-
 class Garbage:
     """Switch of the garbage collection, which is off during motion because it takes longer than a cycle."""
 
@@ -140,17 +121,15 @@ class Garbage:
         self._stopped = False
 
     def stop(self) -> None:
-        """Switch collection off, and exempt all objects that exist now."""
+        """Switch collection off."""
         if not self._stopped and gc.isenabled():
             self._stopped = True
             gc.disable()
-            gc.freeze()
 
     def go_on(self) -> None:
         """Switch collection on again, if it was on before."""
         if self._stopped:
             self._stopped = False
-            gc.unfreeze()
             gc.enable()
 
 

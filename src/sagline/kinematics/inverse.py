@@ -185,11 +185,15 @@ def _reference(robot: Robot, previous: Plan | ArrayLike | None, variable: Variab
             f"{robot.cable_count} cables",
             "Continue a plan of this robot.",
         )
-    tensions = shared_tension(previous.state, variable)
-    # Tensions that the distribution method did not compute are not used as a reference.
-    at_border = np.zeros_like(previous.feasible) if previous.at_border is None else previous.at_border
-    feasible = np.flatnonzero(np.atleast_1d(previous.feasible & ~at_border))
+    found = last_tensions(previous, variable)
+    return np.full(robot.cable_count, np.nan) if found is None else found
+
+
+def last_tensions(plan: Plan, variable: Variable) -> Array | None:
+    """Last tensions of a plan that the distribution method computed, (m,) [N]; None if there are none."""
+    at_border = np.zeros_like(plan.feasible) if plan.at_border is None else plan.at_border
+    feasible = np.flatnonzero(np.atleast_1d(plan.feasible & ~at_border))
     if not feasible.size:
-        return np.full(robot.cable_count, np.nan)
-    last: Array = np.atleast_2d(tensions)[feasible[-1]].copy()
-    return last
+        return None
+    state = plan.state
+    return shared_tension(state[int(feasible[-1])] if state.pose.shape else state, variable).copy()
