@@ -81,7 +81,7 @@ def test_a_process_that_is_killed_at_work_is_a_refusal_and_the_next_request_star
     begun = planner().submit(prototype(), partial(time.sleep, 1e3))
     time.sleep(0.1)
     os.kill(first, signal.SIGKILL)
-    with pytest.raises(RefusedError, match=f"ended with code -{int(signal.SIGKILL)}"):
+    with pytest.raises(RefusedError, match=f"code -{int(signal.SIGKILL)}"):
         begun.result(PATIENCE)
     assert process_of(planner()) != first
     assert answer(planner(), planning(0.1)).robot is prototype()  # the robot was sent again
@@ -89,7 +89,7 @@ def test_a_process_that_is_killed_at_work_is_a_refusal_and_the_next_request_star
 
 def test_a_machine_that_can_start_no_process_is_a_refusal(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "executable", "/nowhere/python")
-    with pytest.raises(RefusedError, match=r"no process can be started .*/nowhere/python"):
+    with pytest.raises(RefusedError, match="/nowhere/python"):
         answer(Planner(), partial(abs, -2))
 
 
