@@ -259,6 +259,7 @@ def _record(space: Workspace, proof: Proof | None) -> dict[str, Any]:
         f"volume_{unit}": space.volume,
         f"volume_error_{unit}": space.volume_error,
         f"components_{unit}": space.components.volume.tolist(),
+        "components_separate": space.components.separate.tolist(),
         "box_low_m": space.box.low.tolist(),
         "box_high_m": space.box.high.tolist(),
         "open_faces": list(space.open_faces),

@@ -61,6 +61,7 @@ QUANTITIES: Final = (
     Quantity("vertex_component", ("vertex",), "", "component of each vertex", "components.vertices", values=int),
     *(Quantity(fine, (fine,), "m", f"{fine[-1]} of finer nodes", f"components.{fine[-1]}") for fine in FINE),
     Quantity("component_nodes", FINE, "", "component of each node, -1 outside", "components.nodes", values=int),
+    Quantity("component_separate", ("component",), "", "proof of no path", "components.separate", values=bool),
     Quantity("rotation", ("turn", "quaternion_part"), "1", "rotations of the platform", "orientations.quaternion"),
     Quantity("wrench_center", ("wrench_part",), "N, N m", "a wrench of the set", "wrenches.center"),
     Quantity("wrench_segment", ("segment", "wrench_part"), "N, N m", "half of each segment", "wrenches.segments"),
@@ -211,6 +212,8 @@ def _attributes(space: Workspace) -> dict[str, Any]:
 def _unpack(path: FilePath, data: Dataset) -> Workspace:
     """Workspace of a data set; the path is used in messages."""
     robot = parse_robot(str(data.attrs["robot"]), f"{path}, robot")
+    if "component_separate" not in data.variables:  # of an older sagline, without proofs
+        data = data.assign(component_separate=("component", np.zeros(data.sizes["component"], dtype=np.bool_)))
     _check_workspace(data, robot.cable_count)
 
     found, attributes = fields_of(data, QUANTITIES), data.attrs

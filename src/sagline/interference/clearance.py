@@ -23,6 +23,7 @@ from sagline.kernels.interference import shapes
 from sagline.kernels.interference.catenary_distance import least_distances, work_arrays_for_pieces
 from sagline.robot.batch import Robots, first_of
 from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.pose import Pose
 from sagline.robot.reach import bounds
 from sagline.robot.robot import Robot
 
@@ -104,6 +105,26 @@ class ClearanceRows:
             return np.where(lost, np.nan, np.inf), np.full(len(lost), -1)
         pair = np.where(lost, -1, found.argmin(axis=1))
         return np.where(lost, np.nan, found.min(axis=1)), pair
+
+    def of_platform(self, pose: Pose, half: Array) -> Array:
+        """Upper bound (N,) [m] of the platform's distance from the obstacles at positions up to `half` (3,) [m] away.
+
+        The platform is a box, smaller by `half`: it is a part of the platform at each of these positions. Meshes are
+        left out.
+        """
+        first = len(self.pairs.parts)
+        pairs = self.pairs.by_kernel
+        pairs = pairs[(pairs >= first).all(axis=1) & (pairs == first).any(axis=1)] - first
+        if not isinstance(self._platform, Box) or not len(pairs):
+            return np.full(len(pose), np.inf)
+        moving = np.ascontiguousarray(box_rows(self._platform, pose).reshape(-1, 1, shapes.COLUMNS))
+        edges = moving[:, 0, shapes.HALF : shapes.HALF + 3]
+        away = half @ np.abs(moving[:, 0, shapes.AXES : shapes.AXES + 9].reshape(-1, 3, 3))
+        beyond = np.linalg.norm(np.maximum(away - edges, 0.0), axis=1)
+        edges[:] = np.maximum(edges - away, 0.0)
+        out = tuple(np.empty((len(pose), len(pairs), *rest)) for rest in ((), (), (2, 3)))
+        least_distances(locked(moving), self._still, pairs, self._precision, False, *work_arrays_for_pieces(), *out)
+        return np.asarray(out[0].min(axis=1) + beyond)
 
     def _moving(self, state: Equilibrium) -> Array:
         """Rows of the moving bodies: parts of cables, and the platform or a placeholder."""

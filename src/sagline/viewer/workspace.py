@@ -170,7 +170,7 @@ def _cells_of(size: Array) -> tuple[int, int, int]:
 
 def _hull_text(found: Outline, query: WorkspaceQuery, region: Region) -> str:
     """HTML of the size of a region, the limiting cables, and the faces of the box that it reaches."""
-    parts = f" in {counted(found.parts, 'part')}" if found.parts > 1 else ""
+    parts = f" in {counted(found.parts, 'part')} on this grid" if found.parts > 1 else ""
     text = f"<b>Region</b> {n(found.volume, '.3g', region.unit)}{parts}, {escape(str(query.wrenches))}"
     key = color_key(
         (cable_color(k), f"{f'cable {k}' if k >= 0 else 'no cable'}, {n(100.0 * share, '.0f')} %")

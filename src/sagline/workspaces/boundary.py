@@ -26,6 +26,7 @@ from sagline.workspaces.grid import (
 from sagline.workspaces.levels import Levels
 from sagline.workspaces.region import Region
 from sagline.workspaces.surface import Components, Surface, components_of, normals_of, vertex_areas, volumes_of
+from sagline.workspaces.walks import labels_of
 
 MOST_CELLS: Final = 128  # along an axis
 MOST_HALVED: Final = 256  # largest number of cells along an axis: 17 million nodes, half a gigabyte
@@ -46,7 +47,7 @@ class Boundary(Result):
         volume_error: Error bound of the volume [m^3]. It does not include parts and gaps of the set that are thinner
             than two cells of the finest grid.
         grid: Values of the function at the nodes of the grid before refinement.
-        components: The separate pieces of the set.
+        components: Components of the set. Parts between which a walk was found are one component.
         open_faces: Faces of the box that the set reaches, for example "x low"; the set may continue beyond them.
         evaluations: Number of positions at which the function was evaluated.
     """
@@ -109,7 +110,7 @@ def boundary(
     volumes = volumes_of(surface.vertices, surface.faces)
     volumes[curved] += between
     volume, error = float(volumes.sum()), float(errors.sum())
-    components = components_of(grid, net.inner, net.faces, volumes)
+    components = components_of(grid, labels_of(counted, grid)[0], net.inner, net.faces, volumes)
     return Boundary(surface, volume, error, first, components, open_faces, counted.count)
 
 
@@ -225,7 +226,7 @@ class Outline(Result):
         on_box: True for triangles on a face of the box, shape (F,).
         open_faces: Faces of the robot's box that the workspace reaches, for example "x low".
         volume: Volume [m^3], or area of a plane [m^2], without the volume between flat triangles and the boundary.
-        parts: Number of separate pieces.
+        parts: Number of components between which no walk was found.
         grid: The level at the nodes.
     """
 
@@ -250,8 +251,6 @@ class Outline(Result):
 
 def outline(levels: Levels, region: Region) -> Outline:
     """Boundary of the set of positions whose level is not negative, from the nodes of the region's grid."""
-    from scipy.ndimage import label  # the import takes a third of a second
-
     grid = sample_grid(levels, region.low, region.high, region.cells)
     net, vertices, _ = _place_vertices(triangulate(grid.inside), grid, levels, precision=PRECISE, narrow=PRECISE)
     surface = Surface(locked(vertices), locked(net.faces))
@@ -265,6 +264,6 @@ def outline(levels: Levels, region: Region) -> Outline:
         on_box=locked(np.logical_or.reduce(on_box)),
         open_faces=tuple(name for name, own, is_box in zip(FACES, on_box, ends, strict=True) if own.any() and is_box),
         volume=float(volumes_of(surface.vertices, surface.faces).sum()) / region.thickness,
-        parts=int(label(grid.inside)[1]),
+        parts=labels_of(levels, grid)[1],
         grid=grid,
     )

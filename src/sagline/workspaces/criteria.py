@@ -16,12 +16,13 @@ import numpy as np
 
 from sagline.cables.model import CableModel
 from sagline.core.arguments import instance
-from sagline.core.arrays import Array, locked
+from sagline.core.arrays import Array, Flags, locked
 from sagline.core.numbers import counted
 from sagline.interference.clearance import ClearanceRows, check_obstacles, obstacles_of
 from sagline.interference.mesh import Mesh
 from sagline.interference.pairs import Obstacle
 from sagline.kinematics.confirm import confirm
+from sagline.robot.pose import Pose
 from sagline.robot.reach import bounds
 from sagline.robot.robot import Robot
 from sagline.statics.slopes import cable_slopes
@@ -212,6 +213,10 @@ class Clearance(Criterion):
         value, pair = rows.least(given.state)
         cables = np.array([*map(_cable_of, rows.pairs.names), -1])
         return Judged(given.spread(value - self.limit), given.spread_cables(cables[pair]))
+
+    def excluded(self, robot: Robot, pose: Pose, half: Array) -> Flags:
+        """Boxes of positions at all of which an obstacle is nearer to the platform than the limit."""
+        return np.asarray(_clearance_rows(robot, self.obstacles).of_platform(pose, half) < self.limit)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -168,6 +168,19 @@ class Criterion:
             InvalidValueError: If the robot is not suitable.
         """
 
+    def excluded(self, robot: Robot, pose: Pose, half: Array) -> Flags:
+        """Boxes of positions, each of which is proved not to meet the criterion with any tensions.
+
+        Args:
+            robot: The robot.
+            pose: N poses at the centers of the boxes.
+            half: Half edges of the boxes [m], shape (3,).
+
+        Returns:
+            True if the criterion is met at no position of the box, shape (N,).
+        """
+        return np.zeros(len(pose), dtype=np.bool_)
+
     @property
     def always(self) -> bool:
         """True if every workspace includes the criterion, so that reports omit it."""

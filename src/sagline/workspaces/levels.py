@@ -84,14 +84,14 @@ class Levels:
         count = len(positions)
         found = Details(*np.empty((2, count)), *np.full((3, count), -1))
         for part in blocks(count, BLOCK):
-            own = self._block(self._in_plane(positions[part]))
+            own = self._block(self.in_plane(positions[part]))
             for whole, piece in zip(found, own, strict=True):
                 whole[part] = piece
             if self.on_block is not None:
                 self.on_block(len(own.level))
         return Details(*map(locked, found))
 
-    def _in_plane(self, positions: Array) -> Array:
+    def in_plane(self, positions: Array) -> Array:
         """Positions (N, 3) [m]; for a planar workspace their projections into the plane."""
         if self.held is None:
             return positions
@@ -102,7 +102,7 @@ class Levels:
 
     def margins_of(self, wrenches: WrenchSet, positions: Array, rotation: Indices) -> Array:
         """Margins of another wrench set [N], (N,), at positions (N, 3) [m] in the rotations of these indices (N,)."""
-        rows = np.hstack((self._in_plane(positions), self.orientations.quaternion[rotation]))
+        rows = np.hstack((self.in_plane(positions), self.orientations.quaternion[rotation]))
         return MarginRows(self.robot, wrenches, self.model, self.moment_arm).rows(rows).value
 
     def _block(self, positions: Array) -> Details:

@@ -320,7 +320,7 @@ def prove(
         docs/model.md, section 13.
     """
     load = load_of(wrenches)
-    _check_robot(instance(robot, Robot, "robot"))
+    check_provable(instance(robot, Robot, "robot"))
     check_tilt(robot, instance(box, PoseBox, "box").tilt, "box: tilt")
     if box.tilt > 0.0 and load.accelerations[1] > 0.0:
         step = "Give their moments as WrenchBox(moment=...), or prove the level poses."
@@ -343,7 +343,7 @@ def prove(
     return Proof(robot, box, load, model, verdict, inside, outside, undecided, cells, prover.tried)
 
 
-def _check_robot(robot: Robot) -> None:
+def check_provable(robot: Robot) -> None:
     """Reject robots without proofs: with pulleys, or with fewer cables than degrees of freedom."""
     check_cable_count(robot)
     if robot.winches is not None and (robot.winches.pulley_radius > 0.0).any():

@@ -181,7 +181,8 @@ def amount_of(space: Workspace) -> str:
     places = max(0, 1 - int(np.floor(np.log10(space.volume_error))))
     size = f"{space.volume:.{places}f} ± {space.volume_error:.{places}f} {space.unit}"
     count = space.components.count
-    return size if count == 1 else f"{size} in {count} parts"
+    where = "" if space.components.separate.all() else " on this grid"
+    return size if count == 1 else f"{size} in {count} parts{where}"
 
 
 def facts_of(space: Workspace) -> list[tuple[str, str]]:
@@ -192,13 +193,23 @@ def facts_of(space: Workspace) -> list[tuple[str, str]]:
         facts.append(("criteria", ", ".join(asked)))
     if space.components.count > 1:
         sizes = [n(volume, ".3g", space.unit) for volume in space.components.volume[:_MOST_PARTS]]
-        facts.append(("parts", ", ".join(sizes) + ", …" * (space.components.count > _MOST_PARTS)))
+        listed = ", ".join(sizes) + ", …" * (space.components.count > _MOST_PARTS)
+        facts.append(("parts", f"{listed}; {_separation_text(space.components)}"))
     if space.open_faces:
         faces = ", ".join(space.open_faces)
         facts.append(("open", f"it reaches the box at {faces}: only its part in this box is known"))
     if space.nearest is not None:
         facts.append(("nearest", space.nearest.reason))
     return facts
+
+
+def _separation_text(components: Components) -> str:
+    """Proof that the parts are separate, or the state of the search."""
+    proved = int(components.separate.sum())
+    if proved == components.count:
+        return "proved: no path in the box leads from one to another"
+    rest = "the robot may be able to go from one to another: neither a path nor a proof was found"
+    return f"{proved} proved separate; of the others, {rest}" if proved else rest
 
 
 def span_of(box: PoseBox) -> str:

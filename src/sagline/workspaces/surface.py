@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sagline.core.arrays import Array, Indices, checked, locked
+from sagline.core.arrays import Array, Flags, Indices, checked, locked
 from sagline.core.numbers import counted, n
 from sagline.core.results import Result, formats
 from sagline.workspaces.grid import Grid
@@ -102,6 +102,7 @@ class Components(Result):
         y: The same along y, shape (ny,).
         z: The same along z, shape (nz,).
         nodes: Index of the component of each node, -1 outside all components, shape (nx, ny, nz).
+        separate: True if it is proved that no path in the box leads from the component to another one, shape (K,).
     """
 
     volume: Array
@@ -110,6 +111,12 @@ class Components(Result):
     y: Array
     z: Array
     nodes: NDArray[np.int32]
+    separate: Flags
+
+    @property
+    def axes(self) -> tuple[Array, Array, Array]:
+        """Coordinates of the nodes along x, y and z [m]."""
+        return self.x, self.y, self.z
 
     @property
     def count(self) -> int:
@@ -136,7 +143,7 @@ class Components(Result):
             InvalidValueError: If a position does not have this form.
         """
         given = checked(position, "position", "m", shape=(3,))
-        axes = (self.x, self.y, self.z)
+        axes = self.axes
         shares = [np.interp(given[..., i], axis, np.arange(len(axis))) for i, axis in enumerate(axes)]
         lower = [np.minimum(share.astype(np.int64), len(axis) - 2) for share, axis in zip(shares, axes, strict=True)]
         best = np.full(given.shape[:-1], np.inf)
@@ -151,15 +158,18 @@ class Components(Result):
         return np.where(np.logical_or.reduce(beyond), -1, labels).astype(np.int32)
 
 
-def components_of(grid: Grid, inner: Indices, faces: Indices, volumes: Array) -> Components:
-    """Components of a set, from its grid, the inner nodes and triangles of its net, and volumes (F,) [m^3]."""
-    from scipy.ndimage import label  # the import takes a third of a second
+def components_of(grid: Grid, nodes: NDArray[np.int32], inner: Indices, faces: Indices, volumes: Array) -> Components:
+    """Components of a set, none of them proved separate from the others.
 
-    nodes, count = label(grid.inside)  # nodes are connected along the axes, as in the net
+    Given are the grid, the labels of its nodes from 1 on, the inner nodes and triangles of the set's net, and volumes
+    (F,) [m^3].
+    """
+    count = int(nodes.max())
     vertices = nodes[tuple(inner.T)] - 1
     volume = np.bincount(vertices[faces[:, 0]], volumes, minlength=count)
     order = np.argsort(-volume, kind="stable")
     rank = np.empty(count + 1, dtype=np.int32)
     rank[order], rank[-1] = np.arange(count), -1  # number 0, outside, becomes -1
     labels = locked(np.ascontiguousarray(rank[nodes - 1]))
-    return Components(locked(volume[order]), locked(rank[vertices]), grid.x, grid.y, grid.z, labels)
+    separate = locked(np.full(count, count == 1))
+    return Components(locked(volume[order]), locked(rank[vertices]), grid.x, grid.y, grid.z, labels, separate)

@@ -25,6 +25,7 @@ from sagline.workspaces.levels import Levels
 from sagline.workspaces.nearest import nearest_to
 from sagline.workspaces.orientations import Orientations, Tilts, orientations_of
 from sagline.workspaces.region import AXES, Region, flat_axis, region_of
+from sagline.workspaces.separation import exclusion, separated
 from sagline.workspaces.space import BY_BOX, Workspace
 from sagline.workspaces.wrench_sets import WrenchSet, load_of
 
@@ -99,6 +100,8 @@ def workspace(
     levels.on_block = None if report is None else _progress_of(report, region.cells)
     found = boundary(levels, region.low, region.high, region.cells, refine)
     surface, components = found.surface, found.components
+    if components.count > 1:
+        components = replace(components, separate=separated(components, exclusion(levels)))
     decided = levels.details(surface.vertices)
     on_box = _on_box(surface.vertices, region) & (decided.level > 1e-6)
     return Workspace(

@@ -1,0 +1,130 @@
+"""Walks between the components of a set on a grid: paths of positions in the set, closer together than the nodes.
+
+A thin part of a set can lie between the nodes of a grid, so that the nodes inside form several components. The path of
+nodes with the highest values between two components leads along such a part. Its positions outside the set are moved
+into it, across the path. The path is halved until its positions are close together, and all of them are in the set.
+"""
+
+from __future__ import annotations
+
+from heapq import heappop, heappush
+from itertools import product
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from sagline.core.arrays import Array, Indices
+from sagline.workspaces.grid import Grid, Level, level_values
+
+FINE: Final = 32  # neighboring positions of a walk are closer than the cell's longest edge divided by this number
+MOST_WALKS: Final = 256  # largest number of components from which a walk is searched
+_MOST_NODES: Final = 4096  # largest number of nodes on the way that are examined
+_MOST_DIVISIONS: Final = 24  # 6 to 8 without failures
+_TRIALS: Final = 40  # largest number of steps of a position toward the set
+_SMALLEST: Final = 1e-4  # smallest step, relative to the distance of the neighboring positions
+
+_NEIGHBORS: Final = np.array([offset for offset in product((-1, 0, 1), repeat=3) if any(offset)])
+_DIRECTIONS: Final = _NEIGHBORS / np.linalg.norm(_NEIGHBORS, axis=1)[:, None]
+
+Labels = NDArray[np.int32]
+_Node = tuple[int, int, int]
+
+
+def labels_of(level: Level, grid: Grid) -> tuple[Labels, int, tuple[Array, ...]]:
+    """Label of the component of each node (0 outside, 1 to count), the count, and the walks that connect parts."""
+    from scipy.ndimage import binary_erosion, label  # the import takes a fifth of a second
+
+    nodes, count = label(grid.inside)  # nodes are connected along the axes, as in the net
+    if count < 2:
+        return nodes, count, ()
+    low, high = (np.array([axis[end] for axis in grid.axes]) for end in (0, -1))
+
+    def in_box(positions: Array) -> Array:
+        return level(np.clip(positions, low, high))
+
+    sizes, names, walks = np.bincount(nodes.ravel(), minlength=count + 1), np.arange(count + 1), []
+    around = np.argwhere(nodes.astype(np.bool_) & ~binary_erosion(nodes, np.ones((3, 3, 3))))  # nodes on the surface
+    labels = nodes[tuple(around.T)]
+    for one in (1 + np.argsort(sizes[1:], kind="stable"))[:-1][:MOST_WALKS].tolist():
+        chain = _widest_path(grid.values, nodes, around[labels == one], np.flatnonzero(names != names[one]))
+        walk = None if chain is None else _walk(in_box, grid.positions(chain), grid.step)
+        if chain is not None and walk is not None:
+            walks.append(walk)
+            names[names == names[one]] = names[nodes[tuple(chain[-1])]]
+    kept, place = np.unique(names, return_inverse=True)
+    return place.astype(np.int32)[nodes], len(kept) - 1, tuple(walks)
+
+
+def _widest_path(values: Array, labels: Labels, start: Indices, ends: Indices) -> Indices | None:
+    """Nodes (K, 3) from one of some nodes to one with another label, with the highest least value; None if not found.
+
+    Nodes are visited in descending order of their values.
+    """
+    shape, others = values.shape, set(ends.tolist()) - {0}
+    before: dict[_Node, _Node | None] = dict.fromkeys((x, y, z) for x, y, z in start.tolist())
+    waiting: list[tuple[float, _Node]] = [(-np.inf, node) for node in before]
+    for _ in range(_MOST_NODES + 2 * len(start)):
+        if not waiting:
+            break
+        _, node = heappop(waiting)
+        if labels[node] in others:
+            chain = [node]
+            while (back := before[chain[-1]]) is not None:
+                chain.append(back)
+            return np.array(chain[::-1])
+        for dx, dy, dz in _NEIGHBORS.tolist():
+            near = node[0] + dx, node[1] + dy, node[2] + dz
+            in_grid = all(0 <= place < size for place, size in zip(near, shape, strict=True))
+            if in_grid and near not in before and values[near] > -np.inf:
+                before[near] = node
+                heappush(waiting, (-values[near], near))
+    return None
+
+
+def _walk(level: Level, path: Array, step: Array) -> Array | None:
+    """Positions (K, 3) in the set along a path whose ends are in the set, close to each other; None if not found."""
+    turn = np.random.default_rng(0)
+    path, at = path.copy(), level_values(level, path).copy()
+    if len(path) > 2:
+        along = path[2:] - path[:-2]
+        path[1:-1], at[1:-1] = _moved_inside(level, path[1:-1], at[1:-1], along, turn)
+        path = path[at >= 0.0]
+    share = 0.5
+    for _ in range(_MOST_DIVISIONS):
+        along = np.diff(path, axis=0)
+        k = np.flatnonzero(np.linalg.norm(along, axis=1) > step.max() / FINE)
+        if not len(k):
+            return path
+        between = path[k] + share * along[k]
+        between, at = _moved_inside(level, between, level_values(level, between), along[k], turn)
+        found = at >= 0.0
+        path = np.insert(path, k[found] + 1, between[found], axis=0)
+        share = 0.5 if found.all() else turn.uniform(0.2, 0.8)  # another place if one of the divisions fails
+    return None
+
+
+def _moved_inside(
+    level: Level, points: Array, at_points: Array, along: Array, turn: np.random.Generator
+) -> tuple[Array, Array]:
+    """Positions (N, 3) moved across directions (N, 3) until the function is not negative, and its values (N,)."""
+    points, at_points = points.copy(), at_points.copy()
+    size = np.linalg.norm(along, axis=1)
+    unit = along / np.maximum(size, np.finfo(np.float64).tiny)[:, None]
+    step = 0.5 * size
+    for _ in range(_TRIALS):
+        k = np.flatnonzero((at_points < 0.0) & (step > _SMALLEST * size))
+        if not len(k):
+            break
+        tried = Rotation.random(rng=turn).apply(_DIRECTIONS)
+        across = tried - (unit[k] @ tried.T)[:, :, None] * unit[k, None]
+        places = points[k, None] + step[k, None, None] * across
+        values = level_values(level, places.reshape(-1, 3)).reshape(len(k), -1)
+        best = values.argmax(axis=1)
+        found = values[np.arange(len(k)), best]
+        better = found > at_points[k]
+        points[k[better]] = places[np.arange(len(k)), best][better]
+        at_points[k] = np.maximum(found, at_points[k])
+        step[k[~better]] *= 0.5
+    return points, at_points
