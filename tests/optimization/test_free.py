@@ -10,7 +10,7 @@ import pytest
 
 import sagline as sl
 from sagline import InvalidValueError
-from sagline.optimization.candidates import Candidates, impossible
+from sagline.optimization.candidates import Candidates, PlatformBox, impossible
 from tests.optimization.pair import UNDER, apart, pair
 from tests.refusal import refused
 
@@ -161,11 +161,11 @@ REFUSED: dict[str, tuple[Callable[[], object], tuple[str, ...]]] = {  # item, va
     "through the platform": (
         lambda: sl.design(
             ROBOT,
-            [sl.FreeAnchors("frame", -4.0, 0.0, along=[0, 0, 1], symmetry="together")],
+            [POSTS],
             ["mean_margin"],
-            poses=sl.Pose([7.4, 5.4, 3.0], np.eye(3)),
+            poses=sl.Pose([[0.0, 0.0, 3.0], [7.4, 5.4, 5.9]], np.stack([np.eye(3)] * 2)),
         ),
-        ("free: the frame anchor of cable 0, at 7.5, 5.5, 2.86 m", "inside the platform at pose 0"),
+        ("the frame anchor of cable 0, at 7.5, 5.5, 6 m", "inside the platform at pose 1"),
     ),
 }
 
@@ -178,6 +178,40 @@ def test_what_cannot_be_searched_is_refused_in_one_line(name: str) -> None:
     text = str(caught.value)
     assert len(text) < 300
     assert "\n" not in text
+
+
+def test_candidates_with_an_anchor_inside_the_platform_are_dropped() -> None:
+    through = sl.FreeAnchors("frame", -4.0, 0.0, along=[0, 0, 1], symmetry="together")
+    poses = sl.Pose([[7.4, 5.4, 3.0], [0.0, 0.0, 2.0]], np.stack([np.eye(3)] * 2))
+    front = sl.design(ROBOT, [through], ["mean_margin"], poses=poses, evaluations=60)
+    assert ROBOT.platform_size is not None
+    half = 0.5 * ROBOT.platform_size[2]
+    middle = 0.5 * np.ptp(ROBOT.platform_anchors[:, 2]) + ROBOT.platform_anchors[:, 2].min()
+    height = 6.0 + front.evaluated[:, 0] - 3.0 - middle
+    dropped = np.isnan(front.evaluated_values[:, 0])
+    assert 0 < dropped.sum() < len(dropped)
+    assert np.array_equal(dropped, np.abs(height) < half)
+
+
+def test_moving_anchors_leave_the_platform() -> None:
+    up = sl.FreeAnchors("frame", -3.0, 3.0, along=[0, 0, 1], symmetry="together")
+    poses = sl.Pose([[7.4, 5.4, 5.9], [0.0, 0.0, 3.0]], np.stack([np.eye(3)] * 2))
+    found = sl.moving_anchors(ROBOT, [up], poses=poses)
+    assert found.fixed_margin[0] == -np.inf
+    assert np.isfinite(found.fixed_margin[1])
+    assert np.isfinite(found.margin).all()
+    boxes = PlatformBox(ROBOT, poses)
+    shifts = found.moved[:, 0, None, None] * [0.0, 0.0, 1.0]
+    assert boxes.holds_at(ROBOT.frame_anchors + 0.0 * shifts, poses).tolist() == [True, False]
+    assert not boxes.holds_at(ROBOT.frame_anchors + shifts, poses).any()
+    points = np.random.default_rng(0).uniform(-1.0, 1.0, (50, 2, 1, 3)) + poses.position[:, None]
+    own = [[boxes_of.holds(one).item() >= 0 for boxes_of, one in zip(_each(poses), row, strict=True)] for row in points]
+    assert np.array_equal([boxes.holds_at(row, poses) for row in points], own)
+    assert 0 < np.count_nonzero(own) < 100
+
+
+def _each(poses: sl.Pose) -> list[PlatformBox]:
+    return [PlatformBox(ROBOT, poses[k : k + 1]) for k in range(len(poses))]
 
 
 def test_the_share_of_a_robot_that_nothing_limits_is_a_number() -> None:

@@ -158,6 +158,16 @@ class PlatformBox:
             found[k] = inside[0] if inside.size else -1
         return found.reshape(points.shape[:-1])
 
+    def holds_at(self, points: Array, poses: Pose) -> Flags:
+        """Mask (N,) of poses at which one of their own points (N, m, 3) [m] is inside the platform."""
+        found = np.zeros(len(points), dtype=np.bool_)
+        away = points - poses.position[:, None]
+        near = np.flatnonzero((np.abs(away) < self._reach).all(axis=-1).any(axis=-1))
+        if near.size:
+            turned = np.einsum("nki,nij->nkj", away[near], poses[near].matrix) - self._middle
+            found[near] = (np.abs(turned) < self._half).all(axis=-1).any(axis=-1)
+        return found
+
 
 @frozen(weakref_slot=False)
 class AnchorErrors:

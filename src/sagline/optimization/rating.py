@@ -180,9 +180,14 @@ class Rating:
         return np.concatenate(parts)
 
     def margins(self, cables: Array, rows: Array) -> Array:
-        """Margins [N], (N,), of tables (R, m, CABLE_COLUMNS), each at its N/R pose rows of (N, POSE_COLUMNS)."""
+        """Margins [N], (N,), of tables (R, m, CABLE_COLUMNS), each at its N/R pose rows of (N, POSE_COLUMNS).
+
+        The margin is -inf at a pose with a frame anchor inside the platform.
+        """
         made = MarginRows(self._candidates.robot, self._wrenches, self._model, self._arm, cables)
-        return made.rows(rows).value
+        anchors = np.repeat(cables[..., : tables.FRAME_Z + 1], len(rows) // len(cables), axis=0)
+        held = self._solid.holds_at(anchors, Pose._adopt(rows[:, :3], rows[:, 3:]))
+        return np.where(held, -np.inf, made.rows(rows).value)
 
     def _rated(self, values: Array) -> Array:
         cables = self._candidates.cables(values)

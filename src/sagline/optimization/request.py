@@ -11,12 +11,11 @@ import numpy as np
 from sagline.cables.model import CableModel
 from sagline.core.arguments import brief, choice, elements, instance, optional, whole_number
 from sagline.core.errors import InvalidValueError
-from sagline.kernels import tables
 from sagline.optimization.candidates import AnchorErrors, Candidates, PlatformBox, free_parts
 from sagline.optimization.free import Free
 from sagline.optimization.free_anchors import FreeAnchors
 from sagline.optimization.goals import Goal
-from sagline.optimization.search import SEARCHES, latin_hypercube
+from sagline.optimization.search import SEARCHES
 from sagline.robot.pose import Pose, PoseBox
 from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot
@@ -74,7 +73,6 @@ def _grid(box: PoseBox, counts: tuple[int, ...]) -> Pose:
 
 
 MOST_EVALUATIONS: Final = 10_000_000
-LOOKED_AT: Final = 256  # number of candidates whose anchors are checked before the search begins
 _SEED: Final = 2**31 - 1  # largest seed that all optimizers accept
 
 
@@ -169,21 +167,11 @@ def _refuse_weights(goals: tuple[Goal, ...]) -> None:
 
 
 def _check_platform(request: Request) -> None:
-    """Refuse frame anchors that are inside the platform, or can move inside it."""
-    for name, free in (("free", request.free), ("inner", request.inner)):
-        if not free:
-            continue
-        candidates = Candidates(request.robot, free, name)
-        points = latin_hypercube(LOOKED_AT, len(candidates.parts), 0)
-        values = np.concatenate((candidates.start[None], candidates.values(points)))
-        anchors = candidates.cables(values)[..., : tables.FRAME_Z + 1]
-        poses = PlatformBox(request.robot, request.poses).holds(anchors)
-        hits = np.argwhere(poses >= 0)
-        if not hits.size:
-            continue
-        which, cable = (int(k) for k in hits[0])
-        where = ", ".join(f"{x:.3g}" for x in anchors[which, cable])
-        item = f"{'the frame anchor' if which == 0 else name + ': the frame anchor'} of cable {cable}, at {where} m"
-        value = f"inside the platform at pose {int(poses[which, cable])}"
-        step = "Narrow low and high, or leave the pose out." if which else "Leave the pose out, or correct the robot."
+    """Refuse a robot with a frame anchor inside the platform; the search drops candidates with this fault."""
+    anchors = request.robot.frame_anchors
+    poses = PlatformBox(request.robot, request.poses).holds(anchors)
+    if (poses >= 0).any():
+        cable = int(np.argmax(poses >= 0))
+        item = f"the frame anchor of cable {cable}, at {', '.join(f'{x:.3g}' for x in anchors[cable])} m"
+        value, step = f"inside the platform at pose {int(poses[cable])}", "Leave the pose out, or correct the robot."
         raise InvalidValueError(item, value, "outside the platform at all poses", step)
