@@ -204,7 +204,7 @@ def test_moving_anchors_leave_the_platform() -> None:
     shifts = found.moved[:, 0, None, None] * [0.0, 0.0, 1.0]
     assert boxes.holds_at(ROBOT.frame_anchors + 0.0 * shifts, poses).tolist() == [True, False]
     assert not boxes.holds_at(ROBOT.frame_anchors + shifts, poses).any()
-    points = np.random.default_rng(0).uniform(-1.0, 1.0, (50, 2, 1, 3)) + poses.position[:, None]
+    points = np.random.default_rng(0).uniform(-0.3, 0.3, (50, 2, 1, 3)) + poses.position[:, None]
     own = [[boxes_of.holds(one).item() >= 0 for boxes_of, one in zip(_each(poses), row, strict=True)] for row in points]
     assert np.array_equal([boxes.holds_at(row, poses) for row in points], own)
     assert 0 < np.count_nonzero(own) < 100
