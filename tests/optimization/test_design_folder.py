@@ -218,7 +218,9 @@ def test_what_is_refused_leaves_no_folder(tmp_path: Path) -> None:
     posts = sl.FreeAnchors("frame", -0.1, 0.1, along=[0, 0, 1], symmetry="together")
     for goal in ("cable_cost", "least_margin"):
         with pytest.raises(InvalidValueError):
-            sl.design(endless, [posts], [goal], grid=(2, 2, 2), evaluations=16, folder=tmp_path / "front")
+            sl.design(
+                endless, [posts], [goal], grid=(2, 2, 2), evaluations=16, folder=tmp_path / "front", model=sl.Straight()
+            )
     with pytest.raises(InvalidValueError):
         search(tmp_path / "front", evaluations=3)
     assert not (tmp_path / "front").exists()

@@ -147,7 +147,7 @@ REFUSED: dict[str, tuple[Callable[[], object], tuple[str, ...]]] = {  # item, va
         ("free[0]: cables", "2", "0 to 1"),
     ),
     "nothing limits": (
-        lambda: sl.design(UNLIMITED, [POSTS], ["least_margin"], evaluations=16, grid=(2, 2, 2)),
+        lambda: sl.design(UNLIMITED, [POSTS], ["least_margin"], evaluations=16, grid=(2, 2, 2), model=sl.Straight()),
         ("least_margin of ipanema-1", "inf N", "a finite number"),
     ),
     "a tilted box": (

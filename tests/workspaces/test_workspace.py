@@ -248,11 +248,12 @@ def test_a_region_smaller_than_a_cell_is_found_by_the_search() -> None:
 
 
 def test_nothing_limits_where_nothing_can_fail() -> None:
-    # a point pulled to all sides without upper limits, on weightless cables, bears any load inside the square
+    # a point pulled to all sides without upper limits, on straight cables, bears any load inside the square
     robot = square(tension_max=np.inf)
-    found = sl.margin(robot, sl.Pose([1.0, 0.5, 1.0], np.eye(3)))
+    found = sl.margin(robot, sl.Pose([1.0, 0.5, 1.0], np.eye(3)), model=sl.Straight())
     assert np.isinf(found.value)
-    space = sl.workspace(robot, sl.PoseBox([0.5, 0.5, 0.5], [1.5, 0.5, 1.5]), sl.WrenchBox([1e6, 0, 1e6]), cells=4)
+    box, loads = sl.PoseBox([0.5, 0.5, 0.5], [1.5, 0.5, 1.5]), sl.WrenchBox([1e6, 0, 1e6])
+    space = sl.workspace(robot, box, loads, model=sl.Straight(), cells=4)
     assert space.volume == pytest.approx(1.0, rel=1e-12)
     assert space.open_faces == ("x low", "x high", "z low", "z high")
     assert (space.limiting == BY_BOX).all()

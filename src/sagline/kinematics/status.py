@@ -21,8 +21,7 @@ class PoseStatus(Status):
     )
     TOO_SLACK = (
         codes.POSE_TOO_SLACK,
-        "a cable would carry less than a thousandth of its weight, or has no catenary between its guides; raise "
-        "tension_min",
+        "a cable has no catenary between its guides; raise tension_min",
     )
     NOT_CONVERGED = codes.POSE_NOT_CONVERGED, "the tensions did not converge; please report this robot and pose"
     NO_CHORD = (

@@ -52,7 +52,7 @@ class MarginStatus(Status):
     )
     TOO_SLACK = (
         codes.MARGIN_TOO_SLACK,
-        "the largest allowed tension of a cable is less than a thousandth of its weight; raise tension_max",
+        "the largest allowed tension of a cable is less than a tenth of its weight; raise tension_max",
     )
 
 
@@ -71,7 +71,8 @@ class Margin(Result):
         moment_arm: Lever arm that converts moments to forces [m]; None for each robot's mean lever arm.
         value: Largest additional load that can still be balanced in any direction [N], shape () or (N,); a moment
             counts as a force at the lever arm. A negative value is the excess of the set. It is continuous and never
-            NaN: infinite without limits, -infinite if the status has no margin.
+            NaN: infinite for straight cables without limits, -infinite if the status has no margin or a cable has no
+            admissible tension.
         low: Lower bound of the margin for all sag forces [N], with the shape of value. If it is not negative, every
             load of the set is proved feasible. Without sag, both bounds are equal to the value.
         high: Upper bound [N]; if it is negative, a load of the set is proved infeasible.
@@ -137,8 +138,8 @@ def margin(
 
     The margin is also valid at poses without a tension distribution. With sag, the bracket is proved for all tensions.
     low >= 0 means that every load of the set can be balanced within the limits, and high < 0 that at least one load
-    cannot. Sagging cables are included up to a length of fifteen times their chord, because a lower limit of zero has
-    no largest sag force. Without an upper limit, tensions are included up to a stretch to twice the cable's length.
+    cannot. The admissible tensions are those of `inverse`: a sagging cable is at most fifteen times as long as its
+    chord, and a cable without upper limit is stretched to at most twice its length.
 
     Args:
         robot: The robot, or a sequence of N robots, one per pose.

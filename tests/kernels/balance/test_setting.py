@@ -11,6 +11,7 @@ from sagline.kernels import tables
 from sagline.kernels.algebra.bounds import HIGH, LOW, START
 from sagline.kernels.balance import setting as s
 from sagline.kernels.cable import states
+from sagline.kernels.cable.admissible import TensionLimits
 from sagline.kernels.cable.cables import Cables, new_cables
 from sagline.kernels.cable.pulley import Pulley
 from sagline.kernels.cable.terms import Chord, Material, Model
@@ -46,7 +47,7 @@ frame_end_tension = from_python(states.frame_end_tension)
 
 EXACT = Model(CATENARY, 0.0, 0.0, GRAVITY)
 NO_PULLEY = Pulley(0.0, 1.0, 0.0, 0.0)
-NO_BOUND = s.TensionLimits(LIMITS_OF_CHORD, math.nan)
+NO_BOUND = TensionLimits(LIMITS_OF_CHORD, math.nan)
 VARIABLES = [CHORD_TENSION, HORIZONTAL_TENSION, FRAME_END_TENSION]
 
 
@@ -61,7 +62,7 @@ def setting(
     case: Case,
     variable: int = CHORD_TENSION,
     weight: Array | None = None,
-    limits: s.TensionLimits = NO_BOUND,
+    limits: TensionLimits = NO_BOUND,
     model: Model = EXACT,
 ) -> Set:
     m = len(case.robot)
@@ -122,13 +123,13 @@ def test_an_infinite_limit_stays_infinite_in_every_variable() -> None:
     case.robot[2, tables.TENSION_MAX] = math.inf
     for variable in VARIABLES:
         for quantity in (LIMITS_OF_CHORD, LIMITS_OF_FRAME_END):
-            balance = setting(case, variable, limits=s.TensionLimits(quantity, math.nan)).balance
+            balance = setting(case, variable, limits=TensionLimits(quantity, math.nan)).balance
             assert list(np.flatnonzero(np.isinf(balance.bounds[HIGH]))) == [2]
 
 
 def test_limits_of_the_frame_end() -> None:
     case = random_case(np.random.default_rng(4), 8)
-    cables = setting(case, limits=s.TensionLimits(LIMITS_OF_FRAME_END, math.nan)).cables
+    cables = setting(case, limits=TensionLimits(LIMITS_OF_FRAME_END, math.nan)).cables
     for i in range(8):
         chord = Chord(cables.chord[i], cables.sine[i], cables.cosine[i])
         material = Material(cables.density[i], cables.stiffness[i])
@@ -140,9 +141,7 @@ def test_limits_of_the_frame_end() -> None:
 
 def test_the_bound_of_validity_lifts_the_lower_limit() -> None:
     case = random_case(np.random.default_rng(5), 8)
-    cables = setting(
-        case, limits=s.TensionLimits(LIMITS_OF_CHORD, 2.0), model=Model(EMPIRICAL, 4.9, 4.0, GRAVITY)
-    ).cables
+    cables = setting(case, limits=TensionLimits(LIMITS_OF_CHORD, 2.0), model=Model(EMPIRICAL, 4.9, 4.0, GRAVITY)).cables
     # (54): T_x = tau cos phi > w D cos phi/(2 |sin phi|) + T_adj
     bound = cables.half_weight * cables.cosine / np.abs(cables.sine) + 2.0
     np.testing.assert_allclose(cables.low, np.maximum(case.robot[:, tables.TENSION_MIN], bound / cables.cosine))

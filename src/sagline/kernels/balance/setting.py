@@ -15,11 +15,11 @@ from sagline.kernels.algebra.bounds import HIGH, LOW, START, STRIP_ROWS
 from sagline.kernels.algebra.factors import factorize, minimum_norm, orthogonal_factor, pseudo_inverse
 from sagline.kernels.balance.wrench import along_freedom, fill_structure_matrix, needed_wrench, rows_along_freedom
 from sagline.kernels.cable import geometry as g
+from sagline.kernels.cable.admissible import TensionLimits, admissible_tensions, is_limited_by_strain
 from sagline.kernels.cable.cables import Cables, chord_of, material_of, pulley_of
 from sagline.kernels.cable.geometry import cable_geometry
 from sagline.kernels.cable.models import shallow_sag_force
 from sagline.kernels.cable.pulley import pulley_at
-from sagline.kernels.cable.states import chord_tension_at_frame_end, taut_at_frame_end
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.jit import glue
 from sagline.kernels.memory import Memory, block, vector
@@ -35,13 +35,6 @@ class Platform(NamedTuple):
     robot: Array  # rows of the cable_table, (m, CABLE_COLUMNS)
     pose: Array  # row of the poses, (POSE_COLUMNS,)
     wrench: Array  # external plus inertial wrench, about the center of mass, (6,)
-
-
-class TensionLimits(NamedTuple):
-    """Limits of the tensions."""
-
-    quantity: int  # code of the tension to which the robot's limits apply
-    validity: float  # T_adj [N] of the article's bound (54), T_x > w D/(2 |tan phi|) + T_adj; NaN omits the bound
 
 
 class Balance(NamedTuple):
@@ -113,7 +106,7 @@ def set_pose(
 
 @glue
 def place_cables(model: Model, limits: TensionLimits, robot: Array, geometry: Array, cables: Cables) -> bool:
-    """Fill chords, material, first-order sag forces and chord tension limits; False if a cable has no chord."""
+    """Fill chords, material, first-order sag forces and admissible tensions; False if a cable has no chord."""
     for i in range(robot.shape[0]):
         chord, sine = geometry[g.CHORD, i], geometry[g.SINE, i]
         if not chord >= SHORTEST_CHORD:
@@ -131,16 +124,8 @@ def place_cables(model: Model, limits: TensionLimits, robot: Array, geometry: Ar
         cables.half_weight[i] = 0.5 * robot[i, tables.DENSITY] * model.gravity * chord
         cables.sag_force[i] = shallow_sag_force(model, chord, robot[i, tables.DENSITY])
         low, high = robot[i, tables.TENSION_MIN], robot[i, tables.TENSION_MAX]
-        if limits.quantity == codes.LIMITS_OF_FRAME_END:
-            line, material, pulley = chord_of(cables, i), material_of(cables, i), pulley_of(cables, i)
-            low = chord_tension_at_frame_end(model, line, material, pulley, low)
-            high = taut_at_frame_end(model, line, material, pulley, high, 0.0)  # 0: no cable has so small a tension
-        if not math.isnan(limits.validity):
-            # the horizontal tension T_x of a vertical cable is zero; a T_adj of zero is then satisfied too
-            margin = limits.validity / cables.cosine[i] if limits.validity > 0.0 else 0.0
-            low = max(low, cables.half_weight[i] / abs(sine) + margin)
-        cables.low[i] = low
-        cables.high[i] = high
+        line, material, pulley = chord_of(cables, i), material_of(cables, i), pulley_of(cables, i)
+        cables.low[i], cables.high[i] = admissible_tensions(model, limits, line, material, pulley, low, high)
     return True
 
 
@@ -164,9 +149,10 @@ def _choose_variable(variable: int, weight: Array, cables: Cables, balance: Bala
 
 @glue
 def scale_limits(cables: Cables, balance: Balance, i: int) -> None:
-    """Fill the limits of one cable in the distribution's variable."""
+    """Fill the limits of one cable in the distribution's variable; the largest strain does not limit a distribution."""
+    limited = cables.high[i] < math.inf and not is_limited_by_strain(cables, i)
     balance.bounds[LOW, i] = cables.low[i] * balance.scale[i]
-    balance.bounds[HIGH, i] = cables.high[i] * balance.scale[i] if cables.high[i] < math.inf else math.inf
+    balance.bounds[HIGH, i] = cables.high[i] * balance.scale[i] if limited else math.inf
 
 
 @glue

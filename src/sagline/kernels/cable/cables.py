@@ -25,8 +25,8 @@ class Cables(NamedTuple):
     chord: Array  # D [m]; for a cable over a pulley, length of the tangent from the platform end
     sine: Array  # sin phi
     cosine: Array  # cos phi
-    low: Array  # lower limit of the chord tension [N]
-    high: Array  # upper limit of the chord tension [N], may be infinite
+    low: Array  # smallest admissible chord tension [N]
+    high: Array  # largest admissible chord tension [N]; infinite only for straight cables
     tau: Array  # chord tension [N]
     ratio: Array  # L/D of the free span
     sag_force: Array  # T_z - tau sin phi [N]

@@ -19,7 +19,6 @@ from sagline.kernels.cable.terms import Model
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block
 
-LOOSEST = 5.0  # largest X = wD/(2 tau): the cable is fifteen times as long as its chord, almost without tension
 SLOPE_STEP = 1e-4  # relative step of the central difference of the sag force
 EXITS = 4  # passes over pulleys: the error of the sag force is then 1e-9 of the tension for X up to 1
 SHRINKINGS = 30
@@ -167,6 +166,7 @@ START_OF_LEAST, START_OF_MOST = 1.25, 0.9
 # share of the sum of its terms. Between that point and the exact peak, the growth changes by a smaller share in all
 # random cables of the tests. Otherwise golden sections search the peak.
 FALLS_FOR_SURE = 0.3
+FIRST_ORDER = 1.0  # largest X at which the first order is used; a steep cable has its first-order peak at a larger one
 
 # Rows of the work array.
 A, B, AT_A, AT_B, TENSION, GROWTH, RISEN, LAST = 0, 1, 2, 3, 4, 5, 6, 7
@@ -235,6 +235,7 @@ def _find_rises(curves: Curves, work: Array) -> None:
     cables = curves.cables
     for i in range(work.shape[1]):
         best = 1.5 * cables.half_weight[i] * cables.cosine[i] * cables.cosine[i] / abs(cables.sine[i])
+        best = max(best, cables.half_weight[i] / FIRST_ORDER)
         work[TENSION, i] = min(max(best, work[A, i]), work[B, i])
     _growths(curves, work[A], work[AT_A])
     _growths(curves, work[B], work[AT_B])
@@ -249,7 +250,10 @@ def _find_rises(curves: Curves, work: Array) -> None:
                 risen = work[B, i]
             elif work[GROWTH, i] > 0.0:
                 risen = work[TENSION, i]
-            elif work[GROWTH, i] > -FALLS_FOR_SURE * (stretch + slope + depth):
+            elif (
+                work[GROWTH, i] > -FALLS_FOR_SURE * (stretch + slope + depth)
+                or cables.half_weight[i] > FIRST_ORDER * work[TENSION, i]
+            ):
                 risen = _rising_tension_between(curves, i, work[A, i], work[B, i])
         work[RISEN, i] = risen
 

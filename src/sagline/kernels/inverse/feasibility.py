@@ -10,7 +10,6 @@ from sagline.kernels.algebra.bounds import START, STRIP_ROWS
 from sagline.kernels.balance.setting import (
     Balance,
     Platform,
-    TensionLimits,
     fill_needed_wrench,
     new_balance,
     set_pose,
@@ -18,10 +17,11 @@ from sagline.kernels.balance.setting import (
 )
 from sagline.kernels.balance.wrench import along_freedom, translation_count
 from sagline.kernels.cable import geometry as g
+from sagline.kernels.cable.admissible import TensionLimits, cable_without_tension
 from sagline.kernels.cable.cables import Cables, new_cables
 from sagline.kernels.cable.pulley import robots_have_machine
 from sagline.kernels.cable.sag_forces import new_curves, sag_forces_at
-from sagline.kernels.inverse.iterations import limits_admit_tensions, linearize_ends
+from sagline.kernels.inverse.iterations import linearize_ends
 from sagline.kernels.inverse.poses import (
     Answers,
     DistributionTerms,
@@ -96,7 +96,7 @@ def decide_poses(
         platform = platform_at(robot_terms, poses, wrenches, p)
         model = model_at(model_terms, platform.body)
         set_pose(model, limits, codes.CHORD_TENSION, weight, platform, cables, balance)
-        if not limits_admit_tensions(cables):
+        if cable_without_tension(cables) >= 0:
             brackets[p, PROVED], brackets[p, ENOUGH] = math.inf, math.inf
             for i in range(m):
                 blocking[p, i] = not cables.low[i] <= cables.high[i]
@@ -145,9 +145,7 @@ def _pose_status(statuses: Codes) -> int:
     gravest = codes.CABLE_SOLVED
     for i in range(statuses.size):
         gravest = max(gravest, statuses[i])
-    if gravest == codes.CABLE_TOO_SLACK:
-        return codes.POSE_TOO_SLACK
-    return codes.POSE_NOT_CONVERGED if gravest == codes.CABLE_NOT_CONVERGED else codes.POSE_SOLVED
+    return codes.POSE_NOT_CONVERGED if gravest >= codes.CABLE_TOO_SLACK else codes.POSE_SOLVED
 
 
 @glue

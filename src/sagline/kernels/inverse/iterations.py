@@ -5,8 +5,6 @@ A distribution in the tension at the frame end is linearized at the tensions of 
 
 from __future__ import annotations
 
-import math
-
 from sagline.core.arrays import Codes
 from sagline.kernels import codes
 from sagline.kernels.balance.setting import (
@@ -17,6 +15,7 @@ from sagline.kernels.balance.setting import (
     scale_limits,
     start_from_minimum_norm,
 )
+from sagline.kernels.cable.admissible import cable_without_tension, is_limited_by_strain
 from sagline.kernels.cable.cables import Cables, chord_of, material_of, pulley_of
 from sagline.kernels.cable.states import NEAR, frame_end_tension, solve_cable_states
 from sagline.kernels.cable.terms import Model
@@ -67,7 +66,7 @@ def distribute_and_solve_cables(
     set_reference(distribution, balance.offset, balance.null, near)
     solved = False
     fill_needed_wrench(platform, cables, balance)
-    possible = limits_admit_tensions(cables)
+    possible = cable_without_tension(cables) < 0
     status = codes.POSE_NOT_CONVERGED if possible else codes.POSE_INFEASIBLE
     for k in range(ITERATIONS if possible else 0):
         start_from_minimum_norm(balance)
@@ -86,7 +85,7 @@ def distribute_and_solve_cables(
         moved, largest = take_tensions(cables, balance)
         gravest = solve_cable_states(model, cables, not solved, solved and moved < NEAR, statuses)
         if gravest == codes.CABLE_TOO_SLACK or gravest == codes.CABLE_NOT_CONVERGED:
-            status = codes.POSE_TOO_SLACK if gravest == codes.CABLE_TOO_SLACK else codes.POSE_NOT_CONVERGED
+            status = codes.POSE_NOT_CONVERGED
             break
         status = codes.POSE_NOT_CONVERGED
         converged = model.code != codes.CATENARY or sag_force_change(cables) <= CONVERGED + SAG_ROUNDING * largest
@@ -105,14 +104,16 @@ def distribute_and_solve_cables(
             reset_work_arrays(work)
         solved = True
         fill_needed_wrench(platform, cables, balance)
+    if status == codes.POSE_SOLVED and not strain_admits_tensions(cables):
+        status = codes.POSE_INFEASIBLE
     return status
 
 
 @glue
-def limits_admit_tensions(cables: Cables) -> bool:
-    """True if every cable has a feasible tension; a horizontal cable has none by the article's bound (54)."""
-    for i in range(cables.low.size):
-        if not (cables.low[i] <= cables.high[i] and cables.low[i] < math.inf):
+def strain_admits_tensions(cables: Cables) -> bool:
+    """True if no cable without upper limit is stretched too far; distributions do not know this limit."""
+    for i in range(cables.tau.size):
+        if cables.tau[i] > cables.high[i] and is_limited_by_strain(cables, i):
             return False
     return True
 

@@ -11,9 +11,10 @@ import math
 from sagline.core.arrays import Array, Codes, Indices
 from sagline.kernels import codes, tables
 from sagline.kernels.algebra.functions import angle
-from sagline.kernels.balance.setting import Balance, Platform, TensionLimits, fill_needed_wrench, new_balance, set_pose
+from sagline.kernels.balance.setting import Balance, Platform, fill_needed_wrench, new_balance, set_pose
 from sagline.kernels.balance.wrench import is_rotation
 from sagline.kernels.cable import geometry as g
+from sagline.kernels.cable.admissible import TensionLimits
 from sagline.kernels.cable.cables import Cables, material_of, new_cables, pulley_of
 from sagline.kernels.cable.pulley import Wrap, behind_cable, robots_have_machine
 from sagline.kernels.cable.terms import Model

@@ -17,7 +17,6 @@ from sagline.core.arrays import Array
 from sagline.kernels import codes
 from sagline.kernels.algebra.factors import factorize, orthogonal_factor, pseudo_inverse
 from sagline.kernels.cable.sag_forces import (
-    LOOSEST,
     Curves,
     Section,
     find_extrema,
@@ -172,19 +171,12 @@ def _split_range(curves: Curves, waiting: Array, top: int, i: int, tau: float) -
 
 @glue
 def _first_range(curves: Curves, size: float, range_: Array) -> None:
-    """Fill the range that the limits allow; almost slack cables (LOOSEST) have a larger lower bound.
-
-    Without an upper limit, the upper bound of a sagging cable is the tension that stretches it to twice its length. For
-    other cables it is a million times the largest force.
-    """
+    """Fill the range of the admissible tensions; a straight cable without upper limit gets a million largest forces."""
     cables = curves.cables
     for i in range(cables.low.size):
         low, high = cables.low[i], cables.high[i]
-        sags = curves.model.code == codes.CATENARY and cables.half_weight[i] > 0.0
         if high == math.inf:
-            high = max(low, cables.stiffness[i] if sags else PLENTY * size)
-        if sags:
-            low = min(max(low, cables.half_weight[i] / LOOSEST), high)
+            high = max(low, PLENTY * size)
         range_[LEAST, i] = low
         range_[LARGEST, i] = high
         range_[AT_LEAST, i] = sag_force_at(curves, i, low)

@@ -16,7 +16,8 @@ from sagline.core.arrays import Array
 from sagline.kernels import codes, tables
 from sagline.kernels.algebra.factors import factor_positive, solve_lower, solve_upper
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable.sag_forces import LOOSEST, Curves, sag_forces_at
+from sagline.kernels.cable.admissible import is_limited_by_strain, least_of_sag
+from sagline.kernels.cable.sag_forces import Curves, sag_forces_at
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block
 from sagline.kernels.workspaces.pose_box import MOTIONS, CablesInBox, PoseRange
@@ -172,30 +173,34 @@ LEAST_WAY = 1e-4  # relative to a chord: lower bound of the displacement that se
 
 
 class Ranges(NamedTuple):
-    """Limits of the chord tensions for all poses of a box [N]."""
+    """Admissible chord tensions for all poses of a box [N]."""
 
-    low: Array  # largest value of the lower limit in the box, (m,), for proofs of feasibility
-    high: Array  # smallest value of the upper limit, at most a stretch to twice the length; may be infinite
-    lowest: Array  # smallest value of the lower limit, for proofs of infeasibility
-    highest: Array  # largest value of the upper limit, or a bound of the tensions from the load; may be infinite
+    low: Array  # largest value of the smallest admissible tension in the box, (m,), for proofs of feasibility
+    high: Array  # smallest value of the largest one; may be infinite
+    lowest: Array  # smallest value of the smallest one, for proofs of infeasibility
+    highest: Array  # largest value of the largest one, or a bound of the tensions from the load; may be infinite
     sag_force: Array  # sag forces at the centered tensions
 
 
 @kernel
 def set_ranges(quantity: int, place: CablesInBox, curves: Curves, ranges: Ranges) -> None:
-    """Fill the limits for all poses of a box from those at its middle."""
+    """Fill the admissible tensions of all poses of a box from those at its middle.
+
+    The smallest tension of the sag grows with the chord.
+    """
     cables = curves.cables
     for i in range(place.way.size):
         low, high = cables.low[i], cables.high[i]
         ranges.low[i] = ranges.lowest[i] = low
         ranges.high[i] = ranges.highest[i] = high
-        if has_sag(curves, i):
-            loosest = cables.half_weight[i] / LOOSEST
-            if quantity != codes.LIMITS_OF_CHORD:
-                _move_limits(place, curves, i, ranges)
-            ranges.lowest[i] = max(ranges.lowest[i], loosest)
-            ranges.low[i] = max(ranges.low[i], loosest)
-            ranges.high[i] = min(ranges.high[i], cables.stiffness[i])
+        floor = least_of_sag(curves.model, cables.half_weight[i])
+        share = place.way[i] / cables.chord[i]
+        if quantity != codes.LIMITS_OF_CHORD and has_sag(curves, i):
+            _move_limits(place, curves, i, ranges)
+        elif not low > floor:
+            ranges.lowest[i] = 0.0
+        ranges.low[i] = max(ranges.low[i], floor * (1.0 + share))
+        ranges.lowest[i] = max(ranges.lowest[i], floor * (1.0 - share))
 
 
 @kernel
@@ -204,18 +209,18 @@ def _move_limits(place: CablesInBox, curves: Curves, i: int, ranges: Ranges) -> 
 
     Away from slackness, a limit changes at most as fast as the sag force. A limit that may be slack somewhere in the
     box is replaced: by the least limit without slackness in proofs of feasibility, and by zero in proofs of
-    infeasibility.
+    infeasibility. A cable without admissible tensions at the middle has slack ones, if any, elsewhere in the box.
     """
     cables = curves.cables
     way = place.way[i]
     tight = cables.half_weight[i] * (1.0 + way / cables.chord[i]) / SLACK
-    low, high = max(cables.low[i], tight), max(cables.high[i], tight)
+    low, high = cables.low[i], cables.high[i]
     moves = way * sag_force_slope(curves, i, way, tight)
-    ranges.low[i] = low + moves
-    ranges.lowest[i] = low - moves if cables.low[i] - moves > tight else 0.0
-    if high < math.inf:
-        ranges.high[i] = high - moves if cables.high[i] - moves > tight else 0.0
-        ranges.highest[i] = high + moves
+    ranges.low[i] = max(low, tight) + moves
+    ranges.lowest[i] = low - moves if tight < low - moves < math.inf else 0.0
+    if not is_limited_by_strain(cables, i):
+        ranges.high[i] = high - moves if high - moves > tight else 0.0
+        ranges.highest[i] = max(high, tight) + moves
 
 
 @kernel

@@ -10,8 +10,9 @@ import numpy as np
 
 from sagline.core.arrays import Array, Codes, Indices
 from sagline.kernels import tables
-from sagline.kernels.balance.setting import TensionLimits, place_cables
+from sagline.kernels.balance.setting import place_cables
 from sagline.kernels.cable import geometry as g
+from sagline.kernels.cable.admissible import TensionLimits
 from sagline.kernels.cable.cables import new_cables
 from sagline.kernels.cable.geometry import cable_geometry
 from sagline.kernels.cable.sag_forces import new_curves

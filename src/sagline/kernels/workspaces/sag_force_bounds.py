@@ -11,8 +11,9 @@ import math
 
 from sagline.core.arrays import Array
 from sagline.kernels import codes
+from sagline.kernels.cable.admissible import LOOSEST, is_limited_by_strain
 from sagline.kernels.cable.cables import Cables
-from sagline.kernels.cable.sag_forces import LOOSEST, Curves, Section, find_extrema, sag_force_range, sag_forces_at
+from sagline.kernels.cable.sag_forces import Curves, Section, find_extrema, sag_force_range, sag_forces_at
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory
 
@@ -23,8 +24,8 @@ FROM_MOST, BEFORE_MOST = 0.85, 1.8  # relative to X_M: an extremum of the sag fo
 BEFORE_LEAST, AFTER_LEAST = 0.25, 1.05  # relative to |sin phi|/cos^2 phi: another extremum is at 0.28 to 1.03 of it
 
 # Rows of the bands (BAND_ROWS, m).
-LOW, HIGH = 0, 1  # chord tensions [N]; the upper one may be infinite
-TAUT = 2  # HIGH, or the chord tension that doubles the length of a sagging cable if HIGH is infinite [N]
+LOW, TAUT = 0, 2  # smallest and largest admissible chord tension [N]; the latter is infinite for straight cables only
+HIGH = 1  # TAUT, or infinity if the strain limits it
 SAG_FORCE_LOW, SAG_FORCE_HIGH = 3, 4  # sag forces at LOW and TAUT [N]
 LEAST, MOST = 5, 6  # least and largest sag force between them [N]
 BAND_ROWS = 7
@@ -32,22 +33,14 @@ BAND_ROWS = 7
 
 @glue
 def fill_bands(curves: Curves, bands: Array, memory: Memory) -> bool:
-    """Fill the bands of the cables in place; False if a cable is too slack at any tension.
-
-    Tensions below which a cable's X = wD/(2 tau) is above LOOSEST are excluded, because the sag force is unbounded for
-    tensions near zero.
-    """
+    """Fill the bands of the cables in place; False if a cable is too slack at any tension."""
     cables = curves.cables
     m = cables.low.size
     exact = curves.model.code == codes.CATENARY
     for i in range(m):
         bands[LOW, i] = cables.low[i]
-        bands[HIGH, i] = cables.high[i]
+        bands[HIGH, i] = math.inf if is_limited_by_strain(cables, i) else cables.high[i]
         bands[TAUT, i] = cables.high[i]
-        if exact:
-            if cables.high[i] == math.inf:
-                bands[TAUT, i] = max(cables.low[i], cables.stiffness[i])
-            bands[LOW, i] = min(max(cables.low[i], cables.half_weight[i] / LOOSEST), bands[TAUT, i])
     if not exact:
         for i in range(m):
             sag_force = cables.sag_force[i]  # first-order sag force, which is the same at every tension

@@ -17,9 +17,10 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array, Codes, Indices
 from sagline.kernels import codes, tables
-from sagline.kernels.balance.setting import TensionLimits, place_cables
+from sagline.kernels.balance.setting import place_cables
 from sagline.kernels.balance.wrench import fill_structure_matrix, is_rotation, rows_along_freedom
 from sagline.kernels.cable import geometry as g
+from sagline.kernels.cable.admissible import TensionLimits, cable_without_tension, least_of_sag
 from sagline.kernels.cable.cables import new_cables
 from sagline.kernels.cable.geometry import cable_geometry
 from sagline.kernels.cable.pulley import robots_have_machine
@@ -46,6 +47,7 @@ from sagline.kernels.workspaces.sag_force_bounds import (
     MOST,
     SAG_FORCE_HIGH,
     SAG_FORCE_LOW,
+    TAUT,
     fill_bands,
 )
 from sagline.kernels.workspaces.wrench_set import SetTerms, WrenchSetArrays, new_set, place_set, reach_of_set
@@ -161,12 +163,17 @@ def signed_margins(
             statuses[p] = codes.MARGIN_SINGULAR
             continue
         curves, left = new_curves(model, cables, memory[2], rest)
+        limiting[p] = cable_without_tension(cables)
+        if limiting[p] >= 0:
+            slack = cables.high[limiting[p]] < least_of_sag(model, cables.half_weight[limiting[p]])
+            statuses[p] = codes.MARGIN_TOO_SLACK if slack else codes.MARGIN_INFEASIBLE
+            continue
         if not fill_bands(curves, bands, left):
             statuses[p] = codes.MARGIN_TOO_SLACK
             continue
         place_set(set_terms, body, inertias[p * inertias.shape[0] // count], rotation, wrenches)
         endless = _fill_weights(body, set_terms[0], geometry, bands, counted, points)
-        counts = _FacetWeights(counted, points, bands[HIGH], endless, arms[0][p * arms[0].size // count], lever)
+        counts = _FacetWeights(counted, points, bands[TAUT], endless, arms[0][p * arms[0].size // count], lever)
         _measure_all_facets(facets, n, m, counts, wrenches, measured, found, directions[p])
         for k in range(3):
             values[k, p] = found[k]
@@ -196,10 +203,12 @@ def _fill_weights(body: Array, center: Array, geometry: Array, bands: Array, row
         points[ENDS, a] = points[RANGES, a] = center[a]
     points[ENDS, 2] = points[RANGES, 2] = center[2] - body[tables.MASS] * body[tables.GRAVITY]
     for i in range(bands.shape[1]):
-        limited = bands[HIGH, i] < math.inf
+        limited = bands[TAUT, i] < math.inf
         endless = endless or not limited
-        rows[WIDTH, i] = 0.5 * (bands[HIGH, i] - bands[LOW, i]) if limited else 0.0
-        rows[SLOPE, i] = 0.5 * (bands[SAG_FORCE_HIGH, i] - bands[SAG_FORCE_LOW, i]) if limited else 0.0
+        rows[WIDTH, i] = 0.5 * (bands[TAUT, i] - bands[LOW, i]) if limited else 0.0
+        # the sag force at the largest strain is far below that of practical tensions: the value neglects this change
+        slope = 0.5 * (bands[SAG_FORCE_HIGH, i] - bands[SAG_FORCE_LOW, i])
+        rows[SLOPE, i] = slope if bands[HIGH, i] < math.inf else 0.0
         rows[UNSURE, i] = 0.5 * (bands[MOST, i] - bands[LEAST, i])
         x, y = geometry[g.LEVER_X, i], geometry[g.LEVER_Y, i]
         rows[LEVER_X, i] = x

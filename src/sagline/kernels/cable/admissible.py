@@ -1,0 +1,152 @@
+"""Admissible chord tensions of a cable at a pose: the one definition for all feasibility; docs/model.md, section 5.
+
+All admissible tensions of a cable are one interval. Its ends follow from the robot's limits, a limit of the sag and a
+limit of the stretch. A limit of the tension at the frame end becomes a limit of the chord tension. The tension at the
+frame end falls and then rises with the chord tension. Usually the interval is on the rising side. It includes tensions
+on the falling side if the tension at the frame end has no value below its lower limit.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from sagline.kernels import codes
+from sagline.kernels.cable.cables import Cables
+from sagline.kernels.cable.pulley import Pulley
+from sagline.kernels.cable.states import frame_end_tension, taut_at_frame_end
+from sagline.kernels.cable.terms import Chord, Material, Model
+from sagline.kernels.jit import formula, glue, kernel
+
+LOOSEST = 5.0  # largest X = wD/(2 tau): the cable is fifteen times as long as its chord, almost without tension
+# At a strain of 1 the cable is twice as long as without tension. The limit applies without an upper limit of the robot.
+LARGEST_STRAIN = 1.0
+SMALLEST = 1e-100  # chord tension of a catenary without weight [N], whose equations divide by it
+SECTIONS = 80  # steps of the search for the smallest admissible tension of a slack cable
+GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
+PRECISION = 1e-14  # relative
+
+
+class TensionLimits(NamedTuple):
+    """Limits of the tensions."""
+
+    quantity: int  # code of the tension to which the robot's limits apply
+    validity: float  # T_adj [N] of the article's bound (54), T_x > w D/(2 |tan phi|) + T_adj; NaN omits the bound
+
+
+@formula
+def sags(model: Model, half_weight: float) -> bool:
+    """True if a cable sags, and its length grows without bound as its tension decreases; half_weight: wD/2 [N]."""
+    return half_weight > 0.0 and model.code != codes.STRAIGHT and model.code != codes.ELASTIC
+
+
+@formula
+def least_of_sag(model: Model, half_weight: float) -> float:
+    """Smallest chord tension that the limit of the sag admits [N]."""
+    if sags(model, half_weight):
+        return half_weight / LOOSEST
+    return SMALLEST if model.code == codes.CATENARY else 0.0
+
+
+@formula
+def largest_of_strain(model: Model, stiffness: float) -> float:
+    """Largest chord tension of a cable without an upper limit [N]."""
+    return LARGEST_STRAIN * stiffness if model.code != codes.STRAIGHT else math.inf
+
+
+@formula
+def is_limited_by_strain(cables: Cables, i: int) -> bool:
+    """True if the largest admissible tension of a cable is that of its largest strain."""
+    return cables.high[i] == LARGEST_STRAIN * cables.stiffness[i]
+
+
+@glue
+def cable_without_tension(cables: Cables) -> int:
+    """Index of the first cable without admissible tensions; -1 if every cable has some.
+
+    By the article's bound (54), a horizontal cable has none.
+    """
+    for i in range(cables.low.size):
+        if not (cables.low[i] <= cables.high[i] and cables.low[i] < math.inf):
+            return i
+    return -1
+
+
+@kernel
+def admissible_tensions(
+    model: Model, limits: TensionLimits, chord: Chord, material: Material, pulley: Pulley, low: float, high: float
+) -> tuple[float, float]:
+    """Smallest and largest admissible chord tension of a cable [N]; the smallest is larger if there is none.
+
+    low, high: limits of the robot [N]; the upper one may be infinite.
+    """
+    half_weight = 0.5 * material.density * model.gravity * chord.length
+    floor = least_of_sag(model, half_weight)
+    if limits.quantity == codes.LIMITS_OF_FRAME_END and sags(model, half_weight):
+        low, high = _limits_at_chord(model, chord, material, pulley, low, high, floor)
+    if high == math.inf:
+        high = largest_of_strain(model, material.stiffness)
+    if not math.isnan(limits.validity):
+        # the horizontal tension T_x of a vertical cable is zero; a T_adj of zero is then satisfied too
+        margin = limits.validity / chord.cosine if limits.validity > 0.0 else 0.0
+        low = max(low, half_weight / abs(chord.sine) + margin)
+    return max(low, floor), high
+
+
+@kernel
+def _limits_at_chord(
+    model: Model, chord: Chord, material: Material, pulley: Pulley, low: float, high: float, floor: float
+) -> tuple[float, float]:
+    """Limits of the chord tension from limits of the tension at the frame end [N].
+
+    Infinity and zero if the tension at the frame end is above its upper limit at every chord tension.
+    """
+    largest = taut_at_frame_end(model, chord, material, pulley, high, -1.0)
+    if largest < 0.0:
+        return math.inf, 0.0
+    least = taut_at_frame_end(model, chord, material, pulley, low, -1.0) if low > 0.0 else -1.0
+    if least < 0.0:
+        least = _slackest_at_frame_end(model, chord, material, pulley, high, floor, largest)
+    return least, largest
+
+
+@kernel
+def _slackest_at_frame_end(
+    model: Model, chord: Chord, material: Material, pulley: Pulley, tension: float, floor: float, taut: float
+) -> float:
+    """Smallest chord tension from which on the tension at the frame end is at most a given one, up to the taut one [N].
+
+    Golden sections find a chord tension with a smaller tension at the frame end. The wanted one is below it.
+
+    floor: lower bound of the result [N]; taut: chord tension on the rising side with the given tension [N].
+    """
+    if tension == math.inf or frame_end_tension(model, chord, material, pulley, floor) <= tension:
+        return min(floor, taut)
+    low, high = math.log(floor), math.log(taut)
+    a, b = low, high
+    c, d = b - GOLDEN * (b - a), a + GOLDEN * (b - a)
+    at_c = frame_end_tension(model, chord, material, pulley, math.exp(c))
+    at_d = frame_end_tension(model, chord, material, pulley, math.exp(d))
+    for _ in range(SECTIONS):
+        if at_c < tension or at_d < tension or not b - a > PRECISION:
+            break
+        if at_c < at_d:
+            b, d, at_d = d, c, at_c
+            c = b - GOLDEN * (b - a)
+            at_c = frame_end_tension(model, chord, material, pulley, math.exp(c))
+        else:
+            a, c, at_c = c, d, at_d
+            d = a + GOLDEN * (b - a)
+            at_d = frame_end_tension(model, chord, material, pulley, math.exp(d))
+    if not (at_c < tension or at_d < tension):
+        return taut
+    high = c if at_c < tension else d
+    for _ in range(SECTIONS):
+        middle = 0.5 * (low + high)
+        if not low < middle < high:
+            break
+        if frame_end_tension(model, chord, material, pulley, math.exp(middle)) > tension:
+            low = middle
+        else:
+            high = middle
+    return math.exp(high)
