@@ -7,6 +7,7 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 from matplotlib.collections import QuadMesh
+from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from syrupy.assertion import SnapshotAssertion
@@ -34,8 +35,8 @@ def texts(figure: Figure) -> list[str]:
 
 def test_the_bold_line_is_the_boundary_and_thin_ones_are_round_margins(space: sl.Workspace) -> None:
     ax = plot.slice(space, "z", at=2.0)
-    drawn: list[Any] = list(ax.collections[-2:])
-    margins, bold = drawn
+    lines: list[Any] = [one for one in ax.collections if isinstance(one, QuadContourSet) and not one.filled]
+    margins, bold = lines
     assert bold.get_linewidth()[0] > 2.0 * margins.get_linewidth()[0]
     ends = np.concatenate([path.vertices for path in bold.get_paths()])[::10]
     poses = sl.Pose.from_euler(np.column_stack((ends, np.full(len(ends), 2.0))), 0.0, 0.0, 0.0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from itertools import count
+from itertools import count, islice
 from math import ceil
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
@@ -19,7 +19,7 @@ from sagline.plot.sheet import BLUE, GAP_COLOR, LABEL, TICK, Sheet, cable_look, 
 from sagline.present.page import Panel
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.contour import ContourSet
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 WIDTH, HEIGHT = 4.6, 3.1  # size on a desktop screen [in]; on a phone it is four fifths of this
 LEFT, RIGHT, BELOW, ABOVE = 0.16, 0.975, 0.5, 0.12  # margins as shares of the width, then in [in]
 POINT = 1.0 / 72.0  # [in]
+APART = 40.0  # smallest distance of the numbers of two lines [pt]
 NAME_SIZE = TICK - 0.5  # text size of legends [pt]
 SHADES = "viridis"
 MOST_POINTS = 400  # largest number of points of a curve over time, to limit the size of the page
@@ -235,26 +236,36 @@ def draw_errors(
 
 
 def _number_lines(ax: Axes, drawn: ContourSet) -> None:
-    """Numbers in the middle of the lines, with a halo to be readable on a dark background."""
-    middles = [middle for path in drawn.get_paths() if (middle := _middle(ax, path)) is not None]
+    """Numbers near the middle of the lines, apart from one another, with a halo for a dark background."""
+    places: list[tuple[float, float]] = []
+    for path in drawn.get_paths():
+        apart = (place for place in _places(ax, path) if all(np.hypot(*np.subtract(place, p)) > APART for p in places))
+        places.extend(islice(apart, 1))
+    figure: Any = ax.get_figure(root=True)
     names = ax.clabel(
-        drawn, manual=middles, fmt=lambda level: n(abs(level), ".3g", "m"), fontsize=TICK - 0.5, inline_spacing=3
+        drawn,
+        manual=ax.transData.inverted().transform(np.reshape(places, (-1, 2)) * figure.dpi / 72.0).tolist(),
+        fmt=lambda level: n(abs(level), ".3g", "m"),
+        fontsize=TICK - 0.5,
+        inline_spacing=3,
     )
     for text in names:
         text.set_path_effects([*HALO])
 
 
-def _middle(ax: Axes, path: Path) -> tuple[float, float] | None:
-    """The point halfway along the longest piece of a line on the sheet; None if there is no line."""
+def _places(ax: Axes, path: Path) -> Iterator[tuple[float, float]]:
+    """Points on the longest piece of a line, from its middle outward, apart from the axes [pt]."""
+    figure: Any = ax.get_figure(root=True)
+    inside = ax.bbox.padded(-0.5 * APART * figure.dpi / 72.0)
     polygons = map(np.asarray, path.to_polygons(closed_only=False))
-    pieces = [ax.transData.transform(piece) for piece in polygons if len(piece) > 1]
-    if not pieces:
-        return None
-    passed = [np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(piece, axis=0).T)))) for piece in pieces]
-    k = int(np.argmax([way[-1] for way in passed]))
-    place = pieces[k][int(np.searchsorted(passed[k], 0.5 * passed[k][-1]))]
-    x, y = ax.transData.inverted().transform(place)
-    return float(x), float(y)
+    pieces = [ax.transData.transform(piece) * 72.0 / figure.dpi for piece in polygons if len(piece) > 1]
+    if pieces:
+        passed = [np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(piece, axis=0).T)))) for piece in pieces]
+        k = int(np.argmax([way[-1] for way in passed]))
+        for share in (0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8):
+            x, y = (float(np.interp(share * passed[k][-1], passed[k], along)) for along in pieces[k].T)
+            if inside.contains(x * figure.dpi / 72.0, y * figure.dpi / 72.0):
+                yield x, y
 
 
 def _points(drawn: ContourSet) -> int:

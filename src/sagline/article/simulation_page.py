@@ -61,7 +61,7 @@ def _robots(study: PathStudy, draw: Drawings) -> Finding:
     panels = []
     for run, caption in zip(study.of(sl.Catenary), ("First configuration: suspended.", "Second: mixed."), strict=True):
         figure = Sheet(figsize=(WIDTH, 3.4))
-        figure.subplots_adjust(left=0.13, right=1.0, bottom=0.0, top=1.0)
+        figure.subplots_adjust(left=0.13, right=0.97, bottom=0.0, top=1.0)
         ax = figure.add_subplot(projection="3d")
         draw_robot(run.plan.state.one_robot, sl.Pose.from_euler(CORNER, 0.0, 0.0, 0.0), ax)
         ax.set_title("")

@@ -16,7 +16,7 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 from sagline.core.arguments import choice, instance, listed, text
 from sagline.core.arrays import checked
 from sagline.core.errors import InvalidValueError
-from sagline.core.numbers import n
+from sagline.core.numbers import ROUNDING, n
 from sagline.dynamics.simulation.results import Simulation
 from sagline.dynamics.vibration.frequency_map import FrequencyMap
 from sagline.dynamics.vibration.response import FrequencyResponse, curves_of_response, response_curves
@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from sagline.core.arrays import Array
 
 ENERGY_STYLES = ("-", DASHED, (0, (1.0, 1.2)), (0, (5.0, 1.5, 1.0, 1.5)), (0, (7.0, 2.0)))
-ROUNDING = 1e-12  # smaller errors, relative to the energy, are rounding errors
+AT_REST = 1e-7  # smallest range of the energies that the axis shows, as a share of the potential energy
 THIN, WIDE = 0.6, 3.6  # width of a mode of the cables only, and of the platform only [pt]
 FAINT = 0.4  # opacity of thin lines
 SHARES = (1.0, 0.5, 0.0)  # platform shares in the legend
@@ -97,9 +97,10 @@ def energy(simulation: Simulation) -> Figure:
     format_clock(below, time, "error [J]")
     for event in simulation.events:
         mark_event(below, event.time, "", GAP_COLOR, 1.0)
-    least = ROUNDING * _largest(*courses.values(), balance.potential)
-    low, high = below.get_ylim()
-    below.set_ylim(min(low, -least), max(high, least))
+    widest = _largest(*courses.values(), balance.potential)
+    for ax, share in ((above, AT_REST), (below, ROUNDING)):
+        low, high = ax.get_ylim()
+        ax.set_ylim(min(low, -share * widest), max(high, share * widest))
     worst = n(_largest(balance.error), ".2g", "J", size=_largest(balance.potential))
     text = wrap_heading(f"sum of all, supplied negative, minus its initial value: at most {worst}", current().tick)
     below.set_title(text, fontsize=current().tick, loc="left")

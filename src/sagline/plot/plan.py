@@ -24,6 +24,7 @@ from sagline.plot.sheet import (
     draw_series,
     format_axes,
     format_clock,
+    hide_shared_labels,
     shade_spans,
     sheet,
     true_runs,
@@ -125,7 +126,7 @@ def overview(plan: Plan) -> Figure:
     panels = figure.subplots(rows, columns, sharex=True).flat
     for ax, quantity in zip(panels, OVERVIEW, strict=True):
         _draw_cables(ax, plan, quantity, LENGTHS | TENSIONS)
-        ax.label_outer()
+        hide_shared_labels(ax)
     figure_legend(figure, panels[:1], "outside right center")
     return figure
 
@@ -215,7 +216,7 @@ def errors(*confirmations: Confirmation) -> Figure:
     for ax, confirmation in zip(panels, confirmations, strict=True):
         _draw_errors(ax, confirmation)
         ax.set_title(confirmation.plan.state.one_robot.name, fontsize=current().tick)
-        ax.label_outer()
+        hide_shared_labels(ax)
     for ax, confirmation in zip(panels, confirmations, strict=True):
         _write_flat_error(ax, confirmation)  # on the common scale of all panels
     figure_legend(figure, panels, "outside right upper")
@@ -284,7 +285,7 @@ def small_multiples(plan: Plan, quantity: str = "chord_tension") -> Figure:
         _format(ax, plan, "")
         ax.set_xlabel("")
         ax.set_title(f"cable {i}", fontsize=current().tick, loc="left", pad=2.0)
-        ax.label_outer()
+        hide_shared_labels(ax)
     low, high = panels[0].get_ylim()
     for i, ax in enumerate(panels[:count]):
         for limit in (robot.tension_min[i], robot.tension_max[i]):

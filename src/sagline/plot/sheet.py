@@ -134,6 +134,17 @@ def format_clock(ax: Axes, clock: Array, label: str, axis: str = TIME) -> None:
         ax.set_xlim(clock[0], clock[-1])
 
 
+def hide_shared_labels(ax: Axes) -> None:
+    """Hide numbers and labels that other axes of the grid repeat: to the left if y is shared, below if x is shared."""
+    place: Any = ax.get_subplotspec()
+    if ax.get_shared_x_axes().get_siblings(ax) != [ax] and not place.is_last_row():
+        ax.tick_params(axis="x", which="both", labelbottom=False)
+        ax.set_xlabel("")
+    if ax.get_shared_y_axes().get_siblings(ax) != [ax] and not place.is_first_col():
+        ax.tick_params(axis="y", which="both", labelleft=False)
+        ax.set_ylabel("")
+
+
 def draw_map(ax: Axes, x: Array, y: Array, values: Array, scale: Normalize, title: str) -> None:
     """Values (nx, ny) at the points of a level grid, as colors; gray where there is none."""
     ax.set_facecolor(GAP_COLOR)
@@ -143,7 +154,7 @@ def draw_map(ax: Axes, x: Array, y: Array, values: Array, scale: Normalize, titl
     format_axes(ax, *PLACE[:2])
     ax.grid(visible=False)
     ax.set_aspect("equal")
-    ax.label_outer()
+    hide_shared_labels(ax)
 
 
 def _cell_edges(middles: Array) -> Array:

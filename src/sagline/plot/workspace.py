@@ -25,8 +25,12 @@ from sagline.workspaces.region import AXES, Plane, Slice, flat_axis, slice_of
 from sagline.workspaces.space import BY_BOX, Workspace, amount_of
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.text import Text
+    from matplotlib.transforms import BboxBase
     from mpl_toolkits.mplot3d.axes3d import Axes3D
 
     from sagline.core.arrays import Array, Flags, Indices
@@ -42,9 +46,9 @@ Color = tuple[float, float, float]
 HALO: Final = [patheffects.withStroke(linewidth=2.2, foreground="white")]
 NEAR_SIDE, FAR_SIDE = 0.5, 0.22  # opacity of the hull in front of and behind the robot
 FINEST: Final = 90  # cells along the longest side of the drawn hull; more are slow and not visible
-HEIGHT, ZOOM = 3.4, 1.0  # [in]; and size of the robot in its axes
+HEIGHT = 3.4  # [in]
 WHOLE, ROBOT, BARS = (0.0, 0.0, 1.0, 0.94), (-0.02, 0.0, 0.7, 0.96), (0.78, 0.2, 0.19, 0.6)  # axes in the sheet
-ABOVE, BELOW = (-0.05, 0.42, 1.1, 0.52), (0.2, 0.1, 0.75, 0.3)  # position of the axes in a narrow sheet
+ABOVE, BELOW = (-0.05, 0.42, 1.05, 0.52), (0.2, 0.1, 0.75, 0.3)  # position of the axes in a narrow sheet
 MOST_LIMITS: Final = 10  # largest number of separate bars
 REST: Final = "others"
 
@@ -94,8 +98,7 @@ def slice(space: Workspace, normal: str = "z", at: float | None = None, ax: Axes
         ax.text(0.5, 0.5, "outside the workspace", transform=ax.transAxes, ha="center", fontsize=current().label)
     else:
         levels = round_levels(float(cut.margin[(cut.level >= 0.0) & np.isfinite(cut.margin)].max(initial=0.0)))
-        _draw_regions(ax, cut, space, levels)
-        _draw_lines(ax, cut, levels)
+        _draw_regions(ax, cut, space, levels, _draw_lines(ax, cut, levels))
     place = f"{AXES[plane.normal]} = {n(plane.at, unit='m')}"
     set_heading(ax, f"{space.robot.name}, {place}; {space.wrenches}; {space.orientations}")
     return ax
@@ -141,8 +144,8 @@ def _shade(color: tuple[int, int, int]) -> Color:
     return red / 255.0, green / 255.0, blue / 255.0
 
 
-def _draw_regions(ax: Axes, cut: Slice, space: Workspace, levels: Array) -> None:
-    """Pale colors by the limit, each region with its name; gray outside."""
+def _draw_regions(ax: Axes, cut: Slice, space: Workspace, levels: Array, numbers: Sequence[Text]) -> None:
+    """Pale colors by the limit, each region with its name beside the numbers of the lines; gray outside."""
     ax.set_facecolor(OUTSIDE)
     inside = ax.contourf(cut.across, cut.up, cut.level, levels=[0.0, np.inf], colors=["white"], zorder=0.8)
     pairs = np.stack((cut.criterion, cut.cable), axis=-1).reshape(-1, 2)
@@ -154,9 +157,12 @@ def _draw_regions(ax: Axes, cut: Slice, space: Workspace, levels: Array) -> None
         cut.across, cut.up, PALE * colors[region] + 1.0 - PALE, shading="nearest", rasterized=True, zorder=0.9
     )
     image.set_clip_path(inside.get_paths()[0], ax.transData)
+    figure: Any = ax.get_figure(root=True)
+    figure.draw_without_rendering()  # this computes the size of the slice on the sheet
+    boxes = [number.get_window_extent() for number in numbers]
     free = (cut.level >= 0.0) & ~_on_lines(cut.margin, levels)
     for k, key in enumerate(keys):
-        _name_region(ax, cut, (region == k) & (cut.level >= 0.0), free, _limit_name(key, space))
+        _name_region(ax, cut, (region == k) & (cut.level >= 0.0), free, _limit_name(key, space), boxes)
 
 
 def _on_lines(margin: Array, levels: Array) -> Flags:
@@ -168,14 +174,22 @@ def _on_lines(margin: Array, levels: Array) -> Flags:
     return passed
 
 
-def _name_region(ax: Axes, cut: Slice, within: Flags, free: Flags, name: str) -> None:
-    """Write the name in the middle of each sufficiently large part, between lines if possible."""
+def _name_region(ax: Axes, cut: Slice, within: Flags, free: Flags, name: str, boxes: Sequence[BboxBase]) -> None:
+    """Write the name in the middle of each sufficiently large part, between lines if possible, and over no box."""
     parts, count = label(within)
     figure: Any = ax.get_figure(root=True)
-    figure.draw_without_rendering()  # this computes the size of the slice on the sheet
     points = ax.bbox.width * 72.0 / figure.dpi / cut.across.size
+    written = ax.text(0.0, 0.0, name, fontsize=current().tick, ha="center", va="center", path_effects=HALO, zorder=3.0)
+    toward = ax.transData.inverted()
+    half = 0.5 * np.ptp(written.get_window_extent().transformed(toward).get_points(), axis=0)
+    written.remove()
+    clear = np.ones(within.shape, dtype=bool)
+    for box in boxes:
+        low, high = box.transformed(toward).get_points() + np.outer((-1.0, 1.0), half)
+        across = (low[0] < cut.across) & (cut.across < high[0])
+        clear &= ~np.outer((low[1] < cut.up) & (cut.up < high[1]), across)
     for part in range(1, count + 1):
-        for area in ((parts == part) & free, parts == part):
+        for area in ((parts == part) & free & clear, (parts == part) & clear):
             depth = distance_transform_edt(np.pad(area, 1))[1:-1, 1:-1]
             row, column = np.unravel_index(int(np.argmax(depth)), depth.shape)
             if points * depth[row, column] >= ROOM:
@@ -184,16 +198,18 @@ def _name_region(ax: Axes, cut: Slice, within: Flags, free: Flags, name: str) ->
                 break
 
 
-def _draw_lines(ax: Axes, cut: Slice, levels: Array) -> None:
-    """Boundary, and contour lines of the margin inside."""
+def _draw_lines(ax: Axes, cut: Slice, levels: Array) -> Sequence[Text]:
+    """Boundary, and contour lines of the margin inside; returns their numbers."""
+    numbers: Sequence[Text] = ()
     if levels.size:
         margin = np.ma.masked_where((cut.level < 0.0) | ~np.isfinite(cut.margin), cut.margin)
         drawn = ax.contour(cut.across, cut.up, margin, levels=levels, colors="0.25", linewidths=0.7, zorder=2.0)
-        for text in ax.clabel(
-            drawn, fmt=lambda value: n(value, unit="N"), fontsize=current().tick - 1.0, inline_spacing=3
-        ):
-            text.set_path_effects([*HALO])
+        size = current().tick - 1.0
+        numbers = ax.clabel(drawn, fmt=lambda value: n(value, unit="N"), fontsize=size, inline_spacing=3)
+        for number in numbers:
+            number.set_path_effects([*HALO])
     ax.contour(cut.across, cut.up, cut.level, levels=[0.0], colors="black", linewidths=2.2, zorder=2.5)
+    return numbers
 
 
 def round_levels(largest: float) -> Array:
@@ -240,7 +256,9 @@ def workspace(space: Workspace) -> Figure:
     _draw_hull(ax, space, colors)
     points = np.concatenate((points, space.surface.vertices))
     format_space_axes(ax, points, "")
-    ax.set_box_aspect([np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim()), np.ptp(ax.get_zlim())], zoom=ZOOM)
+    ax.set_box_aspect(
+        [np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim()), np.ptp(ax.get_zlim())], zoom=0.86 if narrow else 1.0
+    )
     for each in ax.get_children():
         each.set_clip_on(False)
     set_heading(figure, f"{space.robot.name}: {amount_of(space)}; {space.wrenches}; {space.orientations}")
@@ -303,7 +321,7 @@ def _draw_bars(ax: Axes, space: Workspace, colors: dict[Key, tuple[float, float,
     ax.bar_label(drawn, fmt="%.0f %%", fontsize=current().tick, padding=2.0)
     ax.set_yticks(range(len(bars)), labels=names, fontsize=current().tick)
     ax.invert_yaxis()
-    ax.set_xlabel("share of the boundary [%]", fontsize=current().label)
+    ax.set_xlabel("share of the boundary [%]", fontsize=current().label, x=1.0, ha="right")
     ax.set_xlim(0.0, 1.25 * max(shares))
     ax.tick_params(labelsize=current().tick, length=3.0, width=0.6)
     ax.spines[["top", "right"]].set_visible(False)

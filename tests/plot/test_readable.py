@@ -1,0 +1,106 @@
+"""Figures of every command and of every example: axes with units, and texts that are neither cut nor over others."""
+
+from __future__ import annotations
+
+import doctest
+from contextlib import nullcontext
+from pathlib import Path
+from typing import Any
+
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from typer.testing import CliRunner
+
+import sagline as sl
+from sagline.cli.main import app
+from tests.plot.readable import defects
+from tests.tiers import extended, wide
+
+EXAMPLES = (
+    "drawing", "energy", "error", "errors", "frequencies", "frequency_map", "lengths", "overview", "path", "polygon",
+    "response", "robot", "slice", "small_multiples", "tensions", "velocity", "workspace",
+)  # fmt: skip
+COMMANDS = {
+    "track cogiro own_path.yaml": 4,
+    "tension ipanema-1": 1,
+    "run": 7,
+    "tension cogiro": 1,
+    "vibrate cogiro": 1,
+    "vibrate cogiro --map 3x3x2 --up-to 2": 2,
+    "simulate cogiro --break 3@1s": 1,
+    "workspace cogiro --cells 12": 2,
+    "workspace own_planar.yaml --cells 12": 1,
+    "design winches_robot.yaml design.yaml --evaluations 40": 1,
+    "calibrate winches_robot.yaml winches.csv --plot calibration.png": 1,
+    "article": 65,
+}
+
+
+@pytest.fixture
+def figures(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
+    """All figures that are written during the test."""
+    found, plain = list[Figure](), Figure.savefig
+
+    def note(figure: Figure, *arguments: Any, **named: Any) -> None:
+        if figure not in found:
+            found.append(figure)
+        plain(figure, *arguments, **named)
+
+    monkeypatch.setattr(Figure, "savefig", note)
+    return found
+
+
+@pytest.mark.parametrize(("command", "count"), wide(COMMANDS.items()))
+def test_figures_of_commands(
+    command: str, count: int, figures: list[Figure], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    run = CliRunner().invoke
+    assert run(app, ["examples", "--out", "."]).exit_code == 0
+    result = run(app, command.split())
+    assert result.exit_code == 0, result.stderr
+    assert len(figures) == count
+    assert {k: found for k, figure in enumerate(figures) if (found := defects(figure))} == {}
+
+
+@extended
+@pytest.mark.parametrize("style", [None, "ieee", "mdpi"])
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_figures_of_examples(name: str, style: str | None) -> None:
+    function = getattr(sl.plot, name)
+    test, space = doctest.DocTestFinder(recurse=False).find(function, name)[0], dict[str, Any]()
+    test.globs = space
+    with sl.plot.style(style) if style else nullcontext():
+        doctest.DocTestRunner().run(test, clear_globs=False)
+    drawn = {id(one): one for value in space.values() if (one := figure_of(value)) is not None}
+    assert drawn
+    assert [defect for figure in drawn.values() for defect in defects(figure)] == []
+
+
+def figure_of(value: object) -> Figure | None:
+    """The figure of an object that is one or belongs to one."""
+    if isinstance(value, Axes):
+        return value.get_figure(root=True)
+    return value if isinstance(value, Figure) else None
+
+
+@pytest.mark.parametrize(
+    ("spoil", "part"),
+    [
+        (lambda figure: figure.axes[1].tick_params(axis="y", labelleft=False), "no numbers"),
+        (lambda figure: figure.axes[3].set_ylabel(""), "no label"),
+        (lambda figure: figure.axes[2].set_ylabel("tension"), "no unit"),
+        (lambda figure: figure.text(0.99, 0.5, "a long remark"), "cut"),
+        (lambda figure: [figure.text(0.5, 0.5, text) for text in ("one", "other")], "is over"),
+        (lambda figure: figure.axes[0].legend([figure.axes[0].lines[0]] * 2, ["one", "other"]), "looks like"),
+    ],
+)
+def test_a_spoiled_figure_has_its_defect(spoil: Any, part: str) -> None:
+    plan = sl.inverse(sl.load_robot("cogiro"), sl.quintic_path([(0, 0, 1.5), (2, 1, 2.5)], speed=1.0))
+    figure = sl.plot.overview(plan)
+    assert defects(figure) == []
+    spoil(figure)
+    found = defects(figure)
+    assert len(found) == 1
+    assert part in found[0]
