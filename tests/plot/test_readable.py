@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 import sagline as sl
 from sagline.cli.main import app
 from tests.plot.readable import defects
-from tests.tiers import extended, wide
+from tests.tiers import extended
 
 EXAMPLES = (
     "drawing", "energy", "error", "errors", "frequencies", "frequency_map", "lengths", "overview", "path", "polygon",
@@ -51,7 +51,8 @@ def figures(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
     return found
 
 
-@pytest.mark.parametrize(("command", "count"), wide(COMMANDS.items()))
+@extended
+@pytest.mark.parametrize(("command", "count"), COMMANDS.items())
 def test_figures_of_commands(
     command: str, count: int, figures: list[Figure], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
