@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -45,3 +47,17 @@ def test_tensions_are_those_that_move_the_platform_damping_included(
     moved = robot.mass * (run.twist[2:, :3] - run.twist[:-2, :3]) / (2.0 * step)
     off = np.abs(pulled[1:-1] - moved).max()
     assert off < 1e-3
+
+
+def test_losses_of_cables_with_mass_do_not_limit_the_step() -> None:
+    state = sl.inverse(sl.load_robot("cogiro"), sl.Pose((0.0, 0.0, 2.0), np.eye(3))).state
+    given: dict[str, Any] = {"duration": 0.06, "cable_mass": "lumped", "nodes": 8, "events": [sl.Break(0, 0.01)]}
+    free = sl.simulate(state, **given)
+    run = sl.simulate(state, damping=sl.Damping(loss_time=1e-2), **given)
+    assert run.step == free.step
+    fine = sl.simulate(state, damping=sl.Damping(loss_time=1e-2), step=run.step / 8, record=0.01, **given)
+    moved = np.abs(fine.pose.position - free.pose.position).max()
+    assert np.abs(run.pose.position - fine.pose.position).max() < 0.01 * moved
+    assert run.energy.lost[-1] == pytest.approx(fine.energy.lost[-1], rel=5e-3)
+    assert run.energy.lost[-1] > 0.1
+    assert np.abs(run.energy.error).max() < 1e-2 * run.energy.lost[-1]

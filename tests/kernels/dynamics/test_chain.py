@@ -122,7 +122,7 @@ def test_a_birth_leaves_the_tension_and_without_dead_cable_the_center_of_mass(be
 
 def looked_at(chain: Chain, time: float = 0.0) -> Array:
     """Power lost, strain energy, that of heights, kinetic, H, a moment later at constant speeds [W, J, J, J, N]."""
-    place, speed, pulls, seen = chain.place.copy(), chain.speed.copy(), np.zeros(ROOM), np.zeros(5)
+    place, speed, pulls, seen = chain.place.copy(), chain.speed.copy(), np.zeros(3 * ROOM), np.zeros(5)
     place[:, : chain.free + 1] += time * speed[:, : chain.free + 1]
     look(place, speed, chain.free, chain._replace(rest=chain.rest + time * chain.rate).known, pulls, seen)
     return seen

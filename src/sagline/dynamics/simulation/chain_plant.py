@@ -137,7 +137,7 @@ class ChainPlant(Plant):
             table,
             place,
             np.zeros_like(place),
-            np.zeros((m, capacity)),
+            np.zeros((m, 3 * capacity)),
             np.full(m, nodes - 1, dtype=np.int64),
         ]
         self._stock = np.full(2, np.nan)
@@ -171,6 +171,7 @@ class ChainPlant(Plant):
         given = tuple(table.arrays for table in inputs)
         _integrator, kind, remembered, _work, stride = rules
         step, _loss_time, _air, filtering = numbers
+        self._chains[0][:, c.STEP] = step
         self._chains[0][:, c.SMOOTH] = 1.0 - np.exp(-step / (TRAVELS * self._travel[self.cables]))
         return (
             (kind, remembered, stride),

@@ -235,11 +235,14 @@ def time_step(
     events: Any,
     waves: float = 0.0,
 ) -> float:
-    """Checked step [s] for the lightest platform after all events; waves: highest frequency of the cables [rad/s]."""
+    """Checked step [s] for the lightest platform after all events; waves: highest frequency of the cables [rad/s].
+
+    Losses limit the step of massless cables only: those of cables with mass are implicit.
+    """
     robot, lengths = given.robot, given.lengths.value
     platform = platform_frequency(robot, given.poses, lengths) * _lightness(robot.mass, events)
     highest = frequency_with_winches(platform, kind, plant.data, lengths, robot.cables.axial_stiffness)
-    return checked_step(step, code, highest, losses, kind == d.DRUMS, waves)
+    return checked_step(step, code, highest, losses if waves == 0.0 else Damping(), kind == d.DRUMS, waves)
 
 
 def _lightness(mass: float, events: tuple[Event, ...]) -> float:

@@ -37,7 +37,8 @@ WIND = 10  # force of the wind per length and square of the speed [N s^2/m^3]
 SMOOTH = 11  # share of a new value in the filtered mean tension that detects a slack cable
 GRAVITY = 12  # [m/s^2]
 REST, RATE = 13, 14  # unstrained length of the element at the frame [m], and rate of the cable that is let out [m/s]
-CHAIN_COLUMNS = 15
+STEP = 15  # time step, in which damping forces act [s]
+CHAIN_COLUMNS = 16
 
 LEAST, MOST = 0.4, 1.6  # limits of the length of the element at the frame, relative to the other elements
 TINY = 1e-300
@@ -48,7 +49,7 @@ def fill_element_forces(place: Array, speed: Array, count: int, row: Array, pull
     """Fill the force of every element divided by its length [N/m]; returns the power that they lose [W].
 
     place: of the nodes [m], (3, nodes): node 0 is at the platform, node count + 1 at the frame; speed: of the nodes
-    [m/s], used if the elements have damping; pulls: filled, (elements,).
+    [m/s], used if the elements have damping; pulls: filled, then two rows of work, (3 nodes,).
     """
     element, stiffness = row[ELEMENT], row[STIFFNESS]
     inverse = 1.0 / element
@@ -82,26 +83,55 @@ def _element_distance(place: Array, j: int) -> float:
 
 @kernel
 def _add_damping(place: Array, speed: Array, count: int, row: Array, pulls: Array) -> float:
-    """Add the damping force of every taut element, which never pushes; returns the power lost [W]."""
+    """Add the damping force of every taut element, which never pushes; returns the power lost [W].
+
+    The forces are those at the speeds after a step in which they act alone (implicit Euler), so that they limit no
+    step. They are the solution of a tridiagonal system, because an element changes the speeds of its two nodes. The
+    platform and the frame node keep their speeds.
+    """
+    size = place.shape[1]
     viscous = row[STIFFNESS] * row[LOSS_TIME]
-    power = 0.0
+    inner = row[STEP] / (row[DENSITY] * row[ELEMENT])
+    last = row[STEP] / (0.5 * row[DENSITY] * (row[ELEMENT] + row[REST]))
+    ux = uy = uz = value = 0.0  # direction of the element before, and its right side after elimination
+    diagonal = 1.0
     for j in range(count + 1):
-        length = row[REST] + row[BEHIND] if j == count else row[ELEMENT]
-        x = place[0, j + 1] - place[0, j]
-        y = place[1, j + 1] - place[1, j]
-        z = place[2, j + 1] - place[2, j]
-        square = x * x + y * y + z * z + TINY
+        x, y, z = place[0, j + 1] - place[0, j], place[1, j + 1] - place[1, j], place[2, j + 1] - place[2, j]
+        inverse = 1.0 / math.sqrt(x * x + y * y + z * z + TINY)
+        x, y, z = x * inverse, y * inverse, z * inverse
         along = (
             x * (speed[0, j + 1] - speed[0, j])
             + y * (speed[1, j + 1] - speed[1, j])
             + z * (speed[2, j + 1] - speed[2, j])
         )
-        # d(strain)/dt; the frame node has the velocity of the entering cable, which includes the change of the rest
-        # length
-        slope = along / (math.sqrt(square) * length)
+        near = 0.0 if j == 0 else (last if j == count else inner)
+        far = 0.0 if j == count else (last if j == count - 1 else inner)
+        taut = pulls[j] > 0.0
+        coupling = -near * (ux * x + uy * y + uz * z) if taut else 0.0
+        factor = coupling / diagonal
+        length = row[REST] + row[BEHIND] if j == count else row[ELEMENT]
+        diagonal = length / viscous + near + far - coupling * factor
+        value = (along - coupling * value) / diagonal if taut else 0.0
+        ux, uy, uz = (x, y, z) if taut else (0.0, 0.0, 0.0)  # slack elements do not couple their neighbors
+        pulls[size + j], pulls[2 * size + j] = factor, value
+    power = 0.0
+    force = 0.0
+    for back in range(count + 1):
+        j = count - back
+        factor = pulls[size + j + 1] if back > 0 else 0.0
+        force = pulls[2 * size + j] - factor * force
+        x, y, z = place[0, j + 1] - place[0, j], place[1, j + 1] - place[1, j], place[2, j + 1] - place[2, j]
+        distance = math.sqrt(x * x + y * y + z * z + TINY)
+        along = (
+            x * (speed[0, j + 1] - speed[0, j])
+            + y * (speed[1, j + 1] - speed[1, j])
+            + z * (speed[2, j + 1] - speed[2, j])
+        ) / distance
+        length = row[REST] + row[BEHIND] if j == count else row[ELEMENT]
+        # the frame node has the velocity of the entering cable, which includes the change of the rest length
         before = pulls[j]
-        after = max(before + viscous * slope / math.sqrt(square), 0.0) if before > 0.0 else 0.0
-        power += (after - before) * math.sqrt(square) * slope * length
+        after = max(before + force / distance, 0.0) if before > 0.0 else 0.0
+        power += (after - before) * distance * 0.5 * (along + force * length / viscous)
         pulls[j] = after
     return power
 

@@ -35,7 +35,7 @@ class _Chains(NamedTuple):
     table: Array  # parameters of the chains, (m, CHAIN_COLUMNS)
     place: Array  # positions of the nodes [m], (m, 3, P)
     speed: Array  # velocities of the nodes [m/s], (m, 3, P)
-    pulls: Array  # element forces divided by element lengths [N/m], (m, P)
+    pulls: Array  # element forces divided by element lengths [N/m], and work, (m, 3 P)
     counts: Indices  # numbers of free nodes, (m,)
 
 
