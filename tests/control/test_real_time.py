@@ -1,10 +1,12 @@
 """Ticks that do not drift, and how late they were, on a clock that the test turns."""
 
+import os
 import time
 
 import pytest
 
-from sagline.control.real_time import Histogram, Pace
+from sagline.control.real_time import Histogram, Pace, set_priority
+from sagline.core.errors import InvalidValueError
 
 
 class Clock:
@@ -53,6 +55,29 @@ def test_a_cycle_that_took_too_long_is_told_and_missed_ticks_do_not_come_in_a_bu
     assert pace.wait() == 0.0
     assert clock.now - before == pytest.approx(0.01, abs=1e-9)
     assert pace.lateness.longest == pytest.approx(0.04, abs=1e-9)
+
+
+def test_a_priority_is_that_of_the_system_and_a_missing_right_names_the_command(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: list[tuple[int, int, int]] = []
+
+    def schedule(process: int, policy: int, given: os.sched_param) -> None:
+        asked.append((process, policy, given.sched_priority))
+        if given.sched_priority > 50:
+            raise PermissionError(1, "Operation not permitted")
+
+    monkeypatch.setattr(os, "sched_setscheduler", schedule)
+    set_priority(50)
+    assert asked == [(0, os.SCHED_FIFO, 50)]
+    with pytest.raises(InvalidValueError, match="--rtprio=51"):
+        set_priority(51)
+    for wrong in (0, 100, True):
+        with pytest.raises(InvalidValueError, match="1 to 99"):
+            set_priority(wrong)
+    monkeypatch.delattr(os, "sched_setscheduler")
+    with pytest.raises(InvalidValueError, match="Linux"):
+        set_priority(50)
 
 
 def test_quantiles_are_the_ends_of_their_bins() -> None:

@@ -8,7 +8,7 @@ from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from sagline.cli.options import ModbusOption, RobotArgument, flag, option
+from sagline.cli.options import ModbusOption, PriorityOption, RobotArgument, flag, option
 
 if TYPE_CHECKING:
     from sagline.control.link import Link
@@ -23,6 +23,7 @@ def control(
     modbus: ModbusOption = False,
     shadow: Annotated[bool, flag("Read and log only; nothing is sent.", "--shadow")] = False,
     log: Annotated[Path | None, option("FILE", "Write the log to an MCAP file, run.mcap.")] = None,
+    priority: PriorityOption = None,
 ) -> int:
     """Control a machine: connect, home, follow paths, until quit.
 
@@ -39,10 +40,12 @@ def control(
     """
     from sagline.cli.session import OperatorSession
     from sagline.control.controller import Controller
-    from sagline.control.real_time import Pace
+    from sagline.control.real_time import Pace, set_priority
     from sagline.files.robot_file import load_robot
 
     robot = load_robot(name)
+    if priority is not None:
+        set_priority(priority)  # before the threads of link and log, which inherit it
     with ExitStack() as stack:
         link = stack.enter_context(closing(_link(robot, plc, modbus=modbus)))
         record = None

@@ -197,4 +197,7 @@ AirDampingOption = Annotated[
     quantity_option("NUMBER", "Air damping of a cable per length and velocity [N s/m^2].", "N*s/m^2", low=0.0),
 ]
 ModbusOption = Annotated[bool, flag("Use Modbus TCP instead of S7.", "--modbus")]
+PriorityOption = Annotated[
+    int | None, option("NUMBER", "Schedule in real time (SCHED_FIFO of Linux) with this priority, 1 to 99.")
+]
 SeedOption = Annotated[str, option("NUMBER", "Seed of the load cells' noise.")]

@@ -9,7 +9,7 @@ from pathlib import Path
 from socket import gethostname
 from typing import TYPE_CHECKING, Annotated, Final
 
-from sagline.cli.options import ModbusOption, RobotArgument, SeedOption, converted_option, option
+from sagline.cli.options import ModbusOption, PriorityOption, RobotArgument, SeedOption, converted_option, option
 from sagline.cli.terminal import show_note, show_text
 
 if TYPE_CHECKING:
@@ -58,6 +58,7 @@ def twin(
         ),
     ] = None,
     log: Annotated[Path | None, option("FILE.mcap", "Write the true pose of the platform, until Ctrl-C.")] = None,
+    priority: PriorityOption = None,
 ) -> int:
     """Simulate plant, drives and PLCs of a robot in real time, until Ctrl-C.
 
@@ -72,6 +73,7 @@ def twin(
         sagline twin article-prototype --modbus --port 5020
     """
     from sagline.cli.values import whole_of
+    from sagline.control.real_time import set_priority
     from sagline.files.robot_file import load_robot
     from sagline.twin.machine import MOST_SEED, Machine
     from sagline.twin.server import SCAN, Server
@@ -79,6 +81,8 @@ def twin(
     robot = load_robot(name)
     real = robot if true is None else load_robot(true)
     noise = whole_of(seed, "--seed", 0, MOST_SEED)
+    if priority is not None:
+        set_priority(priority)
     with ExitStack() as stack:
         machine = Machine(real, nominal=robot, seed=noise, period=SCAN, faults=tuple(faults or ()))
         server = stack.enter_context(closing(Server(machine, host=host, port=port, modbus=modbus)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import os
 import signal
 import threading
 import time
@@ -20,6 +21,7 @@ from sagline.control.homing import Homing
 from sagline.control.jogging import PlatformJog, winch_jog
 from sagline.control.link import PERIOD
 from sagline.control.set_points import SetPoint, standing_at
+from sagline.core.arguments import whole_number
 from sagline.core.arrays import Array, Indices, locked, number
 from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.motion.rest_to_rest import septic_path
@@ -111,6 +113,27 @@ class Pace:
         self._began = now
         self._next = (now if late > self.period else self._next) + self.period
         return late
+
+
+def set_priority(priority: int) -> None:
+    """Schedule this thread, and the threads and processes that it starts, in real time (SCHED_FIFO of Linux).
+
+    Args:
+        priority: 1 to 99; the kernel's own threads have 50.
+
+    Raises:
+        InvalidValueError: If the priority is out of its range, the right is missing, or this system has no such
+            scheduler.
+    """
+    level = whole_number(priority, "priority", 1, 99)
+    if not hasattr(os, "sched_setscheduler"):
+        raise InvalidValueError("priority", level, "none: only Linux has this scheduler", "Run without a priority.")
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(level))
+    except OSError as error:
+        allowed = f"up to the limit that ulimit -r shows ({error.strerror})"
+        step = f"Raise the limit of this shell: sudo prlimit --pid $$ --rtprio={level}"
+        raise InvalidValueError("priority", level, allowed, step) from None
 
 
 class Garbage:
