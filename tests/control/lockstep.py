@@ -126,7 +126,7 @@ def _without(sample: Sample, before: Sample, lost: Flags, age: Array) -> Sample:
     old = {
         name: np.where(both if value.size == 8 else lost, getattr(before, name), value)
         for name, value in sample._asdict().items()
-        if name not in ("time", "age")
+        if name not in ("time", "age", "reasons")
     }
     return Sample(sample.time, age + 0.004, **old)
 

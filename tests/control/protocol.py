@@ -8,6 +8,7 @@ from sagline.control.link import (
     RAMP,
     GroupFault,
     GroupStatus,
+    Refusal,
     WinchState,
 )
 
@@ -19,5 +20,6 @@ __all__ = [
     "RAMP",
     "GroupFault",
     "GroupStatus",
+    "Refusal",
     "WinchState",
 ]

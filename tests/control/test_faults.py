@@ -13,7 +13,7 @@ import pytest
 import sagline as sl
 from sagline.control.evidence import Cycle, Reaction
 from sagline.control.faults import FAULT_TABLE, FAULTS, faults_of
-from sagline.control.link import GroupFault, GroupStatus, Mode, Sample, WinchState
+from sagline.control.link import GroupFault, GroupStatus, Mode, Refusal, Sample, WinchState
 from sagline.core.arrays import Array
 from tests.control.lockstep import OWNER, ROBOT, Change, course, cycles, one, told, with_sample
 from tests.refusal import refused
@@ -43,7 +43,7 @@ def silent(group: int, count: int, start: int = START) -> Change:
         old = {
             name: np.where(mine[value.size], getattr(last[0], name), value)
             for name, value in cycle.sample._asdict().items()
-            if name not in ("time", "age")
+            if name not in ("time", "age", "reasons")
         }
         age = one(cycle.sample.age, group, 0.004 + 0.01 * (k - start + 1))
         return cycle._replace(sample=Sample(cycle.sample.time, age, **old))
@@ -486,6 +486,20 @@ def test_a_group_that_stops_by_itself_with_locked_drums_says_both(snapshot: Any)
     locked = int(GroupStatus.READY | GroupStatus.LOCKED | GroupStatus.BRAKED)
     found = told(both(field("status", 2, locked), field("fault", 2, GroupFault.FOLLOWING_ERROR)), 60)
     assert found[0].line == snapshot
+
+
+def test_a_discarded_block_is_told_with_the_reason_and_the_next_step_of_its_link() -> None:
+    def bad(reasons: tuple[Refusal | None, ...]) -> str:
+        def change(k: int, cycle: Cycle) -> Cycle:
+            counts = one(cycle.sample.discarded, 2, max(k - START, 0))
+            return with_sample(cycle, discarded=counts, reasons=reasons)
+
+        return told(change, 60)[0].line
+
+    line = bad((None, None, Refusal("torn", "Load"), None))
+    assert line.startswith("group 2:")
+    assert [word in line for word in ("1", "torn.", "Load.")] == [True] * 3
+    assert "network" not in bad(())
 
 
 def test_two_bursts_of_bad_blocks_are_two_events() -> None:

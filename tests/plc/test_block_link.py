@@ -12,11 +12,12 @@ import pytest
 from sagline.control import Mode, Sample
 from sagline.plc import block_link
 from sagline.plc.block_link import BlockLink, GroupThread
-from sagline.plc.blocks import CLAIM, FROM_PLC, TO_PLC, Block, Refusal
+from sagline.plc.blocks import CLAIM, FROM_PLC, TO_PLC, Block
 from sagline.plc.modbus_link import ModbusWire
 from sagline.plc.s7_link import S7Wire
 from sagline.plc.wire import WireError
 from tests.control.protocol import OWNER_TIMEOUT
+from tests.plc.protocol import Refusal
 from tests.plc.samples import (
     a_command,
     a_sample,
@@ -107,11 +108,28 @@ def next_discarded(link: BlockLink, group: int) -> Sample:
     return taken(link)
 
 
-@pytest.mark.parametrize("spoil", wide([torn, foreign, of_another_version, of_another_group, repeated, older]))
-def test_a_block_that_is_no_news_is_counted_and_the_age_goes_on(spoil: Callable[[bytearray], None]) -> None:
+NO_NEWS: list[tuple[Callable[[bytearray], None], str]] = [
+    (torn, "is torn"),
+    (foreign, "program"),
+    (of_another_version, "layout 3"),
+    (of_another_group, "group 0"),
+    (repeated, "repeated"),
+    (older, "9 after 10"),
+]
+
+
+@pytest.mark.parametrize(("spoil", "reason"), wide(NO_NEWS))
+def test_a_block_that_is_no_news_is_counted_with_its_reason_and_the_age_goes_on(
+    spoil: Callable[[bytearray], None], reason: str
+) -> None:
     with plcs(S7, status(10)) as servers, linked(S7, servers) as link:
         servers.publish(bad(11, spoil))
         sample = next_discarded(link, 2)
+        found = sample.reasons[2]
+        assert sample.reasons == (None, None, found, None)
+        assert found is not None
+        assert reason in found.reason
+        assert found.next_step not in ("", found.reason)
         until(lambda: np.all(taken(link).counter == [11, 11, 10, 11]))
         assert taken(link).age[2] >= sample.age[2]
         np.testing.assert_array_equal(taken(link).length[4:6], status(10).length[4:6])

@@ -14,11 +14,11 @@ from sagline.plc.blocks import (
     TO_PLC,
     TYPES,
     Block,
-    Refusal,
     claim_block,
     command_blocks,
     sample_of,
 )
+from tests.plc.protocol import Refusal
 from tests.plc.samples import a_command, a_sample, sample_blocks
 
 

@@ -232,6 +232,7 @@ def test_a_group_of_which_nothing_new_comes(words: str) -> None:
     assert {float(sample.length[4]) for sample in after[:12]} == {float(before[-1].length[4])}
     discarded = 0 if words == "is silent" else 12
     assert after[-1].discarded.tolist() == [0, 0, discarded, 0]
+    assert [reason is not None for reason in after[-1].reasons] == [False, False, discarded > 0, False]
     if words == "repeats":
         assert np.abs(ages[12:, 2]).max() < 1e-9
     assert after[-1].counter[2] > before[-1].counter[2]
@@ -256,6 +257,8 @@ def test_blocks_that_come_twice_or_change_places_do_no_harm() -> None:
     ages = np.array([sample.age[2] for sample in swapped])
     np.testing.assert_allclose(ages, np.tile([PERIOD, 0.0], 30), atol=1e-9)
     assert swapped[-1].discarded.tolist() == [0, 0, 30, 0]
+    assert "repeated" in str(twice[-1].reasons[2])
+    assert "older" in str(swapped[-1].reasons[2])
 
 
 @pytest.mark.parametrize("words", wide(["are foreign", "stop", "repeat", "are torn"], first=2))

@@ -12,7 +12,7 @@ from sagline.control.context import Context
 from sagline.control.execution import ExecutionStatus
 from sagline.control.homing import Homing, HomingJog, jog_tension_limits
 from sagline.control.jogging import PlatformJog
-from sagline.control.link import Missing, Mode, Sample
+from sagline.control.link import CHECK, Missing, Mode, Sample
 from sagline.control.recording import EventKind
 from sagline.control.set_points import Along, Ramp, SetPoint, SetPointSource, Standing
 from sagline.control.states import RefusedError, State
@@ -232,7 +232,7 @@ class HomingState(ActiveState):
         stale = ~(sample.age <= FRESH * c.period)
         if stale.any():
             g = int(np.argmax(stale))
-            return f"group {g} has been silent for {sample.age[g]:.2g} s. Check its PLC and the network"
+            return f"group {g} has been silent for {sample.age[g]:.2g} s. {CHECK}"
         if c.degraded:
             return "a load cell is not reliable. Check the cells, then home again"
         limit = self._largest_tension

@@ -7,6 +7,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from sagline.control.link import (
+    CHECK,
     COUNTERS,
     HEARTBEAT,
     OWNER_TIMEOUT,
@@ -117,7 +118,7 @@ def disagreement(
     codes = sorted({int(code) for code in sample.fault} - {0})
     stops = f"its PLC has stopped it: {'; '.join(map(fault_text, codes))}"
     causes: tuple[tuple[Flags, str, str, bool], ...] = (
-        (~(sample.age <= FRESH * period), f"silent for {age:.2g} s", "Check its PLC and the network.", False),
+        (~(sample.age <= FRESH * period), f"silent for {age:.2g} s", f"{CHECK}.", False),
         (
             (status & _PRESSED) != 0,
             "the emergency stop is pressed",
@@ -166,7 +167,7 @@ class Claim:
             self._silent += 1
             if self._silent * self._period >= SILENT:
                 reason = "; ".join(f"group {g}: {why}" for g, why in zip(*answer[1:], strict=True))
-                self._refuse(Disagreement(reason, "Check the PLCs and the network, then try again."))
+                self._refuse(Disagreement(reason, f"{CHECK}, then try again."))
             return
         self._cycles += 1
         if self._waiting:

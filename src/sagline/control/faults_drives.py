@@ -10,7 +10,7 @@ import numpy as np
 from sagline.control.commands import BEHIND
 from sagline.control.evidence import Cycle, Evidence, Fault, Reaction
 from sagline.control.extrema import finite, largest
-from sagline.control.link import COUNTERS, Command, GroupStatus, Mode, Sample, WinchState, newer
+from sagline.control.link import CHECK, COUNTERS, Command, GroupStatus, Mode, Sample, WinchState, newer
 from sagline.core.arrays import Array
 
 JUMP: Final = 1e-3  # largest jump [m per cycle]
@@ -176,8 +176,7 @@ class NotFollowing(Fault):
             missed = behind[g] - round(float(sample.age[g]) / self.seen.period)  # without later ones
             if missed > BEHIND:
                 return (
-                    f"group {g} has taken no command for {missed} cycles; allowed: {BEHIND}. "
-                    "Check its PLC and the network, then acknowledge."
+                    f"group {g} has taken no command for {missed} cycles; allowed: {BEHIND}. {CHECK}, then acknowledge."
                 )
             if self._idles(cycle, g) > IDLE:
                 return (

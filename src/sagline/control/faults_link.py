@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from sagline.control.evidence import Cycle, Evidence, Fault, Reaction
-from sagline.control.link import GroupFault, GroupStatus, Mode, WinchState, fault_text
+from sagline.control.link import CHECK, GroupFault, GroupStatus, Mode, WinchState, fault_text
 from sagline.core.arrays import Flags
 
 STALE, SILENT = 3, 10  # largest age [cycles]
@@ -62,7 +62,7 @@ class GroupSilent(_Old):
     reaction = Reaction.STOPPING
     within = "100 ms"
     cycles = SILENT
-    step = "Check its PLC and the network, then acknowledge."
+    step = f"{CHECK}, then acknowledge."
 
 
 class BlockDiscarded(Fault):
@@ -86,9 +86,9 @@ class BlockDiscarded(Fault):
             group = int(np.argmax(sample.discarded - before.discarded))
             count = int(sample.discarded[group])
             self._quiet = 0
-            self._line = (
-                f"group {group}: a block was torn, foreign, repeated or late, {count} so far. Check the network."
-            )
+            reason = sample.reasons[group] if sample.reasons else None
+            why, step = reason or ("the link knows no reason", CHECK)
+            self._line = f"group {group}: a block was discarded, {count} so far: {why}. {step}."
         return self._line if self._quiet < WINDOW else None
 
 

@@ -18,6 +18,7 @@ GROUP_SIZE: Final = 2  # number of winches per PLC
 COUNTERS: Final = 2**31 - 1  # counters of commands and blocks run from 1 to this value, then start at 1 again
 HEARTBEAT: Final = 0.1  # [s], a PLC ramps its winches down and holds if the command counter is unchanged for this time
 OWNER_TIMEOUT: Final = 0.5  # [s], another controller may take over if the command counter is unchanged for this time
+CHECK: Final = "Check that its PLC or the twin runs, and its connection"  # next step about a silent group
 RAMP: Final = 0.2  # duration of the ramp of rates to zero, here and in a PLC [s]
 
 
@@ -98,6 +99,18 @@ class Command(NamedTuple):
     claims: bool = True
 
 
+class Refusal(NamedTuple):
+    """Reason why a block, or a PLC, cannot be used.
+
+    Attributes:
+        reason: Reason as text.
+        next_step: Next step for the reader.
+    """
+
+    reason: str
+    next_step: str
+
+
 class Sample(NamedTuple):
     """Newest data of the machine, in the caller's own arrays. G groups, m winches.
 
@@ -119,6 +132,7 @@ class Sample(NamedTuple):
         state: Codes of `WinchState`, shape (m,).
         winch_fault: Fault codes of the drives, 0 for none, shape (m,).
         discarded: Number of invalid blocks of each group so far, shape (G,).
+        reasons: Reason of the last invalid block of each group, None before the first; empty if the link knows none.
     """
 
     time: float
@@ -138,6 +152,7 @@ class Sample(NamedTuple):
     state: Whole
     winch_fault: Whole
     discarded: Whole
+    reasons: tuple[Refusal | None, ...] = ()
 
 
 class Missing(NamedTuple):
@@ -201,6 +216,15 @@ def sent_to(owner: int, command: Command) -> Sent:
 def newer(counter: int, known: int) -> bool:
     """True if a counter is ahead of another by less than half of the range."""
     return 0 < (counter - known) % COUNTERS < COUNTERS // 2
+
+
+def no_news(counter: int, known: int) -> Refusal:
+    """Reason why a block with a counter that is not ahead of the newest one is discarded."""
+    if counter == known:
+        step = "Check that its PLC runs, and that a scan takes less than a cycle"
+        return Refusal(f"its counter {counter} is repeated", step)
+    step = "Check that one PLC has this address, and that it does not restart"
+    return Refusal(f"it is older than the block before: its counter is {counter} after {known}", step)
 
 
 def groups_of(cable_count: int) -> tuple[tuple[int, ...], ...]:

@@ -165,7 +165,7 @@ class Tape:
         asked: tuple[Array, ...] = (self._no_command,)
         mode = -1
         if isinstance(answer, Sample):
-            _, age, counter, plc_time, owner, echo, status, fault, *winches, counts, state, drive, discarded = answer
+            _, age, counter, plc_time, owner, echo, status, fault, *winches, counts, state, drive, discarded, _ = answer
             read = (age, plc_time, *winches)
             codes = (counter, owner, echo, status, fault, discarded, counts, state, drive)
         if command is not None:

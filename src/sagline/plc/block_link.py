@@ -10,10 +10,22 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from sagline.control.link import HEARTBEAT, OWNER_TIMEOUT, PERIOD, Command, Missing, Sample, Sent, newer, sent_to
+from sagline.control.link import (
+    HEARTBEAT,
+    OWNER_TIMEOUT,
+    PERIOD,
+    Command,
+    Missing,
+    Refusal,
+    Sample,
+    Sent,
+    newer,
+    no_news,
+    sent_to,
+)
 from sagline.core.arrays import Array, number
 from sagline.core.errors import InvalidValueError
-from sagline.plc.blocks import CLAIM, FROM_PLC, TO_PLC, Block, Refusal, claim_block, command_blocks, sample_of
+from sagline.plc.blocks import CLAIM, FROM_PLC, TO_PLC, Block, claim_block, command_blocks, sample_of
 from sagline.plc.wire import Address, LinkError, Wire, WireError, groups_at
 from sagline.robot.robot import Robot
 
@@ -55,6 +67,7 @@ class GroupThread(Thread):
         number: Index of the group, from 0.
         newest: Newest valid block of the group; None before the first.
         discarded: Number of invalid blocks.
+        reason: Reason of the last invalid block; None before the first.
         trouble: Last error; None without an error.
         settled: Event that is set when the PLC has answered, validly or not.
     """
@@ -65,6 +78,7 @@ class GroupThread(Thread):
         self.number = number
         self.newest: _Newest | None = None
         self.discarded = 0
+        self.reason: Refusal | None = None
         self.trouble: Refusal | None = None
         self.settled = Event()
         self._winches = winches
@@ -97,9 +111,7 @@ class GroupThread(Thread):
         """Message about a PLC that has not answered for a time [s]."""
         if self._wire.reached():
             return Refusal(f"the port is open, but there was no response for {waited:g} s", "Check the port")
-        return Refusal(
-            f"no response for {waited:g} s", "Check address and cables, and that the PLC is on and in this network"
-        )
+        return Refusal(f"no response for {waited:g} s", "Check address and cables, and that the PLC or the twin runs")
 
     def run(self) -> None:
         """Exchange blocks until the end; reconnect after each failure."""
@@ -132,11 +144,14 @@ class GroupThread(Thread):
     def _take(self, data: bytes, asked: float, connected: float) -> None:
         arrived = self._clock()
         values = FROM_PLC.read(data)
-        self.trouble = values if isinstance(values, Refusal) else self._mismatch(values)
-        if isinstance(values, Refusal) or self.trouble or not self._is_newer(values["counter"], arrived, connected):
+        self.trouble = reason = values if isinstance(values, Refusal) else self._mismatch(values)
+        if not isinstance(values, Refusal):
+            reason = reason or self._no_news(values["counter"], arrived, connected)
+            if reason is None:
+                self.newest = _Newest(values, arrived, arrived - asked)
+        if reason is not None:
+            self.reason = reason
             self.discarded += 1
-        else:
-            self.newest = _Newest(values, arrived, arrived - asked)
         self.settled.set()
 
     def _mismatch(self, values: dict[str, Any]) -> Refusal | None:
@@ -153,14 +168,14 @@ class GroupThread(Thread):
             )
         return None
 
-    def _is_newer(self, counter: int, arrived: float, connected: float) -> bool:
-        """True if a block is newer than the newest; after a long silence the PLC may have restarted."""
+    def _no_news(self, counter: int, arrived: float, connected: float) -> Refusal | None:
+        """Reason why a block is not newer than the newest, or None; after a long silence the PLC may have restarted."""
         newest = self.newest
         if newest is None:
-            return True
+            return None
         known = newest.values["counter"]
         restarted = newest.arrived < connected or arrived - newest.arrived > OWNER_TIMEOUT
-        return newer(counter, known) or (restarted and counter != known)
+        return None if newer(counter, known) or (restarted and counter != known) else no_news(counter, known)
 
 
 def _unexpected(error: Exception) -> Refusal:
@@ -235,6 +250,7 @@ class BlockLink:
             time=now,
             age=np.array([now - n.arrived for n in known]),
             discarded=np.array([group.discarded for group in self._exchanges]),
+            reasons=tuple(group.reason for group in self._exchanges),
         )
 
     def close(self) -> None:

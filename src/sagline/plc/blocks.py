@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from sagline.control.link import GROUP_SIZE, Command, Sample, Whole, groups_of
+from sagline.control.link import GROUP_SIZE, Command, Refusal, Sample, Whole, groups_of
 from sagline.core.arrays import Array
 
 LAYOUT: Final = 1  # version of the blocks; incremented with every change of an offset below
@@ -39,18 +39,6 @@ class Field(NamedTuple):
     type: str | tuple[Field, ...]
     offset: int
     meaning: str
-
-
-class Refusal(NamedTuple):
-    """Reason why a block, or a PLC, cannot be used.
-
-    Attributes:
-        reason: Reason as text.
-        next_step: Next step for the reader.
-    """
-
-    reason: str
-    next_step: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +106,7 @@ class Block:
             return Refusal(f"{block} has layout {values['version']}; this sagline knows layout {LAYOUT}", LOAD)
         if values.get(AGAIN) != values.get("counter"):
             counters = f"its counter is {values['counter']} at the beginning and {values[AGAIN]} at the end"
-            return Refusal(f"{block} is torn: {counters}", "If it continues, the PLC writes it in more than one scan")
+            return Refusal(f"{block} is torn: {counters}", TORN)
         return values
 
 
@@ -133,6 +121,7 @@ def _bytes(kind: str | tuple[Field, ...]) -> int:
 
 
 AGAIN: Final = "counter_again"
+TORN: Final = "If it continues, the PLC writes it in more than one scan"
 LOAD: Final = "Load the blocks of this version into the PLC: sagline export-scl ROBOT --out plc.scl"
 
 FROM_PLC: Final = Block(
@@ -236,9 +225,15 @@ def command_blocks(command: Command) -> list[bytes]:
 
 
 def sample_of(
-    groups: Sequence[Mapping[str, Any]], *, winches: int, time: float, age: Array, discarded: Whole
+    groups: Sequence[Mapping[str, Any]],
+    *,
+    winches: int,
+    time: float,
+    age: Array,
+    discarded: Whole,
+    reasons: tuple[Refusal | None, ...] = (),
 ) -> Sample:
-    """Sample from valid blocks of all groups; time: [s]; age: [s], (G,); discarded: (G,)."""
+    """Sample from valid blocks of all groups; time: [s]; age: [s], (G,); discarded and reasons: (G,)."""
     heads = ("counter", "owner", "echo", "status", "fault")
     columns: dict[str, Any] = {name: np.array([group[name] for group in groups], dtype=np.int64) for name in heads}
     for name in ("length", "rate", "torque", "tension", "filtered", "counts", "state", "winch_fault"):
@@ -246,7 +241,7 @@ def sample_of(
         values = [group[row] for group in groups for row in rows][:winches]
         columns[name] = np.array(values, dtype=np.int64 if name in ("counts", "state", "winch_fault") else np.float64)
     plc_time = np.array([1e-6 * group["time"] for group in groups])
-    return Sample(time=time, age=age, plc_time=plc_time, discarded=discarded, **columns)
+    return Sample(time=time, age=age, plc_time=plc_time, discarded=discarded, reasons=reasons, **columns)
 
 
 def winch_rows(names: Sequence[str], columns: Sequence[Sequence[Any]]) -> dict[str, Any]:

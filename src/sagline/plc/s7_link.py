@@ -8,8 +8,9 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING, Final
 
+from sagline.control.link import Refusal
 from sagline.plc.block_link import BlockLink
-from sagline.plc.blocks import LOAD, Block, Refusal
+from sagline.plc.blocks import LOAD, Block
 from sagline.plc.wire import ANSWER, WireError, addresses_of, plc_packages, refusal_of
 from sagline.robot.robot import Robot
 

@@ -7,10 +7,10 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, Final, NamedTuple, Protocol
 
-from sagline.control.link import groups_of
+from sagline.control.link import Refusal, groups_of
 from sagline.core.arguments import brief, whole_number
 from sagline.core.errors import MOST, FileError, InvalidValueError, SaglineError, shortened
-from sagline.plc.blocks import Block, Refusal
+from sagline.plc.blocks import Block
 from sagline.robot.robot import Robot
 
 LAST_PORT: Final = 65535
@@ -164,7 +164,7 @@ def refusal_of(error: BaseException | None, protocol: str) -> Refusal:
     if isinstance(cause, ConnectionResetError | BrokenPipeError) or "closed" in text:
         return Refusal("the connection is closed at once", "Check the port, and the number of its other clients")
     if isinstance(cause, TimeoutError) or "timeout" in text.lower() or "No response" in text:
-        return Refusal("it does not answer", "Check address and port, and that the PLC is on and in this network")
+        return Refusal("it does not answer", "Check address and port, and that the PLC or the twin runs")
     if isinstance(cause, OSError):
-        return Refusal(f"no connection ({cause.strerror or cause})", "Check the network")
+        return Refusal(f"no connection ({cause.strerror or cause})", "Check the address and the network")
     return Refusal(f"the answer is not {protocol} ({text})", "Check the port")

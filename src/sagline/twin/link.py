@@ -8,9 +8,10 @@ from typing import Any, Final, NamedTuple, Protocol
 
 import numpy as np
 
-from sagline.control.link import Command, Missing, Sample, Sent, Whole, newer, sent_to
+from sagline.control.link import Command, Missing, Refusal, Sample, Sent, Whole, newer, no_news, sent_to
 from sagline.core.arrays import Array, number
 from sagline.core.errors import InvalidValueError
+from sagline.plc.blocks import LOAD, TORN
 from sagline.twin.plc_program import Order
 
 TINY: Final = 1e-9  # tolerance for rounding of times [s]
@@ -138,6 +139,10 @@ class Report(NamedTuple):
     winch_fault: list[int]
 
 
+INVALID: Final = {  # reasons of the blocks of two faults
+    "is torn": Refusal("it is torn: its two counters differ", TORN),
+    "is foreign": Refusal("it is of another program", f"Check the address. {LOAD}"),
+}
 HISTORY: Final = 100  # earlier blocks, which the fault "goes back" can send
 
 
@@ -177,6 +182,7 @@ class MachineLink:
         self._arrival = np.zeros(count)
         self._parts = [slice(winches[0], winches[-1] + 1) for winches in self._groups]
         self._discarded = np.zeros(count, dtype=np.int64)
+        self._reasons: tuple[Refusal | None, ...] = (None,) * count
         self._owner = [0] * count
         self._held: list[PlcBlocks | None] = [None] * count
         self._past: deque[PlcBlocks] = deque(maxlen=HISTORY)
@@ -244,8 +250,8 @@ class MachineLink:
                     self._take(group, arrival, block)
         self._past.append(snapshot)
 
-    def _blocks(self, group: int, snapshot: PlcBlocks, how: str | None) -> list[PlcBlocks | None]:
-        """Blocks that a group sends in a scan; None for an invalid one."""
+    def _blocks(self, group: int, snapshot: PlcBlocks, how: str | None) -> list[PlcBlocks | Refusal]:
+        """Blocks that a group sends in a scan; the reason for an invalid one."""
         held, self._held[group] = self._held[group], None
         if how == "goes back":
             self._steps_back[group] += 1
@@ -257,16 +263,21 @@ class MachineLink:
         if how == "is silent":
             return []
         if how == "repeats":
-            return [self._newest[group]] if self._newest[group] is not None else []
-        if how in ("is torn", "is foreign"):
-            return [None]
+            newest = self._newest[group]
+            return [] if newest is None else [newest]
+        if how in INVALID:
+            return [INVALID[how]]
         return [snapshot, snapshot] if how == "doubles" else [snapshot, held] if held is not None else [snapshot]
 
-    def _take(self, group: int, arrival: float, block: PlcBlocks | None) -> None:
+    def _take(self, group: int, arrival: float, block: PlcBlocks | Refusal) -> None:
         """Accept a block, if it is valid and newer than the previous block."""
-        known = self._newest[group]
-        if block is None or (known is not None and not newer(block.counter(group), known.counter(group))):
+        known, reason = self._newest[group], block if isinstance(block, Refusal) else None
+        if isinstance(block, PlcBlocks) and known is not None:
+            counters = block.counter(group), known.counter(group)
+            reason = None if newer(*counters) else no_news(*counters)
+        if isinstance(block, Refusal) or reason is not None:
             self._discarded[group] += 1
+            self._reasons = (*self._reasons[:group], reason, *self._reasons[group + 1 :])
             return
         self._newest[group], self._arrival[group] = block, arrival
         self._owner[group] = block.owners[group]
@@ -288,7 +299,7 @@ class MachineLink:
         counts, state, winch_fault = whole
         return Sample(
             now, age, counter, clock, owner, echo, status, fault,
-            length, rate, torque, tension, filtered, counts, state, winch_fault, self._discarded.copy(),
+            length, rate, torque, tension, filtered, counts, state, winch_fault, self._discarded.copy(), self._reasons,
         )  # fmt: skip
 
     def _mixed(self, newest: list[PlcBlocks]) -> tuple[Any, ...]:

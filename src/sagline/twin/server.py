@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from sagline.control.link import Command, Mode
+from sagline.control.link import Command, Mode, Refusal
 from sagline.control.real_time import Pace
 from sagline.core.arguments import flag, instance, whole_number
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError, SaglineError
-from sagline.plc.blocks import AGAIN, CLAIM, FROM_PLC, TO_PLC, Refusal, winch_row, winch_rows
+from sagline.plc.blocks import AGAIN, CLAIM, FROM_PLC, TO_PLC, winch_row, winch_rows
 from sagline.plc.wire import LAST_PORT, plc_packages
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
