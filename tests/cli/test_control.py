@@ -46,6 +46,18 @@ def test_an_operator_confirms_a_pose_that_the_lengths_contradict(
     assert re.findall(r"Error: (\w+) is", said.err) == ["confirming", "homing"]
 
 
+def test_a_cell_without_a_reading_is_named_in_place_of_a_number(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    place, machine = session(monkeypatch, "home\nwait 1 s\nstate\n")
+    machine.inject("cell 5 fails at 1 s")
+    assert place.run() == 0
+    out = capsys.readouterr().out
+    assert re.search(r"\(degraded\) .* \d+ to \d+ N, no reading of cell 5\b", out) is not None
+    assert re.search(r"tensions \[N\] (?: +\d+\.\d){5} +– (?: *\d+\.\d){2}", out) is not None
+    assert "nan" not in out
+
+
 @pytest.mark.parametrize(
     "line",
     wide(

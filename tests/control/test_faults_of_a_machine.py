@@ -15,6 +15,7 @@ from tests.tiers import extended
 BIAS = np.array([2.0, -1.0, 1.5, -2.0, 0.5, 2.0, -2.0, 1.0])  # N
 CASES = {  # what happens: what is told, the state that follows, within how many ms each
     "cell 3 reads 0 N": ((("cell zero or saturated", 30),), None),
+    "cell 5 fails": ((("cell lost", 10),), (State.STOPPING, 10)),
     "cable 2 breaks": ((("cable broken", 40),), (State.EMERGENCY, 40)),
     "encoder 5 jumps by 2 mm": ((("encoder jump", 10),), (State.STOPPING, 10)),
     "group 1 is silent": ((("group stale", 30), ("group silent", 100)), (State.STOPPING, 100)),

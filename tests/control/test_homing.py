@@ -13,8 +13,9 @@ from sagline.control.controller import Controller
 from sagline.control.homing import WINDOW, Homing
 from sagline.control.link import Sample
 from sagline.control.null_space import cell_errors
-from sagline.control.states import State
+from sagline.control.states import RefusedError, State
 from tests.control.rigs import HOME, prototype, rig, spy_of, state_of
+from tests.refusal import refused
 
 
 def changed(control: Controller, change: Any) -> None:
@@ -47,7 +48,7 @@ def with_age(sample: Sample) -> Sample:
     ("change", "ruled", "why"),
     [
         (with_nan, True, "load cell"),
-        (with_nan, False, r"cable 5 .*nan N"),
+        (with_nan, False, "load cell of cable 5"),
         (with_age, False, r"group 1 .* 0\.05\d* s"),
     ],
 )
@@ -70,6 +71,21 @@ def test_a_jog_ends_where_tensions_are_no_numbers_or_old(change: Any, ruled: boo
     assert re.search(why, notes[-1])
     followed = [command for command in spy_of(control).commands if command is not None][-1]
     assert followed.rate.max() == 0.0 or followed.mode.name == "HOLD"
+
+
+def test_a_cell_without_a_reading_and_missing_samples_are_named() -> None:
+    control, _ = rig(home=False)
+    control.connect()
+    changed(control, with_nan)
+    with refused("homing", kind=RefusedError) as caught:
+        control.home(HOME)
+    assert "cell of cable 5" in caught.value.reason
+    first = control.sample
+    changed(control, lambda sample: first)
+    with refused("homing", kind=RefusedError) as caught:
+        control.home(HOME)
+    assert re.search(rf"\b{WINDOW}\b.* samples", caught.value.reason) is not None
+    assert "nan" not in str(caught.value)
 
 
 def test_repeated_samples_are_counted_once() -> None:

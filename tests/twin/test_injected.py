@@ -44,7 +44,7 @@ def test_what_a_text_leaves_out() -> None:
 
 
 ITEMS = ("cable", "cell", "commands", "emergency stop", "encoder", "group", "load", "servo")
-CELL = ("cell NUMBER", "sticks", "reads # N", "saturates", "is wrong by # N")
+CELL = ("cell NUMBER", "sticks", "reads # N", "saturates", "fails", "is wrong by # N")
 SECONDS = ("number", " s")
 WRONG: dict[str, tuple[str, ...]] = {  # what the allowed values name
     "cel 3 sticks": ITEMS,
@@ -142,6 +142,14 @@ def test_a_cell_that_reads_something_else(words: str, reads: float) -> None:
     assert abs(after[10].tension[6] - before[-1].tension[6]) < 30.0
     filtered = before[-1].filtered[6] + (reads - before[-1].filtered[6]) * 0.01 / 0.06
     assert after[0].filtered[6] == pytest.approx(filtered)
+
+
+def test_a_cell_that_fails_and_comes_back() -> None:
+    _, before, after = run("cell 6 fails at 0.3 s for 0.1 s", moving=False)
+    read = np.array([(sample.tension[6], sample.filtered[6]) for sample in after])
+    assert np.isnan(read[:10]).all()
+    assert np.abs(read[10:] - before[-1].tension[6]).max() < 30.0
+    assert np.isfinite([np.delete(sample.tension, 6) for sample in after]).all()
 
 
 def test_a_cell_that_is_wrong_by_so_much() -> None:

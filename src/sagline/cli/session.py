@@ -11,12 +11,15 @@ from queue import Empty, SimpleQueue
 from threading import Thread
 from typing import Any, Final, NamedTuple, Self
 
+import numpy as np
+
 from sagline.cli.terminal import show_note, show_text
 from sagline.cli.values import middle_pose, quantity, whole_of
 from sagline.control.controller import Controller
 from sagline.control.real_time import interrupt_calls
 from sagline.control.recording import Event, EventKind
 from sagline.control.states import State
+from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError, SaglineError, nearest
 from sagline.files.path_file import load_path
 from sagline.files.pose_text import pose_of_text
@@ -265,7 +268,7 @@ class OperatorSession:
             x, y, z = control.estimate.position
             parts.append(f"({x:+.3f}, {y:+.3f}, {z:+.3f}) m")
         if sample is not None:
-            parts.append(f"{sample.filtered.min():.0f} to {sample.filtered.max():.0f} N")
+            parts.append(_tensions(sample.filtered))
         if control.clock is not None:
             done, whole = control.clock
             parts.append(f"{done:.1f} of {whole:.1f} s")
@@ -286,7 +289,8 @@ class OperatorSession:
         if sample is None:
             return
         show_text(f"lengths [m]      {' '.join(f'{x:8.4f}' for x in sample.length + control.zero)}", whole=True)
-        show_text(f"tensions [N]     {' '.join(f'{x:8.1f}' for x in sample.filtered)}", whole=True)
+        tensions = (f"{x:8.1f}" if np.isfinite(x) else "       –" for x in sample.filtered)
+        show_text(f"tensions [N]     {' '.join(tensions)}", whole=True)
         show_text(f"grants           {' '.join('mine' if x == control.owner else str(x) for x in sample.owner)}")
         if control.pace is not None:
             often, most = control.pace.lateness.quantile(0.999), control.pace.lateness.longest
@@ -303,6 +307,14 @@ def _pose(item: str, text: str) -> Pose:
     if not text:
         raise InvalidValueError(item, "without a pose", "X,Y,Z or X,Y,Z,A,B,C", f"Enter {item} 0.2,-0.4,1.4.")
     return pose_of_text(text, item, f"Give meters, and degrees about z, y and x: {item} 0.2,-0.4,1.4.")
+
+
+def _tensions(filtered: Array) -> str:
+    """Smallest and largest tension, and the load cells without a reading; filtered: [N], (m,)."""
+    read = np.isfinite(filtered)
+    lost = [f"no reading of cell {cell}" for cell in np.flatnonzero(~read)]
+    known = [f"{filtered[read].min():.0f} to {filtered[read].max():.0f} N"] if read.any() else []
+    return ", ".join((*known, *lost))
 
 
 def _call(action: Callable[[], object]) -> None:

@@ -239,6 +239,8 @@ class HomingState(ActiveState):
         if (sample.tension <= limit).all():
             return ""
         i = int(np.argmax(~(sample.tension <= limit)))
+        if not np.isfinite(sample.tension[i]):
+            return f"the load cell of cable {i} gives no reading. Check cell, plug and amplifier, then home again"
         return f"cable {i} has {sample.tension[i]:.1f} N; allowed: {limit[i]:.1f} N"
 
     def stop(self) -> ActiveState:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 from sagline.control.evidence import Evidence, Fault
-from sagline.control.faults_cables import CableBroken, CellDead, CellOff, CellStuck, OverTension, Slack
+from sagline.control.faults_cables import CableBroken, CellDead, CellLost, CellOff, CellStuck, OverTension, Slack
 from sagline.control.faults_drives import CorrectionAtLimit, EncoderJump, FollowingError, NotFollowing, ServoSaturated
 from sagline.control.faults_link import (
     BlockDiscarded,
@@ -28,7 +28,7 @@ from sagline.robot.robot import Robot
 
 LARGEST_CORRECTION: Final = TensionSettings().largest  # largest correction of the tension loop [m]
 
-# order of evaluation: a dead cell must be found before its cable counts as slack
+# order of evaluation: a lost or dead cell must be found before its cable counts as slack
 FAULTS: Final[tuple[type[Fault], ...]] = (
     EmergencyStop,
     OwnerLost,
@@ -36,6 +36,7 @@ FAULTS: Final[tuple[type[Fault], ...]] = (
     GroupSilent,
     GroupStale,
     BlockDiscarded,
+    CellLost,
     CellDead,
     CellStuck,
     CellOff,
@@ -121,7 +122,7 @@ def faults_of(
         >>> import sagline as sl
         >>> rules = sl.control.faults_of(sl.load_robot("article-prototype"))
         >>> print(len(rules), "rules,", rules[0].name, "first:", rules[0].reaction.name)
-        20 rules, emergency stop first: EMERGENCY
+        21 rules, emergency stop first: EMERGENCY
     """
     checked_robot = instance(robot, Robot, "robot")
     if groups is not None:

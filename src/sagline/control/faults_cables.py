@@ -9,6 +9,7 @@ import numpy as np
 
 from sagline.control.evidence import PLANNED_SHARE, SLACK_SHARE, Cycle, Evidence, Fault, Reaction
 from sagline.control.extrema import largest
+from sagline.control.link import Mode
 from sagline.control.null_space import SIGMAS
 from sagline.core.arrays import Array
 
@@ -118,13 +119,39 @@ DISPROVED: Final = 0.5  # share of full scale; a motor torque for less tension d
 _STEP: Final = "The tension loop is off. Check cell, plug and amplifier when the platform stands, then acknowledge."
 
 
+class CellLost(Fault):
+    """Load cell without a reading, in a motion: nothing monitors the tension of its cable any more."""
+
+    name = "cell lost"
+    rule = "a reading that is not a number, in a motion; its PLC does not wind in this cable any more"
+    reaction = Reaction.STOPPING
+    within = "1 sample"
+    lasting = True
+
+    def found(self, cycle: Cycle) -> str | None:
+        """First cell that has lost its reading since the motion began."""
+        seen = self.seen
+        command = cycle.command
+        if seen.plain or command is None or command.mode != Mode.FOLLOW or not command.rate.any():
+            return None
+        lost = ~np.isfinite(cycle.sample.tension) & np.isfinite(cycle.tension) & seen.believed
+        if not lost.any():
+            return None
+        seen.ignore_cells(lost)
+        cell = int(np.argmax(lost))
+        return (
+            f"the load cell of cable {cell} gives no reading; planned: {cycle.tension[cell]:.4g} N. Its PLC does not "
+            "wind in this cable. Check cell, plug and amplifier, then acknowledge."
+        )
+
+
 class CellDead(Fault):
     """Load cell with an impossible reading."""
 
     name = "cell zero or saturated"
     rule = (
-        f"a reading below -{SIGMAS:g} sigma, at full scale while the motor holds less than {DISPROVED:g} of it, or "
-        f"slack in {SLACK_SAMPLES} samples while the motor pulls"
+        f"no reading at rest, a reading below -{SIGMAS:g} sigma, at full scale while the motor holds less than "
+        f"{DISPROVED:g} of it, or slack in {SLACK_SAMPLES} samples while the motor pulls"
     )
     reaction = Reaction.DEGRADED
     within = "30 ms"
@@ -150,7 +177,9 @@ class CellDead(Fault):
         seen.ignore_cells(dead)
         cell = int(np.argmax(dead))
         holds = f" while its motor holds {pull[cell]:.4g} N" if np.isfinite(pull[cell]) else ""
-        return f"cell {cell} reads {tension[cell]:.4g} N{holds}; planned: {cycle.tension[cell]:.4g} N. {_STEP}"
+        reads = f"reads {tension[cell]:.4g} N" if np.isfinite(tension[cell]) else "gives no reading"
+        planned = f"; planned: {cycle.tension[cell]:.4g} N" if np.isfinite(cycle.tension[cell]) else ""
+        return f"cell {cell} {reads}{holds}{planned}. {_STEP}"
 
 
 class CellStuck(Fault):
@@ -197,6 +226,7 @@ class CellOff(Fault):
         """Begin without suspected cells."""
         super().__init__(seen)
         self._samples = round(ODD_TIME / seen.period)
+        self._side = np.zeros(len(seen.group_of))  # sign of each error beyond the limit in the previous cycle
         self._quiet = True
 
     def found(self, cycle: Cycle) -> str | None:
@@ -207,10 +237,13 @@ class CellOff(Fault):
         if error is None or not largest(error) > limit:
             if not self._quiet:
                 self._for.fill(0)
+                self._side.fill(0.0)
                 self._quiet = True
             return None
-        # oscillations of the platform change sign, and the filter is slow enough to show the sign changes
-        self._for = np.where(np.abs(error) > limit, self._for + 1, 0)
+        # oscillations of the platform change sign within ODD_TIME, and the filter is fast enough to show this
+        side = np.sign(error) * (np.abs(error) > limit)
+        self._for = np.where(side != 0.0, np.where(side == self._side, self._for + 1, 1), 0)
+        self._side = side
         self._quiet = False
         cell = int(np.argmax(np.abs(error)))
         if self._for[cell] < self._samples:

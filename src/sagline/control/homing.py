@@ -106,6 +106,12 @@ class Homing:
         """Error with the deviating lengths or tensions, and the next step."""
         if self.conflicts:
             return self._conflict()
+        if not (read := np.isfinite(self.off)).all():
+            if not read.any():
+                reason = f"fewer than {WINDOW} new samples of all groups came at rest"
+                return RefusedError("homing", reason, "Check the PLCs and the network, then home again.")
+            reason = f"the load cell of cable {int(np.argmin(read))} gives no reading"
+            return RefusedError("homing", reason, "Check cell, plug and amplifier, then home again.")
         off, beyond = self.off, np.abs(self.off) - SIGMAS * self.sigma
         named = ", ".join(f"{i} by {off[i]:+.1f} N" for i in np.argsort(-beyond)[:3] if beyond[i] > 0.0)
         allowed = f"{SIGMAS * float(self.sigma.max()):.3g} N"

@@ -149,8 +149,22 @@ def _number(shown: _CycleField) -> dict[str, Any]:
 
 
 _TEXT: Final = {"type": "string"}
+# Foxglove reads no schema with two types for a value. A list with a missing number is therefore written as objects.
+PARTIAL: Final = "partial"
+_PARTIAL: Final = {
+    "type": "array",
+    "description": "known values of lists that are left out, because one of their values is not a number",
+    "items": {
+        "type": "object",
+        "properties": {"name": _TEXT, "index": {"type": "integer"}, "value": {"type": "number"}},
+        "required": ["name", "index", "value"],
+    },
+}
 SCHEMAS: Final = {
-    CYCLE: _schema("sagline.Cycle", {"state": _TEXT, **{name: _number(shown) for name, shown in CYCLE_FIELDS.items()}}),
+    CYCLE: _schema(
+        "sagline.Cycle",
+        {"state": _TEXT, **{name: _number(shown) for name, shown in CYCLE_FIELDS.items()}, PARTIAL: _PARTIAL},
+    ),
     EVENT: _schema(
         "sagline.Event",
         {
@@ -184,7 +198,12 @@ def cycle_texts(columns: dict[str, NDArray[Any]]) -> Iterator[bytes]:
     rows = zip(states, *kept.values(), strict=True)
     names = ("state", *kept)
     for row in rows:
-        yield _text({name: value for name, value in zip(names, row, strict=True) if value is not None})
+        known = {name: value for name, value in zip(names, row, strict=True) if value is not None}
+        for name in [name for name, value in known.items() if isinstance(value, list) and None in value]:
+            pairs = enumerate(known.pop(name))
+            part = [{"name": name, "index": index, "value": value} for index, value in pairs if value is not None]
+            known[PARTIAL] = known.get(PARTIAL, []) + part
+        yield _text(known)
 
 
 def event_message(event: Event) -> bytes:

@@ -94,10 +94,11 @@ class Hardware:
         """Give a load cell one of the faults of `KINDS`, or remove it."""
         if words is None:
             self._wrong.pop(cell, None)
+            self.read[FILTERED, cell] = self.reading.load_cell[cell]  # a filter without a value begins again
         elif words == "is wrong by #":
             self._wrong[cell] = (1.0, value)
         else:
-            fixed = {"sticks": self.read[CELL, cell], "saturates": self._full[cell]}.get(words, value)
+            fixed = {"sticks": self.read[CELL, cell], "saturates": self._full[cell], "fails": np.nan}.get(words, value)
             self._wrong[cell] = (0.0, float(fixed))
 
     def break_cable(self, cable: int) -> None:

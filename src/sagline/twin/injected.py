@@ -36,6 +36,7 @@ KINDS: Final = MappingProxyType(
             _FaultKind("cell", "sticks", "repeats its last reading"),
             _FaultKind("cell", "reads #", "reads this value, whatever the tension is", "N"),
             _FaultKind("cell", "saturates", "reads its full scale"),
+            _FaultKind("cell", "fails", "gives no reading: its value is not a number"),
             _FaultKind("cell", "is wrong by #", "reads too much, by this value", "N"),
             _FaultKind("cable", "breaks", "has no tension and no weight", for_good=True),
             _FaultKind("encoder", "jumps by #", "counts this additional length of cable", "mm", 1e-3, True),
