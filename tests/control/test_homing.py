@@ -79,12 +79,12 @@ def test_a_cell_without_a_reading_and_missing_samples_are_named() -> None:
     changed(control, with_nan)
     with refused("homing", kind=RefusedError) as caught:
         control.home(HOME)
-    assert "cell of cable 5" in caught.value.reason
+    assert "cable 5" in caught.value.reason
     first = control.sample
     changed(control, lambda sample: first)
     with refused("homing", kind=RefusedError) as caught:
         control.home(HOME)
-    assert re.search(rf"\b{WINDOW}\b.* samples", caught.value.reason) is not None
+    assert str(WINDOW) in caught.value.reason.split()
     assert "nan" not in str(caught.value)
 
 

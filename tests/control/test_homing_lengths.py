@@ -89,6 +89,26 @@ def test_a_confirmation_belongs_to_what_was_reported() -> None:
     assert np.abs(control.zero).max() < 2e-3
 
 
+def test_a_jog_in_a_later_homing_begins_at_the_lengths_of_the_drives() -> None:
+    control, _ = displaced((0.1, 0.0, 0.0))
+    with refused("homing", kind=RefusedError):
+        control.home(HOME)
+    control.confirm_homing()
+    zero = control.zero
+    assert np.abs(zero).max() > 0.04
+    control.off()
+    control.connect()
+    control.begin_homing(HOME)
+    before = control.sample
+    control.jog(0, 0.001)
+    assert before is not None
+    assert control.sample is not None
+    moved = control.sample.length - before.length
+    assert moved == pytest.approx([0.001, *[0.0] * 7], abs=2e-4)
+    assert (control.sample.fault == 0).all()
+    assert np.array_equal(control.zero, zero)
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_a_right_homing_needs_no_confirmation(seed: int) -> None:
     control, _ = rig(imperfect(seed=seed), seed=seed)
@@ -151,7 +171,7 @@ def test_the_tolerance_follows_from_cells_encoders_and_tolerances(tmp_path: Path
         ({"frame_anchors": [1e-6, 0.01, 1e-6]}, 0.01 * np.abs(direction[:, 1])),
         ({"platform_anchors": 2e-3}, np.full(8, 2e-3)),
         ({"axial_stiffness": 1400.0}, 0.1 * STATE.unstrained_length * tension / 14e3),
-        ({"mass": 2.0}, np.zeros(8)),
+        ({"mass": np.inf}, np.zeros(8)),
     ):
         found = tolerance(robot.replace(tolerances=known))
         assert found == pytest.approx(5.0 * np.hypot(cells, also), rel=0.03), known
@@ -159,7 +179,8 @@ def test_the_tolerance_follows_from_cells_encoders_and_tolerances(tmp_path: Path
     file = tmp_path / "calibrated.yaml"
     stated = sl.dump_robot(robot.replace(tolerances={"length_zero": 2e-3}))
     file.write_text(
-        f"{stated}\ncalibration: {{log: log.csv, date: 2026-03-01, standard_error: {{length_zero: 1 mm}}}}\n"
+        f"{stated}\ncalibration:\n  log: log.csv\n  date: 2026-03-01\n"
+        "  standard_error: {length_zero: 1 mm, pulley_radius: .inf}\n"  # no data for the radius
     )
     better = sl.load_robot(file)
     assert tolerance(better) == pytest.approx(5.0 * np.hypot(cells, 1e-3), rel=1e-3)

@@ -79,10 +79,10 @@ def _zeros(winches: Winch | None) -> Array:
 
 
 def _standard_errors(robot: Robot) -> dict[str, Array]:
-    """Tolerances by name, or standard errors of the calibration where they are smaller."""
+    """Tolerances by name, or finite standard errors of the calibration where they are smaller."""
     errors = dict(robot.tolerances)
     for name, error in {} if robot.calibration is None else robot.calibration.standard_error.items():
-        errors[name] = np.minimum(error, errors.get(name, np.inf))
+        errors[name] = np.minimum(error, errors.get(name, np.where(np.isfinite(error), error, 0.0)))
     return errors
 
 
