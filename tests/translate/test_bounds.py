@@ -141,7 +141,7 @@ def test_the_inverse_kernel_needs_all_of_its_memory(name: str) -> None:
 
     def solve(size: int, count: int) -> None:
         memory = (np.empty(size), np.empty(count, dtype=np.int64))
-        inverse_poses(*given, np.full(m, np.nan), memory, None, found.answers, 0, 1)
+        inverse_poses(*given, np.full(m, np.nan), memory, None, None, found.answers, 0, 1)
 
     solve(numbers, counters)
     assert numbers < 100 * m

@@ -85,8 +85,8 @@ SINGLE: Final = {
     "tension.polygon.FLAT": 1e-6,
 }
 ENTRIES: Final[tuple[tuple[str, str, tuple[Type, ...]], ...]] = (
-    ("inverse_poses", "inverse_nearest", (*INVERSE, NONE, *ANSWERS)),
-    ("inverse_poses", "inverse_by_method", (*INVERSE, s.BOOL, *ANSWERS)),
+    ("inverse_poses", "inverse_nearest", (*INVERSE, NONE, NONE, *ANSWERS)),
+    ("inverse_poses", "inverse_by_method", (*INVERSE, s.BOOL, NONE, *ANSWERS)),
     ("forward_poses", "forward_bare", (s.FORWARD, *FORWARD)),
     ("forward_poses", "forward_over_pulleys", (s.FORWARD_PULLEYS, *FORWARD)),
 )
@@ -154,7 +154,19 @@ def bounds() -> dict[str, dict[int, dict[str, Terms]]]:
     for symbol, last, otherwise in (("inverse_nearest", 2, NOTHING), ("inverse_by_method", 11, FLAG)):
         for code in range(last + 1):
             method = _record(exactly(code), FLOAT, Int(), body, body)
-            given = (_record(*model), method, limits, _record(*robot), pose, wrench, body, memory, otherwise, answers)
+            given = (
+                _record(*model),
+                method,
+                limits,
+                _record(*robot),
+                pose,
+                wrench,
+                body,
+                memory,
+                otherwise,
+                NOTHING,
+                answers,
+            )
             every.setdefault(symbol, {})[code] = _bounds_of(inverse, (*given, exactly(0), one))
     for symbol, behind in (("forward_bare", NOTHING), ("forward_over_pulleys", Other("flag", True))):
         given_ = (_record(*model, behind), Other("flag", False), samples, chain, memory, found)

@@ -78,8 +78,8 @@ SIGNATURES: Final[dict[str, dict[str, tuple[Type, ...]]]] = {
     },
     "interpolate": {"": (F2, FLOAT, RULE, F3, F3)},
     "inverse_poses": {
-        "": (*INVERSE, NONE, ANSWERS, INT, INT),
-        "methods": (*INVERSE, BOOL, ANSWERS, INT, INT),
+        "": (*INVERSE, NONE, BOOL, ANSWERS, INT, INT),
+        "methods": (*INVERSE, BOOL, BOOL, ANSWERS, INT, INT),
     },
     "least_distances": {"": (F3, F2, I2, FLOAT, BOOL, F2, F2, F2, F2, F4)},
     "lengths_at_frame_ends": {"": (TERMS, F2, F1, F1, F1, F1, F1, F2, F2)},
@@ -115,6 +115,10 @@ SIGNATURES: Final[dict[str, dict[str, tuple[Type, ...]]]] = {
             MEMORY,
             plain_tuple(CODES1, CODES1),
         ),
+    },
+    "stabilities_of_poses": {
+        "": (FORWARD, ROBOTS, F2, I1, MEMORY, F3, CODES1),
+        "pulleys": (FORWARD_PULLEYS, ROBOTS, F2, I1, MEMORY, F3, CODES1),
     },
     "read_cells": {"": (F1, F2, F1, F1)},
     "read_encoders": {"": (plain_tuple(F2, F2), F1, F1, F1, F1, F3, F1)},

@@ -90,8 +90,8 @@ def encoder(
 
 
 def write_rows(plan: Plan, name: str, rows: Sequence[Sequence[float]], out: Path | None) -> int:
-    """Write the rows of feasible samples, with times; `name` formats a column; returns the exit code."""
-    kept = np.atleast_1d(plan.feasible)
+    """Write the rows of solved samples, with times; `name` formats a column; returns the exit code."""
+    kept = np.atleast_1d(plan.solved)
     header = [name.format(k) for k in range(len(rows[0]))]
     body = [row for row, is_kept in zip(rows, kept, strict=True) if is_kept]
     if plan.path is None:
@@ -105,7 +105,11 @@ def write_rows(plan: Plan, name: str, rows: Sequence[Sequence[float]], out: Path
         write_text(out, text)
     if kept.all():
         return 0
-    show_note("Left out: ", f"{np.sum(~kept):,} of {kept.size:,} samples, which are not feasible", style="bold red")
+    show_note(
+        "Left out: ",
+        f"{np.sum(~kept):,} of {kept.size:,} samples, which are not feasible or not stable",
+        style="bold red",
+    )
     return OUTSIDE
 
 
@@ -116,8 +120,8 @@ def _plan_of(file: Path, out: Path | None) -> Plan:
     if out is not None and out.exists() and out.resolve() == file.resolve():
         raise FileError(out, "is the run itself", "Name another file with --out.")
     plan = load_plan(file)
-    if not plan.feasible.any():
-        raise FileError(file, "has no feasible sample", "Plan another path, or raise the limits.")
+    if not plan.solved.any():
+        raise FileError(file, "has no solved sample", "Plan another path, or raise the limits.")
     return plan
 
 

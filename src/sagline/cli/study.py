@@ -68,7 +68,7 @@ class ConfirmedRun(NamedTuple):
         stays = self.confirmation.held
         if isinstance(self.plan.state.cables.model, Catenary):  # exact plan: any other place is another equilibrium
             stays = stays & (np.linalg.norm(self.confirmation.position_error, axis=-1) < SAME_PLACE)
-        return int(np.sum(self.plan.feasible & ~stays))
+        return int(np.sum(self.plan.solved & ~stays))
 
 
 def run_name(robot: Robot, model: CableModel) -> str:
@@ -144,7 +144,8 @@ def _complaints(run: ConfirmedRun) -> int:
     """Print the infeasible parts of the path; returns the exit code of this run."""
     name, gaps, plan = run.plan.state.one_robot.name, run.plan.gaps, run.plan
     for gap in gaps[:MOST_GAPS]:
-        show_note(f"{name}: ", f"the path leaves the feasible region {_gap_text(gap, plan)}", style="bold red")
+        left = "is unstable" if gap.status is PoseStatus.UNSTABLE else "leaves the feasible region"
+        show_note(f"{name}: ", f"the path {left} {_gap_text(gap, plan)}", style="bold red")
     if len(gaps) > MOST_GAPS:
         show_note(f"{name}: ", f"and {len(gaps) - MOST_GAPS} more times", style="bold red")
     if gaps:

@@ -47,10 +47,11 @@ class Homing:
     ) -> None:
         """Plan the named pose; zero: present offset of the lengths, not zero after an earlier homing [m], (m,)."""
         self.plan = inverse(robot, pose, model, method)
-        if not self.plan.feasible:
+        if not self.plan.solved:
             gap = self.plan.gaps[0]
             step = "Name another pose: every cable must pull there."
-            raise RefusedError("homing", f"the pose has no tensions within the limits, {gap.status.name}", step)
+            reason = "is unstable" if self.plan.feasible else "has no tensions within the limits"
+            raise RefusedError("homing", f"the pose {reason}, {gap.status.name}", step)
         self.state = self.plan.state
         self.standing = Standing.at(self.state)
         self.tension = self.state.cables.frame_end_tension

@@ -205,7 +205,7 @@ def _step_and_damping(robot: Robot, pose: Pose, stiffness: Array) -> tuple[float
 
 def _lengths_at_rest(robot: Robot, pose: Pose) -> Array:
     plan = inverse(robot, pose, model=Elastic())
-    if not plan.feasible:
+    if not plan.solved:
         raise InvalidValueError(
             f"{robot.name} at ({', '.join(f'{x:g}' for x in pose.position)}) m",
             PoseStatus(int(plan.status)).text,

@@ -26,7 +26,7 @@ from sagline.files.variables import (
     variables_of_result,
 )
 from sagline.kinematics.plan import Plan
-from sagline.kinematics.status import PoseStatus
+from sagline.kinematics.status import BALANCED, PoseStatus
 from sagline.motion.path import Path
 from sagline.robot.batch import has_routing
 from sagline.robot.equilibrium import Contact, Equilibrium
@@ -183,7 +183,7 @@ def _check_plan(data: Dataset, cables: int) -> None:
     motion = (TIME, *MOTION) if TIME.name in data.variables else ()
     optional = (one for one in (WINDING, *PROOF, JERK) if one.name in data.variables)
     quantities = sorted((*QUANTITIES, *machine, *motion, *optional), key=lambda one: one.codes is None)  # codes first
-    solved = np.asarray(status.values == PoseStatus.SOLVED)
+    solved = np.isin(status.values, BALANCED)
     check_variables(data, quantities, {"cable": cables, "pose": status.size}, rows, solved)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from sagline.core.arrays import Array, Codes, Flags, locked
 from sagline.core.progress import Progress, blocks
 from sagline.kernels import codes, tables
+from sagline.kernels.forward.stability import stabilities_of_poses
 from sagline.kernels.inverse.feasibility import ENOUGH, PROVED, decide_poses
 from sagline.kernels.inverse.poses import Answers, inverse_poses
 from sagline.kernels.memory import memory_for
@@ -17,6 +18,7 @@ from sagline.statics.tables import robot_terms
 from sagline.tension.method import Options, TensionMethod, takes_default_kernel
 
 UNDECIDED = (codes.POSE_INFEASIBLE, codes.POSE_NOT_CONVERGED)  # statuses of poses without a result from the iterations
+SOLVED = (codes.POSE_SOLVED, codes.POSE_UNPROVED)  # statuses of poses with a result
 BLOCK = 1 << 12  # poses per block of the solution, at most 0.1 s; interrupts are handled between blocks
 DECIDED = 1 << 10  # poses per block of the feasibility decision, which takes longer per pose
 
@@ -44,7 +46,7 @@ class InverseRows(NamedTuple):
     def reject_slack(self, verdicts: Verdicts, lengths: Array) -> bool:
         """Mark solved poses as TOO_SLACK if lengths (N, m) between guides are NaN; return True if there are any."""
         slack = np.isnan(np.atleast_2d(lengths)) & np.isfinite(self.results[tables.LENGTH])
-        lost = (self.pose_status == codes.POSE_SOLVED) & slack.any(axis=-1)
+        lost = np.isin(self.pose_status, SOLVED) & slack.any(axis=-1)
         if not lost.any():
             return False
         self.results[tables.LENGTH :, lost] = np.nan
@@ -67,12 +69,14 @@ def solve_inverse_rows(
     rows: Array,
     loads: Array,
     reference: Array,
+    stability: bool = False,
     progress: Progress | None = None,
 ) -> InverseRows:
     """Run the kernel over poses.
 
     rows: pose rows (N, POSE_COLUMNS); loads: external plus inertial wrenches (1 or N, 6); reference: initial tensions
-    of `Closest`, in its variable (m,), or NaN; changed to the last feasible ones; progress: called after each block
+    of `Closest`, in its variable (m,), or NaN; changed to the last feasible ones; stability: True to mark solved poses
+    without a proof of stability as POSE_UNPROVED; progress: called after each block
     with the number of finished poses, without undecided ones, and the total number.
     """
     shared = first_of(robot)
@@ -80,7 +84,7 @@ def solve_inverse_rows(
     found = InverseRows.empty(len(rows), shared.cable_count, shared.degrees_of_freedom, behind)
     otherwise = None if takes_default_kernel(method) else True
     memory = memory_for(shared.cable_count)
-    given = (*options, robot_terms(robot), rows, loads, reference, memory, otherwise, found.answers)
+    given = (*options, robot_terms(robot), rows, loads, reference, memory, otherwise, stability, found.answers)
     done = 0
     for part in blocks(len(rows), BLOCK):
         inverse_poses(*given, part.start, part.stop)
@@ -143,7 +147,7 @@ def decide_rows(
     count, n = found.needed.shape
     m = found.cable_status.shape[1]
     verdicts = Verdicts.empty(count, m, n)
-    verdicts.brackets[found.pose_status == codes.POSE_SOLVED] = 0.0
+    verdicts.brackets[np.isin(found.pose_status, SOLVED)] = 0.0
     which = locked(np.flatnonzero(np.isin(found.pose_status, UNDECIDED)))
     if not which.size:
         return verdicts
@@ -155,3 +159,15 @@ def decide_rows(
             progress(count - which.size + part.stop, count)
     verdicts.at_border[which] = found.pose_status[which] == codes.POSE_SOLVED
     return verdicts
+
+
+def decide_stability(robot: Robots, options: Options, rows: Array, found: InverseRows, verdicts: Verdicts) -> None:
+    """Decide whether the solved poses without a proof are stable; the others get the status UNSTABLE.
+
+    rows: pose rows (N, POSE_COLUMNS).
+    """
+    which = locked(np.flatnonzero((found.pose_status == codes.POSE_UNPROVED) | verdicts.at_border))
+    given = ((*options.model, has_routing(robot) or None), robot_terms(robot), rows)
+    for part in blocks(which.size, BLOCK):
+        memory = memory_for(found.cable_status.shape[1])
+        stabilities_of_poses(*given, which[part], memory, found.results, found.pose_status)

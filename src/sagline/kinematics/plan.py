@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -12,21 +13,22 @@ from sagline.cables.model import CableStatus
 from sagline.core.arrays import Array, Codes
 from sagline.core.results import Result, Saved
 from sagline.kinematics.rates import length_rate
-from sagline.kinematics.status import PoseStatus
+from sagline.kinematics.status import BALANCED, PoseStatus
 from sagline.motion.path import Path
 from sagline.robot.batch import first_of
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.reach import LEVEL, ROUNDING, forbidden_turn, out_of_plane, turn_in_words
+from sagline.statics.stiffness import smallest_stiffness
 from sagline.tension.method import TensionMethod
 
 
 class Gap(NamedTuple):
-    """Consecutive poses of a plan without a solution.
+    """Consecutive poses of a plan without a solution, or of unstable equilibria.
 
     Attributes:
         first: Index of the first pose.
         last: Index of the last pose.
-        status: Reason for the missing solution at the first pose.
+        status: Reason for the missing solution at the first pose, or UNSTABLE.
         shortfall: Largest finite shortfall in the gap [N]; infinite if all shortfalls are infinite, NaN if there are
             none.
         cables: Indices of the cables whose limits oppose the wrench at any pose of the gap.
@@ -93,7 +95,12 @@ class Plan(Result, Saved):
 
     @property
     def feasible(self) -> NDArray[np.bool_]:
-        """True if each pose has a solution, shape () or (N,)."""
+        """True if tensions within the limits balance the platform, stable or not, shape () or (N,)."""
+        return np.isin(self.status, BALANCED)
+
+    @property
+    def solved(self) -> NDArray[np.bool_]:
+        """True if the pose is feasible and its equilibrium is not unstable, shape () or (N,)."""
         return np.asarray(self.status == PoseStatus.SOLVED)
 
     @property
@@ -141,11 +148,24 @@ class Plan(Result, Saved):
         return None if self.path is None else length_rate(self.state, self.path, self.tension, self.feasible)
 
     @property
+    def stiffness_min(self) -> Array:
+        """Smallest stiffness of the platform against its free motions [N/m], shape () or (N,).
+
+        A rotation is measured by its arc at the root mean square distance of the platform ends from the center of mass,
+        as in `ForwardSolution`. The value is not positive for an unstable equilibrium. It is NaN without a solution and
+        for straight cables. It is computed at each call.
+        """
+        return smallest_stiffness(self.state)
+
+    @property
     def gaps(self) -> tuple[Gap, ...]:
-        """Gaps: consecutive poses without a solution, in order; a single pose counts as a batch of one."""
-        lost = ~np.atleast_1d(self.feasible)
-        edges = np.flatnonzero(np.diff(np.concatenate(([False], lost, [False])).astype(np.int8)))
-        return tuple(self._gap(int(first), int(end) - 1) for first, end in edges.reshape(-1, 2))
+        """Gaps: consecutive poses that are not solved, in order; a single pose counts as a batch of one.
+
+        Infeasible and unstable poses next to each other are separate gaps.
+        """
+        kind = np.where(np.atleast_1d(self.solved), 0, np.where(np.atleast_1d(self.feasible), 1, 2))
+        edges = np.flatnonzero(np.diff(np.concatenate(([0], kind, [0]))))
+        return tuple(self._gap(int(a), int(b) - 1) for a, b in itertools.pairwise(edges) if kind[a])
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -197,7 +217,7 @@ class Plan(Result, Saved):
     def _gap(self, first: int, last: int) -> Gap:
         part = slice(first, last + 1)
         shortfall = np.atleast_1d(self.shortfall)[part]
-        finite, hopeless = shortfall[np.isfinite(shortfall)], int(np.isinf(shortfall).sum())
+        finite, hopeless = shortfall[np.isfinite(shortfall) & (shortfall > 0.0)], int(np.isinf(shortfall).sum())
         cables = np.flatnonzero(np.atleast_2d(self.blocking)[part].any(axis=0))
         return Gap(
             first=first,

@@ -65,7 +65,7 @@ def tension_polygon(
     check_sharing(instance(robot, Robot, "robot"), Centroid())
     if instance(pose, Pose, "pose").shape:
         raise InvalidValueError("pose", f"a batch of shape {pose.shape}", "one pose", "Draw one pose at a time.")
-    plan = inverse(robot, pose, model, MinimumNorm(variable), wrench)
+    plan = inverse(robot, pose, model, MinimumNorm(variable), wrench, stability=False)
     if plan.status not in (PoseStatus.SOLVED, PoseStatus.INFEASIBLE):
         raise InvalidValueError(
             "pose", "one without a balance", "one that `inverse` can solve", PoseStatus(int(plan.status)).text

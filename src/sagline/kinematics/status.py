@@ -48,6 +48,11 @@ class PoseStatus(Status):
         "too near the border of feasibility: neither tensions nor a proof of infeasibility was found; move the "
         "platform, or change the load by more than the shortfall's bracket",
     )
+    UNSTABLE = (
+        codes.POSE_UNSTABLE,
+        "the tensions balance the platform, but the equilibrium is unstable, and the platform would leave it; raise "
+        "tension_min, choose a method with higher tensions such as AnalyticCenter, or move the platform",
+    )
 
 
 class ForwardStatus(Status):
@@ -87,5 +92,7 @@ class ForwardStatus(Status):
     )
 
 
+# Statuses of poses with tensions and lengths.
+BALANCED = (PoseStatus.SOLVED, PoseStatus.UNSTABLE)
 # Statuses of stable equilibria, which the platform does not leave by itself.
 STABLE = (ForwardStatus.SOLVED, ForwardStatus.LOOSE, ForwardStatus.OVERSTRETCHED)

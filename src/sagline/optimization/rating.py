@@ -52,7 +52,9 @@ def distribute(
     terms = (robot.freedom, body, cables)
     reference = np.full(m, np.nan)
     for part in blocks(count, BLOCK):
-        inverse_poses(*options, terms, poses, load, reference, memory, None, found.answers, part.start, part.stop)
+        inverse_poses(
+            *options, terms, poses, load, reference, memory, None, False, found.answers, part.start, part.stop
+        )
     lost = found.pose_status != codes.POSE_SOLVED
     found.results[tables.LENGTH :, lost] = np.nan
     tension = found.results[tables.TENSION].max(axis=-1)

@@ -90,8 +90,9 @@ def _(robot: Robot) -> Summary:
     verdict, good = f"{robot.cable_count} cables", None
     if plan is not None:
         there = "in the middle of its test box"
-        good = bool(plan.feasible)
-        verdict = f"held {there} by {_range(plan.chord_tension)}" if good else f"no tensions hold it {there}"
+        good = bool(plan.solved)
+        lost = f"its equilibrium {there} is unstable" if plan.feasible else f"no tensions hold it {there}"
+        verdict = f"held {there} by {_range(plan.chord_tension)}" if good else lost
     lines = [
         f"{robot.cable_count} cables, {robot.degrees_of_freedom} freedoms ({robot.motion_pattern}), "
         f"platform of {n(robot.mass, '.4g', 'kg')}",
@@ -114,8 +115,10 @@ def middle_plan(robot: Robot) -> Plan | None:
 @summary_of.register
 def _(plan: Plan) -> Summary:
     feasible, name = np.atleast_1d(plan.feasible), plan.state.one_robot.name
-    good, count = bool(feasible.all()), feasible.size
+    good, count = bool(plan.solved.all()), feasible.size
     lines = [f"chord tensions {_range(plan.chord_tension)}"] if feasible.any() else []
+    if np.isfinite(stiffness := plan.stiffness_min).any():
+        lines.append(f"least stiffness {n(np.nanmin(stiffness), '.3g', 'N/m')}")
     gaps = plan.gaps if feasible.size > 1 else ()
     for gap in gaps[:MOST_GAPS]:
         why = PoseStatus(gap.status).text
@@ -127,6 +130,8 @@ def _(plan: Plan) -> Summary:
         verdict = "feasible" if good else PoseStatus(int(plan.status.reshape(-1)[0])).text
     else:
         verdict = f"all {count:,} poses are feasible" if good else f"{int(feasible.sum()):,} of {count:,} feasible"
+        unstable = int(feasible.sum() - plan.solved.sum())
+        verdict += f", {unstable:,} of them unstable" if unstable else ""
     return Summary(f"Plan of {name}", verdict, good, (*lines, *plan.warnings))
 
 

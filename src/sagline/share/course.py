@@ -94,7 +94,8 @@ def of_plan(plan: Plan) -> SharedMotion:
 
 def _why(gap: Gap) -> str:
     if gap.status is not PoseStatus.INFEASIBLE:
-        return f"Not feasible: {gap.status.text.partition(';')[0]}"
+        word = "Unstable" if gap.status is PoseStatus.UNSTABLE else "Not feasible"
+        return f"{word}: {gap.status.text.partition(';')[0]}"
     short = (
         f"short of up to {n(gap.shortfall, '.3g', 'N')}"
         if np.isfinite(gap.shortfall)

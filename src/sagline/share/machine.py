@@ -61,7 +61,7 @@ def model_data(robot: Robot) -> dict[str, Any]:
     forward = (model.code, *model.parameters, behind), False, (*terms, length, pose, wrench), new_chain(m, n)
     draw = _draw_arguments(robot, terms, pose[0], tension)
     calls = {
-        "inverse": ("inverse_poses", (*options, *given, reference, memory, None, found.answers, 0, 1)),
+        "inverse": ("inverse_poses", (*options, *given, reference, memory, None, False, found.answers, 0, 1)),
         "decide": ("decide_poses", (options.model, options.limits, *given, *decided)),
         "forward": (f"forward_poses{'_pulleys' * bool(behind)}", (*forward, memory, rest.arrays)),
         "draw": ("cable_courses", draw),

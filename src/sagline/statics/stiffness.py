@@ -213,6 +213,23 @@ def modes(state: Equilibrium) -> Modes:
     return Modes(state, locked(frequency), locked(np.where(absent, np.nan, shape)))
 
 
+def smallest_stiffness(state: Equilibrium) -> Array:
+    """Smallest stiffness of the platform against its free motions [N/m], shape (...,); NaN without lengths.
+
+    A rotation is measured by its arc at the root mean square distance of the platform ends from the center of mass.
+    """
+    _check_state(state, _MODES_BYTES)
+    slopes, freedom = cable_slopes(state), first_of(state.robot).freedom
+    radius = np.sqrt((slopes.levers**2).sum(axis=-1).mean(axis=-1))[..., None]
+    turning = np.abs(freedom[:, 3:]).max(axis=1) > 0.0
+    unit = np.where(turning & (radius > 0.0), 1.0 / np.where(radius > 0.0, radius, 1.0), 1.0)
+    matrix = unit[..., :, None] * (freedom @ slopes.matrix @ freedom.T) * unit[..., None, :]
+    absent = np.asarray(np.isnan(matrix).any(axis=(-1, -2)))
+    symmetric = 0.5 * (matrix + np.swapaxes(matrix, -1, -2))
+    values = np.linalg.eigvalsh(np.where(absent[..., None, None], 0.0, symmetric))[..., 0]
+    return locked(np.where(absent, np.nan, values))
+
+
 def natural_frequency(squares: Array) -> Array:
     """Frequencies [Hz] from squares of angular frequencies, shape (..., n), n per platform.
 

@@ -41,6 +41,11 @@ class InMotion:
     broken: list[int] = field(default_factory=list)  # True for broken cables
     notice: str = ""  # label of a platform that is not feasible
 
+    @property
+    def solved(self) -> bool:
+        """True if the platform is drawn as feasible, as for a `Snapshot`."""
+        return self.feasible
+
     def numbers(self, scale: TensionScale) -> str:
         """HTML of the pose, and of the table of the cables."""
         return html_block(pose_line(self.pose) + cable_table_html(self.heads, self.columns, scale.colors(self.tension)))

@@ -37,14 +37,14 @@ def sentence(text: str) -> str:
 
 def verdict(snapshot: Snapshot) -> str:
     """HTML of the verdict on feasibility in a colored box, with the reason if infeasible."""
-    if snapshot.feasible:
+    if snapshot.solved:
         return verdict_box("good", "Feasible", _summary(snapshot))
     return verdict_box("bad", headline(snapshot), escape(snapshot.reason))
 
 
 def headline(snapshot: Snapshot) -> str:
     """The verdict in one or two words; it is the status if a pose is neither feasible nor proved infeasible."""
-    if snapshot.feasible:
+    if snapshot.solved:
         return "Feasible"
     if snapshot.status is PoseStatus.INFEASIBLE:
         return "Not feasible"

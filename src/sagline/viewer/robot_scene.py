@@ -212,9 +212,9 @@ class RobotScene:
         if self._wheels is not None:
             turns = shapes.pulley_rotations(snapshot.robot, snapshot.pose)[self._over_pulleys]
             self._wheels.batched_wxyzs = turns.astype(np.float32)
-        self._platform.color = PLATFORM if snapshot.feasible else INFEASIBLE
-        self._notice.visible = self._live and not snapshot.feasible
-        if isinstance(snapshot, Snapshot) and not snapshot.feasible:
+        self._platform.color = PLATFORM if snapshot.solved else INFEASIBLE
+        self._notice.visible = self._live and not snapshot.solved
+        if isinstance(snapshot, Snapshot) and not snapshot.solved:
             self._notice.text = headline(snapshot)
         elif isinstance(snapshot, InMotion):
             self._notice.text = snapshot.notice

@@ -115,14 +115,19 @@ class Snapshot:
         return self.plan is not None and bool(self.plan.feasible)
 
     @property
+    def solved(self) -> bool:
+        """True if the pose is feasible and its equilibrium is stable."""
+        return self.plan is not None and bool(self.plan.solved)
+
+    @property
     def status(self) -> PoseStatus:
         """Status of the solution."""
         return PoseStatus.NO_CHORD if self.plan is None else PoseStatus(int(self.plan.status))
 
     @property
     def reason(self) -> str:
-        """Reason why the pose is not feasible, with shortfall and blocking cables; "" if it is feasible."""
-        if self.feasible:
+        """Reason why the pose is not solved, with shortfall and blocking cables; "" if it is solved."""
+        if self.solved:
             return ""
         if self.plan is None:
             return self.refusal or self.status.text

@@ -119,10 +119,10 @@ def spans_of(time: Array, wrong: NDArray[np.bool_], why: Callable[[slice], str])
 
 
 def infeasible_spans(plan: Plan, time: Array, unit: ForceUnit) -> tuple[Span, ...]:
-    """Spans of a plan of N poses in which it is not feasible."""
+    """Spans of a plan of N poses in which it is not feasible or not stable."""
 
     def why(rows: slice) -> str:
-        lost = ~plan.feasible[rows]
+        lost = ~plan.solved[rows]
         status = PoseStatus(int(plan.status[rows][lost][0]))
         if status is not PoseStatus.INFEASIBLE:
             return status.name.replace("_", " ").lower()
@@ -136,7 +136,7 @@ def infeasible_spans(plan: Plan, time: Array, unit: ForceUnit) -> tuple[Span, ..
         blocking = np.flatnonzero(plan.blocking[rows][lost].any(axis=0))
         return ": ".join(parts) + (f"; at their limits: {_cables(blocking)}" if blocking.size else "")
 
-    return spans_of(time, ~plan.feasible, why)
+    return spans_of(time, ~plan.solved, why)
 
 
 def limit_violations(robot: Robot, time: Array, tension: Array, unit: ForceUnit) -> tuple[Span, ...]:

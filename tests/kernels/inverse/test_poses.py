@@ -89,6 +89,7 @@ def solve(
         np.full(m, math.nan) if previous is None else previous,
         memory_for(m) if room is None else room,
         otherwise,
+        False,
         (answer.results, answer.statuses, answer.residuals, answer.needed, answer.poses),
         *(span or (0, count)),
     )

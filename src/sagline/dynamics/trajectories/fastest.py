@@ -121,7 +121,7 @@ def fastest(
     for again in range(_TRIES):
         new = _joined(path, segments, timed, bounded)
         plan = inverse(inner, new)
-        slower = 1.0 if plan.feasible.all() else 1.0 + _SLOWER * 4.0**again
+        slower = 1.0 if plan.solved.all() else 1.0 + _SLOWER * 4.0**again
         if bounded and _has_speed_limits(robot):
             ratio = _speed_excess(plan)  # elastic terms are proportional to time^-3, the other terms to time^-1
             slower = max(slower, np.cbrt(ratio) if again < _GENTLE else ratio)
@@ -147,7 +147,7 @@ def _fastest_segment(
     place = np.linspace(0.0, 1.0, _PLACES)
     jet = curve.at(place)
     rest = inverse(robot, jet.pose)
-    if not rest.feasible.all():
+    if not rest.solved.all():
         raise _infeasible_error(f"from {segment.begin:g} s to {segment.end:g} s at rest", rest)
     balances, speeds = ForceBalance.at(robot, jet, rest), _winch_speed_bounds(robot, curve, place, rest)
     bounds, least = speeds(place), np.inf
@@ -175,19 +175,19 @@ def _checked(robot: Robot, timed: _TimedSegment, limits: tuple[float, float]) ->
         plan = inverse(robot, pose, wrench=inertial_wrench(robot, pose, twists[0], twists[1]))
         sizes = (np.linalg.norm(twists[2][:, part], axis=1).max() for part in (slice(0, 3), slice(3, 6)))
         slower = max(1.0, *(np.cbrt(size / limit) for size, limit in zip(sizes, limits, strict=True)))
-        if plan.feasible.all() and slower <= 1.0 + _ROUNDING:
+        if plan.solved.all() and slower <= 1.0 + _ROUNDING:
             return timed
-        if not plan.feasible.all():  # the limits hold at rest, and a slower motion changes the tensions less
+        if not plan.solved.all():  # the limits hold at rest, and a slower motion changes the tensions less
             slower = max(slower, 1.0 + _SLOWER * 4.0**again)
         timed = replace(timed, slower=timed.slower * slower)
     raise _infeasible_error("in motion", plan)
 
 
 def _infeasible_error(item: str, plan: Plan) -> InvalidValueError:
-    k = int(np.argmin(plan.feasible))
+    k = int(np.argmin(plan.solved))
     where = ", ".join(f"{x:.4g}" for x in plan.state.pose.position[k])
     status = PoseStatus(plan.status[k]).name.lower().replace("_", " ")
-    value = f"{status} at ({where}) m" if not plan.feasible[k] else "not found"
+    value = f"{status} at ({where}) m" if not plan.solved[k] else "not found"
     return InvalidValueError(
         f"the move {item}",
         value,

@@ -118,36 +118,45 @@ def problem_at(model: Model, given: ForwardSamples, p: int, free: Array, arcs: A
     """Sample p of a batch as a problem, with the gravity of its body in the model; fills the free motions."""
     body, cables = row_of(given.bodies, p), row_of(given.robots, p)
     placed = Model(model.code, model.k_h, model.k_p, body[tables.GRAVITY], model.behind)
-    unit = _fill_free(given.freedom, cables, body, given.lengths[p], free, arcs)
+    unit = _fill_free(given.freedom, given.lengths[p], free)
+    fill_arcs(given.freedom, cables, body, arcs)
     return PoseProblem(placed, free, cables, body, row_of(given.wrenches, p), unit)
 
 
 @kernel
-def _fill_free(freedom: Array, cables: Array, body: Array, lengths: Array, free: Array, arcs: Array) -> float:
-    """Fill the free motions in the units of steps, and in the units for comparing stiffnesses, (n, 6) each.
-
-    For the comparison, a rotation is measured by its arc at the root mean square distance of the platform ends from the
-    center of mass, so that every stiffness is in N/m. Returns the norm of the units of steps.
-    """
+def _fill_free(freedom: Array, lengths: Array, free: Array) -> float:
+    """Fill the free motions in the units of steps, (n, 6); returns the norm of these units."""
     m = lengths.shape[0]
     total = 0.0
-    square = 0.0
     for i in range(m):
         total += lengths[i]
+    units = 0.0
+    for j in range(freedom.shape[0]):
+        unit = 1.0 if is_rotation(freedom, j) else UNIT_SHARE * total / m
+        units += unit * unit
+        for a in range(6):
+            free[j, a] = freedom[j, a] * unit
+    return math.sqrt(units)
+
+
+@kernel
+def fill_arcs(freedom: Array, cables: Array, body: Array, arcs: Array) -> None:
+    """Fill the free motions in the units for comparing stiffnesses, (n, 6).
+
+    A rotation is measured by its arc at the root mean square distance of the platform ends from the center of mass, so
+    that every stiffness is in N/m.
+    """
+    m = cables.shape[0]
+    square = 0.0
+    for i in range(m):
         for k in range(3):
             lever = cables[i, tables.PLATFORM_X + k] - body[tables.CENTER_X + k]
             square += lever * lever
     radius = math.sqrt(square / m)
-    units = 0.0
     for j in range(freedom.shape[0]):
-        turning = is_rotation(freedom, j)
-        unit = 1.0 if turning else UNIT_SHARE * total / m
-        arc = 1.0 / radius if turning and radius > 0.0 else 1.0
-        units += unit * unit
+        arc = 1.0 / radius if is_rotation(freedom, j) and radius > 0.0 else 1.0
         for a in range(6):
-            free[j, a] = freedom[j, a] * unit
             arcs[j, a] = freedom[j, a] * arc
-    return math.sqrt(units)
 
 
 @kernel

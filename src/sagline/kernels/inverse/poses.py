@@ -12,13 +12,14 @@ from sagline.core.arrays import Array, Codes, Indices
 from sagline.kernels import codes, tables
 from sagline.kernels.algebra.functions import angle
 from sagline.kernels.balance.setting import Balance, Platform, fill_needed_wrench, new_balance, set_pose
-from sagline.kernels.balance.wrench import is_rotation
+from sagline.kernels.balance.wrench import is_rotation, translation_count
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.admissible import TensionLimits
 from sagline.kernels.cable.cables import Cables, material_of, new_cables, pulley_of
 from sagline.kernels.cable.pulley import Wrap, behind_cable, robots_have_machine
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.inverse.iterations import distribute_and_solve_cables, store_tensions
+from sagline.kernels.inverse.stability import new_stability_arrays, proves_stability
 from sagline.kernels.jit import entry, glue
 from sagline.kernels.memory import Memory
 from sagline.kernels.tension.nearest import Distribution, new_reference_point
@@ -59,6 +60,7 @@ def inverse_poses(
     previous: Array,
     memory: tuple[Array, Indices],
     otherwise: bool | None,
+    stability: bool | None,
     answers: Answers,
     first: int,
     last: int,
@@ -78,6 +80,8 @@ def inverse_poses(
         memory: `memory_for` the number of cables.
         otherwise: None for methods that project onto a reference in chord or horizontal tensions; the code of all other
             methods is then not compiled. True for any method.
+        stability: True to prove that each equilibrium is stable; a solved pose without a proof gets POSE_UNPROVED. None
+            excludes the proof from compilation.
         answers: Filled: span and rise of the free spans, unstrained length off the drum, T_x, T_z, tau, and, for robots
             with pulleys or dead lengths, the rows of these, (RESULT_ROWS, N, m); status of each cable, (N, m); norms of
             the unbalanced force [N] and moment [N m] along the free motions, (N, 2); wrench that J tau must supply
@@ -95,6 +99,7 @@ def inverse_poses(
     cables, rest = new_cables(Memory(*memory), m, machine)
     balance, rest = new_balance(rest, m, n)
     near, rest = new_reference_point(rest, previous, m - n)
+    proof, rest = (None, rest) if stability is None else new_stability_arrays(rest, m, n - translation_count(freedom))
     others = None if otherwise is None else new_work_arrays(distribution.method, rest, m, m - n)
     for p in range(first, last):
         platform = platform_at(robot_terms, poses, wrenches, p)
@@ -116,6 +121,10 @@ def inverse_poses(
             supplied = status != codes.POSE_NO_CHORD and status != codes.POSE_SINGULAR
             needed[p, k] = balance.right[k] if supplied else math.nan
         pose_statuses[p] = status
+        if proof is not None:
+            asked = stability and status == codes.POSE_SOLVED
+            if asked and not proves_stability(model, platform, cables, balance, proof):
+                pose_statuses[p] = codes.POSE_UNPROVED
         write_solution(status == codes.POSE_SOLVED, model, cables, balance, results, p)
 
 

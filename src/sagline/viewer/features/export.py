@@ -65,7 +65,7 @@ def scene_as_glb(snapshot: Snapshot | InMotion, scale: TensionScale, sag_scale: 
         if run[0, 2] != run[1, 2]:
             name = f"dead length {i}" if known else f"dead length {i}, path not known"
             _add(scene, name, shapes.rod(run, thin), STEEL)
-    _add(scene, "platform", shapes.platform_solid(robot), PLATFORM if snapshot.feasible else INFEASIBLE, place)
+    _add(scene, "platform", shapes.platform_solid(robot), PLATFORM if snapshot.solved else INFEASIBLE, place)
     colors = scale.colors(snapshot.tension)
     for i, course in enumerate(snapshot.courses(sag_scale)):
         _add(scene, f"cable {i}", shapes.tube(course, _CABLE_RADIUS * shapes.size_of(robot)), tuple(colors[i]))
@@ -155,7 +155,7 @@ def _clock(view: View, time: float, speed: float) -> dict[str, Any]:
     """Texts of the strip for one picture."""
     digits = max(1, ceil(-log10(speed / RATE)))
     text = headline(view.snapshot) if isinstance(view.snapshot, Snapshot) else view.snapshot.notice
-    return {"time": f"{time:.{digits}f} s", "text": "" if view.snapshot.feasible else text}
+    return {"time": f"{time:.{digits}f} s", "text": "" if view.snapshot.solved else text}
 
 
 class _Exporter:

@@ -27,7 +27,7 @@ def screen_reader_text(view: View) -> dict[str, str]:
         head = snapshot.notice or f"As in the {'recording' if view.played is None else view.played.name}"
         return {"head": head, "text": _with(head, _tensions(snapshot.robot, snapshot.tension)), "place": place}
     head = headline(snapshot)
-    text = _tensions(snapshot.robot, snapshot.tension) if snapshot.feasible else snapshot.reason
+    text = _tensions(snapshot.robot, snapshot.tension) if snapshot.solved else snapshot.reason
     return {"head": head, "text": _with(head, text), "place": place}
 
 

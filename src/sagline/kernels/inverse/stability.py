@@ -1,0 +1,173 @@
+"""Proof that the equilibrium of a solved pose is stable, from what its solution has computed; docs/model.md, section 6.
+
+The stiffness of a platform end is positive definite. It is therefore at least u u^T/c, with the unit vector u along the
+chord and the compliance c along it. With any right inverse A of the structure matrix J, the inverse of J diag(1/c) J^T
+is at most A^T diag(c) A. Only the geometric stiffness G of the rotations can be negative. The equilibrium is stable if
+1 + L^T G L is positive definite, where L L^T is the part of A^T diag(c) A for the rotations.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from sagline.core.arrays import Array
+from sagline.kernels import codes
+from sagline.kernels.algebra.factors import factor_positive
+from sagline.kernels.algebra.functions import EXCESS_LIMIT, atanhc_excess_polynomial
+from sagline.kernels.balance.setting import Balance, Platform
+from sagline.kernels.cable import geometry as g
+from sagline.kernels.cable.cables import Cables, pulley_of
+from sagline.kernels.cable.pulley import Wrap, softness
+from sagline.kernels.cable.terms import Model
+from sagline.kernels.jit import glue
+from sagline.kernels.memory import Memory, block, vector
+
+ROUNDING = 0.01  # a proof with a smaller margin than this counts as none
+
+
+class StabilityArrays(NamedTuple):
+    """Work arrays of the proof, for m cables and k free rotations."""
+
+    compliance: Array  # of the platform ends along their chords [m/N], (m,)
+    torque: Array  # sum of r T^T, T the force on a cable at its platform end [N m], (3, 3)
+    geometric: Array  # geometric stiffness of the rotations [N m], (k, k)
+    elastic: Array  # upper bound of their compliance by the cables [1/(N m)], later its factor L, (k, k)
+    proof: Array  # G L, then 1 + L^T G L, (2 k, k)
+
+
+@glue
+def new_stability_arrays(memory: Memory, m: int, k: int) -> tuple[StabilityArrays, Memory]:
+    """Work arrays for m cables and k free rotations, and the remaining memory."""
+    compliance, memory = vector(memory, m)
+    torque, memory = block(memory, 3, 3)
+    geometric, memory = block(memory, k, k)
+    elastic, memory = block(memory, k, k)
+    proof, memory = block(memory, 2 * k, k)
+    return StabilityArrays(compliance, torque, geometric, elastic, proof), memory
+
+
+@glue
+def proves_stability(model: Model, platform: Platform, cables: Cables, balance: Balance, work: StabilityArrays) -> bool:
+    """True if the equilibrium of a solved pose is proved to be stable; False leaves it open."""
+    k = work.geometric.shape[0]
+    if model.code != codes.CATENARY and model.code != codes.ELASTIC:
+        return False
+    if k == 0:
+        return True
+    _fill_geometric_stiffness(platform, cables, balance, work)
+    least = 0.0  # bound of the eigenvalues by Gershgorin's circles
+    for j in range(k):
+        low = work.geometric[j, j]
+        for i in range(k):
+            if i != j:
+                low -= abs(work.geometric[j, i])
+        least = min(least, low)
+    _fill_compliances(model, cables, work.compliance)
+    first = balance.inverse.shape[0] - k
+    trace = 0.0
+    for i in range(cables.tau.size):
+        arm = 0.0
+        for j in range(k):
+            arm += balance.inverse[first + j, i] * balance.inverse[first + j, i]
+        trace += work.compliance[i] * arm / (balance.scale[i] * balance.scale[i])
+    if trace * -least <= 1.0 - ROUNDING:
+        return True
+    return _compares_all_rotations(balance, work)
+
+
+@glue
+def _fill_geometric_stiffness(platform: Platform, cables: Cables, balance: Balance, work: StabilityArrays) -> None:
+    """Fill the geometric stiffness of the free rotations: the symmetric part of r T^T - (r.T) 1."""
+    xx, yy, zz, xy, xz, yz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(cables.tau.size):
+        level = cables.tau[i] * cables.cosine[i]
+        tx, ty = level * balance.geometry[g.AZIMUTH_X, i], level * balance.geometry[g.AZIMUTH_Y, i]
+        tz = cables.tau[i] * cables.sine[i] + cables.sag_force[i]
+        x, y, z = balance.geometry[g.LEVER_X, i], balance.geometry[g.LEVER_Y, i], balance.geometry[g.LEVER_Z, i]
+        xx -= y * ty + z * tz
+        yy -= x * tx + z * tz
+        zz -= x * tx + y * ty
+        xy += 0.5 * (x * ty + y * tx)
+        xz += 0.5 * (x * tz + z * tx)
+        yz += 0.5 * (y * tz + z * ty)
+    work.torque[0, 0], work.torque[1, 1], work.torque[2, 2] = xx, yy, zz
+    work.torque[0, 1] = work.torque[1, 0] = xy
+    work.torque[0, 2] = work.torque[2, 0] = xz
+    work.torque[1, 2] = work.torque[2, 1] = yz
+    k = work.geometric.shape[0]
+    first = platform.freedom.shape[0] - k
+    for j in range(k):
+        for i in range(k):
+            if k == 3:
+                work.geometric[j, i] = work.torque[j, i]
+                continue
+            total = 0.0
+            for a in range(3):
+                for b in range(3):
+                    total += platform.freedom[first + j, 3 + a] * work.torque[a, b] * platform.freedom[first + i, 3 + b]
+            work.geometric[j, i] = total
+
+
+@glue
+def _fill_compliances(model: Model, cables: Cables, compliance: Array) -> None:
+    """Fill upper bounds of the compliances u.(dB/dT) u of the platform ends along their chords, (m,) [m/N].
+
+    They are exact without pulleys. Deep sag, outside the range of the polynomial, gets an infinite bound.
+    """
+    for i in range(cables.tau.size):
+        length = cables.ratio[i] * cables.free_chord[i]
+        weight = cables.density[i] * model.gravity if model.code == codes.CATENARY else 0.0
+        x, z = cables.tau[i] * cables.cosine[i], cables.tau[i] * cables.sine[i] + cables.sag_force[i]
+        za = z - weight * length
+        at_end, at_frame = math.sqrt(x * x + z * z), math.sqrt(x * x + za * za)
+        turn = 1.0 / (at_end + at_frame)
+        inverse = 1.0 / (at_end * at_frame)
+        u = weight * length * turn
+        excess = atanhc_excess_polynomial(u * u) if u * u <= EXCESS_LIMIT else math.inf
+        # q c^2 + 2 c s r + p s^2 of `catenary_stiffness`, as a square without cancellation
+        level, mixed = (x * x - za * z) * inverse, x * (za + z) * inverse
+        larger = 1.0 + abs(level)
+        cosine, sine = cables.cosine[i], cables.sine[i]
+        bend = mixed * cosine - larger * sine if level >= 0.0 else larger * cosine - mixed * sine
+        bent = 2.0 * excess * cosine * cosine + bend * bend / larger
+        compliance[i] = length * (1.0 / cables.stiffness[i] + turn * bent)
+    if cables.machine:
+        for i in range(cables.tau.size):
+            length = cables.ratio[i] * cables.free_chord[i]
+            weight = cables.density[i] * model.gravity if model.code == codes.CATENARY else 0.0
+            x, z = cables.tau[i] * cables.cosine[i], cables.tau[i] * cables.sine[i] + cables.sag_force[i]
+            za = z - weight * length
+            at_frame = math.sqrt(x * x + za * za)
+            wrap = Wrap(cables.wrap_sine[i], cables.wrap_cosine[i], math.pi)  # the largest angle
+            strained = 1.0 + at_frame / cables.stiffness[i]
+            soft = strained * softness(pulley_of(cables, i), weight, cables.stiffness[i], at_frame, wrap)
+            compliance[i] += strained * soft / (1.0 + weight * za / at_frame * soft)
+
+
+@glue
+def _compares_all_rotations(balance: Balance, work: StabilityArrays) -> bool:
+    """True if 1 + L^T G L is positive definite."""
+    k = work.geometric.shape[0]
+    first = balance.inverse.shape[0] - k
+    factor, product, proof = work.elastic, work.proof[:k], work.proof[k:]
+    for j in range(k):
+        for i in range(j + 1):
+            total = 0.0
+            for c in range(work.compliance.size):
+                arms = balance.inverse[first + j, c] * balance.inverse[first + i, c]
+                total += work.compliance[c] * arms / (balance.scale[c] * balance.scale[c])
+            factor[j, i] = total
+    if not factor_positive(factor, 0.0, factor):
+        return False
+    for j in range(k):
+        for i in range(k):
+            product[j, i] = 0.0
+            for a in range(i, k):
+                product[j, i] += work.geometric[j, a] * factor[a, i]
+    for j in range(k):
+        for i in range(j + 1):
+            proof[j, i] = 1.0 - ROUNDING if i == j else 0.0
+            for a in range(j, k):
+                proof[j, i] += factor[a, j] * product[a, i]
+    return factor_positive(proof, 0.0, proof)
