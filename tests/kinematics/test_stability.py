@@ -80,7 +80,7 @@ def test_an_unstable_plan_has_values_and_its_platform_leaves() -> None:
     assert plan.stiffness_min == pytest.approx(-66.5, abs=0.05)
     assert np.isfinite(plan.unstrained_length).all()
     assert plan.shortfall == 0.0
-    near = sl.Pose(POSE.position + (1e-3, 0.0, 0.0), np.eye(3))
+    near = sl.Pose.from_euler((2.001, 1.0, 1.5), 0.0, 0.0, 0.0)
     found = sl.forward(LOW, plan.unstrained_length, near)
     assert found.stable
     assert np.linalg.norm(found.pose.position - POSE.position) > 0.2
@@ -137,7 +137,8 @@ def test_gaps_separate_infeasible_and_unstable_poses() -> None:
     np.testing.assert_array_equal(covered, np.flatnonzero(~plan.solved))
     summary = summary_of(plan)
     assert summary is not None
-    assert f"{plan.feasible.sum()} of 40 feasible, {(plan.feasible & ~plan.solved).sum()} of them unstable" in summary.verdict
+    unstable_count = (plan.feasible & ~plan.solved).sum()
+    assert f"{plan.feasible.sum()} of 40 feasible, {unstable_count} of them unstable" in summary.verdict
 
 
 def test_an_unstable_plan_survives_its_file(tmp_path: Any) -> None:

@@ -61,7 +61,7 @@ def library_text(digest: str) -> str:
         body = "\n    ".join(lines)
         calls.append(f"static int call_{symbol}(const Slot *slots, Slot *result) {{\n    {body}\n}}\n")
         assert len(slots) <= MOST_SLOTS
-        form = "".join(_format(type_) for type_ in types)
+        form = "".join(_format(type_) for type_ in types).replace("?", r"\?")  # "??(" is a trigraph of C
         rows.append(f'    {{"{function.__name__}", "({form})", call_{symbol}, {len(slots)}, \'{kind}\'}},')
     host = (Path(__file__).parent / "python.c").read_text(encoding="utf-8")
     return "\n".join((program.text(), EXPORTED, host, *calls, TABLE % (digest, "\n".join(rows))))
