@@ -68,7 +68,7 @@ class ConfirmedRun(NamedTuple):
         stays = self.confirmation.held
         if isinstance(self.plan.state.cables.model, Catenary):  # exact plan: any other place is another equilibrium
             stays = stays & (np.linalg.norm(self.confirmation.position_error, axis=-1) < SAME_PLACE)
-        return int(np.sum(self.plan.solved & ~stays))
+        return int(np.sum(self.plan.feasible & ~stays))
 
 
 def run_name(robot: Robot, model: CableModel) -> str:
@@ -151,7 +151,7 @@ def _complaints(run: ConfirmedRun) -> int:
     if gaps:
         limits = all(gap.status is PoseStatus.INFEASIBLE for gap in gaps)
         show_note("", "The file contains the feasible part and marks the rest." + WIDEN * limits)
-    if run.lost:
+    if run.lost > np.sum(plan.feasible & ~plan.solved):  # more than the gaps state
         what = f"{run.lost} of the planned poses are not stable equilibria: the platform would leave its path"
         show_note(f"{name}: ", f"{what}; move the path, or raise the tensions", style="bold red")
     return OUTSIDE if gaps or run.lost else 0
