@@ -8,11 +8,8 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.kernels import codes
-from sagline.kinematics.inverse_rows import solve_inverse_rows
-from sagline.present.summaries import summary_of
-from sagline.tension.method import kernel_options
-from tests.kinematics.feasible import box_poses, pose_rows
+from sagline.kinematics import inverse_rows
+from tests.kinematics.feasible import box_poses
 
 LOW = sl.load_robot("article-mixed").replace(tension_min=1.0)
 POSE = sl.Pose.from_euler((2.0, 1.0, 1.5), 0.0, 0.0, 0.0)
@@ -114,14 +111,13 @@ def test_a_solver_agrees_with_the_batch(stability: bool) -> None:
 
 
 @pytest.mark.parametrize("name", [name for name in sl.robot_names() if name != "article-mixed"])
-def test_presets_need_no_eigenvalues(name: str) -> None:
+def test_presets_need_no_eigenvalues(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The proof from the solution costs a tenth of the inverse; eigenvalues would cost half of it."""
-    robot, method = sl.load_robot(name), sl.Closest().alone
-    options, none = kernel_options(robot, sl.Catenary(), method), np.full(robot.cable_count, np.nan)
-    rows = pose_rows(box_poses(robot, 300, seed=3))
-    found = solve_inverse_rows(robot, method, options, rows, np.zeros((1, 6)), none, stability=True)
-    assert np.count_nonzero(found.pose_status == codes.POSE_SOLVED) >= 250
-    assert not (found.pose_status == codes.POSE_UNPROVED).any()
+    monkeypatch.setattr(inverse_rows, "stabilities_of_poses", None)
+    robot = sl.load_robot(name)
+    plan = sl.inverse(robot, box_poses(robot, 300, seed=3))
+    assert plan.solved.sum() >= 250
+    assert np.nanmin(plan.stiffness_min) > 0.0
 
 
 def test_gaps_separate_infeasible_and_unstable_poses() -> None:
@@ -135,10 +131,6 @@ def test_gaps_separate_infeasible_and_unstable_poses() -> None:
     assert unstable.cables == ()
     covered = sorted(k for gap in plan.gaps for k in range(gap.first, gap.last + 1))
     np.testing.assert_array_equal(covered, np.flatnonzero(~plan.solved))
-    summary = summary_of(plan)
-    assert summary is not None
-    unstable_count = (plan.feasible & ~plan.solved).sum()
-    assert f"{plan.feasible.sum()} of 40 feasible, {unstable_count} of them unstable" in summary.verdict
 
 
 def test_an_unstable_plan_survives_its_file(tmp_path: Any) -> None:
