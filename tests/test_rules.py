@@ -16,7 +16,7 @@ LETTERS = re.compile(r"[A-Za-z]{2}")
 SENTENCES = 25  # literal sentences that may be left, outside the snapshots
 FOREIGN = 65  # imports of inner modules of another folder that may be left
 # Places whose tests look at every module, and modules that any test may import: core, kernels, the command line.
-OF_ALL_MODULES = {"kernels", "translate", "abuse", "docs", "mutants", "conftest.py"}
+OF_ALL_MODULES = {"kernels", "translate", "abuse", "fuzz", "docs", "mutants", "conftest.py"}
 OPEN = re.compile(r"sagline\.((core|kernels)\b|cli\.main$)")
 
 

@@ -8,17 +8,13 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path as FilePath
-from typing import Any
 from urllib.request import urlopen
 
-import h5py
 import numpy as np
-import pytest
 from typer.testing import CliRunner
 
 import sagline as sl
 from sagline.cli.main import app
-from sagline.cli.terminal import notices
 from sagline.cli.view import played_beside, played_in
 from tests.cli import interrupts
 from tests.refusal import refused
@@ -70,21 +66,6 @@ def test_a_taken_port_is_told() -> None:
     assert result.exit_code == 2
     assert f" {port} " in result.stderr
     assert "--port 0" in result.stderr
-
-
-@extended
-def test_a_run_from_before_digests_is_played_with_a_note(
-    tmp_path: FilePath, capsys: pytest.CaptureFixture[str], snapshot: Any
-) -> None:
-    robot, file = sl.load_robot("article-mixed"), tmp_path / "run.nc"
-    sl.inverse(robot, sl.Pose([[0.0, 0.0, 1.5]], np.eye(3))).save(file)
-    with h5py.File(file, "r+") as content:  # which cuts the digest off
-        content.attrs["sagline_format"] = 1
-    with notices():  # as around every command
-        assert played_in(robot, file).duration == 0.0
-    told = capsys.readouterr().err.removesuffix("\n")
-    assert CliRunner().invoke(app, ["lengths", str(file)]).stderr.splitlines()[0] == told
-    assert told.replace(str(file), "FILE") == snapshot
 
 
 def test_a_simulation_is_played_as_a_run_is(tmp_path: FilePath) -> None:

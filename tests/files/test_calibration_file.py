@@ -156,7 +156,7 @@ def read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[xarray.Da
     monkeypatch.setattr(calibration_file, "parse_robot", cache(parse_robot))
 
     def load(data: xarray.Dataset) -> sl.Calibration:
-        monkeypatch.setattr(format, "read_dataset", lambda *_: (data, True))
+        monkeypatch.setattr(format, "read_dataset", lambda *_: data)
         return sl.load_calibration(tmp_path / "edited.nc")
 
     return load
@@ -166,7 +166,7 @@ def read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[xarray.Da
 def whole(tmp_path_factory: pytest.TempPathFactory) -> xarray.Dataset:
     file = tmp_path_factory.mktemp("calibration") / "found.nc"
     calibration("as usual").save(file)
-    return read_dataset(file, FORMAT)[0]
+    return read_dataset(file, FORMAT)
 
 
 @pytest.mark.parametrize("edit", wide(reversed(EDITS)), ids=lambda edit: edit.__name__)

@@ -130,7 +130,7 @@ def read(monkeypatch: pytest.MonkeyPatch) -> Reader:
     monkeypatch.setattr(netcdf, "parse_robot", cache(parse_robot))
 
     def load(data: xr.Dataset) -> sl.Simulation:
-        monkeypatch.setattr(format, "read_dataset", lambda *_: (data, True))
+        monkeypatch.setattr(format, "read_dataset", lambda *_: data)
         return sl.load_simulation("sim.nc")
 
     return load

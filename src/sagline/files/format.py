@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar
 
 from sagline.core.arguments import file_path, instance
-from sagline.core.errors import FileError
 from sagline.files.netcdf import Content, file_errors, read_dataset, write_dataset
 
 if TYPE_CHECKING:
@@ -27,21 +26,16 @@ class Format(Content, Generic[T]):
     pack: Callable[[T], Dataset]  # data set of a result
     # result of a data set; takes the path for messages. None for results that are only written
     unpack: Callable[[Path, Dataset], T] | None = None
-    sealed_from: int = 1  # first version with a digest at the end of the file
 
     def save(self, result: T, file: os.PathLike[str] | str) -> None:
         """Write a result to a file atomically, with a digest at its end."""
         write_dataset(self.pack(instance(result, self.kind, self.name)), file_path(file))
 
-    def load(self, file: os.PathLike[str] | str, unsealed: Callable[[Path], None] | None = None) -> T:
+    def load(self, file: os.PathLike[str] | str) -> T:
         """Read a file that `save` wrote."""
         path = file_path(file)
-        data, sealed = read_dataset(path, self)
-        if self.format_of(path, data.attrs) < self.sealed_from:
-            if unsealed is not None:
-                unsealed(path)
-        elif not sealed:
-            raise FileError(path, "has changed since it was written: its digest is missing", self.again, item="digest")
+        data = read_dataset(path, self)
+        self.format_of(path, data.attrs)
         assert self.unpack is not None
         with file_errors(path):
             return self.unpack(path, data)

@@ -2,6 +2,7 @@
 
 An HDF5 file contains its own length, and HDF5 ignores later bytes. The digest is therefore appended at the end of the
 file. It is checked before anything else is read, because reading a damaged file may take any amount of memory and time.
+A file without a digest is not read.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Final, Literal, TypeVar
 
 import numpy as np
 
-from sagline.core.errors import FileError, InvalidValueError
+from sagline.core.errors import FileError, InvalidValueError, shortened
 from sagline.files.reading import check_regular, unreadable
 from sagline.files.robot_file import parse_robot
 from sagline.files.variables import PARTS
@@ -150,8 +151,8 @@ def write_dataset(data: Dataset, file: Path, groups: Mapping[str, Dataset] | Non
         seal(partial)
 
 
-def read_dataset(path: Path, content: Content) -> tuple[Dataset, bool]:
-    """Data set of an undamaged file, and True if the file has a digest, which is checked before reading."""
+def read_dataset(path: Path, content: Content) -> Dataset:
+    """Data set of an undamaged file, whose digest is checked before reading."""
     try:
         check_regular(path, path.stat().st_mode)  # opening a pipe would wait for its writer
         right = _digest_is_right(path)
@@ -161,7 +162,9 @@ def read_dataset(path: Path, content: Content) -> tuple[Dataset, bool]:
         raise unreadable(path, error) from None
     if right is False:
         raise FileError(path, "has changed since it was written: it was damaged or edited", content.again)
-    return _load(path, content), right is True
+    if right is None:
+        raise FileError(path, *_cause(path, content), item="digest")
+    return _load(path, content)
 
 
 @contextmanager
@@ -174,14 +177,20 @@ def file_errors(path: Path) -> Iterator[None]:
         raise FileError(path, f"has no {error.args[0]}", step, item=str(error.args[0])) from None
     except InvalidValueError as error:
         raise FileError.of(path, error) from None
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:  # parts do not fit together
+        step = "Write it again; it is incomplete or was edited."
+        (text,) = shortened((f"{type(error).__name__}: {error}",), 120)
+        raise FileError(path, f"has parts that do not fit together ({text})", step) from error
 
 
 def is_of(path: Path, content: Content) -> bool:
-    """True if the attributes of a file name this content; nothing else is checked."""
+    """True if the attributes of an undamaged file name this content; nothing else is checked."""
     from h5py import File
 
     try:
         check_regular(path, path.stat().st_mode)
+        if not _digest_is_right(path):
+            return False
         with File(path) as file:
             return content.key in file.attrs
     except (FileError, OSError, RuntimeError, ValueError):
@@ -203,7 +212,7 @@ def _load(path: Path, content: Content) -> Dataset:
                 raise ValueError(f"{size} bytes for {data.nbytes:.2g} bytes of data")
             return data.load()
     except Exception as error:  # h5py, h5netcdf and xarray have no common error class for a damaged file
-        raise FileError(path, *_cause(path, content)) from error
+        raise FileError(path, "is not a NetCDF file of sagline, but ends in its digest", content.again) from error
 
 
 def _cause(path: Path, content: Content) -> tuple[str, str]:
@@ -211,7 +220,8 @@ def _cause(path: Path, content: Content) -> tuple[str, str]:
     with path.open("rb") as file:
         begin = file.read(len(_BEGIN))
     if begin == _BEGIN:
-        return "is damaged, or was cut off", content.again
+        reason = f"was cut off or edited, or is not a {content.made}: it does not end in a digest"
+        return reason, content.again
     kind = _KINDS.get(path.suffix.lower(), "empty" if not begin else "another kind of file")
     return f"is {kind}, not a {content.made}", content.give
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import warnings
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, Final
 
@@ -11,7 +10,7 @@ import numpy as np
 
 from sagline.cables.model import CableState, CableStatus
 from sagline.cables.models import MODELS
-from sagline.core.errors import FileError, InvalidValueError, SaglineWarning
+from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.format import Format
 from sagline.files.netcdf import choice_attributes, choice_of, index_coordinate, labeled_dataset, robot_of
 from sagline.files.robot_file import dump_robot
@@ -227,9 +226,6 @@ def load_plan(file: os.PathLike[str] | str) -> Plan:
         FileError: If the file is missing, cut off, not a NetCDF file, not a plan, of a newer format, or changed
             after it was written: its digest, shapes, units, status codes and signs are checked.
 
-    Warns:
-        SaglineWarning: If the file has no digest because an older version wrote it.
-
     Examples:
         >>> import sagline as sl
         >>> path = sl.quintic_path([(0, 0, 1.5), (1, 1, 2)], speed=1.0)
@@ -238,13 +234,7 @@ def load_plan(file: os.PathLike[str] | str) -> Plan:
         >>> print(plan.state.robot.name, plan.unstrained_length.shape)
         cogiro (283, 8)
     """
-    return FORMAT.load(file, unsealed=_warn_of_damage)
-
-
-def _warn_of_damage(path: FilePath) -> None:
-    """Warn that damage of a file without a digest may be undetected; the warning names the caller of `load_plan`."""
-    text = f"{path} has no digest, so damage may remain undetected. Save it again to add a digest."
-    warnings.warn(text, SaglineWarning, stacklevel=4)
+    return FORMAT.load(file)
 
 
 def plan_dataset(plan: Plan) -> Dataset:
@@ -313,6 +303,5 @@ FORMAT: Final = Format(
     version=2,  # version 2 added the digest
     pack=plan_dataset,
     unpack=plan_of_dataset,
-    sealed_from=2,
 )
 save = FORMAT.save
