@@ -61,3 +61,10 @@ def test_losses_of_cables_with_mass_do_not_limit_the_step() -> None:
     assert run.energy.lost[-1] == pytest.approx(fine.energy.lost[-1], rel=5e-3)
     assert run.energy.lost[-1] > 0.1
     assert np.abs(run.energy.error).max() < 1e-2 * run.energy.lost[-1]
+
+
+def test_losses_keep_cables_with_mass_at_rest() -> None:
+    state = sl.inverse(sl.load_robot("article-suspended"), sl.Pose((1.0, 0.5, 1.5), np.eye(3))).state
+    run = sl.simulate(state, duration=0.1, cable_mass="lumped", nodes=10, damping=sl.Damping(loss_time=0.1))
+    assert np.abs(run.pose.position - run.pose.position[0]).max() < 1e-12
+    assert np.abs(run.tensions - run.tensions[0]).max() < 1e-8

@@ -81,58 +81,75 @@ def _element_distance(place: Array, j: int) -> float:
     return math.sqrt(x * x + y * y + z * z)
 
 
+@formula
+def _element_direction(place: Array, j: int) -> tuple[float, float, float, float]:
+    """Unit vector from node j to the next node toward the frame, and their distance [m]."""
+    x, y, z = place[0, j + 1] - place[0, j], place[1, j + 1] - place[1, j], place[2, j + 1] - place[2, j]
+    distance = math.sqrt(x * x + y * y + z * z + TINY)
+    return x / distance, y / distance, z / distance, distance
+
+
+@formula
+def _opening_speed(speed: Array, j: int, x: float, y: float, z: float) -> float:
+    """Speed of the next node toward the frame relative to node j, along a unit vector [m/s]."""
+    vx, vy, vz = speed[0, j + 1] - speed[0, j], speed[1, j + 1] - speed[1, j], speed[2, j + 1] - speed[2, j]
+    return x * vx + y * vy + z * vz
+
+
 @kernel
 def _add_damping(place: Array, speed: Array, count: int, row: Array, pulls: Array) -> float:
     """Add the damping force of every taut element, which never pushes; returns the power lost [W].
 
-    The forces are those at the speeds after a step in which they act alone (implicit Euler), so that they limit no
-    step. They are the solution of a tridiagonal system, because an element changes the speeds of its two nodes. The
-    platform and the frame node keep their speeds.
+    The forces are those at the speeds after the step (implicit Euler), so that they limit no step. They are the
+    solution of a tridiagonal system, because an element changes the speeds of its two nodes. The platform and the frame
+    node keep their speeds, and the other nodes are also subject to the elastic forces and to their weight. The power is
+    that at the mean of the speeds before and after the step.
     """
     size = place.shape[1]
     viscous = row[STIFFNESS] * row[LOSS_TIME]
     inner = row[STEP] / (row[DENSITY] * row[ELEMENT])
     last = row[STEP] / (0.5 * row[DENSITY] * (row[ELEMENT] + row[REST]))
-    ux = uy = uz = value = 0.0  # direction of the element before, and its right side after elimination
+    fall = row[GRAVITY] * row[STEP]
+    # directions and elastic forces of the elements before, at and after j
+    bx = by = bz = before = 0.0
+    ax = ay = az = after = 0.0
+    x, y, z, distance = _element_direction(place, 0)
+    force = pulls[0] * distance
     diagonal = 1.0
+    value = 0.0  # right side of the row before, after elimination
     for j in range(count + 1):
-        x, y, z = place[0, j + 1] - place[0, j], place[1, j + 1] - place[1, j], place[2, j + 1] - place[2, j]
-        inverse = 1.0 / math.sqrt(x * x + y * y + z * z + TINY)
-        x, y, z = x * inverse, y * inverse, z * inverse
-        along = (
-            x * (speed[0, j + 1] - speed[0, j])
-            + y * (speed[1, j + 1] - speed[1, j])
-            + z * (speed[2, j + 1] - speed[2, j])
-        )
         near = 0.0 if j == 0 else (last if j == count else inner)
         far = 0.0 if j == count else (last if j == count - 1 else inner)
-        taut = pulls[j] > 0.0
-        coupling = -near * (ux * x + uy * y + uz * z) if taut else 0.0
+        after = 0.0
+        if j < count:
+            ax, ay, az, distance = _element_direction(place, j + 1)
+            after = pulls[j + 1] * distance
+        back, ahead = bx * x + by * y + bz * z, ax * x + ay * y + az * z
+        opening = _opening_speed(speed, j, x, y, z)
+        opening += far * (after * ahead - force) - near * (force - before * back)
+        if j == 0 or j == count:  # the weight acts on both nodes of the other elements
+            opening += fall * z if j == count else -fall * z
+        coupling = -near * back if force > 0.0 and before > 0.0 else 0.0
         factor = coupling / diagonal
         length = row[REST] + row[BEHIND] if j == count else row[ELEMENT]
         diagonal = length / viscous + near + far - coupling * factor
-        value = (along - coupling * value) / diagonal if taut else 0.0
-        ux, uy, uz = (x, y, z) if taut else (0.0, 0.0, 0.0)  # slack elements do not couple their neighbors
+        value = (opening - coupling * value) / diagonal if force > 0.0 else 0.0
         pulls[size + j], pulls[2 * size + j] = factor, value
+        bx, by, bz, before = x, y, z, force
+        x, y, z, force = ax, ay, az, after
     power = 0.0
     force = 0.0
-    for back in range(count + 1):
-        j = count - back
-        factor = pulls[size + j + 1] if back > 0 else 0.0
+    for k in range(count + 1):
+        j = count - k
+        factor = pulls[size + j + 1] if k > 0 else 0.0
         force = pulls[2 * size + j] - factor * force
-        x, y, z = place[0, j + 1] - place[0, j], place[1, j + 1] - place[1, j], place[2, j + 1] - place[2, j]
-        distance = math.sqrt(x * x + y * y + z * z + TINY)
-        along = (
-            x * (speed[0, j + 1] - speed[0, j])
-            + y * (speed[1, j + 1] - speed[1, j])
-            + z * (speed[2, j + 1] - speed[2, j])
-        ) / distance
-        length = row[REST] + row[BEHIND] if j == count else row[ELEMENT]
+        x, y, z, distance = _element_direction(place, j)
         # the frame node has the velocity of the entering cable, which includes the change of the rest length
-        before = pulls[j]
-        after = max(before + force / distance, 0.0) if before > 0.0 else 0.0
-        power += (after - before) * distance * 0.5 * (along + force * length / viscous)
-        pulls[j] = after
+        opening = _opening_speed(speed, j, x, y, z)
+        length = row[REST] + row[BEHIND] if j == count else row[ELEMENT]
+        elastic = pulls[j]
+        pulls[j] = max(elastic + force / distance, 0.0) if elastic > 0.0 else 0.0
+        power += (pulls[j] - elastic) * distance * 0.5 * (opening + force * length / viscous)
     return power
 
 
