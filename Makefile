@@ -4,6 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 OUT ?= output
+TOOLS := build/tools
 SEED ?= $(shell date +%s)
 FOUND = $(shell for p in python3 python3.13 python3.12 python3.11 python3.14; do \
 	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 && { echo $$p; break; }; done)
@@ -11,7 +12,7 @@ PYTHON ?= $(FOUND)
 
 .DEFAULT_GOAL := help
 unexport PYTHONDONTWRITEBYTECODE # else each of a hundred processes compiles anew all that it imports
-.PHONY: help env run article test test-all test-extended coverage check format messages record mutants size bench soak c docs dist clean
+.PHONY: help env run article test test-all test-extended coverage check format messages record mutants size bench soak c docs dist pins audit sbom clean
 
 help: ## show this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{ printf "  make %-13s %s\n", $$1, $$2 }'
@@ -97,6 +98,22 @@ docs: env ## the documentation site, into build/site; warnings are errors
 
 dist: env ## wheel and source distribution, into dist
 	$(BIN)/python -m hatchling build
+
+pins: env ## renew constraints.txt, the versions with which sagline is tested
+	$(BIN)/python -m tools.audit --pins > constraints.part && mv constraints.part constraints.txt
+
+$(TOOLS)/.installed: $(STAMP) # programs of `make audit` and `make sbom`, in an environment of their own
+	$(BIN)/python -m venv $(TOOLS)
+	$(TOOLS)/bin/python -m pip install --quiet --disable-pip-version-check pip-audit cyclonedx-bom && touch $@
+
+audit: env ## licenses of all packages, and known vulnerabilities of the versions in constraints.txt
+	@$(MAKE) --silent $(TOOLS)/.installed || true # without it, the next line says that no database was reached
+	$(BIN)/python -m tools.audit $(TOOLS)/bin/pip-audit
+
+sbom: env $(TOOLS)/.installed ## software bill of materials (CycloneDX) of constraints.txt, into dist
+	mkdir -p dist
+	$(TOOLS)/bin/python -W ignore -m cyclonedx_py requirements constraints.txt --pyproject pyproject.toml \
+		--mc-type library --output-reproducible --of JSON --output-file dist/sagline.cdx.json
 
 clean: ## remove the environment, the folder output and every cache
 	rm -rf $(VENV) output build dist .coverage htmlcov .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

@@ -10,6 +10,7 @@ import tomllib
 import venv
 import zipfile
 from email.message import Message
+from hashlib import sha256
 from pathlib import Path
 from typing import NamedTuple
 
@@ -96,6 +97,26 @@ def sources(folder: Path) -> set[str]:
 def contents(wheel: Path) -> dict[str, bytes]:
     with zipfile.ZipFile(wheel) as archive:
         return {name: archive.read(name) for name in archive.namelist()}
+
+
+@pytest.mark.soak
+def test_a_wheel_and_a_source_that_are_built_twice_have_the_same_bytes(built: Built, tmp_path: Path) -> None:
+    """In folders of different names, with other permissions and another order of hashes."""
+    found = []
+    for name, mask, seed in (("a", 0o022, "1"), ("another folder", 0o077, "2")):
+        place = tmp_path / name
+        place.mkdir()
+        before = os.umask(mask)
+        try:
+            with tarfile.open(built.source) as archive, pytest.MonkeyPatch.context() as patched:
+                archive.extractall(place, filter="data")
+                patched.setenv("PYTHONHASHSEED", seed)
+                build(place / NAME, place / "dist", "wheel", "sdist")
+        finally:
+            os.umask(before)
+        found.append({file.name: sha256(file.read_bytes()).hexdigest() for file in (place / "dist").iterdir()})
+    assert len(found[0]) == 2
+    assert found[0] == found[1]
 
 
 def test_the_wheel_has_the_package_its_data_and_examples_and_nothing_else(built: Built) -> None:
