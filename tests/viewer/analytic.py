@@ -16,5 +16,5 @@ def ball(positions: Array) -> Details:
     margin = np.where(positions[:, 0] > WALL, -np.inf, margin)
     return Details(
         np.clip(margin, -100.0, 100.0), margin, np.zeros(len(positions), dtype=np.int64),
-        np.where(positions[:, 2] > 0.0, 3, 5), np.zeros(len(positions), dtype=np.int64),
+        np.where(positions[:, 2] > 0.0, 3, 5), np.zeros(len(positions), dtype=np.int64), np.zeros(len(positions)),
     )  # fmt: skip

@@ -18,7 +18,7 @@ PATTERNS = {"2T": 2, "3T": 3, "1R2T": 3, "3R3T": 6}
 
 
 class Pulls(NamedTuple):
-    """Of the cables at one pose: chord tensions at their limits, pulls there, and the range between, (m,) each."""
+    """Of the cables at one pose: chord tensions at their limits, pulls there, and pulls minus secants, (m,) each."""
 
     low: Array
     high: Array
@@ -27,10 +27,15 @@ class Pulls(NamedTuple):
     least: Array
     most: Array
 
+    @property
+    def slope(self) -> Array:
+        """Of the secant."""
+        wide = self.high > self.low
+        return np.where(wide, (self.at_high - self.at_low) / np.where(wide, self.high - self.low, 1.0), 0.0)
+
     def ends_only(self) -> Pulls:
-        """What somebody would take for the range who looks at the ends alone."""
-        ends = np.stack([self.at_low, self.at_high])
-        return self._replace(least=ends.min(axis=0), most=ends.max(axis=0))
+        """What somebody would take for the curves who looks at the ends alone."""
+        return self._replace(least=0.0 * self.low, most=0.0 * self.low)
 
 
 class Answer(NamedTuple):
@@ -55,7 +60,9 @@ def pulls_on_a_grid(robot: sl.Robot, pose: sl.Pose, model: sl.CableModel) -> Pul
     cable = sl.Cable(robot.cables.linear_density[:, None], robot.cables.axial_stiffness[:, None])
     hung = model.from_tension(cable, span[:, None], rise[:, None], tension, robot.gravity)
     pull = hung.vertical_force - tension * (rise / np.hypot(span, rise))[:, None]
-    return Pulls(low, high, pull[:, 0], pull[:, -1], pull.min(axis=1), pull.max(axis=1))
+    ends = Pulls(low, high, pull[:, 0], pull[:, -1], low, high)
+    off = pull - pull[:, :1] - ends.slope[:, None] * (tension - low[:, None])
+    return ends._replace(least=off.min(axis=1), most=off.max(axis=1))
 
 
 def mean_arm(robot: sl.Robot) -> float:
@@ -64,7 +71,7 @@ def mean_arm(robot: sl.Robot) -> float:
 
 
 def all_facets(robot: sl.Robot, pose: sl.Pose, pulls: Pulls, support: Support, arm: float) -> Answer:
-    """The margin over the normals of all subsets of the columns, both sides, moments of all free motions kept."""
+    """The margin over the normals of all subsets of the secants, both sides, moments of all free motions kept."""
     freedom = robot.freedom
     n, m = len(freedom), robot.cable_count
     run = pose.transform(robot.platform_anchors) - robot.frame_anchors
@@ -74,7 +81,8 @@ def all_facets(robot: sl.Robot, pose: sl.Pose, pulls: Pulls, support: Support, a
     up = np.tile([0.0, 0.0, 1.0], (m, 1))
     hanging = np.hstack([up, np.cross(lever, up)]).T
     units = np.where(np.abs(freedom[:, 3:]).sum(axis=1) > 0.5, 1.0 / (mean_arm(robot) or 1.0), 1.0)
-    scaled = units[:, None] * (freedom @ full)
+    secants = full - pulls.slope * hanging
+    scaled = units[:, None] * (freedom @ secants)
     chosen = np.array(list(combinations(range(m), n - 1)))
     columns = scaled[:, chosen].transpose(1, 0, 2)  # (F, n, n - 1)
     left, sizes, _ = np.linalg.svd(columns)
@@ -86,10 +94,10 @@ def all_facets(robot: sl.Robot, pose: sl.Pose, pulls: Pulls, support: Support, a
     along, down = normals @ full, normals @ hanging
     needed = normals[:, 2] * robot.mass * robot.gravity + support(normals)
     ends = np.maximum(along * pulls.low - down * pulls.at_low, along * pulls.high - down * pulls.at_high)
-    taut = np.maximum(along * pulls.low, along * pulls.high)
-    least = (taut - np.maximum(down * pulls.least, down * pulls.most)).sum(axis=1) - needed
-    most = (taut - np.minimum(down * pulls.least, down * pulls.most)).sum(axis=1) - needed
+    inside = np.abs(normals @ secants) <= 1e-9 * (np.abs(normals) @ np.abs(secants))
     value = ends.sum(axis=1) - needed
+    least = value - (inside * np.maximum(down * pulls.least, down * pulls.most)).sum(axis=1)
+    most = value - np.minimum(down * pulls.least, down * pulls.most).sum(axis=1)
     best = [int(np.argmin(one)) for one in (value, least, most)]
     return Answer(float(value.min()), float(least.min()), float(most.min()), normals[best])
 

@@ -63,15 +63,15 @@ def test_every_vertex_is_on_the_boundary(suspended: sl.Workspace) -> None:
     free = suspended.limiting != BY_BOX
     weight = SUSPENDED.mass * SUSPENDED.gravity
     assert np.count_nonzero(free) > 8_000
-    assert np.abs(suspended.margin[free]).max() <= 1e-6 * weight
+    assert np.abs(suspended.margin[free]).max() <= 1e-5 * weight  # error bound of a margin on the exact curves
+    assert np.quantile(np.abs(suspended.margin[free]), 0.95) <= 1e-8 * weight
     found = sl.margin(SUSPENDED, sl.Pose(suspended.surface.vertices, np.eye(3)))
     assert np.array_equal(found.value, suspended.margin)
     assert np.array_equal(found.limiting_cable[free], suspended.limiting_cable[free])
 
 
-@pytest.mark.parametrize(("aside", "agreeing"), [(1e-3, 0.94), (3e-3, 1.0)])
+@pytest.mark.parametrize(("aside", "agreeing"), [(1e-4, 0.99), (1e-3, 1.0)])
 def test_a_millimeter_to_either_side_the_inverse_agrees(suspended: sl.Workspace, aside: float, agreeing: float) -> None:
-    """Where the bracket of the margin is open, the exact boundary is up to 2 mm within that of its middle."""
     faces = suspended.surface.faces
     by_box = np.unique(faces[(suspended.limiting[faces] == BY_BOX).any(axis=1)])
     free = np.setdiff1d(np.arange(len(suspended.surface.vertices)), by_box)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from enum import StrEnum
 from math import pi
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -112,6 +113,16 @@ _SceneOption = Annotated[
     option("FILE", "With --clearance: a robot file with a scene, or a mesh in meters. Default: the robot's scene."),
     only_with("--clearance"),
 ]
+
+
+class HullName(StrEnum):
+    """Hulls of a workspace."""
+
+    EXACT = "exact"
+    INNER = "inner"
+    OUTER = "outer"
+
+
 _ToProveOption = Annotated[
     Any, converted_option("BOX", "Prove that all poses of this box are feasible.", "box_of", "--prove")
 ]
@@ -136,6 +147,10 @@ def workspace(
     to_prove: _ToProveOption = None,
     budget: _BudgetOption = 10,
     cells: Annotated[int, option("NUMBER", "Cells of the grid along the longest edge of the box.")] = 32,
+    hull: Annotated[
+        HullName,
+        option("HULL", "exact; or inner or outer, by the lower or the upper bound of the margin.", "--hull"),
+    ] = HullName.EXACT,
     model: ModelOption = ModelName.CATENARY,
     folder: OutOption = Path("output"),
     figures: Annotated[bool, figures_flag("Draw the hull and a slice, as PNG and SVG.")] = True,
@@ -174,9 +189,9 @@ def workspace(
         raise InvalidValueError("--tilt", f"{tilt:g} rad", "0 to 180deg", step)
     robot = robot_with_payload(name, payload)
     criteria = _criteria(name, limits, scene, in_frame=in_frame)
-    space_file, hull = f"{file_stem(robot.name, 'workspace')}.nc", f"{file_stem(robot.name, 'hull')}.glb"
+    space_file, mesh = f"{file_stem(robot.name, 'workspace')}.nc", f"{file_stem(robot.name, 'hull')}.glb"
     drawn = [file_stem(robot.name, what) for what in ("workspace", "slice") if figures]
-    output = Output(folder, [space_file, hull], drawn)
+    output = Output(folder, [space_file, mesh], drawn)
     with working(f"{robot.name}: workspace") as line:
         space = workspace(
             robot,
@@ -186,6 +201,7 @@ def workspace(
             criteria=criteria,
             model=cable,
             cells=cells,
+            hull=hull.value,
             progress=line.progress,
         )
         proof = None
@@ -195,7 +211,7 @@ def workspace(
             proof = prove(robot, claim, wrench, budget=budget, model=cable, progress=stage)
         space.save(output.file(space_file))
         if space.nearest is None:
-            space.surface.export(output.file(hull))
+            space.surface.export(output.file(mesh))
             if figures:
                 from sagline import plot
 
@@ -265,6 +281,7 @@ def _record(space: Workspace, proof: Proof | None) -> dict[str, Any]:
         "open_faces": list(space.open_faces),
         "orientations": str(space.orientations),
         "model": type(space.model).__name__,
+        "hull": space.hull,
         "criteria": [str(one) for one in space.criteria],
         "limits": [
             {

@@ -114,6 +114,28 @@ def boundary(
     return Boundary(surface, volume, error, first, components, open_faces, counted.count)
 
 
+INWARD: Final = 0.01  # distance from a vertex to the position of its slope, relative to a cell
+
+
+def uncertain_volume(level: Level, surface: Surface, uncertainty: Array, cell: float) -> float:
+    """Volume between the boundaries at levels that differ from zero by an uncertainty at each vertex (V,) [m^3].
+
+    The slope of the function is that from each vertex to a position inside. cell: edge of a cell [m], which limits the
+    distance of the boundaries.
+    """
+    k = np.flatnonzero(uncertainty > 0.0)
+    if not len(k):
+        return 0.0
+    areas = normals_of(surface.vertices, surface.faces)
+    corners = surface.faces.ravel()
+    normals = np.stack([np.bincount(corners, np.repeat(part, 3), len(uncertainty)) for part in areas.T], axis=1)[k]
+    sizes = np.maximum(np.linalg.norm(normals, axis=1), np.finfo(np.float64).tiny)[:, None]
+    rise = level_values(level, surface.vertices[k] - INWARD * cell * normals / sizes)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        distance = np.where(rise > 0.0, INWARD * cell * uncertainty[k] / rise, cell)
+    return float(np.minimum(distance, cell) @ vertex_areas(surface.vertices, surface.faces)[k])
+
+
 def _cells_of(cells: int | tuple[int, int, int], size: Array) -> tuple[int, int, int]:
     """Numbers of cells along each axis."""
     if isinstance(cells, tuple):

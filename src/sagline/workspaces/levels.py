@@ -4,20 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
 from sagline.cables.model import CableModel
 from sagline.core.arrays import Array, Indices, locked
 from sagline.core.progress import blocks
+from sagline.kernels import codes
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
+from sagline.workspaces.criteria import LeastMargin
 from sagline.workspaces.criterion import Criterion, Given
-from sagline.workspaces.margin_rows import MarginRows
+from sagline.workspaces.margin_rows import Bracket, MarginRows
 from sagline.workspaces.orientations import Orientations
 from sagline.workspaces.wrench_sets import WrenchSet
 
+Hull = Literal["exact", "inner", "outer"]
 BLOCK: Final = 1 << 12  # poses per block, about 0.1 s; interrupts are handled between blocks
 
 
@@ -30,6 +33,8 @@ class Details(NamedTuple):
         criterion: Index of the limiting criterion, shape (N,).
         cable: Limiting cable, -1 for none, shape (N,).
         rotation: Index of the limiting rotation, shape (N,).
+        uncertainty: Bound of the difference of a level near zero from the exact one, for which the margin is the
+            limiting criterion; 0 if the sign of the level is certain, shape (N,).
     """
 
     level: Array
@@ -37,6 +42,7 @@ class Details(NamedTuple):
     criterion: Indices
     cable: Indices
     rotation: Indices
+    uncertainty: Array
 
 
 @dataclass(eq=False)
@@ -56,6 +62,7 @@ class Levels:
         moment_arm: Lever arm as in `margin` [m].
         held: Axis along which all positions have the same coordinate, and this coordinate [m]; None if there is none.
         on_block: Called after each block with its number of poses.
+        hull: "exact" for the margin; "inner" and "outer" for its lower and its upper bound.
         middle: Middle of the wrench set, which the tensions balance, shape (6,).
     """
 
@@ -68,6 +75,7 @@ class Levels:
     moment_arm: float | None
     held: tuple[int, float] | None = None
     on_block: Callable[[int], None] | None = None
+    hull: Hull = "exact"
 
     def __post_init__(self) -> None:
         """Prepare the margin."""
@@ -82,7 +90,9 @@ class Levels:
     def details(self, positions: Array) -> Details:
         """Levels, and limiting criterion, cable and rotation, at positions (N, 3) of the platform origin [m]."""
         count = len(positions)
-        found = Details(*np.empty((2, count)), *np.full((3, count), -1))
+        level, margin, uncertainty = np.empty((3, count))
+        criterion, cable, rotation = np.full((3, count), -1)
+        found = Details(level, margin, criterion, cable, rotation, uncertainty)
         for part in blocks(count, BLOCK):
             own = self._block(self.in_plane(positions[part]))
             for whole, piece in zip(found, own, strict=True):
@@ -118,7 +128,8 @@ class Levels:
         """Details in one rotation."""
         rows = self.orientations.at(positions, rotation)
         bracket = self._margins.rows(rows)
-        given = Given(self.robot, self.model, self.tension, self.middle, rows, bracket.value, bracket.cable)
+        margin = {"exact": bracket.value, "inner": bracket.low, "outer": bracket.high}[self.hull]
+        given = Given(self.robot, self.model, self.tension, self.middle, rows, margin, bracket.cable)
         level, criterion = np.full(len(rows), np.inf), np.zeros(len(rows), dtype=np.int64)
         cable = np.array(bracket.cable, dtype=np.int64)
         for index, (one, scale) in enumerate(zip(self.criteria, self._scales, strict=True)):
@@ -132,7 +143,19 @@ class Levels:
             least = value < level  # NaN compares as false
             level[least], criterion[least] = value[least], index
             cable[least] = -1 if judged.cable is None else judged.cable[least]
-        return Details(level, bracket.value, criterion, cable, np.full(len(rows), rotation, dtype=np.int64))
+        uncertainty = np.where(criterion == 0, self._uncertainty(bracket), 0.0)
+        return Details(level, margin, criterion, cable, np.full(len(rows), rotation, dtype=np.int64), uncertainty)
+
+    def _uncertainty(self, bracket: Bracket) -> Array:
+        """Distance of the reserve from the farther bound of the margin, if it is between them, over the scale."""
+        reserve = self.criteria[0].limit if isinstance(self.criteria[0], LeastMargin) else 0.0
+        unsure = (bracket.low < reserve) & (reserve <= bracket.high)
+        if reserve == 0.0:
+            unsure &= bracket.status == codes.MARGIN_OPEN
+        if self.hull != "exact" or not unsure.any():
+            return np.zeros(len(bracket.value))
+        farther = np.maximum(reserve - bracket.low, bracket.high - reserve) / self._scales[0]
+        return np.where(unsure, farther, 0.0)
 
 
 def middle_wrench(wrenches: WrenchSet) -> Array:

@@ -70,9 +70,9 @@ class Margin(Result):
         wrenches: The set of loads.
         moment_arm: Lever arm that converts moments to forces [m]; None for each robot's mean lever arm.
         value: Largest additional load that can still be balanced in any direction [N], shape () or (N,); a moment
-            counts as a force at the lever arm. A negative value is the excess of the set. It is continuous and never
-            NaN: infinite for straight cables without limits, -infinite if the status has no margin or a cable has no
-            admissible tension.
+            counts as a force at the lever arm. A negative value is the excess of the set. It is never NaN: infinite for
+            straight cables without limits, -infinite if the status has no margin or a cable has no admissible tension.
+            It is continuous, except for small jumps while the exact curves of sagging cables decide its sign.
         low: Lower bound of the margin for all sag forces [N], with the shape of value. If it is not negative, every
             load of the set is proved feasible. Without sag, both bounds are equal to the value.
         high: Upper bound [N]; if it is negative, a load of the set is proved infeasible.
@@ -138,8 +138,9 @@ def margin(
 
     The margin is also valid at poses without a tension distribution. With sag, the bracket is proved for all tensions.
     low >= 0 means that every load of the set can be balanced within the limits, and high < 0 that at least one load
-    cannot. The admissible tensions are those of `inverse`: a sagging cable is at most fifteen times as long as its
-    chord, and a cable without upper limit is stretched to at most twice its length.
+    cannot. Where the bracket leaves this open, the decision of `inverse` for a single load narrows it. The admissible
+    tensions are those of `inverse`: a sagging cable is at most fifteen times as long as its chord, and a cable without
+    upper limit is stretched to at most twice its length.
 
     Args:
         robot: The robot, or a sequence of N robots, one per pose.

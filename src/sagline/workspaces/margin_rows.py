@@ -109,7 +109,11 @@ class MarginRows:
             step = f"Give every one of the {self.robot_count} robots the same number of poses."
             raise InvalidValueError("poses", f"{count} of them", f"a multiple of {self.robot_count}", step)
         numbers, counters = memory_for(self.cable_count)
-        memory = np.empty(numbers.size + FACET_SIZE), counters, np.empty(self.cable_count, dtype=np.int8)
+        memory = (
+            np.empty(2 * numbers.size + FACET_SIZE),
+            np.empty(2 * counters.size, dtype=np.int64),
+            np.empty(self.cable_count, dtype=np.int8),
+        )
         margins = (
             np.empty((3, count)),
             np.empty((count, 6)),

@@ -16,13 +16,17 @@ from sagline.robot.pose import PoseBox
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 from sagline.workspaces.criterion import Criterion
-from sagline.workspaces.levels import Levels
+from sagline.workspaces.levels import Hull, Levels
 from sagline.workspaces.nearest import Nearest
 from sagline.workspaces.orientations import Orientations
 from sagline.workspaces.region import flat_axis
 from sagline.workspaces.surface import Components, Surface, vertex_areas
 from sagline.workspaces.wrench_sets import WrenchSet
 
+HULLS: Final[dict[Hull, str]] = {
+    "inner": "inner: all its positions are proved feasible",
+    "outer": "outer: all positions beyond it are proved infeasible",
+}
 BY_BOX: Final = -1  # value in `limiting` for a face of the box
 MOST_LIMITS: Final = 10  # largest number of printed shares
 _MOST_PARTS: Final = 5  # largest number of components with printed volumes
@@ -66,9 +70,11 @@ class Workspace(Result, Saved):
         model: Cable model.
         tension: Tension distribution method, for criteria on tensions.
         moment_arm: Lever arm as in `margin` [m]; None for the mean lever arm.
+        hull: "exact", or "inner" or "outer" by the lower or the upper bound of the margin.
         unit: Unit of the volume, "m³" or "m²".
         volume: Volume or area in this unit.
-        volume_error: Error bound of the volume, which excludes parts and gaps that are thinner than two cells of the
+        volume_error: Error bound of the volume: distances between triangles and boundary, and bounds of the margin at
+            vertices where its sign is not certain. It excludes parts and gaps that are thinner than two cells of the
             finest grid; 0 for an empty workspace.
         components: Components of the workspace.
         surface: The closed boundary, including the faces of the box that the workspace reaches.
@@ -92,6 +98,7 @@ class Workspace(Result, Saved):
     model: CableModel
     tension: TensionMethod
     moment_arm: float | None
+    hull: Hull
     unit: str
     volume: float
     volume_error: float
@@ -150,6 +157,7 @@ class Workspace(Result, Saved):
             self.tension,
             self.moment_arm,
             flat_axis(self.box),
+            hull=self.hull,
         )
 
     def __str__(self) -> str:
@@ -189,6 +197,8 @@ def facts_of(space: Workspace) -> list[tuple[str, str]]:
     """Box, loads, orientations, model and criteria of a workspace, as pairs of a heading and a text."""
     facts = [("box", f"{span_of(space.box)} m"), ("loads", str(space.wrenches))]
     facts += [("platform", str(space.orientations)), ("cables", type(space.model).__name__)]
+    if space.hull != "exact":
+        facts.append(("hull", HULLS[space.hull]))
     if asked := [str(one) for one in space.criteria if not one.always]:
         facts.append(("criteria", ", ".join(asked)))
     if space.components.count > 1:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Final
+from typing import Final, get_args
 
 import numpy as np
 
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary
-from sagline.core.arguments import brief, callback, instance, whole_number
+from sagline.core.arguments import brief, callback, choice, instance, whole_number
 from sagline.core.arrays import Array, Flags, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.progress import Progress
@@ -18,10 +18,10 @@ from sagline.robot.pose import PoseBox
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 from sagline.tension.methods import MinimumNorm
-from sagline.workspaces.boundary import MOST_CELLS, boundary
+from sagline.workspaces.boundary import MOST_CELLS, boundary, uncertain_volume
 from sagline.workspaces.criteria import LeastMargin
 from sagline.workspaces.criterion import Criterion, check_continuous
-from sagline.workspaces.levels import Levels
+from sagline.workspaces.levels import Hull, Levels
 from sagline.workspaces.nearest import nearest_to
 from sagline.workspaces.orientations import Orientations, Tilts, orientations_of
 from sagline.workspaces.region import AXES, Region, flat_axis, region_of
@@ -47,13 +47,15 @@ def workspace(
     cells: int = 32,
     refine: bool | int = True,
     moment_arm: float | None = None,
+    hull: Hull = "exact",
     progress: Progress | None = None,
 ) -> Workspace:
     """Workspace: the positions at which the cables can balance every load of a set, and all criteria are met.
 
     The boundary is computed for sagging cables from the sign of `margin`. It can have any shape and any number of
-    parts. Its vertices are exact. The surface is flat between them, and the error bar includes the effect of this.
-    Parts thinner than a cell can be missed; only `prove` is certain for a whole box.
+    parts. Its vertices are on the exact boundary. The surface is flat between them. The error bar includes the effect
+    of this, and the bounds of the margin at vertices where its sign is not certain. Parts thinner than a cell can be
+    missed; only `prove` is certain for a whole box.
 
     Args:
         robot: The robot. For a planar robot, whose plane_normal must be along x, y or z, the workspace is an area.
@@ -68,6 +70,9 @@ def workspace(
         cells: Number of cells along the box's longest edge, 4 to 128.
         refine: Number of times that cells on the boundary are halved, up to 3; True for once.
         moment_arm: Lever arm that converts moments to forces in the margin [m]; None for the mean lever arm.
+        hull: "exact" for the boundary by the sign of the margin. "inner" for the positions whose loads are proved
+            feasible, by the lower bound of the margin; "outer" for those whose loads are not proved infeasible, by the
+            upper bound.
         progress: Called between blocks with the number of finished poses and the expected total number.
 
     Returns:
@@ -96,13 +101,15 @@ def workspace(
     turned = orientations_of(robot, orientations, region.box.tilt)
     loads = load_of(wrenches)
     arm = None if moment_arm is None else number(moment_arm, "moment_arm", "m", low=0.0)
-    levels = Levels(robot, loads, turned, asked, model, tension, arm, flat_axis(region.box))
+    chosen = choice(hull, "hull", get_args(Hull))
+    levels = Levels(robot, loads, turned, asked, model, tension, arm, flat_axis(region.box), hull=chosen)
     levels.on_block = None if report is None else _progress_of(report, region.cells)
     found = boundary(levels, region.low, region.high, region.cells, refine)
     surface, components = found.surface, found.components
     if components.count > 1:
         components = replace(components, separate=separated(components, exclusion(levels)))
     decided = levels.details(surface.vertices)
+    error = found.volume_error + uncertain_volume(levels, surface, decided.uncertainty, float(found.grid.step.max()))
     on_box = _on_box(surface.vertices, region) & (decided.level > 1e-6)
     return Workspace(
         robot=robot,
@@ -113,9 +120,10 @@ def workspace(
         model=model,
         tension=tension,
         moment_arm=arm,
+        hull=chosen,
         unit=region.unit,
         volume=found.volume / region.thickness,
-        volume_error=found.volume_error / region.thickness,
+        volume_error=error / region.thickness,
         components=replace(components, volume=locked(components.volume / region.thickness)),
         surface=surface,
         limiting=locked(np.where(on_box, BY_BOX, decided.criterion).astype(np.int8)),

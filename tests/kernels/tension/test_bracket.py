@@ -13,6 +13,7 @@ from tests.kernels.cable.curves import pulls_of, random_curves
 from tests.kernels.compiled import from_python, memory
 from tests.kernels.tension.demands import change_from, demand_of, weightless
 
+NODES = bracket.NODES
 decide = from_python(bracket.decide_feasibility)
 
 
@@ -25,7 +26,7 @@ def test_weightless_cables_by_hand() -> None:
         ([2.0 + 1e-6, 1.0], POSE_INFEASIBLE, 1e-6),
     ):
         demand = demand_of(np.eye(2), np.array(right), 2)
-        status, proved, enough, by_one = decide(weightless(low, high), demand, change_from(low, 2), memory(5000))
+        status, proved, enough, by_one = decide(weightless(low, high), demand, NODES, change_from(low, 2), memory(5000))
         assert status == expected
         assert enough == pytest.approx(shortfall, abs=1e-12)
         assert proved == pytest.approx(shortfall, abs=1e-12)
@@ -36,7 +37,9 @@ def test_no_force_helps_where_moments_are_out_of_reach() -> None:
     matrix = np.array([[1.0, 1.0], [1.0, -1.0]])  # two cables up at x = -1 and x = 1
     change = change_from(np.ones(2), 2)
     demand = demand_of(matrix, np.array([2.0, 5.0]), 1)
-    status, proved, enough, by_one = decide(weightless(np.zeros(2), np.full(2, 2.0)), demand, change, memory(5000))
+    status, proved, enough, by_one = decide(
+        weightless(np.zeros(2), np.full(2, 2.0)), demand, NODES, change, memory(5000)
+    )
     assert (status, by_one) == (POSE_INFEASIBLE, True)
     assert proved == enough == np.inf
     np.testing.assert_allclose(change.direction, [0.0, 1.0])
@@ -59,7 +62,7 @@ def test_one_sagging_cable_reaches_the_range_of_its_curve() -> None:
             continue  # too near for the grid
         demand = Demand(np.ones((1, 1)), np.full((1, 1), hanging), np.array([right]), 1, abs(right))
         change = change_from(np.array([low]), 1)
-        status, proved, enough, _ = decide(curves, demand, change, memory(5000))
+        status, proved, enough, _ = decide(curves, demand, NODES, change, memory(5000))
         inside = reached.min() < right < reached.max()
         verdicts.append(bool(inside))
         assert status == (POSE_SOLVED if inside else POSE_INFEASIBLE)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from sagline.core.arrays import Array, Codes, Flags, Indices
 from sagline.kernels import codes
@@ -35,7 +36,7 @@ from sagline.kernels.inverse.poses import (
 )
 from sagline.kernels.jit import entry, glue
 from sagline.kernels.memory import Memory, block, vector
-from sagline.kernels.tension.bracket import component_along, decide_feasibility
+from sagline.kernels.tension.bracket import NODES, component_along, decide_feasibility
 from sagline.kernels.tension.least_change import Demand, TensionChange, norm_of_part
 from sagline.kernels.tension.margin import zonotope_margin
 from sagline.kernels.tension.nearest import Distribution
@@ -86,30 +87,23 @@ def decide_poses(
     m = statuses.shape[1]
     cables, rest = new_cables(Memory(*memory), m, robots_have_machine(robots))
     balance, rest = new_balance(rest, m, n)
-    rows, rest = block(rest, 2 * n + 3, m)
-    vectors, rest = block(rest, 3, n)
-    weight, change = rows[2 * n], TensionChange(rows[2 * n + 1], rows[2 * n + 2], vectors[0], vectors[1])
-    for i in range(m):
-        weight[i] = 1.0
-    translations = translation_count(freedom)
+    work, rest = new_demand(rest, m, freedom)
+    change = work.change
+    translations = work.demand.soft
     for p in which:
         platform = platform_at(robot_terms, poses, wrenches, p)
         model = model_at(model_terms, platform.body)
-        set_pose(model, limits, codes.CHORD_TENSION, weight, platform, cables, balance)
+        set_pose(model, limits, codes.CHORD_TENSION, work.weight, platform, cables, balance)
         if cable_without_tension(cables) >= 0:
             brackets[p, PROVED], brackets[p, ENOUGH] = math.inf, math.inf
             for i in range(m):
                 blocking[p, i] = not cables.low[i] <= cables.high[i]
             continue
-        fill_needed_wrench(platform, cables, balance)
-        start_from_minimum_norm(balance)
-        for i in range(m):
-            change.tau[i] = balance.bounds[START, i]
-        demand, lever = _demand_of(
-            platform, cables, balance, Demand(rows[:n], rows[n : 2 * n], vectors[2], translations, 0.0)
-        )
+        demand, lever = demand_of_pose(platform, cables, balance, work)
         curves, left = new_curves(model, cables, statuses[p], rest)
-        status, brackets[p, PROVED], brackets[p, ENOUGH], proved = decide_feasibility(curves, demand, change, left)
+        status, brackets[p, PROVED], brackets[p, ENOUGH], proved = decide_feasibility(
+            curves, demand, NODES, change, left
+        )
         sag_forces_at(curves, change.tau, change.sag_force)
         if status == codes.POSE_SOLVED:
             status = _pose_status(statuses[p])
@@ -148,10 +142,39 @@ def _pose_status(statuses: Codes) -> int:
     return codes.POSE_NOT_CONVERGED if gravest >= codes.CABLE_TOO_SLACK else codes.POSE_SOLVED
 
 
+class DemandArrays(NamedTuple):
+    """Work arrays for the demand on the cables of a pose."""
+
+    weight: Array  # root weights of the cables in the distribution's variable: ones, (m,)
+    demand: Demand  # size is not filled
+    change: TensionChange
+
+
 @glue
-def _demand_of(platform: Platform, cables: Cables, balance: Balance, demand: Demand) -> tuple[Demand, float]:
-    """Fill the wrench demand on the cables of a pose; returns it and the lever arm [m] by which moments are divided."""
+def new_demand(memory: Memory, m: int, freedom: Array) -> tuple[DemandArrays, Memory]:
+    """Work arrays for m cables and the free motions (n, 6), and the remaining memory."""
+    n = freedom.shape[0]
+    rows, memory = block(memory, 2 * n + 3, m)
+    vectors, memory = block(memory, 3, n)
+    for i in range(m):
+        rows[2 * n, i] = 1.0
+    change = TensionChange(rows[2 * n + 1], rows[2 * n + 2], vectors[0], vectors[1])
+    demand = Demand(rows[:n], rows[n : 2 * n], vectors[2], translation_count(freedom), 0.0)
+    return DemandArrays(rows[2 * n], demand, change), memory
+
+
+@glue
+def demand_of_pose(platform: Platform, cables: Cables, balance: Balance, work: DemandArrays) -> tuple[Demand, float]:
+    """Fill the wrench demand on the cables of a placed pose, and the tensions at which its search starts.
+
+    Returns the demand, and the lever arm [m] by which moments are divided.
+    """
+    demand = work.demand
     n, m = balance.matrix.shape
+    fill_needed_wrench(platform, cables, balance)
+    start_from_minimum_norm(balance)
+    for i in range(m):
+        work.change.tau[i] = balance.bounds[START, i]
     lever = 0.0
     for i in range(m):
         for k in range(demand.soft, n):

@@ -211,13 +211,14 @@ def _approach_demand(
 
 @glue
 def decide_feasibility(
-    curves: Curves, demand: Demand, change: TensionChange, memory: Memory
+    curves: Curves, demand: Demand, nodes: int, change: TensionChange, memory: Memory
 ) -> tuple[int, float, float, bool]:
     """Feasibility of a demand with tensions within the cables' limits.
 
-    change: start of the search; filled with the tensions of least residual, this residual and its direction. Returns
-    POSE_SOLVED, POSE_INFEASIBLE, POSE_BORDERLINE, or POSE_NOT_CONVERGED after an arithmetic failure; the lower and
-    upper bound of the shortfall [N]; and True if the direction alone proves infeasibility over the whole first range.
+    nodes: largest number of examined ranges; change: start of the search; filled with the tensions of least residual,
+    this residual and its direction. Returns POSE_SOLVED, POSE_INFEASIBLE, POSE_BORDERLINE, or POSE_NOT_CONVERGED after
+    an arithmetic failure; the lower and upper bound of the shortfall [N]; and True if the direction alone proves
+    infeasibility over the whole first range.
     """
     n, m = demand.matrix.shape
     tops, rest = vector(memory, m)  # largest contribution of each cable along a direction [N]
@@ -232,7 +233,7 @@ def decide_feasibility(
         trial.tau[i] = change.tau[i]
     enough = math.inf
     top = 0
-    for node in range(NODES):
+    for node in range(nodes):
         range_ = ranges[top]
         left, balanced = _approach_demand(curves, demand, range_, trial, rest)
         if node == 0 and not (demand.size < math.inf and left == left):

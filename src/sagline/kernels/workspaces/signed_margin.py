@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array, Codes, Indices
 from sagline.kernels import codes, tables
-from sagline.kernels.balance.setting import place_cables
+from sagline.kernels.balance.setting import Platform, place_cables
 from sagline.kernels.balance.wrench import fill_structure_matrix, is_rotation, rows_along_freedom
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.admissible import TensionLimits, cable_without_tension, least_of_sag
@@ -28,6 +28,7 @@ from sagline.kernels.cable.sag_forces import new_curves
 from sagline.kernels.inverse.poses import LimitTerms, ModelTerms, Robots, model_at
 from sagline.kernels.jit import entry, formula, glue, kernel
 from sagline.kernels.memory import Memory, block, vector
+from sagline.kernels.workspaces.exact_margin import ABOVE, BELOW, VALUE, LimitingFacet, settle_margin
 from sagline.kernels.workspaces.facets import (
     DEPENDENT,
     LIMIT,
@@ -42,28 +43,33 @@ from sagline.kernels.workspaces.facets import (
 from sagline.kernels.workspaces.sag_force_bounds import (
     BAND_ROWS,
     HIGH,
-    LEAST,
     LOW,
-    MOST,
+    OVER,
     SAG_FORCE_HIGH,
     SAG_FORCE_LOW,
-    TAUT,
+    SLOPE,
+    UNDER,
     fill_bands,
 )
-from sagline.kernels.workspaces.wrench_set import SetTerms, WrenchSetArrays, new_set, place_set, reach_of_set
+from sagline.kernels.workspaces.wrench_set import (
+    SetTerms,
+    WrenchSetArrays,
+    new_set,
+    place_set,
+    reach_of_set,
+    worst_wrench,
+)
 
 ALONG = 1e-13  # relative to the terms of a normal: rounding error of its product with a column in the facet
+IN_PLANE = 1e-10  # relative to the same terms: a secant with a smaller product counts as in the facet
 PURE = 1e-9  # a unit normal (moments times lever arm) with a smaller force part counts as a pure moment
 
 # Rows of the cables' weights (COUNT_ROWS, m).
 WIDTH = 0  # half the range of the tensions
-SLOPE = 1  # half the increase of the sag force from the lower to the upper tension limit
-UNSURE = 2  # half the range of the sag force
+BELOW_SECANT, ABOVE_SECANT = 1, 2  # least and largest difference of the sag force from its secant
 LEVER_X, LEVER_Y = 3, 4
-COLUMN = 5  # of the structure matrix, six rows
+COLUMN = 5  # wrench of the secant per newton of chord tension, six rows
 COUNT_ROWS = 11
-
-ENDS, RANGES = 0, 1  # rows of the points
 
 # Facets that are measured together: rows in flat memory with positions known at compile time, so that loops over facets
 # vectorize.
@@ -71,17 +77,18 @@ TOGETHER = 64
 OF_A_SUBSET = 20  # largest number of normals per subset, 6 over 3
 NORMAL = 0  # six rows
 ROUNDING = 6 * TOGETHER
-BY_ENDS, BY_TENSIONS, BY_SAG_FORCES = 7 * TOGETHER, 8 * TOGETHER, 9 * TOGETHER  # half ranges of the cables' wrenches
-AGAINST, FOR = 10 * TOGETHER, 11 * TOGETHER  # extent of the set in both directions
-UP, DOWN = 12 * TOGETHER, 13 * TOGETHER  # largest contributions of cables without limit in both directions
-WORK = 14 * TOGETHER  # two rows
-LENGTH = 16 * TOGETHER  # inverse of the normal's length
-MARGINS = 17 * TOGETHER  # three rows: VALUE, BELOW, ABOVE
-FACET_SIZE = 20 * TOGETHER
+BY_ENDS = 7 * TOGETHER  # half ranges of the cables' wrenches
+# largest decrease and increase of the cables' wrenches by the differences of the sag forces from their secants
+DECREASE, INCREASE = 8 * TOGETHER, 9 * TOGETHER
+IN_FACET = 2 * TOGETHER  # the same of the cables whose secants are in the facet, two rows further
+AGAINST, FOR = 12 * TOGETHER, 13 * TOGETHER  # extent of the set in both directions
+UP, DOWN = 14 * TOGETHER, 15 * TOGETHER  # largest contributions of cables without limit in both directions
+WORK = 16 * TOGETHER  # two rows
+LENGTH = 18 * TOGETHER  # inverse of the normal's length
+MARGINS = 19 * TOGETHER  # three rows: VALUE, BELOW, ABOVE
+FACET_SIZE = 22 * TOGETHER
 AS_GOOD_AS_INFINITE = 1e250
 BEYOND = 1e300  # inverse of a length of zero; products with it count as infinite
-
-VALUE, BELOW, ABOVE = 0, 1, 2  # rows of the margins (3, N) [N]
 
 MarginMemory = tuple[Array, Indices, Codes]
 Margins = tuple[Array, Array, Indices, Codes]  # margins (3, N), directions (N, 6), cables (N,), statuses (N,)
@@ -91,11 +98,10 @@ class _FacetWeights(NamedTuple):
     """Weights of the facets of one pose."""
 
     rows: Array  # rows of the cables' weights, (COUNT_ROWS, m)
-    # wrench of the cables at the middle of the tension limits minus the demand; sag forces at the middle of their
-    # values at the limits (ENDS) or of their ranges (RANGES), (2, 6)
-    points: Array
+    middle: Array  # wrench of the cables at the middle of their secants minus the demand, (6,)
     high: Array  # upper limits [N], (m,)
     endless: bool  # True if a cable has no upper limit
+    curved: bool  # True if a sag force differs from its secant
     arm: float  # lever arm of the norm [m]
     lever: float  # mean lever arm [m] that divides moments in the search for normals; 1 without a lever arm
 
@@ -123,7 +129,7 @@ def signed_margins(
         set_terms: The set of loads.
         arms: Lever arm of the norm, and mean lever arm [m], (1 or R,) each.
         poses: Rows (N, POSE_COLUMNS).
-        memory: `memory_for` the number of cables plus FACET_SIZE numbers, and codes of the cables (m,).
+        memory: twice `memory_for` the number of cables plus FACET_SIZE numbers, and codes of the cables (m,).
         margins: Filled: value, lower and upper bound [N], (3, N); normal of the facet with the least distance, in world
             axes, of length 1 with moments divided by the lever arm, (N, 6); the cable whose limit changes the value
             fastest, -1 for none, (N,); status from the two bounds, (N,).
@@ -140,7 +146,8 @@ def signed_margins(
     wrenches, rest = new_set(set_terms, rest)
     rotation, rest = block(rest, 3, 3)
     found, rest = vector(rest, 3)
-    points, rest = block(rest, 2, 6)
+    middle, rest = vector(rest, 6)
+    wrench, rest = vector(rest, 6)
     measured, rest = vector(rest, FACET_SIZE)
     rows, rest = block(rest, g.GEOMETRY_ROWS + BAND_ROWS + COUNT_ROWS, m)
     geometry, bands = rows[: g.GEOMETRY_ROWS], rows[g.GEOMETRY_ROWS : g.GEOMETRY_ROWS + BAND_ROWS]
@@ -172,13 +179,26 @@ def signed_margins(
             statuses[p] = codes.MARGIN_TOO_SLACK
             continue
         place_set(set_terms, body, inertias[p * inertias.shape[0] // count], rotation, wrenches)
-        endless = _fill_weights(body, set_terms[0], geometry, bands, counted, points)
-        counts = _FacetWeights(counted, points, bands[TAUT], endless, arms[0][p * arms[0].size // count], lever)
+        endless, curved = _fill_weights(body, set_terms[0], geometry, bands, counted, middle)
+        if curved:
+            _fill_facet_table(freedom, counted[COLUMN:], lever, facets.table)
+            choose_basis(facets, n, m, lever)
+        counts = _FacetWeights(counted, middle, bands[HIGH], endless, curved, arms[0][p * arms[0].size // count], lever)
         _measure_all_facets(facets, n, m, counts, wrenches, measured, found, directions[p])
-        for k in range(3):
-            values[k, p] = found[k]
         limiting[p] = _limiting_cable(counts, directions[p]) if found[VALUE] < math.inf else -1
         statuses[p] = _margin_status(found)
+        if curved and statuses[p] == codes.MARGIN_OPEN:
+            single = worst_wrench(set_terms[0], wrenches, directions[p], wrench)
+            for k in range(6):
+                middle[k] -= set_terms[0][k]
+            facet = LimitingFacet(
+                directions[p], counted[COLUMN:], counted[WIDTH], counted[LEVER_X : LEVER_Y + 1], middle, bands,
+                counts.arm, single,
+            )  # fmt: skip
+            platform = Platform(freedom, body, robot, poses[p], wrench)
+            statuses[p] = settle_margin(model, limits, platform, facet, curves, found, left)
+        for k in range(3):
+            values[k, p] = found[k]
 
 
 @glue
@@ -196,38 +216,38 @@ def _fill_facet_table(freedom: Array, full: Array, lever: float, table: Array) -
 
 
 @glue
-def _fill_weights(body: Array, center: Array, geometry: Array, bands: Array, rows: Array, points: Array) -> bool:
-    """Fill the weights of the cables for all facets; returns True if a cable has no upper limit."""
-    endless = False
+def _fill_weights(
+    body: Array, center: Array, geometry: Array, bands: Array, rows: Array, middle: Array
+) -> tuple[bool, bool]:
+    """Fill the weights of the cables for all facets.
+
+    Returns True if a cable has no upper limit, and True if a sag force differs from its secant.
+    """
+    endless = curved = False
     for a in range(6):
-        points[ENDS, a] = points[RANGES, a] = center[a]
-    points[ENDS, 2] = points[RANGES, 2] = center[2] - body[tables.MASS] * body[tables.GRAVITY]
+        middle[a] = center[a]
+    middle[2] -= body[tables.MASS] * body[tables.GRAVITY]
     for i in range(bands.shape[1]):
-        limited = bands[TAUT, i] < math.inf
+        limited = bands[HIGH, i] < math.inf
         endless = endless or not limited
-        rows[WIDTH, i] = 0.5 * (bands[TAUT, i] - bands[LOW, i]) if limited else 0.0
-        # the sag force at the largest strain is far below that of practical tensions: the value neglects this change
-        slope = 0.5 * (bands[SAG_FORCE_HIGH, i] - bands[SAG_FORCE_LOW, i])
-        rows[SLOPE, i] = slope if bands[HIGH, i] < math.inf else 0.0
-        rows[UNSURE, i] = 0.5 * (bands[MOST, i] - bands[LEAST, i])
+        rows[WIDTH, i] = 0.5 * (bands[HIGH, i] - bands[LOW, i]) if limited else 0.0
+        rows[BELOW_SECANT, i], rows[ABOVE_SECANT, i] = bands[UNDER, i], bands[OVER, i]
+        curved = curved or bands[UNDER, i] < bands[OVER, i]
         x, y = geometry[g.LEVER_X, i], geometry[g.LEVER_Y, i]
         rows[LEVER_X, i] = x
         rows[LEVER_Y, i] = y
         for a in range(6):
-            given = rows[COLUMN + a, i] * (bands[LOW, i] + rows[WIDTH, i])
-            points[ENDS, a] += given
-            points[RANGES, a] += given
-        _subtract_sag_force(points[ENDS], bands[SAG_FORCE_LOW, i] + rows[SLOPE, i], x, y)
-        _subtract_sag_force(points[RANGES], 0.5 * (bands[LEAST, i] + bands[MOST, i]), x, y)
-    return endless
-
-
-@glue
-def _subtract_sag_force(point: Array, sag_force: float, x: float, y: float) -> None:
-    """Subtract the wrench of a cable's sag force at a lever from the wrench of the cables, (6,)."""
-    point[2] -= sag_force
-    point[3] -= sag_force * y
-    point[4] += sag_force * x
+            middle[a] += rows[COLUMN + a, i] * (bands[LOW, i] + rows[WIDTH, i])
+        rise = 0.5 * (bands[SAG_FORCE_HIGH, i] - bands[SAG_FORCE_LOW, i]) if limited else 0.0
+        sag_force = bands[SAG_FORCE_LOW, i] + rise
+        slope = bands[SLOPE, i]
+        middle[2] -= sag_force
+        middle[3] -= sag_force * y
+        middle[4] += sag_force * x
+        rows[COLUMN + 2, i] -= slope
+        rows[COLUMN + 3, i] -= slope * y
+        rows[COLUMN + 4, i] += slope * x
+    return endless, curved
 
 
 @glue
@@ -310,7 +330,7 @@ def _measure_facets(
             if measured[DOWN + b] > ALONG * measured[ROUNDING + b]:
                 measured[FOR + b] = -math.inf
     _measure_lengths(counts, held, measured)
-    _measure_sides(counts.points, held, measured)
+    _measure_sides(counts.middle, held, measured)
     best = -1
     for b in range(held):
         if measured[MARGINS + b] < margin[VALUE]:
@@ -324,33 +344,40 @@ def _measure_facets(
 
 @glue
 def _sum_cables(counts: _FacetWeights, held: int, measured: Array) -> None:
-    """Fill half the ranges of the cables' wrenches along the stored normals."""
+    """Fill half the ranges of the cables' wrenches along the stored normals, and their changes off the secants."""
     rows = counts.rows
     for b in range(held):
-        measured[BY_ENDS + b] = measured[BY_TENSIONS + b] = measured[BY_SAG_FORCES + b] = 0.0
+        measured[BY_ENDS + b] = 0.0
+        measured[DECREASE + b] = measured[INCREASE + b] = 0.0
+        measured[DECREASE + IN_FACET + b] = measured[INCREASE + IN_FACET + b] = 0.0
         measured[UP + b] = measured[DOWN + b] = 0.0
     for i in range(rows.shape[1]):
-        width, slope, unsure = rows[WIDTH, i], rows[SLOPE, i], rows[UNSURE, i]
+        width, under, over = rows[WIDTH, i], rows[BELOW_SECANT, i], rows[ABOVE_SECANT, i]
         x, y = rows[LEVER_X, i], rows[LEVER_Y, i]
         j0, j1, j2 = rows[COLUMN, i], rows[COLUMN + 1, i], rows[COLUMN + 2, i]
         j3, j4, j5 = rows[COLUMN + 3, i], rows[COLUMN + 4, i], rows[COLUMN + 5, i]
         for b in range(held):
-            vertical, about_x, about_y = (
-                measured[2 * TOGETHER + b], measured[3 * TOGETHER + b], measured[4 * TOGETHER + b]
-            )  # fmt: skip
             along = (
                 j0 * measured[b]
                 + j1 * measured[TOGETHER + b]
-                + j2 * vertical
-                + j3 * about_x
-                + j4 * about_y
+                + j2 * measured[2 * TOGETHER + b]
+                + j3 * measured[3 * TOGETHER + b]
+                + j4 * measured[4 * TOGETHER + b]
                 + j5 * measured[5 * TOGETHER + b]
             )
-            hanging = vertical + y * about_x - x * about_y
-            measured[BY_ENDS + b] += abs(along * width - hanging * slope)
-            measured[BY_TENSIONS + b] += abs(along) * width
-            measured[BY_SAG_FORCES + b] += abs(hanging) * unsure
+            measured[BY_ENDS + b] += abs(along) * width
             measured[WORK + b] = along
+        if under < over:
+            for b in range(held):
+                hanging = (
+                    measured[2 * TOGETHER + b] + y * measured[3 * TOGETHER + b] - x * measured[4 * TOGETHER + b]
+                )  # fmt: skip
+                inside = 1.0 if abs(measured[WORK + b]) <= IN_PLANE * measured[ROUNDING + b] else 0.0
+                decrease, increase = max(hanging * under, hanging * over), max(-hanging * under, -hanging * over)
+                measured[DECREASE + b] += decrease
+                measured[INCREASE + b] += increase
+                measured[DECREASE + IN_FACET + b] += inside * decrease
+                measured[INCREASE + IN_FACET + b] += inside * increase
         if counts.high[i] == math.inf:
             for b in range(held):
                 measured[UP + b] = max(measured[UP + b], measured[WORK + b])
@@ -370,23 +397,24 @@ def _measure_lengths(counts: _FacetWeights, held: int, measured: Array) -> None:
 
 
 @glue
-def _measure_sides(points: Array, held: int, measured: Array) -> None:
+def _measure_sides(middle: Array, held: int, measured: Array) -> None:
     """Fill the margins from the nearer side of each stored facet."""
-    e0, e1, e2 = points[ENDS, 0], points[ENDS, 1], points[ENDS, 2]
-    e3, e4, e5 = points[ENDS, 3], points[ENDS, 4], points[ENDS, 5]
-    r0, r1, r2 = points[RANGES, 0], points[RANGES, 1], points[RANGES, 2]
-    r3, r4, r5 = points[RANGES, 3], points[RANGES, 4], points[RANGES, 5]
+    e0, e1, e2 = middle[0], middle[1], middle[2]
+    e3, e4, e5 = middle[3], middle[4], middle[5]
     for b in range(held):
         x, y, z = measured[b], measured[TOGETHER + b], measured[2 * TOGETHER + b]
         u, v, w = measured[3 * TOGETHER + b], measured[4 * TOGETHER + b], measured[5 * TOGETHER + b]
-        ends = e0 * x + e1 * y + e2 * z + e3 * u + e4 * v + e5 * w
-        ranges = r0 * x + r1 * y + r2 * z + r3 * u + r4 * v + r5 * w
-        against, other = measured[AGAINST + b], measured[FOR + b]
+        along = e0 * x + e1 * y + e2 * z + e3 * u + e4 * v + e5 * w
+        ahead = measured[BY_ENDS + b] + (along - measured[AGAINST + b])
+        back = measured[BY_ENDS + b] + (-along - measured[FOR + b])
         inverse = measured[LENGTH + b]
-        spare = measured[BY_TENSIONS + b] + min(ranges - against, -ranges - other)
-        measured[MARGINS + b] = (measured[BY_ENDS + b] + min(ends - against, -ends - other)) * inverse
-        measured[MARGINS + TOGETHER + b] = (spare - measured[BY_SAG_FORCES + b]) * inverse
-        measured[MARGINS + 2 * TOGETHER + b] = (spare + measured[BY_SAG_FORCES + b]) * inverse
+        measured[MARGINS + b] = min(ahead, back) * inverse
+        measured[MARGINS + TOGETHER + b] = inverse * min(
+            ahead - measured[DECREASE + IN_FACET + b], back - measured[INCREASE + IN_FACET + b]
+        )
+        measured[MARGINS + 2 * TOGETHER + b] = inverse * min(
+            ahead + measured[INCREASE + b], back + measured[DECREASE + b]
+        )
 
 
 @glue
@@ -395,7 +423,7 @@ def _write_normal(counts: _FacetWeights, measured: Array, normals: Array, b: int
     along = 0.0
     moment = 0.0
     for k in range(6):
-        along += counts.points[ENDS, k] * normals[k, b]
+        along += counts.middle[k] * normals[k, b]
         moment += normals[k, b] * normals[k, b] if k >= 3 else 0.0
     forward = along - measured[AGAINST + b] <= -along - measured[FOR + b]
     pure = measured[LENGTH + b] == BEYOND

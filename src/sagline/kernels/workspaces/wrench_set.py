@@ -216,3 +216,48 @@ def _multiply(wrench: Array, normals: Array, count: int, out: Array) -> bool:
                     out[b] = part * normals[k, b]
             some = True
     return some
+
+
+@kernel
+def worst_wrench(center: Array, wrenches: WrenchSetArrays, direction: Array, wrench: Array) -> bool:
+    """Fill the wrench of the set with the largest -direction . w, (6,); True if the set has no other wrench."""
+    single = True
+    for k in range(6):
+        wrench[k] = center[k]
+    for s in range(9):
+        single = _add_end(wrenches.own[s], direction, wrench) and single
+    for s in range(wrenches.segments.shape[0]):
+        single = _add_end(wrenches.segments[s], direction, wrench) and single
+    for e in range(wrenches.ellipsoids.shape[0]):
+        single = False
+        length = 0.0
+        for j in range(6):
+            along = dot6(wrenches.ellipsoids[e, j], direction)
+            length += along * along
+        length = math.sqrt(length)
+        for j in range(6):
+            share = dot6(wrenches.ellipsoids[e, j], direction) / length if length > 0.0 else 0.0
+            for k in range(6):
+                wrench[k] -= wrenches.ellipsoids[e, j, k] * share
+    first = 0
+    for p in range(wrenches.sizes.size):
+        best = first
+        for c in range(first, first + wrenches.sizes[p]):
+            if dot6(wrenches.corners[c], direction) < dot6(wrenches.corners[best], direction):
+                best = c
+        for k in range(6):
+            wrench[k] += wrenches.corners[best, k]
+        single = single and wrenches.sizes[p] == 1
+        first += wrenches.sizes[p]
+    return single
+
+
+@formula
+def _add_end(segment: Array, direction: Array, wrench: Array) -> bool:
+    """Add the end of a segment with the largest component against a direction; True if its length is zero."""
+    along = dot6(segment, direction)
+    some = False
+    for k in range(6):
+        wrench[k] += -segment[k] if along > 0.0 else segment[k]
+        some = some or segment[k] != 0.0
+    return not some

@@ -1,0 +1,264 @@
+"""Margin near zero on the cables' exact curves, where the bounds of the sag forces do not decide its sign.
+
+The limiting facet has a normal y. Let e be the load of which y measures exactly one newton. The margin near zero is the
+largest multiple of e that the cables can supply in addition to the demand. Newton steps on the exact curves find it:
+all components of the balance except that along e are hard equations. Farther from zero, the decision of `inverse`
+confirms its sign.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from sagline.core.arrays import Array
+from sagline.kernels import codes, tables
+from sagline.kernels.algebra.factors import solve_general
+from sagline.kernels.balance.setting import Platform, new_balance, set_pose
+from sagline.kernels.balance.wrench import along_freedom
+from sagline.kernels.cable.admissible import TensionLimits
+from sagline.kernels.cable.sag_forces import Curves, sag_forces_at
+from sagline.kernels.cable.terms import Model
+from sagline.kernels.inverse.feasibility import demand_of_pose, new_demand
+from sagline.kernels.jit import glue, kernel
+from sagline.kernels.memory import Memory, block, vector
+from sagline.kernels.tension.bracket import decide_feasibility
+from sagline.kernels.tension.least_change import Demand, TensionChange, least_change
+from sagline.kernels.workspaces.sag_force_bounds import HIGH, LOW, SAG_FORCE_LOW, SLOPE
+
+EXACT = 1e-5  # relative to the largest force: error bound of a margin on the exact curves
+NARROW = 1e-3  # relative to the largest force: within narrower bounds, the margin is that in the limiting facet
+CLOSE = 1e-3  # relative to the largest force: the sign of a smaller margin on the exact curves is not confirmed
+NEAR = 1e-2  # relative to the largest force: a smaller margin is confirmed by a short search only
+SHORT, LONG = 4, 300  # numbers of examined ranges
+HARDLY = 1e-9  # relative to the largest force: value at a decided pose whose margin has the other sign
+FURTHER = 1.01  # load at which the search starts, relative to the upper bound of the margin
+IN_FACET = 1e-9  # relative to the terms of the product: a secant with a smaller product is in the facet
+
+VALUE, BELOW, ABOVE = 0, 1, 2  # rows of a margin (3,) [N]
+
+
+class LimitingFacet(NamedTuple):
+    """The limiting facet of a pose whose margin is open."""
+
+    direction: Array  # unit normal y, (6,)
+    columns: Array  # wrench of the secants per newton of chord tension, (6, m)
+    width: Array  # half the ranges of the tensions [N], (m,)
+    levers: Array  # platform anchors along x and y from the center of mass [m], (2, m)
+    middle: Array  # wrench of the cables at the middle of their secants, minus the weight, (6,)
+    bands: Array  # filled by `fill_bands`
+    arm: float  # lever arm of the norm [m]
+    single: bool  # True if the set has no other wrench than the least favorable one
+
+
+@kernel
+def settle_margin(
+    model: Model,
+    limits: TensionLimits,
+    platform: Platform,
+    facet: LimitingFacet,
+    curves: Curves,
+    margin: Array,
+    memory: Memory,
+) -> int:
+    """Replace an open margin (3,) by its value on the exact curves; returns the status of the margin.
+
+    platform: with the least favorable wrench of the set.
+    """
+    cables = curves.cables
+    m, n = cables.low.size, platform.freedom.shape[0]
+    load, rest = vector(memory, n)
+    _fill_load(platform.freedom, facet, load)
+    size = platform.body[tables.MASS] * platform.body[tables.GRAVITY]
+    for i in range(m):
+        size = max(size, cables.half_weight[i])
+    if margin[ABOVE] - margin[BELOW] <= NARROW * size:
+        exact = _margin_in_facet(platform, facet, curves, load, rest)
+        if abs(exact) < math.inf:
+            _write_value(margin, exact, EXACT * size)
+            return codes.MARGIN_OPEN
+    balance, rest = new_balance(rest, m, n)
+    work, rest = new_demand(rest, m, platform.freedom)
+    set_pose(model, limits, codes.CHORD_TENSION, work.weight, platform, cables, balance)
+    demand, lever = demand_of_pose(platform, cables, balance, work)
+    for k in range(demand.soft, n):
+        load[k] /= lever
+    exact = _largest_multiple(curves, demand, facet.bands, load, margin[ABOVE], work.change.tau, rest)
+    if not abs(exact) <= CLOSE * size:
+        verdict, _, _, _ = decide_feasibility(
+            curves, demand, SHORT if abs(exact) <= NEAR * size else LONG, work.change, rest
+        )
+        feasible, infeasible = verdict == codes.POSE_SOLVED, verdict == codes.POSE_INFEASIBLE
+        if not abs(exact) < math.inf or (exact < 0.0 if feasible else infeasible and exact >= 0.0):
+            exact = _largest_multiple(curves, demand, facet.bands, load, margin[ABOVE], work.change.tau, rest)
+        if not abs(exact) < math.inf:
+            exact = margin[VALUE]
+        if feasible:
+            _write_value(margin, max(exact, HARDLY * size), EXACT * size)
+            if facet.single:
+                margin[BELOW] = max(margin[BELOW], 0.0)
+                return codes.MARGIN_FEASIBLE
+            return codes.MARGIN_OPEN
+        if infeasible:
+            _write_value(margin, min(exact, -HARDLY * size), EXACT * size)
+            margin[ABOVE] = min(margin[ABOVE], margin[VALUE])
+            return codes.MARGIN_INFEASIBLE
+    _write_value(margin, exact, EXACT * size)
+    return codes.MARGIN_OPEN
+
+
+@glue
+def _write_value(margin: Array, exact: float, error: float) -> None:
+    """Fill value and bounds from a margin on the exact curves [N].
+
+    The value has the sign of the exact margin. It is continuous at the ends of the bounds, where they decide.
+    """
+    share = 0.0
+    if exact > 0.0:
+        share = max(1.0 + margin[BELOW] / exact, 0.0)
+    elif exact < 0.0:
+        share = max(1.0 + margin[ABOVE] / exact, 0.0)
+    value = exact + share * (margin[VALUE] - exact) if share > 0.0 else exact
+    margin[VALUE] = min(max(value, margin[BELOW]), margin[ABOVE])
+    if abs(exact) <= error:
+        margin[BELOW] = max(margin[BELOW], exact - error)
+        margin[ABOVE] = min(margin[ABOVE], exact + error)
+
+
+@glue
+def _margin_in_facet(platform: Platform, facet: LimitingFacet, curves: Curves, load: Array, memory: Memory) -> float:
+    """Margin on the exact curves, from the tensions at which the load meets the facet; NaN outside of it.
+
+    The tensions are those of the secants. Within narrow bounds their errors change the margin by the second order.
+    """
+    columns, y, bands = facet.columns, facet.direction, facet.bands
+    n, m = platform.freedom.shape[0], columns.shape[1]
+    matrix, rest = block(memory, n, n)
+    right, rest = vector(rest, n)
+    wrench, rest = vector(rest, 6)
+    rows, rest = block(rest, 2, m)
+    tau, sag_force = rows[0], rows[1]
+    for a in range(6):
+        wrench[a] = -facet.middle[a] - platform.wrench[a]
+    count = 0
+    for i in range(m):
+        along = terms = 0.0
+        for a in range(6):
+            along += columns[a, i] * y[a]
+            terms += abs(columns[a, i] * y[a])
+        inside = abs(along) <= IN_FACET * terms
+        tau[i] = math.nan if inside else bands[LOW, i] + (2.0 * facet.width[i] if along > 0.0 else 0.0)
+        if inside:
+            count += 1
+            if count < n:
+                for k in range(n):
+                    matrix[k, count - 1] = _component(platform.freedom, k, columns, i)
+        else:
+            for a in range(6):
+                wrench[a] -= columns[a, i] * math.copysign(facet.width[i], along)
+    if count != n - 1:
+        return math.nan
+    along_freedom(platform.freedom, wrench, right)
+    for k in range(n):
+        matrix[k, n - 1] = -load[k]
+    if not solve_general(matrix, right):
+        return math.nan
+    count = 0
+    for i in range(m):
+        if math.isnan(tau[i]):
+            tau[i] = bands[LOW, i] + facet.width[i] + right[count]
+            count += 1
+            if not bands[LOW, i] <= tau[i] <= bands[HIGH, i]:
+                return math.nan
+    sag_forces_at(curves, tau, sag_force)
+    margin = right[n - 1]
+    for i in range(m):
+        secant = bands[SAG_FORCE_LOW, i] + bands[SLOPE, i] * (tau[i] - bands[LOW, i])
+        hanging = y[2] + y[3] * facet.levers[1, i] - y[4] * facet.levers[0, i]
+        margin -= hanging * (sag_force[i] - secant)
+    return margin
+
+
+@glue
+def _component(freedom: Array, k: int, columns: Array, i: int) -> float:
+    """Component of a wrench, column i (6, m), along free motion k."""
+    total = 0.0
+    for a in range(6):
+        total += freedom[k, a] * columns[a, i]
+    return total
+
+
+@glue
+def _fill_load(freedom: Array, facet: LimitingFacet, load: Array) -> None:
+    """Fill the load e (n,) along the free motions with y . e = 1; without a force part, a moment."""
+    y = facet.direction
+    pure = y[0] == 0.0 and y[1] == 0.0 and y[2] == 0.0
+    weight = 1.0 if pure else facet.arm * facet.arm
+    for k in range(freedom.shape[0]):
+        load[k] = 0.0
+        for a in range(6):
+            load[k] += freedom[k, a] * y[a] * (1.0 if a < 3 else weight)
+
+
+@glue
+def _largest_multiple(
+    curves: Curves, demand: Demand, bands: Array, load: Array, above: float, tau: Array, memory: Memory
+) -> float:
+    """Largest multiple of a load that the cables supply in addition to a demand; infinite or NaN if none is found.
+
+    A reflection turns the load to the first component, the only soft one. The search starts beyond the upper bound.
+    """
+    n, m = demand.matrix.shape
+    rows, rest = block(memory, 2 * n + 4, m)
+    vectors, rest = block(rest, 4, n)
+    mirror, right = vectors[0], vectors[1]
+    length = 0.0
+    for k in range(n):
+        length += load[k] * load[k]
+    length = math.sqrt(length)
+    further = max(FURTHER * above, demand.size * EXACT)
+    if not further < math.inf or not length > 0.0:
+        return math.nan
+    for k in range(n):
+        mirror[k] = load[k] / length
+        right[k] = demand.right[k] + further * load[k]
+    mirror[0] += math.copysign(1.0, mirror[0])
+    square = 2.0 * abs(mirror[0])
+    _reflect_vector(mirror, square, right)
+    for i in range(m):
+        for k in range(n):
+            rows[k, i] = demand.matrix[k, i]
+            rows[n + k, i] = demand.hanging[k, i]
+        _reflect_column(mirror, square, rows[:n], i)
+        _reflect_column(mirror, square, rows[n : 2 * n], i)
+        rows[2 * n, i], rows[2 * n + 1, i] = bands[LOW, i], bands[HIGH, i]
+        rows[2 * n + 2, i] = min(max(tau[i], bands[LOW, i]), bands[HIGH, i])
+    turned = Demand(rows[:n], rows[n : 2 * n], right, 1, demand.size)
+    change = TensionChange(rows[2 * n + 2], rows[2 * n + 3], vectors[2], vectors[3])
+    left = least_change(curves, turned, rows[2 * n : 2 * n + 2], change, rest)
+    for k in range(1, n):
+        if not abs(change.residual[k]) <= HARDLY * demand.size:
+            return math.nan
+    return further - left / length
+
+
+@glue
+def _reflect_vector(mirror: Array, square: float, vector: Array) -> None:
+    """Reflect a vector; the mirror's normal (n,) has a squared length of `square`."""
+    along = 0.0
+    for k in range(vector.size):
+        along += mirror[k] * vector[k]
+    along *= 2.0 / square
+    for k in range(vector.size):
+        vector[k] -= along * mirror[k]
+
+
+@glue
+def _reflect_column(mirror: Array, square: float, columns: Array, i: int) -> None:
+    """Reflect column i of a matrix as by `_reflect_vector`."""
+    along = 0.0
+    for k in range(mirror.size):
+        along += mirror[k] * columns[k, i]
+    along *= 2.0 / square
+    for k in range(mirror.size):
+        columns[k, i] -= along * mirror[k]
