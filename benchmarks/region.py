@@ -49,7 +49,7 @@ def shown(robot: sl.Robot) -> Iterator[Shown]:
     thread = threading.Thread(target=viewer.serve)
     thread.start()
     fields = {each.label: each for each in server.gui._gui_input_handle_from_uuid.values()}
-    with Client(server.get_port()) as client:
+    with Client(server.url) as client:
         await_that(lambda: viewer.view is not None)
         client.set(_name(fields["Region"]), True)
         heard_until(client, "m³")

@@ -32,14 +32,14 @@ PORT = ("--no-browser", "--port", "0")
 
 
 @contextmanager
-def serving(*arguments: str) -> Iterator[tuple[int, Callable[[], float]]]:
-    """A viewer process with its port and its processor time [s]."""
+def serving(*arguments: str) -> Iterator[tuple[str, Callable[[], float]]]:
+    """A viewer process with its address and its processor time [s]."""
     command = (sys.executable, "-m", "sagline.cli", "view", *arguments, *PORT)
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
     assert process.stdout is not None
     try:
-        address = process.stdout.readline().split("http://")[1].split()[0]
-        yield int(address.rpartition(":")[2]), lambda: used(process.pid)
+        address = next(word for word in process.stdout.readline().split() if word.startswith("http://"))
+        yield address, lambda: used(process.pid)
     finally:
         process.terminate()
         process.wait()
@@ -60,9 +60,9 @@ def first_cables() -> Iterator[Row]:
     """Time from the command to the first cables."""
     waits, spent, whole = [], [], []
     for _ in range(REPEATS):
-        with serving(ROBOT) as (port, processor):
+        with serving(ROBOT) as (address, processor):
             told, before = time.perf_counter(), processor()  # the browser opens at this time
-            with Client(port) as client:
+            with Client(address) as client:
                 next(message for message in client.heard(60.0) if cables_in(message))
             waits.append(time.perf_counter() - told)
             spent.append(processor() - before)
@@ -81,12 +81,12 @@ def two_while_a_third_films() -> Iterator[Row]:
         ends = sl.Pose(np.array([[0.0, 0.0, 2.0], [2.0, 1.0, 2.0]]), np.stack([np.eye(3)] * 2))
         file = Path(folder) / "run.nc"
         sl.inverse(robot, sl.quintic_path(ends, durations=[60.0], rate=50)).save(file)
-        with serving(ROBOT, str(file)) as (port, processor), Client(port) as dragging, Client(port) as looking:
+        with serving(ROBOT, str(file)) as (address, processor), Client(address) as dragging, Client(address) as looking:
             dragging.drag([0.0, 0.0, 2.1])
             for client in (dragging, looking):
                 next(message for message in client.heard(60.0) if cables_in(message))
             alone = watched(dragging, looking, processor)
-            with Client(port) as filming:
+            with Client(address) as filming:
                 thread = Filming(filming)
                 thread.start()
                 thread.taken.wait()
@@ -159,7 +159,7 @@ def cut_cables() -> Iterator[Row]:
     """Time from the click on "Cut" to the first picture with a moved platform."""
     for name in CUT:
         waits, spent = [], []
-        with serving(name) as (port, processor), Client(port) as client:
+        with serving(name) as (address, processor), Client(address) as client:
             buttons = {}
             for message in client.heard(SETTLED):
                 if message["type"] == "GuiButtonMessage":

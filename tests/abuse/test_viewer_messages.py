@@ -78,12 +78,12 @@ def press(count: int, seed: int) -> None:
         usual = {uuid: each.value for uuid, each in handles if not isinstance(each, viser.GuiButtonHandle)}
         for _ in range(0, count, BATCH):
             for _ in range(BATCH):
-                with Client(server.get_port()) as bad:  # one each: a client is cut off by some of them
+                with Client(server.url) as bad:  # one each: a client is cut off by some of them
                     bad.say(**message(generator, list(usual)))
             time.sleep(0.2)  # what was said is heard
             assert thread.is_alive()
             place = generator.uniform([-2.0, -2.0, 1.0], [2.0, 2.0, 2.5])
-            with Client(server.get_port()) as good:
+            with Client(server.url) as good:
                 expected = sl.inverse(ROBOT, sl.Pose(place, np.eye(3)), tension=sl.MinimumNorm()).chord_tension
                 end = time.monotonic() + PATIENCE
                 while not shows(viewer, place, expected):  # on a busy machine what was said before may be heard later

@@ -85,7 +85,8 @@ def test_the_viewer_takes_them_too(monkeypatch: pytest.MonkeyPatch) -> None:
         def serve(self) -> None:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr("sagline.viewer.server.start_server", lambda *_: SimpleNamespace(stop=int, get_port=lambda: 1))
+    server = SimpleNamespace(stop=int, url="", access=SimpleNamespace(local=True))
+    monkeypatch.setattr("sagline.viewer.server.start_server", lambda *_, **__: server)
     monkeypatch.setattr("sagline.viewer.page.Page", Page)
     assert sagline("view", "article-suspended", "--no-browser", *LOADS).exit_code == 0
     (robot, wrench) = taken[0]

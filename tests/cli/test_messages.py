@@ -274,6 +274,8 @@ FIRST_TIER = """
 2 view nothing-like-it --no-browser
 2 view cogiro missing.nc --no-browser
 2 view cogiro --port 99999 --no-browser
+2 view cogiro --clients 0 --no-browser
+2 view cogiro --allow-host http://lab.example --port 0 --no-browser
 2 view cogiro --mode 0 --no-browser
 2 view cogiro --mode 'light 1' --no-browser
 2 view cogiro --mode 1 run.nc --no-browser

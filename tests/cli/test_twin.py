@@ -32,6 +32,14 @@ def test_an_address_of_no_computer_is_refused() -> None:
     assert len(result.stderr) < 300
 
 
+def test_a_port_without_ports_after_it_is_refused_before_the_machine_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = []
+    monkeypatch.setattr("sagline.twin.machine.Machine", lambda *_, **__: made.append(1))
+    result = CliRunner().invoke(app, ["twin", "article-prototype", "--port", "65533"])
+    assert (result.exit_code, result.stdout, made) == (2, "", [])
+    assert "0 to 65532" in result.stderr
+
+
 def interrupted(server: Server, watch: Callable[..., object]) -> None:
     raise KeyboardInterrupt
 

@@ -8,9 +8,11 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path as FilePath
+from typing import Any
 from urllib.request import urlopen
 
 import numpy as np
+import pytest
 from typer.testing import CliRunner
 
 import sagline as sl
@@ -23,16 +25,16 @@ from tests.viewer.client import Client
 
 
 @contextmanager
-def viewing(*words: str) -> Iterator[tuple[subprocess.Popen[str], int]]:
+def viewing(*words: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
     command = [sys.executable, "-m", "sagline.cli", "view", *words, "--port", "0", "--no-browser"]
     process = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=interrupts.heard
     )
     try:
         assert process.stdout is not None
-        found = re.search(r"http://127\.0\.0\.1:(\d+)", process.stdout.readline())
+        found = re.search(r"http://127\.0\.0\.1:\d+/\S+", process.stdout.readline())
         assert found is not None
-        yield process, int(found[1])
+        yield process, found[0]
     finally:
         process.kill()
         process.communicate()
@@ -40,10 +42,10 @@ def viewing(*words: str) -> Iterator[tuple[subprocess.Popen[str], int]]:
 
 @extended
 def test_it_serves_a_page_and_stops_at_ctrl_c_mid_drag() -> None:
-    with viewing("article-suspended") as (process, port):
-        with urlopen(f"http://127.0.0.1:{port}") as page:
+    with viewing("article-suspended") as (process, address):
+        with urlopen(address) as page:
             assert b"<html" in page.read().lower()
-        client = Client(port)
+        client = Client(address)
         client.grab()
         client.drag([0.5, 0.0, 2.0])
         assert any("Feasible" in str(message) for message in client.heard(120.0))
@@ -55,6 +57,35 @@ def test_it_serves_a_page_and_stops_at_ctrl_c_mid_drag() -> None:
         assert "Traceback" not in said + complained
         assert "Stopped." in complained
         client.break_off()
+
+
+@pytest.mark.parametrize(
+    ("words", "path", "others"),
+    [
+        ([], r"/[\w-]{20,}", False),
+        (["--no-token"], "", False),
+        (["--host", "localhost", "--clients", "3"], r"/[\w-]{20,}", False),
+        (["--host", "0.0.0.0", "--allow-host", "lab.example"], r"/[\w-]{20,}", True),
+    ],
+)
+def test_the_printed_address_has_the_token_and_the_browser_starts_with_another(
+    words: list[str], path: str, others: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened: list[str] = []
+
+    def serve(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("sagline.viewer.page.Page.serve", serve)
+    monkeypatch.setattr("sagline.cli.hosting._has_display", lambda: True)
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    result = CliRunner().invoke(app, ["view", "article-suspended", "--port", "0", *words])
+    found = re.search(rf"(http://[\w.]+:\d+)({path})   ", result.stdout)
+    assert found is not None
+    assert (opened[0] != found[0].strip()) is bool(path)
+    assert re.fullmatch(re.escape(found[1]) + path, opened[0])
+    place = f"http://{socket.gethostname()}:{found[1].rpartition(':')[2]}{found[2]}."
+    assert (place in result.stderr) is others
 
 
 def test_a_taken_port_is_told() -> None:

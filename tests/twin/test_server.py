@@ -14,7 +14,7 @@ import pytest
 import sagline as sl
 from sagline.control import Command, Mode, Sample
 from sagline.core.arrays import Array
-from sagline.twin.server import block_of
+from sagline.twin.server import block_of, check_first_port
 from tests.control.protocol import GroupFault, GroupStatus
 from tests.plc.protocol import CLAIM, FROM_PLC, TO_PLC, BlockLink, Refusal
 from tests.plc.samples import a_sample, sample_blocks
@@ -152,6 +152,12 @@ def test_a_silent_group_keeps_its_block() -> None:
         before = gone_on(server, link)
         server.scan()
         until(lambda: np.all(taken(link).counter == before.counter + np.array([1, 0, 1, 1])))
+
+
+def test_each_group_needs_a_port() -> None:
+    with refused("port of the first group", "65533", kind=sl.InvalidValueError):
+        sl.twin.Server(machine(), port=65533)
+    check_first_port(65532, machine().robot)
 
 
 @extended

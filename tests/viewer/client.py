@@ -31,11 +31,11 @@ def await_that(done: Callable[[], bool]) -> None:
 class Client:
     """Connects, drags, sets, and hears what is sent."""
 
-    def __init__(self, port: int) -> None:
+    def __init__(self, address: str) -> None:
         self.far = 100.0 + next(_MARKS)  # m: by which a server knows it from others
         protocol = Subprotocol(f"viser-v{viser.__version__}")
         self.socket = connect(
-            f"ws://127.0.0.1:{port}",
+            address.replace("http", "ws", 1),
             subprotocols=[protocol],
             compression=None,
             max_size=None,
@@ -118,9 +118,9 @@ class Client:
 
 
 @contextmanager
-def clients(port: int, count: int) -> Iterator[list[Client]]:
+def clients(address: str, count: int) -> Iterator[list[Client]]:
     """Several clients at once."""
-    some = [Client(port) for _ in range(count)]
+    some = [Client(address) for _ in range(count)]
     try:
         yield some
     finally:

@@ -50,9 +50,9 @@ class Shown(NamedTuple):
     pieces: list[viser.GuiHtmlHandle]
 
     @property
-    def port(self) -> int:
-        """Port of the server."""
-        return int(self.server.get_port())
+    def url(self) -> str:
+        """Address of the page, with its token."""
+        return self.server.url
 
     @property
     def position(self) -> np.ndarray:

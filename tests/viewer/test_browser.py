@@ -97,7 +97,7 @@ def opened(
     page.on("console", hear)
     page.on("pageerror", fail)
     try:
-        page.goto(f"http://127.0.0.1:{server.get_port()}")
+        page.goto(server.url)
         page.get_by_text("Feasible", exact=True).wait_for()
         yield page, viewer
     finally:

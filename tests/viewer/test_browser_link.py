@@ -1,14 +1,19 @@
-"""A pose typed, lines copied and a link followed in headless Chromium."""
+"""A pose typed, lines copied, a link followed, and pages that are refused, in headless Chromium."""
 
 from collections.abc import Iterator
+from threading import Thread
 
 import numpy as np
 import pytest
 from playwright.sync_api import Browser
 
 import sagline as sl
+from sagline.viewer.features import FEATURES
+from sagline.viewer.page import Page as ViewerPage
+from sagline.viewer.server import start_server, stop_server
 from tests.chromium import NEEDED, PATIENCE, launched
 from tests.tiers import extended
+from tests.viewer.client import Client
 from tests.viewer.reach import broken_rules
 from tests.viewer.test_browser import FEWER_PICTURES, FLAGS, await_that, opened
 from tests.viewer.test_state_code import executed
@@ -64,8 +69,65 @@ def test_a_pose_is_typed_and_taken_elsewhere(browser: Browser) -> None:
         elsewhere.goto(link)
         await_that(elsewhere, lambda: np.allclose(place(), wanted, atol=1e-12))
         elsewhere.get_by_role("tab", name="Modes", selected=True).wait_for()
-        assert "#" not in elsewhere.url
+        assert elsewhere.url == page.url == viewer.server.url
         elsewhere.evaluate("location.hash = '#robot=fast:12345678&pose=0,0,1'")
         elsewhere.get_by_role("alert").filter(has_text="the link is of 'fast'; allowed: falcon-7").wait_for()
         elsewhere.close()
         assert np.allclose(place(), wanted, atol=1e-12)
+
+
+# what a page of somebody else tries: to open a connection, and to read the page
+INTRUDING = """async (address) => {
+    const socket = new WebSocket(address.replace("http", "ws"))
+    const opened = new Promise((end) => { socket.onopen = () => end("open"); socket.onerror = () => end("refused") })
+    const read = fetch(address).then((answer) => answer.text()).then((text) => text.length, () => "refused")
+    return [await opened, await read]
+}"""
+
+
+def test_a_page_of_somebody_else_is_refused_even_with_the_token(browser: Browser) -> None:
+    server = start_server(port=0, clients=1)
+    other = start_server(port=0, token=False)
+    try:
+        page = browser.new_page()
+        for address in ("data:text/html,foreign", other.url):
+            page.goto(address)
+            assert page.evaluate(INTRUDING, server.url) == ["refused", "refused"]
+            assert page.evaluate(INTRUDING, server.url.replace("127.0.0.1", "localhost")) == ["refused", "refused"]
+        page.goto(server.url)
+        opened, size = page.evaluate(INTRUDING, server.url)
+        assert opened == "open"
+        assert size > 1e5
+        page.close()
+    finally:
+        stop_server(server)
+        stop_server(other)
+
+
+def test_the_page_connects_to_its_own_server_alone_and_shows_why_it_may_not(browser: Browser) -> None:
+    server = start_server(port=0, clients=1)
+    viewer = ViewerPage(server, FEATURES, sl.load_robot("falcon-7"))
+    thread = Thread(target=viewer.serve)
+    thread.start()
+    page = browser.new_page()
+    page.set_default_timeout(1e3 * PATIENCE)
+    page.add_init_script(FEWER_PICTURES)
+    try:
+        with Client(server.url):
+            page.goto(server.url_at(server.access.path_once()))
+            assert page.url == server.url
+            page.get_by_role("alert").filter(has_text="number of pages is 2; allowed: up to 1").wait_for()
+        page.get_by_text("Feasible", exact=True).wait_for()
+        page.get_by_role("alert").filter(has_text="reconnects").wait_for(state="hidden")
+        page.goto(f"{server.url}?websocket=ws://127.0.0.1:9")
+        page.get_by_text("Feasible", exact=True).wait_for()
+        assert page.url == server.url
+        page.goto("about:blank")
+        await_that(page, lambda: not server.get_clients())  # a frame without focus does not try again
+        page.set_content(f'<iframe src="{server.url}" width="1000" height="640"></iframe>')  # as a notebook does
+        page.frame_locator("iframe").get_by_text("Feasible", exact=True).wait_for()
+    finally:
+        page.close()
+        viewer.stop()
+        thread.join(timeout=PATIENCE)
+        stop_server(server)

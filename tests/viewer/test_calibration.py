@@ -37,7 +37,7 @@ def page() -> Iterator[Shown]:
 
 @pytest.fixture
 def client(page: Shown) -> Iterator[Client]:
-    with Client(page.port) as one:
+    with Client(page.url) as one:
         yield one
         list(one.heard(0.1))
 

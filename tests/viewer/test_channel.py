@@ -40,7 +40,7 @@ def say(server: PageServer, client: Client, text: Any) -> None:
 def test_what_a_page_says_is_heard_in_order_and_nonsense_is_not(server: PageServer, channel: Channel) -> None:
     heard: list[Any] = []
     channel.on("test", lambda value, client: heard.append((value, client)))
-    with Client(server.get_port()) as client:
+    with Client(server.url) as client:
         for k in range(50):
             say(server, client, json.dumps({"topic": "test", "value": [k], "count": k}))
             for nonsense in NONSENSE:
@@ -53,7 +53,7 @@ def test_what_a_page_says_is_heard_in_order_and_nonsense_is_not(server: PageServ
 def test_who_comes_later_is_told_the_last_word(server: PageServer, channel: Channel) -> None:
     channel.send("news", {"a": 1})
     channel.send("news", {"a": 2})
-    with Client(server.get_port()) as client:
+    with Client(server.url) as client:
         contents = [
             m.get("props", m.get("updates", {})).get("content", "")
             for m in client.replayed()
@@ -72,7 +72,7 @@ def test_a_value_is_text_in_an_attribute() -> None:
 
 def test_an_answer_reaches_who_asked_and_nobody_else(server: PageServer, channel: Channel) -> None:
     channel.on("ask", lambda value, client: channel.send_to(client, "asked", value))
-    with Client(server.get_port()) as one, Client(server.get_port()) as other:
+    with Client(server.url) as one, Client(server.url) as other:
         for k in range(20):  # in turn, faster than pages are drawn
             say(server, one, json.dumps({"topic": "ask", "value": f"one {k}", "count": k}))
             say(server, other, json.dumps({"topic": "ask", "value": f"other {k}", "count": k}))

@@ -49,7 +49,7 @@ def button_of(page: Shown, cable: int) -> Any:
 
 
 def test_a_click_marks_the_cable_below_it_and_one_beside_none(page: Shown) -> None:
-    with Client(page.port) as client:
+    with Client(page.url) as client:
         camera, chosen = look(client, page), handle(page, "Cable to cut")
         for cable in (0, 3, 5):
             tell(client, page, "pick", seen_at(page, camera, cable))
@@ -76,7 +76,7 @@ def test_it_swings_as_simulate_says_and_calm_puts_all_back(page: Shown) -> None:
         assert page.viewer.view is not None
         return page.viewer.view.played
 
-    with Client(page.port) as client:
+    with Client(page.url) as client:
         camera = look(client, page)
         tell(client, page, "pick", seen_at(page, camera, 2))
         await_that(lambda: button_of(page, 2) is not None)

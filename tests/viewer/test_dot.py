@@ -112,7 +112,7 @@ def test_a_field_without_an_end_is_drawn_as_far_as_what_is_known() -> None:
 @extended
 def test_chosen_tensions_balance_with_heavy_cables_and_keep_their_limits(page: Shown) -> None:
     generator = np.random.default_rng(4)
-    with Client(page.port) as client:
+    with Client(page.url) as client:
         field = dot_field_of(seen(page))
         assert field is not None
         pulls = []
@@ -139,7 +139,7 @@ def test_chosen_tensions_balance_with_heavy_cables_and_keep_their_limits(page: S
 
 
 def test_code_of_what_is_chosen_by_hand_gives_its_tensions(page: Shown) -> None:
-    with Client(page.port) as client:
+    with Client(page.url) as client:
         snapshot = moved(page, client, {"at": [120.0, -60.0]})
         view = page.viewer.view
         assert view is not None
@@ -150,7 +150,7 @@ def test_code_of_what_is_chosen_by_hand_gives_its_tensions(page: Shown) -> None:
 
 
 def test_steps_add_up_and_stop_at_the_sides() -> None:
-    with contextmanager(shown)(lambda server: Page(server, FEATURES, HEAVY)) as page, Client(page.port) as client:
+    with contextmanager(shown)(lambda server: Page(server, FEATURES, HEAVY)) as page, Client(page.url) as client:
         field = dot_field_of(seen(page))  # as large as the first at a pose are the steps there
         assert field is not None
         start = moved(page, client, {"at": [0.0, 0.0]})
@@ -167,7 +167,7 @@ def test_steps_add_up_and_stop_at_the_sides() -> None:
 
 
 def test_a_drag_keeps_the_tensions_nearest_to_those_chosen(page: Shown) -> None:
-    with Client(page.port) as client:
+    with Client(page.url) as client:
         chosen = moved(page, client, {"at": [150.0, 80.0]}).tension
         client.grab()
         for place in ([0.4, 0.3, 2.4], [2.5, 1.0, 1.5]):
@@ -186,7 +186,7 @@ def test_a_drag_keeps_the_tensions_nearest_to_those_chosen(page: Shown) -> None:
 
 
 def test_a_mark_chooses_its_way_and_the_list_says_so(page: Shown) -> None:
-    with Client(page.port) as client:
+    with Client(page.url) as client:
         moved(page, client, {"at": [10.0, 10.0]})
         method = handle(page, "Tensions")
         assert method.value == BY_HAND
@@ -209,7 +209,7 @@ def test_a_mark_chooses_its_way_and_the_list_says_so(page: Shown) -> None:
      {"by": [True, 1]}, {"at": [[1.0], 2.0]}, {"by": [float("nan"), 0.0]}, {"at": {"0": 1.0}}]),
 )  # fmt: skip
 def test_what_is_no_place_is_not_heard(page: Shown, value: Any) -> None:
-    with Client(page.port) as client:
+    with Client(page.url) as client:
         before = moved(page, client, {"at": [5.0, 5.0]}).tension
         say(page, client, value)
         say(page, client, value, "sharing")
@@ -305,7 +305,7 @@ def test_a_field_keeps_its_place_while_the_dot_moves() -> None:
 
 @extended
 def test_thirty_tensions_a_second_follow_the_dot(page: Shown) -> None:
-    with Client(page.port) as client:
+    with Client(page.url) as client:
 
         def move(angle: float) -> None:
             say(page, client, {"at": [100.0 * np.cos(angle), 100.0 * np.sin(angle)]})

@@ -51,7 +51,7 @@ def said(messages: Iterable[dict[str, Any]], topic: str) -> list[Any]:
 def test_a_film_is_a_matter_of_its_client(film: Shown) -> None:
     """One client films, gives its pictures slowly, and leaves in the middle; another drags meanwhile."""
     button = handle(film, "Film of the run")
-    with Client(film.port) as filming, Client(film.port) as other:
+    with Client(film.url) as filming, Client(film.url) as other:
         other.replayed()
         filming.set(button, True)
         first = next(m for m in filming.heard(PATIENCE) if m["type"] == "GetRenderRequestMessage")
@@ -79,7 +79,7 @@ def test_a_film_is_a_matter_of_its_client(film: Shown) -> None:
 
 def test_a_film_is_told_picture_by_picture_and_can_be_cancelled(film: Shown) -> None:
     button, length = handle(film, "Film of the run"), PATH.time[-1]
-    with Client(film.port) as client:
+    with Client(film.url) as client:
         client.replayed()
         client.set(button, True)
         heard: list[dict[str, Any]] = []
@@ -123,7 +123,7 @@ def test_a_film_longer_than_a_browser_can_keep_is_refused() -> None:
 
 def test_a_picture_is_asked_for_as_large_as_its_paper(film: Shown) -> None:
     paper, strip, button = handle(film, "Picture for"), handle(film, "With legend"), handle(film, "Picture (PNG)")
-    with Client(film.port) as client:
+    with Client(film.url) as client:
         client.replayed()
         client.set(paper, "Page, 182 mm at 300 dpi")
         client.set(strip, False)
@@ -154,7 +154,7 @@ def test_a_picture_is_asked_for_as_large_as_its_paper(film: Shown) -> None:
     [{"wxyz": [0, 0, 0, 0]}, {"fov": 0.0}, {"fov": -1.0}, {"image_height": 0}, {"position": [0, float("nan"), 0]}],
 )
 def test_a_client_with_a_camera_that_cannot_be_gets_no_picture(film: Shown, camera: dict[str, Any]) -> None:
-    with Client(film.port) as client:
+    with Client(film.url) as client:
         framed(client, film)
         eye: dict[str, Any] = {"wxyz": [1, 0, 0, 0], "up_direction": [0, 0, 1], "position": [0, -20, 3], "fov": 1.0}
         eye |= {"look_at": [0, 0, 0], "near": 0.1, "far": client.far, "image_height": 600, "image_width": 800}

@@ -186,7 +186,7 @@ def page() -> Iterator[Shown]:
 
 def test_arrows_in_the_scene_come_and_go(page: Shown) -> None:
     wanted = handle(page, "Forces in the scene")
-    with Client(page.port) as client:
+    with Client(page.url) as client:
         client.replayed()
         client.set(wanted, True)
         await_that(lambda: page.node("/forces") is not None)

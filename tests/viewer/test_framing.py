@@ -48,7 +48,7 @@ def test_the_box_stays_in_the_picture_until_someone_looks_from_elsewhere() -> No
     server = start_server(port=0)
     try:
         Framing(server, low, high)
-        with Client(server.get_port()) as client:
+        with Client(server.url) as client:
             await_that(lambda: len(server.get_clients()) == 1)
             camera = next(iter(server.get_clients().values())).camera
             wide = fitted(low, high, 800 / 600, 1.0)
@@ -78,7 +78,7 @@ def test_a_camera_that_a_link_has_put_is_let_be_whatever_its_page_still_tells() 
     server = start_server(port=0)
     try:
         framing = Framing(server, low, high)
-        with Client(server.get_port()) as client:
+        with Client(server.url) as client:
             camera = put(client, server, framing)
             number, own = camera.client.client_id, np.array(camera.position)
             framing.look(number, np.array([3.0, 4.0, 5.0, 0.5, 0.5, 0.5]))
@@ -104,7 +104,7 @@ def test_a_camera_that_is_just_being_put_somewhere_has_not_been_moved_by_hand() 
     server = start_server(port=0)
     try:
         framing = Framing(server, np.zeros(3), np.ones(3))
-        with Client(server.get_port()) as client, ThreadPoolExecutor(1) as other:
+        with Client(server.url) as client, ThreadPoolExecutor(1) as other:
             camera = put(client, server, framing)
             number = camera.client.client_id
             client.look([9.0, 8.0, 7.0], [0.5, 0.5, 0.5], width=300)

@@ -29,7 +29,7 @@ def page() -> Iterator[Shown]:
 
 
 def tell(page: Shown, topic: str, value: Any, count: int = 0) -> None:
-    with Client(page.port) as client:
+    with Client(page.url) as client:
         text = json.dumps({"topic": topic, "value": value, "count": count})
         client.set(handle(page, "sagline"), text)
         client.replayed()  # who has not heard all takes ten seconds to leave
@@ -81,7 +81,7 @@ def test_steps_that_are_none_and_ways_out_of_sight_move_nothing(page: Shown) -> 
     tell(page, "nudge", [0, 0, 1, 0, 0, 0], 99)  # a step that is one
     await_that(lambda: not there(page, home.position, home.quaternion))
     assert there(page, home.position + np.array([0.0, 0.0, 0.1]), home.quaternion)
-    with Client(page.port) as client:
+    with Client(page.url) as client:
         for count in range(30):
             text = json.dumps({"topic": "nudge", "value": [MOST, 0, 0, 0, 0, 0], "count": count})
             client.set(handle(page, "sagline"), text)

@@ -73,7 +73,7 @@ class Asking:
 
 @contextmanager
 def asking(page: Shown) -> Iterator[Asking]:
-    with Client(page.port) as client:
+    with Client(page.url) as client:
         yield Asking(page, client)
 
 

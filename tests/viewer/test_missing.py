@@ -220,7 +220,7 @@ def page() -> Iterator[Shown]:
 
 @extended
 def test_the_platform_goes_where_it_is_held(page: Shown) -> None:
-    with Client(page.port) as client:
+    with Client(page.url) as client:
         client.grab()
         client.drag([6.3, 2.1, 5.4])
         await_that(lambda: page.viewer.view is not None and not page.viewer.view.snapshot.feasible)
@@ -245,7 +245,7 @@ def test_the_platform_goes_where_it_is_held(page: Shown) -> None:
 
 @pytest.mark.soak
 def test_thirty_explanations_a_second(page: Shown) -> None:
-    with Client(page.port) as client:
+    with Client(page.url) as client:
 
         def move(angle: float) -> None:
             client.drag([6.3 + 0.3 * np.cos(angle), 2.1 + 0.3 * np.sin(angle), 5.4])

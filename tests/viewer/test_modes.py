@@ -67,7 +67,7 @@ def test_a_mode_moves_at_the_rate_of_the_page_and_stops(page: Shown) -> None:
     assert show.swing is not None
     found = vibration(show.swing.state, up_to=20.0)
     assert show.swing.mode.frequency == pytest.approx(found.frequency[1], rel=1e-12)
-    with Client(page.port) as client:
+    with Client(page.url) as client:
         await_that(lambda: len(page.server.get_clients()) == 1)  # who leaves has all shown anew
         heard_for(client, 0.5)
         before = page.viewer.updates
@@ -94,7 +94,7 @@ def test_a_mode_moves_at_the_rate_of_the_page_and_stops(page: Shown) -> None:
 
 @extended
 def test_the_list_says_what_every_frequency_is(page: Shown) -> None:
-    with Client(page.port) as client:
+    with Client(page.url) as client:
         client.set(handle(page, "Mode"), "massless 1")
         await_that(lambda: "massless</b>" in page.text)
         await_that(lambda: any('"massless 1" class="chosen' in row for row in rows_of(page)))
@@ -119,7 +119,7 @@ def test_the_list_says_what_every_frequency_is(page: Shown) -> None:
 
 @extended
 def test_while_the_platform_is_dragged_nothing_swings_and_then_its_new_modes_do(page: Shown) -> None:
-    with Client(page.port) as client:
+    with Client(page.url) as client:
         client.set(handle(page, "Mode"), "1")
         await_that(lambda: moves(page))
         for x in np.linspace(3.0, 0.0, 20):
@@ -142,7 +142,7 @@ def test_a_cut_cable_is_simulated_and_played_as_a_run_is(page: Shown, monkeypatc
         yield made.simulation()
 
     monkeypatch.setattr("sagline.viewer.features.cut.simulate_cut", cut)
-    with Client(page.port) as client:
+    with Client(page.url) as client:
         client.drag([1.0, 0.0, 2.0])
         await_that(lambda: page.position[0] == 1.0)
         client.set(handle(page, "Cable to cut"), "3")

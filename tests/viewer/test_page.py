@@ -36,7 +36,7 @@ def test_the_server_serves_it_and_viser_stays_what_it_was() -> None:
     server = start_server(port=0, title="cogiro <1>")
     try:
         assert infra.WebsockServer is stock
-        with urlopen(f"http://127.0.0.1:{server.get_port()}/") as answer:
+        with urlopen(server.url) as answer:
             (title,) = re.findall("<title>(.*?)</title>", answer.read().decode())
             assert title.startswith(escape("cogiro <1>"))
             assert title.endswith("sagline")

@@ -61,7 +61,7 @@ def pull(client: Client, page: Shown, phase: str, x: float, y: float, *, keep: b
 
 
 def test_a_hand_pulls_as_far_as_it_is_away_and_lets_go(page: Shown) -> None:
-    with Client(page.port) as client:
+    with Client(page.url) as client:
         look(client, page)
         pull(client, page, "start", 0.5, 0.5)
         pull(client, page, "move", 0.55, 0.42)
@@ -93,7 +93,7 @@ def test_a_hand_pulls_as_far_as_it_is_away_and_lets_go(page: Shown) -> None:
 @extended
 def test_who_keeps_it_lets_go_by_the_button(page: Shown) -> None:
     show = page.viewer.feature(PushFeature)
-    with Client(page.port) as client:
+    with Client(page.url) as client:
         look(client, page)
         pull(client, page, "start", 0.5, 0.5)
         pull(client, page, "end", 0.5, 0.4, keep=True)
@@ -132,7 +132,7 @@ def pushes(push: Push, at: list[float], force: list[float]) -> bool:
 
 @extended
 def test_a_force_can_be_typed(page: Shown) -> None:
-    with Client(page.port) as client:
+    with Client(page.url) as client:
         look(client, page)
         client.set(handle(page, "Force [N]"), 25.0)
         client.set(handle(page, "Along x, y, z"), [0.0, 3.0, -4.0])
@@ -154,7 +154,7 @@ def test_a_force_can_be_typed(page: Shown) -> None:
 
 @extended
 def test_a_client_that_goes_lets_go(page: Shown) -> None:
-    with Client(page.port) as client:
+    with Client(page.url) as client:
         look(client, page)
         pull(client, page, "start", 0.5, 0.5)
         pull(client, page, "move", 0.6, 0.5)
@@ -183,7 +183,7 @@ def test_a_client_that_goes_lets_go(page: Shown) -> None:
 )
 def test_nonsense_holds_nothing(page: Shown, value: Any) -> None:
     show = page.viewer.feature(PushFeature)
-    with Client(page.port) as client:
+    with Client(page.url) as client:
         look(client, page)
         before = page.viewer.updates
         tell(client, page, "pull", value)

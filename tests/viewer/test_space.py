@@ -79,7 +79,7 @@ def choose(page: Shown, client: Client, **values: Any) -> None:
 
 @pytest.fixture
 def client(page: Shown) -> Iterator[Client]:
-    with Client(page.port) as one:
+    with Client(page.url) as one:
         yield one
         choose(page, one, hull=False, slice=False, ways=False, force=0.0, moment=0.0, plane="level")
         one.drag(POSE.position)
@@ -220,7 +220,7 @@ def test_thirty_updates_a_second_while_a_slider_is_dragged_that_a_region_follows
     with contextmanager(shown)(lambda server: Page(server, FEATURES, robot)) as page:
         mass = handle(page, "Platform + load [kg]")
 
-        with Client(page.port) as client:
+        with Client(page.url) as client:
 
             def move(angle: float) -> None:
                 client.set(mass, float(robot.mass * (1.1 + 0.2 * np.sin(angle))))

@@ -170,7 +170,7 @@ def page() -> Iterator[Shown]:
 
 def asked(page: Shown, topic: str, text: Any, name: str = "me-1") -> dict[str, Any]:
     """What a page is answered."""
-    with Client(page.port) as client:
+    with Client(page.url) as client:
         field = handle(page, "sagline")
         client.set(field, json.dumps({"topic": topic, "value": [name, text], "count": 0}))
         for message in client.heard(PATIENCE):
@@ -191,7 +191,7 @@ def test_every_control_of_the_robot_is_in_the_code(page: Shown) -> None:
                "Cable model": "parabolic", "Tensions": "Centroid"}  # fmt: skip
     for k, (label, value) in enumerate(changes.items()):
         before = tension()
-        with Client(page.port) as client:
+        with Client(page.url) as client:
             client.set(handle(page, label), value)
             await_that(lambda before=before: not np.array_equal(tension(), before))  # type: ignore[misc]
         names = executed(asked(page, "copy", "code", f"copy-{k}")["text"])
@@ -218,7 +218,7 @@ def test_a_pose_that_is_typed_is_gone_to_and_another_is_refused_in_a_line(page: 
 
 @pytest.mark.parametrize("value", wide([["a", 3], None, 3, [], ["a"], [3, "code"], ["x" * 50, "code"], {"to": "x"}]))
 def test_questions_that_are_none_are_not_answered(page: Shown, value: Any) -> None:
-    with Client(page.port) as client:
+    with Client(page.url) as client:
         for topic in ("pose", "copy"):
             client.set(handle(page, "sagline"), json.dumps({"topic": topic, "value": value, "count": 0}))
     assert "'other'" in asked(page, "copy", "other", "z")["refused"]

@@ -225,7 +225,7 @@ def test_steps_go_from_sample_to_sample() -> None:
 
 
 def test_scrubbing_shows_that_sample_in_both_runs(page: Shown) -> None:
-    with Client(page.port) as client:
+    with Client(page.url) as client:
         tell(page, client, "scrub", 1.25)
         await_that(lambda: np.array_equal(page.position, PLAN.state.pose.position[12]))
         beside = page.node("/beside")
@@ -247,7 +247,7 @@ def test_scrubbing_shows_that_sample_in_both_runs(page: Shown) -> None:
 
 @extended
 def test_play_and_speed_are_heard_and_the_clock_is_told_at_most_thirty_times_a_second(page: Shown) -> None:
-    with Client(page.port) as client:
+    with Client(page.url) as client:
         tell(page, client, "speed", 4.0)
         tell(page, client, "scrub", 0.0)
         await_that(lambda: page.told("clock") == {"time": 0.0, "playing": False, "speed": 4.0, "following": True})
@@ -264,7 +264,7 @@ def test_play_and_speed_are_heard_and_the_clock_is_told_at_most_thirty_times_a_s
 
 
 def test_a_chart_is_chosen_and_a_cable_that_is_pointed_at_is_bold(page: Shown) -> None:
-    with Client(page.port) as client:
+    with Client(page.url) as client:
         tell(page, client, "chart", 1)
         await_that(lambda: page.told("timeline")["tracks"][0]["title"] == "Unstrained length")
         tell(page, client, "chart", 0)
@@ -281,7 +281,7 @@ def test_a_chart_is_chosen_and_a_cable_that_is_pointed_at_is_bold(page: Shown) -
 
 @extended
 def test_a_window_is_looked_at_and_the_whole_again(page: Shown) -> None:
-    with Client(page.port) as client:
+    with Client(page.url) as client:
         tell(page, client, "window", [2.0, 4.0])
         await_that(lambda: page.told("timeline")["window"] == [2.0, 4.0])
         times = page.told("timeline")["tracks"][0]["times"]
@@ -331,7 +331,7 @@ def test_a_window_follows_a_clock_to_its_end_however_long_nobody_looked() -> Non
 
 @extended
 def test_a_log_that_grows_grows_on_the_page_and_who_is_at_its_end_stays_there(growing: Shown, log: PlayedLog) -> None:
-    with Client(growing.port) as client:
+    with Client(growing.url) as client:
         tell(growing, client, "chart", 1)
         tell(growing, client, "scrub", 99.0)
         await_that(lambda: growing.told("clock")["time"] == log.time[99])
@@ -356,7 +356,7 @@ NONSENSE: dict[str, tuple[Any, ...]] = {
 
 
 def test_nonsense_changes_nothing(page: Shown) -> None:
-    with Client(page.port) as client:
+    with Client(page.url) as client:
         tell(page, client, "scrub", 2.0)
         await_that(lambda: page.told("clock")["time"] == 2.0)
         before = page.told("clock"), page.told("timeline")

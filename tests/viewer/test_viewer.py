@@ -39,8 +39,9 @@ def test_it_listens_on_the_loopback_address_alone(page: Shown) -> None:
 
 
 def test_a_port_that_is_taken_is_told(page: Shown) -> None:
-    with refused(f"port {page.port}", "in use on 127.0.0.1", kind=sl.InvalidValueError):
-        start_server(port=page.port)
+    port = page.server.get_port()
+    with refused(f"port {port}", "in use on 127.0.0.1", kind=sl.InvalidValueError):
+        start_server(port=port)
     with refused("203.0.113.7:0", kind=sl.InvalidValueError):
         start_server(host="203.0.113.7", port=0)
     with refused("port", "70000", "0 to 65535", kind=sl.InvalidValueError):
@@ -61,7 +62,7 @@ def test_the_gizmo_goes_where_it_is_put() -> None:
 
 
 def test_everything_follows_a_drag(page: Shown) -> None:
-    with Client(page.port) as client:
+    with Client(page.url) as client:
         client.grab()
         half = np.radians(4.0) / 2.0
         client.drag([1.0, 0.5, 2.0], [np.cos(half), 0.0, 0.0, np.sin(half)])
@@ -77,7 +78,7 @@ def test_everything_follows_a_drag(page: Shown) -> None:
 
 @extended
 def test_thirty_updates_a_second_reach_a_client(page: Shown) -> None:
-    with Client(page.port) as client:
+    with Client(page.url) as client:
 
         def move(angle: float) -> None:
             client.drag([np.cos(angle), np.sin(angle), 2.0])
@@ -86,7 +87,7 @@ def test_thirty_updates_a_second_reach_a_client(page: Shown) -> None:
 
 
 def test_infeasible_pose_turns_the_platform_red_and_back(page: Shown) -> None:
-    with Client(page.port) as client:
+    with Client(page.url) as client:
         client.drag([7.2, 3.0, 1.5])
         await_that(lambda: page.viewer.view is not None and not page.viewer.view.snapshot.feasible)
         updates = (m["updates"] for m in client.heard(PATIENCE) if "updates" in m)
@@ -96,7 +97,7 @@ def test_infeasible_pose_turns_the_platform_red_and_back(page: Shown) -> None:
 
 
 def test_a_slider_changes_the_robot(page: Shown) -> None:
-    with Client(page.port) as client:
+    with Client(page.url) as client:
         mass = handle(page, "Platform + load [kg]")
         client.set(mass, 100.0)
         await_that(lambda: page.viewer.view is not None and page.viewer.view.snapshot.robot.mass == 100.0)
@@ -120,7 +121,7 @@ def test_the_same_pose_shows_the_same_tensions_whatever_the_way_there(page: Show
         assert page.viewer.view is not None
         return page.viewer.view.snapshot.tension
 
-    with Client(page.port) as client:
+    with Client(page.url) as client:
         places = generator.uniform([-4.0, -3.0, 1.0], [4.0, 3.0, 3.5], (8, 3))
         there = [tensions_at(client, place) for place in places]
         back = [tensions_at(client, place) for place in places[::-1]][::-1]
@@ -140,18 +141,18 @@ def test_the_same_pose_shows_the_same_tensions_whatever_the_way_there(page: Show
 
 @extended
 def test_a_client_that_vanishes_mid_drag_is_not_missed(page: Shown) -> None:
-    client = Client(page.port)
+    client = Client(page.url)
     client.grab()
     client.drag([0.3, 0.0, 2.0])
     client.break_off()
-    with Client(page.port) as other:
+    with Client(page.url) as other:
         other.drag([0.6, 0.0, 2.0])
         await_that(lambda: page.position[0] == 0.6)
 
 
 @extended
 def test_ten_clients_at_once_all_see_the_drag_of_one(page: Shown) -> None:
-    with clients(page.port, 10) as some:
+    with clients(page.url, 10) as some:
         for client in some:
             client.replayed()
         some[3].drag([0.9, 0.1, 2.0])
@@ -165,8 +166,8 @@ def test_ten_clients_at_once_all_see_the_drag_of_one(page: Shown) -> None:
     wide([b"\xff\xfe\x00", b"", "text", b"\x81\xa4type\xa4None", b"\x80"]),
 )
 def test_a_malformed_message_harms_its_sender_only(page: Shown, nonsense: bytes | str) -> None:
-    with Client(page.port) as good:
-        bad = Client(page.port)
+    with Client(page.url) as good:
+        bad = Client(page.url)
         bad.send(nonsense)
         good.drag([0.2, 0.7, 2.0])
         await_that(lambda: page.position[1] == 0.7)
@@ -190,7 +191,7 @@ def test_a_pose_that_is_none_is_refused_and_forgotten(page: Shown) -> None:
         ([0.0, 0.0], [1, 0, 0, 0]),
         ([0.0, 0.0, 2.0], [1, 0]),
     ):
-        client = Client(page.port)
+        client = Client(page.url)
         mine = client.met(page.server).client_id
         client.drag(position, wxyz)
         with suppress(ConnectionClosed):  # this may have cut it off
@@ -198,7 +199,7 @@ def test_a_pose_that_is_none_is_refused_and_forgotten(page: Shown) -> None:
         await_that(partial(heard_or_cut_off, page, mine, asked))
         client.break_off()
         assert page.thread.is_alive()
-    with Client(page.port) as client:
+    with Client(page.url) as client:
         client.drag([0.0, 0.4, 2.0])
         await_that(lambda: page.position[1] == 0.4)
 
@@ -216,7 +217,7 @@ def test_what_a_slider_does_not_reach_is_refused_once_and_not_asked_again() -> N
 
 @extended
 def test_a_run_plays_pauses_and_is_left_by_a_drag(film: Shown) -> None:
-    with Client(film.port) as client:
+    with Client(film.url) as client:
         assert np.array_equal(film.position, PATH.pose.position[0])
         tell(film, client, "play", True)
         await_that(lambda: film.position[0] > 0.5)
@@ -239,7 +240,7 @@ def test_a_run_plays_pauses_and_is_left_by_a_drag(film: Shown) -> None:
 @extended
 def test_a_run_is_named_once_and_cannot_be_changed(film: Shown) -> None:
     model, mass = handle(film, "Cable model"), handle(film, "Platform + load [kg]")
-    with Client(film.port) as client:
+    with Client(film.url) as client:
         tell(film, client, "follow", True)
         await_that(lambda: "empirical (the article's)" in unescape(film.text))
         await_that(lambda: not model.visible)

@@ -6,9 +6,11 @@ import os
 import signal
 import sys
 import webbrowser
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from importlib.util import find_spec
+from socket import gethostname
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from sagline.cli.terminal import show_note, show_text
@@ -22,11 +24,12 @@ LATER = "trimesh"  # a package that the viewer loads on demand
 
 
 class ServerAddress(NamedTuple):
-    """Address and port (0: any free port) of the page, and True to open a browser on this computer."""
+    """Address and port (0: any free port) of the page, True to open a browser here, and arguments of `start_server`."""
 
     host: str
     port: int
     browser: bool
+    access: Mapping[str, Any] = MappingProxyType({})
 
 
 def check_viewer() -> None:
@@ -51,19 +54,19 @@ def serve(
     from sagline.viewer.features import FEATURES
     from sagline.viewer.page import Page
 
-    server = web.start_server(address.host, address.port, robot.name)
+    server = web.start_server(address.host, address.port, robot.name, **address.access)
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)  # from now on Ctrl-C is the normal end
     try:
-        url = web.url(server, address.host)
-        show_text(f"{robot.name} is at {url}   (Ctrl-C stops it)", whole=True)
-        if address.host not in ("127.0.0.1", "::1", "localhost"):
-            show_note(
-                "Note: ", "everyone who can reach this machine can see the page and drag the platform.", style="bold"
-            )
+        show_text(f"{robot.name} is at {server.url}   (Ctrl-C stops it)", whole=True)
+        if not server.access.local:
+            who = "who has this address" if server.access.path else "who can reach this machine"
+            place = server.url_at(server.access.path, gethostname())
+            text = f"on other machines it is {place}. Everyone {who} can see the page and drag the platform."
+            show_note("Note: ", text, style="bold")
         viewer = Page(server, FEATURES, robot, **page)
         if address.browser and _has_display():
-            webbrowser.open(url)
+            webbrowser.open(server.url_at(server.access.path_once()))
         with meanwhile(viewer):
             viewer.serve()
     except KeyboardInterrupt:

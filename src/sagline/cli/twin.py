@@ -76,9 +76,10 @@ def twin(
     from sagline.control.real_time import set_priority
     from sagline.files.robot_file import load_robot
     from sagline.twin.machine import MOST_SEED, Machine
-    from sagline.twin.server import SCAN, Server
+    from sagline.twin.server import SCAN, Server, check_first_port
 
     robot = load_robot(name)
+    check_first_port(port, robot)
     real = robot if true is None else load_robot(true)
     noise = whole_of(seed, "--seed", 0, MOST_SEED)
     if priority is not None:
@@ -113,7 +114,7 @@ def _greet(name: str, server: Server, host: str, *, modbus: bool) -> None:
     places = [place.replace(everywhere, f"{gethostname()}:") for place in server.addresses]
     show_text(f"    --plc {','.join(places)}", whole=True)
     show_text("Ctrl-C stops it.")
-    if host != "127.0.0.1":
+    if not server.addresses[0].startswith("127."):
         show_note("Note: ", "everyone who can reach this machine can drive it; there is no password.", style="bold")
 
 

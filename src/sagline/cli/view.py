@@ -62,6 +62,10 @@ _HostOption = Annotated[
     str,
     option("ADDRESS", "Address to listen on; 0.0.0.0 means all addresses of this machine, so that others can look."),
 ]
+_AllowHostOption = Annotated[
+    list[str] | None,
+    option("NAME", "Further name of this machine, or of a proxy, in the address of a browser. It can be repeated."),
+]
 
 
 def view(
@@ -78,11 +82,19 @@ def view(
     payload: PayloadOption = None,
     host: _HostOption = "127.0.0.1",
     port: Annotated[int, converted_option("NUMBER", "Port to listen on; 0 selects a free port.", "port_of")] = 8080,
+    token: Annotated[
+        bool, flag("Answer only requests with the token of the printed address.", "--token/--no-token")
+    ] = True,
+    clients: Annotated[
+        int, converted_option("NUMBER", "Largest number of open pages.", "whole_of", least=1, most=1000)
+    ] = 32,
+    allow_host: _AllowHostOption = None,
     browser: Annotated[bool, flag("Open it in a browser here.", "--browser/--no-browser")] = True,
 ) -> int:
     """Show a robot in the browser; its platform can be dragged, and the cables follow.
 
-    Over SSH, forward the port (`ssh -L 8080:localhost:8080 ...`) and open http://localhost:8080 at home.
+    Only the printed address opens the page. Over SSH, forward the port (`ssh -L 8080:localhost:8080 ...`) and open the
+    printed address at home.
 
     For example:
 
@@ -99,7 +111,8 @@ def view(
     from sagline.cli.hosting import ServerAddress
     from sagline.cli.values import robot_with_payload
 
-    address = ServerAddress(host, port, browser)
+    access = {"token": token, "clients": clients, "allow_host": allow_host or ()}
+    address = ServerAddress(host, port, browser, access)
     log = next((file for file in (run, Path(robot)) if file is not None and file.suffix.lower() == LOG), None)
     if log is None and (live or truth is not None):
         item, step = "--live" if live else "--truth", "Give one: sagline view run.mcap."

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from sagline.control.link import Command, Mode, Refusal
+from sagline.control.link import Command, Mode, Refusal, groups_of
 from sagline.control.real_time import Pace
 from sagline.core.arguments import flag, instance, whole_number
 from sagline.core.arrays import Array
@@ -57,11 +57,12 @@ class Server:
             modbus: True if the servers use Modbus TCP instead of S7.
 
         Raises:
-            InvalidValueError: If a port is in use, or the address is not one of this computer.
+            InvalidValueError: If a port is in use or above 65535, or the address is not one of this computer.
             FileError: If the package for the protocol is not installed.
         """
         self.machine = instance(machine, Machine, "machine")
         place, first_port = instance(host, str, "host"), whole_number(port, "port", 0, LAST_PORT)
+        check_first_port(first_port, machine.robot)
         self._pace = Pace(machine.period)
         self._groups = range(len(machine.groups))
         self._seen = [b""] * len(machine.groups)  # last commands that were read
@@ -130,6 +131,15 @@ class Server:
         """Block of the PLC of a group; None if a fault keeps the previous block."""
         report = self.machine.report(group)
         return None if report is None else block_of(group, report)
+
+
+def check_first_port(port: int, robot: Robot) -> None:
+    """Refuse a port of the first group (0: any free ports) that leaves no ports for the other groups of a robot."""
+    count = len(groups_of(robot.cable_count))
+    last = LAST_PORT + 1 - count
+    if port > last:
+        allowed = f"0 to {last}, because {count} groups have {count} ports"
+        raise InvalidValueError("port of the first group", port, allowed, "Choose another with --port.")
 
 
 def block_of(group: int, report: Report) -> bytes:

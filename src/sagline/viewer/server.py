@@ -11,19 +11,23 @@ import json
 import logging
 import socket
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, redirect_stdout, suppress
 from html import escape
 from importlib.resources import files
 from io import StringIO
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, Final, NamedTuple, cast
 from urllib.parse import quote
 
 import viser
+import websockets
 from viser import infra
+from viser.infra import _infra
 
 from sagline.core.errors import InvalidValueError
+from sagline.viewer.access import CLIENTS, Access, bracketed
 
 STYLES: Final = ("page.css", "state.css", "keys.css", "balance.css", "film.css", "timeline.css")
 SCRIPTS: Final = (  # in the order of execution, before viser's client
@@ -81,19 +85,23 @@ def page_html(html: str, title: str) -> str:
 
 
 @contextmanager
-def _serving_our_page(title: str) -> Iterator[None]:
-    """Context manager; a viser server that is created in it serves the changed page."""
+def _serving_our_page(title: str, access: Access) -> Iterator[None]:
+    """Context manager; a viser server that is created in it serves the changed page and checks requests."""
 
     class PageServer(_STOCK):
         def __init__(self, **options: Any) -> None:
             page = cast("Path", ClientFile(options.pop("http_server_root"), title))
             super().__init__(http_server_root=page, **options)
 
+    checked = SimpleNamespace(server=SimpleNamespace(serve=access.checked_serve))
     infra.WebsockServer = PageServer  # type: ignore[misc, assignment]
+    module: Any = _infra
+    module.websockets = SimpleNamespace(**vars(websockets) | {"asyncio": checked})
     try:
         yield
     finally:
         infra.WebsockServer = _STOCK  # type: ignore[misc]
+        module.websockets = websockets
 
 
 _running: list[PageServer] = []
@@ -101,31 +109,69 @@ _quiet_process = ExitStack()  # silences the logging of the whole process while 
 
 
 class PageServer(viser.ViserServer):
-    """A viser server with the changed page; no page can make it open a tunnel to the internet."""
+    """A viser server with the changed page; no page can make it open a tunnel to the internet.
 
-    def __init__(self, host: str, port: int, title: str) -> None:
+    Attributes:
+        access: The check of requests.
+    """
+
+    def __init__(self, host: str, port: int, title: str, access: Access) -> None:
         """Start serving, with a title for the panel and the browser's tab."""
-        with _serving_our_page(title if title == NAME else f"{title} – {NAME}"):
+        self.access = access
+        with _serving_our_page(title if title == NAME else f"{title} – {NAME}", access):
             super().__init__(host=host, port=port, label=title, verbose=False)
+
+    @property
+    def url(self) -> str:
+        """The address for a browser on this computer, with the token."""
+        return self.url_at(self.access.path)
+
+    def url_at(self, path: str, host: str = "") -> str:
+        """The address of a path, at a host; "" for an address for this computer."""
+        own = self.get_host()
+        place = host or ("localhost" if own in ("0.0.0.0", "::", "") else own)
+        return f"http://{bracketed(place)}:{self.get_port()}{path}"
 
     def request_share_url(self, verbose: bool = True) -> str | None:
         """Reject the request, because viser would publish the page under a public address."""
         return None
 
 
-def start_server(host: str = LOOPBACK, port: int = PORT, title: str = NAME) -> PageServer:
-    """Start a server at an address ("0.0.0.0" for all addresses) and a port (0 for any free port).
+def start_server(
+    host: str = LOOPBACK,
+    port: int = PORT,
+    title: str = NAME,
+    *,
+    token: bool = True,
+    clients: int = CLIENTS,
+    allow_host: Sequence[str] = (),
+) -> PageServer:
+    """Start a server.
+
+    Args:
+        host: Address to listen on; "0.0.0.0" for all addresses.
+        port: Port to listen on; 0 for any free port.
+        title: Title of the page.
+        token: True if only requests with the token of the address are answered; False only on a trusted host.
+        clients: Largest number of open pages.
+        allow_host: Further names of this computer, or of a proxy before it, in the addresses of browsers.
 
     Raises:
         InvalidValueError: If the port is in use or the address does not belong to this computer; viser itself would
-            take the next port or wait forever.
+            take the next port or wait forever. Also if another argument is not allowed, or the installed
+            viser does not permit the check of requests.
     """
     _check(host, port)
+    access = Access(host, token=token, clients=clients, allow_host=allow_host)
     with ExitStack() as quiet:
         if not _running:
             quiet.enter_context(_quiet())
         with redirect_stdout(StringIO()):
-            server = PageServer(host, port, title)
+            server = PageServer(host, port, title, access)
+            if not access.guards:
+                server.stop()
+                allowed = "a version that serves with websockets.asyncio.server.serve"
+                raise InvalidValueError("viser", viser.__version__, allowed, "Install viser==1.1.1.")
         _running.append(server)
         _quiet_process.push(quiet.pop_all())
     server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
@@ -139,12 +185,6 @@ def stop_server(server: PageServer) -> None:
     _running[:] = [other for other in _running if other is not server]
     if not _running:
         _quiet_process.close()
-
-
-def url(server: PageServer, host: str) -> str:
-    """The address for a browser on this computer."""
-    shown = "localhost" if host in ("0.0.0.0", "::", "") else f"[{host}]" if ":" in host else host
-    return f"http://{shown}:{server.get_port()}"
 
 
 @contextmanager

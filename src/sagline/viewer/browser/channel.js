@@ -1,15 +1,18 @@
 // window.sagline: messages between page and server, besides those of viser (server.py).
 (() => {
-  const showBanner = (lost) => {
+  // The reason is given by a server that refuses the page; it is empty if no server answers, and null if one does.
+  const showBanner = (reason) => {
     let banner = document.getElementById("sagline-lost");
-    if (!banner && lost) {
+    if (!banner && reason !== null) {
       banner = document.createElement("div");
       banner.id = "sagline-lost";
       banner.setAttribute("role", "alert");
-      banner.textContent = "Disconnected. Is sagline view still running? The page reconnects by itself.";
       document.body.append(banner);
     }
-    if (banner) banner.hidden = !lost;
+    if (!banner) return;
+    banner.hidden = reason === null;
+    const lost = "Disconnected. Is sagline view still running? After a new start, open the address that it prints.";
+    if (!banner.hidden) banner.textContent = `${reason ? `Not connected: ${reason}` : lost} The page reconnects by itself.`;
   };
 
   const handlers = new Map(); // handlers by topic
@@ -70,23 +73,27 @@
     flush();
   });
 
-  let waiting = 0;
+  let waiting = 0; // timer of the banner from a lost connection to the first message of the next one
+  let reason = "";
   window.Worker = class extends window.Worker {
     constructor(...parts) {
       super(...parts);
       worker = this;
       this.addEventListener("message", ({ data }) => {
         if (data?.type === "connected") {
-          clearTimeout(waiting);
-          waiting = 0;
-          showBanner(false);
           deliver("connected", true);
         } else if (data?.type === "closed") {
           uuid = undefined; // a restarted server has another field
           welcome = false;
           deliver("connected", false);
-          waiting ||= setTimeout(() => showBanner(true), 1500); // no banner for a reload or a short interruption
+          reason = data.closeReason === "Connection closed" ? "" : data.closeReason; // the client's text for no reason
+          waiting ||= setTimeout(() => showBanner(reason), 1500); // no banner for a reload or a short interruption
         } else if (data?.type === "message_batch") {
+          if (waiting) {
+            clearTimeout(waiting);
+            waiting = 0;
+            showBanner(null);
+          }
           data.messages.forEach(receive);
         }
       });

@@ -1,5 +1,10 @@
 // State in a link, after the number sign: it is sent to the server once and removed from the address.
 (() => {
+  // The address consists of the host and the token. viser's client would write the address of its server behind it, and
+  // would connect to any other server that stands there.
+  const replace = history.replaceState.bind(history);
+  history.replaceState = () => replace(null, "", location.pathname);
+
   const DEFAULT = "Readings"; // open tab if a link does not name a tab
   const open = () =>
     [...document.querySelectorAll('[role=tab][aria-selected="true"]')]
@@ -24,8 +29,8 @@
   };
   const apply = () => {
     const hash = location.hash.slice(1);
+    history.replaceState(); // a reload does not apply the link again
     if (!hash.includes("=")) return;
-    history.replaceState(null, "", location.pathname + location.search); // a reload does not apply the link again
     const parts = hash.split("&");
     const tabs = parts.filter((part) => part.startsWith("tab=")).map((part) => part.slice(4));
     window.sagline.ask("link", parts.filter((part) => !part.startsWith("tab=")).join("&"), ({ refused }) => {
