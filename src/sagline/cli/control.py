@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 def control(
     name: RobotArgument,
     plc: Annotated[
-        str, option("ADDRESS,...", "Address, host or host:port, of the PLC of each group, in order.", "--plc")
+        str,
+        option("ADDRESS,...", "Address, host, host:port or [IPv6]:port, of the PLC of each group, in order.", "--plc"),
     ],
     modbus: ModbusOption = False,
     shadow: Annotated[bool, flag("Read and log only; nothing is sent.", "--shadow")] = False,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import re
 from collections.abc import Sequence
 from contextlib import ExitStack, closing
 from pathlib import Path
@@ -44,7 +45,7 @@ def twin(
         ),
     ] = 11021,
     host: Annotated[
-        str, option("ADDRESS", "Address to listen on; 0.0.0.0 means all addresses of this machine.")
+        str, option("ADDRESS", "Address to listen on; 0.0.0.0 and :: mean all addresses of this machine.")
     ] = "127.0.0.1",
     modbus: ModbusOption = False,
     seed: SeedOption = "0",
@@ -110,11 +111,10 @@ def _greet(name: str, server: Server, host: str, *, modbus: bool) -> None:
     show_text(f"{machine.nominal.name}: {winches} winches on {groups} PLCs with {protocol}, brakes on.")
     show_text("From another terminal:")
     show_text(f"  sagline control {name}{' --modbus' * modbus} \\", whole=True)
-    everywhere = "0.0.0.0:"
-    places = [place.replace(everywhere, f"{gethostname()}:") for place in server.addresses]
+    places = [re.sub(r"^(0\.0\.0\.0|\[::\])(?=:)", gethostname(), place) for place in server.addresses]
     show_text(f"    --plc {','.join(places)}", whole=True)
     show_text("Ctrl-C stops it.")
-    if not server.addresses[0].startswith("127."):
+    if not server.addresses[0].startswith(("127.", "[::1]")):
         show_note("Note: ", "everyone who can reach this machine can drive it; there is no password.", style="bold")
 
 

@@ -41,8 +41,8 @@ class ModbusLink(BlockLink):
         """Connect to all groups at once.
 
         Args:
-            addresses: "host" or "host:port" of each group's PLC, in the order of the groups, or one text with commas
-                between them.
+            addresses: "host", "host:port" or "[IPv6]:port" of each group's PLC, in the order of the groups,
+                or one text with commas between them.
             robot: The robot, or its number of winches.
             device: Id of the device behind each address.
             timeout: Longest time to the first answers [s].

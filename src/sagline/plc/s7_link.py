@@ -6,7 +6,7 @@ import logging
 import socket
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from sagline.control.link import Refusal
 from sagline.plc.block_link import BlockLink
@@ -21,6 +21,7 @@ PORT: Final = 102
 PDU: Final = 240  # [bytes], of an S7-1200; each block fits in one request
 RACK: Final = 0
 FORBIDDEN: Final = 0x8104  # answer of a CPU whose settings do not permit PUT or GET
+_NAME: Final = "Connection"  # of the class that knows IPv6
 _CLOSED: Final = Refusal("the connection was closed", "Connect again")
 SLOT: Final = 1  # rack and slot of every S7-1200 and S7-1500
 
@@ -39,8 +40,8 @@ class S7Link(BlockLink):
         """Connect to all groups at once.
 
         Args:
-            addresses: "host" or "host:port" of each group's PLC, in the order of the groups, or one text with commas
-                between them.
+            addresses: "host", "host:port" or "[IPv6]:port" of each group's PLC, in the order of the groups,
+                or one text with commas between them.
             robot: The robot, or its number of winches.
             timeout: Longest time to the first answers [s].
 
@@ -60,6 +61,10 @@ class S7Wire:
         """Keep the address; `open` connects."""
         with plc_packages():
             import snap7
+            import snap7.client
+        client: Any = snap7.client
+        if ":" in host and client.ISOTCPConnection.__name__ != _NAME:
+            client.ISOTCPConnection = _with_ipv6(client.ISOTCPConnection)  # the library itself knows only IPv4
         self._library = snap7
         self._host = host
         self._port = port
@@ -117,6 +122,16 @@ class S7Wire:
                 _socket(client).getpeername()
                 return True
         return False
+
+
+def _with_ipv6(library: Any) -> Any:
+    """Connection of the library that knows IPv6, too."""
+
+    def connect(self: Any) -> None:
+        self.socket = socket.create_connection((self.host, self.port), self.timeout)
+        self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+    return type(_NAME, (library,), {"_tcp_connect": connect})
 
 
 def _socket(client: Client) -> socket.socket:

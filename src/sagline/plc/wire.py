@@ -5,6 +5,7 @@ from __future__ import annotations
 import socket
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from ipaddress import IPv6Address
 from typing import Any, Final, NamedTuple, Protocol
 
 from sagline.control.link import Refusal, groups_of
@@ -21,7 +22,7 @@ class Address(NamedTuple):
     """Address of a PLC.
 
     Attributes:
-        host: Name or IPv4 address.
+        host: Name, IPv4 address, or IPv6 address without brackets.
         port: TCP port.
     """
 
@@ -29,8 +30,8 @@ class Address(NamedTuple):
     port: int
 
     def __str__(self) -> str:
-        """Text host:port."""
-        return f"{self.host}:{self.port}"
+        """Text host:port, or [host]:port for an IPv6 address."""
+        return f"[{self.host}]:{self.port}" if ":" in self.host else f"{self.host}:{self.port}"
 
 
 def addresses_of(given: str | Sequence[str], port: int) -> tuple[Address, ...]:
@@ -70,16 +71,36 @@ def groups_at(addresses: Sequence[Address], robot: Robot | int) -> tuple[tuple[i
 
 
 def _address(index: int, text: object, port: int) -> Address:
-    host, colon, number = (text.strip() if isinstance(text, str) else "").partition(":")
-    known = number.isascii() and number.isdecimal() and 0 < int(number[:6]) <= LAST_PORT if colon else True
-    if not host or not known or any(c.isspace() or not c.isprintable() or c in "/@,;" for c in host):
+    given = text.strip() if isinstance(text, str) else ""
+    if given.startswith("["):
+        host, bracket, rest = given[1:].partition("]")
+        between, colon, number = rest.partition(":")
+        known = bool(bracket) and not between and _is_ipv6(host)
+    elif given.count(":") > 1:
+        host, colon, number = given, "", ""
+        known = _is_ipv6(host)
+    else:
+        host, colon, number = given.partition(":")
+        known = bool(host) and not any(c.isspace() or not c.isprintable() or c in "/@,;[]" for c in host)
+    if colon:
+        known = known and number.isascii() and number.isdecimal() and 0 < int(number[:6]) <= LAST_PORT
+    if not known:
         raise InvalidValueError(
             f"address of group {index}",
             brief(text),
-            f"host or host:port, port 1 to {LAST_PORT}",
+            f"host, host:port or [IPv6]:port, port 1 to {LAST_PORT}",
             "The twin prints its addresses; a PLC has its own in TIA Portal.",
         )
     return Address(host, int(number) if colon else port)
+
+
+def _is_ipv6(host: str) -> bool:
+    """True for an IPv6 address, also with a zone."""
+    try:
+        IPv6Address(host)
+    except ValueError:
+        return False
+    return True
 
 
 ANSWER: Final = 0.5  # time without an answer, after which the connection is opened again [s]

@@ -10,6 +10,7 @@ from typing import Final
 
 from sagline.core.errors import InvalidValueError
 from sagline.plc.blocks import BLOCKS, CLAIM, FROM_PLC, TO_PLC, Block
+from sagline.plc.wire import Address
 
 LOOPBACK: Final = "127.0.0.1"
 
@@ -29,7 +30,7 @@ class BlockServers(ABC):
             for i, block in enumerate(blocks):
                 self._memory[i][FROM_PLC][:] = block
                 number = _check_free(host, port + i if port else 0)
-                self.addresses += (f"{number}:{self._listen(i, number, port + i if port else 0)}",)
+                self.addresses += (str(Address(number, self._listen(i, number, port + i if port else 0))),)
         except BaseException:
             self.close()
             raise
@@ -67,19 +68,16 @@ class BlockServers(ABC):
 
 
 def _check_free(host: str, port: int) -> str:
-    """IPv4 address of a host at which a port is free; python-snap7 shares ports, so two twins would share clients."""
-    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            number = socket.gethostbyname(host)
-            probe.bind((number, port))
-            probe.listen()
-        except (OSError, OverflowError, ValueError, TypeError) as error:  # the last two are for invalid names
-            reason = getattr(error, "strerror", None) or str(error)
-            raise InvalidValueError(
-                "address of the twin",
-                f"{host!r}, port {port} ({reason})",
-                "a free port at an address of this machine",
-                "Choose another with --port, or stop the program that listens there.",
-            ) from None
-    return number
+    """Address of a host at which a port is free; python-snap7 shares ports, so two twins would share clients."""
+    try:
+        number = host.strip("[]") if ":" in host else socket.gethostbyname(host)
+        with socket.create_server((number, port), family=socket.AF_INET6 if ":" in number else socket.AF_INET):
+            return number
+    except (OSError, OverflowError, ValueError, TypeError) as error:  # the last two are for invalid names
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InvalidValueError(
+            "address of the twin",
+            f"{host!r}, port {port} ({reason})",
+            "a free port at an address of this machine",
+            "Choose another with --port, or stop the program that listens there.",
+        ) from None

@@ -6,9 +6,10 @@ import socket
 import struct
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from threading import Thread
 from typing import Any
 
-from snap7.server import Server
+from snap7.server import CPUState, Server, ServerState
 from snap7.type import SrvArea
 
 from sagline.plc.blocks import Block
@@ -23,6 +24,21 @@ class _S71200(Server):
         """Begin without connections."""
         super().__init__(log=False)
         self._sockets: set[socket.socket] = set()
+
+    def start(self, tcp_port: int = 102) -> int:
+        """Listen; the library itself knows only IPv4."""
+        if ":" not in self.host:
+            return super().start(tcp_port)
+        self.server_socket = socket.create_server((self.host, tcp_port), family=socket.AF_INET6)
+        self.running, self.state, self.cpu_state = True, ServerState.RUNNING, CPUState.RUN
+        self.server_thread = Thread(target=self._server_loop, daemon=True)
+        self.server_thread.start()
+        return 0
+
+    @staticmethod
+    def _event_sender(address: Any) -> int:
+        """Sender of an event, which is not used; the library itself converts only IPv4."""
+        return 0
 
     def disconnect_all(self) -> None:
         """Close all connections."""
@@ -69,7 +85,8 @@ class S7Servers(BlockServers):
         server = _S71200()
         for kind, content in self._memory[group].items():
             server.register_area(SrvArea.DB, kind.number, content)
-        server.start_to(host, port)
+        server.host = host
+        server.start(port)
         self._servers.append(server)
         assert server.server_socket is not None
         return int(server.server_socket.getsockname()[1])
