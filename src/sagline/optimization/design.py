@@ -49,6 +49,7 @@ def design(
     """Search for a better robot than the given one, or for a Pareto front of such robots.
 
     The search begins with the robot itself and a seeded sample. Results for one seed are identical bit by bit.
+    Candidates with a frame anchor inside the platform at a pose are dropped; their values are NaN.
 
     Args:
         robot: Initial robot of the search.
