@@ -28,7 +28,7 @@ from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot
 from sagline.robot.routing import with_routing
 from sagline.statics.balance import external_wrench, inertial_wrench
-from sagline.statics.tables import pose_rows, refuse_missing_chords
+from sagline.statics.tables import pose_rows, refuse_missing_chords, robot_terms
 from sagline.tension.method import TensionMethod, Variable, kernel_options, shared_tension
 from sagline.tension.methods import Closest
 
@@ -114,7 +114,7 @@ def inverse(
     found = solve_inverse_rows(robots, method, options, rows, loads, reference, flag(stability, "stability"), progress)
     if (found.pose_status == codes.POSE_NO_CHORD).any():
         refuse_missing_chords(robots, pose)
-    verdicts = decide_rows(robots, options, rows, loads, found, progress)
+    verdicts = decide_rows(robot_terms(robots), options, rows, loads, found, progress)
     whole = locked(np.ascontiguousarray(np.broadcast_to(load, (*pose.shape, 6))))
     direction = None if turning is None else checked_winding(turning, pose.shape, shared.cable_count)
 

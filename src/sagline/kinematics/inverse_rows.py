@@ -12,6 +12,7 @@ from sagline.kernels import codes, tables
 from sagline.kernels.forward.stability import stabilities_of_poses
 from sagline.kernels.inverse.feasibility import ENOUGH, PROVED, decide_poses
 from sagline.kernels.inverse.poses import Answers, inverse_poses
+from sagline.kernels.inverse.poses import Robots as RobotTerms
 from sagline.kernels.memory import memory_for
 from sagline.robot.batch import Robots, first_of, has_routing
 from sagline.statics.tables import robot_terms
@@ -137,12 +138,12 @@ def covers_all(method: int, redundant: int) -> bool:
 
 
 def decide_rows(
-    robot: Robots, options: Options, rows: Array, loads: Array, found: InverseRows, progress: Progress | None = None
+    terms: RobotTerms, options: Options, rows: Array, loads: Array, found: InverseRows, progress: Progress | None = None
 ) -> Verdicts:
     """Decide the feasibility of the poses without a result from the iterations; fill in the results of feasible poses.
 
-    rows: pose rows (N, POSE_COLUMNS); loads: external plus inertial wrenches (1 or N, 6); progress: called after each
-    block with the number of finished poses, including feasible ones, and the total number.
+    terms: those of `robot_terms`; rows: pose rows (N, POSE_COLUMNS); loads: external plus inertial wrenches (1 or N,
+    6); progress: called after each block with the number of finished poses, including feasible ones, and their total.
     """
     count, n = found.needed.shape
     m = found.cable_status.shape[1]
@@ -151,7 +152,7 @@ def decide_rows(
     which = locked(np.flatnonzero(np.isin(found.pose_status, UNDECIDED)))
     if not which.size:
         return verdicts
-    given = (options.model, options.limits, robot_terms(robot), rows, loads)
+    given = (options.model, options.limits, terms, rows, loads)
     how = (covers_all(options.sharing[0], m - n), memory_for(m), found.answers, verdicts.answers)
     for part in blocks(which.size, DECIDED):
         decide_poses(*given, which[part], *how)

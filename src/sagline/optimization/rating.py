@@ -16,7 +16,7 @@ from sagline.kernels.cable.batch import largest_sags
 from sagline.kernels.forward.sensitivity import DATA, describe_states
 from sagline.kernels.inverse.poses import inverse_poses
 from sagline.kernels.memory import memory_for
-from sagline.kinematics.inverse_rows import InverseRows
+from sagline.kinematics.inverse_rows import InverseRows, decide_rows
 from sagline.optimization.candidates import AnchorErrors, Candidates, PlatformBox, impossible
 from sagline.optimization.goals import AT_POSES, Goal, Measured
 from sagline.optimization.search import latin_hypercube
@@ -55,6 +55,7 @@ def distribute(
         inverse_poses(
             *options, terms, poses, load, reference, memory, None, False, found.answers, part.start, part.stop
         )
+    decide_rows(terms, options, poses, load, found)
     lost = found.pose_status != codes.POSE_SOLVED
     found.results[tables.LENGTH :, lost] = np.nan
     tension = found.results[tables.TENSION].max(axis=-1)

@@ -16,6 +16,7 @@ from sagline.kernels import codes
 from sagline.kinematics.inverse_rows import UNDECIDED, InverseRows, Verdicts, decide_rows
 from sagline.robot.batch import has_routing
 from sagline.robot.robot import Robot
+from sagline.statics.tables import robot_terms
 from sagline.tension.method import Options
 
 ITERATIONS: Final = 32  # number of loads per pose whose proofs are tried on the other loads
@@ -85,7 +86,7 @@ def _decide(
     some = InverseRows.empty(len(which), m, n, has_routing(robot))
     some.pose_status[:] = codes.POSE_INFEASIBLE
     some.results[:] = np.nan
-    verdicts: Verdicts = decide_rows(robot, options, rows, wrenches, some)
+    verdicts: Verdicts = decide_rows(robot_terms(robot), options, rows, wrenches, some)
     found.results[:, which] = some.results
     found.pose_status[which] = some.pose_status
     proved = verdicts.brackets[:, PROVED]

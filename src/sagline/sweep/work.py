@@ -18,6 +18,7 @@ from sagline.kinematics.inverse_rows import decide_rows, solve_inverse_rows
 from sagline.kinematics.status import PoseStatus
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
+from sagline.statics.tables import robot_terms
 from sagline.sweep.folder import SweepFolder, TaskSize, check_made_here, open_folder
 from sagline.sweep.request import Request, RequestBox, SweepArray, variables_of
 from sagline.sweep.shared_proofs import proofs_of
@@ -95,7 +96,7 @@ class _Inverse:
         found = solve_inverse_rows(self._robot, request.tension, self._options, rows, wrenches, none)
         answers: dict[str, NDArray[Any]] = {}
         if "shortfall" in request.quantities:
-            verdicts = decide_rows(self._robot, self._options, rows, wrenches, found)
+            verdicts = decide_rows(robot_terms(self._robot), self._options, rows, wrenches, found)
             answers["enough"] = verdicts.shortfall
             answers["proof"] = verdicts.brackets[:, PROVED]
         else:
