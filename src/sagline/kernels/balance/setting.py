@@ -15,8 +15,8 @@ from sagline.kernels.algebra.bounds import HIGH, LOW, START, STRIP_ROWS
 from sagline.kernels.algebra.factors import factorize, minimum_norm, orthogonal_factor, pseudo_inverse
 from sagline.kernels.balance.wrench import along_freedom, fill_structure_matrix, needed_wrench, rows_along_freedom
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable.admissible import TensionLimits, admissible_tensions, is_limited_by_strain
-from sagline.kernels.cable.cables import Cables, chord_of, material_of, pulley_of
+from sagline.kernels.cable.admissible import TensionLimits, fill_admissible_tensions, is_limited_by_strain
+from sagline.kernels.cable.cables import Cables
 from sagline.kernels.cable.geometry import cable_geometry
 from sagline.kernels.cable.models import shallow_sag_force
 from sagline.kernels.cable.pulley import pulley_at
@@ -124,8 +124,7 @@ def place_cables(model: Model, limits: TensionLimits, robot: Array, geometry: Ar
         cables.half_weight[i] = 0.5 * robot[i, tables.DENSITY] * model.gravity * chord
         cables.sag_force[i] = shallow_sag_force(model, chord, robot[i, tables.DENSITY])
         low, high = robot[i, tables.TENSION_MIN], robot[i, tables.TENSION_MAX]
-        line, material, pulley = chord_of(cables, i), material_of(cables, i), pulley_of(cables, i)
-        cables.low[i], cables.high[i] = admissible_tensions(model, limits, line, material, pulley, low, high)
+        fill_admissible_tensions(model, limits, low, high, cables, i)
     return True
 
 

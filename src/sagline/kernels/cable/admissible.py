@@ -12,7 +12,7 @@ import math
 from typing import NamedTuple
 
 from sagline.kernels import codes
-from sagline.kernels.cable.cables import Cables
+from sagline.kernels.cable.cables import Cables, chord_of, material_of, pulley_of
 from sagline.kernels.cable.pulley import Pulley
 from sagline.kernels.cable.states import frame_end_tension, taut_at_frame_end
 from sagline.kernels.cable.terms import Chord, Material, Model
@@ -72,25 +72,28 @@ def cable_without_tension(cables: Cables) -> int:
     return -1
 
 
-@kernel
-def admissible_tensions(
-    model: Model, limits: TensionLimits, chord: Chord, material: Material, pulley: Pulley, low: float, high: float
-) -> tuple[float, float]:
-    """Smallest and largest admissible chord tension of a cable [N]; the smallest is larger if there is none.
+@glue
+def fill_admissible_tensions(
+    model: Model, limits: TensionLimits, low: float, high: float, cables: Cables, i: int
+) -> None:
+    """Fill the smallest and largest admissible chord tension of a cable; the smallest is larger if there is none.
 
     low, high: limits of the robot [N]; the upper one may be infinite.
     """
-    half_weight = 0.5 * material.density * model.gravity * chord.length
-    floor = least_of_sag(model, half_weight)
+    half_weight = cables.half_weight[i]
+    # a slack cable over a pulley has a free span that is longer than the tangent by up to the diameter
+    floor = least_of_sag(model, half_weight + cables.density[i] * model.gravity * cables.radius[i])
     if limits.quantity == codes.LIMITS_OF_FRAME_END and sags(model, half_weight):
+        chord, material, pulley = chord_of(cables, i), material_of(cables, i), pulley_of(cables, i)
         low, high = _limits_at_chord(model, chord, material, pulley, low, high, floor)
     if high == math.inf:
-        high = largest_of_strain(model, material.stiffness)
+        high = largest_of_strain(model, cables.stiffness[i])
     if not math.isnan(limits.validity):
         # the horizontal tension T_x of a vertical cable is zero; a T_adj of zero is then satisfied too
-        margin = limits.validity / chord.cosine if limits.validity > 0.0 else 0.0
-        low = max(low, half_weight / abs(chord.sine) + margin)
-    return max(low, floor), high
+        margin = limits.validity / cables.cosine[i] if limits.validity > 0.0 else 0.0
+        low = max(low, half_weight / abs(cables.sine[i]) + margin)
+    cables.low[i] = max(low, floor)
+    cables.high[i] = high
 
 
 @kernel
