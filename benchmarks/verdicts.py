@@ -11,7 +11,7 @@ import sagline as sl
 from benchmarks.measure import Row, best_seconds, one_core, show
 from sagline.core.arrays import Array
 from sagline.kinematics.inverse_rows import decide_rows, solve_inverse_rows
-from sagline.statics.tables import pose_rows
+from sagline.statics.tables import pose_rows, robot_terms
 from sagline.tension.method import kernel_options
 from tests.tension.reference import BORDER_ROBOTS, found_border, random_poses
 
@@ -66,11 +66,11 @@ def at_the_border(name: str) -> Iterator[Row]:
 def decision_seconds(robot: sl.Robot, poses: sl.Pose, loads: Array) -> float:
     """Time to decide poses that the iterations of the tension distribution left open."""
     options = kernel_options(robot, sl.Catenary(), METHOD)
-    rows, nothing = pose_rows(poses), np.full(robot.cable_count, np.nan)
+    rows, terms, nothing = pose_rows(poses), robot_terms(robot), np.full(robot.cable_count, np.nan)
     found = solve_inverse_rows(robot, METHOD, options, rows, loads, nothing)
 
     def decide() -> None:
-        decide_rows(robot, options, rows, loads, found._replace(pose_status=found.pose_status.copy()))
+        decide_rows(terms, options, rows, loads, found._replace(pose_status=found.pose_status.copy()))
 
     return best_seconds(decide, 3)
 
