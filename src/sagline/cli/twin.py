@@ -93,7 +93,7 @@ def twin(
             from sagline.files.mcap_writer import Recorder
 
             watch.recorder = stack.enter_context(Recorder(log, real, period=SCAN))
-        _greet(name, server, host, modbus=modbus)
+        _greet(name, server, modbus=modbus)
         gc.collect()
         gc.freeze()  # the garbage collector skips all existing objects, because the loop is in real time
         try:
@@ -104,7 +104,7 @@ def twin(
     return 0
 
 
-def _greet(name: str, server: Server, host: str, *, modbus: bool) -> None:
+def _greet(name: str, server: Server, *, modbus: bool) -> None:
     machine = server.machine
     winches, groups = machine.robot.cable_count, len(machine.groups)
     protocol = "Modbus TCP" if modbus else "S7"

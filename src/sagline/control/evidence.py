@@ -291,7 +291,7 @@ class Fault(ABC):
             self.seen.at(cycle)
         # a fault after a stop is mostly a consequence of the stop; a fault that makes a length unreliable is still
         # reported
-        stops, waits = self.reaction >= Reaction.STOPPING, False
+        waits = False
         if self.seen.stopped and self.reaction is Reaction.STOPPING and not self.homing:
             if self.lasting:  # each item is reported once
                 return None
@@ -306,7 +306,7 @@ class Fault(ABC):
             return None
         begins = self.lasting or not self.present
         self.present = True
-        if begins and stops:
+        if begins and self.reaction >= Reaction.STOPPING:
             self.seen.stop()
         return self._without_repeats(line) if begins else None
 
