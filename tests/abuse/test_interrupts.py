@@ -6,6 +6,7 @@ The moments are random, from a seed, over all that a command does: loading, solv
 from __future__ import annotations
 
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -55,8 +56,10 @@ INTERRUPTED = "Interrupted. All written files are complete.\n"
 # Ctrl-C comes from a thread of the process itself, so that the moment is counted from where the command begins
 HEARD = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 TIMED = """
-import os, signal, sys, threading, time
+import faulthandler, os, signal, sys, threading, time
 from sagline.cli.__main__ import app_entry
+
+faulthandler.enable() # a crash leaves its traceback in the assertion
 
 def strike(seconds=float(sys.argv.pop(1)), number=int(sys.argv.pop(1))):
     time.sleep(seconds)
@@ -156,6 +159,18 @@ def test_signals_at_any_moment(number: int, whole: Whole, tmp_path: Path) -> Non
 @pytest.mark.parametrize("number", [*HEARD, signal.SIGKILL])
 def test_ctrl_c_and_kill_at_many_moments(number: int, whole: Whole, tmp_path: Path) -> None:
     each(ALL, 13, number, whole, tmp_path)
+
+
+@pytest.mark.soak
+def test_ctrl_c_in_track_never_crashes(whole: Whole, tmp_path: Path) -> None:
+    """500 moments, at random; once a process in `track` was killed by a segmentation fault after Ctrl-C."""
+    seconds, made = whole(TRACK)
+    draw = random.Random(500)
+    for k in range(500):
+        place = tmp_path / str(k)
+        place.mkdir()
+        check(TRACK, seconds, made, place, draw, signal.SIGINT)
+        shutil.rmtree(place)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP])

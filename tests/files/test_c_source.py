@@ -18,6 +18,7 @@ from tests.files.c_programs import BAD_INPUT, FORWARD, INFEASIBLE, NO_CHORD, SIN
 from tests.refusal import refused
 from tests.tiers import extended, wide
 
+PAGE = Path(__file__).parents[2] / "docs" / "howto" / "microcontroller.md"
 PROTOTYPE = "article-prototype"
 UNDECIDED = (codes.POSE_INFEASIBLE, codes.POSE_NOT_CONVERGED)  # the package goes on to prove these
 
@@ -148,30 +149,30 @@ def test_tensions_follow_a_path_as_closest_does(tmp_path: Path) -> None:
     assert np.abs(alone.unstrained_length - plan.unstrained_length).max() > 1e-4  # there is something to follow
 
 
+def stated_errors() -> list[tuple[str, float, float, float, float]]:
+    """Largest errors in single precision on the page about microcontrollers."""
+    rows = re.findall(r"^\| `([\w-]+)`, \d+ m \| (.*) \|$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
+    units = {"µm": 1e-6, "mN": 1e-3, "N": 1.0}
+    pairs = [(name, [cell.split() for cell in cells.split(" | ")]) for name, cells in rows]
+    return [(name, *(float(number) * units[unit] for number, unit in cells)) for name, cells in pairs]
+
+
 @extended
-@pytest.mark.parametrize(
-    ("name", "length", "tension", "position", "force"),  # largest errors [m], [N]
-    [
-        (PROTOTYPE, 1.5e-6, 1e-3, 1e-6, 0.005),
-        ("cogiro", 3e-6, 2e-3, 5e-6, 0.2),
-        ("ipanema-3-pulleys", 5e-6, 4e-3, 1e-5, 0.4),
-        ("article-suspended", 4e-6, 2e-3, 5e-6, 0.02),
-    ],
-)
+@pytest.mark.parametrize(("name", "length", "tension", "position", "force"), stated_errors())  # [m], [N]
 def test_single_precision(
     name: str, length: float, tension: float, position: float, force: float, tmp_path: Path
 ) -> None:
     robot = sl.load_robot(name)
     program = Program(robot, tmp_path, "-O2", single=True, forward=True)
-    pose = poses_of(robot, 1_000, np.random.default_rng(5))
+    pose = poses_of(robot, 2_000, np.random.default_rng(5))
     rows = np.hstack((pose.position, pose.quaternion)).astype(np.float32).astype(float)
     pose = sl.Pose.from_quaternion(rows[:, :3], rows[:, 3:])
     plan = sl.inverse(robot, pose)
     found = program.inverse(pose)
     np.testing.assert_array_equal(found.status == SOLVED, plan.feasible)
-    assert np.nanmax(np.abs(found.found - plan.unstrained_length)) <= length
-    assert np.nanmax(np.abs(found.tension - plan.chord_tension)) <= tension
-    good = np.flatnonzero(plan.feasible)[:300]
+    assert length / 3 < np.nanmax(np.abs(found.found - plan.unstrained_length)) <= length
+    assert tension / 3 < np.nanmax(np.abs(found.tension - plan.chord_tension)) <= tension
+    good = np.flatnonzero(plan.feasible)[:200]
     lengths = plan.unstrained_length[good].astype(np.float32).astype(float)
     expected = sl.forward(robot, lengths, moved(pose[good], robot))
     found = program.forward(lengths, moved(pose[good], robot))

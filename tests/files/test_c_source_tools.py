@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -88,6 +89,18 @@ def test_a_microcontroller_of_single_precision_needs_no_other(tmp_path: Path) ->
     names = set(called.stdout.split()) - {"U"}
     assert not {name for name in names if name.startswith("__aeabi_d")}  # arithmetic in double precision
     assert {name for name in names if not name.endswith("f")} <= {"memcpy", "memmove", "memset"}
+
+
+@pytest.mark.skipif(shutil.which("arm-none-eabi-gcc") is None, reason="its page names the compiler")
+@pytest.mark.parametrize("single", [True, False])
+@pytest.mark.parametrize(("functions", "asked"), [("inverse", {}), ("inverse, forward", {"forward": True})])
+def test_the_sizes_on_the_page(functions: str, asked: dict[str, Any], single: bool, tmp_path: Path) -> None:
+    core, kind = ("Cortex-M4F", "float") if single else ("Cortex-M7", "double")
+    (stated,) = re.findall(rf"^\| {core}, `{kind}`: {functions} \| ([\d.]+) \|", PAGE.read_text(), re.MULTILINE)
+    robot = sl.load_robot("article-prototype")
+    source, _, _ = sl.export_c(robot, tmp_path / "sagline.c", single_precision=single, **asked)
+    sizes = arm_sizes(source, core)
+    assert (sizes.code + sizes.constants) / 1000.0 == pytest.approx(float(stated), rel=0.1)
 
 
 def test_the_program_on_its_page_prints_what_the_page_says(tmp_path: Path) -> None:

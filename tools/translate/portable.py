@@ -60,6 +60,7 @@ SINGLE: Final = {
     "algebra.linear_program.ROUNDING": 2e-7,
     "algebra.nearest_point.DEPENDENT": 1e-5,
     "balance.setting.SHORTEST_CHORD": 1e-6,
+    "cable.admissible.SMALLEST": 1e-30,
     "cable.catenary.SMALL_HALLEY_STEP": 1e-4,
     "cable.catenary.SMALL_NEWTON_STEP": 1e-4,
     "cable.catenary.SPLIT": 4097.0,
