@@ -67,7 +67,7 @@ SINGLE: Final = {
     "cable.forces.MISSED": 1e-6,
     "cable.over_pulleys.TINY": 1e-30,
     "cable.states.LIMIT_PRECISION": 1e-6,
-    "cable.states.SAME_SAG_FORCE": 2e-7,
+    "cable.states.SAME_EXIT": 1e-5,
     "forward.forward.FLAT": 1e-5,
     "forward.newton.BALANCED": 1e-3,
     "forward.newton.LAST_DIGIT": 5e-7,

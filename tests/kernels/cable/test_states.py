@@ -39,7 +39,7 @@ def cables_of(density: Array, stiffness: Array, chord: Array, sine: Array, tau: 
 
 def hang(cables: Cables, model: Model = EXACT, near: bool = False) -> tuple[int, Codes]:
     statuses = np.full(cables.tau.size, -1, dtype=np.int8)
-    return solve_cable_states(model, cables, not near, near, statuses), statuses
+    return solve_cable_states(model, cables, not near, near, statuses)[0], statuses
 
 
 def assert_exact(cables: Cables) -> None:

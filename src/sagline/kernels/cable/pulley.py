@@ -18,6 +18,8 @@ from sagline.kernels.algebra.functions import angle
 from sagline.kernels.cable.terms import Chord, Force, Material, Model
 from sagline.kernels.jit import formula, kernel
 
+LEAST_TURNED = -0.8  # limit of the derivative in a Newton step, which would turn the cable too far near -1
+
 
 class Pulley(NamedTuple):
     """Pulley and dead length behind one frame anchor."""
@@ -102,6 +104,27 @@ def free_span(pulley: Pulley, chord: Chord, cosine: float) -> float:
 def free_rise(pulley: Pulley, chord: Chord, sine: float) -> float:
     """Height of the platform end above the exit point [m]; sine: of the wrap angle."""
     return chord.length * chord.sine + pulley.radius * (pulley.entry * (chord.cosine - sine))
+
+
+@formula
+def exit_after(
+    pulley: Pulley, weight: float, stiffness: float, force: tuple[float, float], before: tuple[float, float]
+) -> tuple[float, float]:
+    """Sine and cosine of the wrap angle after one Newton step, from those before it.
+
+    force: T_x and T_zA of a cable that leaves at the angle before the step. If this angle grows by d, the free span
+    loses the length R d/E_A, and T_zA grows by its weight.
+    """
+    horizontal, vertical_a = force
+    tension = math.sqrt(horizontal * horizontal + vertical_a * vertical_a)
+    inverse = 1.0 / tension
+    # minus the derivative of the force's angle with respect to the wrap angle
+    turned = pulley.entry * before[0] * weight * pulley.radius * inverse / (1.0 + tension / stiffness)
+    share = 1.0 / (1.0 + max(turned, LEAST_TURNED))
+    sine = before[0] + share * (horizontal * inverse - before[0])
+    cosine = before[1] + share * (pulley.entry * vertical_a * inverse - before[1])
+    inverse = 1.0 / math.sqrt(sine * sine + cosine * cosine)
+    return sine * inverse, cosine * inverse
 
 
 @formula

@@ -14,13 +14,12 @@ from sagline.core.arrays import Array, Codes
 from sagline.kernels import codes
 from sagline.kernels.cable.cables import Cables, chord_of, material_of, pulley_of
 from sagline.kernels.cable.models import shallow_sag_force
-from sagline.kernels.cable.states import solve_cable_state, solve_cable_states
+from sagline.kernels.cable.states import CONTACTS, SAME_EXIT, solve_cable_state, solve_cable_states
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block
 
 SLOPE_STEP = 1e-4  # relative step of the central difference of the sag force
-EXITS = 4  # passes over pulleys: the error of the sag force is then 1e-9 of the tension for X up to 1
 SHRINKINGS = 30
 TURN_ERROR = 1e-10  # relative to half the cable's weight: bound of the error of the sag force at an extremum
 SHRINKS = 0.9  # relative to the previous section: the search ends if a section shrinks by less
@@ -61,8 +60,13 @@ def sag_forces_at(curves: Curves, tau: Array, sag_force: Array) -> None:
     """Fill the sag forces (m,) at chord tensions (m,), and store both in the cables."""
     for i in range(tau.size):
         curves.cables.tau[i] = tau[i]
-    for k in range(EXITS if curves.cables.machine else 1):
-        solve_cable_states(curves.model, curves.cables, k == 0, False, curves.statuses)
+    change = 0.0
+    for k in range(CONTACTS if curves.cables.machine else 1):
+        _gravest, change = solve_cable_states(curves.model, curves.cables, k == 0, False, curves.statuses)
+        if change <= SAME_EXIT:
+            break
+    for i in range(tau.size if change > SAME_EXIT else 0):
+        curves.statuses[i] = codes.CABLE_NOT_CONVERGED
     for i in range(tau.size):
         if curves.model.code != codes.CATENARY:  # the same at every tension, including zero
             curves.cables.sag_force[i] = shallow_sag_force(

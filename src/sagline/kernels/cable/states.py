@@ -18,7 +18,7 @@ from sagline.kernels.cable.catenary import (
 )
 from sagline.kernels.cable.geometry import CHORD, COSINE, SINE, cable_geometry
 from sagline.kernels.cable.models import from_tension
-from sagline.kernels.cable.pulley import Pulley, Wrap, behind_cable, free_rise, free_span, pulley_at
+from sagline.kernels.cable.pulley import Pulley, Wrap, behind_cable, exit_after, free_rise, free_span, pulley_at
 from sagline.kernels.cable.terms import Chord, Material, Model, Terms, model_of
 from sagline.kernels.jit import entry, glue, kernel
 
@@ -26,9 +26,8 @@ from sagline.kernels.jit import entry, glue, kernel
 # is then 3e-8 at X = 2 and 5e-15 at X = 0.01. It falls with the square of the change, so that converged iterations have
 # full precision.
 NEAR = 1e-3
-# largest number of passes for the exit point; a taut cable has errors of 1e-4, 4e-8, 1e-11 and 0 in the first four
-CONTACTS = 40
-SAME_SAG_FORCE = 4e-16  # relative to the tension: smaller changes of a sag force count as converged
+CONTACTS = 40  # largest number of passes for the exit point; a taut cable needs three
+SAME_EXIT = 1e-9  # smaller changes of the direction at the exit point count as converged; the error is then its square
 LIMIT_STEPS = 30
 LIMIT_PRECISION = 1e-13  # relative
 LIMIT_MISS = 1e-6  # relative: larger than the error that the passes leave for a slack cable
@@ -37,13 +36,14 @@ TAUT = 1.25  # in units of wD/2: chord tension, larger than that of the least te
 
 
 @glue
-def _fill_exit_points(model: Model, cables: Cables, fresh: bool) -> None:
+def _fill_exit_points(model: Model, cables: Cables, fresh: bool) -> float:
     """Fill the free spans and their tensions; the forces at the pulleys determine the exit points.
 
     The forces result from the last length and sag force at the present chord tensions; if fresh, from first-order
-    values. Cables of the shallow models leave along their chord.
+    values. Cables of the shallow models leave along their chord. Returns the largest change of a direction.
     """
     exact = model.code == codes.CATENARY
+    change = 0.0
     for i in range(cables.tau.size):
         chord, pulley = chord_of(cables, i), pulley_of(cables, i)
         half_density = 0.5 * cables.density[i] * model.gravity
@@ -52,9 +52,14 @@ def _fill_exit_points(model: Model, cables: Cables, fresh: bool) -> None:
         if not fresh:
             hanging = cables.sag_force[i] - 2.0 * half_density * cables.ratio[i] * cables.free_chord[i]
         vertical_a = cables.tau[i] * chord.sine + hanging
-        inverse = 1.0 / math.sqrt(horizontal * horizontal + vertical_a * vertical_a)
-        sine = horizontal * inverse if exact else chord.cosine
-        cosine = pulley.entry * (vertical_a * inverse if exact else chord.sine)
+        before = (chord.cosine, pulley.entry * chord.sine)  # the direction of the tangent
+        sine, cosine = before
+        if exact:
+            if not fresh:
+                before = (cables.wrap_sine[i], cables.wrap_cosine[i])
+            weight, force = 2.0 * half_density, (horizontal, vertical_a)
+            sine, cosine = exit_after(pulley, weight, cables.stiffness[i], force, before)
+        change = max(change, abs(sine - before[0]) + abs(cosine - before[1]))
         span, rise = free_span(pulley, chord, cosine), free_rise(pulley, chord, sine)
         length = math.sqrt(span * span + rise * rise)
         inverse = 1.0 / length
@@ -65,21 +70,23 @@ def _fill_exit_points(model: Model, cables: Cables, fresh: bool) -> None:
         cables.free_cosine[i] = span * inverse
         cables.free_tau[i] = horizontal / span * length
         cables.free_half_weight[i] = half_density * length
+    return change
 
 
 @glue
-def solve_cable_states(model: Model, cables: Cables, fresh: bool, near: bool, statuses: Codes) -> int:
+def solve_cable_states(model: Model, cables: Cables, fresh: bool, near: bool, statuses: Codes) -> tuple[int, float]:
     """Fill slackness, strain, ratio and sag force of all cables, and the statuses (m,), at their chord tensions.
 
     Ordinary catenaries are solved in loops without branches, which vectorize; the others follow one by one. The exit
     points result from the previous lengths and sag forces.
 
     fresh: True if lengths and sag forces do not exist yet; near: True if the present ratios belong to tensions that
-    differ by less than NEAR; statuses: filled. Returns the most serious status.
+    differ by less than NEAR; statuses: filled. Returns the most serious status, and the largest change of the direction
+    in which a cable leaves its pulley.
     """
     m = cables.tau.size
-    if cables.machine:
-        _fill_exit_points(model, cables, fresh)
+    change = _fill_exit_points(model, cables, fresh) if cables.machine else 0.0
+    near = near and change < NEAR
     for i in range(m):
         cables.slackness[i] = cables.free_half_weight[i] / cables.free_tau[i]
     for i in range(m):
@@ -116,7 +123,7 @@ def solve_cable_states(model: Model, cables: Cables, fresh: bool, near: bool, st
         for i in range(m):
             vertical = cables.free_tau[i] * cables.free_sine[i] + cables.free_sag_force[i]
             cables.sag_force[i] = vertical - cables.tau[i] * cables.sine[i]
-    return gravest
+    return gravest, change
 
 
 @kernel
@@ -127,17 +134,16 @@ def solve_cable_state(
     length, sag_force, status = from_tension(model, chord, material, tau)
     if pulley.radius > 0.0 and model.code == codes.CATENARY:
         horizontal, weight = tau * chord.cosine, material.density * model.gravity
+        sine, cosine = chord.cosine, pulley.entry * chord.sine
         for _ in range(CONTACTS):
-            vertical_a = tau * chord.sine + sag_force - weight * length
-            tension = math.sqrt(horizontal * horizontal + vertical_a * vertical_a)
-            span = free_span(pulley, chord, pulley.entry * vertical_a / tension)
-            rise = free_rise(pulley, chord, horizontal / tension)
+            force, before = (horizontal, tau * chord.sine + sag_force - weight * length), (sine, cosine)
+            sine, cosine = exit_after(pulley, weight, material.stiffness, force, before)
+            span, rise = free_span(pulley, chord, cosine), free_rise(pulley, chord, sine)
             line = math.sqrt(span * span + rise * rise)
             free = Chord(line, rise / line, span / line)
             length, own, status = from_tension(model, free, material, horizontal / free.cosine)
-            before = sag_force
             sag_force = horizontal / free.cosine * free.sine + own - tau * chord.sine
-            if not abs(sag_force - before) > SAME_SAG_FORCE * tau:
+            if not abs(sine - before[0]) + abs(cosine - before[1]) > SAME_EXIT:
                 break
     return length, sag_force, status
 

@@ -17,7 +17,7 @@ from sagline.kernels.balance.setting import (
 )
 from sagline.kernels.cable.admissible import cable_without_tension, is_limited_by_strain
 from sagline.kernels.cable.cables import Cables, chord_of, material_of, pulley_of
-from sagline.kernels.cable.states import NEAR, frame_end_tension, solve_cable_states
+from sagline.kernels.cable.states import NEAR, SAME_EXIT, frame_end_tension, solve_cable_states
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.jit import glue, kernel
 from sagline.kernels.tension.nearest import Distribution, ReferencePoint, is_nearest, set_reference, share_nearest
@@ -83,12 +83,15 @@ def distribute_and_solve_cables(
         if status != codes.POSE_SOLVED:
             break
         moved, largest = take_tensions(cables, balance)
-        gravest = solve_cable_states(model, cables, not solved, solved and moved < NEAR, statuses)
+        gravest, turned = solve_cable_states(model, cables, not solved, solved and moved < NEAR, statuses)
         if gravest == codes.CABLE_TOO_SLACK or gravest == codes.CABLE_NOT_CONVERGED:
             status = codes.POSE_NOT_CONVERGED
             break
         status = codes.POSE_NOT_CONVERGED
-        converged = model.code != codes.CATENARY or sag_force_change(cables) <= CONVERGED + SAG_ROUNDING * largest
+        change = sag_force_change(cables)
+        converged = model.code != codes.CATENARY or (
+            change <= CONVERGED + SAG_ROUNDING * largest and turned <= SAME_EXIT
+        )
         if work is None or distribution.variable != codes.FRAME_END_TENSION:
             if converged:
                 status = codes.POSE_SOLVED

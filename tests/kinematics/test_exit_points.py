@@ -1,0 +1,63 @@
+"""Slack and steep cables over large pulleys leave them where their force points, checked by quadrature."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.core.arrays import Array
+from sagline.robot.batch import pulleys_of
+
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(40)
+PIECES = 60  # the cable is cut at points that are dense near its lowest point
+
+
+def integral(values: Array, size: Array) -> Array:
+    """Sum over the pieces and nodes of the last two axes."""
+    return np.asarray((values * WEIGHTS * 0.5 * size[..., None]).sum(axis=(-1, -2)))
+
+
+def closure(robot: sl.Robot, plan: sl.Plan) -> Array:
+    """Distance of each platform end from the end of its cable, which begins where its force leads, (N, m) [m]."""
+    state = plan.state[plan.feasible]
+    cables, contact = state.cables, state.contact
+    assert contact is not None
+    weight = np.broadcast_to(robot.cables.linear_density * robot.gravity, cables.shape)
+    stiffness = np.broadcast_to(robot.cables.axial_stiffness, cables.shape)
+    x, z = cables.horizontal_tension, cables.vertical_force
+    radius, entry = pulleys_of(robot)
+    free = state.unstrained_length - (contact.wrapped_length + contact.dead_length)
+    at_exit = z - weight * free
+    angle = np.arctan2(x, entry * at_exit)
+    # material points where the vertical force grows in equal steps of asinh(V/T_x)
+    edges = np.linspace(np.arcsinh(at_exit / x), np.arcsinh(z / x), PIECES + 1, axis=-1)
+    vertical = x[..., None] * np.sinh(edges)
+    step = np.diff(vertical, axis=-1) / weight[..., None]
+    middle = 0.5 * (vertical[..., 1:] + vertical[..., :-1])[..., None]
+    force = middle + 0.5 * weight[..., None, None] * step[..., None] * NODES
+    tension = np.hypot(x[..., None, None], force)
+    stretch = 1.0 / tension + 1.0 / stiffness[..., None, None]
+    span = integral(x[..., None, None] * stretch, step) + radius * (1.0 - np.cos(angle))
+    rise = integral(force * stretch, step) + entry * radius * np.sin(angle)
+    reach = state.pose.transform(robot.platform_anchors) - robot.frame_anchors
+    return np.asarray(np.hypot(span - np.hypot(reach[..., 0], reach[..., 1]), rise - reach[..., 2]))
+
+
+@pytest.mark.parametrize("name", ["article-suspended", "article-mixed"])
+@pytest.mark.parametrize("density", [0.1, 1.0, 6.0])
+@pytest.mark.parametrize("axis", [1.0, -1.0])
+def test_lengths_close_over_large_pulleys(name: str, density: float, axis: float) -> None:
+    robot = sl.load_robot(name)
+    robot = robot.replace(
+        winches=sl.Winch(0.7, swivel_axis=(0.0, 0.0, axis)),
+        cables=robot.cables.replace(linear_density=density),
+        tension_min=1.0,
+        tension_max=1e5,
+        mass=60.0 + 400.0 * density,
+    )
+    rng = np.random.default_rng(5)
+    place = rng.uniform((-6.0, -4.0, 0.8), (6.0, 4.0, 4.5), (150, 3))
+    plan = sl.inverse(robot, sl.Pose(place, np.eye(3)), tension=sl.MinimumNorm())
+    assert plan.feasible.mean() > 0.9
+    assert np.nanmax(closure(robot, plan)) < 2e-11
