@@ -209,7 +209,7 @@ def test_poses_without_an_answer_have_no_counts(robot: sl.Robot) -> None:
         ({"counts_per_turn": None}, ("winches: counts_per_turn", "not given", "one value, or one per cable"), ""),
         ({"length_zero": None}, ("winches: length_zero", "not given"), "home(robot, pose, frame_end"),
         ({"drum_width": 0.003}, ("winches: drum_width[0]", "0.003 m", ">= 0.004 m, its groove_pitch"), ""),
-        ({"layers": 5000}, ("winches: layers[0]", "5000", "1 to 1000"), ""),
+        ({"layers": 5000}, ("winches: layers", "5000", "1 to 1000"), ""),
         ({"layers": 2}, ("winches: length_zero[0]", "10 m", "14.9963 to 27.999 m"), "2 layers, 40 turns"),
         ({"length_zero": 30.0}, ("winches: length_zero[0]", "30 m", "0.252534 to 27.999 m"), "28 m of cable"),
         (
@@ -284,3 +284,13 @@ def test_memory_needs_tensions_and_constant_winding_none(robot: sl.Robot) -> Non
         sl.lengths_from_counts(robot, np.full(8, 1e5), drum_tension=np.ones(8))
     with refused("creep", "given for a plan without a path"):
         sl.encoder_counts(sl.inverse(robot, POSE), creep=sl.Creep(1e6, 1.0))
+
+
+def test_counts_with_a_negative_length_are_refused() -> None:
+    robot = wound(drum_width=None, layers=None, drum_distance=None, cable_length=None)
+    counts = np.array(sl.encoder_counts(sl.inverse(robot, POSE)))
+    step = (sl.lengths_from_counts(robot, counts + 1e4) - sl.lengths_from_counts(robot, counts))[3] / 1e4
+    counts[3] -= (sl.lengths_from_counts(robot, counts)[3] + 2.5) / step
+    with refused("cable 3: count", kind=sl.InvalidValueError) as caught:
+        sl.lengths_from_counts(robot, counts)
+    assert "-2.5" in caught.value.value

@@ -117,3 +117,17 @@ def test_the_lever_differs_from_the_radius_by_what_the_docstring_says() -> None:
     helix = np.hypot(2.0 * np.pi * 0.05, 0.004) / (2.0 * np.pi * 0.05) - 1.0
     assert 5e-5 < helix < 1e-4
     assert 100.0 * np.abs(off - helix).max() == pytest.approx(0.06, abs=0.005)
+
+
+def test_a_preset_whose_drums_have_a_radius_alone_has_rates() -> None:
+    robot = sl.load_robot("article-prototype")
+    plan = sl.inverse(robot, sl.quintic_path([(0.0, 0.0, 1.5), (0.5, 0.5, 1.5)], durations=2.0))
+    rates = sl.winch_rates(plan)
+    assert robot.winches is not None
+    assert plan.length_rate is not None
+    assert rates.motor_torque is not None
+    np.testing.assert_allclose(rates.motor_speed, plan.length_rate * 20.0 / 0.03, rtol=1e-12)
+    friction = 15.0 * np.sign(rates.motor_speed)
+    expected = 3.19e-5 * rates.motor_acceleration + (friction - rates.drum_tension) * 0.03 / 20.0
+    np.testing.assert_allclose(rates.motor_torque, expected, rtol=0.0, atol=1e-12)
+    assert not rates.exceeding.any()

@@ -76,6 +76,10 @@ def test_a_planar_robot_out_of_its_plane_is_told() -> None:
     flat = sl.Robot("flat", [[-3, 0.5, 3], [3, 0.5, 3], [0, 0.5, 0]], np.zeros((3, 3)), sl.Cable(0.05, 5e4), 10.0,
                     motion_pattern="2T", plane_normal=[0, 1, 0], tension_min=1.0)  # fmt: skip
     assert sl.inverse(flat, sl.Pose([0.0, 0.5, 1.5], np.eye(3))).warnings == ()
-    (text,) = sl.inverse(flat, sl.Pose([0.0, 2.0, 1.5], np.eye(3))).warnings
-    assert "plane" in text
-    assert "1.5 m" in text
+    away = sl.Pose([0.0, 2.0, 1.5], np.eye(3))
+    with refused("pose", allowed="0 m, by motion_pattern 2T", kind=sl.InvalidValueError) as caught:
+        sl.inverse(flat, away)
+    assert caught.value.value.startswith("1.5 m along plane_normal")
+    batch = sl.Pose([[0.0, 2.0, 1.5], [0.1, 2.0, 1.5]], np.eye(3))
+    with refused("pose[0]", kind=sl.InvalidValueError):
+        sl.inverse(flat, batch)

@@ -110,6 +110,8 @@ def cases() -> list[Case]:
         if name not in UNKNOWN:
             found.append(Case(name, None, "None", "numbers"))
     found += [Case("layers", [1.0, 2.0, 1.5], "1.5", "whole numbers", "[2]"), Case("layers", 0.5, "0.5")]
+    found += [Case("layers", 100000, "100000", "1 to 1000"), Case("layers", [1.0, 2e3], "2000", "1 to 1000", "[1]")]
+    found += [Case("pulley_radius", [0.1, 50.0], "50 m", "0 to 10 m", "[1]")]
     axis = "swivel_axis"
     return [
         *found,

@@ -24,7 +24,7 @@ from sagline.motion.path import Path
 from sagline.robot.batch import first_of, has_routing, one_a_pose
 from sagline.robot.equilibrium import Equilibrium, cables_of_results
 from sagline.robot.pose import Pose
-from sagline.robot.reach import check_reach
+from sagline.robot.reach import check_plane, check_reach
 from sagline.robot.robot import Robot
 from sagline.robot.routing import with_routing
 from sagline.statics.balance import external_wrench, inertial_wrench
@@ -102,6 +102,7 @@ def inverse(
     robots = one_a_pose(robot, len(pose) if pose.shape else None)
     shared = first_of(robots)
     check_reach(shared, pose, "pose")
+    check_plane(shared, pose, "pose")
     options = kernel_options(robots, model, method)
     rows = pose_rows(pose)
     count = len(rows)

@@ -17,7 +17,7 @@ from sagline.kinematics.status import BALANCED, PoseStatus
 from sagline.motion.path import Path
 from sagline.robot.batch import first_of
 from sagline.robot.equilibrium import Equilibrium
-from sagline.robot.reach import LEVEL, ROUNDING, forbidden_turn, out_of_plane, turn_in_words
+from sagline.robot.reach import LEVEL, ROUNDING, forbidden_turn, turn_in_words
 from sagline.statics.stiffness import smallest_stiffness
 from sagline.tension.method import TensionMethod
 
@@ -169,8 +169,8 @@ class Plan(Result, Saved):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Warnings: poses out of the robot's plane, at the border of feasibility, or outside a model's validity."""
-        return (*self._turned_away(), *self._out_of_plane(), *self._at_the_border(), *self._below_validity())
+        """Warnings: a rotation that is not free, poses at the border of feasibility or outside a model's validity."""
+        return (*self._turned_away(), *self._at_the_border(), *self._below_validity())
 
     def _turned_away(self) -> tuple[str, ...]:
         robot = first_of(self.state.robot)
@@ -181,15 +181,6 @@ class Plan(Result, Saved):
             f"the platform is turned by {turn_in_words(turn[0])}, which motion_pattern {robot.motion_pattern} does "
             "not allow: the force balance has no moment that holds it; correct the pose, or give the robot another "
             "motion_pattern",
-        )
-
-    def _out_of_plane(self) -> tuple[str, ...]:
-        away = np.abs(out_of_plane(first_of(self.state.robot), self.state.pose))
-        if not (away > ROUNDING).any():
-            return ()
-        return (
-            f"the cables leave the plane of the robot by up to {np.nanmax(away):.6g} m, and only a guide of the "
-            "platform can balance their forces there; correct the poses, or give the robot another motion_pattern",
         )
 
     def _at_the_border(self) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from sagline.kernels.cable.drum import MEMORY_ROWS, follow_memory
 from sagline.kinematics.plan import Plan
 from sagline.robot.drum import Drums, drum_tension, drums_of, warmth
 from sagline.robot.robot import Robot
+from sagline.robot.winch import Winch
 
 Winding = Literal["constant", "remembered"]
 LARGEST: Final = 2.0**53  # [counts], larger whole numbers are not exact as floats
@@ -230,11 +231,12 @@ def winch_rates(plan: Plan) -> WinchRates:
     The lever of the cable is the change of its length per drum turn divided by 2 pi, so that power is conserved. It
     differs from the pitch radius of the layer by two effects. The pitch of the helix adds about 0.01 %. The moving exit
     adds the groove pitch times the slant of the cable to the pulley, for example 0.06 % for a groove pitch of 4 mm, 40
-    mm off center at a distance of 0.8 m. The cable on the drums is at winding_tension.
+    mm off center at a distance of 0.8 m. The cable on the drums is at winding_tension. If neither groove_pitch nor the
+    diameter of the cables is known, the lever is drum_radius, as in `fastest`.
 
     Args:
-        plan: A plan along a path, of a robot whose winches have drum_radius and groove_pitch and whose cables have a
-            diameter. Several layers or a moving exit also need drum_width and cable_length.
+        plan: A plan along a path, of a robot whose winches have drum_radius. If groove_pitch or the diameter of the
+            cables is known, both are necessary. Several layers or a moving exit also need drum_width and cable_length.
 
     Returns:
         Rates, at every sample.
@@ -266,10 +268,7 @@ def winch_rates(plan: Plan) -> WinchRates:
     robot, rate = instance(plan, Plan, "plan").state.one_robot, plan.length_rate
     if plan.path is None or rate is None:
         raise InvalidValueError("plan", "one of poses without times", "one along a path", "Plan along a Path.")
-    drums = drums_of(robot)
-    winches, stretch = drums.winches, 1.0 + drums.rest_strain
-    _, travel = drums.turns(plan.unstrained_length * stretch)
-    lever = travel / (2.0 * np.pi)
+    winches, stretch, lever = _levers(robot, plan.unstrained_length)
     speed = rate * stretch / lever
     acceleration = winches.gear * _differences(plan.path.time, rate * stretch) / lever
     tension = drum_tension(plan.state)
@@ -289,6 +288,18 @@ def winch_rates(plan: Plan) -> WinchRates:
         _exceeds(turned, winches.speed_limit),
         _exceeds(torque, winches.torque_limit),
     )
+
+
+def _levers(robot: Robot, length: Array) -> tuple[Winch, Array, Array]:
+    """The winches, the stretch of the cable on the drums, and the levers of the cables [m], (N, m)."""
+    winches, cables = robot.winches, robot.cables
+    bare = cables.diameter is None and winches is not None and winches.groove_pitch is None
+    if bare and winches is not None and winches.drum_radius is not None:
+        return winches, 1.0 + winches.winding_tension / cables.axial_stiffness, winches.drum_radius
+    drums = drums_of(robot)
+    stretch = 1.0 + drums.rest_strain
+    _, travel = drums.turns(length * stretch)
+    return drums.winches, stretch, travel / (2.0 * np.pi)
 
 
 def _exceeds(values: Array | None, limit: Array | None) -> Flags | None:

@@ -19,7 +19,6 @@ from sagline.robot.robot import Robot
 from sagline.robot.routing import actual_routing, differs
 from sagline.robot.winch import Winch
 
-MOST_LAYERS: Final = 1000
 ROUNDING: Final = 1e-6  # tolerance in turns beyond a full or an empty drum
 _ZERO_STEP: Final = (
     "Give it in the robot file, or find it with home(robot, pose, frame_end_tension) and save the robot it returns; "
@@ -84,7 +83,13 @@ class Drums:
             ends = self.winches.count_zero[i] + (zero[i] - np.array([self.fewest[i], self.most[i]])) * rate[i]
             allowed = f"{np.ceil(ends.min()):.0f} to {np.floor(ends.max()):.0f}"
             raise self._refusal(_at("count", sample, i, len(counts)), f"{counts[wrong]:.12g}", allowed, turns, wrong)
-        return self.lengths(turns)
+        lengths = self.lengths(turns)
+        if (negative := lengths < 0.0).any():
+            sample, i = (int(k) for k in np.argwhere(negative)[0])
+            value = f"{counts[sample, i]:.12g}, a length of {lengths[sample, i]:.6g} m off the drum"
+            step = "Correct the count, or count_zero, length_zero and gear of the winches."
+            raise InvalidValueError(_at("count", sample, i, len(counts)), value, "a length of at least 0 m", step)
+        return lengths
 
     def zero_and_rate(self) -> tuple[Array, Array]:
         """Turns on the drums at count_zero (length_zero off the drum), and counts per turn of cable paid out.
@@ -167,10 +172,6 @@ def _tables(winches: Winch, diameter: Array) -> tuple[Array, Array]:
     """The drums in the form for kernels, and the lengths where their layers begin."""
     pitch, width = _given(winches, "groove_pitch"), winches.drum_width
     _check_width(winches, pitch)
-    if (winches.layers > MOST_LAYERS).any():
-        i = int(np.argmax(winches.layers))
-        many = f"{winches.layers[i]:g}"
-        raise InvalidValueError(f"winches: layers[{i}]", many, f"1 to {MOST_LAYERS}", "Correct it.")
     table = np.empty((len(pitch), drum.DRUM_COLUMNS))
     table[:, drum.PITCH_RADIUS] = _given(winches, "drum_radius") + 0.5 * diameter
     table[:, drum.LAYER_RISE] = 0.5 * math.sqrt(3.0) * diameter  # each turn lies between two turns of the layer below

@@ -46,6 +46,17 @@ def check_reach(robot: Robot, pose: Pose, item: str) -> None:
         raise InvalidValueError(f"{item}[{k}]", value, f"0 m, by motion_pattern {pattern}", step)
 
 
+def check_plane(robot: Robot, pose: Pose, item: str) -> None:
+    """Refuse poses of a planar robot whose cables would leave the plane of its frame anchors."""
+    away = out_of_plane(robot, pose)
+    if (outside := np.flatnonzero(np.abs(away) > ROUNDING)).size:
+        k = int(outside[0])
+        name = f"{item}[{k}]" if pose.shape else item
+        value = f"{away[k]:.6g} m along plane_normal from the plane of the frame anchors"
+        step = "Project the poses onto the plane, or give the robot another motion_pattern."
+        raise InvalidValueError(name, value, f"0 m, by motion_pattern {robot.motion_pattern}", step)
+
+
 def forbidden_turn(robot: Robot, pose: Pose, other: Array) -> Array:
     """Part of the rotation from an orientation to each pose that the motion pattern of the robot does not allow.
 

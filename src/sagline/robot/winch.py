@@ -17,6 +17,8 @@ from sagline.robot.pose import unit
 
 UPRIGHT: Final = 1e-9  # tolerance of a vertical swivel axis, as the sine of an angle
 _AGREEING: Final = 1e-9  # largest difference between a given dead length and that of the guides, relative to it
+MOST_LAYERS: Final = 1000
+LARGEST_PULLEY: Final = 10.0  # [m], above the largest sheaves of mine hoists and cable cars
 MOST_NAMED: Final = 3  # largest number of fields in a message
 _AXES: Final = {"swivel_axis": 1, "guides": 2}  # number of array axes of a field for one cable, if it is not a number
 
@@ -31,8 +33,8 @@ class Winch:
     is not modeled.
 
     Attributes:
-        pulley_radius: Radius of the pulley at the frame, to the centerline of the cable [m], >= 0; 0 for an eyelet. The
-            pulley swivels about a vertical axis through the frame anchor, where the cable enters it.
+        pulley_radius: Radius of the pulley at the frame, to the centerline of the cable [m], 0 to 10; 0 for an eyelet.
+            The pulley swivels about a vertical axis through the frame anchor, where the cable enters it.
         swivel_axis: Unit vector in the direction from drum to pulley at the pulley's entry, shape (..., 3): up (0, 0,
             1), from a drum below, or down (0, 0, -1).
         pulley_friction: Friction coefficient mu of the cable on the pulley and at the guides. The tensions on the two
@@ -54,7 +56,7 @@ class Winch:
         drum_width: Usable width along the drum axis [m], >= groove_pitch; a layer has drum_width/groove_pitch turns,
             not necessarily a whole number. None: wide enough for one layer.
         groove_pitch: Distance between adjacent turns along the drum axis [m].
-        layers: Largest number of layers on the drum, a whole number >= 1.
+        layers: Largest number of layers on the drum, a whole number from 1 to 1000.
         drum_distance: Distance from the drum to the first pulley, perpendicular to the drum axis [m]; None: the cable
             leaves the drum at a fixed point.
         drum_offset: Exit position of the cable on the empty drum, at the first groove, along the drum axis from the
@@ -282,6 +284,14 @@ def _checked(value: ArrayLike, about: Attribute[Any]) -> Array:
             raise InvalidValueError(
                 item, f"{array[index]:g}", "whole numbers", "Give the number of layers on the drum."
             )
+        case "layers" if (wrong := array > MOST_LAYERS).any():
+            item, index = _element(item, wrong)
+            step = "Give the number of layers on the drum."
+            raise InvalidValueError(item, f"{array[index]:g}", f"1 to {MOST_LAYERS}", step)
+        case "pulley_radius" if (wrong := array > LARGEST_PULLEY).any():
+            item, index = _element(item, wrong)
+            allowed = f"0 to {LARGEST_PULLEY:g} m"
+            raise InvalidValueError(item, f"{array[index]:g} m", allowed, "Give the radius in meters.")
         case "gear" if (wrong := array == 0.0).any():
             step = "Give the encoder turns per drum turn; negative if counts decrease when cable is paid out."
             raise InvalidValueError(_element(item, wrong)[0], "0", "not 0", step)

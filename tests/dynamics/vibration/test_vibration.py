@@ -9,6 +9,7 @@ import pytest
 from scipy.integrate import simpson
 
 import sagline as sl
+from sagline.dynamics.vibration import robot_modes
 from sagline.dynamics.vibration.dynamic_stiffness import EXACT, in_world
 from sagline.dynamics.vibration.robot_modes import dynamic_matrix, modes_below, vibration_model
 from sagline.kernels.dynamics import collocation
@@ -247,3 +248,17 @@ def _first_string(state: sl.Equilibrium) -> float:
 
     table = vibration_model(state).strings.table[0]
     return min(held(table[i : i + 1], 1, plane, 1e-6) for i in range(len(table)) for plane in (0, 1))
+
+
+@pytest.mark.parametrize("name", ["cogiro", "article-suspended"])
+def test_far_too_many_modes_are_refused_before_they_are_counted(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(robot_modes, "modes_below", None)
+    robot = sl.load_robot(name)
+    state = sl.inverse(robot, sl.Pose.from_euler((0.5, 0.3, 2.0), 0.0, 0.0, 0.0)).state
+    cables = state.cables
+    wave = cables.unstrained_length * np.sqrt(robot.cables.linear_density / cables.chord_tension)
+    for up_to in (5e3, 1e6):
+        with refused("up_to", kind=sl.InvalidValueError) as caught:
+            sl.vibration(state, up_to=up_to)
+        count = float(caught.value.value.split("about ")[1].split(" modes")[0].replace(",", ""))
+        assert count == pytest.approx(4.0 * up_to * wave.sum(), rel=0.02)

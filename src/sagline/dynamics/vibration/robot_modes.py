@@ -13,6 +13,7 @@ from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.dynamics.vibration.component_modes import CableComponents, component_modes, stretch_energy
 from sagline.dynamics.vibration.dynamic_stiffness import Damping, check_counts, in_world
 from sagline.kernels.dynamics import collocation
+from sagline.kernels.dynamics import string as columns
 from sagline.kernels.dynamics.collocation import dynamic_stiffnesses
 from sagline.robot.batch import first_of
 from sagline.robot.equilibrium import Equilibrium
@@ -156,6 +157,10 @@ def _negatives(matrix: Array) -> int:
 
 
 MOST_MODES: Final = 2_000
+_CERTAIN: Final = 1.5  # an estimate above this multiple of MOST_MODES is beyond it in spite of its error
+_STEEP: Final = 1e-6  # smallest horizontal tension relative to the vertical force, for a vertical cable
+_EVEN: Final = 1e-9  # range of q below which the tension of a cable counts as constant
+_POINTS: Final = 201
 SLOW: Final = 1e-2  # smallest frequency relative to up_to; a lower one may belong to a motion without stiffness
 BORDER: Final = 1e-6  # relative accuracy of a mode's frequency in the count
 
@@ -184,6 +189,7 @@ class StateModes:
 
 def state_modes(model: VibrationModel, row: int, up_to: float) -> StateModes:
     """Modes of one state below a frequency [Hz]; their number is compared with the exact count."""
+    check_string_count(model.strings, row, up_to, "up_to")
     count = modes_below(model, row, up_to)
     check_mode_count(count, up_to, "up_to")
     problem = reduced_model(model, row, up_to)
@@ -199,6 +205,27 @@ def state_modes(model: VibrationModel, row: int, up_to: float) -> StateModes:
     vectors = vectors[:, :count]
     platform = problem.platform @ vectors[: problem.platform.shape[1]]
     return StateModes(frequency[:count], platform, model.ends[row] @ platform, count, problem, vectors)
+
+
+def check_string_count(strings: Strings, row: int, frequency: float, item: str) -> None:
+    """Reject a frequency [Hz] below which the cables alone have far too many modes, before they are counted.
+
+    N half waves of a cable, in each of two directions, have the phase pi N: the integral of omega sqrt(rho/T) along it.
+    The tension is T_x cosh(q), with the vertical force T_x sinh(q).
+    """
+    table = strings.table[row, strings.taut[row]]
+    level = np.maximum(table[:, columns.HORIZONTAL], _STEEP * np.abs(table[:, columns.VERTICAL]))
+    top, hanging = table[:, columns.VERTICAL], table[:, columns.WEIGHT] * table[:, columns.LENGTH]
+    first, last = np.arcsinh((top - hanging) / level), np.arcsinh(top / level)
+    q = np.linspace(first, last, _POINTS)
+    even = table[:, columns.LENGTH] / np.sqrt(level * np.cosh(last))  # of a cable without weight
+    slow = np.trapezoid(np.sqrt(level * np.cosh(q)), q, axis=0) / np.maximum(table[:, columns.WEIGHT], _TINY)
+    time = np.sqrt(table[:, columns.DENSITY]) * np.where(last - first > _EVEN, slow, even)  # of a wave along the cable
+    count = float(4.0 * frequency * time.sum())
+    if count > _CERTAIN * MOST_MODES:
+        value = f"{frequency:g} Hz, below which the cables have about {count:,.0f} modes"
+        step = "Lower it, or shorten the slack cables."
+        raise InvalidValueError(item, value, f"a frequency with up to {MOST_MODES:,} modes below it", step)
 
 
 def check_mode_count(count: int, frequency: float, item: str) -> None:
