@@ -7,7 +7,6 @@ import pytest
 
 import sagline as sl
 from sagline.core.arrays import Array
-from sagline.robot.batch import pulleys_of
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(40)
 PIECES = 60  # the cable is cut at points that are dense near its lowest point
@@ -26,7 +25,8 @@ def closure(robot: sl.Robot, plan: sl.Plan) -> Array:
     weight = np.broadcast_to(robot.cables.linear_density * robot.gravity, cables.shape)
     stiffness = np.broadcast_to(robot.cables.axial_stiffness, cables.shape)
     x, z = cables.horizontal_tension, cables.vertical_force
-    radius, entry = pulleys_of(robot)
+    assert robot.winches is not None
+    radius, entry = robot.winches.pulley_radius, robot.winches.swivel_axis[:, 2]
     free = state.unstrained_length - (contact.wrapped_length + contact.dead_length)
     at_exit = z - weight * free
     angle = np.arctan2(x, entry * at_exit)
