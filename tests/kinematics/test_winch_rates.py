@@ -130,4 +130,3 @@ def test_a_preset_whose_drums_have_a_radius_alone_has_rates() -> None:
     friction = 15.0 * np.sign(rates.motor_speed)
     expected = 3.19e-5 * rates.motor_acceleration + (friction - rates.drum_tension) * 0.03 / 20.0
     np.testing.assert_allclose(rates.motor_torque, expected, rtol=0.0, atol=1e-12)
-    assert not rates.exceeding.any()
