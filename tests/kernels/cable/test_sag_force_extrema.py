@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from sagline.kernels.cable.sag_forces import LEAST_TENSION, MOST_TENSION, Curves
-from tests.kernels.cable.curves import pulls_of, random_curves, with_turns
+from sagline.kernels.cable.sag_forces import LEAST_TENSION, MOST_TENSION, Curves, Section
+from tests.kernels.cable.curves import pulls_of, random_curves, sag_force_range, with_turns
 
 GRID = 3000
 
@@ -49,3 +49,25 @@ def test_twenty_thousand_cables_turn_where_they_should() -> None:
     rng = np.random.default_rng(12)
     for _ in range(2500):
         check(with_turns(random_curves(rng, 8)))
+
+
+def test_steep_slack_cables_have_no_pull_outside_their_range() -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(60):
+        curves = random_curves(rng, 8)
+        cables = curves.cables
+        cables.sine[:] = -np.sqrt(1.0 - rng.uniform(0.01, 0.4, 8) ** 2)
+        cables.cosine[:] = np.sqrt(1.0 - cables.sine**2)
+        cables.low[:] = cables.half_weight / rng.uniform(2.0, 5.0, 8)
+        cables.high[:] = cables.low * 10 ** rng.uniform(0.3, 4.0, 8)
+        cables.stiffness[:] = np.maximum(cables.high, cables.half_weight * 10 ** rng.uniform(0.3, 6.0, 8))
+        with_turns(curves)
+        for i in range(8):
+            low, high = float(cables.low[i]), float(cables.high[i])
+            tensions = np.geomspace(low, high, 500)
+            tensions[0], tensions[-1] = low, high
+            pulls = pulls_of(curves, i, tensions)
+            least, most = sag_force_range(curves, i, Section(low, high, pulls[0], pulls[-1]))
+            rounding = 1e-9 * cables.half_weight[i]
+            assert least <= pulls.min() + rounding
+            assert most >= pulls.max() - rounding
