@@ -72,7 +72,7 @@ def _not_inside(
     # with no lower chord limit the tensions of least norm may leave a cable slack: others do not
     may_be_slack = (robot.tension_min == 0.0).any() or robot.tension_limits_of == "frame_end"
     sharing = sl.AnalyticCenter() if may_be_slack else sl.MinimumNorm()
-    status = sl.inverse(robot, poses, wrench=load, model=model, tension=sharing).status
+    status = sl.inverse(robot, poses, wrench=load, model=model, tension=sharing, stability=False).status
     return int((status != sl.PoseStatus.SOLVED).sum())
 
 
@@ -81,7 +81,7 @@ def _not_outside(robot: sl.Robot, poses: sl.Pose, model: sl.CableModel, wrenches
         return 0
     if wrenches is not None:
         return int((sl.margin(robot, poses, wrenches, model=model).low > 0.0).sum())
-    return int((sl.inverse(robot, poses, model=model).status != sl.PoseStatus.INFEASIBLE).sum())
+    return int((sl.inverse(robot, poses, model=model, stability=False).status != sl.PoseStatus.INFEASIBLE).sum())
 
 
 def _one_each(robot: sl.Robot, wrenches: sl.WrenchSet | None, count: int, rng: np.random.Generator) -> Array:
