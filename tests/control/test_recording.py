@@ -54,7 +54,7 @@ def test_everything_that_was_put_in_comes_out(expected: int) -> None:
             assert np.array_equal(done.set_rate[k], cycle.command.rate)
             assert np.array_equal(done.set_tension[k], cycle.command.tension)
         if isinstance(cycle.answer, Sample):
-            for name in Sample._fields:
+            for name in Sample._fields[:-1]:  # a recording has no reasons
                 kept, given = (np.asarray(getattr(sample, name)) for sample in (done.samples.at(k), cycle.answer))
                 assert np.array_equal(kept, given), name
                 assert kept.dtype == given.dtype, name

@@ -565,7 +565,8 @@ def test_any_robot_survives_the_dump_bit_for_bit(
     drum: dict[str, Any] = (
         {"drum_radius": positive[:2], "gear": -positive[2], "count_zero": points[:2], "layers": [1, 3]} if wound else {}
     )
-    winches = Winch(positive[4:], dead_rise=-0.0, swivel_axis=[[0, 0, 1], [0, 0, -1]], inertia=positive[0], **drum)
+    radius = np.minimum(positive[4:], 10.0)  # the largest pulley
+    winches = Winch(radius, dead_rise=-0.0, swivel_axis=[[0, 0, 1], [0, 0, -1]], inertia=positive[0], **drum)
     robot = Robot(
         text,
         np.reshape(points[:6], (2, 3)),

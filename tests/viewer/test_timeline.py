@@ -114,10 +114,10 @@ def test_spans_cover_all_that_is_wrong_and_no_more_than_their_pixels(seed: int) 
 def test_a_plan_says_where_it_has_no_answer_and_why() -> None:
     track = PlayedPlan.of(PLAN).track()
     gaps = PLAN.gaps
-    assert len(gaps) == len(track.spans) == 1
-    (gap,), (span,) = gaps, track.spans
+    (before, gap, after), (span,) = gaps, track.spans
+    assert before.status is after.status is sl.PoseStatus.UNSTABLE
     time = track.time
-    assert (span.start, span.end) == (time[gap.first], time[gap.last + 1])
+    assert (span.start, span.end) == (time[before.first], time[after.last + 1])
     cables = ", ".join(map(str, gap.cables))
     assert f" {gap.shortfall:.1f} N; " in span.why
     assert span.why.endswith(f"cables {cables}")

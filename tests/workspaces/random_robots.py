@@ -232,7 +232,9 @@ def _compare_workspace(case: Case, found: Counter[str]) -> None:
 
 def _compare_design(case: Case, found: Counter[str]) -> None:
     """Compare the goals of a design's first robot, at feasible poses, with margin and inverse."""
-    poses = case.poses[case.margin.status == Margin.FEASIBLE]
+    away = np.einsum("kpi,pij->pkj", case.robot.frame_anchors[:, None] - case.poses.position, case.poses.matrix)
+    clear = (np.abs(away) > 0.31).any(axis=-1).all(axis=-1)  # no frame anchor in the platform, which design rejects
+    poses = case.poses[(case.margin.status == Margin.FEASIBLE) & clear]
     if not len(poses):
         return
     raised = sl.FreeAnchors("frame", -0.01, 0.01, along=[0, 0, 1], symmetry="together")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, Final
 
 import numpy as np
@@ -91,7 +91,7 @@ class Samples(Result):
         return len(self.time)
 
     def at(self, index: int) -> Sample:
-        """One sample, with its own arrays.
+        """One sample, with its own arrays and without the reasons of discarded blocks.
 
         Args:
             index: Index of the sample, from 0.
@@ -100,7 +100,8 @@ class Samples(Result):
             InvalidValueError: If the sample does not exist.
         """
         row = whole_number(index, "index", 0, len(self) - 1)
-        return Sample(float(self.time[row]), *(getattr(self, name)[row].copy() for name in Sample._fields[1:]))
+        values = {f.name: getattr(self, f.name)[row] for f in fields(self)}
+        return Sample(**{name: value.copy() for name, value in values.items()} | {"time": float(values["time"])})
 
 
 @dataclass(frozen=True, slots=True, eq=False)

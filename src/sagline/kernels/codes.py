@@ -51,7 +51,7 @@ POSE_NOT_COVERED = 6  # feasible, but not by the chosen tension distribution met
 POSE_UNBOUNDED = 7  # the feasible set is unbounded, and the chosen tension distribution method requires a bounded one
 POSE_BORDERLINE = 8  # too close to the border of the feasible set: neither tensions nor a proof were found
 POSE_UNSTABLE = 9  # solved, but the equilibrium is not stable
-POSE_UNPROVED = 10  # solved, and `stabilities_of_poses` decides whether it is stable
+UNPROVED_STABILITY = 10  # solved, and `stabilities_of_poses` decides whether it is stable
 
 # Status of the forward calculation of one sample.
 FORWARD_SOLVED = 0

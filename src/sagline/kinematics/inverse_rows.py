@@ -19,7 +19,7 @@ from sagline.statics.tables import robot_terms
 from sagline.tension.method import Options, TensionMethod, takes_default_kernel
 
 UNDECIDED = (codes.POSE_INFEASIBLE, codes.POSE_NOT_CONVERGED)  # statuses of poses without a result from the iterations
-SOLVED = (codes.POSE_SOLVED, codes.POSE_UNPROVED)  # statuses of poses with a result
+SOLVED = (codes.POSE_SOLVED, codes.UNPROVED_STABILITY)  # statuses of poses with a result
 BLOCK = 1 << 12  # poses per block of the solution, at most 0.1 s; interrupts are handled between blocks
 DECIDED = 1 << 10  # poses per block of the feasibility decision, which takes longer per pose
 
@@ -77,7 +77,7 @@ def solve_inverse_rows(
 
     rows: pose rows (N, POSE_COLUMNS); loads: external plus inertial wrenches (1 or N, 6); reference: initial tensions
     of `Closest`, in its variable (m,), or NaN; changed to the last feasible ones; stability: True to mark solved poses
-    without a proof of stability as POSE_UNPROVED; progress: called after each block
+    without a proof of stability as UNPROVED_STABILITY; progress: called after each block
     with the number of finished poses, without undecided ones, and the total number.
     """
     shared = first_of(robot)
@@ -167,7 +167,7 @@ def decide_stability(robot: Robots, options: Options, rows: Array, found: Invers
 
     rows: pose rows (N, POSE_COLUMNS).
     """
-    which = locked(np.flatnonzero((found.pose_status == codes.POSE_UNPROVED) | verdicts.at_border))
+    which = locked(np.flatnonzero((found.pose_status == codes.UNPROVED_STABILITY) | verdicts.at_border))
     given = ((*options.model, has_routing(robot) or None), robot_terms(robot), rows)
     for part in blocks(which.size, BLOCK):
         memory = memory_for(found.cable_status.shape[1])

@@ -218,8 +218,8 @@ class InverseSolver:
                 self._decide()
                 code = self._status[0]
                 if self._stability and not code:
-                    code = codes.POSE_UNPROVED
-            if code == codes.POSE_UNPROVED:
+                    code = codes.UNPROVED_STABILITY
+            if code == codes.UNPROVED_STABILITY:
                 self._decide_stability()
                 code = self._status[0]
         try:

@@ -122,9 +122,9 @@ def infeasible_spans(plan: Plan, time: Array, unit: ForceUnit) -> tuple[Span, ..
     """Spans of a plan of N poses in which it is not feasible or not stable."""
 
     def why(rows: slice) -> str:
-        lost = ~plan.solved[rows]
-        status = PoseStatus(int(plan.status[rows][lost][0]))
-        if status is not PoseStatus.INFEASIBLE:
+        lost = plan.status[rows] == PoseStatus.INFEASIBLE
+        if not lost.any():  # poses before and after infeasible ones are often unstable
+            status = PoseStatus(int(plan.status[rows][~plan.solved[rows]][0]))
             return status.name.replace("_", " ").lower()
         short = plan.shortfall[rows][lost]
         known = short[np.isfinite(short)]

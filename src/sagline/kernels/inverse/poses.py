@@ -80,7 +80,7 @@ def inverse_poses(
         memory: `memory_for` the number of cables.
         otherwise: None for methods that project onto a reference in chord or horizontal tensions; the code of all other
             methods is then not compiled. True for any method.
-        stability: True to prove that each equilibrium is stable; a solved pose without a proof gets POSE_UNPROVED. None
+        stability: True to prove that each equilibrium is stable; a solved pose without a proof gets UNPROVED_STABILITY. None
             excludes the proof from compilation.
         answers: Filled: span and rise of the free spans, unstrained length off the drum, T_x, T_z, tau, and, for robots
             with pulleys or dead lengths, the rows of these, (RESULT_ROWS, N, m); status of each cable, (N, m); norms of
@@ -124,7 +124,7 @@ def inverse_poses(
         if proof is not None:
             asked = stability and status == codes.POSE_SOLVED
             if asked and not proves_stability(model, platform, cables, balance, proof):
-                pose_statuses[p] = codes.POSE_UNPROVED
+                pose_statuses[p] = codes.UNPROVED_STABILITY
         write_solution(status == codes.POSE_SOLVED, model, cables, balance, results, p)
 
 
