@@ -80,8 +80,8 @@ def inverse_poses(
         memory: `memory_for` the number of cables.
         otherwise: None for methods that project onto a reference in chord or horizontal tensions; the code of all other
             methods is then not compiled. True for any method.
-        stability: True to prove that each equilibrium is stable; a solved pose without a proof gets UNPROVED_STABILITY. None
-            excludes the proof from compilation.
+        stability: True to prove that each equilibrium is stable; a solved pose without a proof gets
+            UNPROVED_STABILITY. None excludes the proof from compilation.
         answers: Filled: span and rise of the free spans, unstrained length off the drum, T_x, T_z, tau, and, for robots
             with pulleys or dead lengths, the rows of these, (RESULT_ROWS, N, m); status of each cable, (N, m); norms of
             the unbalanced force [N] and moment [N m] along the free motions, (N, 2); wrench that J tau must supply
