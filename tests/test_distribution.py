@@ -131,6 +131,7 @@ def test_the_source_distribution_has_all_that_the_work_needs(unpacked: Path) -> 
     top = {path.name for path in unpacked.iterdir()}
     folders = {"src", "tests", "docs", "examples", "benchmarks", "tools"}
     files = {"CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "Makefile", "README.md", "mkdocs.yml"}
+    files |= {"SECURITY.md", "constraints.txt"}
     assert top == folders | files | {"pyproject.toml", "PKG-INFO", ".gitignore"}
     for folder in sorted(folders):
         made = {f"sagline/{name}" for name in BUILT} if folder == "src" else set()

@@ -114,6 +114,7 @@ INTERNAL = frozenset(
     | {"plc.ModbusLink.exchange", "plc.S7Link.exchange"}
     | {"Orientations.at", "Tilts.sampled"}
     | {f"{name}.{method}" for name in (*CRITERIA, "PositionError") for method in ("check", "judge", "scale", "values")}
+    | {"Clearance.excluded", "Criterion.excluded"}
     | {"AnchorErrors.added", "FreeAnchors.bound", "FreeCable.bound", "FreeLimit.bound", "Goal.values"}
     | {f"control.Recorder.{method}" for method in ("begins", "ends", "cycle", "event")}
 )
@@ -354,6 +355,7 @@ def _kinematics(given: _Given) -> dict[str, Call]:
                 tension=("one", sl.Closest()),
                 wrench=wrench,
                 previous=("one", given.plan, True),
+                stability=("flag", True),
                 progress=silent,
             ),
         ),
@@ -480,7 +482,7 @@ def _solvers(given: _Given) -> dict[str, Call]:
     return {
         "InverseSolver": Call(
             lambda **a: (sl.InverseSolver(**a), None)[1],
-            _all(robot=("one", given.robot), model=model, tension=("one", sl.Closest(), True)),
+            _all(robot=("one", given.robot), model=model, tension=("one", sl.Closest(), True), stability=("flag", True)),
         ),
         "InverseSolver.step": Call(alone(solver.step), _all(**pose, wrench=wrench)),
         "InverseSolver.step_into": Call(alone(solver.step_into), _all(**pose, out=out, wrench=wrench)),
@@ -609,6 +611,7 @@ def _workspaces(given: _Given) -> dict[str, Call]:
                 criteria=("several", [sl.MaximumSag(0.5)]),
                 refine=("flag_or_whole", True),
                 moment_arm=("number", 0.25, True),
+                hull=("word", "inner"),
                 progress=("callback", lambda done, of: None, True),
             ),
         ),

@@ -70,7 +70,7 @@ def short_of_work(stocked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sagline.article.report.ReportPart.build", lambda part: Chapter(part.key, part.key, "", ()))
     monkeypatch.setattr("sagline.cli.output.Output.draw", lambda *_: None)
 
-    def started(host: str, port: int, title: str) -> Any:
+    def started(host: str, port: int, title: str, **_: Any) -> Any:
         server._check(host, port)
         raise SystemExit(0)
 
