@@ -482,7 +482,9 @@ def _solvers(given: _Given) -> dict[str, Call]:
     return {
         "InverseSolver": Call(
             lambda **a: (sl.InverseSolver(**a), None)[1],
-            _all(robot=("one", given.robot), model=model, tension=("one", sl.Closest(), True), stability=("flag", True)),
+            _all(
+                robot=("one", given.robot), model=model, tension=("one", sl.Closest(), True), stability=("flag", True)
+            ),
         ),
         "InverseSolver.step": Call(alone(solver.step), _all(**pose, wrench=wrench)),
         "InverseSolver.step_into": Call(alone(solver.step_into), _all(**pose, out=out, wrench=wrench)),

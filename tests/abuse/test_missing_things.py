@@ -16,7 +16,9 @@ pytestmark = extended
 
 MISSING = ("nothere", "nothere.stl", "nothere.yaml", "nothere/nothere.nc", "folder", "folder.yaml", "/dev/null")
 WRITTEN = frozenset({"--out", "--plot", "--log", "--to"})  # name what is made
-ANY = frozenset({"new file", "view --host", "view --allow-host", "twin --host"})  # a name to be given, and names of machines
+ANY = frozenset(
+    {"new file", "view --host", "view --allow-host", "twin --host"}
+)  # a name to be given, and names of machines
 NUMBERED = (  # what is counted: one more than there are
     "simulate cogiro --after 0.1 --no-figures --break 8@0.05s",
     "vibrate cogiro --up-to 4 --no-figures --film 999",

@@ -187,7 +187,14 @@ def test_a_message_larger_than_any_of_the_page_ends_its_client(
                     list(bad.heard())
                 assert (caught.value.rcvd is not None and caught.value.rcvd.code == 1009) is cut
         assert good.replayed()
-    lines = capsys.readouterr().err.splitlines()
+    said = [""]
+
+    def is_complete() -> bool:
+        said.append(capsys.readouterr().err)
+        return "".join(said).endswith("\n")
+
+    await_that(is_complete)  # the server writes after the client has ended
+    lines = "".join(said).splitlines()
     assert [str(access.LARGEST) in line for line in lines if line.startswith("Refused: ")] == [True]
 
 
