@@ -121,7 +121,7 @@ def inverse_poses(
             supplied = status != codes.POSE_NO_CHORD and status != codes.POSE_SINGULAR
             needed[p, k] = balance.right[k] if supplied else math.nan
         pose_statuses[p] = status
-        if proof is not None:
+        if stability is not None and proof is not None:
             asked = stability and status == codes.POSE_SOLVED
             if asked and not proves_stability(model, platform, cables, balance, proof):
                 pose_statuses[p] = codes.UNPROVED_STABILITY
