@@ -125,7 +125,8 @@ def test_a_stop_needs_no_planner(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 PARENT = """
-import os, time
+import os, signal, time
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell ignores it in its background
 import sagline as sl
 from functools import partial
 from sagline.control.planner import Planner
