@@ -168,7 +168,9 @@ def decide_stability(robot: Robots, options: Options, rows: Array, found: Invers
     rows: pose rows (N, POSE_COLUMNS).
     """
     which = locked(np.flatnonzero((found.pose_status == codes.UNPROVED_STABILITY) | verdicts.at_border))
+    if not which.size:
+        return
     given = ((*options.model, has_routing(robot) or None), robot_terms(robot), rows)
+    memory = memory_for(found.cable_status.shape[1])
     for part in blocks(which.size, BLOCK):
-        memory = memory_for(found.cable_status.shape[1])
         stabilities_of_poses(*given, which[part], memory, found.results, found.pose_status)

@@ -211,7 +211,8 @@ def _load_terms(wrenches: WrenchSet, robot: Robot) -> tuple[Any, ...]:
     segments = np.concatenate([wrenches.segments, inertial])
     kept = segments[np.any(segments != 0.0, axis=1)]
     several = np.repeat(wrenches.sizes > 1, wrenches.sizes)
-    arrays = (center, kept, wrenches.ellipsoids, corners[several], wrenches.sizes[wrenches.sizes > 1])
+    ellipsoids = wrenches.ellipsoids.transpose(0, 2, 1)
+    arrays = (center, kept, ellipsoids, corners[several], wrenches.sizes[wrenches.sizes > 1])
     return tuple(locked(np.ascontiguousarray(array).view()) for array in arrays)
 
 

@@ -31,7 +31,7 @@ def loads_of(kind: str, rng: np.random.Generator) -> Loads:
 
 def support(loads: Loads, along: Array) -> float:
     """Largest along . (w - center), by formulas for each part."""
-    total = np.abs(loads.segments @ along).sum() + sum(np.linalg.norm(axes.T @ along) for axes in loads.ellipsoids)
+    total = np.abs(loads.segments @ along).sum() + sum(np.linalg.norm(axes @ along) for axes in loads.ellipsoids)
     parts = np.split(loads.corners @ along, np.cumsum(loads.sizes)[:-1]) if len(loads.sizes) else []
     return float(total + sum(part.max() for part in parts))
 

@@ -229,8 +229,8 @@ def _largest_multiple(
         for k in range(n):
             rows[k, i] = demand.matrix[k, i]
             rows[n + k, i] = demand.hanging[k, i]
-        _reflect_column(mirror, square, rows[:n], i)
-        _reflect_column(mirror, square, rows[n : 2 * n], i)
+        _reflect_vector(mirror, square, rows[:n, i])
+        _reflect_vector(mirror, square, rows[n : 2 * n, i])
         rows[2 * n, i], rows[2 * n + 1, i] = bands[LOW, i], bands[HIGH, i]
         rows[2 * n + 2, i] = min(max(tau[i], bands[LOW, i]), bands[HIGH, i])
     turned = Demand(rows[:n], rows[n : 2 * n], right, 1, demand.size)
@@ -251,14 +251,3 @@ def _reflect_vector(mirror: Array, square: float, vector: Array) -> None:
     along *= 2.0 / square
     for k in range(vector.size):
         vector[k] -= along * mirror[k]
-
-
-@glue
-def _reflect_column(mirror: Array, square: float, columns: Array, i: int) -> None:
-    """Reflect column i of a matrix as by `_reflect_vector`."""
-    along = 0.0
-    for k in range(mirror.size):
-        along += mirror[k] * columns[k, i]
-    along *= 2.0 / square
-    for k in range(mirror.size):
-        columns[k, i] -= along * mirror[k]

@@ -19,7 +19,7 @@ class Loads(NamedTuple):
 
     center: Array  # center, (6,)
     segments: Array  # segments, (S, 6)
-    ellipsoids: Array  # ellipsoids, (E, 6, 6)
+    ellipsoids: Array  # each A adds all A^T s with |s| <= 1, (E, 6, 6)
     corners: Array  # corners of polytopes, (C, 6)
     sizes: Indices  # corners of each polytope, (P,)
 
@@ -31,20 +31,11 @@ def dot6(a: Array, b: Array) -> float:
 
 
 @formula
-def _along_axis(axes: Array, k: int, against: Array) -> float:
-    """Inner product of column k of an ellipsoid's matrix (6, 6) and a direction (6,)."""
-    along = 0.0
-    for a in range(6):
-        along += axes[a, k] * against[a]
-    return along
-
-
-@formula
 def _reach_of_ellipsoid(axes: Array, against: Array) -> float:
     """Extent of an ellipsoid to either side of its center."""
     square = 0.0
     for k in range(6):
-        along = _along_axis(axes, k, against)
+        along = dot6(axes[k], against)
         square += along * along
     return math.sqrt(square)
 
@@ -81,9 +72,9 @@ def farthest(loads: Loads, against: Array, wrench: Array) -> None:
         length = _reach_of_ellipsoid(axes, against)
         if length > 0.0:
             for k in range(6):
-                share = _along_axis(axes, k, against) / length
+                share = dot6(axes[k], against) / length
                 for a in range(6):
-                    wrench[a] -= axes[a, k] * share
+                    wrench[a] -= axes[k, a] * share
     first = 0
     for p in range(loads.sizes.size):
         best = first
@@ -221,43 +212,13 @@ def _multiply(wrench: Array, normals: Array, count: int, out: Array) -> bool:
 @kernel
 def worst_wrench(center: Array, wrenches: WrenchSetArrays, direction: Array, wrench: Array) -> bool:
     """Fill the wrench of the set with the largest -direction . w, (6,); True if the set has no other wrench."""
-    single = True
-    for k in range(6):
-        wrench[k] = center[k]
-    for s in range(9):
-        single = _add_end(wrenches.own[s], direction, wrench) and single
-    for s in range(wrenches.segments.shape[0]):
-        single = _add_end(wrenches.segments[s], direction, wrench) and single
-    for e in range(wrenches.ellipsoids.shape[0]):
-        single = False
-        length = 0.0
-        for j in range(6):
-            along = dot6(wrenches.ellipsoids[e, j], direction)
-            length += along * along
-        length = math.sqrt(length)
-        for j in range(6):
-            share = dot6(wrenches.ellipsoids[e, j], direction) / length if length > 0.0 else 0.0
-            for k in range(6):
-                wrench[k] -= wrenches.ellipsoids[e, j, k] * share
-    first = 0
+    farthest(Loads(center, wrenches.segments, wrenches.ellipsoids, wrenches.corners, wrenches.sizes), direction, wrench)
+    single = wrenches.segments.shape[0] == 0 and wrenches.ellipsoids.shape[0] == 0
     for p in range(wrenches.sizes.size):
-        best = first
-        for c in range(first, first + wrenches.sizes[p]):
-            if dot6(wrenches.corners[c], direction) < dot6(wrenches.corners[best], direction):
-                best = c
-        for k in range(6):
-            wrench[k] += wrenches.corners[best, k]
         single = single and wrenches.sizes[p] == 1
-        first += wrenches.sizes[p]
+    for s in range(9):
+        sign = -1.0 if dot6(wrenches.own[s], direction) > 0.0 else 1.0
+        for k in range(6):
+            wrench[k] += sign * wrenches.own[s, k]
+            single = single and wrenches.own[s, k] == 0.0
     return single
-
-
-@formula
-def _add_end(segment: Array, direction: Array, wrench: Array) -> bool:
-    """Add the end of a segment with the largest component against a direction; True if its length is zero."""
-    along = dot6(segment, direction)
-    some = False
-    for k in range(6):
-        wrench[k] += -segment[k] if along > 0.0 else segment[k]
-        some = some or segment[k] != 0.0
-    return not some
