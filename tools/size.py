@@ -2,7 +2,7 @@
 
 Code lines are lines with a token that is neither a comment nor part of a docstring. A record type is a NamedTuple, a
 dataclass or an attrs class. A public-looking name is that of a function or class at the top of a module that does not
-begin with an underscore. An inner function is one that `sagline.__all__` does not reach.
+begin with an underscore. An inner function is one that no public name reaches.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 from types import FunctionType, ModuleType
-from typing import Final
+from typing import Any, Final
 
 ROOT: Final = Path(__file__).parents[1]
 LONG_FUNCTION, LONG_FILE = 60, 400  # largest numbers of code lines of a function and lines of a file
@@ -63,19 +63,23 @@ def import_lines(tree: ast.Module) -> int:
     return sum((node.end_lineno or node.lineno) - node.lineno + 1 for node in found)
 
 
-def public_values() -> Iterator[object]:
-    """Values of `sagline.__all__` and of `__all__` of its public modules."""
+def public_values() -> dict[str, Any]:
+    """Public values by name: those of `sagline`, and those that only a group has, as `plot.tensions`."""
     import sagline
+    from sagline.core.surface import public_names
 
-    for name in sagline.__all__:
-        value = getattr(sagline, name)
-        yield from (getattr(value, inner) for inner in value.__all__) if isinstance(value, ModuleType) else (value,)
+    found: dict[str, Any] = {name: getattr(sagline, name) for name in public_names("sagline")}
+    for group in [name for name, value in found.items() if isinstance(value, ModuleType)]:
+        module = found.pop(group)
+        own = {name: getattr(module, name) for name in module.__all__}
+        found |= {f"{group}.{name}": value for name, value in own.items() if found.get(name) is not value}
+    return found
 
 
 def public_functions() -> dict[tuple[str, str], FunctionType]:
     """Public functions, public methods and constructors by module and qualified name."""
     found: dict[tuple[str, str], FunctionType] = {}
-    for value in public_values():
+    for value in public_values().values():
         members: list[object] = [value]
         if isinstance(value, type):
             own = [kind for kind in value.__mro__ if kind.__module__.startswith("sagline")]
@@ -164,12 +168,10 @@ def counts() -> tuple[Counter[str], Counter[str]]:
 def main() -> int:
     """Print both tables."""
     sys.path.insert(0, str(ROOT / "src"))
-    import sagline
-
     total, folders = counts()
     total["public methods without Args"] = len(without_args())
     total["public functions without Examples"] = len(without_examples())
-    total["public names"] = len(sagline.__all__)
+    total["public names"] = len(public_values())
     for name, count in total.items():
         print(f"{name:45s} {count:7,d}")
     print(f"{'public-looking names for a public one':45s} {total['public-looking names'] / total['public names']:7.1f}")

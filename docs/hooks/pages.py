@@ -1,6 +1,6 @@
 """Hooks of MkDocs: generated pages, which are always up to date.
 
-The gallery runs the examples, the reference lists `sagline.__all__`, and the command's page is its help text.
+The gallery runs the examples, the reference lists all public names, and the command's page is its help text.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ RINGS = {  # package -> title and opening line of its page of reference
     "files": ("Files", "Input and output files."),
     "sweep": ("Sweeps", "`sl.sweep`: every robot at every pose under every wrench, on many cores."),
     "plot": ("Figures", "`sl.plot`: figures for papers, on Matplotlib."),
-    "errors": ("Errors", "Exceptions of sagline."),
+    "core": ("Errors", "`sl.core`: exceptions of sagline."),
 }
 SCENE = """\
 import numpy as np
@@ -131,9 +131,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 def names_by_ring() -> dict[str, list[str]]:
     """Full names of everything public, by package, including the lists of public modules such as `sl.plot`."""
-    modules = (getattr(sl, name) for name in sl.__all__)
-    places = [(sl, sl.__all__), *((module, module.__all__) for module in modules if isinstance(module, ModuleType))]
-    listed = [(name, getattr(place, name)) for place, names in places for name in names]
+    groups = [group for name in sl.__all__ if isinstance(group := getattr(sl, name), ModuleType)]
+    listed = [(name, getattr(group, name)) for group in groups for name in group.__all__]
     full = [f"{value.__module__}.{name}" for name, value in listed if callable(value) and hasattr(value, "__module__")]
     rings: dict[str, list[str]] = {ring: [] for ring in RINGS}
     for name in full:

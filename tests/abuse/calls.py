@@ -7,7 +7,6 @@ from collections.abc import Callable
 from enum import Enum
 from functools import cache, partial
 from pathlib import Path
-from types import ModuleType
 from typing import Any, NamedTuple
 
 import attrs
@@ -17,6 +16,7 @@ from matplotlib.figure import Figure
 
 import sagline as sl
 from sagline.control.link import Command, Mode
+from sagline.core.surface import public_names as names_of
 from sagline.robot.tolerances import Provenance
 from tests.calibration.made_up import made_up
 from tests.calibration.synthetic import log_of, true_robot, with_drums
@@ -24,6 +24,7 @@ from tests.control.rigs import HOME, at, prototype, rig
 from tests.files.simulations import a_simulation
 from tests.kinematics.winches import wound
 from tests.plot import made
+from tools.size import public_values
 
 MAGIC = ("__getitem__",)  # of the methods with two underscores: those that a caller gives something
 
@@ -53,15 +54,7 @@ def public_names() -> set[str]:
 
     Left out are results, which sagline makes (their constructors check nothing), exceptions, and statuses.
     """
-    found = set()
-    for name in sl.__all__:
-        value = getattr(sl, name)
-        if isinstance(value, ModuleType):
-            for part in value.__all__:
-                found |= _of_value(f"{name}.{part}", getattr(value, part))
-        else:
-            found |= _of_value(name, value)
-    return found
+    return {each for name, value in public_values().items() for each in _of_value(name, value)}
 
 
 def arguments_of(name: str) -> list[str]:
@@ -83,7 +76,7 @@ def _of_class(name: str, kind: type) -> set[str]:
     if issubclass(kind, Exception | Enum | tuple):
         return set()
     found = set() if name in RESULTS or not inspect.signature(kind).parameters else {name}
-    private = [base for base in kind.__mro__[1:] if base.__name__ not in sl.__all__ and base is not object]
+    private = [base for base in kind.__mro__[1:] if base.__name__ not in names_of("sagline") and base is not object]
     methods = {method: value for base in reversed([kind, *private]) for method, value in vars(base).items()}
     for method, value in methods.items():  # those of a public base are called once, there
         function = value.__func__ if isinstance(value, classmethod) else value

@@ -1,5 +1,6 @@
 """Calibrations of robots that are known: whether the answer is right, and whether it knows how right."""
 
+import sys
 from functools import cache
 from typing import NamedTuple
 
@@ -349,7 +350,7 @@ def test_an_unknown_that_is_none_is_refused_before_any_work(monkeypatch: pytest.
     def work(*_: object) -> None:
         raise AssertionError("it has begun")
 
-    monkeypatch.setattr("sagline.calibration.calibrate.wrong_units", work)
+    monkeypatch.setattr(sys.modules[sl.calibrate.__module__], "wrong_units", work)
     robot = sl.load_robot("cogiro")
     log = sl.WinchLog(
         unstrained_length=np.full((3, 8), 9.0),

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import sagline as sl
 from tests.tiers import extended
+from tools.size import public_values
 
 ROOT = Path(__file__).parents[2]
 FACTS, _, SOURCES = (ROOT / "docs" / "compare.md").read_text(encoding="utf-8").partition("\n## Sources\n")
@@ -55,5 +56,4 @@ def test_what_is_said_of_sagline() -> None:
 
 def count_of(base: type) -> int:
     """Number of public kinds of a class."""
-    public = [getattr(sl, name) for name in sl.__all__]
-    return sum(isinstance(each, type) and issubclass(each, base) and each is not base for each in public)
+    return sum(isinstance(each, type) and issubclass(each, base) and each is not base for each in public_values().values())

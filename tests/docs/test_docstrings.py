@@ -7,13 +7,13 @@ import re
 import textwrap
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import FunctionType, ModuleType
+from types import FunctionType
 from typing import Any, NamedTuple
 
 import pytest
 
-import sagline as sl
 from tests.tiers import extended
+from tools.size import public_values
 
 pytestmark = extended
 
@@ -54,21 +54,11 @@ class Public(NamedTuple):
 
 def public_functions() -> Iterator[Public]:
     """The functions of the public surface, public methods and constructors of its classes."""
-    for value in public_values():
+    for value in public_values().values():
         if isinstance(value, FunctionType):
             yield _public(value)
         elif inspect.isclass(value):
             yield from _methods(value)
-
-
-def public_values() -> Iterator[Any]:
-    """What sagline lists, and what its modules list."""
-    for name in sl.__all__:
-        value = getattr(sl, name)
-        if isinstance(value, ModuleType):
-            yield from (getattr(value, inner) for inner in value.__all__)
-        else:
-            yield value
 
 
 def _methods(owner: type) -> Iterator[Public]:
@@ -151,7 +141,7 @@ def examples() -> dict[str, doctest.DocTest]:
     """The examples of every docstring of the public surface that has some."""
     finder = doctest.DocTestFinder(recurse=False)
     documented: dict[str, Any] = {public.name: public.function for public in public_functions()}
-    documented |= {name: value for name in sl.__all__ if inspect.isclass(value := getattr(sl, name))}
+    documented |= {name: value for name, value in public_values().items() if inspect.isclass(value)}
     found = {name: finder.find(value, name, globs={}) for name, value in documented.items()}
     return {name: tests[0] for name, tests in found.items() if tests and tests[0].examples}
 

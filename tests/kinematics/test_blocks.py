@@ -10,8 +10,6 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.kinematics import confirm as confirming
-from sagline.kinematics import forward as forwarding
 from sagline.kinematics import forward_rows
 from sagline.kinematics import inverse_rows as inverting
 from tests.effort import slowness
@@ -23,7 +21,7 @@ LENGTHS = sl.inverse(ROBOT, PATH).unstrained_length
 
 
 def in_blocks_of(samples: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in (forward_rows, forwarding):
+    for module in (forward_rows, sys.modules[sl.forward.__module__]):
         monkeypatch.setattr(module, "BLOCK", samples * ROBOT.cable_count)
 
 
@@ -81,7 +79,7 @@ def test_samples_that_stand_alone_are_the_same_to_rounding(
 def test_progress_counts_up_to_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
     in_blocks_of(7, monkeypatch)
     monkeypatch.setattr(inverting, "BLOCK", 10)
-    monkeypatch.setattr(confirming, "BLOCK", 20)
+    monkeypatch.setattr(sys.modules[sl.confirm.__module__], "BLOCK", 20)
     position = np.random.default_rng(1).uniform((-12.0, -9.0, 0.5), (12.0, 9.0, 5.0), (43, 3))
     poses = sl.Pose(position, np.stack([np.eye(3)] * 43))
     plan = sl.inverse(ROBOT, poses)

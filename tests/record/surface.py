@@ -9,6 +9,7 @@ from types import ModuleType
 from typing import Any
 
 import sagline as sl
+from sagline.core.surface import public_names
 
 MODULES = (sl.control, sl.plc, sl.plot, sl.sweep, sl.twin)
 
@@ -22,7 +23,7 @@ def record() -> dict[str, Any]:
 
 
 def _names(module: ModuleType) -> list[str]:
-    return sorted(getattr(module, "__all__", None) or [name for name in dir(module) if not name.startswith("_")])
+    return sorted(public_names(module.__name__))
 
 
 def _describe(value: Any) -> Any:

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 import sagline as sl
 from sagline import Cable, MinimumNorm, Plan, Pose, Robot, inverse, load_robot, robot_names
 from sagline.core.arrays import Array
+from tools.size import public_values
 
 BORDER_ROBOTS = ["article-suspended", "article-mixed", "expo2015-lucia", "ipanema-1", "fast"]
 
@@ -28,10 +29,9 @@ def random_poses(robot: Robot, count: int, rng: np.random.Generator, stretch: fl
 
 def public_methods() -> dict[str, type[sl.TensionMethod]]:
     """All tension distribution methods of the public surface, by name."""
-    kinds = {name: getattr(sl, name) for name in sl.__all__}
     return {
         name: kind
-        for name, kind in kinds.items()
+        for name, kind in public_values().items()
         if isinstance(kind, type) and issubclass(kind, sl.TensionMethod) and kind is not sl.TensionMethod
     }
 

@@ -1,1 +1,5 @@
 """Interference: clearances between cables, platform and obstacles."""
+
+from sagline.core.surface import group
+
+group(__name__)

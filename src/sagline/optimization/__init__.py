@@ -1,1 +1,5 @@
 """Design optimization: design variables, goals, optimizers and results."""
+
+from sagline.core.surface import group
+
+group(__name__)

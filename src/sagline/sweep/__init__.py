@@ -1,8 +1,5 @@
 """Sweeps: every robot at every pose under every wrench, computed by Dask workers into a folder."""
 
-from sagline.sweep.request import QUANTITIES, Request
-from sagline.sweep.result import Sweep, load
-from sagline.sweep.running import run
-from sagline.sweep.work import Counts
+from sagline.core.surface import group
 
-__all__ = ["QUANTITIES", "Counts", "Request", "Sweep", "load", "run"]
+group(__name__)

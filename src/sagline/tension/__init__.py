@@ -1,1 +1,5 @@
 """Tension distribution for redundant cables: methods, limits, and the polygon of feasible tensions."""
+
+from sagline.core.surface import group
+
+group(__name__)

@@ -1,8 +1,5 @@
 """Digital twin of a machine: the true robot, its drives, PLCs and network."""
 
-from sagline.twin.injected import KINDS, Injected, fault
-from sagline.twin.link import Report
-from sagline.twin.machine import Machine
-from sagline.twin.server import SCAN, Server
+from sagline.core.surface import group
 
-__all__ = ["KINDS", "SCAN", "Injected", "Machine", "Report", "Server", "fault"]
+group(__name__)

@@ -1,0 +1,36 @@
+"""Public names of `sagline.control`."""
+
+from .checks import Motion as Motion
+from .controller import Controller as Controller
+from .evidence import Cycle as Cycle
+from .evidence import Fault as Fault
+from .evidence import Reaction as Reaction
+from .execution import Execution as Execution
+from .execution import ExecutionStatus as ExecutionStatus
+from .execution import Samples as Samples
+from .execution import null_space_error as null_space_error
+from .execution import planned_position as planned_position
+from .execution import position_error as position_error
+from .faults import FAULT_TABLE as FAULT_TABLE
+from .faults import FaultRow as FaultRow
+from .faults import faults_of as faults_of
+from .link import Command as Command
+from .link import Link as Link
+from .link import Missing as Missing
+from .link import Mode as Mode
+from .link import Sample as Sample
+from .null_space import Gains as Gains
+from .null_space import NullSpace as NullSpace
+from .null_space import gains_along as gains_along
+from .null_space import null_space as null_space
+from .null_space import parity as parity
+from .real_time import Histogram as Histogram
+from .real_time import Pace as Pace
+from .recording import Event as Event
+from .recording import EventKind as EventKind
+from .recording import Recorded as Recorded
+from .recording import Recorder as Recorder
+from .states import RefusedError as RefusedError
+from .states import State as State
+from .tension_loop import TensionLoop as TensionLoop
+from .tension_loop import TensionSettings as TensionSettings

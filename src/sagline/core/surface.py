@@ -1,0 +1,60 @@
+"""Public names: the stubs beside the packages declare them, and each is loaded when it is first used."""
+
+from __future__ import annotations
+
+import re
+import sys
+from functools import cache
+from importlib import import_module
+from importlib.util import resolve_name
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+_LINE = re.compile(r"^from (\.\S*) import (?:(\w+) as \2|\*)$", re.MULTILINE)
+
+
+@cache
+def public_names(package: str, *, listed: bool = False) -> dict[str, str]:
+    """Public names of a package and the modules that contain them; `listed`: without those of `import *`."""
+    stub = Path(__file__).parents[1].joinpath(*package.split(".")[1:], "__init__.pyi")
+    found: dict[str, str] = {}
+    for place, name in _LINE.findall(stub.read_text(encoding="utf-8")):
+        module = resolve_name(place, package)
+        if name:
+            found[name] = module
+        elif not listed:
+            found |= dict.fromkeys(public_names(module), module) | found
+    return found
+
+
+class Group(ModuleType):
+    """A package that lists the names of its stub, and loads each name when it is first used."""
+
+    @property
+    def __all__(self) -> list[str]:
+        """The listed names."""
+        return sorted(public_names(self.__name__, listed=True))
+
+    def __dir__(self) -> list[str]:
+        return self.__all__
+
+    def __getattr__(self, name: str) -> Any:
+        module = public_names(self.__name__).get(name)
+        if module is None:
+            raise AttributeError(f"module {self.__name__!r} has no attribute {name!r}")
+        if module == self.__name__:
+            return import_module(f"{module}.{name}")
+        value = getattr(import_module(module), name)
+        setattr(self, name, value)
+        return value
+
+    def __setattr__(self, name: str, value: object) -> None:
+        """Set an attribute, but keep a public name when the import system binds a module with the same name."""
+        if not isinstance(value, ModuleType) or public_names(self.__name__).get(name, self.__name__) == self.__name__:
+            super().__setattr__(name, value)
+
+
+def group(package: str) -> None:
+    """Make a package, which is being imported, a `Group`."""
+    sys.modules[package].__class__ = Group

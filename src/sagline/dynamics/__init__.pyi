@@ -1,0 +1,34 @@
+"""Public names of `sagline.dynamics`."""
+
+from .simulation.results import Brake as Brake
+from .simulation.results import Break as Break
+from .simulation.results import Drop as Drop
+from .simulation.results import EnergyBalance as EnergyBalance
+from .simulation.results import Occurrence as Occurrence
+from .simulation.results import PickUp as PickUp
+from .simulation.results import Simulation as Simulation
+from .simulation.results import Stall as Stall
+from .simulation.simulate import simulate as simulate
+from .simulation.simulator import Reading as Reading
+from .simulation.simulator import Simulator as Simulator
+from .simulation.winches import SecondOrder as SecondOrder
+from .trajectories.fastest import fastest as fastest
+from .trajectories.shapers import EI as EI
+from .trajectories.shapers import Shaper as Shaper
+from .trajectories.shapers import ZV as ZV
+from .trajectories.shapers import ZVD as ZVD
+from .trajectories.shapers import shaped as shaped
+from .vibration.dynamic_stiffness import Damping as Damping
+from .vibration.dynamic_stiffness import dynamic_stiffness as dynamic_stiffness
+from .vibration.frequency_map import FrequencyMap as FrequencyMap
+from .vibration.frequency_map import frequency_map as frequency_map
+from .vibration.frequency_slopes import FrequencySlopes as FrequencySlopes
+from .vibration.frequency_slopes import frequency_slopes as frequency_slopes
+from .vibration.linearized import Linearized as Linearized
+from .vibration.linearized import linearized as linearized
+from .vibration.response import FrequencyResponse as FrequencyResponse
+from .vibration.response import frequency_response as frequency_response
+from .vibration.vibration import Vibration as Vibration
+from .vibration.vibration import VibrationStatus as VibrationStatus
+from .vibration.vibration import to_shape as to_shape
+from .vibration.vibration import vibration as vibration

@@ -1,0 +1,29 @@
+"""Public names of `sagline.plot`."""
+
+from .calibration import calibration as calibration
+from .drawing import drawing as drawing
+from .dynamics import energy as energy
+from .dynamics import frequencies as frequencies
+from .dynamics import frequency_map as frequency_map
+from .dynamics import response as response
+from .execution import execution as execution
+from .execution import measured_tensions as measured_tensions
+from .execution import mendable_tensions as mendable_tensions
+from .execution import place_errors as place_errors
+from .execution import states as states
+from .film import film as film
+from .front import front as front
+from .plan import error as error
+from .plan import errors as errors
+from .plan import lengths as lengths
+from .plan import overview as overview
+from .plan import path as path
+from .plan import small_multiples as small_multiples
+from .plan import tensions as tensions
+from .plan import velocity as velocity
+from .polygon import polygon as polygon
+from .robot import robot as robot
+from .sheet import save as save
+from .style import style as style
+from .workspace import slice as slice
+from .workspace import workspace as workspace
