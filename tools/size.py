@@ -115,7 +115,7 @@ def without_args() -> list[str]:
 
 def without_examples() -> list[str]:
     """Public functions without an Examples section."""
-    functions = [value for value in public_values() if isinstance(value, FunctionType)]
+    functions = [value for value in public_values().values() if isinstance(value, FunctionType)]
     return sorted(f"{each.__module__}.{each.__name__}" for each in functions if "Examples:" not in (each.__doc__ or ""))
 
 

@@ -57,6 +57,14 @@ def test_infeasible_pose_says_why(folder: FilePath) -> None:
     assert not (folder / "output").exists()
 
 
+def test_modes_at_an_infeasible_pose_name_the_shortfall(folder: FilePath) -> None:
+    result = CliRunner().invoke(app, ["vibrate", "article-suspended", "--pose", "7.45,0,1.5"])
+    plan = sl.inverse(sl.load_robot("article-suspended"), sl.Pose([7.45, 0, 1.5], np.eye(3)))
+    assert result.exit_code == 1
+    assert f" {float(plan.shortfall):.4g} N; " in result.stderr
+    assert result.stderr.endswith(f" cables {', '.join(map(str, np.flatnonzero(plan.blocking)))}\n")
+
+
 def test_large_forces_have_a_prefix_and_ordinary_spaces(folder: FilePath) -> None:
     result = sagline("article-suspended", "--pose", "0,0,2", "--wrench", "0,0,-30000")
     robot = sl.load_robot("article-suspended")

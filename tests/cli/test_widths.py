@@ -22,7 +22,7 @@ from typer.testing import CliRunner
 import sagline as sl
 from sagline.cli import terminal
 from sagline.cli.examples import examples
-from sagline.cli.main import app
+from sagline.cli.main import GROUPS, app
 from sagline.cli.output import TextTable
 from tests.abuse.command_lines import LINES
 from tests.kinematics.winches import wound
@@ -107,9 +107,8 @@ def printed(words: list[str], width: int | None, monkeypatch: pytest.MonkeyPatch
 
 
 def words_of(text: str) -> Counter[str]:
-    """Everything between blanks, rules apart; words that were broken behind a hyphen are put together."""
-    whole = re.sub(r"(?<=\w-)\n\s*", "", text)
-    return Counter(word for word in whole.split() if not set(word) <= set("─"))
+    """Everything between blanks, rules apart."""
+    return Counter(word for word in text.split() if not set(word) <= set("─"))
 
 
 @pytest.mark.parametrize("words", wide(COMMANDS, first=3), ids=" ".join)
@@ -123,6 +122,16 @@ def test_no_number_and_no_word_is_cut(words: list[str], monkeypatch: pytest.Monk
         if "--help" not in words:
             lines = [line for line in text.splitlines() if not re.match(WHOLE, line)]
             assert max(map(len, lines), default=0) <= width, f"too wide for {width} columns"
+
+
+@extended
+def test_the_help_lists_every_command_once_in_a_group(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = printed(["--help"], 80, monkeypatch)
+    places = [text.index(f"\n{title}:\n") for title in GROUPS]
+    assert places == sorted(places)
+    for title, names in GROUPS.items():
+        section = text[text.index(f"\n{title}:\n") :].partition("\n\n")[0]
+        assert re.findall(r"^  ([\w-]+) ", section, re.MULTILINE) == list(names)
 
 
 def test_a_table_is_split_where_it_does_not_fit_and_nowhere_else() -> None:

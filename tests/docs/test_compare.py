@@ -56,4 +56,6 @@ def test_what_is_said_of_sagline() -> None:
 
 def count_of(base: type) -> int:
     """Number of public kinds of a class."""
-    return sum(isinstance(each, type) and issubclass(each, base) and each is not base for each in public_values().values())
+    return sum(
+        isinstance(each, type) and issubclass(each, base) and each is not base for each in public_values().values()
+    )

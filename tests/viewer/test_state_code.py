@@ -118,7 +118,9 @@ def test_arguments_are_written_where_they_are_not_usual() -> None:
     assert method is not None
     assert {each.strip() for each in method[1].split(",")} == {"variable='frame_end'", "target=300.0"}
     assert "wrench" not in code
-    assert {type(method).__name__ for method in METHODS.values()} <= set(public_names("sagline"))  # all can be written so
+    assert {type(method).__name__ for method in METHODS.values()} <= set(
+        public_names("sagline")
+    )  # all can be written so
     same(code, snapshot)
 
 

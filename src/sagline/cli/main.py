@@ -9,6 +9,7 @@ from functools import cache
 from importlib import import_module
 from importlib.metadata import version
 from inspect import cleandoc
+from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any, cast, get_type_hints
 
@@ -21,41 +22,48 @@ from sagline.cli.ending import exit_code_of
 from sagline.cli.options import Condition
 from sagline.files.writing import finished_files
 
-NAMES = (
-    *("track", "lengths", "encoder", "run", "article", "identify", "forward", "tension", "vibrate", "simulate"),
-    *("workspace", "sweep", "design", "calibrate", "robots", "show", "examples", "new", "convert", "export-c"),
-    *("export-scl", "view", "share", "twin", "control", "experiment", "log", "cache"),
-)
+GROUPS = {  # the commands in the order of the help
+    "Robots": ("robots", "show", "new", "convert", "design", "calibrate", "identify"),
+    "Lengths and tensions": ("track", "lengths", "encoder", "forward", "tension"),
+    "Motion and workspace": ("simulate", "vibrate", "workspace", "sweep"),
+    "Pages": ("view", "share"),
+    "Machines": ("control", "twin", "log", "export-c", "export-scl"),
+    "The article": ("run", "article", "experiment"),
+    "Installation": ("examples", "cache"),
+}
+NAMES = tuple(chain.from_iterable(GROUPS.values()))
 MODULES = {"encoder": "lengths", "show": "robots", "export-c": "export", "export-scl": "export"}  # or their names
 DEBUG = "--debug"
+HYPHEN = "\N{NON-BREAKING HYPHEN}"
 MOST_NAMES = 6  # largest number of files listed after an error
 START = """\
 Cable robots with sagging cables: from a robot and a path to proven cable lengths.
 
 Start here:
 
-    sagline run                          the article's test, with its figures
-    sagline robots                       the preset robots
-    sagline show ipanema-1               all values of a robot
-    sagline examples --out DIR           files to try the commands with
-    sagline track cogiro own_path.yaml   a plan along a path of your own
-    sagline forward cogiro lengths.csv   poses from measured lengths
-    sagline tension cogiro               tension distribution methods compared
-    sagline vibrate cogiro               natural frequencies, with cable mass
-    sagline simulate cogiro --break 3@1s motion after a cable breaks
-    sagline workspace cogiro             workspace and its limits
-    sagline sweep own_sweep.yaml         robots x poses x loads, on all cores
-    sagline article                      the article redone, as one page
-    sagline view cogiro                  a platform to drag in the browser
-    sagline share cogiro                 a robot as one HTML page
-    sagline twin article-prototype       a simulated machine, over S7
-    sagline control article-prototype --plc ADDRESSES  a controller, line by line
-    sagline log run.mcap                 contents of a log, also after a crash
-    sagline cache                        kernels compiled by numba
-    sagline new my_robot.yaml            a robot of your own, by questions
-    sagline design cogiro design.yaml    a better robot, by search
-    sagline calibrate winches_robot.yaml winches.csv  parameters from a log
+    sagline run                         the article's test, with its figures
+    sagline show cogiro                 all values of a robot
+    sagline track cogiro                a plan of cable lengths along a path
+    sagline view cogiro                 a platform to drag in the browser
+    sagline examples --out DIR          files to try all commands with
+    sagline new my_robot.yaml           a robot of your own, by questions
 """
+
+
+class _Formatter(cast(Any, typer.Context.formatter_class)):  # type: ignore[misc]
+    """Help text whose lines are not broken inside names with hyphens."""
+
+    def write_dl(self, rows: Sequence[tuple[str, str]], *more: Any, **extra: Any) -> None:
+        """Write a list of options or commands."""
+        super().write_dl([(name, text.replace("-", HYPHEN)) for name, text in rows], *more, **extra)
+
+    def write_text(self, text: str) -> None:
+        """Write a paragraph."""
+        super().write_text(text.replace("-", HYPHEN))
+
+    def getvalue(self) -> str:
+        """The text, with usual hyphens."""
+        return str(super().getvalue()).replace(HYPHEN, "-")
 
 
 class _Command(TyperCommand):
@@ -91,6 +99,7 @@ class _Command(TyperCommand):
 
     def get_help(self, ctx: Any) -> str:
         """The help."""
+        ctx.formatter_class = _Formatter
         usage, _, rest = super().get_help(ctx).partition("\n\n")
         rest = re.sub(
             r"^(  [A-Z.\[\]]\S*) <([^>]+)>", lambda found: found[1].ljust(len(found[0])), rest, flags=re.MULTILINE
@@ -123,6 +132,18 @@ class _Group(TyperGroup):
         """Take the attributes of typer."""
         super().__init__(**attributes)
         self.commands: Any = _Commands()
+
+    def get_help(self, ctx: Any) -> str:
+        """The help."""
+        ctx.formatter_class = _Formatter
+        return str(super().get_help(ctx))
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the commands in groups, with equal columns."""
+        wide = max(map(len, NAMES))
+        for title, names in GROUPS.items():
+            with formatter.section(title):
+                formatter.write_dl([(name.ljust(wide), self.commands[name].short_help) for name in names])
 
     def main(self, args: Sequence[str] | None = None, *more: Any, **extra: Any) -> Any:
         """Run a subcommand; `--debug` may be at any place."""

@@ -40,7 +40,7 @@ ROWS = {  # rows of a summary: label and number format
     "feasible_share_percent": ("feasible poses [%]", ".4g"),
     "inverse_us_per_pose": ("inverse kinematics [µs per pose]", ".2f"),
 }
-NARROW, WIDE = 10, 30  # width of a column's head in characters; four narrow columns fit a line of 80
+WIDE = 30  # width of a column's head in characters
 MOST_GAPS = 5  # largest number of printed gaps
 WIDEN = " Move the path, or widen the tension limits."
 SAME_PLACE = 1e-6  # [m], far above rounding errors and far below the distance to a second equilibrium
@@ -133,7 +133,7 @@ def _summary_grid(runs: Sequence[ConfirmedRun]) -> TextTable:
     """Table with one column per run and one row per number."""
     heads = [""]
     for run in runs:
-        name = fill(run.plan.state.one_robot.name, NARROW if len(runs) > 2 else WIDE)
+        name = fill(run.plan.state.one_robot.name, WIDE, break_long_words=False, break_on_hyphens=False)
         heads.append(f"{name}\n{type(run.plan.state.cables.model).__name__}")
     numbers = [summary(run) for run in runs]
     rows = [[label, *(number_text(column[field], form) for column in numbers)] for field, (label, form) in ROWS.items()]

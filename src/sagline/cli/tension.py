@@ -76,13 +76,13 @@ def tension(
         for title, method in METHODS.items()
         if title not in LEFT_OUT
     }
-    reason = _reason(robot, place, least)
+    why = reason(robot, place, least)
     margin = float(capacity_margin(least.state))
     shape = tension_polygon(robot, place, model.build(), wrench, variable.value) if drawn else None
     for text in least.warnings:
         show_note(f"{robot.name}: ", text)
     if not any(plan is not None and plan.feasible for plan in plans.values()):
-        show_note("No tensions: ", reason, style="bold red")
+        show_note("No tensions: ", why, style="bold red")
         return OUTSIDE
     if shape is not None:
         from sagline import plot
@@ -111,7 +111,8 @@ def _plan(robot: Robot, pose: Pose, model: ModelName, method: TensionMethod, wre
         return None
 
 
-def _reason(robot: Robot, pose: Pose, plan: Plan) -> str:
+def reason(robot: Robot, pose: Pose, plan: Plan) -> str:
+    """Status of a plan of one pose: shortfall and blocking cables, or the motion that no cable resists."""
     from sagline.kinematics.status import PoseStatus
     from sagline.tension.singular import unresisted_motion
 

@@ -28,6 +28,7 @@ from sagline.cli.options import (
     quantity_option,
 )
 from sagline.cli.output import Output, TextTable, csv_text, number_text, show_table
+from sagline.cli.tension import reason
 from sagline.cli.terminal import show_note, show_text, working
 from sagline.core.errors import InvalidValueError
 from sagline.files.writing import write_text
@@ -118,7 +119,6 @@ def vibrate(
     from sagline.dynamics.vibration.vibration import VibrationStatus, vibration
     from sagline.files.writing import file_stem
     from sagline.kinematics.inverse import inverse
-    from sagline.kinematics.status import PoseStatus
 
     losses = Damping(loss_time, air_damping, damping)
     robot = robot_with_payload(name, payload)
@@ -131,7 +131,7 @@ def vibrate(
     with working(f"{robot.name}: modes up to {up_to:g} Hz") as line:
         plan = inverse(robot, place, wrench=wrench)
         if not plan.feasible:
-            show_note("No modes: ", PoseStatus(int(plan.status)).text, style="bold red")
+            show_note("No modes: ", reason(robot, place, plan), style="bold red")
             return OUTSIDE
         found = vibration(plan.state, up_to=up_to, damping=losses)
         if found.status in (VibrationStatus.UNSTABLE, VibrationStatus.NO_LENGTHS):

@@ -37,9 +37,11 @@ class Group(ModuleType):
         return sorted(public_names(self.__name__, listed=True))
 
     def __dir__(self) -> list[str]:
+        """The listed names."""
         return self.__all__
 
     def __getattr__(self, name: str) -> Any:
+        """Load a public name."""
         module = public_names(self.__name__).get(name)
         if module is None:
             raise AttributeError(f"module {self.__name__!r} has no attribute {name!r}")

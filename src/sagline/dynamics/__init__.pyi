@@ -14,9 +14,9 @@ from .simulation.simulator import Simulator as Simulator
 from .simulation.winches import SecondOrder as SecondOrder
 from .trajectories.fastest import fastest as fastest
 from .trajectories.shapers import EI as EI
-from .trajectories.shapers import Shaper as Shaper
 from .trajectories.shapers import ZV as ZV
 from .trajectories.shapers import ZVD as ZVD
+from .trajectories.shapers import Shaper as Shaper
 from .trajectories.shapers import shaped as shaped
 from .vibration.dynamic_stiffness import Damping as Damping
 from .vibration.dynamic_stiffness import dynamic_stiffness as dynamic_stiffness

@@ -1,7 +1,7 @@
 """Public names of `sagline.twin`."""
 
-from .injected import Injected as Injected
 from .injected import KINDS as KINDS
+from .injected import Injected as Injected
 from .injected import fault as fault
 from .link import Report as Report
 from .machine import Machine as Machine
