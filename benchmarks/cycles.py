@@ -7,11 +7,8 @@ from __future__ import annotations
 
 import argparse
 import gc
-import threading
-from collections.abc import Callable, Iterator
-from concurrent.futures import Future
+from collections.abc import Iterator
 from contextlib import closing
-from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -27,7 +24,7 @@ LATE = 5e-3  # a cycle that is later counts for the fault "cycle late" [s]
 SPEED = 0.1  # of the tour through the ten poses [m/s]
 LONG = 0.004  # speed of a path that takes a quarter of an hour [m/s]
 CORNERS = ([0.4, 0.3, 1.5], [-0.4, 0.3, 1.5])  # of this path [m]
-PLANS = 3  # number of plans in each way
+PLANS = 6  # number of plans
 
 
 class NotedPace(sl.control.Pace):
@@ -43,16 +40,6 @@ class NotedPace(sl.control.Pace):
         late = super().wait()
         self.late.append(late)
         return late
-
-
-class ThreadedPlanner:
-    """Planning in a thread of the loop's process, for comparison."""
-
-    def submit(self, robot: sl.Robot, work: Callable[[], Any]) -> Future[Any]:
-        """Begin work."""
-        done: Future[Any] = Future()
-        threading.Thread(target=lambda: done.set_result(work())).start()
-        return done
 
 
 def tours(control: sl.control.Controller, pace: NotedPace, minutes: float, home: sl.Pose) -> Iterator[Row]:
@@ -76,24 +63,15 @@ def tours(control: sl.control.Controller, pace: NotedPace, minutes: float, home:
 
 
 def planning(control: sl.control.Controller, pace: NotedPace, home: sl.Pose) -> Iterator[Row]:
-    """Plans of a path of a quarter of an hour beside the cycles, in another process and in a thread, alternately."""
-    context = control._context
+    """Plans of a path of a quarter of an hour beside the cycles."""
     path = sl.septic_path([home, *(sl.Pose(place, np.eye(3)) for place in CORNERS), home], speed=LONG)
-    ways: dict[str, Any] = {"in another process": context.planner, "in a thread": ThreadedPlanner()}
-    late: dict[str, list[float]] = {way: [] for way in ways}
+    pace.late.clear()
     for _ in range(PLANS):
-        for way, planner in ways.items():
-            context.planner = planner
-            pace.late.clear()
-            control.plan(path)
-            late[way] += pace.late
-    context.planner = ways["in another process"]
-    for way, found in late.items():
-        most, rare = 1e3 * max(found), 1e3 * np.quantile(found, 0.999)
-        measured = f"{rare:.2f}, {most:.2f} ms; {_beyond(np.array(found), LATE)} of {len(found):,} later than 5 ms"
-        yield Row(f"lateness beside plans of {path.duration / 60.0:.0f} minutes {way}: 99.9 %, largest", "", measured)
-    process, thread = (np.quantile(found, 0.999) for found in late.values())
-    yield Row("99.9 % beside plans in a thread, relative to another process", "", f"{thread / process:.1f}")
+        control.plan(path)
+    late = np.array(pace.late)
+    rare, most = 1e3 * np.quantile(late, (0.99, 1.0))
+    measured = f"{rare:.2f}, {most:.2f} ms; {_beyond(late, LATE)} of {len(late):,} later than 5 ms"
+    yield Row(f"lateness beside plans of {path.duration / 60.0:.0f} minutes: 99 %, largest", "", measured)
 
 
 def _beyond(late: Array, limit: float) -> int:

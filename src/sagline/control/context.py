@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from math import nan
 from typing import Final
@@ -17,7 +16,6 @@ from sagline.control.evidence import Cycle, Fault, Reaction
 from sagline.control.execution import Execution, ExecutionStatus, execution_of
 from sagline.control.faults import faults_of
 from sagline.control.link import PERIOD, Link, Sample
-from sagline.control.planner import Planner, planner_of
 from sagline.control.real_time import Garbage, Pace
 from sagline.control.recording import Event, EventKind, Journal, Recorded, Recorder, Tape
 from sagline.control.set_points import Along, Standing, standing_at
@@ -105,7 +103,6 @@ class Context:
     """Data and services that the states of a controller share.
 
     Attributes:
-        planner: Process for planning; None on a lockstep clock, which waits for a plan.
         state: State of the controller.
         sample: Newest sample; None before the first.
         zero: Offset from homing, added to lengths of samples [m], shape (m,).
@@ -144,7 +141,6 @@ class Context:
         self.method = optional(method, TensionMethod, "tension") or Closest()
         self.settings = optional(settings, TensionSettings, "loop") or TensionSettings()
         self.shadow = flag(shadow, "shadow")
-        self.planner: Planner | None = None if pace is None or shadow else planner_of(os.getpid())
         self.random = np.random.default_rng(None if seed is None else whole_number(seed, "seed", 0, MOST_SEED))
         self.sender = Sender(m, self.random)
         self.estimator = Estimator(robot, self.model)

@@ -24,7 +24,6 @@ from sagline.control.tension_loop import TensionSettings
 from sagline.core.arguments import instance
 from sagline.core.arrays import number
 from sagline.core.errors import InvalidValueError
-from sagline.kinematics.inverse import last_tensions
 from sagline.motion.path import Path
 from sagline.motion.rest_to_rest import septic_path
 from sagline.robot.pose import Pose
@@ -90,11 +89,7 @@ class Controller(Preparation):
         super().__init__(Context(robot, link, pace, model, tension, loop, record, shadow, seed))
         if pace is not None:
             c = self._context
-            work = partial(load_kernels, robot, c.period, c.model, c.method)
-            begun = None if c.planner is None else c.planner.submit(robot, work)
-            work()
-            if begun is not None:
-                begun.result()
+            load_kernels(robot, c.period, c.model, c.method)
 
     def plan(self, path: Path) -> Motion:
         """Plan a path and check it completely; nothing is sent.
@@ -109,10 +104,7 @@ class Controller(Preparation):
             RefusedError: If a check fails; the message names the check, the location and the next step.
         """
         c, given = self._context, instance(path, Path, "path")
-        # of the previous plan only the tensions, because a whole plan takes long to send
-        tensions = None if c.previous_plan is None else last_tensions(c.previous_plan, c.method.variable)
-        arguments = c.robot, given, c.period, c.model, c.method, tensions
-        return self._result_of(partial(plan_motion, *arguments))
+        return self._result_of(partial(plan_motion, c.robot, given, c.period, c.model, c.method, c.previous_plan))
 
     def start(self, path: Path | Motion) -> None:
         """Begin to follow a path.

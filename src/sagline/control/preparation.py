@@ -10,7 +10,7 @@ from sagline.control.active_states import Connecting, Holding, HomingState, Off,
 from sagline.control.commands import Disagreement
 from sagline.control.homing import Homing
 from sagline.control.monitor import Monitor
-from sagline.control.real_time import interrupt_calls
+from sagline.control.real_time import interrupt_calls, result_in_thread
 from sagline.control.recording import EventKind
 from sagline.control.states import RefusedError, State, check_transition
 from sagline.core.arguments import instance
@@ -181,16 +181,15 @@ class Preparation(Monitor):
 
     def _result_of(self, work: Callable[[], T]) -> T:
         """Result of long work; in real time, cycles continue during the work, because the PLCs would hold otherwise."""
-        planner = self._context.planner
-        if planner is None or self.state is State.OFF:
+        if self._context.pace is None or self.state is State.OFF:
             return work()
+        result = result_in_thread(work)
 
         def stop() -> None:
             self.stop()
-            planner.end()
+            result.cancel()
 
         with interrupt_calls(stop):
-            begun = planner.submit(self.robot, work)
-            while not begun.done():
+            while not result.done():
                 self.cycle()
-        return begun.result()
+        return result.result()

@@ -8,10 +8,11 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from contextlib import contextmanager, suppress
 from math import inf
 from types import FrameType
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
 
@@ -29,6 +30,7 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 
+T = TypeVar("T")
 BIN: Final = 1e-4  # width of a bin [s]
 BINS: Final = 1000  # number of bins, in addition to one for all longer durations
 
@@ -178,6 +180,31 @@ def interrupt_calls(stop: Callable[[], object]) -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
     if pressed:
         raise KeyboardInterrupt
+
+
+def result_in_thread(work: Callable[[], T]) -> Future[T]:
+    """Future result of work in another thread of ordinary priority; without effect on it, the future can be canceled.
+
+    Cycles go on, because compiled kernels release Python's lock. With another process, cycles are late when a long plan
+    arrives.
+    """
+    result: Future[T] = Future()
+
+    def run() -> None:
+        with suppress(AttributeError, OSError):  # the loop may have a priority in real time
+            os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+        try:
+            value = work()
+        except Exception as error:
+            if result.set_running_or_notify_cancel():
+                result.set_exception(error)
+            return
+        if result.set_running_or_notify_cancel():
+            result.set_result(value)
+
+    # a daemon, so that Python ends without the result
+    threading.Thread(target=run, name="sagline planning", daemon=True).start()
+    return result
 
 
 MOVE = 0.01  # length of the path [m]
