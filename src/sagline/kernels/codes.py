@@ -14,13 +14,13 @@ CABLE_SOLVED = 0
 CABLE_SLACK = 1  # carries no chord tension
 CABLE_NO_TENSION = 2  # the straight model does not determine a tension from a length
 CABLE_BELOW_VALIDITY = 3  # the empirical model's lowest point lies inside the span
-CABLE_TOO_SLACK = 4  # half its weight exceeds RANGE times the chord tension: outside the practical range
+CABLE_TOO_SLACK = 4  # outside the practical range: half the weight exceeds RANGE times the chord tension
 CABLE_NOT_CONVERGED = 5
 
 # Tension distribution methods.
 MINIMUM_NORM = 0
 CLOSEST = 1
-QUADRATIC_PROGRAM = 2  # methods up to this one: feasible point nearest to a target
+QUADRATIC_PROGRAM = 2  # methods with codes up to this one find the feasible point nearest to a target
 LOWEST_SUM = 3
 LOWEST_MAXIMUM = 4
 P_NORM = 5
@@ -47,20 +47,20 @@ POSE_SINGULAR = 2  # the structure matrix has lost rank
 POSE_TOO_SLACK = 3  # a cable has no catenary between its guides
 POSE_NOT_CONVERGED = 4
 POSE_NO_CHORD = 5  # both ends of a cable coincide
-POSE_NOT_COVERED = 6  # feasible, but not by the chosen tension distribution method
-POSE_UNBOUNDED = 7  # the feasible set is unbounded, and the chosen tension distribution method requires a bounded one
+POSE_NOT_COVERED = 6  # feasible, but the chosen tension distribution method found no tensions within the limits
+POSE_UNBOUNDED = 7  # the feasible set is unbounded, but the tension distribution method requires a bounded set
 POSE_BORDERLINE = 8  # too close to the border of the feasible set: neither tensions nor a proof were found
 POSE_UNSTABLE = 9  # solved, but the equilibrium is not stable
 UNPROVED_STABILITY = 10  # solved, and `stabilities_of_poses` decides whether it is stable
 
 # Status of the forward calculation of one sample.
 FORWARD_SOLVED = 0
-FORWARD_LOOSE = 1  # stable, but fewer taut cables than degrees of freedom
+FORWARD_LOOSE = 1  # stable, with fewer taut cables than degrees of freedom
 FORWARD_OVERSTRETCHED = 2  # unrealistic strain: the cables are too short to meet the platform
 FORWARD_UNSTABLE = 3  # an equilibrium, but not a minimum of the energy
 FORWARD_SINGULAR = 4  # an equilibrium with an unconstrained motion
 FORWARD_NOT_CONVERGED = 5
-FORWARD_NO_LENGTHS = 6  # all lengths NaN: a pose without a plan
+FORWARD_NO_LENGTHS = 6  # all lengths are NaN, because the pose has no plan
 FORWARD_FITTED = 7  # straight cables: least-squares pose
 
 # Result of the bracket of a pose's margin.

@@ -1,7 +1,7 @@
 """Decorators of kernels, and the back end that runs them: compiled C, numba, or plain Python.
 
-`SAGLINE_BACKEND` selects the back end. Without it, the first one that is available is used. Results differ by rounding
-at most.
+`SAGLINE_BACKEND` selects the back end. If it is not set, the first available back end is used. Results differ only by
+rounding.
 """
 
 from __future__ import annotations
@@ -83,22 +83,22 @@ def entry(function: F) -> F:
 
 
 def kernel(function: F) -> F:
-    """A kernel that only kernels call. Compiled by numba, it cannot be called from Python."""
+    """A kernel that only kernels call. If numba compiles it, Python cannot call it."""
     return _compiled(function, "kernel")
 
 
 def formula(function: F) -> F:
-    """A kernel that its callers contain, so that their loops over it vectorize."""
+    """A kernel that the compiler inlines into its callers, so that their loops vectorize."""
     return _compiled(function, "formula")
 
 
 def glue(function: F) -> F:
-    """A kernel that is inlined into its callers before compilation, so that passing arguments costs no time."""
+    """A kernel that is inlined into its callers before the compilation, so that its arguments cost no time."""
     return _compiled(function, "glue")
 
 
 def _compiled(function: F, kind: str) -> F:
-    """The function for the back end; the compiled library contains the kernels, so that nothing is left to do."""
+    """The function for the back end; unchanged for the compiled library, which contains the kernels."""
     if backend() == "numba":
         from sagline.kernels.with_numba import compiled
 
@@ -111,9 +111,9 @@ def _compiled(function: F, kind: str) -> F:
 
 
 def bound(function: Callable[..., object], *arguments: object, numbers: int = 0) -> Callable[..., object]:
-    """An entry with its arguments, for many calls; a call costs a microsecond less than one of the entry.
+    """An entry with its arguments, for many calls. A call takes a microsecond less than a call of the entry.
 
-    The arrays may change between calls. The last `numbers` arguments are numbers that each call gives again.
+    The contents of the arrays may change between calls. Each call gives new values of the last `numbers` arguments.
     """
     if isinstance(function, Entry):
         return function.bind(arguments, numbers)

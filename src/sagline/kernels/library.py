@@ -1,6 +1,6 @@
-"""The library of compiled kernels: all entries in C, loaded without a compiler.
+"""The library of compiled kernels. It contains all entries in C; loading requires no compiler.
 
-`tools/build.py` writes two files: for every processor, and for x86-64-v3 (processors with AVX2).
+`tools/build.py` writes two files: one for all processors and one for x86-64-v3 (processors with AVX2).
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ FUNCTIONS: Final = (  # of Python's stable interface, in the order of `Python` i
 )
 
 
-# conversion of a number and member of its slot, by the kind in a format
+# conversion of a number and member of its slot, for each letter of a format
 CONVERSIONS: Final[dict[str, tuple[Callable[[Any], Any], str]]] = {
     "f": (float, "f"),
     "i": (operator.index, "i"),
@@ -50,7 +50,7 @@ class LibraryError(Exception):
     """
 
     def __init__(self, reason: str, *, stale: bool = False) -> None:
-        """Keep the reason."""
+        """Store the reason."""
         super().__init__(reason)
         self.stale = stale
 
@@ -80,7 +80,7 @@ class Entry:
     """A compiled kernel that Python calls, for one or several sets of argument types."""
 
     def __init__(self, function: Callable[..., object], rows: list[_Row], library: ctypes.PyDLL, python: Any) -> None:
-        """Keep the rows of the function; `library` and `python` are those of `Library`."""
+        """Store the rows of the function; `library` and `python` as in `Library`."""
         self.__wrapped__, self.__name__, self.__doc__ = function, function.__name__, function.__doc__
         self.__module__ = function.__module__
         self._rows = [(row, ctypes.addressof(row)) for row in rows]
@@ -99,7 +99,7 @@ class Entry:
         raise self._wrong_types()
 
     def bind(self, arguments: tuple[object, ...], numbers: int) -> Bound:
-        """The kernel with these arguments, whose arrays are kept alive; the last numbers may change at each call."""
+        """The kernel with these arguments, which it keeps alive; the last numbers may change at each call."""
         for row, address in self._rows:
             slots = (Slot * row.slots)()
             if self._fill(self._python, address, arguments, slots) == 0:
@@ -117,7 +117,7 @@ class Bound:
     __slots__ = ("_call", "_kept", "_kind", "_last", "_name", "_result", "_slots")
 
     def __init__(self, name: str, row: _Row, slots: Any, numbers: int, arguments: object) -> None:
-        """Use filled slots; the arguments are kept alive."""
+        """Store filled slots, and keep the arguments alive."""
         self._name, self._kind, self._call = name, row.result, _CALL(row.call)
         self._result = Slot()
         self._slots, self._kept = ctypes.addressof(slots), (arguments, slots)

@@ -1,7 +1,7 @@
-"""Work memory of kernels, which do not allocate memory themselves and so avoid reference counting.
+"""Work memory of kernels. Kernels do not allocate memory themselves, which avoids reference counting.
 
-Python passes one flat array of numbers and one of counters. `block`, `vector` and `counters` take named arrays from
-them one after the other.
+Python passes one flat array of numbers and one flat array of counters. `block`, `vector` and `counters` take named
+arrays from these, one after the other.
 """
 
 from __future__ import annotations
@@ -41,5 +41,5 @@ def vector(memory: Memory, size: int) -> tuple[Array, Memory]:
 
 @glue
 def counters(memory: Memory, count: int) -> tuple[Indices, Memory]:
-    """Counters (count,), and the remaining memory; reshape fails if too few remain."""
+    """Counters (count,), and the remaining memory; `reshape` raises an error if too few counters remain."""
     return memory.counters[:count].reshape((count,)), Memory(memory.numbers, memory.counters[count:])

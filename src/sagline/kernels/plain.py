@@ -1,8 +1,8 @@
-"""Kernels as plain Python functions that give the numbers of the compiled code.
+"""Kernels as plain Python functions with the same results as the compiled code.
 
-Python raises an exception where compiled code gives inf, NaN or 0: at a division by zero, the root of a negative
-number, an overflow. `plain` replaces these operations in the source of a kernel. Two errors of a kernel that compiled
-code does not notice stay exceptions: an index outside an array, and an integer of inf or NaN.
+At a division by zero, the root of a negative number or an overflow, Python raises an exception, but compiled code gives
+inf, NaN or 0. `plain` replaces these operations in the source of a kernel. Compiled code does not detect an index
+outside an array, or the conversion of inf or NaN to an integer. In plain Python both raise an exception.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ ENTRY: Final = "entry"  # name of the decorator of kernels that Python calls
 
 
 def plain(function: F) -> F:
-    """A kernel in plain Python, with the lines of its file; what it calls has to be plain too.
+    """A kernel in plain Python, with the line numbers of its file. The functions that it calls must also be plain.
 
     Args:
         function: A function of the subset that docs/contributing/c-kernels.md defines.
@@ -33,7 +33,7 @@ def plain(function: F) -> F:
     module = ast.parse(textwrap.dedent("".join(lines)))
     ast.increment_lineno(module, first - 1)
     _Compiled().visit(module)
-    # the replacements are variables of a function around the kernel, whose module stays as it is
+    # the replacements are variables of a function around the kernel, so that its module does not change
     around = ast.parse(f"def around({', '.join(REPLACEMENTS)}): return {function.__name__}")
     outer = around.body[0]
     assert isinstance(outer, ast.FunctionDef)
@@ -53,10 +53,10 @@ def plain(function: F) -> F:
 
 
 class _Compiled(ast.NodeTransformer):
-    """Replaces the operations in which Python and compiled code differ."""
+    """Replacement of the operations in which Python and compiled code differ."""
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
-        """Remove the decorator; an entry takes numbers of NumPy too."""
+        """Remove the decorator; an entry also accepts numbers of NumPy."""
         is_entry = any(getattr(each, "id", "") == ENTRY for each in node.decorator_list)
         node.decorator_list = []
         self.generic_visit(node)
@@ -71,42 +71,42 @@ class _Compiled(ast.NodeTransformer):
         return ast.copy_location(ast.Name("_math", node.ctx), node) if node.id in ("math", "np") else node
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
-        """Elements of arrays are numbers of Python: those of NumPy warn, and their integers overflow."""
+        """Convert elements of arrays to numbers of Python; numbers of NumPy warn, and NumPy integers overflow."""
         self.generic_visit(node)
         return _call("_number", node) if isinstance(node.ctx, ast.Load) else node
 
     def visit_For(self, node: ast.For) -> ast.AST:
-        """So are those that a loop runs over."""
+        """Convert the elements of a loop to numbers of Python."""
         self.generic_visit(node)
         node.iter = node.iter if isinstance(node.iter, ast.Call) else _call("_numbers", node.iter)
         return node
 
     def visit_AugAssign(self, node: ast.AugAssign) -> ast.AST:
-        """`a += b` is `a = a + b`."""
+        """Replace `a += b` by `a = a + b`."""
         target = copy.deepcopy(node.target)
         target.ctx = ast.Load()
         value = ast.copy_location(ast.BinOp(target, node.op, node.value), node)
         return self.visit(ast.copy_location(ast.Assign([node.target], value), node))
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
-        """Division, remainder and power."""
+        """Replace division, remainder and power."""
         self.generic_visit(node)
         name = OPERATORS.get(type(node.op))
         return _call(name, node.left, node.right) if name else node
 
 
 def _call(name: str, *arguments: ast.expr) -> ast.Call:
-    """A call of a replacement in the place of its first argument."""
+    """A call of a replacement, at the position of its first argument."""
     return ast.copy_location(ast.Call(ast.Name(name, ast.Load()), list(arguments), []), arguments[0])
 
 
 def _argument(value: Any) -> Any:
-    """An argument of an entry, with numbers of Python."""
+    """An argument of an entry, with its numbers as numbers of Python."""
     return tuple(map(_argument, value)) if type(value) is tuple else _number(value)
 
 
 def _number(value: Any) -> Any:
-    """A number of Python for a number of NumPy; other values as they are."""
+    """A number of NumPy as a number of Python; other values unchanged."""
     return value.item() if isinstance(value, np.generic) else value
 
 
@@ -116,7 +116,7 @@ def _numbers(values: Iterable[Any]) -> Iterable[Any]:
 
 
 def _quotient(a: Any, b: Any) -> Any:
-    """Quotient a / b; inf or NaN by zero, with the sign of zero."""
+    """Quotient a / b; for b = 0, inf or NaN with the sign of zero."""
     try:
         return a / b
     except ZeroDivisionError:
@@ -126,7 +126,7 @@ def _quotient(a: Any, b: Any) -> Any:
 
 
 def _whole_quotient(a: Any, b: Any) -> Any:
-    """Quotient a // b; 0 for integers by zero."""
+    """Quotient a // b; 0 for integers with b = 0."""
     try:
         return a // b
     except ZeroDivisionError:
@@ -134,7 +134,7 @@ def _whole_quotient(a: Any, b: Any) -> Any:
 
 
 def _remainder(a: Any, b: Any) -> Any:
-    """Remainder a % b; by zero 0 for integers, else NaN."""
+    """Remainder a % b; for b = 0, 0 for integers, else NaN."""
     try:
         return a % b
     except ZeroDivisionError:
@@ -154,7 +154,7 @@ def _power(base: Any, exponent: Any) -> Any:
 
 
 def _hypotenuse(x: float, y: float) -> float:
-    """Function hypot of the C library; that of Python rounds in another way."""
+    """Function hypot of the C library, because `math.hypot` rounds in another way."""
     try:
         return abs(complex(x, y))
     except OverflowError:
@@ -162,7 +162,7 @@ def _hypotenuse(x: float, y: float) -> float:
 
 
 def _without_exceptions(function: Callable[..., Any]) -> Callable[..., Any]:
-    """A function of math that gives the numbers of NumPy, inf or NaN, where it would raise an exception."""
+    """A function of math that returns the inf or NaN of NumPy instead of an exception."""
 
     def call(*arguments: float) -> Any:
         try:

@@ -1,7 +1,7 @@
-"""Sources of the kernels, their digest, and the folder in which numba keeps what it compiles from them.
+"""Sources of the kernels, their digest, and the folder of the machine code from numba.
 
-numba does not notice that a function called from another file was edited and would go on running stale machine code.
-What a file's kernels become is therefore kept in a folder named by a hash of that file and of all that it imports.
+numba does not detect changes of functions in other files and would run stale machine code. The machine code of a file
+is therefore in a folder whose name is a hash of this file and of all files that it imports.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ SOURCES = Path(__file__).parent
 BACK_ENDS = frozenset(SOURCES / f"{name}.py" for name in ("jit", "library", "plain", "sources", "with_numba"))
 DIGEST = hashlib.sha256().digest_size  # bytes at the beginning of a file of machine code
 SUFFIX = ".nbc"
-# `from sagline.kernels.algebra import angle, cholesky`, names in parentheses too
+# `from sagline.kernels.algebra import angle, cholesky`, also with names in parentheses
 IMPORT = re.compile(rf"^from {re.escape(KERNELS)}\.?([\w.]*) import (\([^)]*\)|.*)$", re.MULTILINE)
 
 
@@ -67,7 +67,7 @@ def sources_of(module: str, sources: Path) -> frozenset[Path]:
 
 @cache
 def _imported(source: str) -> frozenset[str]:
-    """Names of what a file imports of the kernels: modules, and what is in them, which is not a file."""
+    """Names that a file imports from the kernels: modules, and names in modules (which do not belong to a file)."""
     names = set()
     for match in IMPORT.finditer(source):
         package = match[1]
@@ -78,13 +78,13 @@ def _imported(source: str) -> frozenset[str]:
 
 def cache_folder(module: str, sources: Path = SOURCES) -> Path:
     """Folder of the machine code of a module's kernels."""
-    # a kernel from elsewhere, a benchmark's, may call any
+    # a kernel outside this folder, such as a benchmark, may call all kernels
     return FOLDER / digest(sources, sources_of(module, sources) or sources.rglob("*.py"))
 
 
 @cache
 def folder_of(function_module: str) -> Path:
-    """`cache_folder` of a function's module, which does not change while the program runs."""
+    """`cache_folder` of the module of a function, computed once per process."""
     return cache_folder(function_module.removeprefix(f"{KERNELS}."))
 
 

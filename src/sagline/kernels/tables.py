@@ -27,7 +27,7 @@ BODY_COLUMNS = 5
 # pose row: position of the platform origin [m], unit quaternion, scalar last
 POSE_COLUMNS = 7
 
-# rows of the result of one pose, each of m values; rows from WRAP on only for robots with pulleys or dead lengths
+# rows of the result of one pose, m values each; rows from WRAP on exist only with pulleys or dead lengths
 SPAN, RISE, LENGTH, HORIZONTAL, VERTICAL, TENSION = 0, 1, 2, 3, 4, 5
 WRAP, WRAPPED, DEAD = 6, 7, 8  # wrap angle [rad], unstrained length on the pulley and behind it [m]
 SINE = 9  # sin phi of the chord that touches the pulley

@@ -1,8 +1,8 @@
-"""Kernels compiled by numba, and their machine code on disk, whose content is checked by a digest.
+"""Kernels compiled by numba, and their machine code on disk. A digest checks the files.
 
-There is one file per kernel and set of argument types, written whole. A damaged file is replaced after a new
-compilation. If the folder cannot be used, kernels are compiled again in every process, and one line on standard error
-reports it.
+Each kernel has one file per set of argument types, written atomically. A damaged file is replaced after a new
+compilation. If the folder cannot be used, every process compiles the kernels again, and one line on standard error
+reports this.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ _dumps: Any = serialize.dumps
 
 
 class KernelCache:
-    """Machine code of one kernel, in place of numba's own cache, which uses paths as keys and reads files unchecked."""
+    """Machine code of one kernel. It replaces numba's own cache, which uses paths as keys and does not check files."""
 
     def __init__(self, function: Callable[..., object], folder: Path, *, announced: bool = False) -> None:
-        """Use a folder for a function, without reading or writing."""
+        """Set the folder for a function, without reading or writing."""
         self._announced = announced
         self.cache_path = str(folder)
         self._folder, self._code = folder, function.__code__
@@ -112,15 +112,15 @@ OPTIONS: Final[dict[str, dict[str, Any]]] = {
 def compiled(function: F, kind: str) -> F:
     """A kernel whose machine code is kept on disk; a division by zero gives inf or NaN as in NumPy.
 
-    Kernels allocate nothing (`sagline.kernels.memory`), and so need no counting of references (_nrt), which would take
-    a quarter of their time where arrays come in NamedTuples.
+    Kernels allocate no memory (`sagline.kernels.memory`). They need no reference counting (_nrt), which would take a
+    quarter of their time for arrays in NamedTuples.
     """
     every: dict[str, Any] = {"error_model": "numpy", "_nrt": False, **OPTIONS[kind]}
     return kept(cast("F", numba.njit(**every)(function)), folder_of(function.__module__), announced=kind == "entry")
 
 
 def kept(dispatcher: F, folder: Path, *, announced: bool = False) -> F:
-    """A compiled function whose machine code is kept in a folder; one line announces its compilation if asked for."""
+    """A compiled function whose machine code is kept in a folder. One line announces its compilation if requested."""
     numbas: Any = dispatcher
     numbas._cache = KernelCache(numbas.py_func, folder, announced=announced)
     return dispatcher
@@ -129,8 +129,8 @@ def kept(dispatcher: F, folder: Path, *, announced: bool = False) -> F:
 def machine_code(function: Callable[..., object], arguments: tuple[object, ...]) -> Callable[..., object]:
     """An entry's machine code for arguments of these types, compiled or read from disk.
 
-    Calling it saves the look at every argument's type, a microsecond for a dozen arrays: only arguments of these very
-    types may go in.
+    A call does not check the types of the arguments, which saves a microsecond for a dozen arrays. All arguments must
+    have exactly these types.
     """
     dispatcher: Any = function
     signature = tuple(cast("Any", numba.typeof)(argument) for argument in arguments)

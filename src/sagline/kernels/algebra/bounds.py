@@ -1,7 +1,8 @@
 """Bounds: a point x (d,) satisfies a bound if START + x . row lies between LOW and HIGH.
 
-rows is (d, k), one column per bound; bounds is (3, k), and HIGH may be infinite. A label names one side of a bound:
-2i is the lower side of bound i, 2i + 1 the upper side. The normal of a side points inward.
+The array rows (d, k) has one column per bound. The array bounds (3, k) has the rows START, LOW and HIGH; HIGH may be
+infinite. A label names one side of a bound: 2i is the lower side of bound i, and 2i + 1 is its upper side. The normal
+of a side points inward.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from sagline.kernels.jit import formula, kernel
 START, LOW, HIGH = 0, 1, 2
 STRIP_ROWS = 3
 
-TOLERANCE = 1e-12  # relative to the largest bound: a side violated by less than this counts as satisfied
+TOLERANCE = 1e-12  # relative to the largest bound; a smaller violation counts as none
 
 
 @formula
@@ -30,7 +31,7 @@ def largest_bound(bounds: Array) -> float:
 
 @kernel
 def box_radius(largest: float, bounds: Array) -> float:
-    """Radius of a box around the common points of two-sided bounds; with one-sided bounds, around the near part."""
+    """Half width of a box that contains all common points of two-sided bounds; a large box for one-sided bounds."""
     for i in range(bounds.shape[1]):
         if bounds[HIGH, i] == math.inf:
             return 1e4 * largest
@@ -52,7 +53,7 @@ def side_of(bounds: Array, label: int) -> float:
 
 @formula
 def most_violated_bound(rows: Array, bounds: Array, point: Array, slack: float, first: bool) -> int:
-    """Label of the side that a point violates most by more than a slack (or the first violated one); -1 if none."""
+    """Label of the most violated side, or of the first violated one; -1 if no violation exceeds the slack."""
     d, k = rows.shape
     worst = slack
     label = -1

@@ -13,7 +13,7 @@ STILL = 1e-16  # relative to the largest eigenvalue: a shorter step is below rou
 
 @formula
 def _tridiagonalize(matrix: Array, diagonal: Array, beside: Array, vector: Array) -> None:
-    """Householder: fill diagonal (n,) and beside (n,) of a similar tridiagonal matrix; matrix is overwritten."""
+    """Reduce a matrix to a similar tridiagonal one (Householder): fill diagonal and beside, (n,); overwrites matrix."""
     n = matrix.shape[0]
     product = diagonal  # used as work memory; the diagonal is filled at the end
     for k in range(n - 2):
@@ -50,7 +50,7 @@ def _tridiagonalize(matrix: Array, diagonal: Array, beside: Array, vector: Array
 
 @formula
 def _gershgorin_bound(diagonal: Array, beside: Array, sign: float) -> float:
-    """Lower bound of the eigenvalues of sign times a tridiagonal matrix, by Gershgorin's circles."""
+    """Lower bound of the eigenvalues of sign T, by Gershgorin's circles; T is tridiagonal."""
     low = math.inf
     before = 0.0
     for k in range(diagonal.shape[0]):
@@ -62,10 +62,10 @@ def _gershgorin_bound(diagonal: Array, beside: Array, sign: float) -> float:
 
 @kernel
 def _lowest_eigenvalue(diagonal: Array, beside: Array, sign: float) -> float:
-    """Smallest eigenvalue of sign times a tridiagonal matrix, by Laguerre's iteration from below.
+    """Smallest eigenvalue of sign T, by Laguerre's iteration from below; T is tridiagonal.
 
-    The pivots q of the shifted matrix have the characteristic polynomial as their product, and all pivots are positive
-    below the smallest root. The iteration never passes this root.
+    The product of the pivots q of the shifted matrix is its characteristic polynomial. All pivots are positive below
+    the smallest root. The iteration never passes this root.
     """
     n = diagonal.shape[0]
     root = _gershgorin_bound(diagonal, beside, sign)
@@ -94,9 +94,8 @@ def _lowest_eigenvalue(diagonal: Array, beside: Array, sign: float) -> float:
 def extreme_eigenvalues(matrix: Array, diagonal: Array, beside: Array, work: Array, flat: float) -> tuple[float, float]:
     """Smallest and largest eigenvalue of a symmetric matrix (n, n); all arrays are overwritten.
 
-    The largest eigenvalue is computed only if the absolute smallest one is at most flat times the upper bound.
-    Otherwise the upper bound is returned in its place, which takes less time. It is at most three times the largest
-    eigenvalue.
+    The largest eigenvalue is computed only if |smallest| <= flat times its upper bound. Otherwise the upper bound is
+    returned, which takes less time. The bound is at most three times the largest eigenvalue.
     """
     _tridiagonalize(matrix, diagonal, beside, work)
     low = _lowest_eigenvalue(diagonal, beside, 1.0)

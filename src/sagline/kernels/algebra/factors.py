@@ -1,8 +1,8 @@
 """Small dense systems: Cholesky factor, Gauss elimination, orthonormal frames, and Householder factors.
 
-For a matrix (n, m), n <= m, matrix.T = Q R: the first n columns of the orthogonal Q give the minimum-norm solutions,
-the other columns span the null space. Independent sums run in parallel, because the loops are small and would
-otherwise wait for the previous sum.
+A matrix (n, m), n <= m, is factored as matrix.T = Q R with an orthogonal Q. The first n columns of Q give the
+minimum-norm solutions. The other columns span the null space. The loops are short, so that one sum would wait for its
+last term. They therefore add several independent sums.
 """
 
 from __future__ import annotations
@@ -89,10 +89,10 @@ def solve_general(matrix: Array, right: Array) -> bool:
 
 @formula
 def orthogonalize_row(frame: Array, count: int, triangle: Array) -> float:
-    """Subtract from row count of a frame (.., d) its components along the orthonormal rows before it.
+    """Make row `count` of a frame (.., d) orthogonal to the orthonormal rows before it.
 
-    These components fill column `count` of the triangle above its diagonal. The result is the squared length of the
-    rest.
+    The subtracted components fill column `count` of the triangle above its diagonal. Returns the squared length of the
+    new row.
     """
     d = frame.shape[1]
     for b in range(count):
@@ -122,15 +122,15 @@ def normalize_row(frame: Array, count: int, triangle: Array, square: float) -> N
 
 HEADS, FACTORS = 0, 1
 
-RANK = 1e-9  # relative to its row: a smaller diagonal entry of R means that rank is lost
+RANK = 1e-9  # smallest diagonal entry of R relative to its row; rank is lost below it
 
 
 @formula
 def factorize(reduced: Array, diagonals: Array) -> bool:
     """QR in place; returns whether the matrix (n, m) has full rank.
 
-    Row k of reduced then contains column k of R up to its diagonal, and the vector v of reflection k from there on. Row
-    HEADS of diagonals (2, n) is the diagonal of R. Row FACTORS contains 2/|v|^2 of the reflections.
+    Afterwards row k of reduced contains column k of R above the diagonal, then the vector v of reflection k. In
+    diagonals (2, n), row HEADS is the diagonal of R, and row FACTORS contains 2/|v|^2 of the reflections.
     """
     n, m = reduced.shape
     for k in range(n):
@@ -181,7 +181,7 @@ def orthogonal_factor(reduced: Array, diagonals: Array, q: Array) -> None:
 
 @formula
 def pseudo_inverse(reduced: Array, diagonals: Array, q: Array, inverse: Array) -> None:
-    """Fill the transposed pseudo-inverse (n, m): the minimum-norm solution is right . inverse."""
+    """Fill the transposed pseudo-inverse (n, m). The minimum-norm solution is right . inverse."""
     n, m = reduced.shape
     for k in range(n - 1, -1, -1):
         for i in range(m):

@@ -110,7 +110,7 @@ def atanhc_excess_polynomial(y: float) -> float:
 
 @formula
 def atanhc_excess(u: float) -> float:
-    """atanh(u)/u - 1, to full relative precision for u <= 0.25 and to 1e-14 above, for 0 <= u < 1."""
+    """Value of atanh(u)/u - 1 for 0 <= u < 1. Its relative error is below rounding up to u = 0.25 and 1e-14 above."""
     y = u * u
     if y <= EXCESS_LIMIT:
         return atanhc_excess_polynomial(y)
@@ -135,7 +135,7 @@ def _arctangent_ratio(y: float) -> float:
 
 @formula
 def angle(sine: float, cosine: float) -> float:
-    """The angle [rad] of a direction with sine >= 0, in 0 to pi; both may have any common factor, but not both be 0."""
+    """Angle of a direction, 0 to pi [rad]; sine >= 0. A common positive factor of sine and cosine has no effect."""
     level = abs(cosine)
     steep = sine > MORE * level
     middle = sine > LESS * level

@@ -1,8 +1,8 @@
 """Linear programs in few unknowns, over bounds: the dual simplex method.
 
 The method visits points that are optimal for their active sides. It ends when a point satisfies all bounds. It also
-ends when a side contradicts the active sides, which proves infeasibility. For the same rows and cost with other limits,
-the sides of the last solution are still optimal. The search then starts from them.
+ends when a side contradicts the active sides, which proves infeasibility. If only the limits change, the sides of the
+last solution are still optimal, and the search starts from them.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ PIVOT = 1e-11  # smallest pivot, relative to the largest entry of the row
 class Basis(NamedTuple):
     """The active sides of an optimal point. The next program with the same rows and cost can start from them.
 
-    A limit that was finite must be finite in the next program too: a side at infinity cannot be active.
+    A finite limit must stay finite in the next program, because a side at infinity cannot be active.
     """
 
-    # labels of the sides, and of the side that contradicts them if the bounds have no common point, (d + 1,); labels[0]
-    # is -1 without a basis. Labels from 2k on are sides of a box that replaces infinity.
+    # labels of the active sides, (d + 1,). The last entry is the side that contradicts them if the bounds have no
+    # common point. labels[0] is -1 without a basis. Labels from 2k on are sides of a box that replaces infinity.
     labels: Indices
     weights: Array  # multipliers of the infeasibility proof, (d + 1,), >= 0
     inverse: Array  # inverse of the matrix of the sides' normals, (d, d)
@@ -116,7 +116,7 @@ def _move_to_vertex(rows: Array, bounds: Array, cost: Array, radius: float, basi
 def lowest_point(rows: Array, bounds: Array, cost: Array, slack: float, basis: Basis, point: Array) -> int:
     """Fill the point (d,) of least cost . x that satisfies all bounds up to a slack; returns the outcome.
 
-    A slack of 0 means the usual tolerance. A solution on the box counts as infinitely far.
+    A slack of 0 means the usual tolerance. A program whose solution is on the box counts as unbounded.
     """
     labels, weights, inverse = basis
     d = cost.size

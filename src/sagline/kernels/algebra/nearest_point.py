@@ -21,7 +21,7 @@ from sagline.kernels.jit import glue, kernel
 from sagline.kernels.memory import Memory, block, counters
 
 EXCHANGES = 2000
-DEPENDENT = 1e-10  # a side depends on others if less than this share of its normal is outside their span
+DEPENDENT = 1e-10  # a side depends on the others if a smaller part of its normal is outside their span
 
 # rows of `pushes`
 PUSH, SHARE = 0, 1  # multipliers of the active sides, and components of the entering side
@@ -99,7 +99,7 @@ def _drop_side(rows: Array, held: ActiveSet, leaving: int) -> None:
 def nearest_point(rows: Array, bounds: Array, target: Array, slack: float, held: ActiveSet, point: Array) -> bool:
     """Fill the point (d,) nearest to the target (d,) that satisfies all bounds up to a slack; False if none exists.
 
-    held: active sides of a similar problem, or labels[0] = 0; filled with the active sides of this point.
+    held: active sides of a similar problem, or labels[0] = 0 without one; filled with the active sides of the point.
     """
     labels, frame, triangle, pushes = held
     d = target.size

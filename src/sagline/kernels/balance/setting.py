@@ -1,7 +1,8 @@
 """Data of one pose: cables in place, their limits, and the factored force balance.
 
-Only this module prepares a pose. The tension distribution methods use the variable t = scale times chord tension +
-offset. It is a chord, horizontal or frame-end tension, possibly weighted. Limits and minimum norm refer to t - offset.
+Only this module prepares a pose. The tension distribution methods use the variable t = scale tau + offset, where tau is
+the chord tension. The variable is a chord, horizontal or frame-end tension, possibly weighted. Limits and minimum norm
+refer to t - offset.
 """
 
 from __future__ import annotations
@@ -148,7 +149,7 @@ def _choose_variable(variable: int, weight: Array, cables: Cables, balance: Bala
 
 @glue
 def scale_limits(cables: Cables, balance: Balance, i: int) -> None:
-    """Fill the limits of one cable in the distribution's variable; the largest strain does not limit a distribution."""
+    """Fill the limits of one cable in the distribution's variable, without the limit of the strain."""
     limited = cables.high[i] < math.inf and not is_limited_by_strain(cables, i)
     balance.bounds[LOW, i] = cables.low[i] * balance.scale[i]
     balance.bounds[HIGH, i] = cables.high[i] * balance.scale[i] if limited else math.inf

@@ -107,9 +107,9 @@ def fill_structure_matrix(geometry: Array, matrix: Array) -> None:
 def needed_wrench(geometry: Array, body: Array, wrench: Array, sag_force: Array, needed: Array) -> None:
     """Fill the wrench (6,) that the chord tensions must supply: J tau = needed.
 
-    It balances three loads: the platform's weight, which no other argument includes; the given wrench (external plus
-    inertial, about the center of mass); and the cables' sag forces T_z - tau sin phi (m,), which act at the platform
-    ends.
+    It balances three loads. The first is the platform's weight, which no other argument includes. The second is the
+    given wrench, external plus inertial, about the center of mass. The third are the sag forces T_z - tau sin phi (m,)
+    of the cables, which act at the platform ends.
     """
     fz = body[tables.MASS] * body[tables.GRAVITY] - wrench[2]
     mx = -wrench[3]

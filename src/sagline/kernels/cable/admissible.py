@@ -1,9 +1,9 @@
-"""Admissible chord tensions of a cable at a pose: the one definition for all feasibility; docs/model.md, section 5.
+"""Admissible chord tensions of a cable at a pose, which all tests of feasibility use; docs/model.md, section 5.
 
-All admissible tensions of a cable are one interval. Its ends follow from the robot's limits, a limit of the sag and a
-limit of the stretch. A limit of the tension at the frame end becomes a limit of the chord tension. The tension at the
-frame end falls and then rises with the chord tension. Usually the interval is on the rising side. It includes tensions
-on the falling side if the tension at the frame end has no value below its lower limit.
+The admissible tensions of a cable form one interval. Its ends follow from the robot's limits, a limit of the sag and a
+limit of the stretch. Limits of the frame-end tension are converted to limits of the chord tension. While the chord
+tension grows, the frame-end tension first falls and then rises. Usually the interval is on the rising side. It includes
+the falling side if the frame-end tension is nowhere below its lower limit.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from sagline.kernels.cable.states import frame_end_tension, taut_at_frame_end
 from sagline.kernels.cable.terms import Chord, Material, Model
 from sagline.kernels.jit import formula, glue, kernel
 
-LOOSEST = 5.0  # largest X = wD/(2 tau): the cable is fifteen times as long as its chord, almost without tension
-# At a strain of 1 the cable is twice as long as without tension. The limit applies without an upper limit of the robot.
+LOOSEST = 5.0  # largest X = wD/(2 tau), of a cable fifteen times as long as its chord, almost without tension
+# Largest strain; the cable is then twice as long as without tension. Applies if the robot has no upper limit.
 LARGEST_STRAIN = 1.0
-SMALLEST = 1e-100  # chord tension of a catenary without weight [N], whose equations divide by it
+SMALLEST = 1e-100  # smallest chord tension of a catenary without weight [N]; the equations divide by it
 SECTIONS = 80  # steps of the search for the smallest admissible tension of a slack cable
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 PRECISION = 1e-14  # relative
@@ -36,7 +36,7 @@ class TensionLimits(NamedTuple):
 
 @formula
 def sags(model: Model, half_weight: float) -> bool:
-    """True if a cable sags, and its length grows without bound as its tension decreases; half_weight: wD/2 [N]."""
+    """True if a cable sags, so that its length grows without bound as its tension decreases; half_weight: wD/2 [N]."""
     return half_weight > 0.0 and model.code != codes.STRAIGHT and model.code != codes.ELASTIC
 
 
@@ -56,15 +56,15 @@ def largest_of_strain(model: Model, stiffness: float) -> float:
 
 @formula
 def is_limited_by_strain(cables: Cables, i: int) -> bool:
-    """True if the largest admissible tension of a cable is that of its largest strain."""
+    """True if the largest strain determines the largest admissible tension of a cable."""
     return cables.high[i] == LARGEST_STRAIN * cables.stiffness[i]
 
 
 @glue
 def cable_without_tension(cables: Cables) -> int:
-    """Index of the first cable without admissible tensions; -1 if every cable has some.
+    """Index of the first cable without admissible tensions; -1 if all cables have admissible tensions.
 
-    By the article's bound (54), a horizontal cable has none.
+    With the article's bound (54), a horizontal cable has no admissible tension.
     """
     for i in range(cables.low.size):
         if not (cables.low[i] <= cables.high[i] and cables.low[i] < math.inf):
@@ -102,7 +102,7 @@ def _limits_at_chord(
 ) -> tuple[float, float]:
     """Limits of the chord tension from limits of the tension at the frame end [N].
 
-    Infinity and zero if the tension at the frame end is above its upper limit at every chord tension.
+    Returns infinity and zero if every chord tension gives a frame-end tension above its upper limit.
     """
     largest = taut_at_frame_end(model, chord, material, pulley, high, -1.0)
     if largest < 0.0:
@@ -117,9 +117,9 @@ def _limits_at_chord(
 def _slackest_at_frame_end(
     model: Model, chord: Chord, material: Material, pulley: Pulley, tension: float, floor: float, taut: float
 ) -> float:
-    """Smallest chord tension from which on the tension at the frame end is at most a given one, up to the taut one [N].
+    """Smallest chord tension of the range with frame-end tensions up to `tension` [N]; `taut` is the largest.
 
-    Golden sections find a chord tension with a smaller tension at the frame end. The wanted one is below it.
+    Golden sections find one chord tension of this range. The result is below it.
 
     floor: lower bound of the result [N]; taut: chord tension on the rising side with the given tension [N].
     """

@@ -49,9 +49,9 @@ def batch_from_tension(
 ) -> None:
     """Length, forces on the platform end and status of every cable at its chord tension.
 
-    Loops without branches solve all cables of a chunk as ordinary catenaries. Other cables are then solved again, one
-    by one. Each loop has one result, because the compiler does not vectorize more. buffer is a work array, (BUFFERS,
-    CHUNK).
+    Loops without branches solve all cables of a chunk as ordinary catenaries. Cables that are not ordinary are then
+    solved again, one by one. Each loop computes one result, because the compiler does not vectorize loops with more.
+    buffer is a work array, (BUFFERS, CHUNK).
     """
     model = model_of(terms)
     count = length_out.shape[0]
@@ -141,7 +141,7 @@ def batch_end(
 def catenary_point(
     fraction: float, horizontal: float, vertical: float, length: float, weight: float, stiffness: float
 ) -> tuple[float, float]:
-    """Point at a fraction of the unstrained length from the frame end; it is the end of the cable's first part."""
+    """Point at a fraction of the unstrained length from the frame end."""
     part = fraction * length
     return catenary_end(horizontal, vertical - weight * (length - part), part, weight, stiffness)
 
@@ -192,7 +192,8 @@ def _catenary_sag(
 ) -> float:
     """Largest drop below the chord [m]; on a vertical chord, the drop below its lower end."""
     slope = rise / span if span > 0.0 else 0.0
-    # length from the frame end to the point whose tangent is parallel to the chord (to the turning point if vertical)
+    # length from the frame end to the point with a tangent parallel to the chord; to the turning point of a vertical
+    # cable
     part = length - (vertical - horizontal * slope) / weight
     part = min(max(part, 0.0), length)
     x, z = catenary_end(horizontal, vertical - weight * (length - part), part, weight, stiffness)
@@ -239,7 +240,8 @@ def closures(
 ) -> None:
     """Error of each cable in the equations of its model [m].
 
-    Catenary: distance of its computed end from the platform end. Other models: error of the length.
+    For a catenary, the distance between its computed end and the platform end; for other models, the error of the
+    length.
     """
     model = model_of(terms)
     for i in range(residual_out.shape[0]):

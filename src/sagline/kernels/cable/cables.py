@@ -14,8 +14,8 @@ from sagline.kernels.memory import Memory, block
 class Cables(NamedTuple):
     """Data of the cables of one pose, with m values per field.
 
-    The free span of a cable is its part between the exit point of its pulley and its platform end. If no cable has a
-    pulley or dead length, the free spans are the whole cables, and their fields share the memory of the cables' fields.
+    The free span of a cable is the part between the exit point at its pulley and its platform end. If no cable has a
+    pulley or dead length, each free span is the whole cable. Its fields then use the memory of the cable's fields.
     """
 
     machine: bool  # True if any cable has a pulley or dead length

@@ -27,7 +27,8 @@ RANGE = 500.0  # largest X = wD/(2 tau): sinh X overflows above it; practical ca
 TAUT_STRAIN = 0.01  # largest e = tau/EA at which two Newton steps reach full precision
 ORDINARY_STRAIN = 0.1  # largest e at which three Newton steps reach full precision
 STEPS = 80
-# Relative steps after which the next step is below rounding: Newton's method squares the error, Halley's cubes it.
+# Relative steps after which the next step is below rounding. Newton's method squares the error; Halley's method cubes
+# it.
 SMALL_NEWTON_STEP = 1e-9
 SMALL_HALLEY_STEP = 1e-6
 SPLIT = 134217729.0  # 2^27 + 1: halves of a mantissa
@@ -35,7 +36,7 @@ SPLIT = 134217729.0  # 2^27 + 1: halves of a mantissa
 
 @kernel
 def slack_series(horizontal: float, vertical_a: float, vertical: float, tension_a: float, tension_b: float) -> float:
-    """The ratio atanh(u)/u of P1 if u = (T_zB - T_zA)/(T_A + T_B) may be close to 1; infinite for a fold."""
+    """The ratio atanh(u)/u of P1 for u = (T_zB - T_zA)/(T_A + T_B), accurate also close to 1; infinite for a fold."""
     total = tension_a + tension_b
     u = (vertical - vertical_a) / total
     # T_A + T_B times (1 - u), from sums of positive terms instead of a subtraction
@@ -89,7 +90,7 @@ def _ordinary_newton_step(ratio: float, square: float, cosine2: float, sine2: fl
 def ordinary_length_ratio(half_weight: float, sine: float, cosine: float, strain: float) -> float:
     """P3 by two Newton steps: L/D for X = wD/(2 tau) <= 2 and e = tau/EA <= 0.01; a third step is needed up to e = 0.1.
 
-    The function has no branches and no loop, so that a loop over cables vectorizes.
+    Without branches and inner loops, a loop over cables vectorizes.
     """
     cosine2 = cosine * cosine
     sine2 = sine * sine
@@ -103,7 +104,7 @@ def ordinary_length_ratio(half_weight: float, sine: float, cosine: float, strain
 
 @formula
 def ordinary_length_ratio_near(half_weight: float, sine: float, cosine: float, strain: float, ratio: float) -> float:
-    """One Newton step from an approximate ratio: the ratio at a similar tension, or the result of two steps."""
+    """One Newton step on an approximate ratio, which is the ratio at a similar tension or the result of two steps."""
     return _ordinary_newton_step(ratio, half_weight * half_weight, cosine * cosine, sine * sine, strain)
 
 
@@ -152,7 +153,7 @@ def length_ratio(half_weight: float, sine: float, cosine: float, strain: float) 
 
 @kernel
 def sag_force_ratio(half_weight: float, sine: float, strain: float, ratio: float) -> float:
-    """Part of the vertical platform-end force due to weight, divided by the chord tension: T_z/tau - sin phi."""
+    """Sag force divided by the chord tension: T_z/tau - sin phi."""
     taut = 1.0 - strain * ratio
     h = half_weight * taut
     s = taut * sinhc(h)
@@ -181,7 +182,7 @@ def _product_error(a: float, product: float) -> float:
 
 @formula
 def relative_excess(span: float, rise: float, length: float) -> float:
-    """(D^2 - L^2)/L^2 without rounding error in the difference."""
+    """Value of (D^2 - L^2)/L^2 without rounding error in the difference."""
     x2 = span * span
     z2 = rise * rise
     l2 = length * length
@@ -215,7 +216,7 @@ def _parameter_start(xi: float, zeta: float, kappa: float, excess: float) -> flo
 
 @formula
 def _catenary_parameter(xi: float, zeta: float, kappa: float, excess: float) -> tuple[float, int]:
-    """P2: the h of a cable with span/L = xi > 0, rise/L = zeta, kappa = wL/(2EA) and (D^2 - L^2)/L^2, and a status."""
+    """P2: h and status of a cable with span/L = xi > 0, rise/L = zeta, kappa = wL/(2EA) and (D^2 - L^2)/L^2."""
     xi2 = xi * xi
     zeta2 = zeta * zeta
     low = 0.0

@@ -21,7 +21,8 @@ def cable_courses(
 ) -> None:
     """Points of exact cables from their frame anchors over their pulleys to their platform ends.
 
-    A cable without a tension is drawn along its chord; without a chord from anchor to platform end.
+    A cable without a tension is drawn along its chord. A cable without a chord is drawn from its anchor to its platform
+    end.
 
     Args:
         cables: Row of the cable_table, (m, CABLE_COLUMNS).

@@ -1,8 +1,8 @@
 """Cable on a drum: number of turns as a function of the length off the drum, and the strain at which it was wound.
 
 Turns count from the drum's first groove, where the cable is fastened, and increase with the cable on the drum.
-Layer k lies in the grooves between the turns of the layer below it, and advances in the opposite direction.
-docs/model.md, section 10.
+Layer k lies in the grooves between the turns of layer k - 1, and advances in the opposite direction. docs/model.md,
+section 10.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from sagline.kernels.jit import entry, formula
 # columns of the table of drums
 PITCH_RADIUS, LAYER_RISE, GROOVE_PITCH, LAYER_TURNS, LAYERS, DISTANCE, OFFSET = range(7)
 DRUM_COLUMNS = 7
-# rows of a drum's memory: each column is a piece of cable from its deeper end, which was wound first, to its upper end
+# rows of a drum's memory. Each column is a piece of cable, between its deeper end, wound first, and its upper end.
 DEEP_LENGTH, DEEP_PATH, DEEP_STRAIN, TOP_STRAIN = range(4)
 MEMORY_ROWS = 4
 STEPS = 60  # limit of Newton steps; a convex function of one variable needs two or three
-SETTLED = 1e-8  # last step in turns, or relative to all turns: the next step would be its square
+SETTLED = 1e-8  # size of the last step, in turns or relative to all turns; the next step would be the square of it
 
 
 @formula
@@ -37,7 +37,7 @@ def _turn_length(drum: Array, layer: int) -> float:
 
 @formula
 def _exit_position(drum: Array, layer: int, turns: float) -> tuple[float, float]:
-    """Axial position at which the cable leaves the drum, from the pulley's middle, and its change per turn."""
+    """Axial position where the cable leaves the drum, relative to the pulley's middle, and its change per turn."""
     if layer % 2 == 0:
         return drum[OFFSET] + drum[GROOVE_PITCH] * turns, drum[GROOVE_PITCH]
     return drum[OFFSET] + drum[GROOVE_PITCH] * (drum[LAYER_TURNS] - turns), -drum[GROOVE_PITCH]
@@ -45,7 +45,7 @@ def _exit_position(drum: Array, layer: int, turns: float) -> tuple[float, float]
 
 @formula
 def _wound_length(drum: Array, layer: int, turns: float) -> float:
-    """Decrease of the length off the drum by the first turns of a layer [m]; convex and increasing in the turns."""
+    """Decrease of the length off the drum [m] due to the first turns of a layer; convex and increasing."""
     first, _ = _exit_position(drum, layer, 0.0)
     place, _ = _exit_position(drum, layer, turns)
     distance = drum[DISTANCE]
@@ -109,15 +109,15 @@ def follow_memory(
 ) -> None:
     """Conversion between unstrained lengths off the drum and lengths along the path of winding.
 
-    Cable keeps the strain at which it is wound in until it is let out again. This strain is linear between two samples.
-    Cable that was never off the drum has the initial strain. Samples that are NaN are omitted.
+    On the drum the cable keeps its strain at the winding. This strain is linear between two samples. Cable that was
+    never off the drum has the initial strain. NaN samples are omitted.
 
     Args:
         given: Lengths off the drum [m], (N, m): unstrained, or along the path of winding.
-        strain: Strain of the cable at the drum, at each sample, (N, m).
+        strain: Strain of the cable at the drum for each sample, (N, m).
         rest_strain: Initial strain of the cable on the drum, (m,).
         unstrained: True if the given lengths are unstrained.
-        found_out: Filled with the lengths of the other kind [m], (N, m).
+        found_out: Filled with the converted lengths [m], (N, m).
         memory: Work array, (MEMORY_ROWS, N).
     """
     for i in range(given.shape[1]):

@@ -1,8 +1,8 @@
 """Forces of all cables of one pose at their unstrained lengths.
 
-Most calls are for a pose close to the previous one. Ordinary catenaries therefore take two Halley steps from the
-parameter h of the previous pose. These loops have no branches, so that they vectorize. Cables that have not converged
-afterwards are solved one by one, from the beginning.
+Most calls are for a pose close to the previous pose. Two Halley steps from the previous parameter h therefore solve
+ordinary catenaries. These loops have no branches, so that they vectorize. Cables that have not converged are then
+solved one by one, without the previous h.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class _EquivalentCables(NamedTuple):
 
 @glue
 def _two_halley_steps(gravity: float, cables: Array, asked: _EquivalentCables, rows: Array) -> None:
-    """Two Halley steps for every cable from the stored parameter; one result per loop, so that each loop vectorizes."""
+    """Two Halley steps for every cable from the stored parameter. A loop with one result vectorizes."""
     m = cables.shape[0]
     for i in range(m):
         rows[g.KAPPA, i] = 0.5 * cables[i, tables.DENSITY] * gravity * asked.length[i] / asked.stiffness[i]
@@ -95,11 +95,11 @@ def _has_converged(rows: Array, i: int) -> bool:
 def forces_from_lengths(model: Model, cables: Array, rows: Array, behind: bool | None) -> None:
     """Fill T_x, T_z, tau and status of every cable of a pose from its geometry and length.
 
-    Cables over pulleys are solved in passes, as cables that start where the chord touches the pulley; docs/model.md,
-    section 10.
+    A cable over a pulley is replaced by a cable that starts where the chord touches the pulley. Several passes correct
+    the replacement; docs/model.md, section 10.
 
     cables: rows of the cable_table, (m, CABLE_COLUMNS); rows: as in `sagline.kernels.cable.geometry`, (CABLE_ROWS, m);
-    behind: that of the model, as a separate argument, so that None excludes unused code from compilation.
+    behind: `Model.behind` as a separate argument; None excludes the code of pulleys from compilation.
     """
     if behind is None:
         bare = _EquivalentCables(rows[g.SPAN], rows[g.RISE], rows[g.LENGTH], cables[:, tables.STIFFNESS])

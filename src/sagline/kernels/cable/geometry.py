@@ -1,4 +1,4 @@
-"""Span, rise and azimuth of each cable from anchors and pose, and the rows of the array for all cables of a pose.
+"""Span, rise and azimuth of each cable from anchors and pose, and the rows of the arrays for a pose.
 
 No other module computes span, rise and azimuth; docs/model.md, section 1.
 """
@@ -38,9 +38,9 @@ def tangent(radius: float, entry: float, span: float, rise: float) -> tuple[floa
     """Length, sin phi and cos phi of the tangent from a pulley to a point; NaN if no tangent exists.
 
     The pulley is in the cable's vertical plane. Span and rise are measured from the point where the cable enters the
-    pulley. entry is +1 for a cable that enters from below. A point inside the pulley, or past its near side, does not
-    have a tangent. If the cable is vertical again after half a turn on its pulley, the exit is twice the radius away
-    from the entry; the point is then straight below the exit, or above it if the cable enters from above.
+    pulley. entry is +1 for a cable that enters from below. A point inside the pulley, or past its near side, has no
+    tangent. After half a turn on the pulley the cable is vertical, and its exit is twice the radius away from its
+    entry. The point is then straight below the exit, or above it if the cable enters from above.
     """
     across = span - radius
     along = entry * rise
@@ -106,18 +106,18 @@ def cable_geometries(robots: Array, bodies: Array, poses: Array, rotation: Array
 LENGTH = GEOMETRY_ROWS  # unstrained length [m]
 HORIZONTAL, VERTICAL, TENSION = LENGTH + 1, LENGTH + 2, LENGTH + 3  # T_x, T_z, tau [N]
 STATUS = LENGTH + 4  # status of the cable
-# rows of `cable_forces`; PARAMETER is h, kept from pose to pose, NaN if the previous pose had none
+# rows of `cable_forces`; PARAMETER is the h of the previous pose, NaN without one
 PARAMETER, KAPPA, EXCESS, FIRST, SECOND = LENGTH + 5, LENGTH + 6, LENGTH + 7, LENGTH + 8, LENGTH + 9
 XX, XZ, ZX, ZZ = LENGTH + 10, LENGTH + 11, LENGTH + 12, LENGTH + 13  # in-plane stiffness [N/m]
 SOFT = LENGTH + 14  # EA of the cable that `cable_forces` solves [N]
 # Rows of cables over pulleys. The ASKED rows contain span, rise and length [m] of an equivalent cable without a pulley.
-# The OFF rows contain the corrections [m] of these values with which its forces are those of the cable; they are kept
-# from pose to pose.
+# The OFF rows contain corrections [m] of these values, which make the forces of both cables equal. The next pose starts
+# with these corrections.
 ASKED_SPAN, ASKED_RISE, ASKED_LENGTH = LENGTH + 15, LENGTH + 16, LENGTH + 17
 OFF_X, OFF_Z, OFF_LENGTH = LENGTH + 18, LENGTH + 19, LENGTH + 20
 FREE_SPAN, FREE_RISE, FREE_LENGTH = LENGTH + 21, LENGTH + 22, LENGTH + 23  # of the free span [m]
 WRAP, WRAP_SINE, WRAP_COSINE = LENGTH + 24, LENGTH + 25, LENGTH + 26  # psi [rad]
 LEAVING, TOTAL = LENGTH + 27, LENGTH + 28  # tension T_A at the exit point, and T_A + T_B [N]
-BEHIND, END_X, END_Z = LENGTH + 29, LENGTH + 30, LENGTH + 31  # cable behind the chord; end of the free span [m]
+BEHIND, END_X, END_Z = LENGTH + 29, LENGTH + 30, LENGTH + 31  # length behind the chord; end of the free span [m]
 ACROSS = LENGTH + 32  # stiffness normal to the plane [N/m]
 CABLE_ROWS = LENGTH + 33

@@ -1,4 +1,4 @@
-"""The switch between cable models, by an integer code and two parameters, in both directions; the shallow cable.
+"""The switch between cable models, and the shallow cable: length from tension, and tension from length.
 
 The shallow cable is a straight line of tension tau plus a vertical force b on its platform end; docs/model.md, section
 3. One pair of equations serves the parabolic model (b = wD/2, k = g^2/24, stretched by tau) and the article's empirical
@@ -32,7 +32,7 @@ def stretching_tension(tension: float, sine: float, cosine: float, sag_force: fl
 def shallow_length_ratio(
     tension: float, sine: float, cosine: float, sag_force: float, sag: float, stiffness: float
 ) -> float:
-    """L/D; sag = k (rho D cos phi)^2 [N^2]; sag force = b [N] if the stretching tension includes it, else 0."""
+    """Ratio L/D. sag is k (rho D cos phi)^2 [N^2]; sag_force is b [N] if the stretching tension includes it, else 0."""
     return (1.0 + sag / (tension * tension)) / (1.0 + stretching_tension(tension, sine, cosine, sag_force) / stiffness)
 
 
@@ -40,10 +40,10 @@ def shallow_length_ratio(
 def shallow_tension(
     chord: float, sine: float, cosine: float, sag_force: float, sag: float, stiffness: float, length: float
 ) -> tuple[float, bool]:
-    """Chord tension at which the shallow cable has the given length, and True if it was found.
+    """Chord tension of a shallow cable from its length, and True if it was found.
 
-    Newton steps start from above on the cubic of the parabolic model, and continue on the model's own length within a
-    bracket. A cable without sag that is longer than its chord has the tension 0.
+    The first Newton steps use the cubic of the parabolic model and start from above. The other steps use the model's
+    own length and stay within a bracket. A cable without sag that is longer than its chord has the tension 0.
     """
     p = (length - chord) / length * stiffness
     q = stiffness * chord * sag / length

@@ -1,9 +1,9 @@
 """Cables over pulleys, of given unstrained lengths, at one pose; docs/model.md, section 10.
 
 Each cable is replaced by an equivalent cable without a pulley, which starts where the chord touches the pulley. The
-equivalent cable is shorter by the length behind that point, and softer because that length stretches too. The error of
-its platform end is added to its span and rise in the next pass. The corrections are kept from pose to pose, so that one
-or two passes suffice for a nearby pose. Each loop has one result and no branches, so that it vectorizes.
+length behind this point makes the equivalent cable shorter. Its stretch makes the equivalent cable softer. The error of
+the platform end corrects span and rise in the next pass. The next pose starts with these corrections, so that a nearby
+pose needs only one or two passes. Each loop has one result and no branches, so that it vectorizes.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def chord_at(rows: Array, i: int) -> Chord:
 
 @formula
 def _wrap_at(rows: Array, i: int) -> Wrap:
-    """Wrap of one cable of a pose on its pulley, after `update_from_equivalent_cables`."""
+    """Wrap of one cable on its pulley, after `update_from_equivalent_cables`."""
     return Wrap(rows[g.WRAP_SINE, i], rows[g.WRAP_COSINE, i], rows[g.WRAP, i])
 
 
@@ -66,7 +66,7 @@ def start_passes(cables: Array, rows: Array) -> None:
 
 @glue
 def fill_equivalent_cables(model: Model, cables: Array, rows: Array) -> None:
-    """Fill the equivalent cables, which are solved in place of the cables over pulleys."""
+    """Fill the equivalent cables, which replace the cables over pulleys."""
     m = rows.shape[1]
     for i in range(m):
         length = rows[g.LENGTH, i]
@@ -105,7 +105,7 @@ def update_from_equivalent_cables(model: Model, cables: Array, rows: Array) -> f
 
 @glue
 def _exit_points_from_forces(model: Model, cables: Array, rows: Array) -> None:
-    """Compute exit points, free spans and free lengths of exact cables over pulleys from T_x and T_zA."""
+    """Fill exit points, free spans and free lengths of exact cables over pulleys from T_x and T_zA."""
     m = rows.shape[1]
     for i in range(m):  # T_zA
         rows[g.VERTICAL, i] -= cables[i, tables.DENSITY] * model.gravity * rows[g.ASKED_LENGTH, i]
@@ -177,7 +177,7 @@ def _end_errors(rows: Array) -> float:
 
 @glue
 def _length_errors(model: Model, cables: Array, rows: Array) -> float:
-    """`_end_errors` for shallow and weightless cables, which leave along their chord; weightless ones have no error."""
+    """`_end_errors` for shallow and weightless cables, which leave along the chord; 0 without weight."""
     largest = 0.0
     for i in range(rows.shape[1]):
         material, pulley, chord = material_at(cables, i), pulley_at(cables, i), chord_at(rows, i)
@@ -213,10 +213,10 @@ def behind_at(model: Model, cables: Array, rows: Array, i: int) -> Behind:
 
 @formula
 def end_motion_per_length(model: Model, cables: Array, rows: Array, i: int) -> tuple[float, float, float]:
-    """Motion of the platform end at fixed force: x and z per meter of cable, and the share of it per newton of H.
+    """Motion of the platform end at fixed force: x and z per meter of cable; equivalent cable length per newton of H.
 
-    A newton of H moves the platform end in the same direction as cable that is let out. The third value is the length
-    of cable that has the same effect, because the part behind P stretches.
+    An increase of H stretches the part behind P. The platform end then moves as if cable were let out. The third value
+    is this length of cable per newton of H.
     """
     material, pulley, wrap, tension = (
         material_at(cables, i),
@@ -234,7 +234,7 @@ def end_motion_per_length(model: Model, cables: Array, rows: Array, i: int) -> t
 
 @formula
 def stiffness_in_series(model: Model, cables: Array, rows: Array, i: int, plane: PlaneStiffness) -> PlaneStiffness:
-    """In-plane stiffness of a cable from that of its free span, in series with the part behind P."""
+    """In-plane stiffness of a cable: its free span in series with the part behind P."""
     if not rows[g.LEAVING, i] > 0.0:
         return plane
     x, z, gives = end_motion_per_length(model, cables, rows, i)

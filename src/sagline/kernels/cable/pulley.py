@@ -1,10 +1,10 @@
-"""A cable over the pulley at its frame anchor, and the straight run behind it; docs/model.md, section 10.
+"""A cable over the pulley at its frame anchor, and the cable between drum and pulley; docs/model.md, section 10.
 
-The pulley swivels about a vertical axis through the anchor A, where the cable enters it. It is therefore in the cable's
-vertical plane. The cable leaves the pulley at the point P in the direction of the force F_A = (T_x, T_zA) there. This
-force alone determines P. The model has no friction. H = T + T^2/(2 EA) - w z is therefore constant along the whole
-cable, and -H is the derivative of its energy by its length. With beta = w R/EA and E_A = 1 + T_A/EA, the neglected
-terms on the pulley are of the order R beta^2.
+The cable enters the pulley at the anchor A. The pulley swivels about the vertical axis through A, and is therefore in
+the cable's vertical plane. The cable leaves the pulley at the point P in the direction of the force F_A = (T_x, T_zA)
+at P. This force alone determines P. The model has no friction. H = T + T^2/(2 EA) - w z is therefore constant along the
+whole cable. The derivative of the cable's energy with respect to its length is -H. With beta = w R/EA and E_A = 1 +
+T_A/EA, the neglected terms on the pulley are of the order R beta^2.
 """
 
 from __future__ import annotations
@@ -93,16 +93,16 @@ def robots_have_machine(robots: Array) -> bool:
 
 @formula
 def free_span(pulley: Pulley, chord: Chord, cosine: float) -> float:
-    """Horizontal distance from the exit point to the platform end [m]; cosine: of the wrap angle.
+    """Horizontal distance from the exit point to the platform end [m]; cosine: cos psi.
 
-    chord: chord of the tangent from the platform end.
+    chord: the tangent from the platform end to the pulley.
     """
     return chord.length * chord.cosine + pulley.radius * (cosine - pulley.entry * chord.sine)
 
 
 @formula
 def free_rise(pulley: Pulley, chord: Chord, sine: float) -> float:
-    """Height of the platform end above the exit point [m]; sine: of the wrap angle."""
+    """Height of the platform end above the exit point [m]; sine: sin psi."""
     return chord.length * chord.sine + pulley.radius * (pulley.entry * (chord.cosine - sine))
 
 
@@ -110,10 +110,10 @@ def free_rise(pulley: Pulley, chord: Chord, sine: float) -> float:
 def exit_after(
     pulley: Pulley, weight: float, stiffness: float, force: tuple[float, float], before: tuple[float, float]
 ) -> tuple[float, float]:
-    """Sine and cosine of the wrap angle after one Newton step, from those before it.
+    """Sine and cosine of the wrap angle after one Newton step.
 
     force: T_x and T_zA of a cable that leaves at the angle before the step. If this angle grows by d, the free span
-    loses the length R d/E_A, and T_zA grows by its weight.
+        loses the length R d/E_A, and T_zA grows by the weight of this length.
     """
     horizontal, vertical_a = force
     tension = math.sqrt(horizontal * horizontal + vertical_a * vertical_a)
@@ -143,7 +143,7 @@ def from_axis(pulley: Pulley, chord: Chord) -> float:
 def _strains(
     pulley: Pulley, weight: float, stiffness: float, tension: float, sine: float
 ) -> tuple[float, float, float]:
-    """E = 1 + e at three points: P, the entry of the pulley, and the drum; sine: of the wrap angle."""
+    """Stretch E = 1 + e at P, at the entry of the pulley, and at the drum; sine: sin psi."""
     leaving = 1.0 + tension / stiffness
     entering = math.sqrt(leaving * leaving - 2.0 * pulley.entry * weight * pulley.radius / stiffness * sine)
     return leaving, entering, math.sqrt(entering * entering - 2.0 * weight * pulley.rise / stiffness)
@@ -151,7 +151,7 @@ def _strains(
 
 @formula
 def behind(pulley: Pulley, weight: float, stiffness: float, tension: float, wrap: Wrap) -> Behind:
-    """Unstrained length on the pulley and behind it, from the tension at P; weight: per length [N/m]."""
+    """Unstrained lengths on the pulley and behind it, from the tension at P; weight: weight per length [N/m]."""
     strained, first, last = _strains(pulley, weight, stiffness, tension, wrap.sine)
     beta = weight * pulley.radius / stiffness
     falls = pulley.entry * beta * (1.0 - wrap.cosine - wrap.angle * wrap.sine)
@@ -161,7 +161,7 @@ def behind(pulley: Pulley, weight: float, stiffness: float, tension: float, wrap
 
 @formula
 def behind_cable(model: Model, material: Material, pulley: Pulley, tension: float, wrap: Wrap) -> Behind:
-    """`behind` for any model; only the exact cable has weight there, and the straight cable does not stretch."""
+    """`behind` for any model: only the exact cable has weight behind P, and the straight cable does not stretch."""
     if model.code == codes.STRAIGHT:
         return Behind(pulley.radius * wrap.angle, pulley.dead)
     weight = material.density * model.gravity if model.code == codes.CATENARY else 0.0
@@ -170,7 +170,7 @@ def behind_cable(model: Model, material: Material, pulley: Pulley, tension: floa
 
 @formula
 def softness(pulley: Pulley, weight: float, stiffness: float, tension: float, wrap: Wrap) -> float:
-    """S [m/N]: unstrained length that the part behind P releases per newton of H; at P it is E_A^2 S."""
+    """Compliance S [m/N]: unstrained length that the part behind P releases per newton of H. It moves P by E_A^2 S."""
     strained, first, last = _strains(pulley, weight, stiffness, tension, wrap.sine)
     on_pulley = pulley.radius * wrap.angle / (strained * strained * strained)
     return (on_pulley + 2.0 * pulley.dead / ((first + last) * first * last)) / stiffness
@@ -178,7 +178,7 @@ def softness(pulley: Pulley, weight: float, stiffness: float, tension: float, wr
 
 @formula
 def energy_behind(pulley: Pulley, weight: float, stiffness: float, tension: float, wrap: Wrap, free: float) -> float:
-    """Energy [J] of the part behind P, and of lifting the free span (unstrained length `free`) from A to P."""
+    """Energy [J] of the part behind P, plus the energy to lift the free span (unstrained length `free`) from A to P."""
     radius, entry, dead, _rise = pulley
     strained, entering, drawn = _strains(pulley, weight, stiffness, tension, wrap.sine)
     first, last = entering - 1.0, drawn - 1.0
@@ -200,11 +200,10 @@ def energy_behind(pulley: Pulley, weight: float, stiffness: float, tension: floa
 def _length_behind_by(
     pulley: Pulley, weight: float, stiffness: float, force: Force, free: float, change: Change, grown: float
 ) -> tuple[float, float]:
-    """Derivatives of wrap angle and unstrained length behind P at a fixed force on the platform end.
+    """Changes of psi and of the unstrained length behind P at a fixed force on the platform end.
 
     weight: weight per length [N/m]; stiffness: EA [N]; free: unstrained length of the free span [m]; change: changes of
     the parameters (the length has no effect here); grown: increase of the free span's unstrained length.
-    Returns the changes of psi and of the length behind P.
     """
     radius, entry, dead, rise = pulley
     vertical_a = force.vertical - weight * free
@@ -238,7 +237,7 @@ def end_by(
 ) -> EndMotion:
     """Motion of the platform end at a fixed force on it due to a change of a cable's data; docs/model.md, section 10.
 
-    by_weight: motion per change of w alone at a fixed free length [m^2/N].
+    by_weight: motion per change of w at a fixed free length [m^2/N].
     """
     vertical_a = force.vertical - weight * free
     tension = math.sqrt(force.horizontal * force.horizontal + vertical_a * vertical_a)

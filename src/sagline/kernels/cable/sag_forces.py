@@ -1,8 +1,8 @@
 """Sag forces T_z - tau sin phi of the cables of one pose as curves over their chord tensions.
 
-The sag force of a cable whose platform end is below its frame end is not monotone in the tension. It falls while the
-sag is deep, rises while the sag becomes shallow, and falls again because of the stretch. On a range of tensions it
-therefore lies between its values at the two ends and at up to two extrema; docs/model.md, section 5.
+If the platform end of a cable is below its frame end, its sag force is not monotone in the tension. The sag force falls
+while the sag is deep, rises while the sag becomes shallow, and falls again because of the stretch. Its extreme values
+on a range of tensions are at the two ends or at one of up to two extrema; docs/model.md, section 5.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from sagline.kernels.memory import Memory, block
 
 SLOPE_STEP = 1e-4  # relative step of the central difference of the sag force
 SHRINKINGS = 30
-TURN_ERROR = 1e-10  # relative to half the cable's weight: bound of the error of the sag force at an extremum
-SHRINKS = 0.9  # relative to the previous section: the search ends if a section shrinks by less
+TURN_ERROR = 1e-10  # bound of the error of the sag force at an extremum, relative to half the cable's weight
+SHRINKS = 0.9  # largest ratio of a section to the section before it; the search ends above it
 SMALLEST_GAIN = 1e-15  # smallest gain relative to the terms of the sum
 
 # Rows of the extrema of the cables' sag forces, (TURN_ROWS, m); NaN if a cable has no such extremum.
@@ -100,7 +100,7 @@ def slopes_at(curves: Curves, tau: Array, slope: Array, bend: Array) -> None:
 
 @kernel
 def sag_force_at(curves: Curves, i: int, tau: float) -> float:
-    """Sag force of one cable at a chord tension [N]; zero at an infinite tension, at which the cable has no length."""
+    """Sag force of one cable at a chord tension [N]; zero at an infinite tension, because the length is then zero."""
     cables = curves.cables
     if curves.model.code != codes.CATENARY:
         return shallow_sag_force(curves.model, cables.chord[i], cables.density[i])
@@ -114,7 +114,7 @@ def sag_force_at(curves: Curves, i: int, tau: float) -> float:
 
 @glue
 def sag_force_range(curves: Curves, i: int, section: Section) -> tuple[float, float]:
-    """Least and largest sag force of cable i on a section of its chord tensions."""
+    """Least and largest sag force of cable i on a range of its chord tensions."""
     turns = curves.turns
     beyond = TURN_ERROR * curves.cables.half_weight[i]
     least, most = min(section.at_low, section.at_high), max(section.at_low, section.at_high)
@@ -129,11 +129,10 @@ def sag_force_range(curves: Curves, i: int, section: Section) -> tuple[float, fl
 def most_along(curves: Curves, i: int, section: Section, along: float, hanging: float) -> float:
     """Upper bound of along tau - b sag_force(tau) on a section [N]; exact if an end of the section is optimal.
 
-    The value at that end and the range of the sag force limit the distance to any better tension. The section shrinks
-    to this distance, repeatedly.
+    The value at one end and the range of the sag force limit the distance to a better tension. The section is shortened
+    to this distance. This step is repeated.
 
-    section: range of its chord tensions, whose upper end may be infinite; along: weight of a newton of chord tension;
-    hanging: b, weight of a newton of sag force.
+    section: range of chord tensions, whose upper end may be infinite; along, b: factors of chord tension and sag force.
     """
     low, high, at_low, at_high = section
     if along > 0.0 and high == math.inf:
@@ -157,20 +156,20 @@ def most_along(curves: Curves, i: int, section: Section, along: float, hanging: 
     return bound
 
 
-TURN_PRECISION = 1e-4  # relative error of an extremum's tension; the error of its sag force is 1e-11 of the weight
+TURN_PRECISION = 1e-4  # relative error of the tension at an extremum; the sag force then has an error of 1e-11 weights
 STEPS = 30
 PEAK_STEPS = 40
 PEAK_PRECISION = 1e-3  # relative error of the tension at which the sag force rises fastest
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
-# Start of the search, relative to first order. The first-order extrema are at X = |sin phi|/cos^2 phi and at the
-# tension sqrt(EA wD |sin phi|/6). On 200,000 random cables with X <= 1 and e <= 0.01, the exact extrema are at 0.28 to
-# 1.03 times this X and at 0.58 to 1.0 times this tension.
+# Start of the search, as a factor of the first-order extrema. These are at X = |sin phi|/cos^2 phi and at the tension
+# sqrt(EA wD |sin phi|/6). In 200,000 random cables with X <= 1 and e <= 0.01, the exact extrema were at 0.28 to 1.03
+# times this X and at 0.58 to 1.0 times this tension.
 START_OF_LEAST, START_OF_MOST = 1.25, 0.9
-# The growth of the sag force is negative everywhere if, at its first-order peak, it is below zero by more than this
-# share of the sum of its terms. Between that point and the exact peak, the growth changes by a smaller share in all
-# random cables of the tests. Otherwise golden sections search the peak.
+# Limit for the growth of the sag force at its first-order peak, as a share of the sum of its terms. The growth changes
+# by a smaller share between this peak and the exact peak in all random cables of the tests. Below minus this limit the
+# growth is negative everywhere; otherwise golden sections search the exact peak.
 FALLS_FOR_SURE = 0.3
-FIRST_ORDER = 1.0  # largest X at which the first order is used; a steep cable has its first-order peak at a larger one
+FIRST_ORDER = 1.0  # largest X at which the first order is used; the first-order peak of a steep cable has a larger X
 
 # Rows of the work array.
 A, B, AT_A, AT_B, TENSION, GROWTH, RISEN, LAST = 0, 1, 2, 3, 4, 5, 6, 7
@@ -179,7 +178,7 @@ ROWS = 8
 
 @kernel
 def _growths(curves: Curves, tau: Array, growth: Array) -> None:
-    """Fill the derivatives of the sag forces by the logarithm of the chord tensions [N], (m,)."""
+    """Fill the growth of the sag forces (m,): derivatives with respect to the logarithm of the chord tension [N]."""
     cables = curves.cables
     for i in range(tau.size):
         cables.last_sag_force[i] = tau[i] * (1.0 + SLOPE_STEP)
@@ -193,7 +192,7 @@ def _growths(curves: Curves, tau: Array, growth: Array) -> None:
 
 @formula
 def _growth_of(curves: Curves, i: int, tau: float) -> float:
-    """Derivative of the sag force of cable i by the logarithm of its chord tension [N]."""
+    """Growth of the sag force of cable i: derivative with respect to the logarithm of its chord tension [N]."""
     above, below = sag_force_at(curves, i, tau * (1.0 + SLOPE_STEP)), sag_force_at(curves, i, tau * (1.0 - SLOPE_STEP))
     return (above - below) / (2.0 * SLOPE_STEP)
 
@@ -210,7 +209,7 @@ def _first_order_growth(curves: Curves, i: int, tau: float) -> tuple[float, floa
 
 @kernel
 def _rising_tension_between(curves: Curves, i: int, low: float, high: float) -> float:
-    """A chord tension at which the sag force rises, between two at which it falls; NaN if it never rises.
+    """Chord tension at which the sag force rises, between two tensions at which it falls; NaN if it never rises.
 
     The growth of the sag force has one peak, which golden sections find.
     """
@@ -235,7 +234,7 @@ def _rising_tension_between(curves: Curves, i: int, low: float, high: float) -> 
 
 @glue
 def _find_rises(curves: Curves, work: Array) -> None:
-    """Fill RISEN: for each cable a tension between A and B at which its sag force rises; NaN if it never rises."""
+    """Fill RISEN with a tension between A and B at which the sag force of the cable rises; NaN if it never rises."""
     cables = curves.cables
     for i in range(work.shape[1]):
         best = 1.5 * cables.half_weight[i] * cables.cosine[i] * cables.cosine[i] / abs(cables.sine[i])
@@ -266,11 +265,11 @@ def _find_rises(curves: Curves, work: Array) -> None:
 def _find_extremum(curves: Curves, rising: bool, work: Array, tensions: Array, sag_forces: Array) -> None:
     """Fill tension and sag force at the extremum between A and B, for the cables whose tension is not NaN.
 
-    Newton steps start from TENSION and stay within the remaining range from A to B. The first step uses the first-order
-    slope, the others use the slope between the last two points.
+    The steps start at TENSION and stay within the remaining range from A to B. The first step uses the first-order
+    slope. Each later step uses the slope between the last two points.
 
-    rising: True if the sag forces rise at A and fall at B, False for the opposite; tensions: NaN for cables to skip,
-    (m,), filled; sag forces: filled, (m,).
+    rising: True if the sag forces rise at A and fall at B, False for the opposite; tensions: (m,), NaN for cables to
+        skip, filled; sag forces: (m,), filled.
     """
     m = tensions.size
     for step in range(STEPS):

@@ -1,4 +1,4 @@
-"""In-plane derivatives of a cable's force on its platform end by L, rho and EA, with both ends fixed."""
+"""Derivatives of the force on a cable's platform end with respect to L, rho and EA, in the plane, with fixed ends."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class _MachineSlopes(NamedTuple):
 
 @formula
 def force_change(plane: PlaneStiffness, end: PlaneVector) -> PlaneVector:
-    """Change of force if the motion of the free end is prevented: minus stiffness times motion."""
+    """Change of force if the platform end cannot move: minus stiffness times the prevented motion."""
     return PlaneVector(-(plane.xx * end.x + plane.xz * end.z), -(plane.zx * end.x + plane.zz * end.z))
 
 
@@ -47,7 +47,7 @@ def force_change(plane: PlaneStiffness, end: PlaneVector) -> PlaneVector:
 def _catenary_by_length(
     horizontal: float, vertical: float, length: float, weight: float, stiffness: float
 ) -> PlaneVector:
-    """Motion of the platform end per meter of cable at fixed force; the cable enters at the frame end."""
+    """Motion of the platform end per meter of cable that enters at the frame end, at fixed force."""
     vertical_a = vertical - weight * length
     grown = 1.0 / math.sqrt(horizontal * horizontal + vertical_a * vertical_a) + 1.0 / stiffness
     return PlaneVector(grown * horizontal, grown * vertical_a)

@@ -1,4 +1,4 @@
-"""All cables of one pose: ratios and sag forces at chord tensions, limits as chord tensions, and lengths off drums."""
+"""All cables of one pose: length ratios and sag forces at chord tensions, limits of tensions, lengths off drums."""
 
 from __future__ import annotations
 
@@ -23,24 +23,24 @@ from sagline.kernels.cable.terms import Chord, Material, Model, Terms, model_of
 from sagline.kernels.jit import entry, glue, kernel
 
 # Relative change of tension up to which one Newton step from the last ratio suffices. The relative error of the ratio
-# is then 3e-8 at X = 2 and 5e-15 at X = 0.01. It falls with the square of the change, so that converged iterations have
-# full precision.
+# is then 3e-8 at X = 2 and 5e-15 at X = 0.01. The error is proportional to the square of the change, so that converged
+# iterations have full precision.
 NEAR = 1e-3
 CONTACTS = 40  # largest number of passes for the exit point; a taut cable needs three
-SAME_EXIT = 1e-9  # smaller changes of the direction at the exit point count as converged; the error is then its square
+SAME_EXIT = 1e-9  # largest change of the exit direction that counts as converged; the error is its square
 LIMIT_STEPS = 30
 LIMIT_PRECISION = 1e-13  # relative
-LIMIT_MISS = 1e-6  # relative: larger than the error that the passes leave for a slack cable
+LIMIT_MISS = 1e-6  # relative; larger than the remaining error of a slack cable after all passes
 SECANT = 1e-6  # relative step below which a secant slope is dominated by rounding
-TAUT = 1.25  # in units of wD/2: chord tension, larger than that of the least tension at the frame end
+TAUT = 1.25  # chord tension in units of wD/2, larger than the one with the least frame-end tension
 
 
 @glue
 def _fill_exit_points(model: Model, cables: Cables, fresh: bool) -> float:
     """Fill the free spans and their tensions; the forces at the pulleys determine the exit points.
 
-    The forces result from the last length and sag force at the present chord tensions; if fresh, from first-order
-    values. Cables of the shallow models leave along their chord. Returns the largest change of a direction.
+    The forces follow from the last lengths and sag forces at the present chord tensions; without them (fresh) they are
+    first-order values. Cables of the shallow models leave along their chord. Returns the largest change of a direction.
     """
     exact = model.code == codes.CATENARY
     change = 0.0
@@ -77,12 +77,12 @@ def _fill_exit_points(model: Model, cables: Cables, fresh: bool) -> float:
 def solve_cable_states(model: Model, cables: Cables, fresh: bool, near: bool, statuses: Codes) -> tuple[int, float]:
     """Fill slackness, strain, ratio and sag force of all cables, and the statuses (m,), at their chord tensions.
 
-    Ordinary catenaries are solved in loops without branches, which vectorize; the others follow one by one. The exit
-    points result from the previous lengths and sag forces.
+    Loops without branches, which vectorize, solve ordinary catenaries. The other cables are then solved one by one. The
+    exit points follow from the previous lengths and sag forces.
 
-    fresh: True if lengths and sag forces do not exist yet; near: True if the present ratios belong to tensions that
-    differ by less than NEAR; statuses: filled. Returns the most serious status, and the largest change of the direction
-    in which a cable leaves its pulley.
+    fresh: True if lengths and sag forces do not exist yet; near: True if the tensions have changed by less than NEAR
+    since the last ratios; statuses: filled. Returns the most serious status, and the largest change of the direction in
+    which a cable leaves its pulley.
     """
     m = cables.tau.size
     change = _fill_exit_points(model, cables, fresh) if cables.machine else 0.0
@@ -150,7 +150,7 @@ def solve_cable_state(
 
 @kernel
 def frame_end_tension(model: Model, chord: Chord, material: Material, pulley: Pulley, tau: float) -> float:
-    """Tension at the frame end of a cable's free span at a chord tension [N]."""
+    """Tension at the frame end of the free span of a cable, from its chord tension [N]."""
     if model.code == codes.STRAIGHT or model.code == codes.ELASTIC:
         return tau
     length, sag_force, _status = solve_cable_state(model, chord, material, pulley, tau)
@@ -175,10 +175,10 @@ def taut_at_frame_end(
     """Chord tension at which the tension at the frame end has a given value, on the taut side.
 
     The frame-end tension of a sagging cable has a least value, at most 3/4 wD cos(phi). It is convex in the chord
-    tension, with a slope of at most 1 + wD/EA. Secant steps from the taut side therefore descend to the root, or to the
+    tension, with a slope of at most 1 + wD/EA. Secant steps from the taut side therefore go down to the root, or to the
     least value.
 
-    tension: at the frame end [N]; otherwise: the result if the tension at the frame end is never so small.
+    tension: frame-end tension [N]; otherwise: result if all frame-end tensions are larger.
     """
     weight = material.density * model.gravity
     if model.code == codes.STRAIGHT or model.code == codes.ELASTIC or weight == 0.0 or tension == math.inf:
@@ -246,8 +246,7 @@ def lengths_at_frame_ends(
         body: Row of the body_table.
         pose: Pose row.
         tension: Tensions at the frame ends [N], (m,).
-        tension_out: Tensions at these lengths [N], (m,); they differ from the given ones if no cable has so small a
-            tension.
+        tension_out: Tensions at these lengths [N], (m,). A given tension below the least possible one is replaced.
         length_out: (m,).
         rotation: Work array, (3, 3).
         geometry: Work array, (GEOMETRY_ROWS, m).

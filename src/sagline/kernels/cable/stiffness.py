@@ -1,9 +1,9 @@
 """Stiffness dT/dB of one cable at fixed unstrained length, and its potential energy; docs/model.md, section 6.
 
-In the vertical plane of the cable the stiffness is a 2 x 2 matrix; normal to that plane it is T_x/x_B = tau/D, regular
-on a vertical chord. The weightless and the exact cable have an energy, whose gradient is the force on the platform end.
-The shallow models do not have an energy, because their forces are not a gradient. The curl of the parabolic model's
-force is of the order of the model's error. Their equilibria are reached from those of the exact cable.
+In the vertical plane of the cable the stiffness is a 2 x 2 matrix. Normal to this plane it is T_x/x_B = tau/D, which is
+regular on a vertical chord. For the weightless and the exact cable, the force on the platform end is the gradient of an
+energy. The forces of the shallow models are not a gradient. The curl of the parabolic force is of the order of the
+error of the model. The search for equilibria with a shallow model starts from the equilibrium with the exact cable.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ def shallow_slopes(
 ) -> _ShallowSlopes:
     """Derivatives of tau of a shallow cable by its chord and its own data.
 
-    From L (1 + s/EA) = D (1 + S/tau^2), S = k (rho x_B)^2, s = |T| (empirical) or tau (parabolic).
+    They follow from L (1 + s/EA) = D (1 + S/tau^2) with S = k (rho x_B)^2 and s = |T| (empirical) or tau (parabolic).
     """
     chord = math.sqrt(span * span + rise * rise)
     cosine = span / chord
@@ -120,7 +120,8 @@ def shallow_slopes(
     square = tension * tension
     share = sag / square
     by_tension = length * (tension + sag_force * sine) / (stretch * stiffness) + 2.0 * chord * share / tension
-    # derivative of s by the chord at fixed tau, through sin phi and through the sag force, which is proportional to D
+    # derivative of s with respect to the chord at fixed tau; the chord changes sin phi and the sag force (proportional
+    # to D)
     by_sag_force = (sag_force + tension * sine) / stretch
     by_sine = tension * sag_force / stretch
     stretch_x = by_sag_force * sag_force * cosine / chord - by_sine * sine * cosine / chord
@@ -195,7 +196,7 @@ def plane_of(rows: Array, i: int) -> PlaneStiffness:
 
 @formula
 def catenary_energy(span: float, rise: float, length: float, force: Force, weight: float, stiffness: float) -> float:
-    """V = T.B - C(T) [J] of the exact cable: energy of strain and weight, with the frame end at height 0."""
+    """Energy of strain and weight V = T.B - C(T) [J] of the exact cable, with the frame end at height 0."""
     horizontal, vertical, _ = force
     weight_length = weight * length
     vertical_a = vertical - weight_length
@@ -233,7 +234,7 @@ def energy_of_cables(model: Model, cables: Array, rows: Array, behind: bool | No
     """Energy [J] of all cables of a pose, and the sum of the magnitudes of its terms.
 
     cables: rows of the cable_table, (m, CABLE_COLUMNS); rows: as in `sagline.kernels.cable.geometry`, (CABLE_ROWS, m),
-    after `cable_forces`; behind: that of the model, as a separate argument, so that None excludes unused code from
+    after `cable_forces`; behind: `Model.behind` as a separate argument; None excludes the code of pulleys from
     compilation.
     """
     x = g.SPAN if behind is None else g.FREE_SPAN

@@ -1,6 +1,6 @@
 """Scalar data of one cable: inputs and outputs of kernels for a single cable.
 
-They cost nothing in compiled code, where a NamedTuple of numbers becomes separate numbers.
+These records cost no time in compiled code, because the compiler turns a NamedTuple into separate numbers.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ class Model(NamedTuple):
     k_h: float  # the empirical model's constant of the sag force
     k_p: float  # the empirical model's constant of the sag
     gravity: float  # [m/s^2]
-    # True if cables of given lengths may have pulleys or dead lengths; None removes their code from the machine code
+    # True if cables of given lengths may have pulleys or dead lengths; None excludes the code of pulleys from
+    # compilation
     behind: bool | None = None
 
 

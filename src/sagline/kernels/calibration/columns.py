@@ -1,4 +1,4 @@
-"""Derivatives of the readings of one pose with respect to every unknown: direct, and through the platform's motion."""
+"""Derivatives of the readings of one pose by every unknown: direct effects, and effects of platform motion."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def column_of(matrix: Array, k: int) -> Triple:
 
 @formula
 def in_axes(axes: Array, vector: Triple) -> Triple:
-    """Components of a world vector in axes given as columns of a matrix (3, 3)."""
+    """Components of a world vector along axes, which are the columns of a matrix (3, 3)."""
     return (
         axes[0, 0] * vector[0] + axes[1, 0] * vector[1] + axes[2, 0] * vector[2],
         axes[0, 1] * vector[0] + axes[1, 1] * vector[1] + axes[2, 1] * vector[2],
@@ -88,7 +88,7 @@ def fill_length(space: CalibrationArrays, i: int, force: Triple, moment: Triple,
 
 @glue
 def add_motion(space: CalibrationArrays, slopes: Slopes) -> None:
-    """Add the effect of wrench changes on the readings, through the platform's motion, to the columns."""
+    """Add to the columns the changes of the readings when wrench changes move the platform."""
     for j in range(slopes.work.shape[0]):
         for k in range(6):
             share = space.moved[j, k]
@@ -133,7 +133,7 @@ def _force_by_motion(ends: Array, i: int, vector: Triple) -> Triple:
 
 @formula
 def _tension_by_motion(ends: Array, i: int, shares: Array) -> Triple:
-    """Change of the frame-end tension due to a motion of the platform end without its height: K^T times the slopes."""
+    """Change of the frame-end tension due to a motion of the platform end at equal height: K^T times the slopes."""
     x, y, z = shares[i, 0], shares[i, 1], shares[i, 2]
     return (
         ends[i, 0] * x + ends[i, 3] * y + ends[i, 6] * z,
@@ -166,7 +166,7 @@ def _add_wrench_change(slopes: Slopes, at: int, scale: float, force: Triple, mom
 def _add_force_change(
     slopes: Slopes, space: CalibrationArrays, i: int, at: int, scale: float, force: Triple, direct: float
 ) -> None:
-    """Add the effect of a change of one cable's force to a column; the reading of this cable also changes directly."""
+    """Add to a column the effects of a change of the force of one cable, on the wrench and on its own reading."""
     _add_wrench_change(slopes, at, scale, force, cross(_lever_of(space.rows, i), force))
     slopes.work[i, at] += scale * direct
 
@@ -182,7 +182,7 @@ def _add_parameter_change(
     space: CalibrationArrays,
     slopes: Slopes,
 ) -> None:
-    """Add to a column the effects of a parameter of cable i: on its platform-end force, and directly on its tension."""
+    """Add to a column the effects of a parameter of cable i, on its platform-end force and on its frame-end tension."""
     at = sought.where[row, i]
     if at >= 0:
         change = _in_world_axes(space.rows, i, pair)
@@ -286,7 +286,7 @@ def _free_displacement(free: Array, vector: Triple) -> Triple:
 def _fill_center(
     cables: Array, sensing: Sensing, sought: Unknowns, free: Array, axis: int, space: CalibrationArrays, slopes: Slopes
 ) -> None:
-    """Add the effect of a shift of the center of mass, the reference point of the platform's motion, to the columns.
+    """Add to the columns the effect of a shift of the center of mass, to which the platform's motion refers.
 
     Only the part along free motions counts, because a planar platform stays in its plane.
     """

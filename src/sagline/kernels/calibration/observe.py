@@ -1,7 +1,7 @@
 """Whitened residuals and derivatives of readings at equilibria; docs/model.md, section 14.
 
-The true lengths at every pose are unknowns too. They are eliminated pose by pose: the residual treats the effect of
-errors of the measured lengths as noise, of covariance diag(sigma^2) + sigma_L^2 A A^T.
+The true lengths at every pose are also unknown. They are eliminated pose by pose: errors of the measured lengths count
+as noise of the residual, whose covariance is then diag(sigma^2) + sigma_L^2 A A^T.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ from sagline.kernels.memory import Memory
 
 @glue
 def whiten(sensing: Sensing, residual: Array, space: CalibrationArrays, work: Array) -> None:
-    """Omit missing readings, and fill W, the inverse of the covariance's factor: W^T W is the inverse covariance."""
+    """Omit missing readings and fill W, with W^T W the inverse of the covariance."""
     readings, m = work.shape[0], residual.size - BESIDE
     for j in range(residual.size):
         if not (abs(residual[j]) < math.inf and space.deviation[j] < math.inf):
@@ -69,7 +69,7 @@ def whiten(sensing: Sensing, residual: Array, space: CalibrationArrays, work: Ar
             space.whole[j, k] = total
             space.whole[k, j] = total
     factor_positive(space.whole, 0.0, space.own)
-    for k in range(readings):  # store W in whole, column by column
+    for k in range(readings):  # store all of W, column by column
         for j in range(readings):
             space.whole[j, k] = 0.0
         space.whole[k, k] = 1.0 / space.own[k, k]

@@ -30,7 +30,7 @@ class _FrameEndSlopes(NamedTuple):
 
 @formula
 def frame_end_slopes(model: Model, cables: Array, rows: Array, i: int) -> _FrameEndSlopes:
-    """Slopes of cable i, whose forces must be known; zero if there is no force at the frame end."""
+    """Slopes of cable i, whose forces must be known; zero without a force at the frame end."""
     material = material_at(cables, i)
     gravity = model.gravity if model.code == codes.CATENARY else 0.0
     weight = material.density * gravity
@@ -42,7 +42,7 @@ def frame_end_slopes(model: Model, cables: Array, rows: Array, i: int) -> _Frame
         share = 1.0 / tension if tension > 0.0 else 0.0
         along, up = x * share, at_frame * share
         return _FrameEndSlopes(tension, along, up, 0.0, -up * weight, -up * gravity * length, 0.0, 0.0, 0.0)
-    # T + T^2/(2 EA) - w z is constant from the platform end to the pulley's exit P, which moves on the pulley
+    # T + T^2/(2 EA) - w z is equal at the platform end and at the exit point P, which moves on the pulley
     stiffness, pulley = material.stiffness, pulley_at(cables, i)
     leaving, free = rows[g.LEAVING, i], rows[g.FREE_LENGTH, i]
     end = math.sqrt(x * x + z * z)

@@ -9,7 +9,7 @@ from sagline.kernels.cable.geometry import CABLE_ROWS
 from sagline.kernels.jit import glue
 from sagline.kernels.memory import Memory, block, vector
 
-BESIDE = 6  # readings of a pose in addition to its load cells: position and rotation in the measuring system's axes
+BESIDE = 6  # readings of a pose without load cells: position and rotation in the axes of the measuring system
 
 SensingArrays = tuple[Array, Array, Array, Array, Array, Array, Array, Array]
 ReadingArrays = tuple[Array, Array, Array, Array]
@@ -48,7 +48,7 @@ class Unknowns(NamedTuple):
 
 
 class Linearization(NamedTuple):
-    """Output arrays; the rows of a pose are its load cells, then three of its position and three of its rotation.
+    """Output arrays. The rows of a pose are its load cells, then its position (3) and its rotation (3).
 
     R is m + 6, or m if neither positions nor rotations are measured.
     """
@@ -57,8 +57,8 @@ class Linearization(NamedTuple):
     misfit: Array  # whitened residuals, (N, R)
     residual: Array  # readings minus predictions at the given lengths [N, m, rad], (N, m + 6); NaN if missing
     back: Array  # change of the true lengths per whitened residual [m], (N, m, R)
-    # motion of the platform about its center of mass [m, rad], world axes, (N, m + 1, 6): per cable length, in the last
-    # row per unit of the first unknown; (0, m + 1, 6) if not requested
+    # motion of the platform about its center of mass [m, rad], world axes, (N, m + 1, 6). The first m rows are per
+    # cable length, the last row is per unit of the first unknown. (0, m + 1, 6) if not requested.
     motion: Array
     work: Array  # work array: slopes of the readings and of the wrench on the platform, (R + 6, P)
 
@@ -66,7 +66,7 @@ class Linearization(NamedTuple):
 class Slopes(NamedTuple):
     """Derivatives with respect to the P unknowns at one pose."""
 
-    work: Array  # slopes of the readings, at first with the platform fixed, (R, P)
+    work: Array  # slopes of the readings, (R, P); at first those with a fixed platform
     wrench: Array  # slopes of the wrench on the fixed platform about its center of mass, (6, P)
 
 
@@ -83,7 +83,7 @@ class CalibrationArrays(NamedTuple):
     six: Array  # (6,)
     moved: Array  # change of the readings per wrench on the platform, (R, 6)
     ends: Array  # stiffness of the platform ends, (m, 9)
-    shares: Array  # derivatives of frame-end tensions per platform-end force and height; then the tensions, (m, 5)
+    shares: Array  # derivatives of frame-end tensions by platform-end force and height; then the tensions, (m, 5)
     by_wrench: Array  # change of the wrench on the platform per length, (m, 6)
     by_length: Array  # change of the readings per length, A, (m, R)
     whole: Array  # covariance, then the inverse of its factor, (R, R)

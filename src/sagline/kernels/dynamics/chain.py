@@ -1,6 +1,6 @@
-"""A cable with mass as a chain: nodes at fixed material points, elements transmit tension only.
+"""A cable with mass as a chain: the nodes are fixed material points, and the elements transmit only tension.
 
-docs/model.md, section 11. Node 0 is the platform end, and the last node is the frame end, so that nodes are added and
+docs/model.md, section 11. Node 0 is the platform end, and the last node is the frame end. Nodes are therefore added and
 removed at the end of the arrays. All elements have the same unstrained length, except the element at the frame, which
 has the remaining length. Each element adds half of its mass to each of its two nodes. The mass at node 0 belongs to the
 platform.
@@ -16,10 +16,10 @@ from sagline.kernels.jit import formula, kernel
 
 @formula
 def wind_across(wind: Array, along: float, x: float, y: float, z: float, drag: float) -> tuple[float, float, float]:
-    """Force of a wind, across a line, on this line [N].
+    """Force of a wind on a line, normal to the line [N].
 
     wind: velocity of the air [m/s], (3,); along: its component along the line (x, y, z), divided by the line's length;
-    drag: force per square of the speed across the line [N s^2/m^2].
+    drag: force per square of the speed normal to the line [N s^2/m^2].
     """
     nx, ny, nz = wind[0] - along * x, wind[1] - along * y, wind[2] - along * z
     size = drag * math.sqrt(nx * nx + ny * ny + nz * nz)
@@ -32,12 +32,12 @@ ELEMENT = 3  # unstrained length of an element [m]
 DENSITY, STIFFNESS = 4, 5  # [kg/m], [N]
 LOSS_TIME = 6  # [s]
 AIR_RATE = 7  # force of the air per velocity and mass of the cable [1/s]
-BEHIND, RUN = 8, 9  # cable between drum and exit: unstrained length, and length of its path [m]
+BEHIND, RUN = 8, 9  # cable between drum and exit point: unstrained length, and length of the path [m]
 WIND = 10  # force of the wind per length and square of the speed [N s^2/m^3]
 SMOOTH = 11  # share of a new value in the filtered mean tension that detects a slack cable
 GRAVITY = 12  # [m/s^2]
 REST, RATE = 13, 14  # unstrained length of the element at the frame [m], and rate of the cable that is let out [m/s]
-STEP = 15  # time step, in which damping forces act [s]
+STEP = 15  # time step of the damping forces [s]
 CHAIN_COLUMNS = 16
 
 LEAST, MOST = 0.4, 1.6  # limits of the length of the element at the frame, relative to the other elements
@@ -46,7 +46,7 @@ TINY = 1e-300
 
 @formula
 def fill_element_forces(place: Array, speed: Array, count: int, row: Array, pulls: Array) -> float:
-    """Fill the force of every element divided by its length [N/m]; returns the power that they lose [W].
+    """Fill force/length of every element [N/m]; returns the power lost in the elements [W].
 
     place: of the nodes [m], (3, nodes): node 0 is at the platform, node count + 1 at the frame; speed: of the nodes
     [m/s], used if the elements have damping; pulls: filled, then two rows of work, (3 nodes,).
@@ -98,12 +98,12 @@ def _opening_speed(speed: Array, j: int, x: float, y: float, z: float) -> float:
 
 @kernel
 def _add_damping(place: Array, speed: Array, count: int, row: Array, pulls: Array) -> float:
-    """Add the damping force of every taut element, which never pushes; returns the power lost [W].
+    """Add the damping force of every taut element; the sum is never a compression; returns the power lost [W].
 
-    The forces are those at the speeds after the step (implicit Euler), so that they limit no step. They are the
-    solution of a tridiagonal system, because an element changes the speeds of its two nodes. The platform and the frame
-    node keep their speeds, and the other nodes are also subject to the elastic forces and to their weight. The power is
-    that at the mean of the speeds before and after the step.
+    The forces follow from the speeds after the step (implicit Euler), so that damping does not limit the time step.
+    They are the solution of a tridiagonal system, because an element changes the speeds of its two nodes. The platform
+    and the frame node keep their speeds. Elastic forces and weight also act on the other nodes. The power is the value
+    at the mean speed of the step.
     """
     size = place.shape[1]
     viscous = row[STIFFNESS] * row[LOSS_TIME]
@@ -144,7 +144,7 @@ def _add_damping(place: Array, speed: Array, count: int, row: Array, pulls: Arra
         factor = pulls[size + j + 1] if k > 0 else 0.0
         force = pulls[2 * size + j] - factor * force
         x, y, z, distance = _element_direction(place, j)
-        # the frame node has the velocity of the entering cable, which includes the change of the rest length
+        # the velocity of the frame node is that of the entering cable and includes the change of the rest length
         opening = _opening_speed(speed, j, x, y, z)
         length = row[REST] + row[BEHIND] if j == count else row[ELEMENT]
         elastic = pulls[j]
@@ -182,7 +182,7 @@ def drift_nodes(place: Array, speed: Array, count: int, row: Array, before: floa
     """Move the nodes for h [s]; the node next to the frame keeps its momentum while its mass changes.
 
     place: of the nodes [m]; speed: of the nodes [m/s]; before: unstrained length of the element at the frame before the
-    motion [m]; the row contains the length after it; h: time [s].
+        motion [m] (row: after it); h: time [s].
     """
     old, new = row[ELEMENT] + before, row[ELEMENT] + row[REST]
     middle = 0.5 * (old + new)
@@ -246,7 +246,7 @@ def potential(place: Array, count: int, row: Array) -> tuple[float, float]:
 
 @kernel
 def whole_force(place: Array, speed: Array, count: int, row: Array, pulls: Array) -> float:
-    """Energy that the winch loses per unwound length [N]: H = T + T^2/(2 EA) - w z, less kinetic energy.
+    """Energy that the winch loses per unwound length [N]: H = T + T^2/(2 EA) - w z minus kinetic energy per length.
 
     The energies of `kinetic` and `potential` change by -H times the rate.
     """
@@ -277,7 +277,7 @@ def tension_at_exit(place: Array, count: int, row: Array, pulls: Array) -> float
 
 @formula
 def mean_tension(pulls: Array, count: int, row: Array) -> float:
-    """Mean tension of the elements [N], which detects a slack cable; waves do not change it."""
+    """Mean tension of the elements [N], which detects a slack cable. Waves do not change the mean."""
     total = 0.0
     for j in range(count + 1):
         total += pulls[j]
@@ -288,8 +288,8 @@ def mean_tension(pulls: Array, count: int, row: Array) -> float:
 def insert_node(place: Array, speed: Array, count: int, row: Array) -> None:
     """Insert a node on the element at the frame, one element length from its end; count grows by one, rest shrinks.
 
-    Tension, mass and momentum do not change, with the half element at the frame included. Without cable behind the
-    exit, position and velocity are linear along the element, and the center of mass does not change either.
+    Tension, mass and momentum, including the half element at the frame, do not change. Without cable behind the exit
+    point, position and velocity are linear along the element, and the center of mass does not change.
     """
     rest, rate = row[REST], row[RATE]
     distance, left = _element_distance(place, count), rest - row[ELEMENT]

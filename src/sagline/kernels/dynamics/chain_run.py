@@ -40,7 +40,7 @@ class _Chains(NamedTuple):
 
 
 class ChainRun(NamedTuple):
-    """State and arrays of a run, as in `chains.run_chains`."""
+    """State and arrays of a run; the fields are the arguments of `chains.run_chains`."""
 
     chains: _Chains
     step: float
@@ -172,7 +172,7 @@ def power_of_given_wrench(run: ChainRun) -> float:
 
 @kernel
 def kick_chains(run: ChainRun, h: float, begins: bool) -> None:
-    """Update the nodes' velocities from forces, wind and air during a time; in reverse order at the start of a step."""
+    """Update the nodes' velocities by forces, wind and air during a time; a step starts in reverse order."""
     chains, audit = run.chains, run.drives.audit
     blows = run.wind[0] != 0.0 or run.wind[1] != 0.0 or run.wind[2] != 0.0
     for i in range(chains.counts.shape[0]):

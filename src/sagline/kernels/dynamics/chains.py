@@ -51,7 +51,7 @@ from sagline.kernels.jit import entry, glue, kernel
 ENDED = progress.COUNTERS  # additional counter of cables with mass; FAILED: cable that ended the run
 DONE, LONG, SHORT, GROWN = range(4)
 FEWEST = 2  # smallest number of free nodes of a chain
-GROWTH = 0.5  # energy error relative to the energy convertible into motion; phase errors alone are smaller
+GROWTH = 0.5  # energy error relative to the energy convertible into motion; phase errors cause smaller energy errors
 
 
 @glue
@@ -88,7 +88,7 @@ def change_node_count(run: ChainRun, i: int) -> None:
 
 @kernel
 def _sample_points(place: Array, count: int, row: Array, points: Array) -> None:
-    """Fill points (points, 3) of a chain at equal material steps, from the exit on."""
+    """Fill points (points, 3) of a chain at equal material steps, starting at the exit point."""
     element, rest = row[c.ELEMENT], row[c.REST]
     length = rest + count * element
     for p in range(points.shape[0]):
@@ -102,7 +102,7 @@ def _sample_points(place: Array, count: int, row: Array, points: Array) -> None:
 
 @kernel
 def record_chain_step(run: ChainRun, records: Records, stock: Array) -> None:
-    """Record a step, and check that energy has not increased without supply."""
+    """Record a step, and check that the energy increases only by the supplied energy."""
     states, tensions, lengths, energies, _notes, points = records
     state, drives, chains, at, r = run.state, run.drives, run.chains, run.at, run.at[progress.RECORDS]
     audit = drives.audit
@@ -191,7 +191,7 @@ def run_chains(
     steps: int,
     every: int,
 ) -> None:
-    """Integrate some steps; a prepared run continues from the end of the last call, bit by bit identical.
+    """Integrate some steps. A run in several calls gives bitwise the same result as in one call.
 
     Args:
         rules: See `Rules`; `stride` is the number of steps per control period of drums.
@@ -201,13 +201,14 @@ def run_chains(
             reference point of the given wrench in these axes, (3,).
         data: Data of the drives, (DATA_ROWS, m).
         courses: Time tables of lengths, wrenches and wind velocity, as in `motion.run_massless`.
-        kept: As in `motion.run_massless`, with one more counter. The work array has ROOM numbers, and two for every
-            number of the length table.
+        kept: As in `motion.run_massless`, with one more counter. The work array has ROOM numbers plus two for each
+            column of the table of lengths.
         chain_arrays: `Chains`, in and out.
         stock: Initial energies that are convertible into motion, (2,), in and out; NaN before the first call.
-        records: Filled as in `motion.run_massless`; and points of the cables (R, m, points, 3) at equal material steps
-            from the exit on.
-        steps: Number of steps, fewer if the space for records ends. With 0 the present state is recorded.
+        records: Filled as in `motion.run_massless`, and points of the cables (R, m, points, 3) at equal material steps,
+            starting at the exit point.
+        steps: Largest number of steps; the run ends before if the records are full. With 0 the present state is
+            recorded.
         every: Number of steps per record; the first record is the start.
     """
     kind, _remembered, stride = rules

@@ -1,9 +1,9 @@
 """Exact dynamic stiffness of one cable, and the number of its natural frequencies below a given frequency.
 
 Elements are joined one by one, starting at the frame end; docs/model.md, section 11. The transfer matrix of an element
-solves u' = C f, f' = -mu u about the state of rest, by collocation at eight Gauss points. The motion has one equation
-normal to the cable's plane and two equations in it. The same code solves both, with real numbers, or with complex
-numbers if there is damping.
+solves u' = C f, f' = -mu u about the state of rest, by collocation at eight Gauss points. Normal to the plane of the
+cable, the motion has one equation. In the plane it has two equations. The same code solves both. Without damping the
+numbers are real, with damping complex.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ NODES, WEIGHTS, INTEGRALS = (locked(values) for values in _gauss())  # compiled 
 
 
 class Wave(NamedTuple):
-    """Terms of the two wave equations at a frequency: mu, and the factors of C across the cable and along it."""
+    """Terms of the two wave equations at a frequency: mu, and factors of C for transverse and longitudinal waves."""
 
     mu: Any
     across: Any
@@ -55,7 +55,7 @@ class Wave(NamedTuple):
 
 @glue
 def fill_flexibility(string: String, wave: Wave, start: float, size: float, normal: bool, c: Numbers) -> None:
-    """Fill C at the stages of an element, (STAGES, 3): xx, xz, zz; only the first of them normal to the plane."""
+    """Fill C at the stages of an element, (STAGES, 3): xx, xz, zz; normal to the plane only the first is used."""
     for k in range(STAGES):
         vertical = vertical_at(string, start + NODES[k] * size)
         square = string.horizontal * string.horizontal + vertical * vertical
@@ -150,14 +150,14 @@ def transfer(c: Numbers, mu: Any, size: float, d: int, system: Numbers, phi: Num
                 phi[d + b, column] -= size * mu * WEIGHTS[k] * system[k * d + b, n + column]
 
 
-# columns of a wave: angular frequency; its square; i omega c; factors of C across and along the cable
+# columns of a wave: omega; omega^2; i omega c; factors of C for transverse and longitudinal waves
 OMEGA, SQUARE, DRAG, ACROSS, ALONG = 0, 1, 2, 3, 4
 WAVE_COLUMNS = 5
 ROOM = (5 * STAGES, 20)  # shape of the work array
-MESHES = 8  # number of meshes that are tried if a joint of elements is near a vibration node of the cable up to it
+MESHES = 8  # number of meshes to try if a joint is near a vibration node of the cable between frame end and joint
 SHORTER = 0.0618034  # relative decrease of the element length per mesh; not a ratio of small integers
-ROUNDING = 2.0**-52  # growth of mu per mesh, in case omega is exactly a held frequency
-CLEAR = 1e-6  # relative to a joint's static motion: a joint that moves less is at a node and loses accuracy
+ROUNDING = 2.0**-52  # growth of mu per mesh, because omega may be exactly a held frequency
+CLEAR = 1e-6  # smallest motion of a joint relative to its static motion; below it accuracy is lost
 # columns of a cable's result: in its plane, and normal to it
 XX, XZ, ZZ, YY = 0, 1, 2, 3
 FOUND = 4
@@ -180,7 +180,7 @@ def _transfer_stiffness(phi: Numbers, d: int, k: Numbers, moved: Numbers) -> Non
 
 @glue
 def _first_transfer(phi: Numbers, d: int, give: Numbers, lost: Any, k: Numbers, moved: Numbers) -> None:
-    """`_transfer_stiffness` of the first element, whose start moves by give (d, d) times lost per force; 0: fixed."""
+    """`_transfer_stiffness` of the first element; give (d, d) times lost is the compliance of its start, 0 if fixed."""
     for a in range(d):
         for b in range(d):
             end, force = phi[a, d + b], phi[d + a, d + b]
@@ -194,7 +194,7 @@ def _first_transfer(phi: Numbers, d: int, give: Numbers, lost: Any, k: Numbers, 
 
 @formula
 def _stiffness_from_transfer(moved: Numbers, d: int, k: Numbers) -> None:
-    """Fill k = force end^-1; moved contains end above force."""
+    """Fill k = force end^-1; moved has the rows of end, then the rows of force."""
     if d == 1:
         k[0, 0] = moved[2, 0] / moved[0, 0]
     else:
@@ -246,8 +246,8 @@ def _cable_stiffness_at(
 ) -> int:
     """Fill K(omega) - K(0) of a cable's platform end, (d, d); returns the number of held frequencies below omega.
 
-    A held frequency is a natural frequency of the cable with a fixed platform end. The result is SINGULAR if a joint of
-    elements is close to a node, and TOO_MANY if the number of elements is too large.
+    A held frequency is a natural frequency of the cable with a fixed platform end. The result is SINGULAR if a joint is
+    close to a vibration node, and TOO_MANY if the number of elements is too large.
     """
     c, system, phi = room[2 * STAGES : 3 * STAGES], room[: 2 * STAGES], room[3 * STAGES : 3 * STAGES + 4]
     rest, k = room[3 * STAGES + 4 :, :2], room[3 * STAGES + 4 :, 2:4]

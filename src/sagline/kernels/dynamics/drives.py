@@ -18,12 +18,12 @@ BIN = 0.005  # length of cable on the drum with one common strain [m]
 
 @kernel
 def wind_in(layer: Array, place: float, step: float, strain: float, stiffness: float) -> float:
-    """Wind cable of a given strain onto a drum; returns the energy [J] lost by mixing strains within a bin.
+    """Wind cable of a given strain onto a drum; returns the energy [J] lost when the strain is averaged within a bin.
 
     The cable in a bin has one strain, which preserves its strained and its unstrained length.
 
-    layer: strain of the cable on the drum, bin by bin, (B,), the last bin without end; place: length let out before
-    [m]; step: length that is wound in [m], > 0; stiffness: EA [N].
+    layer: strain in each bin of the cable on the drum, (B,), the last bin without end; place: length let out before
+        [m]; step: length to wind in [m], > 0; stiffness: EA [N].
     """
     lost = 0.0
     first, last = _bin_of(layer, place - step), _bin_of(layer, place)
@@ -45,8 +45,8 @@ def wind_in(layer: Array, place: float, step: float, strain: float, stiffness: f
 def pay_out(layer: Array, place: float, step: float, stiffness: float) -> tuple[float, float]:
     """Mean strain of the cable that a drum lets out, and the energy [J] lost by averaging.
 
-    layer: strain of the cable on the drum, bin by bin, (B,), the last bin without end; place: length let out before
-    [m]; step: length that is let out in addition [m], > 0; stiffness: EA [N].
+    layer: strain in each bin of the cable on the drum, (B,), the last bin without end; place: length let out before
+        [m]; step: length to let out [m], > 0; stiffness: EA [N].
     """
     first, last = _bin_of(layer, place), _bin_of(layer, place + step)
     if first == last:
@@ -76,7 +76,7 @@ NO, YES, NEW = 0.0, 1.0, 2.0
 RATE = 0  # dL/dt of the unstrained length [m/s]
 WOUND, SPEED = 1, 2  # length s that is let out [m], and its rate [m/s]
 FORCE, INTEGRAL = 3, 4  # force of the motor at the cable, outward; integral part of its controller [N]
-AT_FRAME, WHOLE, AT_DRUM = 5, 6, 7  # frame-end tension with damping; H and tension at the drum without damping [N]
+AT_FRAME, WHOLE, AT_DRUM = 5, 6, 7  # frame-end tension including damping; H and drum tension without damping [N]
 STRETCHING = 8  # damping part of H [N]
 FILTERED = 9  # frame-end tension after the load cell's filter [N]
 PEAK = 10  # largest tension at the frame end [N]
@@ -133,7 +133,7 @@ def _kick_lagging(drives: Drives, rows: Array, targets: Array, time: float, begi
 
 @formula
 def _kick_drums(drives: Drives, time: float) -> None:
-    """Update the speeds of the drums from motor, cable and friction, which can hold a drum at rest."""
+    """Update the speeds of the drums by motor, cable and friction; friction can hold a drum at rest."""
     for i in range(drives.now.shape[1]):
         inertia, before = drives.data[INERTIA, i], drives.now[SPEED, i]
         if drives.now[HELD, i] > 0.0:
@@ -216,7 +216,7 @@ def close_loops(drives: Drives, targets: Array, rates: Array, period: float) -> 
 
 @formula
 def tension_at_drum(whole: float, lifted: float, stiffness: float) -> float:
-    """Tension at the drum [N] from H there, which is H at the frame end minus the weight of the cable in between."""
+    """Tension at the drum [N] from H at the drum: H at the frame end minus the weight of the cable in between."""
     fallen = whole - lifted
     return 2.0 * fallen / (1.0 + math.sqrt(max(1.0 + 2.0 * fallen / stiffness, 0.0)))
 
@@ -252,7 +252,7 @@ def store_step_start(drives: Drives, rows: Array) -> None:
 
 @glue
 def turn_winches(drives: Drives, cables: Array, rows: Array, gravity: float, time: float) -> None:
-    """Let out or take in cable for a time; ideal winches take their lengths from the set points elsewhere."""
+    """Let out or take in cable for a time, except with ideal winches, which follow their set points."""
     if drives.kind == DRUMS:
         turn_drums(drives, cables, rows, gravity, time)
     elif drives.kind == SECOND_ORDER:
@@ -273,6 +273,6 @@ def add_winch_energy(drives: Drives, cables: Array, rows: Array, time: float) ->
 
 @glue
 def filter_tensions(drives: Drives, share: float) -> None:
-    """Update the filtered tensions with the share of a new reading."""
+    """Update the filtered tensions; share is the weight of the new reading."""
     for i in range(drives.now.shape[1]):
         drives.now[FILTERED, i] += share * (drives.now[AT_FRAME, i] - drives.now[FILTERED, i])

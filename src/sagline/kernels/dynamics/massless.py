@@ -36,7 +36,7 @@ Records = tuple[Array, Array, Array, Array, Array]  # states, tensions, lengths,
 
 
 class MasslessRun(NamedTuple):
-    """State and arrays of a run, as in `motion.run_massless`."""
+    """State and arrays of a run; the fields are the arguments of `motion.run_massless`."""
 
     model: Model
     work: int
@@ -128,7 +128,7 @@ def _add_at_end(rows: Array, i: int, x: float, y: float, z: float, wrench: Array
 
 @glue
 def project_on_freedom(freedom: Array, wrench: Array, part: Array) -> None:
-    """Remove from a wrench the part that the platform's guides support."""
+    """Remove the part of a wrench that the guides of the platform support."""
     if freedom.shape[0] < 6:
         components_along(freedom, wrench, part)
         fill_motion_of_components(freedom, part, wrench)
@@ -138,7 +138,7 @@ def project_on_freedom(freedom: Array, wrench: Array, part: Array) -> None:
 def fill_frame_end_tensions(
     weight_of: float, cables: Array, rows: Array, data: Array, now: Array, behind: bool | None
 ) -> None:
-    """Fill the tensions at frame ends and drums, and H = T + T^2/(2 EA) - w z, one value of H per cable."""
+    """Fill the tensions at frame ends and drums, and H = T + T^2/(2 EA) - w z of every cable."""
     for i in range(cables.shape[0]):
         weight, stiffness = cables[i, tables.DENSITY] * weight_of, cables[i, tables.STIFFNESS]
         if behind is None:
@@ -166,15 +166,15 @@ def damp_cables(
 ) -> float:
     """Fill the damping wrench (6,) of the cables; returns the power lost.
 
-    The strain rate is the same along a whole cable, including the part behind the free span. Cable that is let out
-    lengthens the span by its strained length. The damping force is proportional to EA/L times the rate of the chord
-    minus this length. A share of this rate stretches the cable, and the rest changes its sag. The share is the elastic
-    compliance divided by the total compliance: 1 for a taut cable, 0 for a slack cable. In the air, a cable moves like
-    its chord.
+    The strain rate is the same along a whole cable, including the part behind the free span. The let-out cable
+    lengthens the span by its strained length. The rate of the chord minus the rate of this length stretches the cable
+    or changes its sag. Only the stretching part causes damping, with EA/L as factor. This part is the elastic
+    compliance divided by the total compliance: 1 for a taut cable, 0 for a slack cable. For the damping of the air, the
+    cable moves like its chord.
 
     losses: loss_time [s], and air damping [N s/m^2]; weight_of: gravity if the cables have weight, else 0 [m/s^2];
-    turning: velocity of the center of mass, and angular velocity, (6,); now: state of the drives, in which the damping
-    parts of the tensions are filled; wrench: filled.
+    turning: velocity of the center of mass, and angular velocity, (6,); now: state of the drives, filled with the
+        damping parts of the tensions; wrench: filled.
     """
     lost = 0.0
     for k in range(6):

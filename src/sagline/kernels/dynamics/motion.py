@@ -54,12 +54,12 @@ from sagline.kernels.dynamics.rigid_body import (
 from sagline.kernels.forward.platform import platform_energy
 from sagline.kernels.jit import entry, glue, kernel
 
-GROWTH = 0.1  # energy error relative to the exchanged energy MOVED; a larger error means that the step is too long
+GROWTH = 0.1  # largest energy error relative to the exchanged energy MOVED; above it the step is too long
 
 
 @kernel
 def record_step(run: MasslessRun, records: Records) -> None:
-    """Record a step, and check that energy has not increased without supply."""
+    """Record a step, and check that the energy increases only by the supplied energy."""
     states, tensions, lengths, energies, _notes = records
     state, drives, rows, at = run.state, run.drives, run.rows, run.at
     audit, row = drives.audit, at[progress.RECORDS]
@@ -205,7 +205,7 @@ def run_massless(
     steps: int,
     every: int,
 ) -> None:
-    """Integrate some steps; a prepared run continues from the end of the last call, bit by bit identical.
+    """Integrate some steps. A run in several calls gives bitwise the same result as in one call.
 
     Args:
         model: See `ModelTerms`.
@@ -217,9 +217,9 @@ def run_massless(
         courses: Time tables of lengths, wrenches and wind velocity. Lengths (K, m) are unstrained. For drums the table
             has lengths s along the path of winding, then expected tensions, (K, 2 m).
         kept: State of a run, in and out, and work arrays.
-        records: Filled: states with the angular velocity in the momentum's place, tensions at the frame ends, lengths,
+        records: Filled: states with angular velocity instead of angular momentum, frame-end tensions, lengths,
             energies, notes.
-        steps: Number of steps, fewer if the space for records ends. With 0 only the start is evaluated.
+        steps: Largest number of steps; the run ends before if the records are full. With 0 only the start is evaluated.
         every: Number of steps per record, starting with the initial state; 0 records only the last step.
     """
     integrator, kind, _remembered, _work, stride = rules

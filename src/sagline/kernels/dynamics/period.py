@@ -21,7 +21,7 @@ def begin_period(
     with_wrench: bool,
     end: float,
 ) -> bool:
-    """Extend the time table linearly to new set points; False, without any change, if one of them is invalid.
+    """Extend the time table linearly to new set points. If a set point is invalid, change nothing and return False.
 
     Args:
         given: Unstrained lengths (m,); for drums also expected tensions (m,); wrench (6,).
@@ -31,8 +31,8 @@ def begin_period(
         course: See `tables_in_time.Course`, with two instants.
         load: Wrench on the platform, (6,).
         at: Counters of the run.
-        with_tension: True if tensions are given; otherwise they do not change.
-        with_wrench: True if a wrench is given; otherwise it does not change.
+        with_tension: True if tensions are given; otherwise the present tensions are kept.
+        with_wrench: True if a wrench is given; otherwise the present wrench is kept.
         end: End of the period [s].
     """
     time, value, begins, ends = course
@@ -89,7 +89,7 @@ def read_encoders(
     """Fill the whole counts of encoders, (m,).
 
     Args:
-        drums: Table and starts of layers, as `turns_of_lengths` takes them.
+        drums: Table and starts of layers, as in `turns_of_lengths`.
         wound: Lengths off the drums [m], (m,).
         stretch: Factors from lengths off the drums to lengths along the path of winding, (m,).
         zero: Counts at zero turns, (m,).

@@ -11,13 +11,13 @@ from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics.drives import Drives
 from sagline.kernels.jit import formula, glue, kernel
 
-MOMENT = 1e-6  # relative to a step: two instants closer than this count as equal
+MOMENT = 1e-6  # largest difference of two equal instants, relative to a step
 
 CubicTableArrays = tuple[Array, Array, Array, Array]  # a Course as passed from Python
 
 
 class CubicTable(NamedTuple):
-    """Piecewise cubic time table of n numbers, from values and rates at interval ends; constant before and after."""
+    """Piecewise cubic time table of n numbers with given values and rates; constant before and after the table."""
 
     time: Array  # instants [s], (K,), increasing
     value: Array  # values at these instants, (K, n)
@@ -27,10 +27,10 @@ class CubicTable(NamedTuple):
 
 @formula
 def interpolate_table(course: CubicTable, at: int, now: float, shift: float, value: Array, rate: Array) -> int:
-    """Fill values and rates (n,) of a table at a time, starting from an interval at or before it; returns its interval.
+    """Fill values and rates (n,) of a table at a time; returns the interval of this time, searched from `at` forward.
 
-    shift: small time offset for the choice of the interval. At an instant of the table, a negative shift selects the
-    interval before it, a positive shift the interval after it.
+    shift: small time offset. At an instant of the table, a negative shift selects the interval before the instant, a
+        positive shift the interval after it.
     """
     times, last, moment = course.time, course.time.shape[0] - 1, now + shift
     while at < last - 1 and moment >= times[at + 1]:
@@ -71,7 +71,7 @@ NOTE_SLACK, NOTE_SATURATED = 0.0, 1.0
 KINETIC, POTENTIAL, SUPPLIED, LOST = range(4)
 ENERGY_COLUMNS = 4
 
-ROUNDING = 1e-9  # tolerance of the energy, relative to the sum of all its parts (for chains, of the weights)
+ROUNDING = 1e-9  # tolerance of the energy, relative to the sum of all its parts (for chains, relative to the weights)
 
 
 @kernel

@@ -1,9 +1,9 @@
 """A rigid body in free motion and under forces: building blocks of the integrators.
 
-The body's own axes are its principal axes, with the origin at the center of mass. A state is a row of 13 numbers:
-position of the center of mass; unit quaternion (scalar last) from these axes to the world; velocity; angular momentum
-in world axes. The first seven are a pose row. The angular momentum is constant in free motion. docs/model.md, section
-11; Dullweber, Leimkuhler & McLachlan, J. Chem. Phys. 107, 1997.
+The body axes are the principal axes, with the origin at the center of mass. A state is a row of 13 numbers: position of
+the center of mass, unit quaternion (scalar last) of the rotation from body axes to world axes, velocity, and angular
+momentum in world axes. The first seven numbers are a pose row. The angular momentum is constant in free motion.
+docs/model.md, section 11; Dullweber, Leimkuhler & McLachlan, J. Chem. Phys. 107, 1997.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def _into_body(state: Array, x: float, y: float, z: float) -> Triple:
 
 @formula
 def _turn_about(a: float, b: float, c: float, w: float, pa: float, pb: float, pc: float, share: float) -> Six:
-    """Rotate by the angle share times pa [rad] about the first of three axes in cyclic order.
+    """Rotate by the angle share * pa [rad] about the first of three axes in cyclic order.
 
     The arguments are the quaternion's components along the axes and its scalar, and the components of the angular
     momentum along the axes. The results are the new quaternion, and the angular momentum along the second and third
@@ -78,7 +78,7 @@ def free_turn(state: Array, inertia: Array, time: float) -> None:
     z, x, y, w, px, py = _turn_about(z, x, y, w, pz, px, py, time / inertia[MOMENTS + 2])
     y, z, x, w, pz, px = _turn_about(y, z, x, w, py, pz, px, by_y)
     x, y, z, w, py, pz = _turn_about(x, y, z, w, px, py, pz, by_x)
-    scale = 1.0 / math.sqrt(x * x + y * y + z * z + w * w)  # a correction of rounding errors only
+    scale = 1.0 / math.sqrt(x * x + y * y + z * z + w * w)  # corrects only rounding errors
     state[TURN], state[TURN + 1], state[TURN + 2], state[TURN + 3] = x * scale, y * scale, z * scale, w * scale
 
 
@@ -111,7 +111,7 @@ def power_of(wrench: Array, state: Array, spinning: Triple) -> float:
 
 @formula
 def rates_of(state: Array, inertia: Array, wrench: Array, rates: Array) -> None:
-    """Fill the time derivative (13,) of a state under a wrench; the derivative preserves the quaternion's length."""
+    """Fill the time derivative (13,) of a state under a wrench. It preserves the length of the quaternion."""
     wx, wy, wz = spin(state, inertia)
     x, y, z, w = state[TURN], state[TURN + 1], state[TURN + 2], state[TURN + 3]
     for k in range(3):
@@ -132,7 +132,7 @@ def platform_state(state: Array, inertia: Array, center: Array, turn: Array, out
         state: State, as in the module's docstring.
         inertia: Row of inertia.
         center: Center of mass, relative to the frame's origin, in principal axes (3,).
-        turn: Quaternion from the frame's axes to the principal ones (4,).
+        turn: Quaternion of the rotation from frame axes to principal axes, (4,).
         out: Filled.
     """
     lever = turned(state, center[0], center[1], center[2])

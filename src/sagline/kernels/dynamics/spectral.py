@@ -1,8 +1,8 @@
-"""Stiffness and mass of one cable in spectral elements, for its modes; docs/model.md, section 11.
+"""Stiffness and mass matrices of one cable for its modes, with spectral elements; docs/model.md, section 11.
 
-The nodes are Gauss-Lobatto nodes, so that the mass matrix is diagonal. The length of an element is limited so that the
-cable's flexibility C is smooth in it. Its degree follows from the number of waves in it. Unknowns are scaled by the
-square roots of their masses.
+With Gauss-Lobatto nodes the mass matrix is diagonal. The length of an element is limited, so that the flexibility C of
+the cable is smooth in the element. The degree of an element follows from the number of waves in it. Unknowns are scaled
+by the square roots of their masses.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ Rule = tuple[Array, Array, Array, Array]
 
 
 class Lobatto(NamedTuple):
-    """Gauss-Lobatto nodes on [-1, 1], their weights, slopes and integrals; first axis: degree; unused entries: 0."""
+    """Gauss-Lobatto nodes on [-1, 1], weights, slopes and integrals. First axis: degree p; unused entries are 0."""
 
     nodes: Array  # (p, i)
     weights: Array  # (p, i)
@@ -64,7 +64,7 @@ def element_from(string: String, omega: float, start: float, first: int) -> _Ele
 
 @formula
 def _element_flexibility(string: String, s: float) -> tuple[float, float, float, float, float, float, float]:
-    """C^-1 and C at a material point: xx, xz, zz of each, and C normal to the plane."""
+    """Matrices C^-1 and C at a material point: xx, xz, zz of each, and C normal to the plane."""
     vertical = vertical_at(string, s)
     square = string.horizontal * string.horizontal + vertical * vertical
     across = 1.0 / math.sqrt(square) + 1.0 / string.stiffness
@@ -141,7 +141,7 @@ def add_stretch(string: String, part: _Element, lobatto: Lobatto, plane: Array) 
 
 @formula
 def lagrange(lobatto: Lobatto, degree: int, place: float, values: Array) -> None:
-    """Fill the values of the Lagrange polynomials at a point of [-1, 1], by barycentric weights."""
+    """Fill the values of the Lagrange polynomials at a point in [-1, 1], with barycentric weights."""
     total = 0.0
     sign = 1.0
     for i in range(degree + 1):
@@ -213,7 +213,7 @@ def _scale_by_masses(matrix: Array, points: Array, used: int, each: int) -> None
 
 @formula
 def _set_frame_end(strings: Array, i: int, count: int, plane: Array) -> None:
-    """Make the frame end's only flexible direction its first unknown; the second unknown is not used."""
+    """Make the only flexible direction of the frame end its first unknown, and leave the second unknown unused."""
     x, z = strings[i, BEHIND_X], strings[i, BEHIND_Z]
     square = x * x + z * z
     if square > 0.0:
@@ -241,8 +241,8 @@ def spectral_matrices(
         points: Filled: s, mass and integrals of C of every node, (m, nodes, 6); s is NaN for unused nodes.
         plane: Filled: scaled stiffness in the plane, (m, 2 nodes, 2 nodes), node by node [1/s^2].
         normal: Filled: scaled stiffness normal to the plane [1/s^2], (m, nodes, nodes).
-        carried: Filled: static motion of the nodes per motion of the platform end, times the roots of their masses, (m,
-            nodes, 5).
+        carried: Filled: static motion of the nodes per motion of the platform end, times the root of the node's mass,
+            (m, nodes, 5).
         still: Filled: mass of the cable in this static motion: xx, xz, zz, yy, (m, 4) [kg].
     """
     lobatto = Lobatto(*rule)
@@ -291,7 +291,7 @@ def spectral_matrices(
 
 @entry
 def interpolate(strings: Array, omega: float, rule: Rule, points: Array, values: Array) -> None:
-    """Fill matrices from scaled motions of the nodes to displacements at equal steps of length, (m, count, nodes)."""
+    """Fill matrices (m, count, nodes): displacements at equal steps of length, per scaled motion of each node."""
     lobatto = Lobatto(*rule)
     count = values.shape[1]
     for i in range(strings.shape[0]):

@@ -18,11 +18,11 @@ LENGTH = 2  # unstrained length of the free span [m]
 WEIGHT = 3  # weight per length [N/m]
 STIFFNESS = 4  # EA [N]
 DENSITY = 5  # [kg/m]
-# compliance of the cable behind the frame end: (x, z) times its transpose in the plane, and normal to it [m/N]
+# compliance [m/N] of the cable behind the frame end: in the plane (x, z)^T (x, z), and normal to the plane
 BEHIND_X, BEHIND_Z, BEHIND_Y = 6, 7, 8  # the first two in [sqrt(m/N)]
 STRING_COLUMNS = 9
 
-SMOOTH = 0.5  # longest element in units of min N/w, for which the flexibility C is smooth
+SMOOTH = 0.5  # longest element with smooth flexibility C, in units of min N/w
 TINY = 1e-300
 
 
@@ -52,7 +52,7 @@ def string_at(strings: Array, i: int) -> String:
 
 @formula
 def vertical_at(string: String, s: float) -> float:
-    """Vertical part of the force in the cable [N] at a material point, counted from the frame end."""
+    """Vertical part of the force in the cable [N] at a material point; s is the length from the frame end."""
     return string.vertical - string.weight * (string.length - s)
 
 
@@ -72,7 +72,7 @@ def slowness(string: String, force: float) -> float:
 
 @formula
 def shortest_wave(string: String, omega: float) -> float:
-    """Half the wavelength of a transverse wave at the largest force [m]; elsewhere it is shorter."""
+    """Half the wavelength of a transverse wave at the largest force [m], where it is longest."""
     low, high = abs(vertical_at(string, 0.0)), abs(string.vertical)
     force = math.hypot(string.horizontal, max(low, high))
     return math.pi / (omega * slowness(string, force) + TINY)

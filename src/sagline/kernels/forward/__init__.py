@@ -1,1 +1,1 @@
-"""From lengths to poses."""
+"""Forward kinematics: poses from lengths."""

@@ -1,7 +1,7 @@
 """Forward kinematics of straight cables: a least-squares pose by the Levenberg-Marquardt method.
 
-This model serves for comparison with the exact cable. Straight cables that are too long or too short are not
-distinguished from taut ones. All lengths have the same weight, and mirrored poses fit as well as the true one.
+The model is for comparison with the exact cable. It does not distinguish slack cables from taut cables. All lengths
+have the same weight. A mirrored pose fits as well as the true pose.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ from sagline.kernels.memory import Memory
 FIT_STEPS = 200
 FIRST_DAMPING = 1e-3  # relative to the largest diagonal element
 SMALL_STEP = 1e-14  # largest last step, in the problem's units
-NOTHING = 1e-13  # relative decrease of the cost below which a fit ends
+NOTHING = 1e-13  # a fit ends at a smaller relative decrease of the cost
 
 
 @formula
@@ -133,7 +133,7 @@ def fit_poses(
     memory: tuple[Array, Indices],
     found: SolutionArrays,
 ) -> None:
-    """Fit every sample in turn; arguments as in `forward_poses`. Forces are NaN, energy is half the sum of squares."""
+    """Fit all samples; arguments as in `forward_poses`. Forces are NaN; the energy is half the sum of squares."""
     batch, answer, kept = ForwardSamples(*given), Solutions(*found), LastEquilibrium(*chain)
     count, m = batch.lengths.shape
     space, rest = new_forward_arrays(Memory(*memory), kept.rows, kept.factor)

@@ -1,4 +1,4 @@
-"""Forward kinematics of a batch: the pose in which the platform rests on cables of given lengths.
+"""Forward kinematics of a batch: the pose of the platform at rest on cables of given lengths.
 
 docs/model.md, section 6.
 """
@@ -43,7 +43,7 @@ from sagline.kernels.forward.problem import (
 from sagline.kernels.jit import entry, glue
 from sagline.kernels.memory import Memory
 
-FLAT = 1e-9  # relative to the largest stiffness: smaller ones count as zero
+FLAT = 1e-9  # relative to the largest stiffness; a smaller stiffness counts as zero
 OVERSTRETCHED = 0.1  # strain above which a result is unrealistic
 PREDICTION, FROM_START, DOWNHILL = 0, 1, 2  # methods for the equilibrium, in the order of use
 
@@ -58,7 +58,7 @@ def _stability(low: float, high: float) -> int:
 
 @glue
 def _support_status(model: Model, cables: Array, rows: Array, needed: int) -> int:
-    """Support status of a stable platform; needed: number of taut cables required."""
+    """Support status of a stable platform; needed: required number of taut cables."""
     taut = 0
     strain = 0.0
     for i in range(cables.shape[0]):
@@ -100,8 +100,8 @@ def _find_pose(
 ) -> tuple[int, float]:
     """Fill the equilibrium by the first reliable method; returns the number of steps and the sum of tensions.
 
-    On return, space contains unbalance, stiffness and its factor at the pose. A factor with NaN as its first number
-    does not exist. exact: model with an energy, from whose equilibrium the problem's own model continues.
+    On return, space contains unbalance, stiffness and its factor at the pose. A first number NaN means that the factor
+    does not exist. exact: model with an energy, whose equilibrium is the start for the problem's own model.
     """
     model, cables, body, wrench, free = problem.model, problem.cables, problem.body, problem.wrench, problem.free
     steps, size, known = 0, 0.0, 0.0
@@ -151,7 +151,7 @@ def _fill_stability(
 
 @glue
 def _store_chain(chain: LastEquilibrium, pose: Array, wrench: Array) -> None:
-    """Keep a pose as the last equilibrium, if its stiffness was factored."""
+    """Keep a pose with a factored stiffness as the last equilibrium."""
     if not math.isnan(chain.factor[0, 0]):
         copy_pose(pose, chain.last)
         for k in range(6):
@@ -192,10 +192,10 @@ def forward_poses(
 
     Args:
         model: Cable model, the empirical model's constants, and True if cables may have pulleys or dead lengths, else
-            None. For shallow models, the descent uses the exact cable, and the last steps use the model itself.
-        chained: True if each sample starts at the result of the last solved one, and the first at starts[0].
+            None. For shallow models, only the last steps use the model; the descent before them uses the exact cable.
+        chained: True if each sample starts at the last result, and the first sample at starts[0].
         given: `ForwardSamples`.
-        chain: `LastEquilibrium`; a chain of samples continues from it if it starts at its pose.
+        chain: `LastEquilibrium`. A chain of samples that starts at its pose continues from its stored stiffness.
         memory: `memory_for` the number of cables.
         found: `Solutions`, filled.
     """

@@ -1,6 +1,6 @@
-"""Steps to an equilibrium: Newton's method from nearby poses, energy descent with a trust region from distant ones.
+"""Steps to an equilibrium: Newton's method from a nearby pose, energy descent with a trust region from a distant pose.
 
-docs/model.md, section 6. The descent ends in a stable equilibrium from almost any start. Steps are in the problem's
+docs/model.md, section 6. From almost any start, the descent ends in a stable equilibrium. Steps are in the problem's
 units.
 """
 
@@ -73,11 +73,11 @@ def trust_step(matrix: Array, gradient: Array, radius: float, factor: Array, wor
 POLISH_STEPS = 30
 SHORTENINGS = 10
 NEAR_STEPS = 6
-NEAR = 3e-3  # the descent ends and Newton's method continues if a full Newton step is shorter than this
+NEAR = 3e-3  # length of a full Newton step below which Newton's method replaces the descent
 PREDICTED = 0.03  # the longest first-order step that is tried
 SHRINKING = 0.3  # largest ratio of a Newton step to the previous one
 FRESH = 1e-4  # largest distance from its pose at which a factored stiffness is reused
-BALANCED = 1e-9  # an unbalance below this share of the sum of tensions and weight counts as zero
+BALANCED = 1e-9  # relative to the sum of tensions and weight; a smaller unbalance counts as zero
 LAST_DIGIT = 1e-15  # a shorter step is below rounding
 
 
@@ -98,7 +98,7 @@ def _add_length_change(model: Model, cables: Array, lengths: Array, rows: Array,
 
 @kernel
 def solve_step(factor: Array, part: Array, step: Array) -> float:
-    """Fill the step (n,) that removes an unbalance (n,), from the factored stiffness; returns its length."""
+    """Fill the step (n,) that removes an unbalance (n,), with the factored stiffness; returns the step length."""
     for j in range(part.shape[0]):
         step[j] = -part[j]
     solve_lower(factor, step)
@@ -108,7 +108,7 @@ def solve_step(factor: Array, part: Array, step: Array) -> float:
 
 @glue
 def predict(problem: PoseProblem, lengths: Array, start: Array, last: Array, space: ForwardArrays, pose: Array) -> bool:
-    """Fill the first-order change due to new lengths and wrench; False if no equilibrium is stored for the start.
+    """Fill the first-order change due to new lengths and wrench; False without a stored equilibrium at the start.
 
     Afterwards the rows contain the new lengths.
     """
@@ -130,12 +130,12 @@ def predict(problem: PoseProblem, lengths: Array, start: Array, last: Array, spa
 
 @glue
 def newton_from(problem: PoseProblem, pose: Array, space: ForwardArrays) -> tuple[int, float]:
-    """Full Newton steps with the symmetric stiffness; returns the number of steps and the sum of tensions at the pose.
+    """Full Newton steps with the symmetric stiffness; returns the number of steps and the last sum of tensions.
 
-    The number is 0 if the stiffness is not positive definite or the first step is too long; the pose is then unchanged,
-    and matrix is its stiffness. The number is -1 if the steps do not decrease fast enough. On return, space belongs to
-    the pose, except for the stiffness. The skew part of the stiffness, half of a given moment, is neglected, which
-    costs one step more.
+    The number is 0 if the stiffness is not positive definite or the first step is too long. The pose is then unchanged,
+    and matrix is its stiffness. The number is -1 if the steps do not decrease fast enough. On return, all of space
+    except the stiffness belongs to the pose. The skew part of the stiffness is half of a given moment. It is neglected,
+    which costs one additional step.
     """
     model, cables, body, wrench, free = problem.model, problem.cables, problem.body, problem.wrench, problem.free
     rotation, rows, gradient = space.rotation, space.rows, space.gradient
@@ -182,8 +182,9 @@ def _newton_steps(
 ) -> tuple[float, float]:
     """One Newton step on the wrench balance, shortened until the unbalance is below best; requires the stiffness.
 
-    Returns the new unbalance and the length of the step; length 0 and an unchanged pose if no step is better. Close to
-    the balance (unbalance below good) only the full step is tried, because only rounding prevents it from being better.
+    Returns the new unbalance and the length of the step. If no step is better, the length is 0 and the pose is
+    unchanged. If the unbalance is below good, only the full step is tried, because a worse full step is then due to
+    rounding.
     """
     model, cables, body, wrench, free = problem.model, problem.cables, problem.body, problem.wrench, problem.free
     step, trial, part = space.step, space.trial, space.part
@@ -227,7 +228,7 @@ def polish(problem: PoseProblem, pose: Array, space: ForwardArrays, good: float)
     for iteration in range(POLISH_STEPS):
         platform_stiffness(problem.model, problem.cables, space.rows, space.stiffness)
         best, length = _newton_steps(problem, pose, space, best, good)
-        # each step is as long as the error before it; the next step would be about length^3/before^2
+        # the length of a step is the error before the step; the next step would be about length^3/before^2
         if length == 0.0 or length * length * length <= LAST_DIGIT * before * before:
             steps = iteration + 1
             break
@@ -244,12 +245,13 @@ NOISE = 4e-15  # rounding error of an energy, relative to the sum of its parts
 
 @glue
 def descend(problem: PoseProblem, pose: Array, space: ForwardArrays, known: float) -> tuple[int, float]:
-    """Decrease the energy until a full Newton step is short; a start in balance does not move, stable or not.
+    """Decrease the energy until a full Newton step is short. A start in balance does not move, even if it is unstable.
 
-    known: the sum of tensions that `unbalance` gave at the pose, if space still belongs to the pose and matrix is its
-    stiffness; else 0.
+    known: the sum of tensions from `unbalance` at the pose; 0 unless space belongs to the pose and matrix is its
+        stiffness.
 
-    Returns the number of steps tried, and this sum at the pose, or 0 if the last pose tried is not the result.
+    Returns the number of tried steps, and the sum of tensions at the pose, or 0 if the last tried pose is not the
+    result.
     """
     model, cables, body, wrench, free = problem.model, problem.cables, problem.body, problem.wrench, problem.free
     trial, motion, rotation, rows, gradient = space.trial, space.motion, space.rotation, space.rows, space.gradient

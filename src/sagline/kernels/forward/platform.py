@@ -1,7 +1,8 @@
-"""The platform on cables of given lengths: wrench at a pose, and its derivatives by motions.
+"""The platform on cables of given lengths: wrench at a pose, and derivatives of the wrench by motions.
 
-A motion consists of the displacement of the center of mass and a rotation vector in world axes, multiplied from the
-left. The unbalance is the negative total wrench on the platform, which is the gradient of the energy.
+A motion consists of the displacement of the center of mass and a rotation vector in world axes, which rotates the
+present orientation from the left. The unbalance is minus the total wrench on the platform. It is the gradient of the
+energy.
 """
 
 from __future__ import annotations
@@ -28,8 +29,8 @@ def unbalance(
 ) -> float:
     """Fill rotation, geometry, cable forces and statuses, and the unbalance (6,) as gradient, at a pose.
 
-    The rows must contain the lengths. Returns the sum of the tensions and the platform's weight [N], with which the
-    unbalance is compared.
+    The rows must contain the lengths. Returns the sum of the tensions and the platform's weight [N], to which the
+    unbalance is relative.
     """
     cable_geometry(cables, body, pose, rotation, rows)
     forces_from_lengths(model, cables, rows, model.behind)
@@ -62,10 +63,10 @@ def add_force(rows: Array, i: int, horizontal: float, vertical: float, wrench: A
 def platform_energy(
     model: Model, cables: Array, body: Array, wrench: Array, pose: Array, rotation: Array, rows: Array
 ) -> tuple[float, float]:
-    """Energy [J] after `unbalance` at the pose, and the sum of its terms' magnitudes, a measure of rounding.
+    """Energy [J] after `unbalance` at the pose, and the sum of the magnitudes of its terms (a measure of rounding).
 
-    The energy is that of cables, weight and given force; it is NaN if the model does not have one. A given moment,
-    constant in world axes, does not have a potential energy and is not included.
+    The terms are the energies of cables, weight and given force. The result is NaN if the cable model has no energy. A
+    given moment, constant in world axes, has no potential energy and is not included.
     """
     energy, size = energy_of_cables(model, cables, rows, model.behind)
     for k in range(3):
@@ -107,7 +108,8 @@ def _add_row(target: Array, share: float, row: Six) -> None:
 def platform_stiffness(model: Model, cables: Array, rows: Array, stiffness: Array) -> None:
     """Fill the derivative (6, 6) of the unbalance after `unbalance`: the sum of elastic, sag and geometric stiffness.
 
-    Its skew part is half the moment of the cables' forces, which is zero in an equilibrium without a given moment.
+    The skew part of the derivative is half the moment of the cable forces. It is zero in an equilibrium without a given
+    moment.
     """
     stiffnesses_in_plane(model, cables, rows, model.behind)
     for j in range(6):
@@ -166,7 +168,7 @@ def moved_pose(body: Array, pose: Array, motion: Array, moved: Array) -> None:
     aw = w * qw - x * qx - y * qy - z * qz
     scale = 1.0 / math.sqrt(ax * ax + ay * ay + az * az + aw * aw)
     moved[3], moved[4], moved[5], moved[6] = ax * scale, ay * scale, az * scale, aw * scale
-    # displacement of the origin: that of the center of mass plus d = Q c - Q' c from the rotation of its lever
+    # displacement of the origin: displacement of the center of mass plus d = Q c - Q' c due to the rotation
     cx, cy, cz = body[tables.CENTER_X], body[tables.CENTER_Y], body[tables.CENTER_Z]
     before = turned(pose, cx, cy, cz)
     after = turned(moved, cx, cy, cz)

@@ -12,7 +12,7 @@ from sagline.kernels.cable.terms import Model
 from sagline.kernels.jit import glue, kernel
 from sagline.kernels.memory import Memory, block, vector
 
-UNIT_SHARE = 0.2  # displacement, relative to the mean length, that has the same weight as a rotation by 1 rad
+UNIT_SHARE = 0.2  # displacement with the weight of a rotation by 1 rad, relative to the mean length
 
 # columns of the numbers that describe one solution
 ENERGY, FORCE_RESIDUAL, MOMENT_RESIDUAL, STIFFNESS_MIN, ITERATIONS = 0, 1, 2, 3, 4
@@ -65,7 +65,7 @@ class PoseProblem(NamedTuple):
     cables: Array  # rows of the cable_table, (m, CABLE_COLUMNS)
     body: Array  # row of the body_table, (BODY_COLUMNS,)
     wrench: Array  # external plus inertial wrench, about the center of mass, (6,)
-    unit: float  # norm of the units, which converts a sum of forces to components along the free motions
+    unit: float  # norm of the units, which converts a sum of forces to a component along the free motions
 
 
 class ForwardArrays(NamedTuple):
@@ -85,7 +85,7 @@ class ForwardArrays(NamedTuple):
 
 @glue
 def new_forward_arrays(memory: Memory, rows: Array, factor: Array) -> tuple[ForwardArrays, Memory]:
-    """Working memory, whose rows and factor are kept between calls, and the remaining memory."""
+    """Working memory with the given rows and factor, which are kept between calls, and the remaining memory."""
     n = factor.shape[0]
     rotation, memory = block(memory, 3, 3)
     gradient, memory = vector(memory, 6)
@@ -115,7 +115,7 @@ def row_of(array: Array, p: int) -> Array:
 
 @glue
 def problem_at(model: Model, given: ForwardSamples, p: int, free: Array, arcs: Array) -> PoseProblem:
-    """Sample p of a batch as a problem, with the gravity of its body in the model; fills the free motions."""
+    """Problem of sample p of a batch, with the gravity of its body in the model; fills the free motions."""
     body, cables = row_of(given.bodies, p), row_of(given.robots, p)
     placed = Model(model.code, model.k_h, model.k_p, body[tables.GRAVITY], model.behind)
     unit = _fill_free(given.freedom, given.lengths[p], free)

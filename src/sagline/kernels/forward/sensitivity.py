@@ -1,4 +1,4 @@
-"""Stiffness of a platform in equilibrium, and the sensitivities of the cable forces to the cables' data."""
+"""Stiffness of a platform in equilibrium, and sensitivities of the cable forces to the data of the cables."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def describe_states(
         matrices: Filled: stiffness of the platform, (N, 6, 6).
         blocks: Filled: stiffness of every cable's platform end in world axes, (N, m, 3, 3).
         slopes: Filled: dT of every cable by its data, (N, DATA, m, 3).
-        levers: Filled: from the center of mass to the platform ends, (N, m, 3).
+        levers: Filled: vectors from the center of mass to the platform ends, (N, m, 3).
     """
     batch = ForwardSamples(*given)
     code, k_h, k_p, behind = model

@@ -1,4 +1,4 @@
-"""Decision about the stability of poses whose solution contains no proof, by the smallest stiffness."""
+"""Stability of poses without a proof in their solution, decided by the smallest stiffness."""
 
 from __future__ import annotations
 

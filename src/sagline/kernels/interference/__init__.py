@@ -1,1 +1,1 @@
-"""Least distances of sagging cables."""
+"""Least distances between sagging cables and other bodies."""

@@ -1,9 +1,10 @@
-"""Least distances of sagging cables from each other, from rods and from boxes, with proved bounds by branch and bound.
+"""Least distances of sagging cables from cables, rods and boxes; branch and bound proves their bounds.
 
 A cable is divided into pieces. The bulge of a piece is an upper bound of its distance from its own chord. The distance
-of two chords minus the bulges is a lower bound of the distance. Points of the cables give the upper bound, which
-Newton's method improves to full precision. A pair of pieces is finished when its lower bound is within the precision of
-the upper bound; otherwise one piece is split. All pairs of a cable use the same pieces. docs/model.md, section 13.
+of two chords minus both bulges is a lower bound of the distance of the pieces. Points of the cables give an upper
+bound, which Newton's method improves to full precision. A pair of pieces is finished when the two bounds differ by less
+than the precision. Otherwise one piece is split. All pairs with the same cable use the same pieces. docs/model.md,
+section 13.
 """
 
 from __future__ import annotations
@@ -32,8 +33,8 @@ from sagline.kernels.interference.shapes import (
 )
 from sagline.kernels.jit import entry, kernel
 
-# Columns of a piece: ends of its chord (six), bulge, range as shares of the cable, first of its two parts (0: not
-# split).
+# Columns of a piece: ends of its chord (six), bulge, range as shares of the cable, index of the first of its two parts
+# (0 if not split).
 BULGE = 6
 BEGIN = 7
 END = 8
@@ -41,10 +42,10 @@ PARTS = 9
 PIECE_COLUMNS = 10
 
 PIECES = 8192  # largest number of pieces of all cables of a pose
-COUNTER = PIECES - 1  # a row without a piece: its last column is the number of pieces, the other columns hold an edge
+COUNTER = PIECES - 1  # last row: its last column is the number of pieces, its other columns hold an edge of a box
 WAITING = 4096  # largest number of waiting pairs of pieces
-PAIRS = 100_000  # largest number of pairs per distance; the search then ends with the lower bound reached
-ROUNDING = 1e-13  # relative to the coordinates: rounding error of a lower bound
+PAIRS = 100_000  # largest number of pairs per distance; the search then ends with its present lower bound
+ROUNDING = 1e-13  # rounding error of a lower bound, relative to the coordinates
 FAR = 1e300
 
 
@@ -73,7 +74,7 @@ def _whole_piece(piece: Array, row: Array) -> None:
 
 @kernel
 def _split_piece(pieces: Array, index: int, row: Array) -> None:
-    """Split a piece in the middle, or at the cable's lowest point, which separates the two parts of a fold."""
+    """Split a piece in the middle, or at the lowest point of the cable if it separates two parts of a fold."""
     count = int(pieces[COUNTER, PARTS])
     piece, one, other = pieces[index], pieces[count], pieces[count + 1]
     middle = 0.5 * (piece[BEGIN] + piece[END])
@@ -200,7 +201,7 @@ def _edge_of(box: Array, axis: int, corner: int, edge: Array) -> None:
 
 @kernel
 def _edges_to_box(box: Array, other: Array, edge: Array, nearest: Array, best: float) -> float:
-    """Least distance of a box's edges from another box [m] and its points, if it is below a known distance."""
+    """Least distance of the edges of a box from another box [m], and its points, if it is below a known distance."""
     for axis in range(3):
         for corner in range(4):
             _edge_of(box, axis, corner, edge)
@@ -217,7 +218,7 @@ def _edges_to_box(box: Array, other: Array, edge: Array, nearest: Array, best: f
 
 @kernel
 def _least_of_boxes(box: Array, other: Array, edge: Array, nearest: Array) -> float:
-    """Least distance of two boxes [m], 0 if they touch; it is that of an edge of one box from the other box."""
+    """Least distance of two boxes [m], 0 if they touch: the distance of an edge of one box from the other box."""
     best = _edges_to_box(box, other, edge, nearest, FAR)
     turned = _edges_to_box(other, box, edge, nearest, best)
     if turned < best:
@@ -250,15 +251,15 @@ def least_distances(
     low_out: Array,
     nearest_out: Array,
 ) -> None:
-    """Least distances of pairs at every pose, minus their radii, with proved lower bounds and the nearest points.
+    """Least distances of pairs at every pose, minus the radii, with proved lower bounds and the nearest points.
 
     Args:
         moving: Shapes that move with the pose, shape (N, K, COLUMNS).
         still: Fixed shapes, shape (S, COLUMNS).
-        pairs: Indices of two shapes, counted through moving and fixed shapes, shape (P, 2); a box is the second of a
-            pair.
+        pairs: Indices of two shapes, shape (P, 2). Fixed shapes are counted after moving shapes. A box is the second
+            shape of a pair.
         precision: Largest difference of the lower bound from the distance [m].
-        together: True if only the least distance of a pose is required; the other distances are then only bounded.
+        together: True if only the least distance of a pose is required. The other distances then get only bounds.
         pieces: Work array from `work_arrays_for_pieces`.
         waiting: Work array from `work_arrays_for_pieces`.
         distance_out: [m], shape (N, P).

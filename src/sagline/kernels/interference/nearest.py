@@ -1,4 +1,4 @@
-"""Local minimum of the distance from two given points, by Newton's method within the ends of the cables."""
+"""Local minimum of the distance, by Newton's method from two given points, within the ends of the cables."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from sagline.kernels.jit import kernel
 STEPS = 30
 HALVINGS = 6
 SMALL = 1e-8  # last step, relative to the cable's length; Newton's method squares the error
-FLAT = 1e-13  # relative to the product of curvatures: a smaller determinant means parallel cables
+FLAT = 1e-13  # relative to the product of curvatures; a smaller determinant means parallel cables
 
 
 @kernel
@@ -40,12 +40,12 @@ def _newton_step(one: Array, other: Array, s: float, t: float) -> tuple[float, f
     ds, dt = 0.0, 0.0
     if s_free and t_free:
         determinant = hss * htt - hst * hst
-        if not (hss > 0.0 and determinant > FLAT * uu * vv):  # far from the nearest points, or parallel cables
+        if not (hss > 0.0 and determinant > FLAT * uu * vv):  # far from the minimum, or parallel cables
             hss, htt = uu * (1.0 + 1e-9), vv * (1.0 + 1e-9)
             determinant = max(hss * htt - hst * hst, FLAT * uu * vv)
         ds = -(gs * htt - gt * hst) / determinant
         dt = -(gt * hss - gs * hst) / determinant
-        # a bound that is reached stays active; only the other share changes further
+        # a reached bound stays active; then only the other share changes
         new_s, new_t = min(max(s + ds, one[FIRST]), one[LAST]), min(max(t + dt, other[FIRST]), other[LAST])
         if new_s != s + ds and new_t == t + dt:
             new_t = min(max(t - (gt + hst * (new_s - s)) / htt, other[FIRST]), other[LAST])

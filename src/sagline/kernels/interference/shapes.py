@@ -33,7 +33,7 @@ HANGING = 0.0
 PARABOLA = 1.0
 BOX = 2.0
 
-FOLD = 1e-12  # relative to a cable's length: a point closer to the turning point than this counts as at it
+FOLD = 1e-12  # largest distance from the turning point that counts as zero, relative to the length of the cable
 
 
 @kernel
@@ -51,8 +51,8 @@ def point(row: Array, share: float) -> tuple[float, float, float]:
 def slopes(row: Array, share: float) -> tuple[float, float, float, float]:
     """First and second derivatives of (x, z) in the cable's plane by the share of its length [m].
 
-    With t the tension and T the force, by the unstrained length: r' = T (1/t + 1/EA), r'' = (-T_x T_z w/t^3, w
-    T_x^2/t^3 + w/EA).
+    With t the tension and T the force, the derivatives with respect to the unstrained length are r' = T (1/t + 1/EA)
+    and r'' = (-T_x T_z w/t^3, w T_x^2/t^3 + w/EA).
     """
     if row[KIND] != HANGING:
         return row[SPAN], row[RISE] - row[DROP] * (1.0 - 2.0 * share), 0.0, 2.0 * row[DROP]
@@ -78,10 +78,10 @@ def level_point(row: Array) -> float:
 
 @kernel
 def bulge(row: Array, first: float, last: float, chord2: float) -> float:
-    """Largest distance of a piece's points from its chord [m]; the square of the chord is given.
+    """Largest distance of the points of a piece from its chord [m]; `square` is the squared chord.
 
-    It is the smaller of two bounds. The first is |r''| (s1 - s0)^2/8 with the least tension on the piece. The second
-    follows from the piece's length and the distance of its ends, and holds for folds too.
+    The result is the smaller of two upper bounds. The first is |r''| (s1 - s0)^2/8 with the least tension on the piece.
+    The second follows from the length of the piece and the distance of its ends, and is also valid for folds.
     """
     width = last - first
     if row[KIND] != HANGING:
@@ -112,7 +112,7 @@ STEPS = 12  # Newton on a slope of at most six straight parts
 
 @kernel
 def between_segments(one: Array, other: Array) -> tuple[float, float, float, float]:
-    """Squared distance of segments (x0, y0, z0, x1, y1, z1), a lower bound of it [m^2], and the nearest shares."""
+    """Squared distance of segments (x0, y0, z0, x1, y1, z1), a lower bound of it, [m^2], and the nearest shares."""
     ax, ay, az = one[3] - one[0], one[4] - one[1], one[5] - one[2]
     bx, by, bz = other[3] - other[0], other[4] - other[1], other[5] - other[2]
     rx, ry, rz = one[0] - other[0], one[1] - other[1], one[2] - other[2]
@@ -151,13 +151,13 @@ def in_box_axes(box: Array, x: float, y: float, z: float) -> tuple[float, float,
 
 @kernel
 def outside(coordinate: float, half: float) -> float:
-    """Signed distance of a coordinate beyond a box's faces; 0 between them."""
+    """Signed distance of a coordinate from the nearer face of a box; 0 between the two faces."""
     return coordinate - min(max(coordinate, -half), half)
 
 
 @kernel
 def to_box(segment: Array, box: Array) -> tuple[float, float, float]:
-    """Squared distance of a segment from a box, a lower bound of it [m^2], and the share of the nearest point."""
+    """Squared distance of a segment from a box, a lower bound of it, [m^2], and the share of the nearest point."""
     px, py, pz = in_box_axes(box, segment[0] - box[PLACE], segment[1] - box[PLACE + 1], segment[2] - box[PLACE + 2])
     dx, dy, dz = in_box_axes(box, segment[3] - segment[0], segment[4] - segment[1], segment[5] - segment[2])
     hx, hy, hz = box[HALF], box[HALF + 1], box[HALF + 2]

@@ -1,1 +1,1 @@
-"""From poses to tensions and lengths."""
+"""Inverse kinematics: tensions and lengths from poses."""

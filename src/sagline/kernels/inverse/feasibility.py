@@ -43,8 +43,8 @@ from sagline.kernels.tension.nearest import Distribution
 from sagline.kernels.tension.on_polygon import feasible_interval
 from sagline.kernels.tension.polygon import feasible_polygon
 
-SUPPORT = 1e-9  # relative to the largest component along the proof: smaller components do not oppose the wrench
-AT_LIMIT = 1e-9  # relative to a limit: a value closer to the limit than this counts as at the limit
+SUPPORT = 1e-9  # smallest component of a cable that opposes the wrench, relative to the largest one
+AT_LIMIT = 1e-9  # largest distance from a limit that counts as at the limit, relative to the limit
 PROVED, ENOUGH = 0, 1  # columns of the brackets
 
 
@@ -61,9 +61,9 @@ def decide_poses(
     answers: Answers,
     verdicts: tuple[Array, Array, Array, Flags],
 ) -> None:
-    """Check, in chord tensions, the poses that the distribution iterations reported as infeasible.
+    """Check the poses that the distribution iterations reported as infeasible, in terms of chord tensions.
 
-    If a pose is feasible after all, its tensions are filled.
+    Tensions are filled for each pose that proves to be feasible.
 
     Args:
         model_terms: As in `inverse_poses`.
@@ -72,7 +72,7 @@ def decide_poses(
         poses: Rows (N, POSE_COLUMNS).
         wrenches: External plus inertial wrenches about the center of mass, (1 or N, 6).
         which: Indices of the poses, (K,).
-        covers: True if the method finds every feasible distribution; if False, a feasible pose gets POSE_NOT_COVERED.
+        covers: True if the method finds every feasible distribution. If False, a feasible pose gets POSE_NOT_COVERED.
         memory: `memory_for` the number of cables.
         answers: As in `inverse_poses`; overwritten for these poses.
         verdicts: Filled for these poses: lower and upper bound of the smallest sufficient change of the force [N],
@@ -165,7 +165,7 @@ def new_demand(memory: Memory, m: int, freedom: Array) -> tuple[DemandArrays, Me
 
 @glue
 def demand_of_pose(platform: Platform, cables: Cables, balance: Balance, work: DemandArrays) -> tuple[Demand, float]:
-    """Fill the wrench demand on the cables of a placed pose, and the tensions at which its search starts.
+    """Fill the demand of a pose on its cables, and the tensions at the start of the search.
 
     Returns the demand, and the lever arm [m] by which moments are divided.
     """
@@ -207,7 +207,7 @@ def demand_of_pose(platform: Platform, cables: Cables, balance: Balance, work: D
 
 @glue
 def _write_proof(demand: Demand, change: TensionChange, lever: float, farkas: Array) -> None:
-    """Fill the direction of the proof; its force part, or its moment part if the force part is zero, has length 1."""
+    """Fill the direction of the proof; its force part has length 1, or its moment part if the force part is zero."""
     n = farkas.size
     for k in range(n):
         farkas[k] = change.direction[k] if k < demand.soft else change.direction[k] / lever
@@ -253,8 +253,8 @@ def polygon_of_pose(
         carried: Chord tensions and sag forces of the cables, (m,) each; NaN selects sag forces of first order.
         memory: `memory_for` the number of cables.
         polygon: Filled: scale and offset of the variable, (m,) each; minimum norm and limits, (3, m); null space (r,
-            m); for r = 2 corners and labels as `feasible_polygon`; for r = 1 corners[0, 0] and corners[1, 0] are the
-            ends of the interval (infinite if it is unbounded); for r = 0 nothing more.
+            m); for r = 2 corners and labels as in `feasible_polygon`; for r = 1 the ends of the interval, corners[0, 0]
+            and corners[1, 0], which may be infinite.
     """
     distribution = Distribution(*distribution_terms)
     freedom, bodies, robots = robot_terms

@@ -1,6 +1,6 @@
 """Iterations of tension distribution and cable states until the sag forces converge; docs/model.md, section 5.
 
-A distribution in the tension at the frame end is linearized at the tensions of the last iteration.
+If the variable of the distribution is the frame-end tension, the balance is linearized at the last tensions.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ def linearize_ends(model: Model, distribution: Distribution, cables: Cables, bal
 
 
 ITERATIONS = 30
-FREE_ITERATIONS = 8  # iterations after which the reference is fixed; rounding then cannot change a tie
-CONVERGED = 1e-10  # [N]; sag forces that change by less, or by this share of the largest tension, have converged:
+FREE_ITERATIONS = 8  # iterations after which the reference is fixed, so that rounding cannot change a tie
+CONVERGED = 1e-10  # largest change of a converged sag force [N], or relative to the largest tension:
 SAG_ROUNDING = 1e-15
 
 
@@ -56,9 +56,9 @@ def distribute_and_solve_cables(
 ) -> int:  # fmt: skip
     """Distribute the tensions and solve the cables until their sag forces converge; returns the pose's status.
 
-    cables: those of `set_pose`, whose tensions, ratios and sag forces are filled; work: work arrays for methods that
-    are not projections and for frame-end tensions, or None to exclude them from compilation; statuses: filled with the
-    status of each cable, (m,).
+    cables: the cables from `set_pose`, with tensions, ratios and sag forces to be filled; work: work arrays for
+        frame-end tensions and for methods that are not projections, or None to exclude both from compilation; statuses:
+        filled with the status of each cable, (m,).
     """
     near.held.labels[0] = 0
     if work is not None:
@@ -114,7 +114,7 @@ def distribute_and_solve_cables(
 
 @glue
 def strain_admits_tensions(cables: Cables) -> bool:
-    """True if no cable without upper limit is stretched too far; distributions do not know this limit."""
+    """True if the strain of all cables without upper limit is allowed; distribution methods ignore this limit."""
     for i in range(cables.tau.size):
         if cables.tau[i] > cables.high[i] and is_limited_by_strain(cables, i):
             return False
@@ -123,7 +123,7 @@ def strain_admits_tensions(cables: Cables) -> bool:
 
 @glue
 def fix_reference(balance: Balance, near: ReferencePoint) -> None:
-    """Make the present tensions the reference, and release the bound of a tie if it is active."""
+    """Make the present tensions the reference, and release an active bound of a tie."""
     near.held.labels[0] = 0
     for k in range(balance.null.shape[0]):
         near.reference[k] = 0.0

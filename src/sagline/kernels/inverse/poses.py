@@ -1,4 +1,4 @@
-"""Inverse kinematics of a batch of poses: tensions that balance the platform, and the lengths for the winches.
+"""Inverse kinematics of a batch of poses: tensions that balance the platform, and unstrained lengths of the cables.
 
 docs/model.md, sections 4 and 5. For the exact cable, the sag forces T_z - tau sin phi depend on the tensions. The
 balance is therefore solved repeatedly, with the sag forces of the last iteration, until they converge.
@@ -27,7 +27,7 @@ from sagline.kernels.tension.polygon import new_work_arrays
 
 FORCE, MOMENT = 0, 1  # columns of the residuals
 
-# types of the arguments from Python: plain tuples, which are passed fastest
+# types of the arguments from Python; plain tuples take the least time to pass
 ModelTerms = tuple[int, float, float]  # code, k_h, k_p
 DistributionTerms = tuple[int, float, int, Array, Array]  # Distribution
 LimitTerms = tuple[int, float]  # Limits
@@ -37,7 +37,7 @@ Answers = tuple[Array, Codes, Array, Array, Codes]  # results, statuses, residua
 
 @glue
 def platform_at(robots: Robots, poses: Array, wrenches: Array, p: int) -> Platform:
-    """Platform at pose p; robots and wrenches have one row for all poses or one row per pose."""
+    """Platform at pose p; robots and wrenches have one row in total or one row per pose."""
     freedom, bodies, cables = robots
     body, cable_rows = bodies[min(p, bodies.shape[0] - 1)], cables[min(p, cables.shape[0] - 1)]
     return Platform(freedom, body, cable_rows, poses[p], wrenches[min(p, wrenches.shape[0] - 1)])
@@ -75,17 +75,17 @@ def inverse_poses(
             cable_table, (1 or N, m, CABLE_COLUMNS).
         poses: Rows (N, POSE_COLUMNS).
         wrenches: External plus inertial wrenches about the center of mass, (1 or N, 6).
-        previous: Tensions in the distribution's variable (m,) to stay close to, NaN for the minimum norm; on return,
-            with CLOSEST, those of the last feasible pose.
+        previous: Reference tensions in the distribution's variable (m,), NaN for the minimum norm. With CLOSEST, filled
+            with the tensions of the last feasible pose.
         memory: `memory_for` the number of cables.
-        otherwise: None for methods that project onto a reference in chord or horizontal tensions; the code of all other
-            methods is then not compiled. True for any method.
-        stability: True to prove that each equilibrium is stable; a solved pose without a proof gets
+        otherwise: True for any method. None for projections onto a reference in chord or horizontal tensions, which
+            excludes the code of all other methods from compilation.
+        stability: True to prove the stability of each equilibrium. A solved pose without a proof then gets
             UNPROVED_STABILITY. None excludes the proof from compilation.
-        answers: Filled: span and rise of the free spans, unstrained length off the drum, T_x, T_z, tau, and, for robots
-            with pulleys or dead lengths, the rows of these, (RESULT_ROWS, N, m); status of each cable, (N, m); norms of
-            the unbalanced force [N] and moment [N m] along the free motions, (N, 2); wrench that J tau must supply
-            along the free motions, (N, n); status of each pose, (N,).
+        answers: Filled: span and rise of the free spans, unstrained length off the drum, T_x, T_z, tau, then the rows
+            for pulleys and dead lengths, if any, (RESULT_ROWS, N, m); status of each cable, (N, m); norms of the
+            unbalanced force [N] and moment [N m] along the free motions, (N, 2); wrench that J tau must supply along
+            the free motions, (N, n); status of each pose, (N,).
         first: Index of the first pose.
         last: Index after the last pose.
     """
@@ -163,7 +163,7 @@ def write_solution(solved: bool, model: Model, cables: Cables, balance: Balance,
 
 @glue
 def _write_behind(solved: bool, model: Model, cables: Cables, results: Array, p: int) -> None:
-    """Write the free spans, and add the cable on the pulleys and behind them to their lengths."""
+    """Write the free spans; add the cable on the pulleys and the dead lengths to the unstrained lengths."""
     m = cables.tau.size
     for i in range(m):
         if not solved:

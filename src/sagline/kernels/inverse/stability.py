@@ -1,9 +1,9 @@
-"""Proof that the equilibrium of a solved pose is stable, from what its solution has computed; docs/model.md, section 6.
+"""Proof that the equilibrium of a solved pose is stable, from values of its solution; docs/model.md, section 6.
 
-The stiffness of a platform end is positive definite. It is therefore at least u u^T/c, with the unit vector u along the
-chord and the compliance c along it. With any right inverse A of the structure matrix J, the inverse of J diag(1/c) J^T
-is at most A^T diag(c) A. Only the geometric stiffness G of the rotations can be negative. The equilibrium is stable if
-1 + L^T G L is positive definite, where L L^T is the part of A^T diag(c) A for the rotations.
+The stiffness of a platform end is positive definite. Let u be the unit vector along the chord and c the compliance
+along u. The stiffness is then at least u u^T/c. With any right inverse A of the structure matrix J, the inverse of J
+diag(1/c) J^T is at most A^T diag(c) A. Only the geometric stiffness G of the rotations can be negative. The equilibrium
+is stable if 1 + L^T G L is positive definite, where L L^T is the part of A^T diag(c) A for the rotations.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from sagline.kernels.cable.terms import Model
 from sagline.kernels.jit import glue
 from sagline.kernels.memory import Memory, block, vector
 
-ROUNDING = 0.01  # a proof with a smaller margin than this counts as none
+ROUNDING = 0.01  # smallest margin of a valid proof
 
 
 class StabilityArrays(NamedTuple):
     """Work arrays of the proof, for m cables and k free rotations."""
 
-    compliance: Array  # of the platform ends along their chords [m/N], (m,)
+    compliance: Array  # compliance of the platform ends along their chords [m/N], (m,)
     torque: Array  # sum of r T^T, T the force on a cable at its platform end [N m], (3, 3)
     geometric: Array  # geometric stiffness of the rotations [N m], (k, k)
-    elastic: Array  # upper bound of their compliance by the cables [1/(N m)], later its factor L, (k, k)
+    elastic: Array  # upper bound of the compliance of the rotations [1/(N m)], later its factor L, (k, k)
     proof: Array  # G L, then 1 + L^T G L, (2 k, k)
 
 
@@ -49,7 +49,7 @@ def new_stability_arrays(memory: Memory, m: int, k: int) -> tuple[StabilityArray
 
 @glue
 def proves_stability(model: Model, platform: Platform, cables: Cables, balance: Balance, work: StabilityArrays) -> bool:
-    """True if the equilibrium of a solved pose is proved to be stable; False leaves it open."""
+    """True if the equilibrium of a solved pose is proved to be stable; False without a proof."""
     k = work.geometric.shape[0]
     if model.code != codes.CATENARY and model.code != codes.ELASTIC:
         return False
@@ -113,7 +113,7 @@ def _fill_geometric_stiffness(platform: Platform, cables: Cables, balance: Balan
 def _fill_compliances(model: Model, cables: Cables, compliance: Array) -> None:
     """Fill upper bounds of the compliances u.(dB/dT) u of the platform ends along their chords, (m,) [m/N].
 
-    They are exact without pulleys. Deep sag, outside the range of the polynomial, gets an infinite bound.
+    The bounds are exact without pulleys. They are infinite for deep sag, which is outside the range of the polynomial.
     """
     for i in range(cables.tau.size):
         length = cables.ratio[i] * cables.free_chord[i]

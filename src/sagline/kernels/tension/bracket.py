@@ -1,10 +1,9 @@
 """Feasibility of a wrench with tensions within their limits, decided on the cables' exact curves.
 
 Tensions that balance the wrench prove that it is feasible. A direction y can prove that it is infeasible: along y each
-cable gives at most the largest value of its curve. If the sum of these values is less than the demand, no tensions
-balance the wrench. Without such a proof, each direction limits how far each cable may be below its largest value, which
-narrows the ranges of tensions. If the ranges do not become narrower, the range of the cable with the least certain sag
-force is split in two.
+cable contributes at most the largest value of its curve. If the sum of these values is less than the demand, no
+tensions balance the wrench. Otherwise a cable cannot be far below its largest value along y, which narrows its range of
+tensions. If the ranges do not become narrower, the range with the most uncertain sag force is split in two.
 
 The shortfall lies between the gap of the first proof and the residual of the least change.
 """
@@ -29,12 +28,12 @@ from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block, vector
 from sagline.kernels.tension.least_change import Demand, TensionChange, least_change, norm_of_part
 
-PLENTY = 1e6  # tension, relative to the largest force, that a cable without limit never exceeds
-FEASIBLE = 1e-9  # relative to the largest force: a smaller residual of the balance counts as zero
-CERTAIN = 1e-14  # relative to the terms of the sum: a smaller gap may be rounding
+PLENTY = 1e6  # largest tension of a cable without limit, relative to the largest force
+FEASIBLE = 1e-9  # relative to the largest force; a smaller residual of the balance counts as zero
+CERTAIN = 1e-14  # relative to the terms of the sum; a smaller gap may be rounding
 NODES = 300  # number of examined ranges after which the search stops without a result
 DEPTH = 40  # largest number of waiting ranges
-STANDSTILL = 0.7  # if narrowing leaves more than this share of the uncertainty, the range is split
+STANDSTILL = 0.7  # a range is split if more than this share of the uncertainty remains after narrowing
 
 # Rows of a range (RANGE_ROWS, m): least and largest tensions, and the sag forces at them.
 LEAST, LARGEST, AT_LEAST, AT_LARGEST = 0, 1, 2, 3
@@ -60,7 +59,8 @@ def component_along(columns: Array, direction: Array, i: int) -> float:
 def _spare_capacity(curves: Curves, demand: Demand, range_: Array, direction: Array, tops: Array) -> float:
     """Capacity of the cables along a direction minus the demand [N]; a negative value proves infeasibility.
 
-    It is an upper bound that includes rounding. tops is filled with the largest contribution of each cable, (m,).
+    The value is an upper bound that includes rounding. tops is filled with the largest contribution of each cable,
+    (m,).
     """
     spare = 0.0
     size = 0.0
@@ -104,7 +104,7 @@ def _narrow_range(curves: Curves, demand: Demand, range_: Array, direction: Arra
 def _narrow_free(
     curves: Curves, demand: Demand, range_: Array, change: TensionChange, tops: Array, memory: Memory
 ) -> bool:
-    """Narrow a range along directions in which only one of the cables between their limits contributes.
+    """Narrow a range along directions in which only one cable between its limits contributes.
 
     Returns False if the range becomes empty.
     """
@@ -155,7 +155,7 @@ def _least_certain(curves: Curves, range_: Array) -> tuple[int, float]:
 
 @glue
 def _split_range(curves: Curves, waiting: Array, top: int, i: int, tau: float) -> None:
-    """Split the tensions of one cable in two; the half with its present tension comes last and is examined next."""
+    """Split the tensions of one cable in two; the half with its present tension is the last range, examined next."""
     for row in range(RANGE_ROWS):
         for j in range(waiting.shape[2]):
             waiting[top + 1, row, j] = waiting[top, row, j]
@@ -171,7 +171,7 @@ def _split_range(curves: Curves, waiting: Array, top: int, i: int, tau: float) -
 
 @glue
 def _first_range(curves: Curves, size: float, range_: Array) -> None:
-    """Fill the range of the admissible tensions; a straight cable without upper limit gets a million largest forces."""
+    """Fill the range of the admissible tensions. The upper end for a straight cable without limit is finite."""
     cables = curves.cables
     for i in range(cables.low.size):
         low, high = cables.low[i], cables.high[i]
@@ -189,8 +189,8 @@ def _approach_demand(
 ) -> tuple[float, bool]:
     """Compute the tensions in a range whose wrench is closest to the demand.
 
-    Returns the residual force [N], and True if the moments balance. The force is infinite if the moments cannot be
-    balanced; the direction then has a moment part only.
+    Returns the residual force [N], and True if the moments balance. If the moments cannot be balanced, the force is
+    infinite, and the direction has only a moment part.
     """
     n, m = demand.matrix.shape
     first = demand.soft
@@ -215,10 +215,10 @@ def decide_feasibility(
 ) -> tuple[int, float, float, bool]:
     """Feasibility of a demand with tensions within the cables' limits.
 
-    nodes: largest number of examined ranges; change: start of the search; filled with the tensions of least residual,
-    this residual and its direction. Returns POSE_SOLVED, POSE_INFEASIBLE, POSE_BORDERLINE, or POSE_NOT_CONVERGED after
-    an arithmetic failure; the lower and upper bound of the shortfall [N]; and True if the direction alone proves
-    infeasibility over the whole first range.
+    nodes: largest number of examined ranges; change: start of the search, filled with the tensions of least residual,
+        this residual and its direction. Returns POSE_SOLVED, POSE_INFEASIBLE, POSE_BORDERLINE, or POSE_NOT_CONVERGED
+        after an arithmetic failure; the lower and upper bound of the shortfall [N]; and True if the one direction
+        proves infeasibility over the whole first range.
     """
     n, m = demand.matrix.shape
     tops, rest = vector(memory, m)  # largest contribution of each cable along a direction [N]

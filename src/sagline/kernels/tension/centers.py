@@ -15,14 +15,14 @@ from sagline.kernels.tension.norms import program_status
 from sagline.kernels.tension.on_polygon import centroid, feasible_corners
 from sagline.kernels.tension.polygon import WorkArrays
 
-THIN = 1e-9  # relative to the largest tension: a thinner set has no center
+THIN = 1e-9  # smallest thickness of a set with a center, relative to the largest tension
 NEWTON_STEPS = 200
 CENTERED = 1e-18  # square of the Newton decrement at which the search ends
 
 
 @kernel
 def share_at_center(bounds: Array, null: Array, point: Array, work: WorkArrays) -> int:
-    """Move the point (r,) to the analytic center, starting from the center of the previous iteration, if any."""
+    """Move the point (r,) to the analytic center, starting from the previous center, if any."""
     corners, labels, known = work.corners, work.labels, work.known
     if known[0] > 0 and keeps_limits_inside(bounds, null, point) and _analytic_center(bounds, null, work.rest, point):
         return codes.POSE_SOLVED
@@ -51,7 +51,7 @@ def share_at_center(bounds: Array, null: Array, point: Array, work: WorkArrays) 
 
 @kernel
 def keeps_limits_inside(bounds: Array, null: Array, point: Array) -> bool:
-    """True if a point is farther than the smallest thickness from all limits."""
+    """True if the distance of a point from all limits exceeds the smallest thickness."""
     slack = THIN * largest_bound(bounds)
     for i in range(null.shape[1]):
         tension = bounds[START, i]
@@ -67,7 +67,7 @@ def deepest_point(bounds: Array, null: Array, work: WorkArrays, point: Array) ->
     """Fill the point (r,) whose tensions are farthest from their nearest limits; returns the pose's status."""
     r, m = null.shape
     rows, memory = block(work.rest, r + 1, 2 * m)
-    halves, memory = block(memory, STRIP_ROWS, 2 * m)  # one bound per side; the depth is an unknown that narrows it
+    halves, memory = block(memory, STRIP_ROWS, 2 * m)  # one bound per side; the depth, an unknown, narrows the bound
     vectors, memory = block(memory, 2, r + 1)
     cost, found = vectors[0], vectors[1]
     for i in range(m):

@@ -1,8 +1,8 @@
-"""Least change of the wrench that makes it feasible with tensions within their limits, on the cables' exact curves.
+"""Least change of a wrench to a feasible wrench, with tensions within their limits, on the cables' exact curves.
 
-The wrench of cable i on the platform is J_i tau - G_i s_i(tau), a curve, with s_i its sag force. Newton steps replace
+The wrench of cable i on the platform is the curve J_i tau - G_i s_i(tau) with the sag force s_i. Newton steps replace
 the curves by their tangents. Each step is a least-squares problem within limits. The moments are hard equations, so
-that the residual is a force only. A small weight on the change of the tensions makes the solution unique.
+that the residual is only a force. A small weight on the change of the tensions makes the solution unique.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ HALVINGS = 12
 STEADINESS = 1e-8  # weight of the squared change of a tension, relative to the weight of the squared wrench
 DECREASE = 1e-4  # share of the predicted decrease that a step must reach
 STIFFEST = 1e3  # largest weight of a curvature; a larger one would make the normal matrix ill-conditioned
-STANDS = 1e-13  # relative to the largest force: the search ends if the predicted decrease is smaller
-STEADY = 1e-6  # relative to the residual: smaller changes of the tensions do not change the residual's direction
+STANDS = 1e-13  # smallest predicted decrease, relative to the largest force; the search ends below it
+STEADY = 1e-6  # relative to the residual; smaller changes of the tensions do not change the direction of the residual
 
 
 class Demand(NamedTuple):
@@ -123,8 +123,8 @@ def norm_of_part(vector: Array, first: int, last: int) -> float:
 def _set_tangents(curves: Curves, demand: Demand, tau: Array, multipliers: Array, step: _Tangents) -> bool:
     """Fill the tangents at given tensions, and the normal matrix; False if the hard rows are linearly dependent.
 
-    The curvature of the curves enters with the multipliers (n,) of the previous step, if its sign stabilizes the steps.
-    Without it the steps oscillate across a valley.
+    The normal matrix includes the curvature of the curves, times the multipliers (n,) of the previous step, if its sign
+    is stabilizing. Without the curvature, the steps oscillate across a valley.
     """
     n, m = step.matrix.shape
     soft = demand.soft
@@ -160,7 +160,7 @@ def _set_tangents(curves: Curves, demand: Demand, tau: Array, multipliers: Array
 
 @glue
 def _find_step(demand: Demand, ranges: Array, change: TensionChange, step: _Tangents) -> bool:
-    """Fill tensions of a full step and multipliers of the limits; False if hard rows and limits contradict."""
+    """Fill tensions of a full step and multipliers of the limits; False if hard rows and limits are contradictory."""
     n, m = step.matrix.shape
     soft = demand.soft
     hard = n - soft
@@ -210,12 +210,12 @@ def _find_step(demand: Demand, ranges: Array, change: TensionChange, step: _Tang
 
 @glue
 def _point_along(soft: int, change: TensionChange, step: _Tangents) -> float:
-    """Fill the direction of the step's residual, scaled so that its soft rows have length 1.
+    """Fill the direction of the step's residual; its soft rows have length 1.
 
     Returns the length of the soft rows before this scaling [N].
 
-    The direction is perpendicular to the tangents of cables between their limits. For a cable at a limit, it points
-    beyond that limit.
+    The direction is perpendicular to the tangents of cables between their limits. For a cable at a limit, the direction
+    points beyond the limit.
     """
     n, m = step.matrix.shape
     hard = n - soft
@@ -240,10 +240,10 @@ def _point_along(soft: int, change: TensionChange, step: _Tangents) -> float:
 
 @glue
 def _line_search(curves: Curves, demand: Demand, rest: float, change: TensionChange, step: _Tangents) -> bool:
-    """Halve a step until it reaches the required decrease; False without a gain, or if the last step is worse.
+    """Halve a step until it reaches the required decrease; False if no step does, or if the last step is worse.
 
-    The residual of the hard rows has a weight above their multipliers, so that a step cannot increase it in exchange
-    for a smaller soft residual.
+    The weight of the hard residual exceeds the multipliers of the hard rows. A step therefore cannot increase the hard
+    residual to decrease the soft one.
     """
     n, m = demand.matrix.shape
     soft = demand.soft
@@ -282,9 +282,9 @@ def _line_search(curves: Curves, demand: Demand, rest: float, change: TensionCha
 def least_change(curves: Curves, demand: Demand, ranges: Array, change: TensionChange, memory: Memory) -> float:
     """Change tensions within their ranges until the residual of the demand is least; returns its length [N].
 
-    ranges: least and largest tensions, rows 0 and 1; change: start of the search, filled with the result. The length is
-    that of the soft rows' residual [N]. It is infinite if hard rows and ranges contradict each other on the tangents,
-    and NaN if the hard rows are linearly dependent.
+    ranges: least and largest tensions, rows 0 and 1; change: start of the search, filled with the result. The result is
+        the length of the soft residual [N]. It is infinite if hard rows and ranges contradict each other on the
+        tangents, and NaN if the hard rows are linearly dependent.
     """
     n, m = demand.matrix.shape
     soft = demand.soft

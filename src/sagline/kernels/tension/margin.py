@@ -1,8 +1,8 @@
 """Capacity margin of a pose: distance to the faces of the available wrench set.
 
 The wrenches of all tensions within their limits form a zonotope. Each of its faces is parallel to n - 1 columns of the
-structure matrix. The distance to a face, with a normal whose force part has length 1, is the smallest extra force that
-reaches the face.
+structure matrix. The force part of a face normal has length 1. The distance to a face is then the smallest extra force
+that reaches the face.
 
 Source:
     Bouchard, Gosselin & Moore 2010, "On the ability of a cable-driven robot to generate a prescribed set of
@@ -20,13 +20,13 @@ from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block, counters
 
 MOST_FACES = 1 << 40  # upper bound of the loop; never reached
-ALONG = 1e-13  # component of a column along a unit normal, below which the column lies in the face
-DEPENDENT = 1e-20  # a column depends on others if less than this share of its square is outside their span
+ALONG = 1e-13  # a column lies in the face if its component along the unit normal is smaller
+DEPENDENT = 1e-20  # a column depends on the others if a smaller share of its squared length is outside their span
 
 
 @glue
 def next_choice(chosen: Indices, m: int) -> int:
-    """The next combination in order, in place; returns the first place that changed, -1 after the last."""
+    """Replace a combination by the next one; returns the first changed position, -1 after the last combination."""
     count = chosen.size
     place = -1
     for k in range(count):
@@ -41,9 +41,9 @@ def next_choice(chosen: Indices, m: int) -> int:
 
 @glue
 def extend_frame(matrix: Array, chosen: Indices, first: int, frame: Array, triangle: Array) -> int:
-    """Add the chosen columns, from a place on, to the orthonormal frame (n, n); returns the number of its rows.
+    """Add the chosen columns, from a position on, to the orthonormal frame (n, n); returns the number of its rows.
 
-    The number is smaller than that of the chosen columns if a column depends on those before it.
+    The number is smaller than the number of columns if a column depends on the columns before it.
     """
     n = matrix.shape[0]
     held = first
@@ -96,7 +96,7 @@ def zonotope_reach(matrix: Array, low: Array, high: Array, normal: Array) -> tup
 
 @kernel
 def zonotope_margin(matrix: Array, needed: Array, low: Array, high: Array, translations: int, memory: Memory) -> float:
-    """Largest force [N] in any direction that can be added to the needed wrench; negative if that is infeasible.
+    """Largest force [N] that can be added to the needed wrench in all directions; negative if the wrench is infeasible.
 
     Args:
         matrix: Structure matrix along the free motions, translations first, (n, m).

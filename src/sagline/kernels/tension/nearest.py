@@ -1,4 +1,4 @@
-"""Distribution nearest to a reference: minimum norm, closest to the previous tensions, quadratic program.
+"""Distributions nearest to a reference: minimum norm, closest to the previous tensions, quadratic program.
 
 docs/model.md, section 5. The objective (55) of the article asks for the tensions closest to given tensions t_ref. In
 coordinates of an orthonormal null-space basis N, these tensions are the projection of lambda_ref = N^T (t_ref - t0)
@@ -49,7 +49,7 @@ def new_reference_point(memory: Memory, previous: Array, r: int) -> tuple[Refere
 def set_reference(distribution: Distribution, offset: Array, null: Array, near: ReferencePoint) -> None:
     """Fill the reference point in the null space for the tension distribution.
 
-    offset: of the distribution's variable (m,).
+    offset: offset of the distribution's variable (m,).
     """
     from_before = distribution.method == codes.CLOSEST and not math.isnan(near.previous[0])
     for k in range(null.shape[0]):

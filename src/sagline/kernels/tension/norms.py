@@ -1,6 +1,6 @@
-"""Distributions of least norm of the tensions: lowest sum and maximum by linear programs, p-norms by Newton steps.
+"""Distributions with the least norm of the tensions: sum and maximum by linear programs, p-norms by Newton steps.
 
-Each Newton step is projected onto the feasible set in its own metric.
+Each Newton step is projected onto the feasible set in the metric of the step.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block, vector
 from sagline.kernels.tension.nearest import ReferencePoint
 
-TIED = 1e-10  # relative: smaller differences of sums count as ties, and smaller weights as zero
+TIED = 1e-10  # relative; smaller differences of sums count as ties, and smaller weights count as zero
 
 
 @formula
@@ -83,7 +83,7 @@ def share_lowest_sum(bounds: Array, null: Array, near: ReferencePoint, basis: Ba
 def share_lowest_maximum(
     bounds: Array, offset: Array, null: Array, near: ReferencePoint, basis: Basis, memory: Memory
 ) -> int:
-    """Fill the point (r,) of `near` whose largest tension is least; of several, the one nearest to the reference.
+    """Fill the point (r,) of `near` with the least largest tension; if not unique, the one nearest to the reference.
 
     The program's last unknown is the largest tension.
     """
@@ -128,8 +128,8 @@ def share_lowest_maximum(
 
 STEPS = 200
 HALVINGS = 40
-CLOSE = 1e-2  # relative to the largest tension: after a shorter step, the exponent is increased
-STILL = 1e-12  # relative to the largest tension: a shorter step ends the search
+CLOSE = 1e-2  # relative to the largest tension; after a shorter step, the exponent is increased
+STILL = 1e-12  # relative to the largest tension; a shorter step ends the search
 
 
 @kernel
@@ -170,7 +170,7 @@ def _tension_at(bounds: Array, null: Array, point: Array, i: int) -> float:
 
 @formula
 def _p_norm_power(bounds: Array, offset: Array, null: Array, point: Array, p: float, scale: float) -> float:
-    """Sum of the p-th powers of the tensions over a scale."""
+    """Sum of the p-th powers of tension/scale."""
     total = 0.0
     for i in range(null.shape[1]):
         total += abs((_tension_at(bounds, null, point, i) + offset[i]) / scale) ** p
@@ -181,9 +181,9 @@ def _p_norm_power(bounds: Array, offset: Array, null: Array, point: Array, p: fl
 def _newton_target(
     bounds: Array, offset: Array, null: Array, point: Array, p: float, slope: Array, curve: Array, target: Array
 ) -> float:
-    """Fill slope, Cholesky factor of the curvature, and the point after a Newton step without limits.
+    """Fill slope, Cholesky factor of the curvature, and the end point of a Newton step without limits.
 
-    Returns the largest tension [N], the unit of slope and curvature; if it is 0, nothing remains to do.
+    Returns the largest tension [N], which is the unit of slope and curvature. If it is 0, no step is needed.
     """
     r, m = null.shape
     scale = 0.0

@@ -1,9 +1,9 @@
 """Methods on the corners of the feasible polygon or interval: its centroid, and the polygon walk.
 
-The walk starts at a corner of the parallelogram of two cables' limits, and follows the border of the limits included so
-far. At the line of a violated limit, the walk turns into this line, and the limit is included. After a full turn
-without violated limits, the walk has visited all corners. If a limit is still violated after a full turn, the polygon
-is empty.
+The limits of two cables form a parallelogram. The walk starts at one of its corners and follows the border of the
+included limits. At the line of a violated limit, the walk turns into this line and includes the limit. After a full
+turn without violated limits, the walk has visited all corners. If a limit is still violated after a full turn, the
+polygon is empty.
 
 Source:
     Gouttefarde, Lamaury, Reichert & Bruckmann 2015, "A versatile tension distribution algorithm for n-DOF parallel
@@ -60,7 +60,7 @@ def most_independent(null: Array) -> tuple[int, int]:
 
 @kernel
 def walk_polygon(bounds: Array, null: Array, memory: Memory, corners: Array, labels: Indices) -> int:
-    """Fill corners, counter-clockwise, and labels as `feasible_polygon` does; returns their number.
+    """Fill corners, counter-clockwise, and labels as in `feasible_polygon`; returns the number of corners.
 
     The number is 0 if the polygon is empty, and -1 if the walk failed. All limits must be finite.
     """
@@ -71,7 +71,7 @@ def walk_polygon(bounds: Array, null: Array, memory: Memory, corners: Array, lab
     met, memory = counters(memory, 2 * m)  # 1 for an included limit
     a, b = most_independent(null)
     line = 2 * a
-    # the parallelogram's corner from which line a runs counter-clockwise, with the inside on its left
+    # start: the corner from which line a runs counter-clockwise, with the inside on its left
     other = 2 * b
     cross = lines[line, 0] * lines[other, 1] - lines[line, 1] * lines[other, 0]
     if cross > 0.0:
@@ -134,7 +134,7 @@ WALK_SUM, WALK_NORM, WALK_CENTROID = 0.0, 1.0, 2.0  # the optimum of the polygon
 def distribute_on_polygon(
     method: int, parameter: float, bounds: Array, null: Array, near: ReferencePoint, work: WorkArrays
 ) -> int:
-    """Fill the point (r,) of `near` by the centroid or the polygon walk; edges of the last polygon are tried first."""
+    """Fill the point (r,) of `near` by centroid or polygon walk; tries the sides of the last polygon first."""
     r, m = null.shape
     corners, labels, known = work.corners, work.labels, work.known
     count = known[0]
@@ -167,7 +167,7 @@ def distribute_on_polygon(
 
 @kernel
 def feasible_interval(bounds: Array, null: Array) -> tuple[float, float]:
-    """Ends of the feasible interval of one redundant cable; the first end exceeds the second if it is empty."""
+    """Ends of the feasible interval for r = 1. If it is empty, the first end exceeds the second."""
     slack = TOLERANCE * largest_bound(bounds)
     first = -math.inf
     last = math.inf
@@ -191,7 +191,7 @@ def feasible_interval(bounds: Array, null: Array) -> tuple[float, float]:
 
 @kernel
 def feasible_corners(bounds: Array, null: Array, corners: Array, labels: Indices) -> int:
-    """Corners of the feasible polygon, or for r = 1 the two ends of the interval on the first axis; 0 if empty.
+    """Fill the corners of the feasible polygon, or for r = 1 the ends of the interval; returns the number, 0 if empty.
 
     An infinite end of the interval is replaced by the edge of the box around the polygon, and has the label of the box.
     """
@@ -242,7 +242,7 @@ def centroid(corners: Array, count: int) -> tuple[float, float]:
 def lowest_corner(
     bounds: Array, null: Array, corners: Array, count: int, goal_x: float, goal_y: float
 ) -> tuple[float, float]:
-    """The point of least sum of tensions: a corner, or, for a side of equal sums, its point nearest to a goal."""
+    """The point with the least sum of tensions. If a whole side has the least sum, the point nearest to the goal."""
     r, m = null.shape
     gx = 0.0
     gy = 0.0

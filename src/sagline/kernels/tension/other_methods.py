@@ -1,4 +1,4 @@
-"""Tension distribution methods that are not projections: the choice of the method, and the closed forms.
+"""Tension distribution methods that are not projections: selection of the method, and the closed forms.
 
 The closed forms give tensions near the middle of the limits without a search. They do not find every feasible
 distribution.
@@ -18,7 +18,7 @@ from sagline.kernels.tension.norms import share_by_norm, share_lowest_maximum, s
 from sagline.kernels.tension.on_polygon import distribute_on_polygon
 from sagline.kernels.tension.polygon import WorkArrays
 
-DEPENDENT = 1e-10  # below this squared length of its remaining row, a cable depends on those already fixed
+DEPENDENT = 1e-10  # a cable depends on the fixed cables if the squared length of its remaining row is smaller
 
 
 @kernel
@@ -118,7 +118,7 @@ def distribute_by_other_method(
 ) -> int:
     """Fill the tensions (m,) in the distribution's variable less its offset; return POSE_SOLVED or the failure.
 
-    Of several solutions, the one nearest to the reference is taken.
+    If the solution is not unique, the one nearest to the reference is selected.
     """
     method, parameter = distribution.method, distribution.parameter
     status = codes.POSE_SOLVED

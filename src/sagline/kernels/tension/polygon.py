@@ -1,8 +1,8 @@
 """The polygon of feasible tensions in the null space of two redundant cables; docs/model.md, section 5.
 
-Cable i allows low_i <= t0_i + N_i . lambda <= high_i, which is a bound. A polygon is stored as its corners,
-counter-clockwise, each with the label of the side that leaves it: 2i for the lower limit of cable i, 2i + 1 for its
-upper limit, and from 2m on for the sides of the box that replaces infinity.
+The limits of cable i are the bound low_i <= t0_i + N_i . lambda <= high_i. A polygon is stored as its corners,
+counter-clockwise, each with the label of the side that starts at the corner. The label is 2i for the lower limit of
+cable i and 2i + 1 for its upper limit. The sides of the box that replaces infinity have labels from 2m on.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block, counters
 
 FLAT = 1e-12  # a null-space row shorter than this does not move the cable's tension
-SPARE_CORNERS = 6  # in addition to two per cable: corners of the box and the corner being inserted
+SPARE_CORNERS = 6  # corners in addition to two per cable: corners of the box, and the corner to insert
 
 
 @glue
@@ -43,7 +43,7 @@ def _cut_polygon(
         before = here
     if kept == count or kept == 0:
         return kept
-    # the new side runs from where the polygon leaves the half-plane to where it enters it
+    # the new side connects the point where the polygon leaves the half-plane with the point where it enters
     ax, ay = _crossing(corners, leaving, leaving + 1 if leaving + 1 < count else 0, x, y, side)
     bx, by = _crossing(corners, entering, entering - 1 if entering > 0 else count - 1, x, y, side)
     last_label = labels[entering - 1 if entering > 0 else count - 1]
@@ -55,7 +55,7 @@ def _cut_polygon(
 
 @formula
 def _crossing(corners: Array, inside: int, outside: int, x: float, y: float, side: float) -> tuple[float, float]:
-    """Intersection of the line (x, y) . corner = side with the edge between two corners, one on each side of it."""
+    """Intersection of the line (x, y) . corner = side with the edge between two corners, which it separates."""
     px, py = corners[inside, 0], corners[inside, 1]
     qx, qy = corners[outside, 0], corners[outside, 1]
     depth = x * px + y * py - side
@@ -65,7 +65,7 @@ def _crossing(corners: Array, inside: int, outside: int, x: float, y: float, sid
 
 @kernel
 def _shift_corners(corners: Array, labels: Indices, count: int, leaving: int, entering: int, kept: int) -> int:
-    """Remove the corners outside and insert space for the two ends of a new side; returns the index of the first."""
+    """Remove the corners outside and make space for the two ends of a new side; returns the index of the first end."""
     if leaving >= entering:  # the corners inside lie between the two ends: move them to the front
         for k in range(kept):
             corners[k, 0], corners[k, 1] = corners[entering + k, 0], corners[entering + k, 1]
@@ -86,7 +86,7 @@ def _shift_corners(corners: Array, labels: Indices, count: int, leaving: int, en
 def widest_pair(null: Array) -> tuple[int, int, float]:
     """Two cables whose rows span a large parallelogram, and its signed area.
 
-    One cable has the longest row; the other one gives the largest area with it.
+    The first cable has the longest row; the second one gives the largest area with it.
     """
     m = null.shape[1]
     first = second = 0
@@ -164,10 +164,9 @@ def feasible_polygon(bounds: Array, null: Array, corners: Array, labels: Indices
 
 @kernel
 def polygon_again(bounds: Array, null: Array, corners: Array, labels: Indices, count: int) -> bool:
-    """Fill the corners of a polygon with known sides; False if the limits have changed so far that the sides differ.
+    """Fill the corners of a polygon with known sides; False if the sides are no longer those of the feasible polygon.
 
-    The corners are those of the feasible polygon if its sides still follow each other in this order and no limit cuts
-    one of them off.
+    They are still its sides if they follow each other in this order, and if no limit cuts off a corner.
     """
     m = null.shape[1]
     slack = TOLERANCE * largest_bound(bounds)
@@ -188,7 +187,7 @@ def polygon_again(bounds: Array, null: Array, corners: Array, labels: Indices, c
         following = k + 1 if k + 1 < count else 0
         label = labels[k]
         x, y = inward(label) * null[0, label // 2], inward(label) * null[1, label // 2]
-        # the inside is to the left of the walk, so the direction of the walk is the inward normal turned to the right
+        # the inside is to the left of the walk; the direction of the walk is the inward normal turned to the right
         way = y * (corners[following, 0] - corners[k, 0]) - x * (corners[following, 1] - corners[k, 1])
         if not way > 0.0:
             return False
@@ -242,7 +241,7 @@ class WorkArrays(NamedTuple):
 
 @glue
 def new_work_arrays(method: int, memory: Memory, m: int, r: int) -> WorkArrays:
-    """Work arrays for m cables, r of them redundant."""
+    """Work arrays for m cables and r redundant cables."""
     corner_count = 2 * m + SPARE_CORNERS
     corners, memory = block(memory, corner_count, 2)
     known, memory = counters(memory, 1)

@@ -1,1 +1,1 @@
-"""Margins over sets of loads, and proofs for boxes of poses."""
+"""Margins for sets of loads, and proofs for boxes of poses."""

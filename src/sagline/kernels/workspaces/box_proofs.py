@@ -1,4 +1,4 @@
-"""Proofs for a box of poses: a tension policy within the limits at all poses, or a direction that separates them."""
+"""Proofs for a box of poses: a tension policy within the limits, or a direction that separates demand and wrenches."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from sagline.kernels.workspaces.pose_box import MOTIONS, CablesInBox, PoseRange,
 from sagline.kernels.workspaces.sag_force_bounds import fall, fall_rate, rise, rise_rate, sag_force_slope
 from sagline.kernels.workspaces.wrench_set import Loads, dot6, reach_of_loads
 
-POOREST_INVERSE = 1e-6  # error of the pseudo-inverse above which no proof is tried, because the pose is almost singular
-HEADROOM = 1.2  # ratio of the tried box of tensions to the first estimate
+POOREST_INVERSE = 1e-6  # largest error of the pseudo-inverse; above it the pose is almost singular, without proof
+HEADROOM = 1.2  # ratio of the box of tensions for the proof to the first estimate
 ITERATIONS = 3  # iterations of this estimate
 
 
 class Precision(NamedTuple):
     """Safety terms of the proofs; tests set them to zero."""
 
-    bends: float  # weight of the terms beyond the linear prediction: 1
+    bends: float  # weight of the terms beyond the linear prediction; 1 in proofs
     rounding: float  # rounding error of a sum, relative to the sum of its terms' magnitudes
 
 
@@ -38,9 +38,9 @@ def proves_inside(
     precision: Precision,
     memory: Memory,
 ) -> bool:
-    """True if the policy tau + J^+ z is within the limits at all poses of a box; z: demand of poses and loads.
+    """True if the tensions tau + J^+ z are within the limits at all poses of a box; z: demand of poses and loads.
 
-    centered.give is filled with the change of each tension due to the set of wrenches alone [N].
+    centered.give is filled with the change of each tension due only to the set of wrenches [N].
     """
     n, m = place.matrix.shape
     inverse, memory = block(memory, m, n)
@@ -144,7 +144,7 @@ def proves_inside(
 
 
 BORNE = 0.3  # largest share of the gap that a free cable may use
-PIECES = 4  # pieces of the tension range below a cable's tension; each lower end is half the upper end
+PIECES = 4  # pieces of the tension range below the tension of a cable; the lower end of a piece is half its upper end
 
 # rows of the cables' contributions along a direction
 VALUE, BENT, SPREAD, HANGING, HANGING_SPREAD, HANGING_BENT = 1, 2, 3, 4, 5, 6
@@ -163,8 +163,8 @@ def proves_outside(
 ) -> bool:
     """True if a direction y, varying with the pose, separates demand and available wrenches at all poses of a box.
 
-    The direction is the residual of the centered tensions and its derivatives by the pose. A small correction makes the
-    contribution of cables between their limits zero or less along it.
+    The direction is the residual of the centered tensions, with its derivatives by the pose. A small correction of the
+    direction makes the contribution of cables between their limits zero or less.
     """
     n, m = place.matrix.shape
     wide, memory = block(memory, 7 + MOTIONS, m)
@@ -257,9 +257,9 @@ def proves_outside(
 def _measure_direction(place: CablesInBox, box: PoseRange, direction: Array, turning: Array, rows: Array) -> None:
     """Fill the contributions per newton of tension and of sag force along a direction, and their changes in a box.
 
-    direction: y at the middle, (6,); turning: its slopes with each motion, (MOTIONS, 6); rows: filled, for tensions:
-    value at the middle, largest linear change (SPREAD), and largest deviation from the linear change (BENT); the same
-    for sag forces.
+    direction: y at the middle, (6,); turning: slopes of y with each motion, (MOTIONS, 6); rows: filled for tensions,
+        then for sag forces, with the value at the middle, the largest linear change (SPREAD), and the largest deviation
+        from the linear change (BENT).
     """
     m = place.way.size
     motions = MOTIONS if box.turn > 0.0 else 3
@@ -327,7 +327,7 @@ def _measure_direction(place: CablesInBox, box: PoseRange, direction: Array, tur
 
 @formula
 def _most_of_run(slope: float, rate: float, most: float, width: float) -> float:
-    """Largest t slope + min(t rate, most) for t from 0 to width; rate and most are >= 0."""
+    """Largest value of t slope + min(t rate, most) for 0 <= t <= width; rate and most are >= 0."""
     if slope >= 0.0 or width == 0.0:
         return width * slope + min(rate * width, most) if width > 0.0 else 0.0
     if rate + slope <= 0.0:
@@ -338,18 +338,18 @@ def _most_of_run(slope: float, rate: float, most: float, width: float) -> float:
 
 @kernel
 def _most_of_cable(place: CablesInBox, curves: Curves, ranges: Ranges, tau: float, i: int, rows: Array) -> float:
-    """Upper bound over a box of the gain of a cable's contribution along y if its tension differs from tau."""
+    """Upper bound, over a box, of the gain of the contribution of a cable along y if its tension differs from tau."""
     low, high = ranges.lowest[i], ranges.highest[i]
     bend, spread, hanging = rows[BENT, i], rows[SPREAD, i], rows[HANGING, i]
     weight = abs(hanging)
-    # tensions above tau: the column of the structure matrix with the largest contribution
+    # tensions above tau; the column of the structure matrix has its largest contribution
     slope = rows[VALUE, i] + spread + bend
     if slope > 0.0 and high == math.inf:
         return math.inf
     most = fall(curves, i, tau, high) if hanging > 0.0 else rise(curves, i, tau, high)
     rate = fall_rate(curves, i, tau) if hanging > 0.0 else rise_rate(curves, i, tau)
     gain = _most_of_run(slope, weight * rate, weight * most, max(high - tau, 0.0))
-    # tensions below tau, in pieces: the column with the smallest contribution
+    # tensions below tau, in pieces; the column has its smallest contribution
     slope = -(rows[VALUE, i] - spread + bend)
     top = tau
     largest = 0.0

@@ -1,10 +1,10 @@
-"""Tensions for a box of poses: limits for all its poses, and tensions well inside them at its middle.
+"""Tensions for a box of poses: limits for all its poses, and tensions well inside these limits at its middle.
 
 Centered tensions minimize a sum of two terms. The first term is the smoothing times the sum over cables of -log(tau -
-low) - log(high - tau). The second term is half the square of the residual of the demand. If the demand is feasible, the
+low) - log(high - tau). The second term is half the squared residual of the demand. If the demand is feasible, the
 tensions are near the analytic center. Otherwise the residual points along the direction that separates the demand from
-all wrenches of the cables, with an error of the order of the square root of the smoothing. The method takes primal-dual
-Newton steps. Each step solves a linear system with one unknown per free motion of the platform.
+all wrenches of the cables. The error of this direction is of the order of the square root of the smoothing. The method
+takes primal-dual Newton steps. Each step solves a linear system with one unknown per free motion of the platform.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from sagline.kernels.workspaces.sag_force_bounds import has_sag, largest_sag_for
 STEPS = 40
 REDUCTION = 0.1  # smallest factor of the smoothing per step
 TO_LIMIT = 0.95  # largest step, relative to the distance to a limit
-CENTERED = 0.2  # relative error of slack times barrier force at the center; it does not affect the validity of proofs
-FARTHEST = 50.0  # upper end of the search without a limit, relative to the sum of all forces
+CENTERED = 0.2  # relative error of slack times barrier force at the center, without effect on the validity of proofs
+FARTHEST = 50.0  # upper end of the search for a tension without limit, relative to the sum of all forces
 
 
 class Centered(NamedTuple):
@@ -70,7 +70,7 @@ def fill_imbalance(matrix: Array, centered: Centered) -> float:
 
 @kernel
 def _start_centering(matrix: Array, smoothing: float, centered: Centered) -> None:
-    """Start from the tensions of the previous search if they are between the limits, else from the middle."""
+    """Start from the previous tensions if they are between the limits, else from the middle of the limits."""
     m = centered.tau.size
     known = not math.isnan(centered.tau[0])
     for i in range(m):
@@ -88,7 +88,7 @@ def _start_centering(matrix: Array, smoothing: float, centered: Centered) -> Non
 
 @kernel
 def factor_normal(matrix: Array, give: Array, unit: float, normal: Array) -> bool:
-    """Fill the factor of unit times 1 + matrix give matrix^T, (n, n); False if it is not positive definite."""
+    """Fill the factor of unit * 1 + matrix give matrix^T, (n, n); False if the sum is not positive definite."""
     n, m = matrix.shape
     for k in range(n):
         for j in range(k + 1):
@@ -166,27 +166,27 @@ def find_center(matrix: Array, smoothing: float, centered: Centered) -> float:
 
 
 SMOOTHNESS = 0.01  # residual due to the smoothing, relative to the change of the demand over a box
-SLACK = 0.45  # largest X at which a frame-end limit moves at most as fast as the sag force
+SLACK = 0.45  # largest X at which a frame-end limit changes at most as fast as the sag force
 LEAST_WIDTH = 0.05  # smallest range of the search after subtracting the set of wrenches, relative to the full range
 ITERATIONS = 2  # iterations of tensions and their sag forces
-LEAST_WAY = 1e-4  # relative to a chord: lower bound of the displacement that sets the smoothing
+LEAST_WAY = 1e-4  # lower bound of the displacement that determines the smoothing, relative to a chord
 
 
 class Ranges(NamedTuple):
     """Admissible chord tensions for all poses of a box [N]."""
 
     low: Array  # largest value of the smallest admissible tension in the box, (m,), for proofs of feasibility
-    high: Array  # smallest value of the largest one; may be infinite
-    lowest: Array  # smallest value of the smallest one, for proofs of infeasibility
-    highest: Array  # largest value of the largest one, or a bound of the tensions from the load; may be infinite
+    high: Array  # smallest value of the largest admissible tension, for proofs of feasibility; may be infinite
+    lowest: Array  # smallest value of the smallest admissible tension, for proofs of infeasibility
+    highest: Array  # largest value of the largest admissible tension, or a bound from the load; may be infinite
     sag_force: Array  # sag forces at the centered tensions
 
 
 @kernel
 def set_ranges(quantity: int, place: CablesInBox, curves: Curves, ranges: Ranges) -> None:
-    """Fill the admissible tensions of all poses of a box from those at its middle.
+    """Fill the admissible tensions of all poses of a box from the admissible tensions at its middle.
 
-    The smallest tension of the sag grows with the chord.
+    The smallest tension due to the limit of the sag grows with the chord.
     """
     cables = curves.cables
     for i in range(place.way.size):
@@ -205,11 +205,11 @@ def set_ranges(quantity: int, place: CablesInBox, curves: Curves, ranges: Ranges
 
 @kernel
 def _move_limits(place: CablesInBox, curves: Curves, i: int, ranges: Ranges) -> None:
-    """Separate frame-end limits, given as chord limits at the middle, by their change in a box.
+    """Separate the chord limits that follow from frame-end limits at the middle, by their change in a box.
 
     Away from slackness, a limit changes at most as fast as the sag force. A limit that may be slack somewhere in the
-    box is replaced: by the least limit without slackness in proofs of feasibility, and by zero in proofs of
-    infeasibility. A cable without admissible tensions at the middle has slack ones, if any, elsewhere in the box.
+    box is replaced. Proofs of feasibility use the least limit without slackness; proofs of infeasibility use zero. If a
+    cable has no admissible tension at the middle, its admissible tensions elsewhere in the box, if any, are slack.
     """
     cables = curves.cables
     way = place.way[i]
@@ -225,7 +225,7 @@ def _move_limits(place: CablesInBox, curves: Curves, i: int, ranges: Ranges) -> 
 
 @kernel
 def tighten(freedom: Array, place: CablesInBox, curves: Curves, upward: float, ranges: Ranges) -> None:
-    """Reduce the largest tensions to the values that the load can cause if all cables pull up.
+    """Reduce the largest tensions to the values that the load can cause, if all cables pull up.
 
     The vertical parts of all tensions balance weight, load and sag forces. The vertical part of one tension is
     therefore at most this sum minus the smallest vertical parts of the others.
@@ -306,7 +306,7 @@ def _fill_demand(
 
 @glue
 def _smoothing_of(place: CablesInBox, geometry: Array, tau: Array) -> float:
-    """Smoothing for a box [N^2], proportional to the squared change of the tensions' wrenches in the box."""
+    """Smoothing for a box [N^2], proportional to the squared change of the wrench of the tensions in the box."""
     square = 0.0
     for i in range(tau.size):
         change = tau[i] * max(place.way[i] / geometry[g.CHORD, i], LEAST_WAY)
@@ -316,7 +316,7 @@ def _smoothing_of(place: CablesInBox, geometry: Array, tau: Array) -> float:
 
 @glue
 def search_limits(ranges: Ranges, taken: Array, size: float, centered: Centered) -> bool:
-    """Fill the limits of the search for tensions: those of the box, narrowed by `taken` (m,).
+    """Fill the limits of the search for tensions: the limits of the box, narrowed by `taken` (m,).
 
     Returns False if a lower limit exceeds an upper one.
     """
@@ -335,7 +335,7 @@ def search_limits(ranges: Ranges, taken: Array, size: float, centered: Centered)
 def center_tensions(
     place: CablesInBox, curves: Curves, geometry: Array, body: Array, wrench: Array, centered: Centered, ranges: Ranges
 ) -> tuple[float, float]:
-    """Compute centered tensions within the limits of the search for a wrench (6,), with their own sag forces.
+    """Compute centered tensions within the limits of the search, and their sag forces, for a wrench (6,).
 
     Returns the square of the residual [N^2], and the smoothing.
     """

@@ -1,9 +1,9 @@
-"""Margin near zero on the cables' exact curves, where the bounds of the sag forces do not decide its sign.
+"""Margin on the exact curves of the cables, near zero, where the bounds of the sag forces do not decide its sign.
 
-The limiting facet has a normal y. Let e be the load of which y measures exactly one newton. The margin near zero is the
-largest multiple of e that the cables can supply in addition to the demand. Newton steps on the exact curves find it:
-all components of the balance except that along e are hard equations. Farther from zero, the decision of `inverse`
-confirms its sign.
+Let y be the normal of the limiting facet, and e the load with y . e = 1 N. The margin near zero is the largest multiple
+of e that the cables can supply in addition to the demand. Newton steps on the exact curves find this multiple. All
+components of the balance are hard equations, except the component along e. Farther from zero, the decision of `inverse`
+confirms the sign of the margin.
 """
 
 from __future__ import annotations
@@ -26,20 +26,20 @@ from sagline.kernels.tension.bracket import decide_feasibility
 from sagline.kernels.tension.least_change import Demand, TensionChange, least_change
 from sagline.kernels.workspaces.sag_force_bounds import HIGH, LOW, SAG_FORCE_LOW, SLOPE
 
-EXACT = 1e-5  # relative to the largest force: error bound of a margin on the exact curves
-NARROW = 1e-3  # relative to the largest force: within narrower bounds, the margin is that in the limiting facet
-CLOSE = 1e-3  # relative to the largest force: the sign of a smaller margin on the exact curves is not confirmed
-NEAR = 1e-2  # relative to the largest force: a smaller margin is confirmed by a short search only
+EXACT = 1e-5  # error bound of a margin on the exact curves, relative to the largest force
+NARROW = 1e-3  # relative to the largest force; within narrower bounds, the margin in the limiting facet is used
+CLOSE = 1e-3  # relative to the largest force; the sign of a smaller margin on the exact curves is not confirmed
+NEAR = 1e-2  # relative to the largest force; a smaller margin gets only a short confirming search
 SHORT, LONG = 4, 300  # numbers of examined ranges
-HARDLY = 1e-9  # relative to the largest force: value at a decided pose whose margin has the other sign
-FURTHER = 1.01  # load at which the search starts, relative to the upper bound of the margin
-IN_FACET = 1e-9  # relative to the terms of the product: a secant with a smaller product is in the facet
+HARDLY = 1e-9  # value at a decided pose whose margin has the other sign, relative to the largest force
+FURTHER = 1.01  # start of the search, relative to the upper bound of the margin
+IN_FACET = 1e-9  # relative to the terms of the product; a secant with a smaller product is in the facet
 
 VALUE, BELOW, ABOVE = 0, 1, 2  # rows of a margin (3,) [N]
 
 
 class LimitingFacet(NamedTuple):
-    """The limiting facet of a pose whose margin is open."""
+    """The limiting facet of a pose whose margin has no certain sign."""
 
     direction: Array  # unit normal y, (6,)
     columns: Array  # wrench of the secants per newton of chord tension, (6, m)
@@ -48,7 +48,7 @@ class LimitingFacet(NamedTuple):
     middle: Array  # wrench of the cables at the middle of their secants, minus the weight, (6,)
     bands: Array  # filled by `fill_bands`
     arm: float  # lever arm of the norm [m]
-    single: bool  # True if the set has no other wrench than the least favorable one
+    single: bool  # True if the least favorable wrench is the only wrench of the set
 
 
 @kernel
@@ -61,7 +61,7 @@ def settle_margin(
     margin: Array,
     memory: Memory,
 ) -> int:
-    """Replace an open margin (3,) by its value on the exact curves; returns the status of the margin.
+    """Replace a margin (3,) without certain sign by its value on the exact curves; returns the status of the margin.
 
     platform: with the least favorable wrench of the set.
     """
@@ -111,7 +111,7 @@ def settle_margin(
 def _write_value(margin: Array, exact: float, error: float) -> None:
     """Fill value and bounds from a margin on the exact curves [N].
 
-    The value has the sign of the exact margin. It is continuous at the ends of the bounds, where they decide.
+    The value has the sign of the exact margin. It is continuous where the bounds begin to decide the sign.
     """
     share = 0.0
     if exact > 0.0:
@@ -127,9 +127,10 @@ def _write_value(margin: Array, exact: float, error: float) -> None:
 
 @glue
 def _margin_in_facet(platform: Platform, facet: LimitingFacet, curves: Curves, load: Array, memory: Memory) -> float:
-    """Margin on the exact curves, from the tensions at which the load meets the facet; NaN outside of it.
+    """Margin on the exact curves, from the tensions at which the load meets the facet; NaN outside the facet.
 
-    The tensions are those of the secants. Within narrow bounds their errors change the margin by the second order.
+    The tensions follow from the secants. Within narrow bounds, their errors have only a second-order effect on the
+    margin.
     """
     columns, y, bands = facet.columns, facet.direction, facet.bands
     n, m = platform.freedom.shape[0], columns.shape[1]
@@ -204,9 +205,10 @@ def _fill_load(freedom: Array, facet: LimitingFacet, load: Array) -> None:
 def _largest_multiple(
     curves: Curves, demand: Demand, bands: Array, load: Array, above: float, tau: Array, memory: Memory
 ) -> float:
-    """Largest multiple of a load that the cables supply in addition to a demand; infinite or NaN if none is found.
+    """Largest multiple of a load that the cables supply in addition to a demand; infinite or NaN if not found.
 
-    A reflection turns the load to the first component, the only soft one. The search starts beyond the upper bound.
+    A reflection turns the load to the first component, which is the only soft one. The search starts beyond the upper
+    bound.
     """
     n, m = demand.matrix.shape
     rows, rest = block(memory, 2 * n + 4, m)

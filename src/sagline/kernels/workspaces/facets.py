@@ -1,11 +1,11 @@
 """Facets of the available wrench set: normals to all subsets of n - 1 columns of the structure matrix.
 
 Elimination with complete pivoting turns n columns, the basis, into unit vectors. Each row is then a normal to all
-columns of the basis except one. r = m - n columns are not in the basis. A normal to k of these and to all columns of
-the basis except k + 1 is a combination of k + 1 rows. Its coefficients are k x k minors of the k columns in these rows.
-Laplace's expansion gives them from the minors of one column less. The subsets of the other columns are visited depth
-first. All normals of a subset are computed in a loop without branches. A normal with rounding errors remains a valid
-direction for measuring the margin.
+columns of the basis except one. The other r = m - n columns are not in the basis. A facet contains k of the other
+columns and all columns of the basis except k + 1. Its normal is a combination of k + 1 rows. The coefficients are the k
+x k minors of the k columns in these rows. Laplace's expansion computes them from the minors of k - 1 columns. The
+subsets of the other columns are visited depth first. A loop without branches computes all normals of a subset. A normal
+with rounding errors is still a valid direction for the margin.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from sagline.core.arrays import Array, Indices
 from sagline.kernels.jit import formula, glue
 from sagline.kernels.memory import Memory, block, counters
 
-RANK = 1e-9  # relative to the largest entry, as in `kernels.algebra.factors`: rank is lost at a smaller pivot
-DEPENDENT = 1e-10  # minors up to this size mean that the columns are linearly dependent
+RANK = 1e-9  # relative to the largest entry, as in `kernels.algebra.factors`; at a smaller pivot, rank is lost
+DEPENDENT = 1e-10  # largest minor of columns that count as linearly dependent
 LIMIT = 1 << 40  # largest number of steps; never reached
 MOST_FREE = 6  # largest number of free motions
 
@@ -39,11 +39,11 @@ MEMBERS: Final = np.array([([i for i in range(6) if bits >> i & 1] + [0] * 6)[:6
 class Facets(NamedTuple):
     """State of the walk over the facets."""
 
-    # One row per column of the basis, (n, m + 7): components along the m columns, components in world axes, and the sum
-    # of their absolute values with moments times the lever arm
+    # One row per column of the basis, (n, m + 7): components along the m columns, six components in world axes, and the
+    # sum of the absolute values of these six, with moments times the lever arm.
     table: Array
     others: Array  # components of the other columns along the rows, scaled to a largest entry of 1, (r, n)
-    minors: Array  # minors of the present subset and its leading parts, by sets of rows, (n, 2^n)
+    minors: Array  # minors of the present subset and of its leading parts, for each set of rows, (n, 2^n)
     basis: Indices  # index of the basis column of each row, (n,)
     chosen: Indices  # present subset of the other columns, from index 1 on, (n + 1,)
 

@@ -1,8 +1,8 @@
-"""The cables over a box of poses: geometry at its middle, and its largest change in the box.
+"""The cables over a box of poses: geometry at the middle, and bounds of its change in the box.
 
-A box contains all positions within half an edge of its middle along each axis. At each position it contains all
-orientations that differ from the one at the middle by a rotation, about any axis, of at most a given angle. If the
-angle is zero, all poses have the same orientation.
+A box contains all positions within half an edge of its middle along each axis. At each position, the orientations
+differ from the orientation at the middle by a rotation about any axis, up to a given angle. If the angle is zero, all
+poses have the same orientation.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class PoseRange(NamedTuple):
     """A box of poses."""
 
     half: Array  # half edges [m], (3,)
-    turn: float  # largest turn away from the orientation at the middle [rad]
+    turn: float  # largest rotation from the orientation at the middle [rad]
 
 
 class CablesInBox(NamedTuple):
@@ -59,7 +59,7 @@ def new_cables_in_box(memory: Memory, m: int, n: int) -> tuple[CablesInBox, Memo
 def set_cables_in_box(
     freedom: Array, geometry: Array, rotation: Array, center: Array, box: PoseRange, place: CablesInBox
 ) -> bool:
-    """Fill a place from the geometry of its cables; False if a platform end may meet its frame end in the box.
+    """Fill `place` from the geometry of the cables; False if a platform end may meet its frame end in the box.
 
     freedom: rows that select the free motions, (n, 6); geometry: rows of `cable_geometry` at the middle,
     (GEOMETRY_ROWS, m); rotation: platform -> world at the middle, (3, 3); center: center of mass in the platform frame
@@ -152,7 +152,7 @@ def norm3(x: float, y: float, z: float) -> float:
 
 @formula
 def most_of_linear(box: PoseRange, slopes: Array) -> float:
-    """Largest value in a box of a linear function with these slopes (MOTIONS,), which is zero at the middle."""
+    """Largest value, in a box, of a linear function with these slopes (MOTIONS,) and the value zero at the middle."""
     most = abs(slopes[0]) * box.half[0] + abs(slopes[1]) * box.half[1] + abs(slopes[2]) * box.half[2]
     if box.turn > 0.0:
         most += box.turn * norm3(slopes[3], slopes[4], slopes[5])

@@ -1,7 +1,8 @@
 """Proofs that every pose of a box is wrench-feasible, or that no pose is; docs/model.md, section 13.
 
-Proof of INSIDE: a tension policy that balances every wrench at every pose stays within the limits. Proof of OUTSIDE:
-for one wrench of the set there is a direction, varying with the pose, along which all cables together give too little.
+INSIDE is proved by a tension policy that balances every wrench at every pose within the limits. OUTSIDE is proved by
+one wrench of the set and a direction that varies with the pose. Along this direction, all cables together contribute
+less than the wrench demands.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ from sagline.kernels.workspaces.wrench_set import Loads, farthest, reach_of_load
 OPEN, INSIDE, OUTSIDE = 0, 1, 2  # verdicts
 BOX_COLUMNS = 11  # pose row, half edges, turn
 ATTEMPTS = 3  # iterations of tensions and of the change of their limits by the set of wrenches
-BEYOND = 2.0  # smoothing per cable: a demand with a larger residual is infeasible
+BEYOND = 2.0  # smoothing per cable; a demand with a larger residual is infeasible
 
 LoadTerms = tuple[Array, Array, Array, Array, Indices]  # Loads
 PrecisionTerms = tuple[float, float]  # Precision
@@ -57,7 +58,7 @@ def prove_boxes(
     memory: tuple[Array, Indices],
     answers: tuple[Codes, Codes],
 ) -> None:
-    """Try to prove for each of N boxes that all its poses are wrench-feasible, or that none is.
+    """Try to prove for each of N boxes that all its poses are wrench-feasible, or that all are infeasible.
 
     Args:
         model_terms: Cable model: code, k_h, k_p.
@@ -65,7 +66,7 @@ def prove_boxes(
         robot_terms: Rows that select the free motions, (n, 6); body_table (1, BODY_COLUMNS); cable_table, (1, m,
             CABLE_COLUMNS), without pulleys.
         load_terms: The wrenches to balance: `Loads`.
-        boxes: Rows: pose at the middle, half edges [m], largest turn from there [rad], (N, BOX_COLUMNS).
+        boxes: Rows: pose at the middle, half edges [m], largest rotation from the middle [rad], (N, BOX_COLUMNS).
         precision_terms: `Precision`.
         memory: `proof_memory` for the number of cables.
         answers: Filled: OPEN, INSIDE or OUTSIDE, (N,); and a work array of statuses, (m,).

@@ -1,8 +1,8 @@
-"""Bounds of the cables' sag forces within the chord tension limits, and for changes of tension and platform end.
+"""Bounds of the sag forces within the chord tension limits, and of their changes with tension and platform end.
 
-For an inextensible cable, X = wD/(2 tau): sag force = tau X (L/D) + tau sin phi (X coth X - 1), whose slopes are
-bounded here in closed form. Stretch decreases the slopes by position. It increases the rate at which the sag force
-falls with the tension by at most wD/(2 EA); docs/model.md, section 13.
+The sag force of an inextensible cable is tau X (L/D) + tau sin phi (X coth X - 1) with X = wD/(2 tau). This module
+bounds its slopes in closed form. Stretch decreases the slopes with respect to position. Because of stretch, the sag
+force falls faster with the tension, by at most wD/(2 EA); docs/model.md, section 13.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from sagline.kernels.memory import Memory
 # Rows of the bands (BAND_ROWS, m).
 LOW, HIGH = 0, 1  # smallest and largest admissible chord tension [N]; the latter is infinite for straight cables only
 SAG_FORCE_LOW, SAG_FORCE_HIGH = 2, 3  # sag forces at LOW and HIGH [N]
-SLOPE = 4  # slope of the sag force's secant from LOW to HIGH
+SLOPE = 4  # slope of the secant of the sag force from LOW to HIGH
 UNDER, OVER = 5, 6  # least and largest difference of the sag force from its secant [N], <= 0 and >= 0
 BAND_ROWS = 7
 
@@ -58,11 +58,11 @@ def fill_bands(curves: Curves, bands: Array, memory: Memory) -> bool:
 
 @formula
 def _from_secant(cables: Cables, i: int, low: float, high: float) -> tuple[float, float]:
-    """Bounds of a sag force minus its secant between two chord tensions [N], <= 0 and >= 0.
+    """Lower and upper bound, <= 0 and >= 0, of a sag force minus its secant between two chord tensions [N].
 
     The sag force of an inextensible cable is a sum of convex functions of the tension, except for the term
-    wD/2 sin phi (X/3 - ...) of a cable below its frame end, which is concave. The secant of 1/tau is above it by at
-    most (1/sqrt(low) - 1/sqrt(high))^2. Tested on two million random cables with X <= 10 and e <= 10.
+    wD/2 sin phi (X/3 - ...) of a cable below its frame end, which is concave. The secant of 1/tau is above 1/tau by at
+    most (1/sqrt(low) - 1/sqrt(high))^2. Two million random cables with X <= 10 and e <= 10 confirmed the bounds.
     """
     half_weight = cables.half_weight[i]
     if half_weight == 0.0:
@@ -101,7 +101,7 @@ def has_sag(curves: Curves, i: int) -> bool:
 
 @kernel
 def sag_force_slope(curves: Curves, i: int, way: float, tension: float) -> float:
-    """Largest derivative of a sag force by the platform end's position [N/m], at or above a chord tension.
+    """Largest derivative of a sag force with respect to the position of the platform end [N/m], above a chord tension.
 
     way: largest distance of the platform end from its position in `curves` [m]; tension: least chord tension [N].
     """
@@ -153,7 +153,7 @@ def rise_rate(curves: Curves, i: int, tension: float) -> float:
 
 @kernel
 def fall(curves: Curves, i: int, low: float, high: float) -> float:
-    """Largest decrease of a sag force from one chord tension to a higher one [N]."""
+    """Largest decrease of a sag force between a chord tension and a higher chord tension [N]."""
     if not has_sag(curves, i):
         return 0.0
     cables = curves.cables
@@ -165,7 +165,7 @@ def fall(curves: Curves, i: int, low: float, high: float) -> float:
 
 @kernel
 def rise(curves: Curves, i: int, low: float, high: float) -> float:
-    """Largest increase of a sag force from one chord tension to a higher one [N]."""
+    """Largest increase of a sag force between a chord tension and a higher chord tension [N]."""
     if not has_sag(curves, i):
         return 0.0
     half = curves.cables.half_weight[i]

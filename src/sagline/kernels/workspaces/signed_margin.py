@@ -1,9 +1,9 @@
-"""Signed margin of a pose for a set of loads; a negative value is the excess of the set.
+"""Signed margin of a pose for a set of loads; a negative value is the distance by which the set exceeds the limit.
 
-The margin is the signed least distance of the set to the facets of the available wrench set; docs/model.md, section 13.
-The sag forces depend on the tensions, which vary within their limits. The least favorable sag forces give a lower bound
-of the margin, and the most favorable ones an upper bound. The value between them uses the tension limits with their own
-sag forces. It is continuous in the pose.
+The margin is the least signed distance between the set and the facets of the available wrench set; docs/model.md,
+section 13. The sag forces depend on the tensions, which vary within their limits. The least favorable sag forces give a
+lower bound of the margin, and the most favorable sag forces give an upper bound. The value between the bounds uses the
+sag forces at the tension limits. It is continuous in the pose.
 
 Source:
     Bouchard, Gosselin & Moore 2010, "On the ability of a cable-driven robot to generate a prescribed set of wrenches";
@@ -60,8 +60,8 @@ from sagline.kernels.workspaces.wrench_set import (
     worst_wrench,
 )
 
-ALONG = 1e-13  # relative to the terms of a normal: rounding error of its product with a column in the facet
-IN_PLANE = 1e-10  # relative to the same terms: a secant with a smaller product counts as in the facet
+ALONG = 1e-13  # rounding error of the product of a normal with a column in its facet, relative to its terms
+IN_PLANE = 1e-10  # relative to the same terms; a secant with a smaller product counts as in the facet
 PURE = 1e-9  # a unit normal (moments times lever arm) with a smaller force part counts as a pure moment
 
 # Rows of the cables' weights (COUNT_ROWS, m).
@@ -71,16 +71,16 @@ LEVER_X, LEVER_Y = 3, 4
 COLUMN = 5  # wrench of the secant per newton of chord tension, six rows
 COUNT_ROWS = 11
 
-# Facets that are measured together: rows in flat memory with positions known at compile time, so that loops over facets
-# vectorize.
+# Facets that are measured together: rows in flat memory. Loops over facets vectorize, because the positions of the rows
+# are known at compile time.
 TOGETHER = 64
 OF_A_SUBSET = 20  # largest number of normals per subset, 6 over 3
 NORMAL = 0  # six rows
 ROUNDING = 6 * TOGETHER
 BY_ENDS = 7 * TOGETHER  # half ranges of the cables' wrenches
-# largest decrease and increase of the cables' wrenches by the differences of the sag forces from their secants
+# largest decrease and increase of the wrenches because the sag forces differ from their secants
 DECREASE, INCREASE = 8 * TOGETHER, 9 * TOGETHER
-IN_FACET = 2 * TOGETHER  # the same of the cables whose secants are in the facet, two rows further
+IN_FACET = 2 * TOGETHER  # the same for the cables whose secants are in the facet, two rows further
 AGAINST, FOR = 12 * TOGETHER, 13 * TOGETHER  # extent of the set in both directions
 UP, DOWN = 14 * TOGETHER, 15 * TOGETHER  # largest contributions of cables without limit in both directions
 WORK = 16 * TOGETHER  # two rows
@@ -88,7 +88,7 @@ LENGTH = 18 * TOGETHER  # inverse of the normal's length
 MARGINS = 19 * TOGETHER  # three rows: VALUE, BELOW, ABOVE
 FACET_SIZE = 22 * TOGETHER
 AS_GOOD_AS_INFINITE = 1e250
-BEYOND = 1e300  # inverse of a length of zero; products with it count as infinite
+BEYOND = 1e300  # inverse of the length zero; products with this number count as infinite
 
 MarginMemory = tuple[Array, Indices, Codes]
 Margins = tuple[Array, Array, Indices, Codes]  # margins (3, N), directions (N, 6), cables (N,), statuses (N,)
@@ -125,14 +125,14 @@ def signed_margins(
         model_terms: Cable model: code, k_h, k_p.
         limit_terms: Limits of the tensions: `TensionLimits`.
         robot_terms: Rows that select the free motions, translations first, (n, 6); body_table, (1 or R, BODY_COLUMNS);
-            cable_table, (1 or R, m, CABLE_COLUMNS); the first N/R poses belong to the first robot, and so on.
+            cable_table, (1 or R, m, CABLE_COLUMNS). N/R successive poses belong to each robot.
         set_terms: The set of loads.
         arms: Lever arm of the norm, and mean lever arm [m], (1 or R,) each.
         poses: Rows (N, POSE_COLUMNS).
         memory: twice `memory_for` the number of cables plus FACET_SIZE numbers, and codes of the cables (m,).
         margins: Filled: value, lower and upper bound [N], (3, N); normal of the facet with the least distance, in world
-            axes, of length 1 with moments divided by the lever arm, (N, 6); the cable whose limit changes the value
-            fastest, -1 for none, (N,); status from the two bounds, (N,).
+            axes, of length 1 with moments divided by the lever arm, (N, 6); index of the cable whose limit has the
+            largest effect on the value, or -1, (N,); status from the two bounds, (N,).
         first: Index of the first pose.
         last: Index after the last pose.
     """
@@ -286,7 +286,7 @@ def _measure_all_facets(
 
 @formula
 def _add_normal(facets: Facets, depth: int, rows: int, m: int, measured: Array, b: int) -> bool:
-    """Fill the normal from a set of rows, one more than the columns of the present subset; False if there is none."""
+    """Fill the normal from a set of rows, one more than the columns of the present subset; False if it is zero."""
     minors = facets.minors[depth]
     x = y = z = u = v = w = 0.0
     sign = 1.0
@@ -344,7 +344,7 @@ def _measure_facets(
 
 @glue
 def _sum_cables(counts: _FacetWeights, held: int, measured: Array) -> None:
-    """Fill half the ranges of the cables' wrenches along the stored normals, and their changes off the secants."""
+    """Fill half the ranges of the cables' wrenches along the stored normals, and the changes due to secant errors."""
     rows = counts.rows
     for b in range(held):
         measured[BY_ENDS + b] = 0.0

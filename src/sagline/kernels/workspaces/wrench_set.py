@@ -1,4 +1,4 @@
-"""Sets of wrenches on the platform: support function for margins, and extent from the center for proofs.
+"""Sets of wrenches on the platform: support function for margins, and extent about the center for proofs.
 
 docs/model.md, section 13.
 """
@@ -15,7 +15,7 @@ from sagline.kernels.memory import Memory, block
 
 
 class Loads(NamedTuple):
-    """A set of wrenches on the platform, as in `WrenchSet`, whose corners are counted from their mean."""
+    """A set of wrenches on the platform, as in `WrenchSet`, with corners relative to their mean."""
 
     center: Array  # center, (6,)
     segments: Array  # segments, (S, 6)
@@ -95,8 +95,8 @@ class WrenchSetArrays(NamedTuple):
     """A set of loads at one pose, in world axes about the center of mass."""
 
     own: Array  # segments of the pose: box, linear accelerations, angular accelerations, (9, 6)
-    segments: Array  # segments from minus to plus each row, (S, 6)
-    ellipsoids: Array  # each A adds all A^T s with |s| <= 1, (E, 6, 6)
+    segments: Array  # segments, each from -row to +row, (S, 6)
+    ellipsoids: Array  # ellipsoids; each matrix A adds all A^T s with |s| <= 1, (E, 6, 6)
     corners: Array  # corners of all polytopes, one polytope after the other, (C, 6)
     sizes: Indices  # number of corners of each polytope, (P,)
 
@@ -111,7 +111,7 @@ def new_set(terms: SetTerms, memory: Memory) -> tuple[WrenchSetArrays, Memory]:
 
 @glue
 def place_set(terms: SetTerms, body: Array, inertia: Array, rotation: Array, wrenches: WrenchSetArrays) -> None:
-    """Fill the box and the loads of accelerations, w = -M a and -Q I Q^T alpha, of a platform in its rotation."""
+    """Fill the segments of box and accelerations: forces -M a, moments -Q I Q^T alpha of a platform with rotation Q."""
     own = wrenches.own
     for s in range(9):
         for k in range(6):
@@ -211,7 +211,7 @@ def _multiply(wrench: Array, normals: Array, count: int, out: Array) -> bool:
 
 @kernel
 def worst_wrench(center: Array, wrenches: WrenchSetArrays, direction: Array, wrench: Array) -> bool:
-    """Fill the wrench of the set with the largest -direction . w, (6,); True if the set has no other wrench."""
+    """Fill the wrench of the set with the largest -direction . w, (6,); True if it is the only wrench of the set."""
     farthest(Loads(center, wrenches.segments, wrenches.ellipsoids, wrenches.corners, wrenches.sizes), direction, wrench)
     single = wrenches.segments.shape[0] == 0 and wrenches.ellipsoids.shape[0] == 0
     for p in range(wrenches.sizes.size):
