@@ -94,7 +94,7 @@ def test_bad_input() -> None:
             solver.step(np.where(np.arange(8) == 5, wrong, 5.0))
     with pytest.raises(sl.InvalidValueError, match="one sample"):
         solver.step(np.full((1, 8), 5.0))
-    with pytest.raises(sl.InvalidValueError, match="one pose"):
+    with pytest.raises(sl.InvalidValueError, match="single pose"):
         solver.reset(box_poses(COGIRO, 2, seed=0))
     with pytest.raises(sl.InvalidValueError, match="Straight"):
         sl.ForwardSolver(COGIRO, sl.Straight())

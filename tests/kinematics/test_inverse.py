@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import sagline as sl
 from sagline import (
     AnalyticCenter,
     Cable,
@@ -325,3 +326,18 @@ def test_tensions_continue_as_their_plan_does() -> None:
     for wrong in (before.chord_tension[:7], 3.0, "closest", [np.nan] * 8):
         with pytest.raises(InvalidValueError, match="previous"):
             inverse(robot, poses[1], previous=wrong)
+
+
+def test_models_and_methods_by_their_names_on_the_command_line() -> None:
+    robot, pose = sl.load_robot("cogiro"), (1.0, 1.0, 2.0)
+    for model, kind in (("elastic", sl.Elastic()), ("straight", sl.Straight())):
+        named, made = sl.inverse(robot, pose, model=model), sl.inverse(robot, pose, kind)
+        np.testing.assert_array_equal(named.unstrained_length, made.unstrained_length)
+        assert isinstance(named.state.cables.model, type(kind))
+    for method, choice in (("centroid", sl.Centroid()), ("improved-closed-form", sl.ImprovedClosedForm())):
+        named = sl.inverse(robot, pose, tension=method)
+        np.testing.assert_array_equal(named.chord_tension, sl.inverse(robot, pose, tension=choice).chord_tension)
+    with refused("model", "'elastik'", "straight, elastic, empirical, parabolic, catenary"):
+        sl.inverse(robot, pose, model="elastik")
+    with refused("tension", "3"):
+        sl.inverse(robot, pose, tension=3)  # type: ignore[arg-type]

@@ -109,5 +109,5 @@ def test_nothing_feasible() -> None:
 
 
 def test_one_pose_at_a_time() -> None:
-    with pytest.raises(InvalidValueError, match="one pose"):
+    with pytest.raises(InvalidValueError, match="single pose"):
         tension_polygon(load_robot("article-mixed"), Pose(np.zeros((2, 3)), np.broadcast_to(np.eye(3), (2, 3, 3))))

@@ -1,12 +1,14 @@
 """Parts of a batch: the same numbers, the same memory where it can be, and locked."""
 
 from dataclasses import fields
+from typing import Any
 
 import numpy as np
 import pytest
 
 import sagline as sl
 from sagline.core.arrays import Array
+from sagline.core.numbers import n
 from tests.refusal import refused
 
 ROBOT = sl.load_robot("article-suspended")
@@ -107,3 +109,40 @@ def test_several_robots_are_taken_along_and_not_mistaken_for_one() -> None:
         _ = batch.one_robot
     with refused("robot", "an empty sequence", kind=sl.InvalidValueError):
         sl.stiffness(batch[np.zeros(4, dtype=bool)])
+
+
+def test_functions_of_an_equilibrium_take_every_kind_of_start() -> None:
+    here = (1.0, 1.0, 1.5)
+    plan = sl.inverse(ROBOT, here)
+    ball = sl.Sphere((0.0, 0.0, 0.2), radius=0.1)
+    calls: list[tuple[Any, tuple[Any, ...], Any]] = [
+        (sl.stiffness, (), lambda found: found.matrix),
+        (sl.modes, (), lambda found: found.frequency),
+        (sl.limit_margin, (), np.asarray),
+        (sl.capacity_margin, (), np.asarray),
+        (sl.clearance, (ball,), lambda found: found.distance),
+        (sl.linearized, (sl.Damping(modal_damping=0.01), "speeds"), lambda found: found.A),
+        (sl.dynamic_stiffness, ([1.0],), np.asarray),
+        (sl.frequency_response, ([1.0],), lambda found: found.compliance),
+        (sl.control.parity, (), np.asarray),
+        (sl.control.null_space, (), lambda found: found.projection),
+    ]
+    for function, further, number in calls:
+        expected = number(function(plan.state, *further))
+        solution = sl.forward(ROBOT, plan.unstrained_length, start=plan.state.pose)
+        for start in ((plan,), (ROBOT, here), (ROBOT, sl.Pose(here))):
+            np.testing.assert_array_equal(number(function(*start, *further)), expected, err_msg=function.__name__)
+        np.testing.assert_allclose(number(function(solution, *further)), expected, rtol=1e-6, atol=1e-7)
+    np.testing.assert_array_equal(sl.stiffness(ROBOT, pose=[here, here]).matrix[1], sl.stiffness(plan).matrix)
+    np.testing.assert_array_equal(sl.vibration(ROBOT, here).frequency, sl.vibration(plan.state, up_to=20.0).frequency)
+    assert sl.frequency_slopes(plan).mass_sensitivity[0] == sl.frequency_slopes(plan.state).mass_sensitivity[0]
+
+
+def test_a_robot_at_an_infeasible_pose_is_refused_with_its_shortfall() -> None:
+    far = (50.0, 0.0, 1.0)
+    short = float(sl.inverse(ROBOT, far).shortfall)
+    with refused("pose", f"INFEASIBLE, {n(short, '.4g', 'N')} short", "a feasible pose"):
+        sl.vibration(ROBOT, far)
+    for wrong in (ROBOT, 3, None):
+        with refused("state", None, "an Equilibrium"):
+            sl.modes(wrong)  # type: ignore[call-overload]

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from sagline import InvalidValueError, Pose, forward, load_robot
 from sagline.core.arrays import Array
+from sagline.robot.pose import pose_of, single_pose
 from tests.effort import least_seconds
 from tests.refusal import refused
 from tests.tiers import extended
@@ -168,3 +169,31 @@ def test_points_are_checked_and_a_lost_pose_has_none() -> None:
         Pose([0, 0, 0], np.eye(3)).transform([np.nan, 0.0, 0.0])
     lost = forward(load_robot("cogiro"), np.full(8, np.nan), Pose([0, 0, 2], np.eye(3))).pose
     assert np.isnan(lost.transform([1.0, 0.0, 0.0])).all()
+
+
+def test_a_position_alone_is_a_level_pose() -> None:
+    level = Pose.from_euler((1.0, -2.0, 3.0), 0.0, 0.0, 0.0)
+    for pose in (Pose((1.0, -2.0, 3.0)), Pose(1.0, -2.0, 3.0), Pose(np.array(1.0), -2, z=3)):
+        np.testing.assert_array_equal(pose.position, level.position)
+        np.testing.assert_array_equal(pose.quaternion, level.quaternion)
+    np.testing.assert_array_equal(Pose([1, 2], 0, [[3, 4]][0]).position, [[1, 0, 3], [2, 0, 4]])
+    np.testing.assert_array_equal(Pose(np.zeros((2, 3))).quaternion, [[0, 0, 0, 1]] * 2)
+    with refused("z", "'up'"):
+        Pose(1, 2, "up")
+    with refused("x, y, z"):
+        Pose([1, 2], [1, 2, 3], 0)
+
+
+def test_positions_and_lists_of_poses_take_the_place_of_a_pose() -> None:
+    turned = Pose.from_euler((0.0, 0.0, 1.0), 0.5, 0.0, 0.0)
+    both = pose_of([turned, Pose(1, 0, 1)])
+    np.testing.assert_array_equal(both.position, [(0, 0, 1), (1, 0, 1)])
+    np.testing.assert_array_equal(both.quaternion, [turned.quaternion, (0, 0, 0, 1)])
+    assert pose_of(turned) is turned
+    np.testing.assert_array_equal(single_pose([1, 2, 3]).position, (1, 2, 3))
+    with refused("start", "a batch of 2", "a single pose"):
+        single_pose(np.zeros((2, 3)), "start")
+    with refused("pose", "'here'", "a Pose"):
+        pose_of("here")
+    with refused("pose[1]", "nan m"):
+        pose_of((0.0, np.nan, 0.0))

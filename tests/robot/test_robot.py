@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from sagline import Cable, InvalidValueError, PoseBox, Robot
+from sagline.core.arrays import Array
 from sagline.robot.inertia import box_inertia, cylinder_inertia, with_mass
 from tests.refusal import refused
 
@@ -82,6 +83,27 @@ def test_inertia_grows_in_proportion_to_the_mass() -> None:
         "linear_density": 0.05, "axial_stiffness": 1e5, "diameter": 0.004, "expansion": 1e-5
     }  # fmt: skip
     np.testing.assert_allclose(heavier.inertia, 1.5 * tripod().inertia, rtol=1e-15)
+
+
+def test_a_payload_is_a_point_or_has_the_shape_of_the_platform() -> None:
+    own, place = tripod(center_of_mass=(0.1, 0.0, -0.2)), np.array((0.5, -0.3, 1.0))
+    loaded = own.with_payload(2.0, at=place)
+    assert loaded.mass == 6.0
+    np.testing.assert_allclose(loaded.center_of_mass, (4.0 * own.center_of_mass + 2.0 * place) / 6.0, atol=1e-15)
+
+    def about_center(mass: float, center: Array) -> Array:
+        x, y, z = center - loaded.center_of_mass  # Steiner, written out
+        return mass * np.array(
+            [[y * y + z * z, -x * y, -x * z], [-x * y, x * x + z * z, -y * z], [-x * z, -y * z, x * x + y * y]]
+        )
+
+    expected = own.inertia + about_center(4.0, own.center_of_mass) + about_center(2.0, place)
+    np.testing.assert_allclose(loaded.inertia, expected, atol=1e-14)
+    np.testing.assert_allclose(own.with_payload(2.0).inertia, 1.5 * own.inertia, rtol=1e-15)
+    with refused("mass of the payload", "-1 kg"):
+        own.with_payload(-1.0)
+    with refused("at", "of shape (2,)"):
+        own.with_payload(1.0, at=(0, 0))
 
 
 def test_a_body_that_cannot_turn_needs_no_inertia() -> None:

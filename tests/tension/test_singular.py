@@ -74,7 +74,7 @@ def test_the_resistance_is_a_number_without_unit() -> None:
 
 
 def test_one_pose_at_a_time() -> None:
-    with refused("pose", "a batch of shape (2,)", "one pose", kind=InvalidValueError):
+    with refused("pose", "a batch of 2", "a single pose", kind=InvalidValueError):
         unresisted_motion(planar(), Pose(np.zeros((2, 3)), np.broadcast_to(np.eye(3), (2, 3, 3))))
 
 

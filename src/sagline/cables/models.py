@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from sagline.cables.model import CableModel
+from sagline.core.arguments import named
 from sagline.core.arrays import number
 from sagline.kernels import codes
 
@@ -102,3 +103,8 @@ MODELS: dict[str, type[CableModel]] = {
         Catenary,
     )
 }
+
+
+def model_of(value: CableModel | str, item: str = "model") -> CableModel:
+    """A cable model unchanged, or one by its name on the command line: "elastic"."""
+    return named(value, CableModel, MODELS, item)

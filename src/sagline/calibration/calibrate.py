@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from sagline.cables.model import CableModel
-from sagline.cables.models import Catenary
+from sagline.cables.models import Catenary, model_of
 from sagline.calibration.diagnostics import GOOD, diagnose_log, fits_without_measured_poses, frame_mismatch, wrong_units
 from sagline.calibration.evaluation import calibration_of
 from sagline.calibration.findings import Omission
@@ -37,7 +37,7 @@ def calibrate(
     log: WinchLog,
     unknowns: Sequence[str | Unknown] = UNKNOWNS,
     *,
-    model: CableModel = _CATENARY,
+    model: CableModel | str = _CATENARY,
     robust: bool = True,
     folds: int = 5,
     progress: Progress | None = None,
@@ -87,7 +87,8 @@ def calibrate(
     """
     instance(robot, Robot, "robot")
     instance(log, WinchLog, "log")
-    _check_model(robot, instance(model, CableModel, "model"))
+    model = model_of(model)
+    _check_model(robot, model)
     callback(progress, "progress")
     robust = flag(robust, "robust")
     if (folds := whole_number(folds, "folds", 0, MOST_FOLDS)) == 1:

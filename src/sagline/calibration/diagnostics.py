@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from sagline.cables.model import CableModel
-from sagline.cables.models import Catenary
+from sagline.cables.models import Catenary, model_of
 from sagline.calibration.hypotheses import Hypothesis, Trial
 from sagline.calibration.log import WinchLog, load_cells_of
 from sagline.calibration.screening import screen
@@ -31,7 +31,7 @@ SHIFTS: Final = 5  # largest tested number of rows by which load cells are early
 _FULLY: Final = 3  # number of most promising changes that are fitted to convergence
 
 
-def diagnose_log(robot: Robot, log: WinchLog, model: CableModel = _CATENARY) -> tuple[str, ...]:
+def diagnose_log(robot: Robot, log: WinchLog, model: CableModel | str = _CATENARY) -> tuple[str, ...]:
     """Likely mistakes in a log, as sentences with the next step; empty for a consistent log.
 
     The first check compares the sizes of readings, to detect lengths and positions in mm, and load cells in kN. Then a
@@ -42,7 +42,7 @@ def diagnose_log(robot: Robot, log: WinchLog, model: CableModel = _CATENARY) -> 
     """
     instance(robot, Robot, "robot")
     instance(log, WinchLog, "log")
-    instance(model, CableModel, "model")
+    model = model_of(model)
     if found := tuple(wrong_units(robot, log)):
         return found  # other mistakes can be found only after the units are right
     _, rows, _ = screen(robot, log)

@@ -14,13 +14,13 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.fields import given, if_known, reduced, rule
 from sagline.core.indices import part_of
 from sagline.core.results import Result, Saved
-from sagline.robot.pose import Pose, unit
+from sagline.robot.pose import Pose, PoseLike, single_pose, unit
 from sagline.robot.robot import Robot
 
 LENGTH_DEVIATION = 5e-4  # [m], typical for a length off a grooved drum with rope
 
 
-def _world_if_none(frame: Pose | None) -> Pose:
+def _world_if_none(frame: PoseLike | None) -> PoseLike:
     return Pose(np.zeros(3), np.eye(3)) if frame is None else frame
 
 
@@ -91,9 +91,7 @@ class Sensors(_Replaceable):
                     allowed, step = f"shape () or ({axes or 'm'},)", "Give one number, or one number per entry."
                     raise InvalidValueError(about.name, f"of shape {own.shape}", allowed, step)
                 object.__setattr__(self, about.name, own)
-        if instance(self.frame, Pose, "frame").shape:
-            value = f"a batch of {len(self.frame)}"
-            raise InvalidValueError("frame", value, "a single pose", "Take one of them: frame[0].")
+        object.__setattr__(self, "frame", single_pose(self.frame, "frame"))
         object.__setattr__(self, "target", exactly(self.target, "target", "m", (3,)))
 
 

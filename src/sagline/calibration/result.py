@@ -13,14 +13,14 @@ from sagline.calibration.findings import Findings
 from sagline.calibration.log import Sensors
 from sagline.calibration.observations import unwhitened_slopes
 from sagline.calibration.parameters import Parameters
-from sagline.core.arguments import choice, instance
+from sagline.core.arguments import choice
 from sagline.core.arrays import Array, locked, numbers
 from sagline.core.numbers import counted, n
 from sagline.core.results import Result, Saved
 from sagline.kinematics.forward import forward
 from sagline.kinematics.forward_rows import ForwardSolution
 from sagline.kinematics.inverse import inverse
-from sagline.robot.pose import Pose
+from sagline.robot.pose import Pose, PoseLike, pose_of
 from sagline.robot.robot import Robot
 from sagline.statics.tables import pose_rows
 
@@ -158,7 +158,7 @@ class Calibration(Findings, Saved):
         """Verdict, values with their standard errors, and diagnostics, in lines of 80 columns."""
         return summary.calibration_text(self)
 
-    def pose_error(self, pose: Pose) -> PoseError:
+    def pose_error(self, pose: PoseLike) -> PoseError:
         """Expected error of the platform at a commanded pose, with this calibration.
 
         The true robot takes the lengths that `inverse` computes for the calibrated robot. Errors of the calibration and
@@ -173,7 +173,7 @@ class Calibration(Findings, Saved):
         Raises:
             InvalidValueError: If `pose` is not a pose, or is outside the motion pattern of the robot.
         """
-        rows, shape = pose_rows(instance(pose, Pose, "pose")), pose.shape
+        rows, shape = pose_rows(pose := pose_of(pose)), pose.shape
         lengths = np.atleast_2d(inverse(self.robot, pose, model=self.model).unstrained_length)
         whole, own = np.full((2, len(rows), 6, 6), np.nan)
         held = np.isfinite(lengths).all(axis=1)
@@ -183,7 +183,7 @@ class Calibration(Findings, Saved):
             own[held] = self._covariance(by_values - _common_motions(rows[held]) @ self._common_motion(), by_length)
         return PoseError(pose, locked(whole.reshape(*shape, 6, 6)), locked(own.reshape(*shape, 6, 6)))
 
-    def forward(self, unstrained_length: ArrayLike, start: Pose | None = None) -> ForwardSolution:
+    def forward(self, unstrained_length: ArrayLike, start: PoseLike | None = None) -> ForwardSolution:
         """Pose of the platform at reported lengths, with its covariance.
 
         Args:

@@ -28,9 +28,9 @@ class ModelName(StrEnum):
 
     def build(self) -> CableModel:
         """The model, with its default constants."""
-        from sagline.cables.models import MODELS
+        from sagline.cables.models import model_of
 
-        return MODELS[self.value.title().replace("-", "")]()
+        return model_of(self.value)
 
 
 class TensionVariable(StrEnum):

@@ -13,7 +13,6 @@ from sagline.core.errors import InvalidValueError
 from sagline.files.pose_text import pose_of_text as pose_of_text
 from sagline.files.pose_text import wrench_of_text
 from sagline.files.quantity import in_si
-from sagline.robot.inertia import with_mass
 from sagline.robot.pose import Pose, PoseBox
 
 if TYPE_CHECKING:
@@ -71,7 +70,7 @@ def robot_with_payload(name: str, payload: float | None) -> Robot:
     from sagline.files.robot_file import load_robot
 
     robot = load_robot(name)
-    return robot if payload is None else with_mass(robot, robot.mass + payload)
+    return robot if payload is None else robot.with_payload(payload)
 
 
 def wrenches_of(text: str, item: str) -> WrenchSet:

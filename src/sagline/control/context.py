@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from sagline.cables.model import CableModel
-from sagline.cables.models import Catenary
+from sagline.cables.models import Catenary, model_of
 from sagline.control.checks import Motion
 from sagline.control.commands import Sender, disagreement
 from sagline.control.evidence import Cycle, Fault, Reaction
@@ -31,7 +31,7 @@ from sagline.robot.drum import drum_lever
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
-from sagline.tension.methods import Closest
+from sagline.tension.methods import Closest, method_of
 
 MOST_SEED: Final = 2**128
 SAME: Final = 1e-9  # tolerance of the period, as a share of it
@@ -119,8 +119,8 @@ class Context:
         robot: Robot,
         link: Link,
         pace: Pace | None,
-        model: CableModel | None,
-        method: TensionMethod | None,
+        model: CableModel | str | None,
+        method: TensionMethod | str | None,
         settings: TensionSettings | None,
         record: Recorder | None,
         shadow: bool,
@@ -137,8 +137,8 @@ class Context:
         self.link, self.pace = link, optional(pace, Pace, "pace")
         self.period = PERIOD if pace is None else pace.period
         _check_period(link, self.period)
-        self.model = optional(model, CableModel, "model") or Catenary()
-        self.method = optional(method, TensionMethod, "tension") or Closest()
+        self.model = Catenary() if model is None else model_of(model)
+        self.method = Closest() if method is None else method_of(method)
         self.settings = optional(settings, TensionSettings, "loop") or TensionSettings()
         self.shadow = flag(shadow, "shadow")
         self.random = np.random.default_rng(None if seed is None else whole_number(seed, "seed", 0, MOST_SEED))

@@ -23,10 +23,9 @@ from sagline.control.states import RefusedError, State, check_transition
 from sagline.control.tension_loop import TensionSettings
 from sagline.core.arguments import instance
 from sagline.core.arrays import number
-from sagline.core.errors import InvalidValueError
 from sagline.motion.path import Path
 from sagline.motion.rest_to_rest import septic_path
-from sagline.robot.pose import Pose
+from sagline.robot.pose import Pose, PoseLike, single_pose
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 
@@ -49,8 +48,8 @@ class Controller(Preparation):
         link: Link,
         *,
         pace: Pace | None = None,
-        model: CableModel | None = None,
-        tension: TensionMethod | None = None,
+        model: CableModel | str | None = None,
+        tension: TensionMethod | str | None = None,
         loop: TensionSettings | None = None,
         record: Recorder | None = None,
         shadow: bool = False,
@@ -146,7 +145,7 @@ class Controller(Preparation):
         self.start(path)
         return self.wait()
 
-    def path_to(self, pose: Pose, speed: float = SPEED, angular_speed: float = TURNING) -> Path:
+    def path_to(self, pose: PoseLike, speed: float = SPEED, angular_speed: float = TURNING) -> Path:
         """Straight path from the pose of the platform.
 
         Args:
@@ -159,8 +158,7 @@ class Controller(Preparation):
         """
         limits = number(speed, "speed", "m/s", above=0.0), number(angular_speed, "angular_speed", "rad/s", above=0.0)
         here = self._here()
-        if instance(pose, Pose, "pose").shape:
-            raise InvalidValueError("pose", f"a batch of {len(pose)}", "a single pose", "Give one: pose[0].")
+        pose = single_pose(pose)
         points = self.robot.platform_anchors
         if float(np.abs(pose.transform(points) - here.transform(points)).max()) < 1e-6:
             raise RefusedError("the way", "the platform is there already", "Name another pose.")
@@ -175,7 +173,7 @@ class Controller(Preparation):
         )
         return self._result_of(work)
 
-    def go_to(self, pose: Pose, speed: float = SPEED, angular_speed: float = TURNING) -> Execution:
+    def go_to(self, pose: PoseLike, speed: float = SPEED, angular_speed: float = TURNING) -> Execution:
         """Move straight to a pose.
 
         Args:

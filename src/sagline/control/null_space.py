@@ -13,7 +13,7 @@ from sagline.core.arrays import Array, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.kinematics.plan import Plan
 from sagline.robot.batch import first_of
-from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.equilibrium import Equilibrium, of_equilibrium
 from sagline.robot.robot import Robot
 from sagline.statics.slopes import cable_slopes, on_platform, tension_slopes
 from sagline.statics.stiffness import stiffness
@@ -45,6 +45,7 @@ def balance_slope(state: Equilibrium) -> Array:
     return found
 
 
+@of_equilibrium
 def parity(state: Equilibrium) -> Array:
     """Parity matrix for fault detection of load cells, independent of the weight of the load.
 
@@ -55,13 +56,13 @@ def parity(state: Equilibrium) -> Array:
     like a wrong cell.
 
     Args:
-        state: An equilibrium, single or N of them.
+        state: An equilibrium, single or N of them; a plan or a solution; or a robot and its poses.
 
     Returns:
         Shape (..., m, m); zero rows for cells whose errors are not visible, NaN if the state has no lengths.
 
     Raises:
-        InvalidValueError: If the state is not an Equilibrium (for a plan: plan.state).
+        InvalidValueError: If the state is not one of these.
 
     Examples:
         >>> import sagline as sl
@@ -74,7 +75,7 @@ def parity(state: Equilibrium) -> Array:
     Source:
         docs/model.md, section 12.
     """
-    slope = balance_slope(instance(state, Equilibrium, "state"))
+    slope = balance_slope(state)
     lost = np.isnan(slope).any(axis=(-1, -2), keepdims=True)
     slope = np.where(lost, 0.0, slope)
     inverse = np.linalg.pinv(slope)
@@ -104,6 +105,7 @@ class NullSpace(NamedTuple):
     parity: Array
 
 
+@of_equilibrium
 def null_space(state: Equilibrium) -> NullSpace:
     """Changes of length that do not move the platform, to first order, and their effect on the tensions.
 
@@ -112,13 +114,14 @@ def null_space(state: Equilibrium) -> NullSpace:
     are excluded.
 
     Args:
-        state: An equilibrium of a robot with more cables than free motions, single or N of them.
+        state: An equilibrium, single or N of them; a plan or a solution; or a robot and its poses.
+            The robot has more cables than free motions.
 
     Returns:
         Matrices, single or N of them; NaN if the state has no lengths or its stiffness is singular.
 
     Raises:
-        InvalidValueError: If the state is not an Equilibrium (for a plan: plan.state).
+        InvalidValueError: If the state is not one of these.
 
     Examples:
         >>> import sagline as sl

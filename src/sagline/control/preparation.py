@@ -13,8 +13,7 @@ from sagline.control.monitor import Monitor
 from sagline.control.real_time import interrupt_calls, result_in_thread
 from sagline.control.recording import EventKind
 from sagline.control.states import RefusedError, State, check_transition
-from sagline.core.arguments import instance
-from sagline.robot.pose import Pose
+from sagline.robot.pose import PoseLike, pose_of
 
 T = TypeVar("T")
 SETTLING: Final = 3.0  # longest time in which homing compares tensions [s]
@@ -56,7 +55,7 @@ class Preparation(Monitor):
             refused = connecting.claim.refused if isinstance(connecting, Connecting) else None
             raise (refused or Disagreement(self._context.run.reason, step)).refusal("connecting")
 
-    def begin_homing(self, pose: Pose) -> None:
+    def begin_homing(self, pose: PoseLike) -> None:
         """State the pose of the platform at rest, and begin to compare tensions.
 
         Args:
@@ -70,7 +69,7 @@ class Preparation(Monitor):
             check_transition(self.state, State.HOMING, "homing")
         elif active.source is not None:
             raise RefusedError("homing", "a winch is being jogged", "Wait until it stands.")
-        place = instance(pose, Pose, "pose")
+        place = pose_of(pose)
         present = c.zero - c.correction  # the tension loop has corrected the lengths, too
         homing = self._result_of(partial(Homing, c.robot, place, c.model, c.method, present))
         c.zero, c.homed = present, False
@@ -81,7 +80,7 @@ class Preparation(Monitor):
         else:
             self._loop.active = HomingState(c, homing)
 
-    def home(self, pose: Pose) -> None:
+    def home(self, pose: PoseLike) -> None:
         """State the pose of the platform at rest, and wait until tensions and lengths agree.
 
         Lengths are compared if the robot has `length_zero`, or if the controller was homed before.

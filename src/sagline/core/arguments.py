@@ -36,14 +36,14 @@ HOW_TO_GET: Final = MappingProxyType(
         "Creep": "Give Creep(axial_stiffness, time), or None.",
         "Criterion": "Give one of the criteria, MaximumSag(0.05) for instance.",
         "Damping": "Give Damping(loss_time, air_damping, modal_damping), or None.",
-        "Equilibrium": "Take that of a plan or a solution: plan.state.",
+        "Equilibrium": "Give that of a plan, plan.state, or a robot and a pose.",
         "Front": 'Make one: design(robot, free, ["workspace_share"]).',
         "FrequencyMap": "Make one: frequency_map(robot, poses, up_to=20.0).",
         "Goal": 'Give Goal("workspace_share") for instance.',
         "MeasuredTension": "Give MeasuredTension(frame_end_tension, tension_deviation, length_deviation).",
         "Path": "Make one, with quintic_path(waypoints, speed=1.0) for instance.",
         "Plan": "Make one: inverse(robot, motion).",
-        "Pose": "Make one: Pose.from_euler(position, 0, 0, 0).",
+        "Pose": "Give Pose(x, y, z), or a position [m] of three numbers.",
         "PoseBox": "Give PoseBox(low, high, tilt).",
         "Provenance": "Take that of a calibrated robot, or None: robot.calibration.",
         "Robot": 'Load one by its name or file: load_robot("cogiro").',
@@ -113,6 +113,14 @@ def choice(value: Any, item: str, allowed: Iterable[str]) -> Any:
     near = nearest(value, words) if isinstance(value, str) else None
     step = f"Choose one of them as {item}." if near is None else f"Did you mean {near}?"
     raise InvalidValueError(item, brief(value), ", ".join(words), step)
+
+
+def named(value: str | T, kind: type[T], kinds: Mapping[str, type[T]], item: str) -> T:
+    """An object of a type unchanged; a name in words, for example "minimum-norm", gives one with default options."""
+    if not isinstance(value, str):
+        return instance(value, kind, item)
+    words = {re.sub("(?<!^)(?=[A-Z])", "-", name).lower(): name for name in kinds}
+    return kinds[words[choice(value, item, words)]]()
 
 
 def text(value: Any, item: str) -> str:

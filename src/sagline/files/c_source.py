@@ -35,7 +35,7 @@ from sagline.robot.reach import LEVEL
 from sagline.robot.robot import Robot
 from sagline.statics.tables import body_table, cable_table
 from sagline.tension.method import Options, TensionMethod, kernel_options, takes_default_kernel
-from sagline.tension.methods import Closest
+from sagline.tension.methods import Closest, method_of
 
 KERNELS: Final = "c/kernels.json"
 BAD_INPUT: Final = 9
@@ -48,7 +48,7 @@ def export_c(
     robot: Robot,
     file: str | os.PathLike[str],
     *,
-    tension: TensionMethod | Sequence[TensionMethod] = _CLOSEST,
+    tension: TensionMethod | str | Sequence[TensionMethod | str] = _CLOSEST,
     forward: bool = False,
     single_precision: bool = False,
 ) -> tuple[Path, Path, Path]:
@@ -84,7 +84,7 @@ def export_c(
     methods = tuple(tension) if isinstance(tension, list | tuple) else (tension,)
     if not methods:
         raise InvalidValueError("tension", "empty", "a method or several", "Give one, Closest() for instance.")
-    chosen = [instance(method, TensionMethod, "tension") for method in methods]
+    chosen = [method_of(method) for method in methods]
     path = checked_name(file_path(file), ".c", "C source", "sagline")
     source, header = source_of(without_guides(robot, "export_c", "inverse"), chosen, forward, real, path.stem)
     texts = {path: source, path.with_suffix(".h"): header, path.with_suffix(".scl"): filled("c/sagline.scl", {})}

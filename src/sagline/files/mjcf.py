@@ -27,7 +27,7 @@ from sagline.kinematics.forward import dead_only
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.status import PoseStatus
 from sagline.robot.batch import dead_cable, outward, points_on_pulleys, pulley_centers, pulleys_of
-from sagline.robot.pose import Pose
+from sagline.robot.pose import Pose, PoseLike, single_pose
 from sagline.robot.robot import Robot
 from sagline.statics.tables import refuse_missing_chords, touching_angle
 
@@ -110,7 +110,7 @@ def _add(parent: Element, tag: str, **attributes: str | ArrayLike) -> Element:
     return SubElement(parent, tag, texts)
 
 
-def dump_mjcf(robot: Robot, pose: Pose, unstrained_length: ArrayLike | None = None) -> str:
+def dump_mjcf(robot: Robot, pose: PoseLike, unstrained_length: ArrayLike | None = None) -> str:
     """Text of a MuJoCo model of the robot, with the platform at a pose.
 
     A cable of unstrained length L becomes a spatial tendon with the stiffness EA/L, which is slack if it is shorter
@@ -143,8 +143,7 @@ def dump_mjcf(robot: Robot, pose: Pose, unstrained_length: ArrayLike | None = No
         True
     """
     instance(robot, Robot, "robot")
-    if instance(pose, Pose, "pose").shape:
-        raise InvalidValueError("pose", f"a batch of {len(pose)}", "a single pose", "Write one model per pose.")
+    pose = single_pose(pose)
     lengths = _lengths_at_rest(robot, pose) if unstrained_length is None else _check_lengths(robot, unstrained_length)
     stiffness = robot.cables.axial_stiffness / lengths
     lead, over_pulley = _lead_of(robot, pose), pulleys_of(robot).radius > 0.0

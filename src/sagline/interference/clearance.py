@@ -22,7 +22,7 @@ from sagline.interference.pairs import Obstacle, box_rows, cable_rows, pairs_of,
 from sagline.kernels.interference import shapes
 from sagline.kernels.interference.catenary_distance import least_distances, work_arrays_for_pieces
 from sagline.robot.batch import Robots, first_of
-from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.equilibrium import Equilibrium, of_equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.reach import bounds
 from sagline.robot.robot import Robot
@@ -243,6 +243,7 @@ class Clearances(Result):
         return NO_TENSIONS if np.isnan(row).any() else self.pairs[int(row.argmin())]
 
 
+@of_equilibrium
 def clearance(
     state: Equilibrium,
     obstacles: Obstacle | Sequence[Obstacle] = (),
@@ -259,7 +260,7 @@ def clearance(
     distances by more than the precision.
 
     Args:
-        state: An equilibrium, single or N of them; for a plan, plan.state.
+        state: An equilibrium, single or N of them; a plan or a solution; or a robot and its poses.
         obstacles: One or several obstacles: Box, Capsule, Sphere and Mesh. They are solid: a body inside is in contact.
         precision: Largest difference between a distance and its proved bound [m], > 0.
         cable_radius: Radius of the cables [m], one for all or one per cable, >= 0; None for the radius of the robot's
@@ -288,7 +289,7 @@ def clearance(
     Source:
         docs/model.md, section 13.
     """
-    robot = instance(state, Equilibrium, "state").robot
+    robot = state.robot
     things = check_obstacles(obstacles, first_of(robot))
     some = None if from_anchor is None else number(from_anchor, "from_anchor", "m", above=0.0)
     radius = None if cable_radius is None else _radius(cable_radius, first_of(robot).cable_count)

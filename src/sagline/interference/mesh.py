@@ -8,14 +8,14 @@ import numpy as np
 from attrs import field, frozen
 from numpy.typing import ArrayLike
 
-from sagline.core.arguments import instance, label
+from sagline.core.arguments import label
 from sagline.core.arrays import FARTHEST, Array, Flags, Indices, checked, locked, numbers
 from sagline.core.errors import InvalidValueError
 from sagline.core.fields import check_fields, checked_by, given, reduced
 from sagline.core.memory import check_memory
 from sagline.core.numbers import counted
 from sagline.core.results import Result, set_fields
-from sagline.robot.pose import Pose
+from sagline.robot.pose import PoseLike, single_pose
 
 MOST: Final = 1_000_000  # triangles
 _AT_ONCE: Final = 1 << 19  # triangles times points
@@ -88,7 +88,7 @@ class Mesh(Result):
         a, b, c = np.moveaxis(self.vertices[self.faces] - self.bounds.mean(axis=0), 1, 0)
         return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
 
-    def placed(self, pose: Pose) -> Mesh:
+    def placed(self, pose: PoseLike) -> Mesh:
         """Copy of the mesh at a pose.
 
         Args:
@@ -100,9 +100,7 @@ class Mesh(Result):
         Raises:
             InvalidValueError: If `pose` is not a single Pose.
         """
-        if instance(pose, Pose, "pose").shape:
-            raise InvalidValueError("pose", f"a batch of {len(pose)}", "a single pose", "Take one of them: pose[0].")
-        return Mesh(pose.transform(self.vertices), self.faces, self.name)
+        return Mesh(single_pose(pose).transform(self.vertices), self.faces, self.name)
 
     def encloses(self, points: ArrayLike) -> Flags:
         """True for points in the solid.

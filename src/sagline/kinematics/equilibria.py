@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.cables.model import CableModel
-from sagline.cables.models import Catenary
+from sagline.cables.models import Catenary, model_of
 from sagline.core.arguments import instance, whole_number
 from sagline.core.arrays import Array, Indices, locked
 from sagline.core.errors import InvalidValueError
@@ -53,7 +53,7 @@ class Equilibria(Result):
 def equilibria(
     robot: Robot,
     unstrained_length: ArrayLike,
-    model: CableModel = _CATENARY,
+    model: CableModel | str = _CATENARY,
     wrench: ArrayLike | None = None,
     starts: int = 300,
     seed: int = 0,
@@ -91,7 +91,7 @@ def equilibria(
     Source:
         docs/model.md, section 6.
     """
-    instance(model, CableModel, "model")
+    model = model_of(model)
     lengths = checked_lengths(instance(robot, Robot, "robot"), unstrained_length)
     if lengths.ndim != 1 or np.isnan(lengths).any():
         raise InvalidValueError(

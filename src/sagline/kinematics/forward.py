@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.cables.model import CableModel
-from sagline.cables.models import Catenary
-from sagline.core.arguments import callback, instance, optional
+from sagline.cables.models import Catenary, model_of
+from sagline.core.arguments import callback, optional
 from sagline.core.arrays import LARGEST, SMALLEST, Array, Flags, Indices, locked, numbers
 from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_poses
@@ -33,7 +33,7 @@ from sagline.robot.batch import (
 )
 from sagline.robot.equilibrium import cables_of_results, limited_tension
 from sagline.robot.pattern import PLANAR, ROTATING
-from sagline.robot.pose import Pose
+from sagline.robot.pose import Pose, PoseLike, pose_of
 from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot
 from sagline.robot.routing import differs, with_routing
@@ -180,8 +180,8 @@ _CATENARY = Catenary()
 def forward(
     robot: Robot | Sequence[Robot],
     unstrained_length: ArrayLike,
-    start: Pose | None = None,
-    model: CableModel = _CATENARY,
+    start: PoseLike | None = None,
+    model: CableModel | str = _CATENARY,
     wrench: ArrayLike | None = None,
     tension_measured: MeasuredTension | None = None,
     *,
@@ -231,9 +231,9 @@ def forward(
         True [1. 1. 2.]
     """
     robots = together(robot)
-    for value, kind, item in ((start, Pose, "start"), (tension_measured, MeasuredTension, "tension_measured")):
-        optional(value, kind, item)
-    instance(model, CableModel, "model")
+    start = None if start is None else pose_of(start, "start")
+    optional(tension_measured, MeasuredTension, "tension_measured")
+    model = model_of(model)
     callback(progress, "progress")
     lengths = checked_lengths(robots, unstrained_length)
     shape = lengths.shape[:-1]

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.cables.model import CableModel
-from sagline.cables.models import Catenary
-from sagline.core.arguments import instance, optional
+from sagline.cables.models import Catenary, model_of
+from sagline.core.arguments import instance
 from sagline.core.arrays import LARGEST, SMALLEST, Array, Codes, checked, exactly, locked
 from sagline.core.errors import InvalidValueError
 from sagline.kernels import codes, tables
@@ -22,7 +22,7 @@ from sagline.kinematics.forward_rows import new_chain
 from sagline.kinematics.status import STABLE, ForwardStatus
 from sagline.kinematics.winding import without_guides
 from sagline.robot.batch import dead_cable, has_routing
-from sagline.robot.pose import Pose
+from sagline.robot.pose import PoseLike, single_pose
 from sagline.robot.robot import Robot
 from sagline.statics.tables import body_table, cable_table, pose_rows
 
@@ -56,7 +56,7 @@ class ForwardSolver:
     do not share it between threads.
     """
 
-    def __init__(self, robot: Robot, model: CableModel | None = None, start: Pose | None = None) -> None:
+    def __init__(self, robot: Robot, model: CableModel | str | None = None, start: PoseLike | None = None) -> None:
         """Prepare the robot's arrays and the kernel.
 
         Args:
@@ -69,7 +69,7 @@ class ForwardSolver:
                 guides, or an argument has the wrong type.
         """
         self._robot = without_guides(instance(robot, Robot, "robot"), "ForwardSolver", "forward")
-        self._model = optional(model, CableModel, "model") or Catenary()
+        self._model = Catenary() if model is None else model_of(model)
         if self._model.code == codes.STRAIGHT:
             raise InvalidValueError(
                 "model", "Straight()", "a model with forces", "Use forward() to fit straight cables."
@@ -104,7 +104,7 @@ class ForwardSolver:
         forward_poses(*self._arguments)
         self.reset(start)
 
-    def reset(self, start: Pose | None = None) -> None:
+    def reset(self, start: PoseLike | None = None) -> None:
         """Clear the last pose. The next step starts at the given pose, or searches.
 
         Args:
@@ -113,11 +113,9 @@ class ForwardSolver:
         Raises:
             InvalidValueError: If start is a batch, or not a pose.
         """
-        if start is not None and instance(start, Pose, "start").shape:
-            raise InvalidValueError("start", f"a batch of {len(start)} poses", "one pose", "Give one of them.")
         self._lost = start is None
         if start is not None:
-            self._start[:] = pose_rows(start)
+            self._start[:] = pose_rows(single_pose(start, "start"))
 
     def step(self, unstrained_length: ArrayLike, wrench: ArrayLike | None = None) -> ForwardStep:
         """Solve one sample.

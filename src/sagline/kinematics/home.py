@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.cables.model import CableModel
-from sagline.cables.models import Catenary
+from sagline.cables.models import Catenary, model_of
 from sagline.core.arguments import instance
 from sagline.core.arrays import Array, Flags, checked
 from sagline.core.errors import InvalidValueError
@@ -17,7 +17,7 @@ from sagline.kernels.cable.geometry import GEOMETRY_ROWS
 from sagline.kernels.cable.states import lengths_at_frame_ends
 from sagline.robot.checks import per_cable
 from sagline.robot.drum import warmth
-from sagline.robot.pose import Pose
+from sagline.robot.pose import Pose, PoseLike, single_pose
 from sagline.robot.robot import Robot
 from sagline.robot.winch import Winch
 from sagline.statics.tables import body_table, cable_table, pose_rows, refuse_missing_chords
@@ -31,10 +31,10 @@ PRECISION: Final = 1e-4  # relative precision of this smallest tension
 
 def home(
     robot: Robot,
-    pose: Pose,
+    pose: PoseLike,
     frame_end_tension: ArrayLike,
     counts: ArrayLike = 0.0,
-    model: CableModel = _CATENARY,
+    model: CableModel | str = _CATENARY,
     *,
     temperature: ArrayLike = 0.0,
 ) -> Robot:
@@ -79,14 +79,13 @@ def home(
     if winches.guides is not None:
         step = "Set length_zero to unstrained_length (1 + winding_tension/EA) of inverse(robot, pose) instead."
         raise InvalidValueError("winches: guides", "given", "None for home", step)
-    if instance(pose, Pose, "pose").shape:
-        raise InvalidValueError("pose", f"a batch of {len(pose)}", "a single pose", "Take one of them: pose[0].")
+    pose = single_pose(pose)
     refuse_missing_chords(robot, pose)
     m = robot.cable_count
     reading = per_cable(checked(frame_end_tension, "frame_end_tension", "N"), "frame_end_tension", m)
     zero = per_cable(checked(counts, "counts", ""), "counts", m)
     tension = _tensions(robot, winches, reading)
-    length = _lengths(robot, pose, tension, instance(model, CableModel, "model"))
+    length = _lengths(robot, pose, tension, model_of(model))
     strain = winches.winding_tension / robot.cables.axial_stiffness
     at_rest = length * (1.0 + strain) / warmth(robot, temperature)
     _check_whole(winches, at_rest)

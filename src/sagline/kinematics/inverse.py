@@ -10,27 +10,29 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.cables.model import CableModel
-from sagline.cables.models import Catenary
-from sagline.core.arguments import brief, callback, choice, flag, instance
+from sagline.cables.models import Catenary, model_of
+from sagline.core.arguments import brief, callback, choice, flag
 from sagline.core.arrays import Array, exactly, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_poses
+from sagline.core.numbers import n
 from sagline.core.progress import Progress
 from sagline.kernels import codes
 from sagline.kinematics.inverse_rows import decide_rows, decide_stability, solve_inverse_rows
 from sagline.kinematics.plan import Plan
+from sagline.kinematics.status import PoseStatus
 from sagline.kinematics.winding import Winding, checked_winding
 from sagline.motion.path import Path
 from sagline.robot.batch import first_of, has_routing, one_a_pose
 from sagline.robot.equilibrium import Equilibrium, cables_of_results
-from sagline.robot.pose import Pose
+from sagline.robot.pose import Pose, PoseLike, pose_of
 from sagline.robot.reach import check_plane, check_reach
 from sagline.robot.robot import Robot
 from sagline.robot.routing import with_routing
 from sagline.statics.balance import external_wrench, inertial_wrench
 from sagline.statics.tables import pose_rows, refuse_missing_chords, robot_terms
 from sagline.tension.method import TensionMethod, Variable, kernel_options, shared_tension
-from sagline.tension.methods import Closest
+from sagline.tension.methods import Closest, method_of
 
 STANDING: Final = 1e-7  # slower cables, relative to the fastest cable, are at rest; rates are accurate to 1e-8
 _CATENARY = Catenary()
@@ -39,9 +41,9 @@ _CLOSEST = Closest()
 
 def inverse(
     robot: Robot | Sequence[Robot],
-    motion: Path | Pose,
-    model: CableModel = _CATENARY,
-    tension: TensionMethod = _CLOSEST,
+    motion: Path | PoseLike,
+    model: CableModel | str = _CATENARY,
+    tension: TensionMethod | str = _CLOSEST,
     wrench: ArrayLike | None = None,
     previous: Plan | ArrayLike | None = None,
     *,
@@ -94,7 +96,7 @@ def inverse(
         >>> print(plan.feasible, plan.unstrained_length.round(3))
         True [11.049 10.542  9.674  9.829  8.49   7.85   9.453  9.402]
     """
-    _check_kinds(motion, model, tension)
+    motion, model, tension = _motion_of(motion), model_of(model), method_of(tension)
     callback(progress, "progress")
     turning = _given_winding(winding, motion)
     method = tension if isinstance(motion, Path) or previous is not None else tension.alone
@@ -145,6 +147,16 @@ def inverse(
     return plan if winding is None or turning is not None else _with_path_friction(plan)
 
 
+def equilibrium_at(robot: Robot, pose: PoseLike) -> Equilibrium:
+    """Equilibrium at a pose, or at a batch; InvalidValueError at a single pose without one, with the shortfall."""
+    plan = inverse(robot, pose)
+    if not plan.state.pose.shape and not plan.feasible:
+        why, short = PoseStatus(int(plan.status)), float(plan.shortfall)
+        value = why.name + (f", {n(short, '.4g', 'N')} short" if np.isfinite(short) else "")
+        raise InvalidValueError("pose", value, "a feasible pose", f"{why.text[0].upper()}{why.text[1:]}.")
+    return plan.state
+
+
 def _given_winding(winding: Winding | None, motion: Path | Pose) -> ArrayLike | None:
     """Winding directions of the caller, checked; None if not given, or if they follow from the path."""
     if not isinstance(winding, str):
@@ -164,12 +176,11 @@ def _with_path_friction(plan: Plan) -> Plan:
     return replace(plan, state=with_routing(plan.state, locked(np.where(standing, 0.0, -np.sign(rate)))))
 
 
-def _check_kinds(motion: object, model: object, tension: object) -> None:
-    if not isinstance(motion, Path | Pose):
-        step = "Give Pose.from_euler(position, 0, 0, 0), or quintic_path(waypoints, speed=1.0)."
-        raise InvalidValueError("motion", brief(motion), "a Pose or a Path", step)
-    instance(model, CableModel, "model")
-    instance(tension, TensionMethod, "tension")
+def _motion_of(motion: Path | PoseLike) -> Path | Pose:
+    if isinstance(motion, Path | Pose | list | tuple | np.ndarray):
+        return motion if isinstance(motion, Path) else pose_of(motion, "motion")
+    step = "Give Pose(x, y, z), or quintic_path(waypoints, speed=1.0)."
+    raise InvalidValueError("motion", brief(motion), "a Pose or a Path", step)
 
 
 def _in_world(components: Array, robot: Robot) -> Array:

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.cables.model import CableModel
-from sagline.cables.models import Catenary
-from sagline.core.arguments import flag, instance, optional
+from sagline.cables.models import Catenary, model_of
+from sagline.core.arguments import flag, instance
 from sagline.core.arrays import Array, exactly, locked
 from sagline.core.errors import InvalidValueError
 from sagline.kernels import codes, tables
@@ -28,7 +28,7 @@ from sagline.robot.batch import has_routing
 from sagline.robot.robot import Robot
 from sagline.statics.tables import robot_terms
 from sagline.tension.method import TensionMethod, kernel_options, takes_default_kernel
-from sagline.tension.methods import Closest
+from sagline.tension.methods import Closest, method_of
 
 _STATUSES = tuple(sorted(PoseStatus))  # statuses by code; a lookup takes a tenth of the time of a conversion
 # A struct accepts exactly this number of real numbers, and is faster than an array assignment from a tuple.
@@ -75,8 +75,8 @@ class InverseSolver:
     def __init__(
         self,
         robot: Robot,
-        model: CableModel | None = None,
-        tension: TensionMethod | None = None,
+        model: CableModel | str | None = None,
+        tension: TensionMethod | str | None = None,
         *,
         stability: bool = True,
     ) -> None:
@@ -95,10 +95,10 @@ class InverseSolver:
         """
         without_guides(instance(robot, Robot, "robot"), "InverseSolver", "inverse")
         m, n = robot.cable_count, robot.degrees_of_freedom
-        method = optional(tension, TensionMethod, "tension") or Closest()
+        method = Closest() if tension is None else method_of(tension)
         self._robot = robot
         self._stability = flag(stability, "stability")
-        self._options = kernel_options(robot, optional(model, CableModel, "model") or Catenary(), method)
+        self._options = kernel_options(robot, Catenary() if model is None else model_of(model), method)
         self._pose = np.zeros((1, tables.POSE_COLUMNS))
         self._pose[0, 6] = 1.0
         self._wrench = np.zeros((1, 6))

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.cables.model import CableModel
-from sagline.cables.models import Catenary
+from sagline.cables.models import Catenary, model_of
 from sagline.core.arguments import instance
 from sagline.core.arrays import Array, Indices, locked
 from sagline.core.errors import InvalidValueError
@@ -17,7 +17,7 @@ from sagline.kernels.tension.polygon import SPARE_CORNERS
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
-from sagline.robot.pose import Pose
+from sagline.robot.pose import Pose, PoseLike, single_pose
 from sagline.robot.robot import Robot
 from sagline.statics.tables import pose_rows, robot_terms
 from sagline.tension.method import Options, Variable, check_sharing, kernel_options
@@ -31,8 +31,8 @@ _CATENARY = Catenary()
 
 def tension_polygon(
     robot: Robot,
-    pose: Pose,
-    model: CableModel = _CATENARY,
+    pose: PoseLike,
+    model: CableModel | str = _CATENARY,
     wrench: ArrayLike | None = None,
     variable: Variable = "chord",
 ) -> TensionPolygon:
@@ -63,8 +63,7 @@ def tension_polygon(
         4 corners, first side: Side(cable=1, limit='min')
     """
     check_sharing(instance(robot, Robot, "robot"), Centroid())
-    if instance(pose, Pose, "pose").shape:
-        raise InvalidValueError("pose", f"a batch of shape {pose.shape}", "one pose", "Draw one pose at a time.")
+    pose, model = single_pose(pose), model_of(model)
     plan = inverse(robot, pose, model, MinimumNorm(variable), wrench, stability=False)
     if plan.status not in (PoseStatus.SOLVED, PoseStatus.INFEASIBLE):
         raise InvalidValueError(

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.core.arguments import instance
 from sagline.core.arrays import Array, checked
 from sagline.core.errors import InvalidValueError
 from sagline.core.results import Shown
-from sagline.robot.pose import Pose
+from sagline.robot.pose import Pose, PoseLike, pose_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,7 +38,7 @@ class Path(Shown):
     def __init__(
         self,
         time: ArrayLike,
-        pose: Pose,
+        pose: PoseLike,
         twist: ArrayLike,
         twist_rate: ArrayLike,
         jerk: ArrayLike | None = None,
@@ -58,9 +57,9 @@ class Path(Shown):
         Raises:
             InvalidValueError: If the times do not increase, a number is not finite, or the lengths differ.
         """
-        clock = checked_time(time)
+        clock, pose = checked_time(time), pose_of(pose)
         samples = clock.size
-        if instance(pose, Pose, "pose").shape != (samples,):
+        if pose.shape != (samples,):
             raise _length_error("pose", f"of shape {pose.shape}", samples)
         object.__setattr__(self, "time", clock)
         object.__setattr__(self, "pose", pose)

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import cast
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -13,7 +10,7 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_memory
 from sagline.motion.path import Path
 from sagline.motion.segments import QUINTIC, SEPTIC, RestProfile, Segments
-from sagline.robot.pose import Pose
+from sagline.robot.pose import Pose, PoseLike, pose_of
 
 LIMITS = ("speed", "acceleration", "angular_speed", "angular_acceleration")
 MOST_SAMPLES = 100_000_000  # 21 GB of path; with more samples, a duration or the rate probably has the wrong unit
@@ -21,7 +18,7 @@ SAMPLE_BYTES = 300.0  # peak memory per sample during construction of the path
 
 
 def quintic_path(
-    waypoints: Pose | Sequence[Pose] | ArrayLike,
+    waypoints: PoseLike,
     *,
     durations: ArrayLike | None = None,
     speed: float | None = None,
@@ -76,7 +73,7 @@ def quintic_path(
 
 
 def septic_path(
-    waypoints: Pose | Sequence[Pose] | ArrayLike,
+    waypoints: PoseLike,
     *,
     durations: ArrayLike | None = None,
     speed: float | None = None,
@@ -123,7 +120,7 @@ def septic_path(
 
 def _rest_to_rest(
     profile: RestProfile,
-    waypoints: Pose | Sequence[Pose] | ArrayLike,
+    waypoints: PoseLike,
     durations: ArrayLike | None,
     limits: tuple[float | None, float | None, float | None, float | None],
     rate: float,
@@ -145,15 +142,8 @@ def _rest_to_rest(
     return segments.sampled(grid, ends, times)
 
 
-def _as_pose(waypoints: Pose | Sequence[Pose] | ArrayLike) -> Pose:
-    if isinstance(waypoints, Pose):
-        stops = waypoints
-    elif isinstance(waypoints, list | tuple) and waypoints and all(isinstance(w, Pose) for w in waypoints):
-        position = np.vstack([w.position for w in waypoints])
-        stops = Pose.from_quaternion(position, np.vstack([w.quaternion for w in waypoints]))
-    else:
-        position = checked(cast(ArrayLike, waypoints), "waypoints", "m", shape=(None, 3))
-        stops = Pose.from_euler(position, 0.0, 0.0, 0.0)
+def _as_pose(waypoints: PoseLike) -> Pose:
+    stops = pose_of(waypoints, "waypoints")
     if stops.shape < (2,):
         raise InvalidValueError(
             "waypoints", f"of shape {stops.shape}", "shape (N,), N >= 2", "Give at least two poses."

@@ -5,14 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.core.arguments import instance
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
 from sagline.motion.path import Path, checked_time
-from sagline.robot.pose import Pose
+from sagline.robot.pose import PoseLike, pose_of
 
 
-def path_from_samples(time: ArrayLike, pose: Pose) -> Path:
+def path_from_samples(time: ArrayLike, pose: PoseLike) -> Path:
     """Path from timed poses.
 
     Position and quaternion are interpolated by cubic splines with continuous second derivatives; the path keeps the
@@ -42,8 +41,8 @@ def path_from_samples(time: ArrayLike, pose: Pose) -> Path:
         >>> print(path.twist[-1, :3].round(6), path.twist_rate[0, :3].round(6))
         [4. 0. 8.] [2. 0. 4.]
     """
-    clock = checked_time(time)
-    if clock.size < 2 or instance(pose, Pose, "pose").shape != (clock.size,):
+    clock, pose = checked_time(time), pose_of(pose)
+    if clock.size < 2 or pose.shape != (clock.size,):
         raise InvalidValueError(
             "pose",
             f"of shape {pose.shape} with {clock.size} time{'s' * (clock.size != 1)}",

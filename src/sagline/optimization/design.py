@@ -21,7 +21,7 @@ from sagline.optimization.front import Front, Ledger
 from sagline.optimization.goals import Goal
 from sagline.optimization.request import COUNTS, MOST_EVALUATIONS, checked_request, poses_of
 from sagline.optimization.search import SEARCHES, Task, latin_hypercube, population_of
-from sagline.robot.pose import Pose, PoseBox
+from sagline.robot.pose import PoseBox, PoseLike
 from sagline.robot.robot import Robot
 from sagline.workspaces.wrench_sets import WrenchSet
 
@@ -33,13 +33,13 @@ def design(
     free: Sequence[Free],
     goals: Sequence[Goal | str],
     wrenches: WrenchSet | None = None,
-    poses: Pose | None = None,
+    poses: PoseLike | None = None,
     *,
     box: PoseBox | None = None,
     grid: Sequence[int] = COUNTS,
     inner: Sequence[Free] = (),
     robust: AnchorErrors | None = None,
-    model: CableModel = _CATENARY,
+    model: CableModel | str = _CATENARY,
     optimizer: str = "cma",
     evaluations: int = 600,
     seed: int = 0,

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from sagline.cables.model import CableModel
-from sagline.cables.models import Catenary
+from sagline.cables.models import Catenary, model_of
 from sagline.core.arguments import callback, instance, optional
 from sagline.core.arrays import Array, locked
 from sagline.core.errors import InvalidValueError
@@ -21,7 +21,7 @@ from sagline.optimization.free import DesignVariable, Free
 from sagline.optimization.goals import Goal
 from sagline.optimization.rating import Rating, move_anchors
 from sagline.optimization.request import COUNTS, poses_of
-from sagline.robot.pose import Pose, PoseBox
+from sagline.robot.pose import Pose, PoseBox, PoseLike
 from sagline.robot.robot import Robot
 from sagline.workspaces.wrench_sets import WrenchSet
 
@@ -67,11 +67,11 @@ def moving_anchors(
     robot: Robot,
     moving: Sequence[Free],
     wrenches: WrenchSet | None = None,
-    poses: Pose | None = None,
+    poses: PoseLike | None = None,
     *,
     box: PoseBox | None = None,
     grid: Sequence[int] = COUNTS,
-    model: CableModel = _CATENARY,
+    model: CableModel | str = _CATENARY,
     progress: Progress | None = None,
 ) -> MovingAnchors:
     """Move anchors of a robot to the positions with the largest margin at each pose.
@@ -112,7 +112,7 @@ def moving_anchors(
     if not parts:
         raise InvalidValueError("moving", "empty", "FreeAnchors", 'Give FreeAnchors("frame", low, high).')
     inner = Candidates(robot, parts, "moving")
-    rating = Rating(inner, (Goal("mean_margin"),), wrenches, places, instance(model, CableModel, "model"), None, None)
+    rating = Rating(inner, (Goal("mean_margin"),), wrenches, places, model_of(model), None, None)
     count = len(rating.rows)
     table = inner.cables(inner.start[None])
     moved, margin = np.empty((count, len(inner.parts))), np.empty(count)

@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from sagline.cables.model import CableModel
+from sagline.cables.models import model_of
 from sagline.core.arguments import brief, choice, elements, instance, optional, whole_number
 from sagline.core.errors import InvalidValueError
 from sagline.optimization.candidates import AnchorErrors, Candidates, PlatformBox, free_parts
@@ -16,7 +17,7 @@ from sagline.optimization.free import Free
 from sagline.optimization.free_anchors import FreeAnchors
 from sagline.optimization.goals import Goal
 from sagline.optimization.search import SEARCHES
-from sagline.robot.pose import Pose, PoseBox
+from sagline.robot.pose import Pose, PoseBox, PoseLike, pose_of
 from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot
 from sagline.workspaces.wrench_sets import WrenchSet
@@ -25,13 +26,13 @@ COUNTS: Final = (9, 7, 5)  # points of the grid along x, y and z
 MOST: Final = 100_000  # largest number of poses
 
 
-def poses_of(robot: Robot, poses: Pose | None, box: PoseBox | None, grid: Sequence[int]) -> Pose:
+def poses_of(robot: Robot, poses: PoseLike | None, box: PoseBox | None, grid: Sequence[int]) -> Pose:
     """Poses as a batch, or a grid of level poses over a box, by default the robot's test box."""
     counts = _counts(grid)
     if poses is not None:
         if box is not None:
             raise InvalidValueError("box", "given beside poses", "one of the two", "Leave one of them out.")
-        given = instance(poses, Pose, "poses")
+        given = pose_of(poses, "poses")
         batch = given if given.shape else Pose.from_quaternion(given.position[None], given.quaternion[None])
         if not 0 < len(batch) <= MOST:
             raise InvalidValueError("poses", f"{len(batch):,} of them", f"1 to {MOST:,}", "Give some of them.")
@@ -122,7 +123,7 @@ def checked_request(
         _goals(goals),
         wrenches,
         poses,
-        instance(model, CableModel, "model"),
+        model_of(model),
         free_parts(inner, "inner"),
         optional(robust, AnchorErrors, "robust"),
         str(choice(optimizer, "optimizer", SEARCHES)),

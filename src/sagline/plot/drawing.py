@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 from matplotlib.collections import LineCollection, PolyCollection
 
-from sagline.core.arguments import instance, optional
+from sagline.core.arguments import instance
 from sagline.core.arrays import number
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
@@ -28,7 +28,7 @@ from sagline.plot.robot import (
 )
 from sagline.plot.sheet import VERMILLION, Sheet, axes_or_new
 from sagline.plot.style import current
-from sagline.robot.pose import Pose
+from sagline.robot.pose import Pose, PoseLike
 from sagline.robot.robot import Robot
 from sagline.viewer.tension_scale import TensionScale
 
@@ -68,7 +68,7 @@ class _Stroke(NamedTuple):
 
 def drawing(
     robot: Robot,
-    pose: Pose | None = None,
+    pose: PoseLike | None = None,
     azimuth: float = float(AZIMUTH),
     elevation: float = float(ELEVATION),
     ax: Axes | None = None,
@@ -101,7 +101,7 @@ def drawing(
         >>> [text.get_text() for text in ax.texts[:8]]
         ['0', '1', '2', '3', '4', '5', '6', '7']
     """
-    where = drawn_pose(instance(robot, Robot, "robot"), optional(pose, Pose, "pose"))
+    where = drawn_pose(instance(robot, Robot, "robot"), pose)
     turn, above = number(azimuth, "azimuth", "rad"), number(elevation, "elevation", "rad")
     if not 0.0 <= above <= 0.5 * np.pi:
         raise InvalidValueError("elevation", f"{above:g} rad", "0 to pi / 2", "Look down at the robot.")

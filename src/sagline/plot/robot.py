@@ -22,7 +22,7 @@ from sagline.plot.labels import PLACE
 from sagline.plot.sheet import VERMILLION, color_bar, sheet
 from sagline.plot.style import current
 from sagline.robot.batch import points_on_pulleys, pulleys_of
-from sagline.robot.pose import Pose
+from sagline.robot.pose import Pose, PoseLike, single_pose
 from sagline.robot.robot import Robot
 from sagline.viewer import shapes
 from sagline.viewer.tension_scale import TensionScale
@@ -46,14 +46,14 @@ HALO = [patheffects.withStroke(linewidth=2.0, foreground="white")]
 LABEL_DISTANCE = 0.045  # distance of a label outward from its anchor, as a share of the robot's size
 
 
-def drawn_pose(robot: Robot, pose: Pose | None) -> Pose:
+def drawn_pose(robot: Robot, pose: PoseLike | None) -> Pose:
     """The given pose, or the middle of the robot's test box; InvalidValueError for a batch or without both."""
-    if pose is None and robot.test_box is not None:
-        return Pose(0.5 * (robot.test_box.low + robot.test_box.high), np.eye(3))
-    if pose is None or pose.shape:
-        value = "missing" if pose is None else f"a batch of {len(pose)}"
-        raise InvalidValueError("pose", value, "a single pose, because the robot has no test box", "Give one pose.")
-    return pose
+    if pose is not None:
+        return single_pose(pose)
+    if robot.test_box is None:
+        allowed = "a single pose, because the robot has no test box"
+        raise InvalidValueError("pose", "missing", allowed, "Give one pose.")
+    return Pose(0.5 * (robot.test_box.low + robot.test_box.high))
 
 
 def catenary_points(robot: Robot, pose: Pose, plan: Plan) -> Array:
@@ -126,7 +126,7 @@ def ground(points: Array, platform: Array) -> tuple[Array, Array]:
     return flat[0], flat[1]
 
 
-def robot(robot: Robot, pose: Pose | None = None, ax: Axes3D | None = None) -> Axes3D:
+def robot(robot: Robot, pose: PoseLike | None = None, ax: Axes3D | None = None) -> Axes3D:
     """The robot in space at rest: frame, platform, and its cables as exact catenaries.
 
     Cables have the color of their chord tension, on the scale of the robot's limits as in `sagline view`, and their
@@ -149,7 +149,7 @@ def robot(robot: Robot, pose: Pose | None = None, ax: Axes3D | None = None) -> A
         >>> import sagline as sl
         >>> axes = sl.plot.robot(sl.load_robot("cogiro"))
     """
-    where = drawn_pose(instance(robot, Robot, "robot"), optional(pose, Pose, "pose"))
+    where = drawn_pose(instance(robot, Robot, "robot"), pose)
     optional(ax, Axes3D, "ax")
     if ax is None:
         ax = sheet(height=4.0, width=5.6).add_subplot(projection="3d")

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import wraps
+from importlib import import_module
+from typing import Any, Concatenate, Final, ParamSpec, Protocol, TypeVar, overload
 
 import numpy as np
 
 from sagline.cables.model import CableModel, CableState
+from sagline.core.arguments import instance
 from sagline.core.arrays import Array, Codes, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.indices import batch_length, part_of
@@ -23,8 +27,13 @@ from sagline.robot.batch import (
     points_on_pulleys,
     robots_at,
 )
-from sagline.robot.pose import Pose
+from sagline.robot.pose import Pose, PoseLike
 from sagline.robot.robot import Robot
+
+_P = ParamSpec("_P")
+_R_co = TypeVar("_R_co", covariant=True)
+# inverse kinematics builds on this module; it is imported by name when a robot and a pose are the start
+_INVERSE: Final = "sagline.kinematics.inverse"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -158,6 +167,46 @@ class Equilibrium(Result):
     def limited_tension(self) -> Array:
         """The limited tension [N], shape (m,) or (N, m): chord tension or frame-end tension."""
         return limited_tension(self.robot, self.cables, self.contact)
+
+
+class HasState(Protocol):
+    """A result about an equilibrium: a plan, a forward solution, a vibration."""
+
+    @property
+    def state(self) -> Equilibrium:
+        """The equilibrium."""
+
+
+class OfEquilibrium(Protocol[_P, _R_co]):
+    """A function of an equilibrium, that of a result, or that of a robot at a pose."""
+
+    @overload
+    def __call__(self, state: Equilibrium | HasState, *args: _P.args, **options: _P.kwargs) -> _R_co: ...
+    @overload
+    def __call__(self, robot: Robot, pose: PoseLike, *args: _P.args, **options: _P.kwargs) -> _R_co: ...
+
+
+def equilibrium_of(start: Any, pose: PoseLike | None = None, item: str = "state") -> Equilibrium:
+    """An equilibrium unchanged; that of a result, such as a plan; or that of a robot at a pose, or at several."""
+    if isinstance(start, Robot) and pose is not None:
+        found: Equilibrium = import_module(_INVERSE).equilibrium_at(start, pose)
+        return found
+    state = getattr(start, "state", None)
+    return state if isinstance(state, Equilibrium) else instance(start, Equilibrium, item)
+
+
+def of_equilibrium(function: Callable[Concatenate[Equilibrium, _P], _R_co]) -> OfEquilibrium[_P, _R_co]:
+    """Let a function of an equilibrium take a result with one, or a robot and a pose, in its place."""
+
+    @wraps(function)
+    def call(*given: Any, **options: Any) -> _R_co:
+        start, *rest = given or (options.pop("state", None),)
+        pose = None
+        if isinstance(start, Robot):
+            pose = options.pop("pose") if "pose" in options else rest.pop(0) if rest else None
+        return function(equilibrium_of(start, pose), *rest, **options)
+
+    return call
 
 
 def limited_tension(robot: Robots, cables: CableState, contact: Contact | None = None) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +11,8 @@ import numpy as np
 from attrs import field, fields, frozen
 from numpy.typing import ArrayLike, NDArray
 
-from sagline.core.arrays import Array, checked, locked, number
+from sagline.core.arguments import instance
+from sagline.core.arrays import Array, broadcast_shape, checked, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.fields import given, reduced, rule
 from sagline.core.indices import batch_length, part_of
@@ -96,18 +97,32 @@ class Pose:
     position: Array
     quaternion: Array
 
-    def __init__(self, position: ArrayLike, rotation: Rotation | ArrayLike) -> None:
+    def __init__(
+        self, position: ArrayLike, rotation: Rotation | ArrayLike | None = None, z: ArrayLike | None = None
+    ) -> None:
         """Check position and rotation and broadcast them.
+
+        `Pose(x, y, z)` is a level pose, too; x, y and z are numbers, or of shape (N,).
 
         Args:
             position: Position of the platform frame's origin [m], shape (3,) or (N, 3).
-            rotation: scipy Rotation, or rotation matrices of shape (3, 3) or (N, 3, 3).
+            rotation: scipy Rotation, or rotation matrices of shape (3, 3) or (N, 3, 3); None: level.
+            z: Third coordinate [m] of a level pose; position and rotation are then x and y.
 
         Raises:
             InvalidValueError: If a number is not finite, a matrix is not a rotation, or the counts differ.
+
+        Examples:
+            >>> import sagline as sl
+            >>> print(sl.Pose(1, 0.5, 2).position, sl.Pose([(0, 0, 1), (0, 0, 2)]).shape)
+            [1.  0.5 2. ] (2,)
         """
-        quaternion = _quaternion_of(rotation)
-        self._fill(checked(position, "position", "m", shape=(3,)), quaternion)
+        if z is not None:
+            each = [checked(value, name, "m") for name, value in (("x", position), ("y", rotation), ("z", z))]  # type: ignore[arg-type]
+            shape = broadcast_shape("x, y, z", *(one.shape for one in each))
+            position, rotation = np.stack([np.broadcast_to(one, shape) for one in each], axis=-1), None
+        place = checked(position, "position", "m", shape=(3,))
+        self._fill(place, np.array((0.0, 0.0, 0.0, 1.0)) if rotation is None else _quaternion_of(rotation))
 
     @classmethod
     def from_euler(cls, position: ArrayLike, alpha: ArrayLike, beta: ArrayLike, gamma: ArrayLike) -> Pose:
@@ -260,6 +275,26 @@ class Pose:
     def __reduce__(self) -> tuple[Any, tuple[Array, Array]]:
         """Pickle through a constructor, so that a loaded pose is checked and locked too."""
         return Pose.from_quaternion, (self.position, self.quaternion)
+
+
+PoseLike = Pose | Sequence[Pose] | ArrayLike  # positions [m] are level poses
+
+
+def pose_of(value: PoseLike, item: str = "pose") -> Pose:
+    """A pose unchanged; poses in a list as a batch; level poses at positions [m], shape (3,) or (N, 3)."""
+    if not isinstance(value, list | tuple | np.ndarray):
+        return instance(value, Pose, item)
+    if len(value) and isinstance(value, list | tuple) and all(isinstance(one, Pose) for one in value):
+        return Pose._adopt(*(np.vstack([getattr(one, name) for one in value]) for name in Pose.__slots__))
+    return Pose(checked(value, item, "m", shape=(3,)))
+
+
+def single_pose(value: PoseLike, item: str = "pose") -> Pose:
+    """A single pose, or the level pose at a position [m], shape (3,)."""
+    pose = pose_of(value, item)
+    if pose.shape:
+        raise InvalidValueError(item, f"a batch of {len(pose)}", "a single pose", f"Give one of them: {item}[0].")
+    return pose
 
 
 def _quaternion_of(rotation: Any) -> Array:

@@ -8,6 +8,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 from attrs import evolve, field, frozen
+from numpy.typing import ArrayLike
 
 from sagline.cables.cable import Cable
 from sagline.core.arguments import brief, choice, label, optional, text
@@ -176,6 +177,36 @@ class Robot(Shown):
         if self.winches is not None and guides is not None and "frame_anchors" in changes and "winches" not in changes:
             changes["winches"] = self.winches.replace(guides=guides)  # the new robot computes the dead length again
         return evolve(self, **changes)._kept(self) if "calibration" not in changes else evolve(self, **changes)
+
+    def with_payload(self, mass: float, *, at: ArrayLike | None = None) -> Robot:
+        """A robot with a payload on its platform.
+
+        Args:
+            mass: Mass of the payload [kg], >= 0.
+            at: Place of the payload in the platform frame [m], a point, shape (3,). None: the payload is distributed
+                like the mass of the platform; the inertia increases in proportion, and the center of mass stays.
+
+        Returns:
+            A new robot; this one remains unchanged.
+
+        Raises:
+            InvalidValueError: If the mass is negative, or the place is not three numbers.
+
+        Examples:
+            >>> import sagline as sl
+            >>> loaded = sl.load_robot("cogiro").with_payload(100.0, at=(0, 0, -0.5))
+            >>> print(f"{loaded.mass:g} kg, center of mass at {loaded.center_of_mass[2]:.3f} m")
+            191.058 kg, center of mass at -0.136 m
+        """
+        whole = self.mass + number(mass, "mass of the payload", "kg", low=0.0)
+        if at is None:
+            return self.replace(mass=whole, inertia=self.inertia * (whole / self.mass))
+        lever = exactly(at, "at", "m", (3,)) - self.center_of_mass
+        share = mass / whole
+        # parallel axes: both masses about their common center, with the reduced mass
+        added = share * self.mass * (lever @ lever * np.eye(3) - np.outer(lever, lever))
+        center = self.center_of_mass + share * lever
+        return self.replace(mass=whole, inertia=self.inertia + added, center_of_mass=center)
 
     def _kept(self, before: Robot) -> Robot:
         """This robot with standard errors only for the values that are unchanged since the calibration."""

@@ -14,12 +14,12 @@ from sagline.core.errors import InvalidValueError
 from sagline.kernels.balance.wrench import structure_matrices
 from sagline.kernels.cable import geometry as rows
 from sagline.robot.batch import Robots, bodies_of, first_of, one_a_pose
-from sagline.robot.pose import Pose
+from sagline.robot.pose import Pose, PoseLike, pose_of
 from sagline.robot.robot import Robot
 from sagline.statics.tables import chord_geometry, refuse_missing_chords
 
 
-def inertial_wrench(robot: Robot | Sequence[Robot], pose: Pose, twist: ArrayLike, twist_rate: ArrayLike) -> Array:
+def inertial_wrench(robot: Robot | Sequence[Robot], pose: PoseLike, twist: ArrayLike, twist_rate: ArrayLike) -> Array:
     """Inertial (d'Alembert) wrench of a motion of the platform.
 
     Args:
@@ -45,7 +45,8 @@ def inertial_wrench(robot: Robot | Sequence[Robot], pose: Pose, twist: ArrayLike
         Newton and Euler; docs/model.md, section 4. The equations use the angular velocity itself, not Euler-angle
         rates.
     """
-    if not instance(pose, Pose, "pose").shape:
+    pose = pose_of(pose)
+    if not pose.shape:
         raise InvalidValueError("pose", "a single one", "a batch of N poses", "Take Pose(position[None], rotation).")
     body = bodies_of(one_a_pose(robot, len(pose)))
     twist = exactly(twist, "twist", "m/s or rad/s", (len(pose), 6))
@@ -98,7 +99,7 @@ def _geometry(robot: Robots, pose: Pose) -> Array:
     return geometry
 
 
-def structure_matrix(robot: Robot | Sequence[Robot], pose: Pose) -> Array:
+def structure_matrix(robot: Robot | Sequence[Robot], pose: PoseLike) -> Array:
     """Structure matrix J: the wrenches of unit chord tensions about the center of mass, in world axes.
 
     Args:
@@ -123,7 +124,8 @@ def structure_matrix(robot: Robot | Sequence[Robot], pose: Pose) -> Array:
     Source:
         docs/model.md, section 1.
     """
-    shape = instance(pose, Pose, "pose").shape
+    pose = pose_of(pose)
+    shape = pose.shape
     checked = one_a_pose(robot, shape[0] if shape else None)
     shared = first_of(checked)
     geometry = _geometry(checked, pose)
@@ -132,7 +134,7 @@ def structure_matrix(robot: Robot | Sequence[Robot], pose: Pose) -> Array:
     return locked((shared.freedom @ out).reshape(*shape, shared.degrees_of_freedom, shared.cable_count))
 
 
-def article_balance(robot: Robot, pose: Pose, k_h: float = 4.845) -> ArticleBalance:
+def article_balance(robot: Robot, pose: PoseLike, k_h: float = 4.845) -> ArticleBalance:
     """The article's own H and b, in the horizontal tensions t_x, for comparison.
 
     H and b follow the article's equations with the levers b_i = B_i - P from the center of mass, with the corrected
@@ -164,7 +166,8 @@ def article_balance(robot: Robot, pose: Pose, k_h: float = 4.845) -> ArticleBala
     """
     instance(robot, Robot, "robot")
     k_h = number(k_h, "k_h", "m/s^2")
-    geometry = np.moveaxis(_geometry(robot, instance(pose, Pose, "pose")), 1, 0)
+    pose = pose_of(pose)
+    geometry = np.moveaxis(_geometry(robot, pose), 1, 0)
     cosine, sine = geometry[rows.AZIMUTH_X], geometry[rows.AZIMUTH_Y]
     bx, by, bz = geometry[rows.LEVER_X], geometry[rows.LEVER_Y], geometry[rows.LEVER_Z]
     pull = k_h * robot.cables.linear_density * geometry[rows.CHORD]

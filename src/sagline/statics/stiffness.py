@@ -6,12 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sagline.core.arguments import instance
 from sagline.core.arrays import Array, Flags, locked
 from sagline.core.memory import check_memory
 from sagline.core.results import Result
 from sagline.robot.batch import bodies_of, first_of
-from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.equilibrium import Equilibrium, of_equilibrium
 from sagline.statics.slopes import CableSlopes, cable_slopes, on_platform, tension_slopes
 from sagline.statics.strings import strings_below, strings_of
 
@@ -97,17 +96,18 @@ class Modes(Result):
         return locked(np.asarray((below > 0).any(axis=-1)).reshape(self.frequency.shape))
 
 
+@of_equilibrium
 def stiffness(state: Equilibrium) -> Stiffness:
     """Stiffness of the platform at fixed unstrained lengths, and sensitivities of its pose; all analytic.
 
     Args:
-        state: An equilibrium, single or N of them, from `inverse` or `forward`.
+        state: An equilibrium, single or N of them; a plan or a solution; or a robot and its poses.
 
     Returns:
         Stiffness; NaN if the state has no lengths, or the cables are straight (their stiffness is undefined).
 
     Raises:
-        InvalidValueError: If the state is not an Equilibrium (for a plan, pass plan.state).
+        InvalidValueError: If the state is not one of these.
 
     Examples:
         Platform height change due to 100 N upward, and due to 1 mm more length of cable 0:
@@ -180,17 +180,19 @@ def _null_space(matrix: Array) -> Array:
     return np.where(lost, np.nan, np.swapaxes(rows, -1, -2))
 
 
+@of_equilibrium
 def modes(state: Equilibrium) -> Modes:
     """Natural frequencies and mode shapes of the platform on its cables; cables are massless.
 
     Args:
-        state: An equilibrium, single or N of them. The free motions must have mass; rotations require an inertia.
+        state: An equilibrium, single or N of them; a plan or a solution; or a robot and its poses.
+            The free motions must have mass; rotations require an inertia.
 
     Returns:
         Modes; NaN if the state has no lengths.
 
     Raises:
-        InvalidValueError: If the state is not an Equilibrium (for a plan, pass plan.state).
+        InvalidValueError: If the state is not one of these.
 
     Examples:
         >>> import numpy as np
@@ -242,7 +244,7 @@ def natural_frequency(squares: Array) -> Array:
 
 
 def _check_state(state: Equilibrium, cable_bytes: float) -> None:
-    size = instance(state, Equilibrium, "state").cables.unstrained_length.size
+    size = state.cables.unstrained_length.size
     check_memory("state", cable_bytes * size, "Take the poses in parts: state[:1000].")
 
 

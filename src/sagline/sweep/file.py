@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.cables.models import MODELS
+from sagline.cables.models import model_of
 from sagline.core.arguments import brief, file_path, whole_number
 from sagline.core.arrays import Array, number
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.core.memory import check_memory
-from sagline.files.netcdf import Choice
 from sagline.files.path_file import load_path
 from sagline.files.quantity import in_si
 from sagline.files.reading import read_text
@@ -25,7 +23,7 @@ from sagline.robot.catalogue import robot_names
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.sweep.request import Request
-from sagline.tension.methods import METHODS
+from sagline.tension.methods import method_of
 from sagline.workspaces.wrench_sets import WrenchBox, WrenchSet
 
 KEYS: Final = ("low", "high", "count")  # keys of an axis: its ends and its number of points
@@ -129,8 +127,8 @@ def load_sweep(file: os.PathLike[str] | str) -> Request:
             _poses(entry.poses, path.parent),
             _wrenches(entry.wrenches),
             entry.quantities,
-            model=_named(entry.model, "model", MODELS)(),
-            tension=_named(entry.tension, "tension", METHODS)(),
+            model=model_of(entry.model),
+            tension=method_of(entry.tension),
             around=None if entry.around is None else _around(entry.around),
             moment_arm=None if entry.moment_arm is None else _one(entry.moment_arm, "moment_arm", "m"),
         )
@@ -217,15 +215,3 @@ def _product(axes: dict[str, Array]) -> Array:
     count = int(np.prod([float(len(axis)) for axis in axes.values()]))
     check_memory(f"a grid of {count:,} points", _POINT_BYTES * count, "Take fewer points.")
     return np.stack(np.meshgrid(*axes.values(), indexing="ij"), axis=-1).reshape(-1, len(axes))
-
-
-def _named(word: str, item: str, kinds: Mapping[str, type[Choice]]) -> type[Choice]:
-    """Model or method by its name on the command line, for example minimum-norm."""
-    words = {_word(name): kind for name, kind in kinds.items()}
-    if word not in words:
-        raise InvalidValueError(item, brief(word), ", ".join(words), f"Choose one of them as {item}.")
-    return words[word]
-
-
-def _word(name: str) -> str:
-    return "".join(f"-{letter.lower()}" if letter.isupper() else letter for letter in name).lstrip("-")

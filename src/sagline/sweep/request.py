@@ -12,19 +12,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.cables.model import CableModel
-from sagline.cables.models import Catenary
-from sagline.core.arguments import brief, choice, elements, instance, listed
+from sagline.cables.models import Catenary, model_of
+from sagline.core.arguments import brief, choice, elements, listed
 from sagline.core.arrays import Array, checked, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import counted
 from sagline.core.results import Result, set_fields
 from sagline.kinematics.status import PoseStatus
 from sagline.kinematics.winding import without_guides
-from sagline.robot.pose import Pose
+from sagline.robot.pose import Pose, PoseLike, pose_of
 from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod, kernel_options
-from sagline.tension.methods import MinimumNorm
+from sagline.tension.methods import MinimumNorm, method_of
 from sagline.workspaces.margin import MarginStatus
 from sagline.workspaces.wrench_sets import WrenchSet, load_of
 
@@ -121,12 +121,12 @@ class Request(Result):
     def __init__(
         self,
         robots: Robot | Sequence[Robot],
-        poses: Pose,
+        poses: PoseLike,
         wrenches: ArrayLike | None = None,
         quantities: str | Sequence[str] = ("tension",),
         *,
-        model: CableModel = _CATENARY,
-        tension: TensionMethod = _MINIMUM_NORM,
+        model: CableModel | str = _CATENARY,
+        tension: TensionMethod | str = _MINIMUM_NORM,
         around: WrenchSet | None = None,
         moment_arm: float | None = None,
     ) -> None:
@@ -147,7 +147,7 @@ class Request(Result):
                 support a robot, or a pose is outside the motions of a robot.
         """
         machines = listed(robots, Robot, "robots")
-        batch = instance(poses, Pose, "poses")
+        batch = pose_of(poses, "poses")
         if not batch.shape:
             batch = Pose.from_quaternion(batch.position[None], batch.quaternion[None])
         loads = np.atleast_2d(checked(np.zeros(6) if wrenches is None else wrenches, "wrenches", "N, N m", shape=(6,)))
@@ -163,8 +163,7 @@ class Request(Result):
                 raise InvalidValueError(item, "empty", "one or more", f"Give {item}.")
         if (count := len(machines) * len(batch) * len(loads)) > MOST:
             raise InvalidValueError("the sweep", f"of {count:,} requests", f"<= {MOST:,}", "Ask for fewer at a time.")
-        instance(model, CableModel, "model")
-        method = instance(tension, TensionMethod, "tension").alone
+        model, method = model_of(model), method_of(tension).alone
         for one in machines:
             kernel_options(without_guides(one, "a sweep", "inverse"), model, method)
             check_reach(one, batch, "poses")

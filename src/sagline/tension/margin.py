@@ -4,31 +4,31 @@ from __future__ import annotations
 
 import numpy as np
 
-from sagline.core.arguments import instance
 from sagline.core.arrays import Array, locked
 from sagline.core.progress import blocks, rows_of
 from sagline.kernels.inverse.feasibility import margins_of_poses
 from sagline.kernels.memory import memory_for
 from sagline.robot.batch import first_of, limits_of
-from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.equilibrium import Equilibrium, of_equilibrium
 from sagline.statics.tables import pose_rows, robot_terms
 from sagline.tension.method import LIMITS_OF
 
 BLOCK = 1 << 12  # poses per block, about 0.1 s; interrupts are handled between blocks
 
 
+@of_equilibrium
 def limit_margin(state: Equilibrium) -> Array:
     """Distance of the tensions of each pose to their nearest limit.
 
     Args:
-        state: Robot or robots, and cables; `plan.state` for instance.
+        state: An equilibrium, single or N of them; a plan or a solution; or a robot and its poses.
 
     Returns:
         Smallest distance [N] of the tension of a cable to its limits, shape () or (N,). It is 0 if a cable is at its
         limit, and NaN without tensions. It depends on the tension distribution.
 
     Raises:
-        InvalidValueError: If the state is not an Equilibrium (for a plan, pass plan.state).
+        InvalidValueError: If the state is not one of these.
 
     Examples:
         >>> import sagline as sl
@@ -46,11 +46,12 @@ def cable_margins(state: Equilibrium) -> Array:
 
     Returns (m,) or (N, m) [N].
     """
-    tension, limits = instance(state, Equilibrium, "state").limited_tension, limits_of(state.robot)
+    tension, limits = state.limited_tension, limits_of(state.robot)
     margins: Array = np.minimum(tension - limits.low, limits.high - tension)
     return margins
 
 
+@of_equilibrium
 def capacity_margin(state: Equilibrium) -> Array:
     """Largest additional force in any direction that tensions within the limits can balance at each pose.
 
@@ -59,14 +60,14 @@ def capacity_margin(state: Equilibrium) -> Array:
     m over n - 1. Eight cables have 56 faces, which take about twenty microseconds per pose.
 
     Args:
-        state: Robot or robots, poses, wrench and cables; `plan.state` for instance.
+        state: An equilibrium, single or N of them; a plan or a solution; or a robot and its poses.
 
     Returns:
         Force [N], shape () or (N,), independent of the tension distribution; infinite if no additional force makes the
         pose infeasible, NaN without tensions.
 
     Raises:
-        InvalidValueError: If the state is not an Equilibrium (for a plan, pass plan.state).
+        InvalidValueError: If the state is not one of these.
 
     Examples:
         >>> import sagline as sl
@@ -78,7 +79,7 @@ def capacity_margin(state: Equilibrium) -> Array:
     Source:
         Bouchard, Gosselin & Moore 2010; Guay, Cardou, Cruz-Ruiz & Caro 2014.
     """
-    shared, model = first_of(instance(state, Equilibrium, "state").robot), state.cables.model
+    shared, model = first_of(state.robot), state.cables.model
     rows = pose_rows(state.pose)
     pulls = np.atleast_2d(state.pull)
     margins = np.empty(len(rows))

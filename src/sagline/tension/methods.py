@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.core.arguments import choice
+from sagline.core.arguments import choice, named
 from sagline.core.arrays import Array, checked, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.kernels import codes
@@ -309,3 +309,8 @@ METHODS: dict[str, type[TensionMethod]] = {
         PolygonWalk,
     )
 }
+
+
+def method_of(value: TensionMethod | str, item: str = "tension") -> TensionMethod:
+    """A tension distribution method unchanged, or one by its name on the command line: "minimum-norm"."""
+    return named(value, TensionMethod, METHODS, item)

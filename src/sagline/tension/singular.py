@@ -8,8 +8,7 @@ import numpy as np
 
 from sagline.core.arguments import instance
 from sagline.core.arrays import Array, locked
-from sagline.core.errors import InvalidValueError
-from sagline.robot.pose import Pose
+from sagline.robot.pose import Pose, PoseLike, single_pose
 from sagline.robot.robot import Robot
 from sagline.statics.balance import structure_matrix
 
@@ -30,7 +29,7 @@ class UnresistedMotion(NamedTuple):
     text: str
 
 
-def unresisted_motion(robot: Robot, pose: Pose) -> UnresistedMotion:
+def unresisted_motion(robot: Robot, pose: PoseLike) -> UnresistedMotion:
     """The motion of the platform that changes the cable lengths least (not at all at a singular pose).
 
     Args:
@@ -51,8 +50,7 @@ def unresisted_motion(robot: Robot, pose: Pose) -> UnresistedMotion:
         >>> motion = sl.unresisted_motion(robot, pose)
     """
     instance(robot, Robot, "robot")
-    if instance(pose, Pose, "pose").shape:
-        raise InvalidValueError("pose", f"a batch of shape {pose.shape}", "one pose", "Ask for one pose at a time.")
+    pose = single_pose(pose)
     lever = float(np.linalg.norm(robot.platform_anchors - robot.center_of_mass, axis=1).max()) or 1.0
     units = np.where(np.linalg.norm(robot.freedom[:, 3:], axis=1) > 0.5, 1.0 / lever, 1.0)
     structure = units[:, None] * structure_matrix(robot, pose)

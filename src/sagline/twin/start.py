@@ -8,7 +8,6 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from sagline.control.link import HEARTBEAT
-from sagline.core.arguments import optional
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
 from sagline.dynamics.simulation.steps import frequency_with_winches, platform_frequency
@@ -20,7 +19,7 @@ from sagline.kinematics.inverse import inverse
 from sagline.robot.batch import dead_cable
 from sagline.robot.drum import drum_lever, drums_of
 from sagline.robot.equilibrium import Equilibrium
-from sagline.robot.pose import Pose
+from sagline.robot.pose import Pose, single_pose
 from sagline.robot.robot import Robot
 from sagline.twin.plc_program import LEFT, PlcLimits
 
@@ -108,11 +107,8 @@ def initial_state(true: Robot, nominal: Robot, start: Any, surveyed: bool) -> St
 
 def _start_pose(robot: Robot, start: Any) -> Pose:
     """Pose at which encoders are set; by default the middle of the robot's test_box, without rotation."""
-    pose = optional(start, Pose, "start")
-    if pose is not None:
-        if pose.shape:
-            raise InvalidValueError("start", f"a batch of {len(pose)}", "a single pose", "Give one of them: start[0].")
-        return pose
+    if start is not None:
+        return single_pose(start, "start")
     if robot.test_box is None:
         allowed = f"a pose, because {robot.name} has no test_box"
         step = "Give the pose at which encoders are set: start=Pose.from_euler([0, 0, 1.5], 0, 0, 0)."

@@ -15,7 +15,7 @@ from typing import Any, Final
 import numpy as np
 
 from sagline.cables.model import CableModel
-from sagline.core.arguments import instance
+from sagline.cables.models import model_of
 from sagline.core.arrays import Array, Flags, locked
 from sagline.core.numbers import counted
 from sagline.interference.clearance import ClearanceRows, check_obstacles, obstacles_of
@@ -111,7 +111,7 @@ class PositionError(Criterion):
 
     def __post_init__(self) -> None:
         """Check both fields."""
-        instance(self.model, CableModel, "PositionError: model")
+        object.__setattr__(self, "model", model_of(self.model, "PositionError: model"))
         super(PositionError, self).__post_init__()
 
     def __str__(self) -> str:

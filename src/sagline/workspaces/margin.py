@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.cables.model import CableModel
-from sagline.cables.models import Catenary
-from sagline.core.arguments import callback, instance
+from sagline.cables.models import Catenary, model_of
+from sagline.core.arguments import callback
 from sagline.core.arrays import Array, Codes, Flags, Indices, locked, number
 from sagline.core.memory import check_memory
 from sagline.core.numbers import counted, n
@@ -19,7 +19,7 @@ from sagline.core.results import Result
 from sagline.core.status import Status
 from sagline.kernels import codes
 from sagline.robot.batch import Robots, first_of, one_a_pose
-from sagline.robot.pose import Pose
+from sagline.robot.pose import Pose, PoseLike, pose_of
 from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot
 from sagline.statics.tables import pose_rows
@@ -127,10 +127,10 @@ def _newtons(value: ArrayLike) -> str:
 
 def margin(
     robot: Robot | Sequence[Robot],
-    pose: Pose,
+    pose: PoseLike,
     wrenches: WrenchSet | None = None,
     *,
-    model: CableModel = _CATENARY,
+    model: CableModel | str = _CATENARY,
     moment_arm: float | None = None,
     progress: Progress | None = None,
 ) -> Margin:
@@ -170,13 +170,14 @@ def margin(
     Source:
         docs/model.md, section 13; Guay, Cardou, Cruz-Ruiz & Caro 2014.
     """
-    shape = instance(pose, Pose, "pose").shape
+    pose, model = pose_of(pose), model_of(model)
+    shape = pose.shape
     robots = one_a_pose(robot, shape[0] if shape else None)
     check_reach(first_of(robots), pose, "pose")
     report = callback(progress, "progress")
     load = load_of(wrenches)
     arm = None if moment_arm is None else number(moment_arm, "moment_arm", "m", low=0.0)
-    prepared = MarginRows(robots, load, instance(model, CableModel, "model"), arm)
+    prepared = MarginRows(robots, load, model, arm)
     rows = pose_rows(pose)
     check_memory(f"margins at {len(rows):,} poses", _POSE_BYTES * len(rows), "Take them in parts.")
     found = prepared.rows(rows, report)

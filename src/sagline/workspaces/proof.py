@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from sagline.cables.model import CableModel
-from sagline.cables.models import Catenary
+from sagline.cables.models import Catenary, model_of
 from sagline.core.arguments import callback, instance
 from sagline.core.arrays import Array, Codes, Indices, locked, number
 from sagline.core.errors import InvalidValueError
@@ -280,7 +280,7 @@ def prove(
     wrenches: WrenchSet | None = None,
     *,
     budget: float = 10.0,
-    model: CableModel = _CATENARY,
+    model: CableModel | str = _CATENARY,
     smallest: float | None = None,
     progress: Progress | None = None,
 ) -> Proof:
@@ -329,7 +329,7 @@ def prove(
     seconds = number(budget, "budget", "s", above=0.0)
     least = 0.0 if smallest is None else number(smallest, "smallest", "m", above=0.0)
     report = callback(progress, "progress")
-    instance(model, CableModel, "model")
+    model = model_of(model)
     # loading or compiling the kernel is not part of the budget
     Prover(robot, load, model).verdicts(box.low[None], np.zeros(3))
     prover = Prover(robot, load, model, progress=report)

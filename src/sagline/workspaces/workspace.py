@@ -9,7 +9,7 @@ from typing import Final, get_args
 import numpy as np
 
 from sagline.cables.model import CableModel
-from sagline.cables.models import Catenary
+from sagline.cables.models import Catenary, model_of
 from sagline.core.arguments import brief, callback, choice, instance, whole_number
 from sagline.core.arrays import Array, Flags, locked, number
 from sagline.core.errors import InvalidValueError
@@ -17,7 +17,7 @@ from sagline.core.progress import Progress
 from sagline.robot.pose import PoseBox
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
-from sagline.tension.methods import MinimumNorm
+from sagline.tension.methods import MinimumNorm, method_of
 from sagline.workspaces.boundary import MOST_CELLS, boundary, uncertain_volume
 from sagline.workspaces.criteria import LeastMargin
 from sagline.workspaces.criterion import Criterion, check_continuous
@@ -42,8 +42,8 @@ def workspace(
     *,
     orientations: Orientations | Tilts | None = None,
     criteria: Sequence[Criterion] = (),
-    model: CableModel = _CATENARY,
-    tension: TensionMethod = _MINIMUM_NORM,
+    model: CableModel | str = _CATENARY,
+    tension: TensionMethod | str = _MINIMUM_NORM,
     cells: int = 32,
     refine: bool | int = True,
     moment_arm: float | None = None,
@@ -94,7 +94,8 @@ def workspace(
     Source:
         docs/model.md, section 13; Bouchard, Gosselin & Moore 2010 (margin); Lorensen & Cline 1987 (marching cubes).
     """
-    asked = _checked(robot, criteria, model, tension)
+    model, tension = model_of(model), method_of(tension)
+    asked = _checked(robot, criteria, tension)
     count = whole_number(cells, "cells", LEAST_CELLS, MOST_CELLS)
     report = callback(progress, "progress")
     region = region_of(robot, box, count)
@@ -151,13 +152,9 @@ def _progress_of(progress: Progress, cells: tuple[int, int, int]) -> Callable[[i
     return add
 
 
-def _checked(
-    robot: Robot, criteria: Sequence[Criterion], model: CableModel, tension: TensionMethod
-) -> tuple[Criterion, ...]:
+def _checked(robot: Robot, criteria: Sequence[Criterion], tension: TensionMethod) -> tuple[Criterion, ...]:
     """Checked criteria, with the margin first."""
     instance(robot, Robot, "robot")
-    instance(model, CableModel, "model")
-    instance(tension, TensionMethod, "tension")
     if not isinstance(criteria, list | tuple):
         raise InvalidValueError("criteria", brief(criteria), "a list of criteria", "Give [MaximumSag(0.05)].")
     for k, one in enumerate(criteria):

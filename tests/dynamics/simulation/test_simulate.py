@@ -11,6 +11,7 @@ import pytest
 import sagline as sl
 from sagline.core.arrays import Array
 from tests.dynamics.let_go import LIFT, beside, integrated, lopsided
+from tests.refusal import refused
 from tests.tiers import extended, wide
 
 Code = Literal["splitting", "runge-kutta"]
@@ -209,3 +210,14 @@ def test_a_run_has_the_twists_of_its_path() -> None:
     run = sl.simulate(sl.inverse(robot, path, tension=LIFT), record=0.01)
     assert np.abs(run.twist - path.twist[::10]).max() < 1e-7
     assert np.abs(np.cross(path.twist[:, 3:], robot.center_of_mass)).max() > 1e-3
+
+
+def test_a_robot_at_a_pose_and_a_plan_of_one_pose_are_starts_at_rest() -> None:
+    robot, here, push = sl.load_robot("article-suspended"), (1.0, 1.0, 1.5), [0, 0, 50.0, 0, 0, 0]
+    plan = sl.inverse(robot, here)
+    expected = sl.simulate(plan.state, duration=0.3, wrench=push).pose.position
+    assert np.abs(expected[-1] - here).max() > 1e-4
+    np.testing.assert_array_equal(sl.simulate(robot, here, duration=0.3, wrench=push).pose.position, expected)
+    np.testing.assert_array_equal(sl.simulate(plan, duration=0.3, wrench=push).pose.position, expected)
+    with refused("start", "a plan of poses without times"):
+        sl.simulate(sl.inverse(robot, [here, here]), duration=0.3)

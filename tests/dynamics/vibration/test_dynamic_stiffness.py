@@ -115,7 +115,7 @@ def test_damped_against_finite_elements() -> None:
 @pytest.mark.parametrize("frequency", [-1.0, np.nan, [[1.0]], 1e15])
 def test_frequencies_that_are_none(frequency: object) -> None:
     with pytest.raises(sl.InvalidValueError, match="frequency"):
-        sl.dynamic_stiffness(middle("cogiro"), frequency)  # type: ignore[arg-type]
+        sl.dynamic_stiffness(middle("cogiro"), frequency)  # type: ignore[call-overload]
 
 
 def test_a_pose_that_is_not_feasible_has_no_dynamics() -> None:

@@ -67,7 +67,7 @@ def test_strings_lower_and_split_the_peak() -> None:
 @pytest.mark.parametrize("frequency", [[], 1.0, [[1.0]], [-1.0], [np.nan], [900.0], [1e14]])
 def test_frequencies_that_are_none(frequency: object) -> None:
     with pytest.raises(sl.InvalidValueError, match="frequency"):
-        sl.frequency_response(middle("cogiro"), frequency)  # type: ignore[arg-type]
+        sl.frequency_response(middle("cogiro"), frequency)  # type: ignore[call-overload]
 
 
 def test_a_pose_without_an_answer_is_refused() -> None:

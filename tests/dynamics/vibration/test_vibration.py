@@ -216,7 +216,7 @@ def test_a_pose_without_an_answer() -> None:
 @pytest.mark.parametrize("up_to", [0.0, -1.0, np.nan, np.inf, 1e-60, "ten", 1e14])
 def test_limits_that_are_none(up_to: object) -> None:
     with pytest.raises(sl.InvalidValueError):
-        sl.vibration(middle("cogiro"), up_to=up_to)  # type: ignore[arg-type]
+        sl.vibration(middle("cogiro"), up_to=up_to)  # type: ignore[call-overload]
 
 
 def test_too_many_modes_are_counted_and_refused() -> None:

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.cables.model import CableModel
-from sagline.core.arguments import brief
 from sagline.core.arrays import Array, checked, exactly, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.kernels import codes
@@ -20,8 +19,8 @@ from sagline.kinematics.winding import without_guides
 from sagline.motion.path import checked_time
 from sagline.robot.batch import dead_cable
 from sagline.robot.drum import drum_tension
-from sagline.robot.equilibrium import Equilibrium
-from sagline.robot.pose import Pose
+from sagline.robot.equilibrium import Equilibrium, equilibrium_of
+from sagline.robot.pose import Pose, PoseLike
 from sagline.robot.robot import Robot
 from sagline.robot.routing import differs
 from sagline.statics.balance import inertial_wrench
@@ -166,18 +165,17 @@ class InitialConditions:
     end: float  # last time of the inputs [s]
 
 
-def initial_conditions(start: Any, unstrained_length: Any, wrench: Any, duration: Any) -> InitialConditions:
+def initial_conditions(
+    start: Any, unstrained_length: Any, wrench: Any, duration: Any, pose: PoseLike | None = None
+) -> InitialConditions:
     """Checked initial conditions and inputs of `simulate`, with the duration in s."""
-    if isinstance(start, Plan):
+    if isinstance(start, Plan) and (start.path is not None or start.state.pose.shape):
         if unstrained_length is not None:
             step = "Give plan.state[0] to wind other lengths than the plan's."
             raise InvalidValueError("unstrained_length", "given with a plan", "None", step)
         initial = _from_plan(start)
-    elif isinstance(start, Equilibrium):
-        initial = _from_equilibrium(start, unstrained_length)
     else:
-        step = "Give inverse(robot, path), or the state of a pose: plan.state."
-        raise InvalidValueError("start", brief(start), "a Plan along a path, or an Equilibrium", step)
+        initial = _from_equilibrium(equilibrium_of(start, pose, "start"), unstrained_length)
     _check_robot(initial.robot, initial.model)
     end = initial.end
     if duration is not None:

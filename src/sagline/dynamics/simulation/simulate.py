@@ -29,7 +29,9 @@ from sagline.dynamics.vibration.dynamic_stiffness import Damping
 from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics import massless as k
 from sagline.kinematics.plan import Plan
-from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.equilibrium import Equilibrium, HasState
+from sagline.robot.pose import PoseLike
+from sagline.robot.robot import Robot
 
 Integrator = Literal["splitting", "runge-kutta"]  # in the order of the kernel's codes
 CableMass = Literal["none", "lumped", "modal"]
@@ -38,7 +40,8 @@ MOST_STEPS: Final = 10**8  # some minutes
 
 
 def simulate(
-    start: Plan | Equilibrium,
+    start: Plan | Equilibrium | HasState | Robot,
+    pose: PoseLike | None = None,
     *,
     duration: float | None = None,
     step: float | None = None,
@@ -63,8 +66,10 @@ def simulate(
     `length_rate` as derivatives. More samples follow the exact lengths more closely: give the path at 1 kHz.
 
     Args:
-        start: A plan along a path, or a single equilibrium at rest. With a plan, the simulation starts at the initial
-            pose and speed of the plan. The wrench of the plan acts without the inertial wrench of the path.
+        start: A plan along a path, a single equilibrium at rest, a plan of one, or a robot, which rests at a pose.
+            With a path, the simulation starts at the initial pose and speed of the plan. The wrench of the plan acts
+            without the inertial wrench of the path.
+        pose: Pose of a robot at rest, with the tensions of `inverse`.
         duration: Duration [s]; lengths are constant after the end of the plan or table. None: duration of the plan or
             of the table of lengths.
         step: Time step of the integrator [s]; None: 0.2 rad divided by the highest angular frequency (massless and taut
@@ -121,7 +126,7 @@ def simulate(
     """
     choice(cable_mass, "cable_mass", get_args(CableMass))
     elements = checked_nodes(nodes)
-    given = initial_conditions(start, unstrained_length, wrench, duration)
+    given = initial_conditions(start, unstrained_length, wrench, duration, pose)
     if cable_mass == "modal":
         others = {"events": events, "winches": winches != "ideal", "wind": wind is not None, "integrator": integrator}
         check_modal_arguments([name for name, asked in others.items() if asked])

@@ -37,10 +37,9 @@ from sagline.kernels.dynamics.massless import LOADED
 from sagline.kernels.dynamics.period import begin_period
 from sagline.kernels.jit import bound
 from sagline.kinematics.caller import copy_in
-from sagline.kinematics.inverse import inverse
 from sagline.robot.batch import dead_cable
-from sagline.robot.equilibrium import Equilibrium
-from sagline.robot.pose import Pose
+from sagline.robot.equilibrium import Equilibrium, HasState, equilibrium_of
+from sagline.robot.pose import Pose, PoseLike
 from sagline.robot.robot import Robot
 
 NEAR: Final = 1e-6  # tolerance for a whole number of steps in a period
@@ -84,7 +83,7 @@ class Simulator:
     def __init__(
         self,
         robot: Robot,
-        start: Pose | Equilibrium,
+        start: PoseLike | Equilibrium | HasState,
         *,
         winches: Winches = "robot",
         winding: Winding = "constant",
@@ -350,9 +349,9 @@ class Simulator:
 
 def _at_rest(robot: Robot, start: Any) -> Equilibrium:
     """Equilibrium of the robot at the start."""
-    if isinstance(start, Pose):
-        return inverse(robot, start).state
-    state = instance(start, Equilibrium, "start")
+    if isinstance(start, Pose | list | tuple | np.ndarray):
+        return equilibrium_of(robot, start)
+    state = equilibrium_of(start, item="start")
     if state.cables.shape[-1:] != (robot.cable_count,):
         allowed = f"{robot.cable_count}, as {robot.name} has"
         raise InvalidValueError("start", f"of {state.cables.shape[-1]} cables", allowed, "Give one of this robot.")

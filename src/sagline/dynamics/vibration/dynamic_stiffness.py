@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sagline.core.arguments import instance, optional
+from sagline.core.arguments import optional
 from sagline.core.arrays import Array, checked, locked
 from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.core.fields import NumberFields, rule
@@ -15,7 +15,7 @@ from sagline.core.memory import check_memory
 from sagline.kernels import codes
 from sagline.kernels.dynamics import collocation
 from sagline.kernels.dynamics.collocation import dynamic_stiffnesses
-from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.equilibrium import Equilibrium, of_equilibrium
 from sagline.statics.slopes import cable_slopes
 from sagline.statics.strings import Strings, strings_of
 
@@ -54,6 +54,7 @@ Complex = NDArray[np.complex128]
 _BYTES = 400.0  # largest number of elements per cable and frequency
 
 
+@of_equilibrium
 def dynamic_stiffness(state: Equilibrium, frequency: ArrayLike, damping: Damping | None = None) -> Complex:
     """Dynamic stiffness of every cable at its platform end, for vibration about an equilibrium.
 
@@ -62,7 +63,7 @@ def dynamic_stiffness(state: Equilibrium, frequency: ArrayLike, damping: Damping
     cable stiffness of `stiffness`.
 
     Args:
-        state: An equilibrium, a single one.
+        state: A single equilibrium; a plan or a solution of one; or a robot and a pose.
         frequency: Frequencies [Hz], >= 0, shape (F,) or a single one.
         damping: Energy losses of the vibration; None: no losses. Its modal_damping acts as a loss factor of the whole
             stiffness, equal to twice its value. Every mode then has this damping ratio at its own frequency.
@@ -102,7 +103,7 @@ def dynamic_stiffness(state: Equilibrium, frequency: ArrayLike, damping: Damping
 
 def single_state(state: Equilibrium) -> Equilibrium:
     """Check a single equilibrium and return it unchanged."""
-    if instance(state, Equilibrium, "state").pose.shape:
+    if state.pose.shape:
         step = "Take the poses one by one: state[i]."
         raise InvalidValueError("state", f"a batch of {len(state)}", "a single state", step)
     return state

@@ -23,10 +23,10 @@ from sagline.dynamics.vibration.robot_modes import (
     state_modes,
     vibration_model,
 )
-from sagline.dynamics.vibration.vibration import VibrationStatus
+from sagline.dynamics.vibration.vibration import UP_TO, VibrationStatus
 from sagline.kinematics.inverse import inverse
 from sagline.robot.equilibrium import Equilibrium
-from sagline.robot.pose import Pose
+from sagline.robot.pose import Pose, PoseLike, pose_of
 from sagline.robot.robot import Robot
 from sagline.statics.slopes import cable_slopes
 from sagline.statics.stiffness import compliance_of
@@ -73,10 +73,10 @@ class FrequencyMap(Result, Saved):
 
 def frequency_map(
     robot: Robot,
-    poses: Pose,
+    poses: PoseLike,
     *,
-    up_to: float,
-    tension: TensionMethod = _CLOSEST,
+    up_to: float = UP_TO,
+    tension: TensionMethod | str = _CLOSEST,
     damping: Damping | None = _ONE_PERCENT,
     progress: Progress | None = None,
 ) -> FrequencyMap:
@@ -88,7 +88,7 @@ def frequency_map(
     Args:
         robot: The robot.
         poses: A batch of N.
-        up_to: Upper limit of the mode frequencies [Hz], > 0.
+        up_to: Upper limit of the mode frequencies [Hz], > 0; by default 20 Hz.
         tension: Tension distribution method, as in `inverse`.
         damping: Energy losses for the largest response, by default a modal damping of 1 %; None: no losses.
         progress: Called after every few poses: number done, total number.
@@ -114,7 +114,8 @@ def frequency_map(
         docs/model.md, section 11.
     """
     instance(robot, Robot, "robot")
-    if not instance(poses, Pose, "poses").shape:
+    poses = pose_of(poses, "poses")
+    if not poses.shape:
         raise InvalidValueError("poses", "a single pose", "a batch of them", "For one pose use vibration.")
     limit = number(up_to, "up_to", "Hz", above=0.0)
     known = optional(damping, Damping, "damping") or Damping()

@@ -23,7 +23,7 @@ from sagline.dynamics.vibration.mode_sensitivities import (
     string_data,
 )
 from sagline.dynamics.vibration.vibration import Vibration, VibrationStatus
-from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.equilibrium import Equilibrium, HasState, equilibrium_of
 from sagline.statics.stiffness import modes
 
 
@@ -71,19 +71,19 @@ class FrequencySlopes(Result):
     wrench_sensitivity: Array
 
 
-def frequency_slopes(state: Equilibrium | Vibration, together: float = 1e-6) -> FrequencySlopes:
+def frequency_slopes(state: Equilibrium | HasState, together: float = 1e-6) -> FrequencySlopes:
     """Sensitivities of every natural frequency to the robot's data, its pose and the wrench; all analytic.
 
     Args:
-        state: A single equilibrium, for the massless frequencies of `modes`; or a vibration, for frequencies with cable
-            mass. Cables are exact or weightless, without pulleys and dead lengths.
+        state: A single equilibrium, or a plan of one, for the massless frequencies of `modes`; or a vibration, for
+            frequencies with cable mass. Cables are exact or weightless, without pulleys and dead lengths.
         together: Relative difference up to which adjacent frequencies count as equal.
 
     Returns:
         FrequencySlopes; NaN where a frequency is NaN.
 
     Raises:
-        InvalidValueError: If the state is neither an equilibrium nor a vibration (for a plan, pass plan.state), is a
+        InvalidValueError: If the state is not one of these, is a
             batch, has no lengths, or has shallow cables, pulleys or dead lengths; if the vibration was not solved.
 
     Examples:
@@ -104,6 +104,7 @@ def frequency_slopes(state: Equilibrium | Vibration, together: float = 1e-6) -> 
     together = number(together, "together", "", low=0.0)
     if isinstance(state, Vibration):
         return _with_cable_mass(state, together)
+    state = equilibrium_of(state)
     rest = _rest(state)
     found, flexible = modes(state), flexibility(state, rest.slopes.force)
     groups = list(_groups(found.frequency, together))

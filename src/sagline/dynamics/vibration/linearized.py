@@ -13,7 +13,7 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.results import Result
 from sagline.dynamics.vibration.dynamic_stiffness import Damping, single_state
 from sagline.dynamics.vibration.flexibility import flexibility
-from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.equilibrium import Equilibrium, of_equilibrium
 from sagline.statics.slopes import (
     CableSlopes,
     cable_slopes,
@@ -86,6 +86,7 @@ class Linearized(Result):
         return StateSpace(self.A, self.B, self.C, self.D)
 
 
+@of_equilibrium
 def linearized(state: Equilibrium, damping: Damping | None = None, inputs: Inputs = "lengths") -> Linearized:
     """Linear model of the robot about a state, from winches and wrench to pose, tensions and lengths.
 
@@ -93,7 +94,8 @@ def linearized(state: Equilibrium, damping: Damping | None = None, inputs: Input
     The static gains are the compliance and the sensitivities of `stiffness`, the poles are `modes`.
 
     Args:
-        state: A single equilibrium, from `inverse` or `forward`. An unstable one has growing poles.
+        state: A single equilibrium; a plan or a solution of one; or a robot and a pose.
+            An unstable one has growing poles.
         damping: `loss_time` of the cables' stretch, to first order in it, and `modal_damping`; none by default.
         inputs: Inputs of the winches: "lengths" off the drums, or "speeds", their rates, with lengths as states.
 
@@ -101,7 +103,7 @@ def linearized(state: Equilibrium, damping: Damping | None = None, inputs: Input
         The system.
 
     Raises:
-        InvalidValueError: If the state is not an Equilibrium (for a plan, pass plan.state), is a batch, or has no
+        InvalidValueError: If the state is not one of these, is a batch, or has no
             lengths; for `air_damping`, which acts on cables with mass; for `loss_time` with "lengths" as inputs,
             because tensions then depend on winch speeds.
 

@@ -17,7 +17,7 @@ from sagline.dynamics.vibration.dynamic_stiffness import Complex, Damping, check
 from sagline.dynamics.vibration.receptance import LOWEST, Receptance
 from sagline.dynamics.vibration.robot_modes import check_mode_count, massless_modes, modes_below, vibration_model
 from sagline.dynamics.vibration.vibration import Vibration, VibrationStatus
-from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.equilibrium import Equilibrium, of_equilibrium
 from sagline.statics.slopes import cable_slopes
 from sagline.statics.stiffness import modes, stiffness
 
@@ -53,6 +53,7 @@ class FrequencyResponse(Result):
     deviation: Array
 
 
+@of_equilibrium
 def frequency_response(state: Equilibrium, frequency: ArrayLike, damping: Damping | None = None) -> FrequencyResponse:
     """Motion of the platform for an oscillating wrench, with cable mass, and with massless cables for comparison.
 
@@ -60,7 +61,7 @@ def frequency_response(state: Equilibrium, frequency: ArrayLike, damping: Dampin
     response for the exact stiffness of the cables, and the deviation is reported.
 
     Args:
-        state: An equilibrium, a single one.
+        state: A single equilibrium; a plan or a solution of one; or a robot and a pose.
         frequency: Frequencies [Hz], >= 0, shape (F,).
         damping: Energy losses; None: no losses, with infinite response at the natural frequencies. Its modal_damping
             acts as a loss factor of the whole stiffness, equal to twice its value, as in `dynamic_stiffness`.

@@ -23,7 +23,7 @@ from sagline.dynamics.vibration.robot_modes import (
     vibration_model,
 )
 from sagline.motion.path import Path
-from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.equilibrium import Equilibrium, of_equilibrium
 from sagline.robot.robot import Robot
 from sagline.statics.balance import inertial_wrench
 from sagline.statics.stiffness import Modes
@@ -150,18 +150,20 @@ class Vibration(Result):
         return _most_excited(self.state, self.frequency, self.shape, path)
 
 
+UP_TO: Final = 20.0  # default upper limit of the mode frequencies [Hz]
 POINTS: Final = 41  # number of points of a cable's shape
 
 
-def vibration(state: Equilibrium, *, up_to: float, damping: Damping | None = None) -> Vibration:
+@of_equilibrium
+def vibration(state: Equilibrium, *, up_to: float = UP_TO, damping: Damping | None = None) -> Vibration:
     """All modes of a robot with cable mass below a frequency.
 
     In addition to the platform modes, each cable vibrates like a string about its catenary, in its plane and out of it.
     The number of modes is compared with an independent exact count, so that none is missing.
 
     Args:
-        state: A single equilibrium, from `inverse` or `forward`.
-        up_to: Upper limit of the mode frequencies [Hz], > 0.
+        state: A single equilibrium; a plan or a solution of one; or a robot and a pose.
+        up_to: Upper limit of the mode frequencies [Hz], > 0; by default 20 Hz.
         damping: Energy losses of the vibration, for `loss`; None: no losses.
 
     Returns:
