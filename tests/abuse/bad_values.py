@@ -200,6 +200,19 @@ def _flag_or_whole(valid: Any) -> Iterator[Bad]:
         yield Bad(f"{value!r}", value, REFUSED)
 
 
+def _entry(valid: Any) -> Iterator[Bad]:
+    """A whole number, of which -1 is the last."""
+    yield from (bad for bad in _whole(valid) if bad.label != "-1")
+
+
+def _methods(valid: Any) -> Iterator[Bad]:
+    """A tension distribution method, or several of them."""
+    yield from _object(valid)
+    for other in ([valid, 3], [None], [[valid]], {0: valid}, [], ()):
+        yield Bad(f"{other!r:.40}", other, REFUSED)
+    yield Bad("one in a list", [valid], EITHER)
+
+
 def _wholes(valid: Any) -> Iterator[Bad]:
     """As many whole numbers as this, all positive."""
     first = list(valid)
@@ -481,7 +494,7 @@ KINDS = {
     name.removeprefix("_"): function
     for name, function in globals().items()
     if function in (_flag, _flag_or_whole, _wholes, _cables, _groups, _several, _texts, _address, _table,
-                    _recorder, _tensions, _folder,
+                    _recorder, _tensions, _folder, _entry, _methods,
                     _array, _number, _whole, _cable, _seed, _index, _word, _words, _text, _file, _callback, _mapping,
                     _object, _objects, _one, _place, _motion, _out, _ax, _points, _sample)
 }  # fmt: skip

@@ -840,7 +840,7 @@ def _files(given: _Given) -> dict[str, Call]:
             _all(
                 robot=("one", given.robot),
                 file=("file", str(folder / "sagline.c")),
-                tension=("one", sl.Closest()),
+                tension=("methods", sl.Closest()),
                 forward=("flag", False),
                 single_precision=("flag", True),
             ),
@@ -1061,7 +1061,10 @@ def _sweeps(given: _Given) -> dict[str, Call]:
             ),
         ),
         "sweep.load": Call(sl.sweep.load, _all(folder=("file", folder))),
-        "sweep.Sweep.values": Call(found.values, _all(name=("word", "status"), index=("index", 0))),
+        "sweep.Sweep.values": Call(
+            lambda **a: found.values(a.get("name", "status"), (0, a["index"]) if "index" in a else ()),
+            _all(name=("word", "status"), index=("index", 0)),
+        ),
         "load_sweep": Call(sl.load_sweep, _all(file=("file", file))),
     }
 
@@ -1198,7 +1201,7 @@ def _controls(given: _Given) -> dict[str, Call]:
             sl.control.null_space_error, _all(execution=("one", done), filter_time=("number", 0.5, True))
         ),
         "load_execution": Call(
-            lambda **a: (sl.load_execution(**a), None)[1], _all(file=("file", kept), plan=("whole", 0, True))
+            lambda **a: (sl.load_execution(**a), None)[1], _all(file=("file", kept), plan=("entry", 0, True))
         ),
         "plot.execution": Call(lambda done: (sl.plot.execution(done), None)[1], _all(done=("one", done))),
         **{

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from sagline.core.arguments import brief, choice, file_path
 from sagline.core.arrays import locked
 from sagline.core.errors import FileError, InvalidValueError
+from sagline.core.indices import part_of
 from sagline.core.memory import check_memory
 from sagline.core.numbers import counted
 from sagline.core.results import Result
@@ -166,8 +167,8 @@ class Sweep(Result):
 
         Args:
             name: One of `names`.
-            index: Robots, poses, wrenches and cables, as whole numbers and slices of numpy, for example (0, slice(10)).
-                The default is all.
+            index: Robots, poses, wrenches and cables, as whole numbers, slices, or arrays of whole numbers or booleans,
+                for example (0, slice(10)). The default is all.
 
         Returns:
             Array of shape (R, P, W), for tensions and lengths (R, P, W, m), or the part selected by the index. Values
@@ -180,14 +181,17 @@ class Sweep(Result):
         """
         choice(name, "name", self.names)
         array: Any = open_folder(self.folder).group[name]
-        if isinstance(index, tuple) and not index:
+        parts = index if isinstance(index, tuple) else (index,)
+        if not parts:
             check_memory(f"all of {name}", 2.0 * array.nbytes, "Read a part, by an index.")
+        if len(parts) > array.ndim:
+            allowed = f"at most {array.ndim} whole numbers and slices"
+            raise InvalidValueError("index", brief(index), allowed, "Count robot, pose, wrench and cable.")
+        chosen = tuple(part_of(part, (size,), "value") for part, size in zip(parts, array.shape, strict=False))
         try:
-            return locked(np.asarray(array[index]))
-        except IndexError as error:
-            allowed = f"within {', '.join(map(str, array.shape))}"
-            step = f"Give whole numbers and slices ({error})."
-            raise InvalidValueError("index", brief(index), allowed, step) from None
+            return locked(np.asarray(array.oindex[chosen]))
+        except IndexError:
+            raise InvalidValueError("index", brief(index), "slices upward", "Reverse the result.") from None
         except (ValueError, RuntimeError, OSError) as error:
             step = "Run the sweep again: it repeats the damaged part."
             raise FileError(self.folder, f"{name} cannot be read ({error})", step) from None

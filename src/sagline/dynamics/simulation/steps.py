@@ -33,8 +33,9 @@ def platform_frequency(robot: Robot, poses: Pose, lengths: Array) -> float:
     along = chords / np.maximum(distance, 1e-300)
     rows = np.concatenate((along, np.cross(levers, along)), axis=-1) @ freedom.T
     taut = np.maximum(distance[..., 0], 1e-300)
-    springs = robot.cables.axial_stiffness / (np.minimum(lengths.min(axis=0), taut) if len(poses) == 1 else taut)
-    stiffness = np.swapaxes(rows, 1, 2) @ (springs[..., None] * rows)
+    with np.errstate(over="ignore", invalid="ignore"):  # too short lengths, refused below
+        springs = robot.cables.axial_stiffness / (np.minimum(lengths.min(axis=0), taut) if len(poses) == 1 else taut)
+        stiffness = np.swapaxes(rows, 1, 2) @ (springs[..., None] * rows)
     if not np.isfinite(stiffness).all():
         value = f"down to {lengths.min():g} m"
         raise InvalidValueError("unstrained_length", value, "longer cables", "Correct unstrained_length.")
