@@ -46,7 +46,7 @@ ANY: Any = sl  # for calls that no type allows
         (lambda: ANY.inverse(ROBOT, {1, 2}), ("motion", "{1, 2}", "a Pose or a Path")),
         (
             lambda: ANY.InverseSolver([ROBOT]),
-            ("robot", "[a Robot]", "a Robot", 'Load one by its name or file: load_robot("cogiro").'),
+            ("robot", "[a Robot]", "a Robot", 'Load one by name or file: load_robot("cogiro").'),
         ),
         (lambda: ANY.ForwardSolver([ROBOT]), ("robot", "[a Robot]", "a Robot")),
         (lambda: ANY.tension_polygon([ROBOT], POSE), ("robot", "[a Robot]", "a Robot")),

@@ -1,4 +1,4 @@
-"""Cables with elongation and sag: material, five cable models and cable states."""
+"""Cables with elongation and sag: material, five cable models, and cable states."""
 
 from sagline.core.surface import group
 

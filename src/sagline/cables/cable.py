@@ -75,10 +75,9 @@ class Cable:
 
         Args:
             linear_density: Mass per unstrained length [kg/m], >= 0.
-            youngs_modulus: Young's modulus E of the whole rope [Pa], > 0, which is smaller than that of its fibers or
-                wires.
-            section_area: Section area A for which E was measured [m^2], > 0; for a rope usually the area of its fibers
-                or metal alone.
+            youngs_modulus: Young's modulus E of the whole rope [Pa], > 0; the modulus of its fibers or wires is larger.
+            section_area: Section area A to which E refers [m^2], > 0; for a rope usually only the area of its fibers or
+                metal.
             diameter: Diameter of the rope [m], > 0; None if not known. The section area does not follow from it.
             expansion: Coefficient of thermal expansion [1/K], or None.
 
@@ -112,7 +111,7 @@ class Cable:
             A new cable; this one remains unchanged.
 
         Raises:
-            InvalidValueError: If there is no such field, or the constructor does not accept the new values.
+            InvalidValueError: If a field does not exist, or the constructor does not accept the new values.
 
         Examples:
             >>> import sagline as sl
@@ -129,12 +128,12 @@ class Cable:
         """The fields that are known, by their names.
 
         Returns:
-            linear_density and axial_stiffness; also diameter and expansion where they are not None.
+            linear_density, axial_stiffness, and diameter and expansion unless they are None.
         """
         return {name: value for name in self.__slots__ if (value := getattr(self, name)) is not None}
 
     def _part(self, index: int | slice | NDArray[Any], shape: tuple[int, ...]) -> Cable:
-        """Material of a part of a batch of that shape; unchanged if it lacks the first axis of the batch."""
+        """Material of a part of a batch of the given shape; unchanged if it has no axis for the batch."""
         own = self.linear_density.shape
         if len(own) < len(shape):
             return self
@@ -147,7 +146,7 @@ class Cable:
         return part
 
     def __reduce__(self) -> tuple[Any, tuple[dict[str, Array]]]:
-        """Pickle through the constructor, so that a loaded cable is checked and locked too."""
+        """Pickle through the constructor, which checks and locks a loaded cable."""
         return _from_fields, (self.known(),)
 
 

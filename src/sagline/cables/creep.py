@@ -18,16 +18,16 @@ MOST_ELEMENTS = 2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Creep:
-    """Creep strain of a cable: one or two Kelvin-Voigt elements (spring parallel to damper) in series with it.
+    """Creep strain of a cable: one or two Kelvin-Voigt elements (spring parallel to damper) in series with the cable.
 
-    Together with the elastic axial stiffness of the cable, one element gives the standard linear solid and two give the
-    five-element model of polymer ropes. The creep is recoverable: without tension the strain returns to zero.
+    Elastic axial stiffness and one element give the standard linear solid. Two elements give the five-element model of
+    polymer ropes. The creep is recoverable: without tension the strain returns to zero.
 
     Attributes:
         axial_stiffness: Stiffness k of each element [N], > 0, shape (1,) or (2,). Under a constant tension T, the
             strain of an element approaches T/k.
-        time: Retardation time of each element [s], > 0, of the same shape. After this time, the strain differs from T/k
-            by the share 1/e.
+        time: Retardation time of each element [s], > 0, of the same shape. After this time, 1/e of the final strain T/k
+            is missing.
 
     Examples:
         A fiber rope under 1 kN, after a second, a minute and an hour:

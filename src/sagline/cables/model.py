@@ -1,4 +1,4 @@
-"""The interface of all cable models, the cable states that they return, and the cable status."""
+"""Interface of all cable models, cable states, and cable status."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ class CableStatus(Status):
     """Status of one cable; `text` states its meaning and the next step."""
 
     SOLVED = codes.CABLE_SOLVED, "solved"
-    SLACK = codes.CABLE_SLACK, "slack: the cable carries no chord tension; shorten it if it should pull"
+    SLACK = codes.CABLE_SLACK, "slack: the cable has no chord tension; a shorter length makes it taut"
     NO_TENSION = (
         codes.CABLE_NO_TENSION,
-        "a straight cable has no tension for a length; use another model, or give the tension",
+        "the length of a straight cable does not determine its tension; use another model, or give the tension",
     )
     BELOW_VALIDITY = (
         codes.CABLE_BELOW_VALIDITY,
-        "the empirical model is outside its validity: the lowest point of the cable lies inside the span; "
+        "the empirical model is not valid here, because the lowest point of the cable is inside the span; "
         "raise the tension above w D/(2 |sin phi|), or use Catenary()",
     )
     TOO_SLACK = codes.CABLE_TOO_SLACK, "the chord tension is below a thousandth of the cable's weight; raise it"
@@ -65,14 +65,14 @@ class CableModel:
     weightless: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
-        """Refuse direct use of the interface, which is not a cable model."""
+        """Refuse to create the interface, which is not a cable model."""
         if type(self) is CableModel:
             step = "Choose one of the models, Catenary() for instance."
             raise InvalidValueError("CableModel()", "the abstract base class", "a cable model", step)
 
     @property
     def parameters(self) -> tuple[float, float]:
-        """The article's k_h and k_p; zero in models without these parameters."""
+        """Parameters k_h and k_p of the article; zero in other models."""
         return 0.0, 0.0
 
     def terms(self, gravity: float) -> Terms:
@@ -177,7 +177,7 @@ class CableModel:
         tension: Array,
         status: Codes,
     ) -> CableState:
-        """State of the solved batch in the caller's shape."""
+        """State of the solved batch, in the shape of the arguments."""
         return CableState(
             model=self,
             cable=cable,
@@ -213,8 +213,8 @@ class CableModel:
 class CableState(Result):
     """Ends, forces and lengths of cables: results of a cable model.
 
-    Every array has shape (...), one entry per cable. Forces act on the cable at its platform end. A batch is indexed
-    along its first axis, by a number, a slice, or an array of numbers or booleans; a slice shares the memory of the
+    Every array has shape (...), one entry per cable. Forces act on the cable at its platform end. A number, a slice, or
+    an array of numbers or booleans selects entries along the first axis of a batch. A slice shares the memory of the
     batch.
 
     Attributes:
@@ -227,7 +227,7 @@ class CableState(Result):
         horizontal_tension: T_x [N], >= 0.
         vertical_force: T_z [N], up positive.
         chord_tension: tau = T_x/cos phi [N].
-        status: Codes of `CableStatus`; values are NaN for all codes except SOLVED, SLACK and BELOW_VALIDITY.
+        status: Codes of `CableStatus`; only SOLVED, SLACK and BELOW_VALIDITY have values, other codes have NaN.
     """
 
     model: CableModel
@@ -251,14 +251,14 @@ class CableState(Result):
         return batch_length(self.shape, "state of a single cable")
 
     def __getitem__(self, index: int | slice | NDArray[Any]) -> CableState:
-        """The state of a part of the cables, along the first axis.
+        """State of some of the cables, selected along the first axis.
 
         Args:
             index: A number (negative: from the end), a slice, or an array of numbers or booleans.
 
         Raises:
-            NoBatchError: If the state is that of a single cable (also a TypeError).
-            NoSuchEntryError: If there is no such entry (also an IndexError).
+            NoBatchError: If the state has only a single cable (also a TypeError).
+            NoSuchEntryError: If an entry does not exist (also an IndexError).
         """
         part = part_of(index, self.shape, "state of a single cable")
         arrays: dict[str, Any] = {name: locked(getattr(self, name)[part, ...]) for name in _ARRAYS}
@@ -304,7 +304,7 @@ class CableState(Result):
 
     @property
     def closure_residual(self) -> Array:
-        """Closure error of the state in the equations of its cable model [m]."""
+        """Closure error of the state [m]: error in the equations of its cable model."""
         out = np.empty(self.unstrained_length.size)
         batch.closures(self.model.terms(self.gravity), *self._columns(), out)
         return out.reshape(self.shape)
@@ -322,7 +322,7 @@ class CableState(Result):
             InvalidValueError: If count is less than two, or the points do not fit into memory.
         """
         whole_number(count, "points", 2)
-        check_memory("points", 16.0 * self.unstrained_length.size * count, "Ask for fewer points.")
+        check_memory("points", 16.0 * self.unstrained_length.size * count, "Choose fewer points.")
         out = np.empty((self.unstrained_length.size, count, 2))
         batch.shape_points(self.model.terms(self.gravity), *self._columns(), out)
         return locked(out.reshape(*self.shape, count, 2))

@@ -44,11 +44,11 @@ class Empirical(CableModel):
     """The article's closed form: T_z = tan(phi) T_x + k_h rho D, and L as a function of T_x by equation (48).
 
     The model is valid if the lowest point of the cable is outside the span, T_x > w D/(2 |tan phi|). Results for
-    smaller T_x have the status BELOW_VALIDITY. For a given length, (48) is solved on its decreasing branch.
+    smaller T_x have the status BELOW_VALIDITY. For a given length, T_x is on the decreasing branch of (48).
 
     Attributes:
-        k_h: Intercept constant [m/s^2]; the published 4.845 in magnitude (exactly g/2 for a shallow cable).
-        k_p: Sag constant [m^2/s^4]; the published 4.385 (exactly g^2/24 for a shallow cable).
+        k_h: Intercept constant [m/s^2]; the magnitude of the published value 4.845 (exactly g/2 for a shallow cable).
+        k_p: Sag constant [m^2/s^4]; the published value 4.385 (exactly g^2/24 for a shallow cable).
 
     Source:
         Gia Luan & Truong Thinh 2020, equations (21), (27), (28), (45), (48); docs/model.md, section 3.

@@ -1,4 +1,4 @@
-"""A batch of cables to solve: checks and flattening of operands, and results in the caller's shape."""
+"""A batch of cables to solve: checks and flattening of operands; results in the shape of the arguments."""
 
 from __future__ import annotations
 
@@ -21,8 +21,7 @@ class Problem(NamedTuple):
     gravity: float  # gravitational acceleration [m/s^2]
     span: Array  # horizontal distances between the ends [m]; broadcasts with the shape
     rise: Array  # heights of the platform ends above the frame ends [m]; broadcasts with the shape
-    # span, rise, linear density, axial stiffness and the given quantity, flat: each as long as the batch, or of length
-    # 1
+    # span, rise, linear density, axial stiffness and the given quantity, flat; each has the length of the batch, or 1
     operands: tuple[Array, Array, Array, Array, Array]
 
     @classmethod

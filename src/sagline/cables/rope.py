@@ -1,4 +1,4 @@
-"""Ropes of cables: a small catalogue; properties follow from the diameter, with their sources."""
+"""A small catalogue of ropes for cables. Properties follow from the diameter; each rope names its source."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Arrays, arguments, errors, numbers and results: the base that every other folder uses."""
+"""Base of all other folders: arrays, arguments, errors, numbers and results."""
 
 from sagline.core.surface import group
 

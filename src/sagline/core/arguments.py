@@ -1,4 +1,4 @@
-"""Checks of arguments that are not numbers: instances, words, texts, whole numbers, callbacks, paths.
+"""Checks of arguments: instances, words, texts, whole numbers, callbacks, paths.
 
 `sagline.core.arrays` checks numbers and arrays of numbers.
 """
@@ -21,39 +21,39 @@ from sagline.core.errors import FileError, InvalidValueError, nearest, printable
 
 T = TypeVar("T")
 
-# instruction for each type to get an object; it ends every message about a missing object
+# how to get an object of each type, for the end of the message about a wrong type
 HOW_TO_GET: Final = MappingProxyType(
     {
-        "AnchorErrors": "Give AnchorErrors(deviation), 0.01 m for instance, or None.",
-        "Axes": "Make them with matplotlib, or leave ax out.",
-        "Axes3D": 'Make them with add_subplot(projection="3d"), or leave ax out.',
+        "AnchorErrors": "Give AnchorErrors(deviation), for instance 0.01 m, or None.",
+        "Axes": "Create them with matplotlib, or omit ax.",
+        "Axes3D": 'Create them with add_subplot(projection="3d"), or omit ax.',
         "Box": "Give Box(size, center), in meters.",
         "Cable": "Give Cable(linear_density, axial_stiffness).",
-        "CableModel": "Give one of the models, Catenary() for instance.",
-        "CableState": "Take that of a model: Catenary().from_tension(...).",
-        "Calibration": "Make one: calibrate(robot, log).",
-        "Confirmation": "Make one of a plan: confirm(plan).",
+        "CableModel": "Give a cable model, for instance Catenary().",
+        "CableState": "Create one with a cable model: Catenary().from_tension(...).",
+        "Calibration": "Create one: calibrate(robot, log).",
+        "Confirmation": "Create one from a plan: confirm(plan).",
         "Creep": "Give Creep(axial_stiffness, time), or None.",
-        "Criterion": "Give one of the criteria, MaximumSag(0.05) for instance.",
+        "Criterion": "Give a criterion, for instance MaximumSag(0.05).",
         "Damping": "Give Damping(loss_time, air_damping, modal_damping), or None.",
-        "Equilibrium": "Give that of a plan, plan.state, or a robot and a pose.",
-        "Front": 'Make one: design(robot, free, ["workspace_share"]).',
-        "FrequencyMap": "Make one: frequency_map(robot, poses, up_to=20.0).",
-        "Goal": 'Give Goal("workspace_share") for instance.',
+        "Equilibrium": "Give the state of a plan, plan.state, or a robot and a pose.",
+        "Front": 'Create one: design(robot, free, ["workspace_share"]).',
+        "FrequencyMap": "Create one: frequency_map(robot, poses, up_to=20.0).",
+        "Goal": 'Give a goal, for instance Goal("workspace_share").',
         "MeasuredTension": "Give MeasuredTension(frame_end_tension, tension_deviation, length_deviation).",
-        "Path": "Make one, with quintic_path(waypoints, speed=1.0) for instance.",
-        "Plan": "Make one: inverse(robot, motion).",
+        "Path": "Create one, for instance with quintic_path(waypoints, speed=1.0).",
+        "Plan": "Create one: inverse(robot, motion).",
         "Pose": "Give Pose(x, y, z), or a position [m] of three numbers.",
         "PoseBox": "Give PoseBox(low, high, tilt).",
-        "Provenance": "Take that of a calibrated robot, or None: robot.calibration.",
-        "Robot": 'Load one by its name or file: load_robot("cogiro").',
-        "Simulation": "Make one: simulate(plan).",
-        "Sensors": "Give Sensors(length_deviation, tension_deviation), 5e-4 m and 5 N for instance.",
-        "Shaper": "Make one, for a frequency: ZV(2.0), ZVD(2.0) or EI(2.0).",
-        "TensionMethod": "Give one of the methods, MinimumNorm() for instance.",
-        "TensionPolygon": "Make one: tension_polygon(robot, pose).",
-        "Vibration": "Make one: vibration(state, up_to=20.0).",
-        "Workspace": "Make one: workspace(robot).",
+        "Provenance": "Use robot.calibration of a calibrated robot, or None.",
+        "Robot": 'Load one by name or file: load_robot("cogiro").',
+        "Simulation": "Create one: simulate(plan).",
+        "Sensors": "Give Sensors(length_deviation, tension_deviation), for instance 5e-4 m and 5 N.",
+        "Shaper": "Create one for a frequency: ZV(2.0), ZVD(2.0) or EI(2.0).",
+        "TensionMethod": "Give a tension method, for instance MinimumNorm().",
+        "TensionPolygon": "Create one: tension_polygon(robot, pose).",
+        "Vibration": "Create one: vibration(state, up_to=20.0).",
+        "Workspace": "Create one: workspace(robot).",
         "WinchLog": 'Read one: load_log("winches.csv").',
         "Winch": "Give Winch(pulley_radius, dead_cable=...), or None.",
     }
@@ -64,7 +64,7 @@ _PARTS = ("state", "pose", "robot", "plan", "path", "cables", "cable", "model", 
 
 
 class _Brief(Repr):
-    """Short text of a value for a message; its type if the text would be too long."""
+    """Short text of a value for a message, or its type if the text would be too long."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -89,7 +89,7 @@ def brief(value: object) -> str:
         return f"the class {value.__name__}"
     try:
         return printable(_Brief().repr(value))
-    except Exception:  # code of the caller creates the text of its object
+    except Exception:  # the text of an object comes from code of the caller, which may fail
         return f"one of type {type(value).__name__}"
 
 
@@ -101,7 +101,7 @@ def instance(value: object, kind: type[T], item: str) -> T:
 
 
 def optional(value: object, kind: type[T], item: str) -> T | None:
-    """Return an argument unchanged after a check of its type; None is allowed and means not given."""
+    """Return an argument unchanged after a check of its type; None is allowed."""
     return None if value is None else instance(value, kind, item)
 
 
@@ -128,7 +128,7 @@ def text(value: Any, item: str) -> str:
     if not isinstance(value, str):
         raise InvalidValueError(item, brief(value), "a text", f'Put {item} between quotes: "...".')
     if (flat := value.replace("\n", " ").replace("\t", " ")) != printable(flat):
-        raise InvalidValueError(item, brief(value), "printable text", f"Remove what does not print in {item}.")
+        raise InvalidValueError(item, brief(value), "printable text", f"Remove the unprintable characters of {item}.")
     return str(value)  # numpy has its own string type
 
 
@@ -158,8 +158,8 @@ def integer(value: Any) -> int | None:
 def whole_number(value: Any, item: str, low: int, high: int = sys.maxsize) -> int:
     """Check a whole number.
 
-    value: integer of Python or numpy; Booleans are refused; high: largest allowed number, by default the largest size
-    of a Python container.
+    value: integer of Python or numpy, not a Boolean; high: largest allowed number, by default the largest size of a
+        Python container.
     """
     number = integer(value)
     if number is not None and low <= number <= high:
@@ -218,7 +218,7 @@ def file_path(file: Any, item: str = "file", *, folder: bool = False) -> Path:
     if not isinstance(given, str):
         raise InvalidValueError(item, brief(file), "the path of a file, a text or a Path", f"Give {item} as a text.")
     if not given.strip():
-        raise FileError(".", f"is the folder that an empty {item} means", "Give the name of a file.")
+        raise FileError(".", f"is the present folder, because {item} is empty", "Give the name of a file.")
     path = Path(given)
     if not path.name and not folder:
         raise FileError(path, "is a folder", "Give the name of a file in it.")
@@ -240,7 +240,7 @@ def _a(name: str) -> str:
 def _step_to(value: object, kind: type) -> str:
     """Instruction for a message: how to get an object of the required type from the given value."""
     if isinstance(value, type) and issubclass(value, kind):
-        return f"Write {value.__name__}(), with parentheses: that makes one."
+        return f"Add parentheses to create one: {value.__name__}()."
     if type(value).__module__.startswith("sagline"):
         name = re.findall("[A-Z][a-z]*", type(value).__name__)[-1:] or [type(value).__name__]
         for part in _PARTS:

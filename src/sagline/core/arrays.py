@@ -21,8 +21,8 @@ Codes = NDArray[np.int8]
 Indices = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-LARGEST: Final = 1e50  # larger than any value of a machine in any unit; its square and cube are still finite
-FARTHEST: Final = 1e6  # m: largest coordinate of a point, larger than on any machine
+LARGEST: Final = 1e50  # larger than any value of a machine in any unit; the square and cube are still finite
+FARTHEST: Final = 1e6  # largest coordinate of a point [m], larger than on any machine
 SMALLEST: Final = 1e-50  # smallest value of a quantity that must be positive
 _KINDS = {"c": "complex", "M": "dates", "m": "durations of a calendar", "V": "records"}
 
@@ -46,11 +46,10 @@ def checked(
 ) -> Array:
     """Locked float64 copy of a caller's value; raises an error that names the problem.
 
-    unit: unit of the value, for the message; "" if dimensionless; shape: required trailing axes; None in the shape
-    means any length, and leading axes are arbitrary; None as the shape (default) accepts every shape; above: every
-    value must be strictly larger than this; missing: True if NaN is allowed. Returns a float64 array, C-contiguous,
-    write-locked, that owns its memory. An array that already has all these properties, such as a result of sagline, is
-    returned without a copy.
+    unit: unit of the value, for the message; "" if dimensionless; shape: required trailing axes, with None for any
+        length; leading axes are arbitrary; None (default) accepts every shape; above: strict lower limit of every
+        value; missing: True if NaN is allowed. Returns a float64 array, C-contiguous, write-locked, that owns its
+        memory. An array with all these properties, such as a result of sagline, is returned without a copy.
     """
     array = value if _is_immutable(value) else numbers(value, item, unit)
     if shape is not None:
@@ -63,15 +62,14 @@ def checked(
 def numbers(value: ArrayLike, item: str, unit: str) -> Array:
     """Float64 copy of a caller's numbers in C order, of any shape and range; NaN is allowed.
 
-    value: real number or array of real numbers, without unit object and without mask; unit: unit of the value, for the
-    message.
+    value: real number or array of real numbers, without unit object and mask; unit: its unit, for the message.
     """
     if type(value) in (float, np.float64):
         return np.array(value)
     _refuse_masked_or_with_unit(value, item, unit)
     try:
         size = value.size if isinstance(value, np.ndarray) else len(value)  # type: ignore[arg-type]
-    except Exception:  # a number has no length, and a caller's object may raise any error
+    except Exception:  # a number has no length, and an object of the caller may raise any error
         size = 1
     check_memory(item, 8.0 * size, "Give fewer numbers.")
     try:
@@ -89,7 +87,7 @@ def numbers(value: ArrayLike, item: str, unit: str) -> Array:
 def number(value: Any, item: str, unit: str, *, low: float = -np.inf, above: float = -np.inf) -> float:
     """A single finite number.
 
-    above: the value must be strictly larger than this.
+    above: strict lower limit of the value.
     """
     return float(exactly(value, item, unit, (), low=low, above=above))
 
@@ -113,7 +111,7 @@ def kernel_input(value: ArrayLike, shape: tuple[int, ...]) -> Array:
 
 
 def spread(array: Array, shape: tuple[int, ...]) -> Array:
-    """Write-locked array of `checked`, broadcast to the shape if its own shape differs."""
+    """Write-locked array from `checked`, broadcast to the given shape."""
     return array if array.shape == shape else locked(np.array(np.broadcast_to(array, shape), order="C"))
 
 
@@ -160,7 +158,7 @@ def _refuse_masked_or_with_unit(value: Any, item: str, unit: str) -> None:
 def _from_other_kind(given: NDArray[Any], item: str) -> Array:
     """Convert long doubles and Python number objects; refuse values that are not real numbers."""
     if given.dtype.kind in "fO" and (given.dtype.kind == "f" or all(_is_real(entry) for entry in given.flat)):
-        with np.errstate(over="ignore"):  # a value beyond the float64 range becomes infinite and is refused as infinite
+        with np.errstate(over="ignore"):  # an overflow gives infinity, which is refused
             return np.array(given, dtype=np.float64, order="C")
     shown = next((entry for entry in given.flat if not _is_real(entry)), given) if given.dtype.kind == "O" else given
     kind = _KINDS.get(given.dtype.kind, "")
@@ -180,7 +178,7 @@ def _is_real(entry: object) -> bool:
 
 
 def _is_within(array: Array, *, low: float, above: float) -> bool:
-    """True if all values are finite and in range; two reductions are sufficient, because they propagate NaN."""
+    """True if all values are finite and in range; minimum and maximum suffice, because they propagate NaN."""
     if array.size == 0:
         return True
     smallest, largest = float(array.min()), float(array.max())

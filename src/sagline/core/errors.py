@@ -1,4 +1,4 @@
-"""Exceptions and warnings of sagline: one class hierarchy; each has data fields and a one-line message."""
+"""Exceptions and warnings of sagline, in one class hierarchy, with data fields and a one-line message."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class InvalidValueError(SaglineError, ValueError):
 
 
 class CableGeometryError(InvalidValueError):
-    """The two ends of a cable are at positions that no cable can have."""
+    """Positions of the two ends of a cable that are impossible for a cable."""
 
 
 class NoSuchEntryError(InvalidValueError, IndexError):
@@ -67,7 +67,7 @@ class FileError(SaglineError):
         path: The file or folder.
         reason: Description of the problem.
         next_step: Action that solves the problem.
-        item: Part of the file that is wrong ("cable 3: linear_density", "line 12"); the path if it is the whole file.
+        item: Wrong part of the file ("cable 3: linear_density", "line 12"), or the path if the whole file is wrong.
         value: Value of the item, as text with its unit; the reason if the value is not known.
         allowed: Allowed values of the item; empty if not known.
     """
@@ -118,11 +118,10 @@ class FileError(SaglineError):
 
 
 def printable(text: str, kept: str = "") -> str:
-    r"""Text that is safe on a terminal: no character moves the cursor, hides a letter or cannot be encoded.
+    r"""Text for a terminal, without characters that move the cursor, hide a letter or cannot be encoded.
 
-    text: any text, from a file for instance; kept: characters that remain unchanged, line ends for instance. Returns
-    the text with control characters, line ends, lone surrogates and all other invisible characters as Python escape
-    sequences.
+    text: any text; kept: characters that remain unchanged, for instance line ends. Returns the text with control
+        characters, line ends, lone surrogates and all other invisible characters as Python escape sequences.
 
     Examples:
         >>> from sagline.core.errors import printable
@@ -137,7 +136,7 @@ def printable(text: str, kept: str = "") -> str:
 def is_seen(character: str) -> bool:
     """True for a character that is visible, or a space of any width.
 
-    It is False for invisible formatting marks, such as U+200E and U+200B.
+    Invisible formatting marks, such as U+200E and U+200B, give False.
     """
     return character.isprintable() or unicodedata.category(character) == "Zs"
 
@@ -158,7 +157,7 @@ def nearest(word: str, known: Iterable[str]) -> str | None:
 
 
 def shortened(parts: Sequence[str], room: int) -> list[str]:
-    """Shorten texts to one line in total: escape invisible characters, omit the middle of the longest text."""
+    """Shorten texts to one line in total: escape invisible characters, and omit the middle of the longest text."""
     texts = [printable(part) for part in parts]
     while (excess := sum(map(len, texts)) - room) > 0:
         k = max(range(len(texts)), key=lambda k: len(texts[k]))

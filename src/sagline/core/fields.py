@@ -1,9 +1,9 @@
-"""Fields of input types: name, default, unit and allowed range are defined once, where the type declares the field.
+"""Fields of input types. The declaration of a field is the only definition of its name, default, unit and range.
 
-A type is `attrs.frozen`. Each field has a converter, from which a type checker infers the type of the constructor
-argument, and has the arguments of `sagline.core.arrays.checked` as metadata. `__attrs_post_init__` checks the values;
-it is `check_fields` if each field declares its complete check. A dataclass of single numbers derives from
-`NumberFields` and declares its ranges in the same way.
+A type is `attrs.frozen`. Each field has a converter, which gives type checkers the type of the constructor argument.
+Its metadata are the arguments of `sagline.core.arrays.checked`. `__attrs_post_init__` checks the values. It is
+`check_fields` if each field declares its complete check. A dataclass of single numbers derives from `NumberFields` and
+declares its ranges in the same way.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from sagline.core.arrays import Array, number
 
 
 def given(value: ArrayLike) -> Array:
-    """Return a value unchanged: a converter that gives type checkers the type of the argument."""
+    """Return a value unchanged. This converter gives type checkers the type of the argument."""
     return value  # type: ignore[return-value]
 
 
@@ -30,7 +30,7 @@ def if_known(value: ArrayLike | None) -> Array | None:
 
 
 def given_or_none(value: ArrayLike | None) -> Array:
-    """Return a value or None unchanged: the converter of a field whose check supplies a missing value."""
+    """Return a value or None unchanged: the converter of a field whose check replaces None."""
     return value  # type: ignore[return-value]
 
 
@@ -45,12 +45,12 @@ def rule(unit: str = "", **limits: Any) -> dict[str, Any]:
 
 
 def checked_by(check: Callable[..., Any], *arguments: Any, **limits: Any) -> dict[str, Any]:
-    """Metadata of a field: a check from `core.arguments`, called with value, name and these arguments."""
+    """Metadata of a field: a check from `core.arguments`, with arguments in addition to value and name."""
     return {"check": lambda value, item: check(value, item, *arguments, **limits)}
 
 
 def check_fields(made: Any) -> None:
-    """Check each field of a new object by its `checked_by`; None is allowed if it is the default."""
+    """Check each field of a new object with its `checked_by`; None is allowed if it is the default."""
     for about in fields(type(made)):
         value = getattr(made, about.name)
         if "check" in about.metadata and not (value is None and about.default is None):
@@ -77,7 +77,7 @@ class NumberFields:
 
 
 def reduced(value: Any) -> tuple[Any, tuple[type[Any], dict[str, Any]]]:
-    """Reduction for pickle through the constructor: a loaded value is also checked and locked."""
+    """Reduction for pickle through the constructor, which checks and locks a loaded value."""
     kind = type(value)
     values = {about.name: getattr(value, about.name) for about in fields(kind)}
     return _constructed, (kind, {name: dict(own) if isinstance(own, Mapping) else own for name, own in values.items()})

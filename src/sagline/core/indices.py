@@ -19,7 +19,7 @@ def part_of(index: Any, shape: tuple[int, ...], single: str) -> Any:
     slice, or an array of integers or booleans.
     """
     if not shape:
-        raise NoBatchError("index", brief(index), "none", f"A {single} cannot be indexed; take it as it is.")
+        raise NoBatchError("index", brief(index), "none", f"A {single} cannot be indexed; use it directly.")
     if isinstance(index, slice):
         return _sliced(index, shape[0])
     number = integer(index)
@@ -30,7 +30,7 @@ def part_of(index: Any, shape: tuple[int, ...], single: str) -> Any:
     chosen = np.asarray(index) if isinstance(index, list | np.ndarray) else None
     if chosen is None or chosen.ndim != 1 or not _names_entries(chosen, shape[0]):
         raise _no_entry(index, shape[0])
-    return chosen if chosen.size else chosen.astype(np.int64)  # the array of an empty list has the wrong type
+    return chosen if chosen.size else chosen.astype(np.int64)  # numpy converts an empty list to an array of floats
 
 
 def batch_length(shape: tuple[int, ...], single: str) -> int:
@@ -39,7 +39,7 @@ def batch_length(shape: tuple[int, ...], single: str) -> int:
     shape: shape of the batch; () for a single entry; single: name of a single entry, "single pose" for instance.
     """
     if not shape:
-        raise NoBatchError("this", f"a {single}", "a batch", f"A {single} has no length; take it as it is.")
+        raise NoBatchError("this", f"a {single}", "a batch", f"A {single} has no length; use it directly.")
     return shape[0]
 
 

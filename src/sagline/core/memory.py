@@ -1,4 +1,4 @@
-"""Checks of free memory before large allocations, because the system kills a process that takes too much memory."""
+"""Checks of free memory before large allocations. The system kills a process that uses too much memory."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from typing import Final
 from sagline.core.errors import InvalidValueError
 
 UNASKED: Final = 1 << 26  # smaller allocations are not checked [bytes]
-_POSE_BYTES, _CABLE_BYTES = 400.0, 64.0  # measured bytes per pose during its solution, and per cable of the pose
+_POSE_BYTES, _CABLE_BYTES = 400.0, 64.0  # measured memory for a pose and for each of its cables [bytes]
 _BEHIND_BYTES = 72.0  # measured memory for the routing of each cable [bytes]
-_GROUPS: Final = (  # files with limit and use of a container
+_GROUPS: Final = (  # files with the memory limit and the used memory of a container
     ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"),
     ("/sys/fs/cgroup/memory/memory.limit_in_bytes", "/sys/fs/cgroup/memory/memory.usage_in_bytes"),
 )
 
 
 def check_memory(item: str, size: float, next_step: str) -> None:
-    """Refuse an allocation that does not fit into memory, before it starts.
+    """Refuse an allocation that does not fit into memory.
 
-    item: purpose of the memory, for the message: "a path of 2e+08 samples"; size: peak memory [bytes]; sizes below 64
-    MB are not checked.
+    item: purpose of the memory, for the message, such as "a path of 2e+08 samples"; size: peak memory [bytes], not
+        checked below 64 MB.
     """
     if size > UNASKED and size > (free := free_memory()):
         # the two numbers must differ in the message
@@ -37,7 +37,9 @@ def check_poses(count: int, cable_count: int, behind: bool) -> None:
     cable_count: number of cables m of the robot.
     """
     cable = _CABLE_BYTES + (_BEHIND_BYTES if behind else 0.0)
-    check_memory(f"a batch of {count:,} poses", count * (_POSE_BYTES + cable * cable_count), "Take them in parts.")
+    check_memory(
+        f"a batch of {count:,} poses", count * (_POSE_BYTES + cable * cable_count), "Solve the batch in parts."
+    )
 
 
 def free_memory() -> float:

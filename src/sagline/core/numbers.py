@@ -1,4 +1,4 @@
-"""Numbers as text, with unit prefixes instead of exponents and without digits below the rounding error."""
+"""Numbers as text, with unit prefixes instead of exponents, and without digits that are only rounding."""
 
 from __future__ import annotations
 
@@ -10,12 +10,11 @@ ROUNDING = 1e-12  # a smaller difference, relative to the size of the operands, 
 PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 POWERS = {prefix: power for power, prefix in PREFIXES.items()}
 HIGHEST = {"m": 3, "g": 3, "s": 0, "rad": 0}  # power of ten of the largest usual prefix; other units use all prefixes
-LONGEST_PLAIN = 1e7  # numbers from this value on, without a prefix, are written with a power of ten
+LONGEST_PLAIN = 1e7  # larger numbers without a prefix are written with a power of ten
 SPACE = "\N{NO-BREAK SPACE}"
 TIGHT = ("", "°")  # units written without a space before them
 
-# first unit of a product, with its prefix; a unit raised to a power does not get a prefix, because it would be hard to
-# read
+# first unit of a product, with its prefix; a power of a unit gets no prefix, which would be hard to read
 _scaled = re.compile(r"([fpnµmkMG]?)(rad|Pa|m|g|s|N|J|W)(?![\w²³⁴⁻^])")
 _superscript = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -30,15 +29,14 @@ def n(
 ) -> str:
     """Number with its unit, for display.
 
-    A number from 0.1 to 1000 keeps the given unit. Otherwise the unit gets the prefix that brings the number between 1
-    and 1000; without such a prefix, a power of ten is written. The minus sign is U+2212; the space before a unit does
-    not break.
+    A number from 0.1 to 1000 keeps the given unit. Any other number gets the prefix with which it is between 1 and
+    1000, or a power of ten if no such prefix exists. The minus sign is U+2212. The space before a unit does not break.
 
     value: the number, in the unit; "–" if not finite; form: format of the digits, as in `format`; not used with an
-    uncertainty; unit: its unit, such as "mm", "kg/m", "%"; "" if dimensionless; uncertainty: standard uncertainty, in
-    the unit, written in parentheses after the last digits of the value, with two digits: 43.98(10) is 43.98 ± 0.10.
-    None: not written; size: size of the operands whose difference is the value, in the unit: a value of at most
-    `ROUNDING` times the size is written as "0 (rounding)".
+        uncertainty; unit: its unit, such as "mm", "kg/m", "%"; "" if dimensionless; uncertainty: standard uncertainty
+        in the unit, or None; its two digits follow the value in parentheses: 43.98(10) is 43.98 ± 0.10; size: size of
+        the operands if the value is a difference, in the unit; a value up to `ROUNDING` times the size is written as "0
+        (rounding)".
 
     Source:
         ISO 80000-1:2022, 7.2 (prefixes); JCGM 100:2008, 7.2.2 (uncertainty in parentheses).

@@ -1,4 +1,4 @@
-"""Long calculations in blocks; between two blocks, interrupts are handled and progress is reported."""
+"""Long calculations in blocks, with interrupts and progress reports between the blocks."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Progress: TypeAlias = Callable[[int, int], None]  # called after each block: num
 
 
 def blocks(count: int, size: int, progress: Progress | None = None) -> Iterator[slice]:
-    """Slices that divide `count` rows into blocks of at most `size`; progress is reported after each block."""
+    """Slices that divide `count` rows into blocks of at most `size` rows; reports progress after each block."""
     for first in range(0, count, size):
         part = slice(first, min(first + size, count))
         yield part
@@ -20,5 +20,5 @@ def blocks(count: int, size: int, progress: Progress | None = None) -> Iterator[
 
 
 def rows_of(array: Array, part: slice) -> Array:
-    """Block of an array that has either one common row or one row per entry."""
+    """Block of an array with one row for all entries or one row per entry."""
     return array if len(array) == 1 else array[part]

@@ -12,9 +12,9 @@ import numpy as np
 
 from sagline.core.arrays import locked
 
-# this module is imported by name at the first display, because a normal import would be circular
+# imported by name at the first display, because a normal import would be circular
 _PAGES = "sagline.notebook.html"
-# file formats import all results; to avoid a circular import, a result imports them by name when it is saved
+# imported by name when a result is saved, because the formats import all results
 _FORMATS: Final = "sagline.files.format"
 
 
@@ -30,13 +30,13 @@ def set_fields(target: object, **values: Any) -> None:
 
 
 class Shown:
-    """Base class for the display in Jupyter as a summary with a figure; other places show the ordinary text."""
+    """Base class of results with a display in Jupyter: a summary with a figure instead of the ordinary text."""
 
     __slots__ = ()
 
     def _repr_html_(self) -> str | None:
         """Summary and figure as HTML; None if not available, so that Jupyter displays the ordinary text."""
-        with suppress(Exception):  # an error during display must not make a finished cell fail
+        with suppress(Exception):  # an error of the display must not turn a finished cell into a failed cell
             shown: str | None = import_module(_PAGES).html_of(self)
             return shown
         return None
@@ -45,7 +45,7 @@ class Shown:
 class ByFields:
     """Frozen dataclass that is pickled by its fields; its arrays are write-locked after loading or copying.
 
-    Loading restores the saved fields without the constructor, whose arguments may differ from the fields.
+    Loading restores the fields without the constructor, because its arguments may differ from the fields.
     """
 
     __slots__ = ()
@@ -75,11 +75,12 @@ class Saved:
 
         The format follows from the type: NetCDF with the robot inside for plans, simulations, workspaces, frequency
         maps and calibrations (.nc); CSV for logs of winches (.csv); YAML for calibration poses (.yaml); MCAP or NetCDF
-        for executions (.mcap, .nc). `load_plan`, `load_simulation` and so on read it back;
-        `load_path` reads calibration poses; xarray opens frequency maps and NetCDF files of executions.
+        for executions (.mcap, .nc). Each type has a function that reads its file, such as `load_plan` and
+        `load_simulation`; `load_path` reads calibration poses; xarray opens frequency maps and NetCDF files of
+        executions.
 
         Args:
-            file: The file; an existing regular file is replaced, any other existing object is refused.
+            file: The file; an existing regular file is replaced. A folder or device of this name is refused.
 
         Raises:
             InvalidValueError: If the result cannot be read back: a plan of several robots, or a cable model, tension

@@ -1,4 +1,4 @@
-"""Base class of status codes: an integer returned by a kernel, with an explanatory sentence."""
+"""Base class of status codes. A code is an integer from a kernel, with an explanatory sentence."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Self
 
 
 class Status(IntEnum):
-    """Outcome of a calculation; the text of a member is its code and its sentence.
+    """Outcome of a calculation, with a code and a sentence for each member.
 
     Attributes:
         text: Meaning and next step, one sentence.

@@ -23,9 +23,9 @@ _ALIKE = {"cable_count": "", "motion_pattern": "", "tension_limits_of": "", "gra
 
 
 def together(robot: Robot | Sequence[Robot]) -> Robots:
-    """Check a robot, or several robots against each other; several are returned as a tuple.
+    """Check a robot, or check that several robots form a batch; several robots are returned as a tuple.
 
-    Several robots must have the same number of cables, motion pattern with plane normal, type of tension limits, and
+    Several robots must have the same number of cables, motion pattern, plane normal, type of tension limits, and
     gravity. All other properties may differ.
 
     robot: a robot, or a sequence of them.
@@ -44,7 +44,7 @@ def check_count(robot: Robots, poses: int | None) -> None:
     if isinstance(robot, Robot) or len(robot) == poses:
         return
     allowed = "one robot" if poses is None else f"one robot, or a sequence of {poses}"
-    step = "Give one robot per pose; repeat the pose if it is the same for all robots."
+    step = "Give one robot per pose; to solve one pose for all robots, repeat the pose."
     raise InvalidValueError("robot", f"a sequence of {len(robot)} robots", allowed, step)
 
 
@@ -56,11 +56,11 @@ def one_a_pose(robot: Robot | Sequence[Robot], poses: int | None) -> Robots:
 
 
 def first_of(robot: Robots) -> Robot:
-    """The robot, or the first of several robots, for common properties; refuses an empty selection."""
+    """The robot, or the first of several robots, from which common properties are read; refuses an empty selection."""
     if isinstance(robot, Robot):
         return robot
     if not robot:
-        raise InvalidValueError("robot", "an empty sequence", "at least one robot", "Give or select at least one.")
+        raise InvalidValueError("robot", "an empty sequence", "at least one robot", "Select at least one robot.")
     return robot[0]
 
 
@@ -78,7 +78,7 @@ def robot_at(robot: Robots, pose: int) -> Robot:
 
 
 def cables_of(robot: Robots) -> Cable:
-    """Material of the cables, (m,), or (N, m) for several robots; an optional field is known if all robots have it."""
+    """Material of the cables, (m,), or (N, m) for several robots; with an optional field only if all robots have it."""
     if isinstance(robot, Robot):
         return robot.cables
     materials = [one.cables.known() for one in robot]
@@ -93,7 +93,7 @@ def has_routing(robot: Robots) -> bool:
 
 
 class _Bodies(NamedTuple):
-    """Inertia of the platform, one for all poses or, for several robots, with a leading axis N."""
+    """Inertia of the platform; for several robots with a leading axis N."""
 
     mass: Array  # [kg], shape () or (N,)
     center_of_mass: Array  # in the platform frame [m], shape (3,) or (N, 3)
@@ -118,7 +118,7 @@ def anchors_of(robot: Robots) -> _Anchors:
 
 
 class _Pulleys(NamedTuple):
-    """The pulleys of the cables; without pulleys, the radius is 0 and the entry is from below."""
+    """The pulleys of the cables; a cable without a pulley has radius 0 and enters from below."""
 
     radius: Array  # R [m], shape (m,) or, for several robots, (N, m)
     entry: Array  # +1 if a cable enters from below, -1 if from above, of the same shape
@@ -148,7 +148,7 @@ def limits_of(robot: Robots) -> _Limits:
 
 
 def _each(robot: Robots, own: Callable[[Robot], tuple[Array, ...]]) -> tuple[Array, ...]:
-    """Arrays of one robot unchanged; arrays of several robots stacked, with a leading axis N."""
+    """Arrays of one robot, unchanged; or arrays of several robots, stacked along a leading axis N."""
     if isinstance(robot, Robot):
         return own(robot)
     return tuple(np.stack(arrays) for arrays in zip(*(own(one) for one in robot), strict=True))
@@ -159,12 +159,12 @@ def _check_alike(first: Robot, other: Robot, index: int) -> None:
         raise InvalidValueError(f"robot[{index}]", brief(other), "a Robot", "Give robots only.")
     if other is first:
         return
-    step = "Robots of one batch share it; solve those that differ in a batch of their own."
+    step = "All robots of a batch must be equal in this; solve the others in another batch."
     for name, unit in _ALIKE.items():
         value, wanted = getattr(other, name), getattr(first, name)
         if value != wanted:
             raise InvalidValueError(f"robot[{index}]: {name}", f"{value}{unit}", f"{wanted}{unit}, as robot[0]", step)
-    # both are given or both are None, because the motion pattern is common
+    # both normals are given or both are None, because the motion patterns are equal
     normal, wanted = other.plane_normal, first.plane_normal
     if normal is not None and wanted is not None and not np.array_equal(normal, wanted):
         raise InvalidValueError(f"robot[{index}]: plane_normal", normal, f"{wanted}, as robot[0]", step)
@@ -185,9 +185,9 @@ def outward(robot: Robots, pose: Pose) -> Array:
 def points_on_pulleys(robot: Robots, pose: Pose, angle: Array) -> Array:
     """Points on the pulleys, measured along the cables from the entry points.
 
-    pose: one pose, or a batch of N: it defines the swivel angles of the pulleys; angle: angle along the cable from the
-    frame anchor [rad], shape (..., m), for which the wrap angle gives the exit point. Returns points in the world [m],
-    shape (..., m, 3); frame anchors for cables without a pulley.
+    pose: one pose, or a batch of N, which defines the swivel angles of the pulleys; angle: angle on the pulley from the
+        frame anchor [rad], shape (..., m); the wrap angle gives the exit point. Returns points in the world [m], shape
+        (..., m, 3); frame anchors for cables without a pulley.
     """
     radius, entry = pulleys_of(robot)
     away = outward(robot, pose) * (radius * (1.0 - np.cos(angle)))[..., None]
@@ -196,14 +196,14 @@ def points_on_pulleys(robot: Robots, pose: Pose, angle: Array) -> Array:
 
 
 def pulley_centers(robot: Robot, pose: Pose) -> Array:
-    """Centers of the pulleys [m], shape (m, 3): at the height of the frame anchors, one radius away horizontally."""
+    """Centers of the pulleys [m], shape (m, 3), at a horizontal distance of one radius from the frame anchors."""
     centers = robot.frame_anchors.copy()
     centers[:, :2] += pulleys_of(robot).radius[:, None] * outward(robot, pose)
     return locked(centers)
 
 
 def dead_cable(robot: Robots) -> Array:
-    """Length of each cable between pulley and drum [m], (m,) or (N, m), the smallest possible length off the drum."""
+    """Length of each cable between pulley and drum [m], (m,) or (N, m). A length off the drum cannot be smaller."""
     if not isinstance(robot, Robot):
         return np.stack([dead_cable(one) for one in robot])
     return np.zeros(robot.cable_count) if robot.winches is None else robot.winches.dead_cable

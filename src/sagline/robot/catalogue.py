@@ -1,4 +1,4 @@
-"""Robot presets of sagline, and an initial robot design from a few numbers."""
+"""Robot presets, and an initial robot design from a few numbers."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def preset_text(name: str) -> str:
         near = nearest(name, names)
         hint = f"Did you mean {near}? " if near else ""
         raise InvalidValueError(
-            "robot", repr(name), ", ".join(names), f"{hint}A robot file is given by its path, robot.yaml."
+            "robot", repr(name), ", ".join(names), f"{hint}To use a robot file, give its path, such as robot.yaml."
         )
     return (_PRESETS / f"{name}.yaml").read_text(encoding="utf-8")
 
@@ -91,7 +91,7 @@ class Design:
         cables: int = 8,
         layout: str = "top",
     ) -> None:
-        """Check the data that the robot itself does not check or reports in other terms.
+        """Check the data that `Robot` does not check, or reports in other terms.
 
         Args:
             name: Name of the robot.
@@ -105,7 +105,7 @@ class Design:
 
         Raises:
             InvalidValueError: If a size is not positive, the platform does not fit, the layout cannot support a load,
-                or there is no such rope.
+                or the rope is unknown.
         """
         outer = checked(frame, "frame", "m", shape=(3,), above=0.0)
         inner = checked(platform, "platform", "m", shape=(3,), above=0.0)
@@ -116,7 +116,7 @@ class Design:
             )
         if choice(layout, "layout", LAYOUTS) == "bottom":
             raise InvalidValueError(
-                "layout", "'bottom'", "top, mixed", "Cables from below only pull down; some must come from above."
+                "layout", "'bottom'", "top, mixed", "Cables from below only pull down; add cables from above."
             )
         if cables not in COUNTS[layout]:
             allowed = " or ".join(map(str, COUNTS[layout]))
@@ -134,13 +134,13 @@ class Design:
             object.__setattr__(self, field.name, value)
 
     def robot(self) -> Robot:
-        """The robot; its tension limits follow from the weight of the platform and the strength of the ropes.
+        """Robot of this design. Its tension limits follow from platform weight and rope strength.
 
         Returns:
             Robot; assumed values are marked in its field `assumed`.
 
         Raises:
-            InvalidValueError: If the ropes are too weak for any tension between the limits, or a value is wrong.
+            InvalidValueError: If the ropes are too weak for the load, or a value is wrong.
         """
         rope = ROPES[self.rope]
         cable = rope.cable(self.diameter)
@@ -212,6 +212,6 @@ def _octahedron() -> tuple[Array, Array]:
 
 
 def _mixed(below: Array) -> tuple[Array, Array]:
-    """Cables from each top corner to the adjacent lower platform corner, and from floor points to upper ones."""
+    """Cables from top corners to adjacent lower platform corners, and from floor points to upper platform corners."""
     frame = np.concatenate((_at(_CORNERS, 0.5), _at(below, -0.5)))
     return frame, np.concatenate((_at(_CORNERS, -0.5), _at(below, 0.5)))

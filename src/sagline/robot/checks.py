@@ -14,12 +14,12 @@ from sagline.robot.pose import unit
 from sagline.robot.winch import Winch
 
 _SYMMETRY = 1e-9  # largest difference of mirrored elements, relative to the largest element
-# tolerance for moments with three digits, because the largest moment of a thin plate equals the sum of the others
+# tolerance for moments with three digits: the largest moment of a thin plate equals the sum of the other two
 _ROUNDED = 0.01
 
 
 def anchors(frame: ArrayLike, platform: ArrayLike) -> tuple[Array, Array]:
-    """Frame and platform anchors [m], (m, 3) each, one pair per cable, no pair twice."""
+    """Frame and platform anchors [m], (m, 3) each, one pair per cable; all pairs are different."""
     pair = []
     for value, item in ((frame, "frame_anchors"), (platform, "platform_anchors")):
         array = checked(value, item, "m", shape=(None, 3))
@@ -64,23 +64,23 @@ def cables(given: Cable, count: int) -> Cable:
             f"cables: linear_density[{int(np.argmin(density))}]",
             "0 kg/m",
             "> 0 kg/m",
-            "Give the cable's mass per length; to leave its weight out, compute with the model Elastic or Straight.",
+            "Give the mass per length of the cable; to neglect its weight, use the model Elastic or Straight.",
         )
     return given if given.linear_density.shape == (count,) else given.replace(**fields)
 
 
 def winch_of_each_cable(given: Winch | None, frame: Array) -> Winch | None:
-    """The winches, one per cable, or None; guides define the dead length up to the frame anchors (m, 3)."""
+    """The winches, one per cable, or None; with guides, the dead length ends at the frame anchors (m, 3)."""
     winch = optional(given, Winch, "winches")
     return None if winch is None else winch.per_cable(len(frame))._run_to(frame)
 
 
 def inertia(given: ArrayLike | None, pattern: str, normal: Array | None) -> Array:
-    """Inertia about the center of mass: symmetric, no negative moment, positive about each free rotation axis.
+    """Inertia about the center of mass: symmetric, without negative moments, positive about each axis of free rotation.
 
     A body with three free rotations must also satisfy the triangle inequality: each principal moment is at most the sum
-    of the other two. The moments of a planar platform about the axes in its plane may be zero, because other tools
-    write them so. Without rotations all moments may be zero.
+    of the other two. For a planar platform, the moments about the axes in its plane may be zero, because other tools
+    write zeros. Without rotations all moments may be zero.
 
     given: inertia [kg m^2], or None; pattern: the motion pattern, which defines the free rotations; normal: unit normal
     of the plane of a planar pattern, shape (3,); None for the other patterns. Returns a matrix of shape (3, 3).
@@ -90,7 +90,7 @@ def inertia(given: ArrayLike | None, pattern: str, normal: Array | None) -> Arra
             "inertia",
             "missing",
             "a symmetric matrix of shape (3, 3)",
-            f"Motion pattern {pattern} turns; give its inertia.",
+            f"The motion pattern {pattern} has a rotation; give the inertia.",
         )
     matrix = exactly(np.zeros((3, 3)) if given is None else given, "inertia", "kg m^2", (3, 3))
     skew = np.abs(matrix - matrix.T)
@@ -100,7 +100,7 @@ def inertia(given: ArrayLike | None, pattern: str, normal: Array | None) -> Arra
             f"inertia[{row}, {column}]",
             f"{matrix[row, column]:g} kg m^2",
             f"the same as inertia[{column}, {row}], {matrix[column, row]:g} kg m^2",
-            "An inertia matrix is symmetric; correct one of the two.",
+            "An inertia matrix is symmetric; correct one of the two elements.",
         )
     _check_moments(np.linalg.eigvalsh(matrix).astype(np.float64), everywhere=pattern in ROTATING and normal is None)
     if pattern in ROTATING and normal is not None and not (about := float(normal @ matrix @ normal)) > 0.0:
@@ -114,7 +114,7 @@ def inertia(given: ArrayLike | None, pattern: str, normal: Array | None) -> Arra
 
 
 def _check_moments(moments: Array, *, everywhere: bool) -> None:
-    """Refuse impossible principal moments (increasing order) [kg m^2]; everywhere: True if all rotations are free."""
+    """Refuse impossible principal moments [kg m^2], in increasing order; everywhere: True if all rotations are free."""
     least = 0.0 if everywhere else np.nextafter(-_SYMMETRY * abs(moments[2]), -1.0)
     if moments[0] <= least:
         raise InvalidValueError(
@@ -128,12 +128,12 @@ def _check_moments(moments: Array, *, everywhere: bool) -> None:
             "inertia",
             f"a matrix with the principal moments {', '.join(f'{moment:g}' for moment in moments)} kg m^2",
             "none larger than the sum of the other two",
-            "No body has these; give the inertia about the center of mass, in the platform frame.",
+            "Such a body does not exist; give the inertia about the center of mass, in the platform frame.",
         )
 
 
 def plane_normal(given: ArrayLike | None, pattern: str) -> Array | None:
-    """Unit normal of the plane of motion of a planar platform, from any nonzero vector; None for other patterns."""
+    """Unit normal of the plane of motion, from any nonzero vector; None if the motion pattern is not planar."""
     if (given is None) == (pattern in PLANAR):
         has = "not given" if given is None else "given"
         allowed = "a vector of three numbers" if given is None else "nothing"
@@ -149,7 +149,7 @@ def plane_normal(given: ArrayLike | None, pattern: str) -> Array | None:
 
 
 def limits_of_each_cable(low: ArrayLike, high: ArrayLike, count: int) -> tuple[Array, Array]:
-    """Lower and upper tension limits [N], (m,); not negative, each lower limit at most its upper limit."""
+    """Lower and upper tension limits [N], (m,). No limit is negative; a lower limit is at most the upper limit."""
     lower = per_cable(checked(low, "tension_min", "N", low=0.0), "tension_min", count)
     upper = per_cable(checked(high, "tension_max", "N", low=0.0, infinite=True), "tension_max", count)
     crossed = np.flatnonzero(lower > upper)
@@ -159,13 +159,13 @@ def limits_of_each_cable(low: ArrayLike, high: ArrayLike, count: int) -> tuple[A
             f"tension_min[{i}]",
             f"{lower[i]:g} N",
             f"<= tension_max[{i}], {upper[i]:g} N",
-            "Lower it or raise the other.",
+            "Lower this limit, or raise the other one.",
         )
     return lower, upper
 
 
 def per_cable(array: Array, item: str, count: int) -> Array:
-    """One value per cable, (m,), from one value per cable or one value for all."""
+    """Values (m,), one per cable, from one value per cable or one value for all."""
     if array.shape not in ((), (1,), (count,)):
         raise InvalidValueError(item, f"of shape {array.shape}", f"shape () or ({count},)", "Give one value per cable.")
     return array if array.shape == (count,) else locked(np.full(count, array))

@@ -1,4 +1,4 @@
-"""Drums of a robot: conversion between cable length off the drum, drum turns and encoder counts."""
+"""Drums of a robot: conversions between length off the drum, turns of the drum and encoder counts."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from sagline.robot.winch import Winch
 
 ROUNDING: Final = 1e-6  # tolerance in turns beyond a full or an empty drum
 _ZERO_STEP: Final = (
-    "Give it in the robot file, or find it with home(robot, pose, frame_end_tension) and save the robot it returns; "
+    "Give it in the robot file, or determine it with home(robot, pose, frame_end_tension) and save the new robot; "
     "then plan again."
 )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drums:
-    """The drums of m cables. Lengths are lengths off the drums, at the winding tension.
+    """The drums of m cables. All lengths are lengths off the drums at the winding tension.
 
     Attributes:
         winches: The winch data, fields of shape (m,).
@@ -92,7 +92,7 @@ class Drums:
         return lengths
 
     def zero_and_rate(self) -> tuple[Array, Array]:
-        """Turns on the drums at count_zero (length_zero off the drum), and counts per turn of cable paid out.
+        """Turns on the drums at count_zero, where the length off the drum is length_zero, and counts per turn paid out.
 
         Returns both of shape (m,).
         """
@@ -137,8 +137,8 @@ class Drums:
 def drums_of(robot: Robot) -> Drums:
     """The drums of a robot.
 
-    robot: the robot. Its winches need drum_radius and groove_pitch, its cables a diameter. Several layers also need
-    drum_width. Several layers or a wandering exit also need cable_length.
+    robot: the robot. Its winches need drum_radius and groove_pitch. Its cables need a diameter. Several layers also
+        need drum_width and cable_length. A moving exit also needs cable_length.
     """
     winches, diameter = robot.winches, robot.cables.diameter
     names = ["drum_radius", "groove_pitch"]
@@ -151,15 +151,14 @@ def drums_of(robot: Robot) -> Drums:
         missing.append("cables: diameter")
     if winches is None or diameter is None or missing:
         step = "Give them in the robot file, or with robot.replace(winches=Winch(...), cables=Cable(...))."
-        raise InvalidValueError(*not_given(missing), "known, because drums need it", step)
+        raise InvalidValueError(*not_given(missing), "a known value for each drum", step)
     return Drums(winches, *_tables(winches, diameter), *_limits(winches, robot))
 
 
 def not_given(names: Sequence[str]) -> tuple[str, str]:
-    """Item and value of a message about missing data.
+    """Item and value of a message about missing fields.
 
-    names: names of the missing fields, "winches: drum_radius" for instance, grouped by type. Returns item and value;
-    the type of several fields is named once.
+    names: names of the missing fields, such as "winches: drum_radius", grouped by type. Each type is named once.
     """
     if len(names) == 1:
         return names[0], "not given"
@@ -169,7 +168,7 @@ def not_given(names: Sequence[str]) -> tuple[str, str]:
 
 
 def _tables(winches: Winch, diameter: Array) -> tuple[Array, Array]:
-    """The drums in the form for kernels, and the lengths where their layers begin."""
+    """Table of the drums for kernels, and the lengths at which their layers begin."""
     pitch, width = _given(winches, "groove_pitch"), winches.drum_width
     _check_width(winches, pitch)
     table = np.empty((len(pitch), drum.DRUM_COLUMNS))
@@ -186,8 +185,8 @@ def _tables(winches: Winch, diameter: Array) -> tuple[Array, Array]:
 def _layer_starts(winches: Winch, table: Array) -> Array:
     """Lengths off the drum at which the layers begin.
 
-    Each is the cable length, minus the length on the layers below, minus the extra length of the slanted cable between
-    drum and pulley.
+    Such a length is the cable length, minus the length on the layers below, minus the extra length of the slanted cable
+    between drum and pulley.
     """
     count = np.arange(int(winches.layers.max()) + 1)
     known = winches.cable_length if winches.cable_length is not None else winches.length_zero
@@ -202,7 +201,7 @@ def _layer_starts(winches: Winch, table: Array) -> Array:
 
 
 def _limits(winches: Winch, robot: Robot) -> tuple[Array, Array, Array]:
-    """Strain of the cable on the drums, and turns on the empty and the full drums."""
+    """Strain of the cable on the drums, turns on the empty drums, and turns on the full drums."""
     strain = locked(winches.winding_tension / robot.cables.axial_stiffness)
     if winches.cable_length is None:
         endless = np.full(strain.shape, np.inf)
@@ -212,13 +211,13 @@ def _limits(winches: Winch, robot: Robot) -> tuple[Array, Array, Array]:
 
 
 def drum_tension(state: Equilibrium) -> Array:
-    """Tension of the cables where they leave the drum, with friction if the state has winding directions.
+    """Tension of the cables at the drum, with friction if the state has winding directions.
 
-    Along an exact cable without friction, T + T^2/(2 EA) - w z is constant, with z the height. Cables of the other
-    models have no weight between pulley and drum; their tension there is the chord tension.
+    Along an exact cable without friction, T + T^2/(2 EA) - w z is constant (z is the height). With the other models,
+    the cable between pulley and drum has no weight, and its tension is the chord tension.
 
-    Returns tensions [N], shape (m,) or (N, m). They are negative if a slack cable leaves a drum downward, and NaN if a
-    cable would have to be compressed to a negative length.
+    Returns tensions [N], shape (m,) or (N, m). A slack cable that leaves a drum downward has a negative tension. The
+    tension is NaN if it would compress the cable to a negative length.
 
     Source:
         docs/model.md, section 10.
@@ -234,7 +233,7 @@ def drum_tension(state: Equilibrium) -> Array:
     stiffness = robot.cables.axial_stiffness
     strain = cables.frame_end_tension / stiffness
     lost = 2.0 * robot.cables.linear_density * robot.gravity * fall / stiffness
-    gained = strain * (2.0 + strain) - lost  # (1 + strain there)^2 - 1
+    gained = strain * (2.0 + strain) - lost  # (1 + strain at the drum)^2 - 1
     with np.errstate(invalid="ignore"):
         return locked(stiffness * gained / (1.0 + np.sqrt(1.0 + gained)))
 
@@ -242,8 +241,8 @@ def drum_tension(state: Equilibrium) -> Array:
 def warmth(robot: Robot, temperature: Any) -> Array | float:
     """Factor of thermal expansion of the cables.
 
-    temperature: difference to the reference temperature [K], one number or one per cable. Returns 1 + expansion times
-    the difference, shape (m,) or a number.
+    temperature: difference from the reference temperature [K], one number or one per cable. Returns 1 + expansion *
+        temperature, shape (m,) or a number.
     """
     difference = checked(temperature, "temperature", "K")
     if difference.shape not in ((), (robot.cable_count,)):
@@ -254,13 +253,13 @@ def warmth(robot: Robot, temperature: Any) -> Array | float:
     if not difference.any():
         return 1.0
     if robot.cables.expansion is None:
-        step = "Give it in the robot file or with Cable(..., expansion=...), or leave temperature out."
+        step = "Give it in the robot file or with Cable(..., expansion=...), or omit temperature."
         raise InvalidValueError("cables: expansion", "not given", "known if a temperature is given", step)
     factor: Array = 1.0 + robot.cables.expansion * difference
     if not (factor > 0.0).all():
         shown = f"{np.ravel(difference)[0]:g} K"
         raise InvalidValueError(
-            "temperature", shown, "a temperature at which cables have a positive length", "Correct it, or expansion."
+            "temperature", shown, "a temperature at which cables have a positive length", "Correct it or expansion."
         )
     return factor
 
@@ -279,7 +278,7 @@ def _check_width(winches: Winch, pitch: Array) -> None:
             f"winches: drum_width[{i}]",
             f"{winches.drum_width[i]:g} m",
             f">= {pitch[i]:g} m, its groove_pitch",
-            "A layer has at least one turn; correct one of the two.",
+            "A layer has at least one turn; correct one of the two values.",
         )
 
 
@@ -288,10 +287,10 @@ def _at(item: str, sample: int, cable: int, samples: int) -> str:
 
 
 def drum_lever(robot: Robot, length: Array) -> Array:
-    """Cable length per radian of drum rotation, at given lengths off the drums [m].
+    """Cable length per radian of drum rotation [m], at given lengths off the drums.
 
-    length: unstrained lengths off the drums [m], (m,) or (N, m). Returns the lever of the layer at these lengths if the
-    drums are known, else drum_radius plus half the cable diameter; same shape as the lengths.
+    length: unstrained lengths off the drums [m], (m,) or (N, m). Returns the lever of the layer at these lengths;
+        without drum data, drum_radius plus half the cable diameter; same shape as the lengths.
     """
     winch = robot.winches
     if winch is None or winch.drum_radius is None:

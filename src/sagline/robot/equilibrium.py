@@ -44,9 +44,9 @@ class Contact(Result):
         wrap_angle: Psi, the angle over which a cable lies on its pulley [rad].
         wrapped_length: Unstrained length on the pulley [m].
         dead_length: Unstrained length between pulley and drum [m].
-        chord_tension: T_x/cos phi along the chord that is tangent to the pulley and ends at the platform end [N], to
-            which tension distribution and limits apply. The chord of the free span itself starts at the actual exit
-            point.
+        chord_tension: T_x/cos phi along the tangent from the platform end to the pulley [N]. Tension distribution and
+            limits apply to this tension. The chord of the free span starts at the actual exit point and is another
+            line.
         chord_sine: sin phi of the tangent chord.
         winding: The direction of friction: +1 winding in, -1 paying out, 0 at rest; None: no friction.
     """
@@ -69,18 +69,18 @@ class Contact(Result):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Equilibrium(Result):
-    """Common input type for stiffness, modes, the viewer and files.
+    """Equilibrium of a robot, the input of stiffness, vibration, viewer and files.
 
-    A batch is indexed like an array: `state[3]` is one of its poses, `state[2:5]` and `state[mask]` are batches; slices
+    A batch is indexed like an array: `state[3]` is a single pose, `state[2:5]` and `state[mask]` are batches. Slices
     share the memory of the batch.
 
     Attributes:
-        robot: The robot; or a tuple of N, one per pose, if a sequence of robots was solved.
+        robot: The robot, or a tuple of N robots, one per pose.
         pose: Pose of the platform, single or a batch of N.
         wrench: External plus inertial wrench on the platform about its center of mass, world axes, without
             gravity: force [N], moment [N m], shape (6,) or (N, 6).
         cables: State of the free spans, from their exit points to their platform ends, fields of shape (m,) or (N, m).
-        contact: Wrapped and dead lengths of the cables; None without pulleys and dead lengths. Each cable then starts
+        contact: Wrapped and dead lengths of the cables. None without pulleys and dead lengths: each cable then starts
             at its frame anchor, and its length off the drum is its free length.
     """
 
@@ -104,9 +104,9 @@ class Equilibrium(Result):
 
     @property
     def chord_tension(self) -> Array:
-        """Chord tension tau = T_x/cos phi [N], shape (m,) or (N, m); over a pulley, phi is that of the tangent chord.
+        """Chord tension tau = T_x/cos phi [N], shape (m,) or (N, m); over a pulley, with phi of the tangent chord.
 
-        Tension distribution and chord limits apply to this tension.
+        Tension distribution and limits of the chord tension apply to this tension.
         """
         return self.cables.chord_tension if self.contact is None else self.contact.chord_tension
 
@@ -137,7 +137,7 @@ class Equilibrium(Result):
             "robot",
             f"a sequence of {len(self.robot)} robots, one per pose",
             "one robot for all poses",
-            "Take the poses one by one: state[i].",
+            "Select a single pose: state[i].",
         )
 
     def __len__(self) -> int:
@@ -151,8 +151,8 @@ class Equilibrium(Result):
             index: A number (negative: from the end), a slice, or an array of numbers or of N booleans.
 
         Raises:
-            NoBatchError: If the equilibrium is a single one. NoBatchError is also a TypeError.
-            NoSuchEntryError: If there is no such pose (also an IndexError).
+            NoBatchError: If the equilibrium has a single pose (also a TypeError).
+            NoSuchEntryError: If a pose does not exist (also an IndexError).
         """
         part = part_of(index, self.pose.shape, "single equilibrium")
         contact = None if self.contact is None else self.contact.part(part)
@@ -165,7 +165,7 @@ class Equilibrium(Result):
 
     @property
     def limited_tension(self) -> Array:
-        """The limited tension [N], shape (m,) or (N, m): chord tension or frame-end tension."""
+        """Tension to which the limits apply [N], shape (m,) or (N, m): chord tension or frame-end tension."""
         return limited_tension(self.robot, self.cables, self.contact)
 
 
@@ -210,7 +210,7 @@ def of_equilibrium(function: Callable[Concatenate[Equilibrium, _P], _R_co]) -> O
 
 
 def limited_tension(robot: Robots, cables: CableState, contact: Contact | None = None) -> Array:
-    """The tension to which the limits of a robot apply: along the chord, or at the frame end.
+    """Tension to which the limits of a robot apply: chord tension or frame-end tension.
 
     robot: the robot, or several with common properties; cables: state of their cables, fields of shape (m,) or (N, m);
     contact: pulleys and dead lengths, or None. Returns tensions [N], of the shape of the cable fields.
@@ -256,7 +256,7 @@ def cables_of_results(
 
 
 def _free_chord_tension(span: Array, rise: Array, horizontal: Array, tension: Array) -> Array:
-    """Chord tensions of the free spans; on a vertical span the given chord tension."""
+    """Chord tensions of the free spans; for a vertical span, the given chord tension."""
     level = np.where(span > 0.0, span, 1.0)
     own: Array = np.where(span > 0.0, horizontal * (np.hypot(span, rise) / level), tension)
     return own

@@ -43,7 +43,7 @@ def with_mass(robot: Robot, mass: float) -> Robot:
 
 
 def without_cables(robot: Robot, *cables: int) -> Robot:
-    """Robot after the failure of some cables; the weight of these cables on the platform is removed too.
+    """Robot after the failure of some cables. The weight of these cables on the platform is also removed.
 
     Args:
         robot: The whole robot.
@@ -65,7 +65,7 @@ def without_cables(robot: Robot, *cables: int) -> Robot:
     for cable in cables:
         kept[whole_number(cable, "cable", 0, robot.cable_count - 1)] = False
     if not kept.any():
-        raise InvalidValueError("cables", "all that the robot has", "fewer", "Leave one cable at least.")
+        raise InvalidValueError("cables", "all cables of the robot", "fewer", "Keep at least one cable.")
     return robot.replace(
         frame_anchors=robot.frame_anchors[kept],
         platform_anchors=robot.platform_anchors[kept],

@@ -16,7 +16,7 @@ _SPATIAL: Final = {"3R3T": locked(np.eye(6)), "3T": locked(np.eye(3, 6))}
 
 
 def freedom_matrix(pattern: MotionPattern, plane_normal: Array | None) -> Array:
-    """Matrix that selects the free motions from (force, moment) or (velocity, angular velocity), world axes.
+    """Matrix that selects the free components of (force, moment) or (velocity, angular velocity), world axes.
 
     pattern: "3R3T" (all six), "3T" (a point mass), "1R2T" (a plane), "2T" (a plane without rotation); plane_normal:
     unit normal of the plane, shape (3,); None for the spatial patterns. Returns array of shape (n, 6) with orthonormal
@@ -32,9 +32,9 @@ def freedom_matrix(pattern: MotionPattern, plane_normal: Array | None) -> Array:
 
 
 def _plane_axes(normal: Array) -> Array:
-    horizontal = np.cross((0.0, 0.0, 1.0), normal)  # the length of e1 is the sine of the normal's angle to the vertical
+    horizontal = np.cross((0.0, 0.0, 1.0), normal)  # its length is the sine of the angle between normal and vertical
     length = float(np.linalg.norm(horizontal))
-    if length < 1e-12:  # horizontal plane, except for rounding: every direction is horizontal, and x is chosen
+    if length < 1e-12:  # in a horizontal plane (except for rounding) every direction is horizontal; x is chosen
         horizontal = np.array([1.0, 0.0, 0.0]) - normal[0] * normal
         length = float(np.linalg.norm(horizontal))
     first = horizontal / length

@@ -28,8 +28,9 @@ _ROUNDING = 4.0 * np.finfo(np.float64).eps
 def unit(vectors: Array) -> Array:
     """Normalize vectors along the last axis.
 
-    A vector whose length differs from 1 only by rounding errors is returned unchanged, bit for bit. Files, pickles and
-    copies normalize again, and their values must not drift. Zero vectors give NaN; check lengths first.
+    If the length of a vector differs from 1 only by rounding errors, the vector is returned unchanged. Files, pickles
+    and copies normalize again, and repeated normalization must not change values. Zero vectors give NaN; check lengths
+    first.
 
     vectors: shape (..., k). Returns array of the same shape; the given array itself if all lengths are 1.
     """
@@ -74,14 +75,14 @@ class PoseBox:
             raise InvalidValueError(item, f"{high[axis]:g} m", allowed, "Exchange low and high.")
         angle = number(self.tilt, "test_box: tilt", "rad", low=0.0)
         if angle > np.pi:
-            value, step = f"{angle:.6g} rad", "Give it in radians: no rotation turns by more than half a turn."
+            value, step = f"{angle:.6g} rad", "Give the angle in radians; the largest rotation is half a turn."
             raise InvalidValueError("test_box: tilt", value, "0 to pi rad", step)
         object.__setattr__(self, "tilt", angle)
 
     __reduce__ = reduced
 
 
-_MATRIX_TOLERANCE = 1e-9  # largest element of Q Q^T - 1 for an accepted rotation matrix
+_MATRIX_TOLERANCE = 1e-9  # largest accepted element of Q Q^T - 1 for a rotation matrix Q
 _QUATERNION_TOLERANCE = 1e-6  # tolerance that accepts a quaternion with seven digits
 
 
@@ -100,9 +101,9 @@ class Pose:
     def __init__(
         self, position: ArrayLike, rotation: Rotation | ArrayLike | None = None, z: ArrayLike | None = None
     ) -> None:
-        """Check position and rotation and broadcast them.
+        """Pose from a position and a rotation.
 
-        `Pose(x, y, z)` is a level pose, too; x, y and z are numbers, or of shape (N,).
+        `Pose(x, y, z)` is a level pose; x, y and z are numbers, or arrays of shape (N,).
 
         Args:
             position: Position of the platform frame's origin [m], shape (3,) or (N, 3).
@@ -262,8 +263,8 @@ class Pose:
             index: A number (negative: from the end), a slice, or an array of numbers or of N booleans.
 
         Raises:
-            NoBatchError: If the pose is a single one (also a TypeError).
-            NoSuchEntryError: If there is no such pose (also an IndexError).
+            NoBatchError: If the pose is a single pose (also a TypeError).
+            NoSuchEntryError: If a pose does not exist (also an IndexError).
         """
         part = part_of(index, self.shape, "single pose")
         return Pose._adopt(self.position[part], self.quaternion[part])
@@ -273,7 +274,7 @@ class Pose:
         return (self[i] for i in range(len(self)))
 
     def __reduce__(self) -> tuple[Any, tuple[Array, Array]]:
-        """Pickle through a constructor, so that a loaded pose is checked and locked too."""
+        """Pickle through a constructor, which checks and locks a loaded pose."""
         return Pose.from_quaternion, (self.position, self.quaternion)
 
 
@@ -304,7 +305,7 @@ def _quaternion_of(rotation: Any) -> Array:
     excess = np.abs(matrix @ np.swapaxes(matrix, -1, -2) - np.eye(3)).max(axis=(-1, -2))
     _refuse(excess > _MATRIX_TOLERANCE, "rotation", "largest element of Q Q^T - 1", excess, "an orthonormal matrix")
     determinant = np.linalg.det(matrix)
-    _refuse(determinant < 0.0, "rotation", "determinant", determinant, "determinant +1, a rotation without mirror")
+    _refuse(determinant < 0.0, "rotation", "determinant", determinant, "determinant +1, a rotation without reflection")
     from scipy.spatial.transform import Rotation
 
     quaternion: Array = Rotation.from_matrix(matrix).as_quat()
@@ -326,4 +327,4 @@ def _refuse(wrong: NDArray[np.bool_], item: str, measure: str, values: Array, al
 
 def _counts_differ(item: str, shapes: list[tuple[int, ...]]) -> InvalidValueError:
     counts = " and ".join(str(shape) for shape in shapes)
-    return InvalidValueError(item, f"of batch shapes {counts}", "the same count, or a single one", "Give one for each.")
+    return InvalidValueError(item, f"of batch shapes {counts}", "equal counts, or a single pose", "Give one for each.")

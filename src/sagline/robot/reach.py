@@ -1,4 +1,4 @@
-"""Checks of poses against the motion pattern of a robot: rotations that are not free must not be requested."""
+"""Checks of poses against the motion pattern of a robot: poses must not differ by a rotation that is not free."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
 LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
-# [rad] and [m], smaller deviations count as zero; numbers with seven digits have such rounding errors
+# [rad] and [m]; smaller deviations count as zero, because they are the rounding errors of seven digits
 ROUNDING = 1e-6
 
 
@@ -24,8 +24,8 @@ def check_reach(robot: Robot, pose: Pose, item: str) -> None:
     The orientation of a platform without rotations is arbitrary but constant. A planar platform rotates only about the
     normal of its plane, and remains in one of the parallel planes.
 
-    robot: the robot, or the first of several with a common pattern; pose: a batch, or one pose, which is always
-    accepted; NaN is accepted.
+    robot: the robot, or the first of several with a common pattern; pose: a batch, or one pose. A single pose and NaN
+        are always accepted.
     """
     pattern, normal = robot.motion_pattern, robot.plane_normal
     if pattern == "3R3T" or len(pose.shape) == 0 or len(pose) == 0:
@@ -36,13 +36,13 @@ def check_reach(robot: Robot, pose: Pose, item: str) -> None:
         k = int(outside[0])
         value = f"turned by {turn_in_words(turn[k])} from {item}[0]"
         allowed = "a turn about plane_normal" if pattern in ROTATING else "no turn"
-        step = "Give the robot another motion_pattern, or correct the poses."
+        step = "Correct the poses, or choose another motion_pattern of the robot."
         raise InvalidValueError(f"{item}[{k}]", value, f"{allowed}, by motion_pattern {pattern}", step)
     height = np.zeros(1) if normal is None else (pose.position - pose.position[0]) @ normal
     if (outside := np.flatnonzero(np.abs(height) > ROUNDING)).size:
         k = int(outside[0])
         value = f"{height[k]:.6g} m along plane_normal from {item}[0]"
-        step = "Project the poses onto one plane, or give the robot another motion_pattern."
+        step = "Project the poses onto one plane, or choose another motion_pattern of the robot."
         raise InvalidValueError(f"{item}[{k}]", value, f"0 m, by motion_pattern {pattern}", step)
 
 
@@ -53,15 +53,15 @@ def check_plane(robot: Robot, pose: Pose, item: str) -> None:
         k = int(outside[0])
         name = f"{item}[{k}]" if pose.shape else item
         value = f"{away[k]:.6g} m along plane_normal from the plane of the frame anchors"
-        step = "Project the poses onto the plane, or give the robot another motion_pattern."
+        step = "Project the poses onto the plane, or choose another motion_pattern of the robot."
         raise InvalidValueError(name, value, f"0 m, by motion_pattern {robot.motion_pattern}", step)
 
 
 def forbidden_turn(robot: Robot, pose: Pose, other: Array) -> Array:
-    """Part of the rotation from an orientation to each pose that the motion pattern of the robot does not allow.
+    """Rotation of each pose from a given orientation, without the part that the motion pattern allows.
 
-    pose: one pose or a batch of N; other: the orientation, a unit quaternion, shape (4,). Returns sine of half the
-    angle times the axis, shape (N, 3); zeros if all motions are free.
+    pose: one pose or a batch of N; other: the orientation, a unit quaternion, shape (4,). Returns sin(angle/2) times
+        the axis, shape (N, 3); zeros if all motions are free.
     """
     own = np.atleast_2d(pose.quaternion)
     if robot.motion_pattern == "3R3T":
@@ -75,7 +75,7 @@ def forbidden_turn(robot: Robot, pose: Pose, other: Array) -> Array:
 def turn_in_words(turn: Array) -> str:
     """Description of a rotation for a message.
 
-    turn: sine of half the angle times the axis, shape (3,), not zero.
+    turn: sin(angle/2) times the axis, shape (3,), not zero.
     """
     sine = float(np.linalg.norm(turn))
     axis = ", ".join(f"{x:.3g}" for x in np.round(turn / sine, 9) + 0.0)
@@ -83,10 +83,10 @@ def turn_in_words(turn: Array) -> str:
 
 
 def out_of_plane(robot: Robot, pose: Pose) -> Array:
-    """Distance of the platform ends of a planar robot from the plane of its frame ends.
+    """Distance between the platform ends of a planar robot and the plane of its frame ends.
 
-    pose: one pose or a batch of N. Returns signed distance of the platform ends from the plane of the frame ends [m],
-    shape (N,); zeros if the robot is not planar, or its frame or platform ends are not in one plane.
+    pose: one pose or a batch of N. Returns the signed distance [m], shape (N,); zeros if the robot is not planar, or if
+        its frame ends or its platform ends are not in one plane.
     """
     away = np.zeros(len(np.atleast_2d(pose.position)))
     if robot.plane_normal is None:
@@ -98,14 +98,14 @@ def out_of_plane(robot: Robot, pose: Pose) -> Array:
     return distance
 
 
-_FLAT: Final = 0.05  # height difference, relative to the robot's size, below which all anchors are at the top
+_FLAT: Final = 0.05  # largest height difference, relative to the size of the robot, of anchors that are all at the top
 
 
 def bounds(robot: Robot) -> tuple[Array, Array]:
-    """Lowest and highest corner of the box around the robot [m]: its frame, or the range of its anchors.
+    """Lowest and highest corner [m] of the box around the robot: its frame, or the range of its anchors.
 
-    The top of the frame is at the height of the highest anchors. If all anchors are at the top and no frame is given,
-    the box extends down to the floor, or to the lowest pose of the test box.
+    The top of the frame is at the height of the highest anchors. If all anchors are at the top and the frame is not
+    given, the box extends down to the floor, or to the lowest pose of the test box.
 
     Returns the two corners, shape (3,) each.
     """
@@ -121,6 +121,6 @@ def bounds(robot: Robot) -> tuple[Array, Array]:
 
 
 def home_pose(robot: Robot) -> Pose:
-    """Center of the test box of a robot, or of the box around it."""
+    """Center of the test box of a robot, or of the box around the robot."""
     low, high = bounds(robot) if robot.test_box is None else (robot.test_box.low, robot.test_box.high)
     return Pose(0.5 * (low + high), np.eye(3))

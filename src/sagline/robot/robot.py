@@ -34,8 +34,8 @@ class Robot(Shown):
         frame_anchors: Frame ends of the cables in the world [m], z up, shape (m, 3).
         platform_anchors: Platform ends of the cables in the platform frame [m], shape (m, 3).
         cables: Material of the cables, one for all or one per cable; fields of shape (m,).
-        winches: Pulleys, dead lengths, drums and motors, one for all cables or one per cable, fields of shape (m,);
-            None if cables start at the frame anchors and their lengths are prescribed directly.
+        winches: Pulleys, dead lengths, drums and motors, one for all cables or one per cable, fields of shape (m,).
+            None if the cables start at the frame anchors, without winches.
         mass: Mass of the platform [kg], > 0.
         inertia: Inertia about the center of mass in the platform frame [kg m^2], shape (3, 3). It is positive definite,
             and no principal moment is larger than the sum of the other two. A planar pattern requires only a positive
@@ -50,16 +50,16 @@ class Robot(Shown):
         tension_limits_of: The tension that is limited, "chord" or "frame_end".
         platform_size: Edges of the platform, for drawing [m], shape (3,), or None.
         frame_size: Edges of the frame, for drawing [m], shape (3,), or None.
-        test_box: Box of poses, nearly all of them wrench-feasible, or None.
+        test_box: Box of poses, or None; almost all of its poses are wrench-feasible.
         source: Source of the numbers.
-        assumed: Reasons by field name, for the fields with values that are not from the source.
+        assumed: Reason for each field whose values are not from the source, by field name.
         notes: Further remarks for users.
-        tolerances: Standard deviations of the robot's values by name of the quantity [SI], > 0, from a drawing or data
+        tolerances: Standard deviations of quantities of the robot, by name, in SI units, > 0, from a drawing or data
             sheet; infinite if unknown. A deviation is one number for the whole field, one number per axis for a
             quantity with three components, or an array of the shape of the field. Names: frame_anchors,
             platform_anchors, center_of_mass (with three components each), mass, and per cable length_zero, drum_radius,
             linear_density, axial_stiffness, pulley_radius, dead_cable, load_cell_gain, load_cell_bias.
-        calibration: The calibration that identified some of the values, with their standard errors; or None.
+        calibration: Calibration that identified some of the values, with standard errors; or None.
 
     Raises:
         InvalidValueError: If a field is wrong; the message names it, with its index.
@@ -103,7 +103,7 @@ class Robot(Shown):
     calibration: Provenance | None = field(default=None, kw_only=True)
 
     def __attrs_post_init__(self) -> None:
-        """Check every field once; expand values for all cables to one value per cable."""
+        """Check every field, and expand a value for all cables to one value per cable."""
         frame, platform = checks.anchors(self.frame_anchors, self.platform_anchors)
         pattern = choice(self.motion_pattern, "motion_pattern", MOTION_PATTERNS)
         normal = checks.plane_normal(self.plane_normal, pattern)
@@ -153,8 +153,7 @@ class Robot(Shown):
     def replace(self, **changes: Any) -> Robot:
         """A robot with some fields changed, checked like a new one.
 
-        The tolerances remain unchanged. The standard errors of a calibration are kept only for values that are not
-        replaced.
+        The tolerances remain unchanged. A calibration loses the standard errors of replaced values.
 
         Args:
             changes: Fields of `Robot` and their new values.
@@ -163,7 +162,7 @@ class Robot(Shown):
             A new robot; this one remains unchanged.
 
         Raises:
-            InvalidValueError: If there is no such field, or the constructor does not accept the new values.
+            InvalidValueError: If a field does not exist, or the constructor does not accept the new values.
 
         Examples:
             >>> import sagline as sl
@@ -209,7 +208,7 @@ class Robot(Shown):
         return self.replace(mass=whole, inertia=self.inertia + added, center_of_mass=center)
 
     def _kept(self, before: Robot) -> Robot:
-        """This robot with standard errors only for the values that are unchanged since the calibration."""
+        """This robot without the standard errors of values that have changed since the calibration."""
         if self.calibration is None:
             return self
         errors = self.calibration.standard_error

@@ -1,12 +1,12 @@
-"""Routing between the pulleys' exit points and the drums: friction, and catenary spans between guides.
+"""Routing between exit points and drums: friction, and catenary spans between guides.
 
 Kernels model this routing as a straight, guided cable without friction, also for energy and stiffness. This module
 computes the difference of unstrained length between the actual routing and this model; docs/model.md, section 10.
 
-With friction, the tensions on the two sides of a bend of angle psi differ by the factor exp(mu psi), and the pulley's
-bearing takes the share f of the tension. While winding in, both increase the tension toward the drum. The effect of the
-cable's weight on the pulley is of first order, as without friction. Between guides a cable is a catenary. The tension
-of its far end follows from T + T^2/(2 EA) - w z, which is constant along the whole cable without friction.
+With friction, the tensions on the two sides of a bend of angle psi differ by the factor exp(mu psi), and the bearing of
+the pulley takes the share f of the tension. Both effects increase the tension toward the drum while winding in. The
+weight of the cable on the pulley is included to first order, as without friction. Between guides a cable is a catenary.
+The tension of its far end follows from T + T^2/(2 EA) - w z, which is constant along a cable without friction.
 """
 
 from __future__ import annotations
@@ -25,8 +25,7 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.robot import Robot
 from sagline.robot.winch import Winch
 
-# iterations between bend angles and tensions, which depend on each other; each iteration adds at least one correct
-# digit
+# iterations between bend angles and tensions, which depend on each other; each adds at least one correct digit
 PASSES: Final = 40
 STEPS: Final = 60  # iterations of Newton's method for one span
 _TOLERANCE: Final = 1e-15  # relative change of a length
@@ -48,7 +47,7 @@ class _ExitState(NamedTuple):
     """State of the cables at their exit points, arrays of shape (K,) for the K cables of the calculation."""
 
     tension: Array  # T_A at the exit point P [N]
-    weight: Array  # w [N/m]; 0 if the model has no weight there
+    weight: Array  # w [N/m]; 0 if the cable of the model has no weight behind P
     stiffness: Array  # EA [N]
     wrap: Array  # psi [rad]
     sine: Array  # sin psi
@@ -59,7 +58,7 @@ class _ExitState(NamedTuple):
     rolling: Array  # 1 + f while winding in, 1 - f while paying out, 1 at rest
 
     def entering(self, bend: Array) -> Array:
-        """Tension on the drum side of the pulley [N], for an additional bend at the frame anchor [rad]."""
+        """Tension on the drum side of the pulley [N], with an additional bend at the frame anchor [rad]."""
         rubbed = self.tension * np.exp(self.friction * (self.wrap + bend)) * self.rolling
         drop = 2.0 * self.weight * self.radius * self.entry * self.sine / self.stiffness
         return _tension_after(rubbed, drop, self.stiffness)
@@ -79,11 +78,11 @@ def differs(robot: Robot | tuple[Robot, ...], winding: Array | None) -> bool:
 
 
 def with_routing(state: Equilibrium, winding: Array | None) -> Equilibrium:
-    """Equilibrium of the kernels, corrected for the actual routing between exit points and drums.
+    """Equilibrium with the lengths of the actual routing between exit points and drums.
 
-    state: robot, pose and cables in the model of the kernels; winding: +1 winding in, -1 paying out, 0 at rest, shape
-    (m,) or (N, m); None: no friction. Returns the equilibrium with corrected wrapped and dead lengths, NaN if a cable
-    is too slack for a catenary between guides; without routing, the given equilibrium itself.
+    state: equilibrium with the routing of the kernels; winding: +1 winding in, -1 paying out, 0 at rest, shape (m,) or
+        (N, m); None: no friction. Returns the equilibrium with corrected wrapped and dead lengths, NaN if a cable is
+        too slack for a catenary between guides. Without guides and friction, returns the given equilibrium.
     """
     if state.contact is None or (winding is None and not differs(state.robot, None)):
         return state
@@ -96,7 +95,7 @@ def with_routing(state: Equilibrium, winding: Array | None) -> Equilibrium:
 
 
 def kernel_length(state: Equilibrium) -> Array:
-    """Unstrained lengths for the kernels, computed for a straight guided cable [m]."""
+    """Unstrained lengths of straight guided cables, for the kernels [m]."""
     contact = state.contact
     if contact is None or not differs(state.robot, contact.winding) or state.cables.model.code == codes.STRAIGHT:
         return state.unstrained_length
@@ -108,7 +107,7 @@ def kernel_length(state: Equilibrium) -> Array:
 def actual_routing(state: Equilibrium) -> _Routing:
     """The actual routing with guides, and with friction if the contact of the state has winding directions.
 
-    state: an equilibrium with pulleys or dead lengths. Returns the routing, of the shape of the state's cables.
+    state: an equilibrium with pulleys or dead lengths. The arrays of the result have the shape of its cables.
     """
     return _routing(state, guided=False)
 
@@ -146,7 +145,7 @@ def _routing_of_robot(state: Equilibrium, robot: Robot, *, guided: bool) -> _Rou
 
 
 def _exit_tension(state: Equilibrium) -> Array:
-    """Tensions at P in the model of the kernels [N], which vary along the cable only in the exact model."""
+    """Tensions at the exit points P in the cable model [N]. They vary along the cable only in the exact model."""
     cables = state.cables
     return cables.frame_end_tension if cables.model.code == codes.CATENARY else state.chord_tension
 
@@ -179,7 +178,7 @@ def _exit_state(state: Equilibrium, robot: Robot, winches: Winch, known: Flags, 
 
 
 def _tension_after(tension: Array, drop: Array, stiffness: Array) -> Array:
-    """Tension [N] at a point where (1 + e)^2 is smaller by a given drop, because T + T^2/(2 EA) - w z is constant."""
+    """Tension [N] at a point with a smaller (1 + e)^2, by a given drop; T + T^2/(2 EA) - w z is constant."""
     strain = tension / stiffness
     gained = strain * (2.0 + strain) - drop  # (1 + strain)^2 - 1
     with np.errstate(invalid="ignore"):
@@ -212,13 +211,13 @@ def _guided_spans(
 ) -> tuple[Array, Array]:
     """Unstrained length between pulley and drum [m], and tension at the drum [N]; points (K, k + 1, 3), starting at A.
 
-    Tensions and bend angles depend on each other and are iterated alternately.
+    Tensions and bend angles depend on each other. Iterations compute them alternately.
     """
     hanging = Catenary() if model.code == codes.CATENARY else Elastic()
     material = Cable(robot.cables.linear_density[cable], robot.cables.axial_stiffness[cable])
     axis, eyelet = winches.swivel_axis[cable], at.radius == 0.0
-    # an eyelet at the frame anchor is one bend from the drum-side span to the cable; at a pulley, the span begins along
-    # the swivel axis
+    # an eyelet at the frame anchor bends the cable from the drum-side span to its exit direction; at a pulley, the span
+    # begins along the swivel axis
     onward = np.where(eyelet[:, None], at.tangent, axis)
     at = at._replace(wrap=np.where(eyelet, 0.0, at.wrap))
     steps = points[:, :-1] - points[:, 1:]
@@ -245,7 +244,8 @@ def _guided_spans(
 def _span(model: CableModel, cable: Cable, step: Array, tension: Array, gravity: float) -> CableState:
     """Catenaries over steps (K, 3) with given tension at the upper ("platform") ends; NaN if there is no solution.
 
-    The upper tension increases with the chord tension, above a minimum. No catenary has a smaller upper tension.
+    The upper tension has a minimum over the chord tension and increases above it. No catenary has a smaller upper
+    tension.
     """
     level, rise = np.hypot(step[:, 0], step[:, 1]), step[:, 2]
     weight = 0.0 if model.weightless else cable.linear_density * gravity

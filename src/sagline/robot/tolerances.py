@@ -21,7 +21,7 @@ from sagline.core.results import set_fields
 class _Uncertain(NamedTuple):
     """An uncertain quantity of a robot."""
 
-    place: str  # location in the robot, as a dotted attribute
+    place: str  # attribute of the robot, with dots
     unit: str  # its unit in SI
     each: bool = True  # True if every cable has its own value
     axes: bool = False  # True for three components, along x, y and z
@@ -55,9 +55,9 @@ def deviations(
 ) -> Mapping[str, Array]:
     """Standard deviations of the quantities of a robot, each in the shape of its field.
 
-    given: deviations for some names of `UNCERTAIN`: one number for the whole field, three along the axes for a quantity
-    with three components, or the whole field; low: the smallest allowed deviation; a deviation may be infinite if
-    nothing is known. Returns the same names in the same order.
+    given: deviations for some names of `UNCERTAIN`: one number for the whole field, three numbers (x, y, z) for a
+        quantity with three components, or an array of the shape of the field; infinite if unknown; low: the smallest
+        allowed deviation. Returns the same names in the same order.
     """
     if not isinstance(given, Mapping):
         allowed = "names of fields and standard deviations"
@@ -79,7 +79,7 @@ def deviations(
 def value_of(robot: object, name: str) -> Array | None:
     """Value of the robot's quantity to which a tolerance applies.
 
-    Returns its value in SI, shape () or that of the field; None if the robot does not have it.
+    Returns the value in SI, with the shape of the field or (); None if the robot has no such value.
     """
     found: Any = robot
     for part in UNCERTAIN[name].place.split("."):
@@ -90,8 +90,8 @@ def value_of(robot: object, name: str) -> Array | None:
 def of_share(share: ArrayLike, value: Array | None, item: str) -> Array:
     """Standard deviation of a quantity from a relative deviation.
 
-    share: the relative deviation, shape () or that of the quantity; value: value of the quantity, or None if it is not
-    known. Returns the deviation in the unit and the shape of the quantity.
+    share: the relative deviation, shape () or the shape of the quantity; value: value of the quantity, or None if
+        unknown. Returns the deviation in the unit and the shape of the quantity.
     """
     if value is None:
         raise InvalidValueError(item, "in percent", "a field that is given", f"Give {item} in its unit, or the field.")
@@ -108,8 +108,8 @@ class Provenance:
     Attributes:
         log: The winch log that it used.
         date: Date of the calibration, ISO 8601.
-        standard_error: Standard errors of the robot's values by name of the identified quantity, in the shape and SI
-            unit of the field; infinite with neither observations nor a prior. The names are those of tolerances.
+        standard_error: Standard errors of the identified quantities, by name (as in `Robot.tolerances`), in the shape
+            and SI unit of the field; infinite without observations and prior.
         note: Further remarks for users.
 
     Raises:
@@ -122,7 +122,7 @@ class Provenance:
     note: str = ""
 
     def __attrs_post_init__(self) -> None:
-        """Check the fields, except for names and shapes, which the robot checks."""
+        """Check the fields; `Robot` checks names and shapes."""
         given: Any = self.standard_error  # a caller without type checks may pass anything
         if not isinstance(given, Mapping):
             allowed, step = "names of fields and standard errors", 'Give {"frame_anchors": 0.001}, in SI.'

@@ -16,7 +16,7 @@ from sagline.core.memory import check_memory
 from sagline.robot.pose import unit
 
 UPRIGHT: Final = 1e-9  # tolerance of a vertical swivel axis, as the sine of an angle
-_AGREEING: Final = 1e-9  # largest difference between a given dead length and that of the guides, relative to it
+_AGREEING: Final = 1e-9  # largest relative difference between a given dead length and the dead length from the guides
 MOST_LAYERS: Final = 1000
 LARGEST_PULLEY: Final = 10.0  # [m], above the largest sheaves of mine hoists and cable cars
 MOST_NAMED: Final = 3  # largest number of fields in a message
@@ -27,46 +27,47 @@ _AXES: Final = {"swivel_axis": 1, "guides": 2}  # number of array axes of a fiel
 class Winch:
     """One winch with its pulley, or the winches of all cables. All given fields have one shape, () or (m,).
 
-    A field that is None is not known; a function that needs it raises an error that names it.
+    None means that a value is unknown. A function that needs an unknown value raises an error with the name of the
+    field.
 
-    A cable ends at its platform anchor. A loop, in which a cable runs over a pulley at the platform back to the frame,
-    is not modeled.
+    A cable ends at its platform anchor. Cables that run over a pulley at the platform back to the frame are not
+    modeled.
 
     Attributes:
         pulley_radius: Radius of the pulley at the frame, to the centerline of the cable [m], 0 to 10; 0 for an eyelet.
             The pulley swivels about a vertical axis through the frame anchor, where the cable enters it.
-        swivel_axis: Unit vector in the direction from drum to pulley at the pulley's entry, shape (..., 3): up (0, 0,
-            1), from a drum below, or down (0, 0, -1).
+        swivel_axis: Unit vector of the cable's direction at the entry of the pulley, from drum to pulley, shape (...,
+            3): up (0, 0, 1) for a drum below, or down (0, 0, -1).
         pulley_friction: Friction coefficient mu of the cable on the pulley and at the guides. The tensions on the two
             sides of a bend of angle psi differ by the factor exp(mu psi). The tension is larger on the side toward
             which the cable moves. Friction acts only if the direction of `winding` is given, as in `inverse` and
             `forward`.
         rolling_friction: Share f of the tension that the pulley's bearing takes, >= 0, < 1. On the drum side of the
-            pulley, friction multiplies the tension by 1 + f while winding in and by 1 - f while paying out.
-        dead_cable: Length of the straight guided cable from drum to pulley [m], >= 0. With a moving exit, it is
-            measured for a cable that leaves the drum opposite the first pulley. With guides, the robot computes it as
-            the sum of the distances.
-        dead_rise: Height of the pulley's entry above the drum [m], at most dead_cable in magnitude; negative if lower.
-            With guides, the robot computes it.
+            pulley, the tension is multiplied by 1 + f while winding in and by 1 - f while paying out.
+        dead_cable: Length of the straight guided cable from drum to pulley [m], >= 0. If the exit moves along the drum,
+            this is the length for the exit opposite the first pulley. With guides, the robot computes it as the sum of
+            the distances.
+        dead_rise: Height of the pulley's entry above the drum [m], at most dead_cable in magnitude; negative below the
+            drum. With guides, the robot computes it.
         guides: Eyelets, or pulleys small enough to be points, along the cable from the drum to the frame anchor, world
-            axes [m], shape (..., k, 3). The first guide is the point where the cable leaves the drum, and the frame
-            anchor is not among the guides. Between two guides the cable is a free catenary. None: the whole dead length
-            is guided. Stiffness and sensitivities are those of a straight guided cable of the same length.
+            axes [m], shape (..., k, 3). The first guide is the point where the cable leaves the drum. The frame anchor
+            is not one of the guides. Between two guides the cable is a free catenary. None: the whole dead length is
+            guided. Stiffness and sensitivities use a straight guided cable of the same length.
         drum_radius: Radius of the drum to the surface under the cable [m]; None if the drum is not known.
         drum_width: Usable width along the drum axis [m], >= groove_pitch; a layer has drum_width/groove_pitch turns,
             not necessarily a whole number. None: wide enough for one layer.
         groove_pitch: Distance between adjacent turns along the drum axis [m].
-        layers: Largest number of layers on the drum, a whole number from 1 to 1000.
+        layers: Largest possible number of layers on the drum, a whole number from 1 to 1000.
         drum_distance: Distance from the drum to the first pulley, perpendicular to the drum axis [m]; None: the cable
             leaves the drum at a fixed point.
-        drum_offset: Exit position of the cable on the empty drum, at the first groove, along the drum axis from the
-            center of the first pulley [m]; the grooves of the first layer continue in the positive direction. Use
+        drum_offset: Axial position of the first groove, where the cable leaves the empty drum, relative to the center
+            of the first pulley [m]. The grooves of the first layer continue in the positive direction. Use
             -drum_width/2 for a drum whose center is opposite the pulley.
         gear: Encoder turns per drum turn, not zero; negative if counts decrease while cable is paid out.
         counts_per_turn: Encoder counts per encoder turn.
         count_zero: Encoder counts at which the length off the drum is length_zero.
-        length_zero: Length of cable off the drum at count_zero, at the winding tension, including dead_cable for the
-            run to the pulley [m]; `home` determines it.
+        length_zero: Length of cable off the drum at count_zero, at the winding tension, including dead_cable [m];
+            `home` determines it.
         cable_length: Total length of the cable, on and off the drum, at the winding tension [m]; at least dead_cable.
         winding_tension: Tension of the cable on the drum [N], >= 0.
         inertia: Moment of inertia of motor, gear and drum at the motor's shaft [kg m^2].
@@ -82,7 +83,7 @@ class Winch:
         load_cell_gain: Measured value per newton of load.
 
     All fields are in SI, one number for all cables or one per cable. A swivel axis may have any nonzero length. Guides
-    have the shape (k, 3) for all cables or (m, k, 3), k >= 1; dead_cable and dead_rise then remain 0.
+    have the shape (k, 3) for all cables or (m, k, 3), k >= 1. With guides, do not give dead_cable and dead_rise.
 
     Raises:
         InvalidValueError: If a value is out of its range, the dead rise exceeds the dead length, the dead length
@@ -130,7 +131,7 @@ class Winch:
     load_cell_gain: Array = field(default=1.0, kw_only=True, converter=given, metadata=rule(above=0.0))
 
     def __attrs_post_init__(self) -> None:
-        """Check every field once, and expand all known fields to one shape."""
+        """Check every field, and expand all known fields to one shape."""
         values = {
             name: _checked(value, about)
             for name, about in _FIELDS.items()
@@ -146,12 +147,12 @@ class Winch:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Shape of every field that is given, () or (m,)."""
+        """Shape of all known fields, () or (m,)."""
         return self.pulley_radius.shape
 
     @property
     def anything_behind(self) -> bool:
-        """True if a cable has a pulley or a dead length; guides count after a robot has computed the dead length."""
+        """True if a cable has a pulley or a dead length. A robot computes the dead length from guides."""
         return bool(self.pulley_radius.any() or self.dead_cable.any())
 
     def per_cable(self, count: int) -> Winch:
@@ -170,7 +171,7 @@ class Winch:
         check_memory("winches", 8.0 * (len(_FIELDS) - len(_AXES)) * count, "Give fewer cables.")
         if self.shape not in ((), (1,), (count,)):
             allowed = f"one value, or {count}, one per cable"
-            raise InvalidValueError(self._long(), f"{self.shape[0]} values", allowed, "Give every cable its own.")
+            raise InvalidValueError(self._long(), f"{self.shape[0]} values", allowed, "Give one value per cable.")
         if self.shape == (count,):
             return self
         length = len(self.shape)
@@ -179,7 +180,7 @@ class Winch:
         )
 
     def _long(self) -> str:
-        """Names, for a message, of the fields that differ among the cables.
+        """Names of the fields that differ among the cables, for a message.
 
         All fields are expanded to one shape, so that their original shapes are not known here.
         """
@@ -202,7 +203,7 @@ class Winch:
             A new winch; this one remains unchanged.
 
         Raises:
-            InvalidValueError: If there is no such field, or the constructor does not accept the new values.
+            InvalidValueError: If a field does not exist, or the constructor does not accept the new values.
 
         Examples:
             >>> import sagline as sl
@@ -223,11 +224,11 @@ class Winch:
             frame_anchors: End points of the guides, world axes [m], shape (m, 3).
 
         Returns:
-            Winch with fields of shape (m,); this one if there are no guides.
+            Winch with fields of shape (m,); the same object without guides.
 
         Raises:
-            InvalidValueError: If the last guide is at the frame anchor, or a given dead length or rise is neither 0 nor
-                equal to the value from the guides within a relative error of 1e-9.
+            InvalidValueError: If the last guide is at the frame anchor, or if a given dead length or rise (not 0)
+                differs from the value from the guides by more than a relative error of 1e-9.
         """
         if self.guides is None:
             return self
@@ -251,7 +252,7 @@ class Winch:
                     f"winches: {name}[{i}]",
                     f"{own[i]:.9g} m",
                     f"{follows[i]:.9g} m, from the guides, or 0",
-                    "Leave it out if guides are given.",
+                    "Omit it if guides are given.",
                 )
         return evolve(self, dead_cable=length, dead_rise=rise)
 
@@ -318,7 +319,7 @@ def _points(points: Array) -> Array:
             f"winches: guides[{', '.join(map(str, index))}]",
             "at the guide before it",
             "points apart",
-            "Leave one of the two out.",
+            "Omit one of the two guides.",
         )
     return points
 
@@ -350,8 +351,7 @@ def _vertical(axis: Array) -> Array:
             "winches: swivel_axis",
             f"({', '.join(f'{x:.3g}' for x in slanted)})",
             "up or down",
-            "A pulley that swivels about a slanted axis, or that does not swivel, is not modeled: its cable leaves the "
-            "vertical plane. Give [0, 0, 1] or [0, 0, -1].",
+            "Only pulleys with a vertical swivel axis are modeled. Give [0, 0, 1] or [0, 0, -1].",
         )
     upright = np.zeros(axis.shape)
     upright[..., 2] = np.sign(axis[..., 2])
@@ -362,7 +362,7 @@ def _check_rolling(rolling_friction: Array) -> None:
     if (much := rolling_friction >= 1.0).any():
         i = int(np.argmax(much))
         item, shown = f"winches: rolling_friction[{i}]", f"{rolling_friction.flat[i]:g}"
-        raise InvalidValueError(item, shown, ">= 0, < 1", "A bearing takes less than all; correct it.")
+        raise InvalidValueError(item, shown, ">= 0, < 1", "A bearing takes only part of the tension; correct it.")
 
 
 def _check_rise(dead_cable: Array, dead_rise: Array) -> None:
@@ -373,7 +373,7 @@ def _check_rise(dead_cable: Array, dead_rise: Array) -> None:
             f"winches: dead_rise[{i}]",
             f"{dead_rise.flat[i]:g} m",
             f"within +-{dead_cable.flat[i]:g} m, its dead_cable",
-            "A straight run rises by no more than its length; correct one of the two.",
+            "A straight cable rises by at most its length; correct one of the two values.",
         )
 
 
@@ -387,5 +387,5 @@ def _check_whole(dead_cable: Array, cable_length: Array | None) -> None:
             f"winches: cable_length[{i}]",
             f"{cable_length.flat[i]:g} m",
             f">= {dead_cable.flat[i]:g} m, its dead_cable",
-            "The cable must be longer than the distance from drum to pulley; correct one of the two.",
+            "The cable must be longer than the distance from drum to pulley; correct one of the two values.",
         )

@@ -51,10 +51,10 @@ class WinchDrive:
             fields: Other fields of `Winch`, position_gain for instance.
 
         Returns:
-            The winch with gear, inertia and limits of the drive; the inertia includes that of the drum.
+            The winch with gear, inertia and limits of the drive. The inertia includes the inertia of the drum.
 
         Raises:
-            InvalidValueError: If a value is out of its range, or a field is not a field of `Winch` or is set by the
+            InvalidValueError: If a value is out of its range, or if a field does not exist in `Winch` or belongs to the
                 drive.
 
         Examples:
@@ -87,7 +87,7 @@ _GEARED_SOURCE: Final = (
 )
 _GEARED_ASSUMED: Final = (
     "torques: output torque divided by the gear ratio, so that losses in the gear reduce the torque; speed: "
-    "that of the motor, 4000 min^-1; backlash and torsion of the gear neglected"
+    "speed of the motor, 4000 min^-1; backlash and torsion of the gear neglected"
 )
 # model: turns of the motor per output turn, rated and peak torque at the output [N m], inertia of motor and gear [1e-4
 # kg m^2]
@@ -181,7 +181,7 @@ def winch_drive(name: str) -> WinchDrive:
         The drive, with its source and assumptions.
 
     Raises:
-        InvalidValueError: If there is no such drive; the message suggests a similar name.
+        InvalidValueError: If the drive does not exist; the message suggests a similar name.
 
     Examples:
         >>> import sagline as sl
