@@ -80,9 +80,7 @@ def late_cells(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> M
     n = len(log)
     cells = np.arange(max(0, -by), min(n, n - by))  # what they read is written beside the lengths of so many rows later
     shifted = log.rows(cells + by).replace(load_cells=_cells(log)[cells])
-    words = (
-        f"load cells seem to come {abs(by)} row{'s'[: abs(by) != 1]} {'after' if by > 0 else 'before'} their lengths"
-    )
+    words = f"load cell readings seem to be {abs(by)} row{'s'[: abs(by) != 1]} {'late' if by > 0 else 'early'}"
     return Mistake(shifted, (words,))
 
 

@@ -381,7 +381,7 @@ REFUSED = [
     Refused({"candidates": 4}, "candidates", "4", "5 to 20000"),
     Refused({"robot": MACHINES["point"]}, "box", "missing", "a PoseBox"),
     Refused({"box": sl.PoseBox([50, 50, 50], [60, 60, 60])}, "box", "without a pose .*tensions", "a box with"),
-    Refused({"robot": MACHINES["point"], "box": PLANE}, "box: tilt", "0.2 rad", "0 rad, by motion_pattern 3T"),
+    Refused({"robot": MACHINES["point"], "box": PLANE}, "box: tilt", "0.2 rad", "0 rad, because"),
     Refused({"sensors": sl.Sensors()}, "sensors", "lengths alone", "load cells"),
     Refused(
         {"unknowns": ("load_cell_gain",), "sensors": sl.Sensors(5e-4, None, 1e-3)},

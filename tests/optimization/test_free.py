@@ -140,7 +140,7 @@ REFUSED: dict[str, tuple[Callable[[], object], tuple[str, ...]]] = {  # item, va
         lambda: asked(free=[sl.FreeAnchors("frame", -1.5, 1.0, along=[1, 0, 0], symmetry="x")]),
         ("free[0]: the shift along x", "up to 1.5 m inward", "< 1 m, the distance to the plane x = 0 m"),
     ),
-    "twice the same": (lambda: asked(free=[apart(), apart()]), ("free", "free twice in frame_anchors x")),
+    "twice the same": (lambda: asked(free=[apart(), apart()]), ("free", "twice among frame_anchors x")),
     "a cost that nobody gave": (lambda: asked(goals=["cable_cost"]), ("goals: cable_cost",)),
     "no such cable": (
         lambda: asked(free=[sl.FreeAnchors("frame", -1, 1, cables=[2])]),

@@ -1,4 +1,4 @@
-"""Calibration: actual anchors, length zeros and cable properties of a robot, from its own readings."""
+"""Calibration of a robot: estimation of anchors, length zeros and cable properties from the robot's own readings."""
 
 from sagline.core.surface import group
 

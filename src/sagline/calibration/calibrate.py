@@ -28,7 +28,7 @@ from sagline.kernels import codes
 from sagline.robot.robot import Robot
 
 _CATENARY = Catenary()
-MOST_FOLDS: Final = 1000  # each part costs one calibration
+MOST_FOLDS: Final = 1000  # parts of the cross-validation; each part takes the time of one calibration
 UNKNOWNS: Final = ("frame_anchors", "length_zero", "axial_stiffness", "mass", "center_of_mass")
 
 
@@ -42,29 +42,30 @@ def calibrate(
     folds: int = 5,
     progress: Progress | None = None,
 ) -> Calibration:
-    """Actual anchors, length zeros and cable properties of a robot, from its own readings, with standard errors.
+    """Estimate anchors, length zeros and cable properties of a robot from its own readings, with standard errors.
 
-    One nonlinear least-squares problem with exact cables estimates all parameters and the unknown true lengths at every
-    pose. Reported lengths are weighted by the deviation in `log.sensors`. Parameters that the readings do not observe
-    keep the values of the robot, and are listed.
+    The estimate is a nonlinear least-squares problem with exact cables. Its variables are the parameters and the true
+    lengths at every pose. Reported lengths are weighted by the deviation in `log.sensors`. Parameters that the readings
+    do not observe keep the values of the robot, and are listed.
 
     Args:
-        robot: The robot before the calibration. Its values are the initial values and the priors. Their standard
-            deviations are its `tolerances`, those of `Unknown(name, deviation=...)`, or typical values of the kind.
+        robot: The robot before the calibration. Its values are the initial values and the priors. The standard
+            deviation of a prior is that of `Unknown(name, deviation=...)`, the robot's tolerance, or a typical value of
+            the kind, in this order.
         log: Readings at poses at rest.
         unknowns: Parameters to estimate: names of `KINDS` in `sagline.calibration.parameters`, or `Unknown`s.
         model: Cable model: the exact or the weightless one.
         robust: True to reduce the weight of poses that do not fit the other poses.
-        folds: Number of parts of the poses for the cross-validation, at most one per pose; each part costs one
-            calibration. 0 for no cross-validation.
+        folds: Number of parts of the poses for the cross-validation, at most one per pose; each part takes the time of
+            one calibration. 0 for no cross-validation.
         progress: Called with the number of finished poses of a pass and the number of all poses.
 
     Returns:
         Calibration; its `robot` is the calibrated robot.
 
     Raises:
-        InvalidValueError: If an unknown has another name, or neither readings nor a prior; if the log is not of this
-            robot, has swapped cables or wrong units, or has fewer readings than unknowns; the message names the reason.
+        InvalidValueError: If an unknown has another name, or neither readings nor a prior; if the log does not fit this
+            robot, has swapped cables or wrong units, or has fewer readings than unknowns. The message names the reason.
 
     Examples:
         >>> import numpy as np
@@ -137,7 +138,7 @@ def _check_model(robot: Robot, model: CableModel) -> None:
 
 
 def _refuse_mistakes(robot: Robot, log: WinchLog, fit_log: WinchLog, parameters: Parameters, model: CableModel) -> None:
-    """Reject a log with a likely mistake, and measured poses that are the only readings without a fit."""
+    """Reject a log with a likely mistake. Reject measured poses that do not fit, if all other readings fit."""
     if not {"measuring_frame", "target"}.isdisjoint(parameters.names):
         log = log.replace(position=None, rotation=None)  # the axes of the measuring system are not known yet
     _refuse(diagnose_log(robot, log, model))
@@ -146,12 +147,12 @@ def _refuse_mistakes(robot: Robot, log: WinchLog, fit_log: WinchLog, parameters:
 
 
 def _refuse(sentences: Iterable[str]) -> None:
-    """Reject a log that no similar robot can have written; the message is the first reason."""
+    """Reject a log if there is a sentence about a mistake; the message is the first sentence."""
     for sentence in sentences:
         what, _, step = sentence.partition("; " if "; " in sentence else ": ")
         step = f"{step[:1].upper()}{step[1:]}."
         raise InvalidValueError(
-            "log", f"not what this robot reads: {what}", "readings that a similar robot can give", step
+            "log", f"inconsistent with this robot: {what}", "readings that fit this robot, or a similar one", step
         )
 
 

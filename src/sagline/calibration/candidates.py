@@ -1,4 +1,4 @@
-"""Candidates of calibration poses: feasible poses of a box, each with several sets of tensions; and short tours."""
+"""Candidates for calibration poses: feasible poses of a box, each with several sets of tensions; short tours."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from sagline.tension.method import TensionMethod
 from sagline.tension.methods import MinimumNorm, QuadraticProgram
 
 MOST_SETS: Final = 5  # number of sets of tensions at one pose
-ROUNDS: Final = 6  # attempts to draw poses, for boxes of which a large part is not feasible
-KEPT: Final = 0.02  # margin at both limits, as a share of their range; actual tensions differ from the commanded ones
-GROUP: Final = 20  # number of poses whose sets of tensions are near the same corners
+ROUNDS: Final = 6  # largest number of attempts to draw poses; a large part of a box may be infeasible
+KEPT: Final = 0.02  # margin at both tension limits, as a share of their range; actual tensions differ from commands
+GROUP: Final = 20  # number of poses per solution; their sets of tensions are near the same corners
 UNLIMITED: Final = 3.0  # upper limit in place of an infinite one, relative to the largest minimum-norm tension
-SAME: Final = 1e-6  # share of the largest tension: sets closer than this count as one
+SAME: Final = 1e-6  # smallest distance of two sets of tensions, as a share of the largest tension
 
 
 class CandidatePoses(NamedTuple):
@@ -34,7 +34,7 @@ class CandidatePoses(NamedTuple):
         poses: Pose rows, shape (N, POSE_COLUMNS).
         lengths: All cable off the drums [m], shape (N, m).
         tensions: Tensions at the frame ends [N], shape (N, m).
-        place: Index of the pose, shape (N,); sets of tensions at one pose have one index.
+        place: Index of the pose, shape (N,); all sets of tensions at one pose have the same index.
         usual: True if the pose belongs to the uniform distribution over the box, shape (N,).
     """
 
@@ -54,8 +54,8 @@ def candidates_of(
 ) -> CandidatePoses:
     """Feasible poses of a box, at most `count`, each with several sets of tensions near corners of the feasible set.
 
-    Every second pose is uniformly distributed in the box. The other poses are nearer to its faces and to the largest
-    tilt, where readings are most informative. Raises an error with the reason if no pose is feasible.
+    Every second pose is uniformly distributed in the box. The other poses are nearer to the faces of the box and to the
+    largest tilt, because readings are most informative there. Raises an error with the reason if no pose is feasible.
     """
     rng = np.random.default_rng(seed)
     sets = min(MOST_SETS, 1 + 2 * max(robot.cable_count - robot.degrees_of_freedom, 0))
@@ -134,21 +134,21 @@ def _solve(robot: Robot, model: CableModel, poses: Pose, method: TensionMethod) 
     """Status, lengths and frame-end tensions of each pose."""
     try:
         plan = inverse(robot, poses, model, method)
-    except CableGeometryError:  # at this pose a cable starts inside an anchor or a pulley
+    except CableGeometryError:  # at this pose, a platform anchor is at a frame anchor or inside a pulley
         missing = np.full((len(poses), robot.cable_count), np.nan)
         return np.full(len(poses), PoseStatus.NO_CHORD, dtype=np.int8), missing, missing
     return plan.status, plan.unstrained_length, plan.state.cables.frame_end_tension
 
 
 def _different(tensions: Array) -> Flags:
-    """Flags of the sets of tensions (N, sets, m) that differ from all previous sets at their pose, (N, sets)."""
+    """Flags (N, sets): True for a set of tensions (N, sets, m) that differs from all previous sets at the same pose."""
     apart = np.abs(tensions[:, :, None] - tensions[:, None]).max(axis=-1)
     same = apart <= SAME * np.nanmax(tensions, initial=0.0)
     return np.asarray(~np.tril(same, -1).any(axis=-1))
 
 
 def _in_range(robot: Robot, lengths: Array, tensions: Array) -> Flags:
-    """Flags of lengths and tensions (..., m) within the cable on the winches and the range of the load cells."""
+    """True where lengths and tensions (..., m) are within the cable on the winches and the range of the load cells."""
     winches = robot.winches
     fits = np.ones(lengths.shape, dtype=np.bool_)
     if winches is not None and winches.cable_length is not None:
@@ -176,9 +176,9 @@ _ROUNDING: Final = 1e-9  # smallest improvement, relative to the largest distanc
 
 
 def shortest_tour(places: Array) -> Indices:
-    """Indices (N,) of an order in which places (N, d) are visited once on a short open tour (2-opt, Croes 1958)."""
+    """Order (N,) of places (N, d) on a short open tour that visits each place once (2-opt, Croes 1958)."""
     count = len(places)
-    apart = np.zeros((count + 1, count + 1))  # the last index is a virtual place at distance zero
+    apart = np.zeros((count + 1, count + 1))  # the last place is virtual, at distance zero from all
     apart[:count, :count] = np.linalg.norm(places[:, None] - places[None], axis=-1)
     order = np.concatenate(([count], _nearest_neighbor_tour(apart[:count, :count]), [count]))
     for _ in range(PASSES):

@@ -18,27 +18,27 @@ from sagline.core.arrays import Array, Flags, Indices
 from sagline.robot.robot import Robot
 
 _CATENARY = Catenary()
-UNIT: Final = 50.0  # ratio to the expected value above which a unit is wrong; between 1 and 1000
+UNIT: Final = 50.0  # ratio of a reading to its expected value above which its unit is wrong; between 1 and 1000
 GOOD: Final = 5.0  # largest sum of squares per reading for a good fit; slips and rope errors raise it above 1
-POOR: Final = 50.0  # larger limit in place of GOOD if the sum is also at most a hundredth of the previous one
-# largest mean square of the departures from the priors, in prior deviations; if the anchors are wrong by 0.25 m, a fit
+POOR: Final = 50.0  # a larger limit than GOOD; it applies if a correction reduces the sum to a hundredth or less
+# largest mean square of the departures from the priors, in prior deviations. If the anchors are wrong by 0.25 m, a fit
 # with swapped cables may agree with the readings by chance
 NEAR: Final = 0.25
 # smallest ratio of the robot's size to the deviation of lengths or positions; below it, they are not informative
 ROUGH: Final = 10.0
-FAR: Final = 0.25  # error of a zero relative to a cable's length; a larger one exceeds that of any tape measure
-SHIFTS: Final = 5  # largest tested number of rows by which load cells are early or late
-_FULLY: Final = 3  # number of most promising changes that are fitted to convergence
+FAR: Final = 0.25  # smallest reported error of a zero, relative to the length; tape measures have smaller errors
+SHIFTS: Final = 5  # largest tested shift of the load cells in time, in rows
+_FULLY: Final = 3  # number of fits to convergence, for the most promising changes
 
 
 def diagnose_log(robot: Robot, log: WinchLog, model: CableModel | str = _CATENARY) -> tuple[str, ...]:
     """Likely mistakes in a log, as sentences with the next step; empty for a consistent log.
 
-    The first check compares the sizes of readings, to detect lengths and positions in mm, and load cells in kN. Then a
-    robot similar to the given one is fitted to about 24 rows. If none fits, the readings are changed by one mistake at
-    a time: columns of two cables exchanged (encoders, load cells or both), an encoder that counts backward, zeros with
-    large errors, or load cells up to five rows early or late. The first mistake whose correction gives a fit is
-    reported. Zeros with large errors, and lengths with the wrong sign, are found only with commanded poses.
+    The first check compares the readings with their expected sizes. It detects lengths and positions in mm, and load
+    cells in kN. Then a robot similar to the given one is fitted to about 24 rows. If no such robot fits, corrections of
+    single mistakes are tested: columns of two cables exchanged (encoders, load cells or both), an encoder that counts
+    backward, zeros with large errors, or load cells up to five rows early or late. The first correction that gives a
+    fit is reported. Zeros with large errors, and lengths with the wrong sign, are found only with commanded poses.
     """
     instance(robot, Robot, "robot")
     instance(log, WinchLog, "log")
@@ -52,7 +52,7 @@ def diagnose_log(robot: Robot, log: WinchLog, model: CableModel | str = _CATENAR
 
 
 def wrong_units(robot: Robot, log: WinchLog) -> Iterator[str]:
-    """Sentences about readings whose size suggests another unit; checks all rows of the log."""
+    """Sentences about readings that seem to have another unit, judged by their size in all rows of the log."""
     size = _extent(robot)
     if log.unstrained_length is not None and log.unstrained_length.size:
         typical = float(np.nanmedian(log.unstrained_length)) if not np.isnan(log.unstrained_length).all() else 0.0
@@ -127,7 +127,7 @@ def _extent(robot: Robot) -> float:
 
 
 def _spread(position: Array) -> float:
-    """Largest difference of measured coordinates [m]; for a single position, its largest coordinate."""
+    """Largest difference between measured positions along an axis [m]."""
     there = ~np.isnan(position).all(axis=0)
     if not there.any():
         return 0.0
@@ -158,7 +158,7 @@ def _single_mistake(trial: Trial) -> Iterator[str]:
 
 
 def _length_changes(trial: Trial) -> Iterator[Hypothesis]:
-    """Possible mistakes in lengths or counts, alone or together with mistakes in the load cells of the same cables."""
+    """Possible mistakes in lengths or counts; some of them include an exchange of the load cells of the same cables."""
     m = trial.robot.cable_count
     for two in combinations(range(m), 2):
         yield Hypothesis(lengths=two)
@@ -187,7 +187,7 @@ def _load_cell_changes(trial: Trial) -> Iterator[Hypothesis]:
 
 
 def _usual(trial: Trial) -> Array:
-    """Typical lengths of the cables [m], independent of zeros: distances of the anchors."""
+    """Typical lengths of the cables [m]: distances between the anchors, because lengths depend on the zeros."""
     middle = trial.robot.frame_anchors.mean(axis=0) if trial.log.commanded is None else None
     if middle is None and trial.log.commanded is not None:
         middle = np.median(trial.log.commanded.position, axis=0)
@@ -223,8 +223,8 @@ def _change_text(change: Hypothesis, log: WinchLog) -> str:
         i = change.flipped
         return f"the encoder of cable {i} seems to count backward: change the sign of gear[{i}], or of {kind}_{i}"
     rows = f"{abs(change.late)} row{'s'[: abs(change.late) != 1]}"
-    way, where = ("after", "up") if change.late > 0 else ("before", "down")
-    return f"load cells seem to come {rows} {way} their lengths: move their columns {where} by {rows}"
+    way, where = ("late", "up") if change.late > 0 else ("early", "down")
+    return f"the load cell readings seem to be {rows} {way}: move the columns of all load cells {where} by {rows}"
 
 
 def _misfit_text(quality: float) -> str:

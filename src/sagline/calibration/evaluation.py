@@ -24,13 +24,12 @@ from sagline.core.progress import blocks
 from sagline.robot.pose import Pose
 from sagline.robot.tolerances import UNCERTAIN, Provenance
 
-# smallest probability that chance explains the distance of chi squared from its expected value; below it the result is
-# doubtful
+# smallest probability of such a chi squared by chance; with a smaller probability, the result is doubtful
 DOUBTFUL: Final = 1e-4
 ODD: Final = 0.1  # largest share of poses that fit badly; above it the whole result is doubtful
 ODD_WEIGHT: Final = 0.5  # a pose with a lower weight fits badly
-TOLERATED: Final = 1.1  # ratio of chi squared to its expected value: in a large log, no model reaches a smaller one
-LITTLE: Final = 1e-6  # a parameter with a smaller share of an unobservable direction is still observable
+TOLERATED: Final = 1.1  # accepted ratio of chi squared to its expected value; no model is more exact in a large log
+LITTLE: Final = 1e-6  # smallest component of an unobservable direction for a parameter to count as unobservable
 
 
 def calibration_of(
@@ -41,7 +40,7 @@ def calibration_of(
     source: str,
     validation: CrossValidation | None,
 ) -> Calibration:
-    """Result of a search; `rows`: rows of the log in the problem (N,); `left_out`: omitted rows by reason."""
+    """Calibration from a search; rows: indices of the used rows of the log, (N,); left_out: omitted rows by reason."""
     fit, kept, parameters = found.fit, found.kept, problem.parameters
     numbers, machine, normal = fit.state.numbers, fit.state.machine, fit.normal
     residuals, triangle = _final_readings(problem, fit)
@@ -125,9 +124,9 @@ def covariance_of(problem: FitProblem, triangle: Array, slopes: Array) -> tuple[
 
 
 def _is_doubtful(chi_squared: float, free: int, readings: Indices, *, robust: bool) -> bool:
-    """True if residuals contradict the deviations of the sensors.
+    """True if the residuals are too large or too small for the deviations of the sensors.
 
-    Without the poses that fit badly, the other poses fit better than by chance. The expected value is then the mean of
+    Poses that fit badly are not counted. This lowers the expected sum of squares of the other poses: it is the mean of
     a chi squared distribution truncated at a quantile c, r F(c; r + 2)/F(c; r).
     """
     if free <= 0:

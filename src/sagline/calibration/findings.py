@@ -23,12 +23,12 @@ class CalibrationStatus(Status):
     FOUND = 0, "found"
     DOUBTFUL = (
         1,
-        "found, but chi squared shows that the model or the deviations are wrong: see residuals and outliers, "
+        "found, but chi squared shows that the model or the deviations are wrong: check residuals and outliers, "
         "and do not trust the standard errors",
     )
     NOT_CONVERGED = (
         2,
-        "not converged: check the log, and give better values or fewer unknowns",
+        "not converged: check the log, and give better initial values or fewer unknowns",
     )
 
 
@@ -50,7 +50,8 @@ class Direction(Result):
     Attributes:
         name: For example "the world shifted along x", or "pulley_radius with frame_anchors z".
         vector: Change of the parameters for one standard deviation of the combination, in their units, (P,).
-        known: Remaining share of the prior standard deviation: 1 without information.
+        known: Ratio of the standard deviation after the calibration to the prior one: 1 if the readings have no
+            information.
         step: Recommended measurement, for example "fix a frame anchor, or measure 3 points".
     """
 

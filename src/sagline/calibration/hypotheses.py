@@ -1,4 +1,4 @@
-"""Hypotheses about a log without a fitting robot. Each change of the readings is tested on some of the rows."""
+"""Hypotheses about mistakes in a log that fits no similar robot. Each hypothesis is tested on some of the rows."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ from sagline.robot.drum import drums_of
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
-MOST_ROWS: Final = 24  # number of rows for the trials of changes; three load cell readings per unknown
+MOST_ROWS: Final = 24  # number of rows for the tests of changes, for three load cell readings per unknown
 STEPS: Final = 12  # least-squares iterations; if a robot fits, half of them are sufficient
 TOLERANCE: Final = 1.0  # relative tolerance of the sum of squares; a few percent are sufficient for a decision
-FEWEST_ROWS: Final = 8  # number of rows without commanded poses
-# Prior deviations are wider than usual, because the test is for any similar robot. They are shares of the values if
-# logarithms are estimated.
+FEWEST_ROWS: Final = 8  # number of rows if the log has no commanded poses
+# Prior deviations: larger than usual, because any similar robot may fit. If a logarithm is estimated, the deviation is
+# a share of the value.
 _WIDE: Final = {
     "frame_anchors": 0.3,
     "platform_anchors": 0.05,
@@ -52,7 +52,7 @@ class Hypothesis(NamedTuple):
         lengths: Two cables whose lengths or counts are exchanged, or None.
         cells: Two cables whose load cells are exchanged, or None.
         flipped: A cable whose encoder counts backward, or None.
-        moved: Cables whose zeros are set from the commanded poses.
+        moved: Cables with zeros that are computed from the commanded poses.
         late: Number of rows by which the load cells lag behind the encoders.
     """
 
@@ -87,7 +87,7 @@ class Trial:
         model: Cable model.
         log: The whole log.
         rows: Indices of the rows that are fitted.
-        found: Poses by forward kinematics, stored by change of the lengths and number of rows.
+        found: Poses by forward kinematics, for each change of the lengths and number of rows.
     """
 
     robot: Robot
@@ -110,7 +110,7 @@ class Trial:
         return _TrialResult(quality, departure, moved + off[zeros])
 
     def promise(self, change: Hypothesis, steps: int) -> float:
-        """Sum of squares per row, predicted one step after some least-squares steps; infinite without a fit."""
+        """Predicted sum of squares per row after one more least-squares step than `steps`; infinite without a fit."""
         most = FEWEST_ROWS if self.log.commanded is None else MOST_ROWS
         problem, poses, _ = self._problem(change, most)
         kept, step = np.ones(len(problem.log.cells), dtype=np.bool_), None
@@ -126,18 +126,18 @@ class Trial:
         return float(normal.squares[kept].sum() - gain) / there if 2 * there > len(kept) else np.inf
 
     def most_promising(self, changes: Iterable[Hypothesis], steps: int, most: int) -> list[Hypothesis]:
-        """Changes with a better prediction than no change, best first, at most `most`."""
+        """At most `most` changes with a smaller predicted misfit than the unchanged log, best first."""
         promises = {change: self.promise(change, steps) for change in changes}
         limit = self.promise(Hypothesis(), steps)
         return sorted((change for change in promises if promises[change] < limit), key=promises.__getitem__)[:most]
 
     def offsets(self) -> tuple[Array, Array]:
-        """Median offset of lengths from those at the commanded poses, and its median deviation [m], both (m,)."""
+        """Median of lengths minus lengths at the commanded poses, and the median deviation from it [m], both (m,)."""
         problem, poses, _ = self._problem(Hypothesis(), MOST_ROWS)
         return _offsets(problem, poses)
 
     def _problem(self, change: Hypothesis, most: int) -> tuple[FitProblem, Pose | None, Array]:
-        """Least-squares problem for some of the rows, their commanded poses, and the shifts of the zeros."""
+        """Least-squares problem for some rows, their commanded poses, and the shifts of the zeros [m]."""
         log, late, m = self.log, change.late, self.robot.cable_count
         rows = self.rows[(self.rows + late >= 0) & (self.rows + late < len(log))]
         rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(most, len(rows))).round().astype(np.int64))]

@@ -15,13 +15,13 @@ from sagline.core.arrays import Array, Indices, locked
 from sagline.kernels.calibration import kinds
 from sagline.robot.robot import Robot
 
-OPEN: Final = 1e-12  # relative to the largest singular value: rounding errors of slopes that cancel
-_SPREAD: Final = 1e-9  # relative to the largest singular value: directions with larger ones are always observable
-_FIXED: Final = 5e-2  # relative to the usual deviation: a parameter with a smaller stated deviation counts as known
+OPEN: Final = 1e-12  # rounding error of slopes that cancel, relative to the largest singular value
+_SPREAD: Final = 1e-9  # a direction with a larger singular value, relative to the largest, is always observable
+_FIXED: Final = 5e-2  # a parameter counts as known if its stated deviation, relative to the usual deviation, is smaller
 _WIDE: Final = 1e3  # largest prior deviation, relative to the usual deviation of an unknown value
-_SAME: Final = 1e-6  # sine of the angle below which two directions are equal
+_SAME: Final = 1e-6  # two directions count as equal below this sine of the angle between them
 _TINY: Final = 1e-300
-_NAMED: Final = 3  # number of components in the text of a direction without a name
+_NAMED: Final = 3  # number of parameters in the text of a direction that is not a symmetry
 
 
 class PriorUnits(NamedTuple):
@@ -30,7 +30,7 @@ class PriorUnits(NamedTuple):
     Attributes:
         scale: One standard deviation in the internal parameters, (P,).
         units: One standard deviation in the units of the parameters, (P,).
-        free: Indices of the parameters that are not almost exactly known.
+        free: Indices of the parameters that do not count as known.
     """
 
     scale: Array
@@ -39,9 +39,9 @@ class PriorUnits(NamedTuple):
 
 
 def append_rows(triangle: Array, matrix: Array) -> Array:
-    """Triangular factor (at most P, P) of the previous rows and additional rows (..., P); rows with NaN are left out.
+    """Triangular factor (at most P, P) of the previous factor and additional rows (..., P), without rows with NaN.
 
-    Householder reflections keep singular values down to rounding; normal equations would lose half of the digits.
+    Householder reflections keep all digits of small singular values; normal equations would lose half of them.
     """
     rows = matrix.reshape(-1, matrix.shape[-1])
     rows = rows[~np.isnan(rows).any(axis=1) & rows.any(axis=1)]
@@ -49,9 +49,9 @@ def append_rows(triangle: Array, matrix: Array) -> Array:
 
 
 def prior_units(parameters: Parameters) -> PriorUnits:
-    """Priors as units of directions; the usual deviation of an unknown value if there is no prior.
+    """Units of the directions: prior deviations, or the usual deviation of an unknown value if there is no prior.
 
-    A much wider prior is limited to `_WIDE`. Otherwise rounding would hide the other parameters.
+    A larger prior deviation is reduced to `_WIDE`, because rounding would otherwise hide the other parameters.
     """
     usual = np.array([KINDS[name].assumed for name in parameters.names])
     usual = np.where(parameters.logarithmic, usual * np.abs(parameters.prior), usual)
@@ -77,7 +77,7 @@ def _open_directions(triangle: Array, frame: PriorUnits) -> Array:
 
 
 def numerical_rank(values: Array) -> int:
-    """Number of singular values (descending) above rounding, that is, before the widest gap near `OPEN`."""
+    """Number of singular values (descending) before the widest gap near `OPEN`; smaller ones are rounding errors."""
     largest = values[0] if values.size else 0.0
     if largest == 0.0:
         return 0
@@ -93,7 +93,7 @@ def numerical_rank(values: Array) -> int:
 def gauge_of(
     triangle: Array, parameters: Parameters, values: Array, robot: Robot, sensors: Sensors
 ) -> tuple[Direction, ...]:
-    """Unobservable directions of the unknowns, each with its name; along these the values follow from the priors."""
+    """Unobservable directions of the unknowns, with names; only the priors determine the values along them."""
     frame = prior_units(parameters)
     size = np.linalg.norm(triangle, axis=0) * frame.scale
     alone = [int(index) for index in frame.free if size[index] <= OPEN * size.max()]
@@ -128,7 +128,7 @@ def _direction(name: str, vector: Array, step: str, frame: PriorUnits) -> Direct
 def _symmetric_part(
     left: Array, frame: PriorUnits, where: Indices, known: Symmetries
 ) -> tuple[Array, list[tuple[str, str]]]:
-    """Symmetries among the unobservable directions, (P, d), with names and steps."""
+    """Symmetries within the span of the unobservable directions (P, d), with names and steps."""
     vectors, shares = _admissible_symmetries(frame, where, known)
     if not vectors.shape[1] or not left.shape[1]:
         return np.zeros((len(frame.scale), 0)), []
@@ -143,8 +143,8 @@ def _symmetric_part(
 def _admissible_symmetries(frame: PriorUnits, where: Indices, known: Symmetries) -> tuple[Array, Array]:
     """Combinations of symmetries that change only unknowns: vectors (P, k), and coefficients of the symmetries (g, k).
 
-    Both are in standard deviations. Known values do not change, and shared values change together. The drums pay out
-    the lengths that the symmetries require.
+    Both are in standard deviations. Known values do not change, and values that all cables share change equally. Zeros
+    and radii of the drums change so that the drums pay out the required lengths.
     """
     free = np.isin(where, frame.free)
     conditions = [known.table[known.matters & ~free], known.lengths]
@@ -188,7 +188,7 @@ def _echelon(rows: Array) -> Array:
 
 
 def _named(shares: Array, known: Sequence[Generator]) -> tuple[str, str]:
-    """Name and step of a combination of symmetries: step of the first one, names of it and of others except shifts."""
+    """Name and step of a combination of symmetries: step of the first symmetry, names without later shifts."""
     size = np.abs(shares)
     taken = [known[index] for index in map(int, np.flatnonzero(size > _SAME * size.max()))]
     first = taken[0]
@@ -197,7 +197,7 @@ def _named(shares: Array, known: Sequence[Generator]) -> tuple[str, str]:
 
 
 def _sparse(basis: Array) -> Array:
-    """Sparse basis of the same span, as columns."""
+    """Sparse basis of the span of some columns, as columns."""
     return _echelon(basis.T).T if basis.size else basis
 
 

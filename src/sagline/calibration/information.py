@@ -1,4 +1,4 @@
-"""Information of poses on the parameters, D-optimal choice of poses, and recommended measurements."""
+"""Information about the parameters from poses, D-optimal choice of poses, and recommended measurements."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from sagline.core.arrays import Array, Indices
 from sagline.core.numbers import n
 from sagline.robot.robot import Robot
 
-FEW: Final = 8  # readings per parameter above which exchanges reduce errors by less than 1 %
-OPEN: Final = 1e-12  # relative to the largest singular value: directions with a smaller one are unobservable
-ROUNDING: Final = 1e-6  # parameters with a smaller share of a direction's square do not belong to it
+FEW: Final = 8  # largest number of readings per parameter for exchanges; with more, they reduce errors by less than 1 %
+OPEN: Final = 1e-12  # a direction with a smaller singular value, relative to the largest, is unobservable
+ROUNDING: Final = 1e-6  # a parameter with a smaller share of the square of a direction does not belong to the direction
 CONDITION: Final = 1e-13  # smallest prior relative to the information of all candidates; rounding hides smaller ones
 _WORTH: Final = 1e-9  # smallest increase of the log det by an exchange; smaller ones are rounding
 
 
 class Information:
-    """Information of some of N candidates on P parameters, each candidate with k whitened rows.
+    """Information about P parameters from the chosen ones of N candidates, each with k whitened rows.
 
     Attributes:
         rows: Derivatives of the readings with respect to the internal parameters, shape (N, k, P).
@@ -33,7 +33,7 @@ class Information:
     """
 
     def __init__(self, rows: Array, known: Array) -> None:
-        """Begin without candidates; known: inverse of the prior covariance (P, P)."""
+        """Start with no chosen candidate; known: inverse of the prior covariance (P, P)."""
         self.rows = rows
         self.chosen: list[int] = []
         self._known = known
@@ -63,7 +63,7 @@ class Information:
         self.chosen.append(candidate)
 
     def leave(self, candidate: int) -> None:
-        """Remove a candidate; the sum is computed again, because rounding would hide a difference."""
+        """Remove a candidate. The sum is computed again, because a subtraction would have large rounding errors."""
         self.chosen.remove(candidate)
         self.covariance, self._heard = self._recompute()
 
@@ -75,7 +75,7 @@ class Information:
 
 
 def prior_information(rows: Array) -> Array:
-    """Prior information (P, P) in units of the priors: 1, or the rounding error of the observations if larger."""
+    """Prior information (P, P) in units of the priors: identity, or the rounding error of the rows if it is larger."""
     return np.eye(rows.shape[-1]) * max(1.0, CONDITION * float((rows**2).sum()))
 
 
@@ -84,8 +84,8 @@ class Choice(NamedTuple):
 
     Attributes:
         order: Their indices, shape (count,).
-        gain: Increase of the log det of the information by the first k of them, shape (count,).
-        deviation: Standard deviations of the parameters by prior and the first k, shape (count, P).
+        gain: Increase of the log det of the information by the first k candidates, shape (count,).
+        deviation: Standard deviations of the parameters from the priors and the first k candidates, shape (count, P).
     """
 
     order: Indices
@@ -94,10 +94,10 @@ class Choice(NamedTuple):
 
 
 def choose_informative(rows: Array, known: Array, count: int) -> Choice:
-    """D-optimal choice of `count` candidates: greedy; exchanges then improve small choices.
+    """D-optimal choice of `count` candidates: a greedy choice, and for few candidates an improvement by exchanges.
 
-    The greedy choice alone reaches at least the share 1 - 1/e of the best one, because log det is submodular
-    (Nemhauser, Wolsey & Fisher 1978); exchanges after Fedorov 1972.
+    The increase of log det by the greedy choice is at least 1 - 1/e of the largest possible one, because log det is
+    submodular (Nemhauser, Wolsey & Fisher 1978). The exchanges follow Fedorov 1972.
     """
     found = Information(rows, known)
     for _ in range(count):
@@ -124,9 +124,9 @@ def _exchange(found: Information) -> None:
 
 
 def deviations_of(rows: Array, held: Array) -> Array:
-    """Standard deviations (P,) from whitened slopes (..., P) and inverse prior deviations (P,); infinite if open."""
+    """Standard deviations (P,) from whitened slopes and inverse prior deviations (P,); infinite if unobserved."""
     whole = np.concatenate((rows.reshape(-1, len(held)), np.diag(held)))
-    _, size, vectors = np.linalg.svd(np.linalg.qr(whole, mode="r"))  # without J^T J, whose condition number is squared
+    _, size, vectors = np.linalg.svd(np.linalg.qr(whole, mode="r"))  # J^T J would square the condition number
     there = size > OPEN * size[0]
     variance = ((vectors[there] / size[there, None]) ** 2).sum(axis=0)
     left = (vectors[~there] ** 2).sum(axis=0)
@@ -142,12 +142,12 @@ def information_of(rows: Array) -> Array:
 
 TOTAL_STATION: Final = 1e-3  # standard deviation of each coordinate [m]
 CELL_SHARE: Final = 0.01  # standard deviation of a typical load cell, relative to the median tension
-NEARLY: Final = 0.9  # share of the largest decrease of the log errors that is sufficient for a cheaper measurement
+NEARLY: Final = 0.9  # a cheaper measurement is recommended with this share of the largest decrease of the log errors
 WORTH: Final = 0.99  # largest remaining share of the errors for a recommendation
 
 
-# by kind: the measurement, its standard deviation in the unit of the kind, and True if the deviation is a share of the
-# value
+# for each kind: name of the measurement, its standard deviation in the unit of the kind, True if the deviation is a
+# share of the value
 TOOLS: Final[dict[str, tuple[str, float, bool]]] = {
     "mass": ("weighing the platform to 0.1 %", 1e-3, True),
     "linear_density": ("weighing a length of the cable to 1 %", 0.01, True),
@@ -161,7 +161,7 @@ Option = tuple[str, Array]  # text of a measurement, and the information with it
 
 
 class Situation(NamedTuple):
-    """Information on the parameters after the poses.
+    """Information about the parameters after the measurements at the chosen poses.
 
     Attributes:
         robot: The robot.
@@ -198,7 +198,7 @@ class Situation(NamedTuple):
 
 
 def most_helpful(situation: Situation) -> str:
-    """Sentence with the recommended measurement, which reduces the mean log error most."""
+    """Sentence about the recommended measurement: the one that reduces the mean log error most."""
     before = _deviations(situation.information)
     best: Option | None = None
     most = -np.log(WORTH)
@@ -256,10 +256,10 @@ def _measured_positions(situation: Situation) -> Iterator[Option]:
 def _best_subset(
     situation: Situation, rows: Array, beside: Array, words: dict[int, str], instead: Array | None = None
 ) -> Iterator[Option]:
-    """Most informative subset of some rows, for each number of rows with a text.
+    """Most informative measurements, for each number of measurements in `words`.
 
-    rows: information of each measurement alone; beside: information that is added; instead: readings that the
-    measurements replace.
+    rows: whitened rows of each measurement alone; beside: rows to add for a measurement; instead: rows to remove for
+    it.
     """
     found = Information(rows, situation.information)
     for _ in range(min(max(words), len(rows))):
@@ -284,7 +284,7 @@ def _largest_reduction(situation: Situation, before: Array, after: Array) -> str
     unit = situation.parameters.units[int(np.argmax(mine))]
     size = situation.scale * np.abs(situation.slopes)
     one, other = (error_text(float(np.sqrt(np.mean((each * size)[mine] ** 2))), unit) for each in (before, after))
-    return f"those of {name} fall from {one} to {other}"
+    return f"the errors of {name} fall from {one} to {other}"
 
 
 def error_text(value: float, unit: str) -> str:

@@ -1,7 +1,8 @@
-"""The least squares of a calibration: Gauss-Newton method with exact cables; true lengths are eliminated pose by pose.
+"""Least squares of a calibration: Gauss-Newton method with exact cables.
 
-The objective consists of three sums: ((reading - prediction)/sigma)^2 and ((length - reported length)/sigma_L)^2 over
-the poses, and ((value - prior)/deviation)^2 over the internal parameters; docs/model.md, section 14.
+True lengths are eliminated at every pose. The objective has three sums. The sums over the poses are of ((reading -
+prediction)/sigma)^2 and of ((length - reported length)/sigma_L)^2. The sum over the internal parameters is of ((value -
+prior)/deviation)^2. See docs/model.md, section 14.
 """
 
 from __future__ import annotations
@@ -41,15 +42,15 @@ from sagline.kernels.calibration.terms import PoseReadings
 from sagline.kinematics.forward_rows import solve_forward_rows
 from sagline.robot.robot import Robot
 
-SIGNIFICANT: Final = 1e-13  # relative to the largest eigenvalue: smaller eigenvalues count as zero
+SIGNIFICANT: Final = 1e-13  # eigenvalues that are smaller, relative to the largest, count as zero
 STEPS: Final = 60
 HALVINGS: Final = 12
-TOLERANCE: Final = 1e-5  # relative decrease of the sum of squares; ends within 3e-3 standard deviations of the minimum
+TOLERANCE: Final = 1e-5  # relative decrease of the sum of squares; the result is within 3e-3 standard deviations
 ROUNDING: Final = 1e-12  # relative rounding error of the sum of squares
-QUANTILE: Final = 0.99  # quantile of the chi squared of a pose, above which the pose has less weight
+QUANTILE: Final = 0.99  # quantile of chi squared: a pose with a larger sum of squares has less weight
 NEARLY: Final = 1e-3  # sufficient relative decrease of the sum of squares if rounding hides further decrease
-GROSS: Final = 0.1  # weight of a pose that would spoil the first step
-LESS: Final = 0.9  # the weights are computed again if the misfit scale falls below this share of its last value
+GROSS: Final = 0.1  # initial weight of a pose with a much too large sum of squares
+LESS: Final = 0.9  # the weights are updated if the misfit scale falls below this share of its last value
 
 
 def whitened_at(
@@ -63,8 +64,9 @@ def whitened_at(
 ) -> WhitenedRows:
     """Whitened readings of some poses at a state, with their slopes; reported: lengths [m], (n, m).
 
-    With a direction (P,), only the slopes along it are computed. `free_of_noise` takes slopes at the true lengths. At
-    the reported lengths the scale of all lengths would seem observable, because it also scales the noise.
+    If `direction` (P,) is given, only the slopes along it are computed. With `free_of_noise`, the slopes are those at
+    the true lengths. At the reported lengths, the scale of all lengths would seem observable, because it also scales
+    the noise.
     """
     log, parameters, machine = problem.log, problem.parameters, state.machine
     counts, along = (None if log.counts is None else log.counts[part]), reported
@@ -96,12 +98,12 @@ def _squares_of(sensors: Sensors, rows: WhitenedRows, reported: Array, lengths: 
 
 
 def _limits_of(readings: Indices, scale: float) -> Array:
-    """Sums of squares above which poses have less weight, (N,): quantile of chi squared times a scale."""
+    """Largest sums of squares of poses with full weight, (N,): quantile of chi squared times a scale."""
     return np.asarray(scale * exceeded_with(1.0 - QUANTILE, readings))
 
 
 def _pose_weights(squares: Array, readings: Indices, scale: float) -> Array:
-    """Weights of poses: less than 1 beyond the 99 % quantile of chi squared times a scale."""
+    """Weights of poses: less than 1 if the sum of squares exceeds the 99 % quantile of chi squared times a scale."""
     if not np.isfinite(scale):
         return np.ones(len(squares))
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -129,7 +131,7 @@ def predict_state(
 ) -> tuple[Array, Array]:
     """First-order prediction of true lengths [m] and pose rows of some poses after a step of the parameters (P,).
 
-    known: whitened readings before the step, if stored. machine, reported (n, m) [m]: values after the step.
+    known: whitened readings before the step, if they were stored. machine, reported (n, m) [m]: values after the step.
     """
     if known is not None:
         off = np.einsum("nij,nj->ni", known.back, known.misfit - known.matrix @ step)
@@ -153,8 +155,8 @@ def evaluate_step(
 ) -> Evaluated:
     """One pass over the log: solve every pose after a step of the parameters, and sum the normal equations.
 
-    Without a step, the state itself is evaluated. Poses with more than `scale` times the expected squares have less
-    weight. Raises an error if the parameters are invalid for the robot.
+    Without a step, the state itself is evaluated. Poses with a sum of squares above `scale` times the expected value
+    have less weight. Raises an error if the parameters are invalid for the robot.
     """
     numbers = before.numbers if step is None else np.maximum(before.numbers + step, problem.least)
     machine = before.machine if step is None else machine_at(problem, numbers)
@@ -188,7 +190,7 @@ def evaluate_step(
 
 
 def _cost_of(problem: FitProblem, current: Evaluated, kept: Flags, scale: float) -> float:
-    """Objective function; infinite if a pose with weight has no equilibrium."""
+    """Value of the objective function; infinite if one of the used poses has no equilibrium."""
     state, normal = current
     squares = normal.squares[kept]
     if np.isfinite(scale):
@@ -266,7 +268,7 @@ def _lowest(matrix: Array, downhill: Array, *, positive: bool) -> Array:
     if positive:
         try:
             return np.asarray(cho_solve(cho_factor(matrix), downhill))
-        except LinAlgError:  # rounding hides the priors beside the readings
+        except LinAlgError:  # the readings are so informative that rounding hides the priors
             pass
     values, vectors = _significant_eigenpairs(matrix)
     return np.asarray(vectors @ ((vectors.T @ downhill) / values))
@@ -274,7 +276,7 @@ def _lowest(matrix: Array, downhill: Array, *, positive: bool) -> Array:
 
 def _lowest_within(matrix: Array, downhill: Array, lower: Array) -> Array:
     """Minimizer of x^T M x - 2 b^T x with x >= lower (P,); lower is zero or negative."""
-    from scipy.optimize import lsq_linear  # rarely needed, and the import takes a quarter of a second
+    from scipy.optimize import lsq_linear  # imported here, because it is rarely needed and takes a quarter of a second
 
     values, vectors = _significant_eigenpairs(matrix)
     root = np.sqrt(values)
@@ -295,7 +297,7 @@ def exceeded_with(probability: Any, freedoms: Any) -> Array:
 
 
 def _move_poses(before: Robot, after: Robot, poses: Array, motion: Array) -> Array:
-    """Pose rows after small motions of the center of mass (N, 6) [m, rad]; its location may differ in `after`."""
+    """Pose rows after small motions of the center of mass (N, 6) [m, rad]; the robots may have different centers."""
     turned = Rotation.from_quat(poses[:, 3:])
     turning = Rotation.from_rotvec(motion[:, 3:]) * turned
     first, last = (np.array(robot.center_of_mass) for robot in (before, after))  # scipy needs writable arrays

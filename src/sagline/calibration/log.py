@@ -17,7 +17,7 @@ from sagline.core.results import Result, Saved
 from sagline.robot.pose import Pose, PoseLike, single_pose, unit
 from sagline.robot.robot import Robot
 
-LENGTH_DEVIATION = 5e-4  # [m], typical for a length off a grooved drum with rope
+LENGTH_DEVIATION = 5e-4  # [m], typical error of the length of a fiber rope on a grooved drum
 
 
 def _world_if_none(frame: PoseLike | None) -> PoseLike:
@@ -54,14 +54,14 @@ class Sensors(_Replaceable):
     """Accuracy of a robot's sensors, and the pose of its measuring system.
 
     Attributes:
-        length_deviation: Standard deviation of a counted or reported length off a drum [m], > 0, shape () or (m,).
+        length_deviation: Standard deviation of the lengths off the drums [m], > 0, shape () or (m,).
         tension_deviation: Standard deviation of a load cell [N], > 0, shape () or (m,); None without load cells.
         position_deviation: Standard deviation of each coordinate of a measured position [m], > 0, shape () or (3,),
             along the axes of the measuring system; None if positions are not measured.
-        rotation_deviation: Standard deviation of a measured rotation about each axis [rad], > 0, shape () or (3,); None
+        rotation_deviation: Standard deviation of measured rotations about each axis [rad], > 0, shape () or (3,); None
             if rotations are not measured.
-        frame: Pose of the measuring system in the world: a point with measured coordinates p is at frame.position +
-            frame.matrix p. None for the axes of the world.
+        frame: Pose of the measuring system in the world; None for the axes of the world. A point with measured
+            coordinates p has the world coordinates frame.position + frame.matrix p.
         target: The point of the platform whose position is measured, platform frame [m], shape (3,).
 
     Raises:
@@ -107,12 +107,12 @@ def reading_deviations(sensors: Sensors, cables: int) -> Array:
 
 
 def load_cells_of(robot: Robot) -> tuple[Array | float, Array | float]:
-    """Gain of a robot's load cells and their bias [N], (m,) or a number; ideal values without winches."""
+    """Gain and bias [N] of a robot's load cells, (m,) or a number; gain 1 and bias 0 if the robot has no winches."""
     return (1.0, 0.0) if robot.winches is None else (robot.winches.load_cell_gain, robot.winches.load_cell_bias)
 
 
 _BY_ROW = ("counts", "unstrained_length", "load_cells", "position", "rotation", "time", "commanded")
-_UNIT = 1e-6  # tolerance of the length of a quaternion, sufficient for printed quaternions of seven digits
+_UNIT = 1e-6  # tolerance of the norm of a quaternion; sufficient for quaternions that are printed with seven digits
 
 
 @frozen(eq=False, repr=False, weakref_slot=False)
@@ -121,7 +121,7 @@ class WinchLog(_Replaceable, Saved):
 
     Attributes:
         counts: Encoder counts, shape (N, m), or None. Either counts or lengths are given, not both. A calibration omits
-            rows without the counts of all cables.
+            rows with a missing count.
         unstrained_length: Reported lengths off the drums [m], shape (N, m), or None.
         load_cells: Readings of the load cells at the frame ends [N], may be negative, shape (N, m), NaN if missing; or
             None.

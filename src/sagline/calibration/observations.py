@@ -1,4 +1,4 @@
-"""Readings at equilibria: residuals and their derivatives by the parameters, and lengths at encoder counts."""
+"""Predicted readings at equilibria: residuals, their derivatives by the parameters, and lengths at encoder counts."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from sagline.robot.robot import Robot
 from sagline.robot.winch import Winch
 from sagline.statics.tables import body_table, cable_table, pose_rows
 
-STEP: Final = 1e-4  # relative step of a drum radius or zero for difference quotients, which are nearly linear
+STEP: Final = 1e-4  # relative step of a drum radius or zero for difference quotients; lengths are nearly linear in both
 SLOPES: Final = 3  # length_zero, drum_radius and axial_stiffness, in the order of `kernels.calibration.observe`
-BLOCK: Final = 1 << 9  # number of poses per kernel call: some 10 MB
+BLOCK: Final = 1 << 9  # number of poses per kernel call; this takes about 10 MB
 NO_LOAD: Final = locked(np.zeros((1, 6)))  # only cable forces and weight act on the platform
 
 
@@ -74,24 +74,24 @@ def winch_slopes(robot: Robot, parameters: Parameters, counts: Array | None, len
 
 
 def _known_field(of: Winch | Cable, name: str) -> Array:
-    """Value of a field that `drums_of` has checked."""
+    """Value of a field, without None, because `drums_of` has checked it."""
     return np.asarray(getattr(of, name))
 
 
 class WhitenedRows(NamedTuple):
-    """Whitened observations at N equilibria: independent rows of one standard deviation each.
+    """Whitened observations at N equilibria: the rows are independent, each with a standard deviation of 1.
 
-    R is m + 6, or m if no system measures positions or rotations.
+    The number of rows R of a pose is m + 6, or m if neither positions nor rotations are measured.
 
     Attributes:
-        matrix: Derivatives by the internal parameters (logarithms where `logarithmic`), with adapted true lengths, (N,
-            R, P); rows without a reading are zero.
+        matrix: Derivatives by the internal parameters, with adapted true lengths, (N, R, P); rows without a reading are
+            zero. The internal parameter is the logarithm where `logarithmic` is True.
         misfit: Readings minus predictions, (N, R).
         residual: Residuals in physical units [N, m, rad] at the given lengths, (N, m + 6); NaN if missing.
-        back: Change of the true lengths [m] by a misfit, (N, m, R).
-        motion: Motion of the platform about its center of mass [m, rad], world axes. It has one row per true length,
-            and a last row for the step along a direction with adapted lengths, (N, m + 1, 6). Without a direction it
-            has no rows.
+        back: Change of the true lengths [m] per unit of misfit, (N, m, R).
+        motion: Motion of the platform about its center of mass [m, rad], world axes, (N, m + 1, 6). The first m rows
+            are per true length. The last row is for a step along a direction, with adapted lengths. There are no rows
+            without a direction.
     """
 
     matrix: Array
@@ -102,7 +102,7 @@ class WhitenedRows(NamedTuple):
 
 
 def _locked_view(array: Array) -> Array:
-    """Write-locked contiguous view of an array, the form for which the kernels are compiled."""
+    """Write-locked contiguous view of an array; the kernels are compiled for such arrays."""
     return locked(np.ascontiguousarray(array).view())
 
 
@@ -154,8 +154,8 @@ class MachineTerms(NamedTuple):
 def machine_of(
     robot: Robot, model: CableModel, parameters: Parameters, sensors: Sensors, offset: Array
 ) -> MachineTerms:
-    """A robot and its sensors in the form of the kernel; an error if counts are read and drum data are missing."""
-    # pulley radii and dead lengths that are unknowns have slopes, even if their values in the robot are zero
+    """A robot and its sensors in the form of the kernel; raises an error if drum data for counts are missing."""
+    # unknown pulley radii and dead lengths need slopes, although their values in the robot may be zero
     routed = has_routing(robot) or bool((parameters.where[[kinds.RADIUS, kinds.DEAD]] >= 0).any())
     return MachineTerms(
         robot,
@@ -181,8 +181,8 @@ def whitened_rows(
 ) -> WhitenedRows:
     """Readings near equilibria to first order; NaN where the platform is not stable.
 
-    slopes: derivatives of reported lengths (3, N, m), by `winch_slopes`. With a direction (P,), only the
-    slopes along it, P = 1.
+    slopes: derivatives of reported lengths (3, N, m) from `winch_slopes`. If `direction` (P,) is given, only the slopes
+    along it are computed, and P is 1 in the result.
     """
     count, m = lengths.shape
     factor, width = machine.slopes, len(parameters.names)
@@ -220,7 +220,7 @@ def whitened_rows(
 def predicted_rows(
     robot: Robot, model: CableModel, parameters: Parameters, sensors: Sensors, poses: Array, lengths: Array
 ) -> WhitenedRows:
-    """Slopes of readings of these sensors at equilibria: pose rows and unstrained lengths (N, m) [m]; zero misfit."""
+    """Slopes of readings at equilibria, given by pose rows and unstrained lengths (N, m) [m]; the misfit is zero."""
     machine = machine_of(robot, model, parameters, sensors, np.zeros(robot.cable_count))
     counts = None if machine.drums is None else counts_at(machine.drums, lengths)
     slopes, count = winch_slopes(robot, parameters, counts, lengths), len(lengths)
@@ -230,18 +230,18 @@ def predicted_rows(
     return rows._replace(misfit=np.where(np.isnan(rows.misfit), np.nan, 0.0))
 
 
-_EXACT: Final = 1e-10  # [m], a deviation of lengths that is too small to affect the whitening
+_EXACT: Final = 1e-10  # [m], deviation of lengths; it is too small to have an effect on the whitening
 
 
 def _unit_sensors(sensors: Sensors) -> Sensors:
-    """Sensors with all readings at a deviation of 1 in SI units, and exact lengths."""
+    """Sensors for all readings, each with a standard deviation of 1 in SI units, and with exact lengths."""
     return Sensors(_EXACT, 1.0, 1.0, 1.0, frame=sensors.frame, target=sensors.target)
 
 
 def unwhitened_slopes(
     robot: Robot, model: CableModel, parameters: Parameters, sensors: Sensors, poses: Array, lengths: Array
 ) -> tuple[Array, Array]:
-    """Slopes of load cells, position and rotation in SI units by values (N, m + 6, P) and lengths (N, m + 6, m)."""
+    """Derivatives of load cells, position, rotation in SI units: by values (N, m + 6, P), by lengths (N, m + 6, m)."""
     count, m = lengths.shape
     by_values, by_length = np.empty((count, m + 6, len(parameters.names))), np.empty((count, m + 6, m))
     for part in blocks(count, BLOCK):
@@ -257,7 +257,7 @@ class Reference(NamedTuple):
     Attributes:
         model: Cable model.
         machine: The robot with its sensors, in the form of the kernel.
-        parameters: Placeholder, whose slopes are not used.
+        parameters: Parameters that the kernel requires; their slopes are not used.
     """
 
     model: CableModel

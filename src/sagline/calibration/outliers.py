@@ -1,4 +1,4 @@
-"""Outliers: poses that do not fit the rest, and the wrong length, load cell or measured pose at them."""
+"""Outliers: poses that do not fit the other poses, and the wrong length, load cell or measured pose at such a pose."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.kernels.calibration.terms import PoseReadings
 from sagline.kinematics.forward_rows import solve_forward_rows
 
-CHANCE: Final = 0.01  # probability of one outlier among all poses of a log without errors
-EXAMINED: Final = 100  # largest number of examined poses; if more are bad, the calibration is wrong
-_MOST: Final = 3  # largest number of errors at one pose; with more errors, the whole pose is the outlier
-_CLEAR: Final = 3.0  # smallest difference in log probability of distinguishable explanations
-_REST: Final = 0.1  # allowance for errors of the calibration, relative to the squares that one error explains
-_WORTH: Final = 20.0  # first-order difference in log probability above which explanations are not computed exactly
-_NONLINEAR: Final = 0.6  # ratio of squares: linear improvement that is sufficient for an exact fit of large errors
+CHANCE: Final = 0.01  # probability that a log without errors has an outlier by chance
+EXAMINED: Final = 100  # largest number of examined poses; if more poses do not fit, the calibration is wrong
+_MOST: Final = 3  # largest number of single errors at one pose; with more errors, the whole pose is the outlier
+_CLEAR: Final = 3.0  # two explanations are distinguishable if their log probabilities differ by more than this
+_REST: Final = 0.1  # allowance for errors of the calibration, relative to the decrease of the squares by one error
+_WORTH: Final = 20.0  # an explanation is not computed exactly if its linear log probability is lower by more than this
+_NONLINEAR: Final = 0.6  # ratio of squares after and before a linear fit below which large errors are fitted exactly
 _DROP: Final = 500.0  # quantile of chi squared
 _ITERATIONS: Final = 10
 _QUANTITIES: Final = ("length", "load cell", "position", "rotation")
@@ -38,7 +38,7 @@ class _Suspect(NamedTuple):
     Attributes:
         quantity: Quantity of the `Outlier`.
         cable: Index of the cable, or None.
-        which: Indices among 2 m + 6 of the lengths and readings that the error changes.
+        which: Indices of the changed lengths and readings among all 2 m + 6.
     """
 
     quantity: str
@@ -47,7 +47,7 @@ class _Suspect(NamedTuple):
 
 
 class _SuspectFit(NamedTuple):
-    """Best fit of a pose if the errors of the suspects are free.
+    """Best fit of a pose if the suspects may have any errors.
 
     Attributes:
         squares: Remaining sum of squares.
@@ -86,7 +86,7 @@ class _Case(NamedTuple):
 
 
 def _fit_suspects(case: _Case, taken: Sequence[_Suspect], iterations: int) -> _SuspectFit:
-    """Best fit of a pose with free errors of the suspects, linear for one iteration, else nonlinear."""
+    """Best fit of a pose if the suspects may have any errors; a linear fit if the number of iterations is 1."""
     which = np.concatenate([one.which for one in taken]).astype(np.int64) if taken else np.zeros(0, dtype=np.int64)
     counts = np.concatenate((np.ones(case.lengths.shape[1], dtype=np.bool_), case.read))
     counts[which] = False
@@ -103,14 +103,14 @@ def _fit_suspects(case: _Case, taken: Sequence[_Suspect], iterations: int) -> _S
 
 
 def _squares(case: _Case, counts: Flags) -> float:
-    """Sum of squares of the terms without suspects."""
+    """Sum of squares of all terms except those of the suspects."""
     return float(np.sum((case.misses()[0] / case.deviation)[counts] ** 2))
 
 
 def _linear_fit(
     case: _Case, taken: Sequence[_Suspect], which: Indices, counts: Flags
 ) -> tuple[_SuspectFit, Array, float]:
-    """Best linear fit, its true lengths (m,), and the sum of squares before it."""
+    """Best linear fit, its true lengths (m,), and the sum of squares before the fit."""
     misses, by_length = case.misses()
     m, read = case.lengths.shape[1], case.read
     slopes, variance = by_length[read], case.deviation[:m] ** 2
@@ -135,7 +135,7 @@ def _linear_fit(
 
 
 def _improved(case: _Case, counts: Flags, wanted: Array, squares: float) -> _Case | None:
-    """Case with a smaller sum of squares at lengths between the present and the target ones; None if not found."""
+    """Case with a smaller sum of squares, at lengths between the present lengths and `target`; None if not found."""
     reference = case.reference
     for halving in range(_HALVINGS):
         lengths = case.lengths + 0.5**halving * (wanted - case.lengths)
@@ -152,7 +152,7 @@ def _improved(case: _Case, counts: Flags, wanted: Array, squares: float) -> _Cas
 
 
 def misfitting(squares: Array, readings: Indices) -> Indices:
-    """Increasing indices of poses that chance does not explain, at most `EXAMINED`; squares (N,), NaN if unused."""
+    """Indices of at most `EXAMINED` poses that fit worse than by chance; squares: (N,), NaN for unused poses."""
     known = np.where(np.isfinite(squares), squares, 0.0)
     bad = np.flatnonzero(known > exceeded_with(CHANCE / max(len(squares), 1), readings))
     return np.sort(bad[np.argsort(-known[bad], kind="stable")][:EXAMINED])
@@ -163,9 +163,9 @@ def outliers_in(
 ) -> tuple[Outlier, ...]:
     """Causes of misfit at some poses of a search, in the order of the rows of the log.
 
-    For every length, load cell, measured position or rotation of a pose, the best-fitting error is computed. The error
-    that explains most of the misfit is taken first, then the one that explains most of the rest. If several cables
-    explain the misfit equally well, or no cable does, the whole pose is the outlier.
+    For every length, load cell, measured position or rotation of a pose, the best-fitting error is computed. The first
+    error is the one that explains most of the misfit, the second error explains most of the remaining misfit. If
+    several cables or no cable can explain the misfit, the whole pose is the outlier.
     """
     log, machine, m = problem.log, state.machine, state.lengths.shape[1]
     reported = reported_lengths(problem, machine, slice(None))
@@ -195,7 +195,7 @@ def _outliers_at(case: _Case, row: int, count: int) -> list[Outlier]:
         fits = [_fit_suspects(case, (*taken, one), _ITERATIONS) for one in close]
         if min(fit.squares for fit in fits) > _limit(
             case.read, (*taken, close[0]), count
-        ):  # no suspect explains the readings, or the linear fits were inaccurate
+        ):  # no suspect explains the readings, possibly because the linear fits were inaccurate
             likely = ~near_best & (np.array([fit.squares for fit in first]) < _NONLINEAR * before)
             more = [suspects[k] for k in np.flatnonzero(likely)]
             fits += [_fit_suspects(case, (*taken, one), _ITERATIONS) for one in more]
@@ -220,13 +220,13 @@ def _outliers_at(case: _Case, row: int, count: int) -> list[Outlier]:
 
 
 def _limit(there: Flags, taken: Sequence[_Suspect], count: int) -> float:
-    """Largest sum of squares that chance explains for the worst of `count` poses, without some suspects."""
+    """Largest sum of squares by chance for the worst of `count` poses, without the terms of the suspects."""
     used = sum(len(one.which) for one in taken)
     return float(exceeded_with(CHANCE / count, int(there.sum()) - used))
 
 
 def _rarity(before: float, after: _SuspectFit, suspect: _Suspect) -> float:
-    """Log probability of an improvement of the fit by this amount by chance alone."""
+    """Log probability that chance alone improves the fit by this amount."""
     half, drop = 0.5 * len(suspect.which), max(before - after.squares, 0.0)
     if drop < _DROP:
         return float(np.log(chdtrc(len(suspect.which), drop)))
@@ -244,7 +244,7 @@ def _suspects(m: int, there: Flags) -> list[_Suspect]:
 
 
 def _whole(case: _Case, row: int, squares: float) -> Outlier:
-    """Outlier for the whole pose, with the kind of reading of the largest error."""
+    """Outlier for the whole pose; its quantity is the kind of reading with the largest error."""
     m = case.lengths.shape[1]
     off, _ = case.misses()
     parts = (slice(0, m), slice(m, 2 * m), slice(2 * m, 2 * m + 3), slice(2 * m + 3, 2 * m + 6))

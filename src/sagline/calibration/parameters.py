@@ -22,13 +22,13 @@ class _Kind(NamedTuple):
     """A kind of unknown.
 
     Attributes:
-        owner: Part of the robot with this field: "robot", "cables" or "winches"; "system" for the measuring system.
+        owner: Object that has the field: "robot", its "cables" or "winches", or the measuring "system".
         unit: Its unit in SI.
         first: First row of the kind in `kernels.calibration.kinds`.
         axes: Names of its components, ("",) for a single number.
         each: True if every cable has its own value.
         shared: True if all cables share one value by default.
-        logarithmic: True if the logarithm is estimated: a positive value with a relative deviation.
+        logarithmic: True if the logarithm is estimated, because the value is positive and its deviation is relative.
         deviation: Standard deviation of a value from a drawing or data sheet, relative if logarithmic.
         assumed: Standard deviation of a value that is missing in the robot's source.
         needs: The readings that observe the kind: "counts", "load cells", "positions"; "" for any readings.
@@ -76,9 +76,9 @@ class Unknown:
     Attributes:
         name: Name of a kind in `KINDS`.
         shared: True if the cables share one value; None for the default of the kind.
-        deviation: Standard deviation of the robot's value, in the unit of the kind (a share of the value for drum
-            radius, linear density, axial stiffness and mass); infinite without a prior; None for the robot's tolerance
-            if it has one, otherwise the usual deviation of the kind.
+        deviation: Standard deviation of the robot's value, in the unit of the kind; for drum radius, linear density,
+            axial stiffness and mass, as a share of the value. Infinite without a prior. None for the robot's tolerance
+            or, if it has none, the usual deviation of the kind.
     """
 
     name: str
@@ -109,12 +109,13 @@ class Parameters(Result):
         labels: Name of each parameter, for example "frame_anchors[3].x", "axial_stiffness", "measuring_frame.about z".
         units: Unit of each parameter.
         cables: Cable of each parameter, or -1 for a parameter of all cables or of the platform.
-        where: Index of the parameter of each row of `kernels.calibration.kinds` and cable, (KIND_ROWS, m), -1 for none.
+        where: Index of the parameter for each row of `kernels.calibration.kinds` and each cable, (KIND_ROWS, m); -1 if
+            it is not an unknown.
         prior: Prior values, in the units of the parameters, (P,).
         prior_deviation: Standard deviations of the priors, in the same units, (P,); infinite without a prior.
         stated: True where the robot's tolerances or the caller give the prior, (P,).
         logarithmic: True where the logarithm is estimated, (P,).
-        counted: True if encoders count turns of drums; otherwise lengths are reported, and length_zero is their offset.
+        counted: True if the readings are encoder counts; otherwise they are lengths, and length_zero is their offset.
     """
 
     names: tuple[str, ...]
@@ -133,7 +134,7 @@ _NOTHING: Final = {"load_cell_gain": "1", "load_cell_bias": "0 N", "dead_cable":
 
 
 def parameters_of(robot: Robot, unknowns: Sequence[str | Unknown], sensors: Sensors, *, counted: bool) -> Parameters:
-    """Parameters of some kinds of unknowns in their order; within a kind, by cable and axis.
+    """Parameters of the unknowns, in the order of the unknowns; parameters of one unknown are sorted by cable and axis.
 
     Raises an error for a repeated unknown, for a value that the robot lacks, and for an unknown with neither a reading
     nor a stated prior.
@@ -168,7 +169,7 @@ def checked_unknowns(unknowns: Sequence[str | Unknown]) -> list[Unknown]:
     found = [Unknown(one) if isinstance(one, str) else instance(one, Unknown, "unknown") for one in items]
     names = [one.name for one in found]
     if twice := [name for name in names if names.count(name) > 1]:
-        raise InvalidValueError("unknowns", f"{twice[0]} twice", "each once", "Leave one out.")
+        raise InvalidValueError("unknowns", f"{twice[0]} twice", "each once", "Name every unknown once.")
     return found
 
 
@@ -261,7 +262,7 @@ def external(parameters: Parameters, numbers: Array) -> Array:
 
 
 def slopes_of_values(robot: Robot, parameters: Parameters) -> Array:
-    """Derivatives of the values by the internal parameters (P,): the value itself for logarithms, else 1."""
+    """Derivatives of the values by the internal parameters (P,): the value for a logarithm, otherwise 1."""
     slopes = np.ones(len(parameters.names))
     for name in dict.fromkeys(parameters.names):
         kind = KINDS[name]
@@ -309,7 +310,7 @@ def offset_with(robot: Robot, parameters: Parameters, values: Array) -> Array:
     return np.asarray(values[parameters.where[kinds.ZERO]])
 
 
-_SMALL = 1e-4  # [rad], below this angle the first terms of the series are sufficient
+_SMALL = 1e-4  # [rad], for a smaller angle, the first terms of the series are sufficient
 
 
 def left_jacobian(vector: Array) -> Array:

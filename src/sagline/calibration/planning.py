@@ -42,7 +42,7 @@ COLUMNS: Final = (20, 9, 13, 13, 15)  # width of the table of errors, in columns
 NARROW: Final = (16, 8, 9, 11, 13)  # width for a narrow terminal
 WIDE: Final = 2 + sum(COLUMNS)
 KILO: Final = 1e4  # [N], larger tensions are written in kN
-FAR: Final = 100.0  # [m], larger positions are written with one decimal less
+FAR: Final = 100.0  # [m], larger positions are written with one decimal fewer
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -58,10 +58,12 @@ class CalibrationPoses(Result, Saved):
         unstrained_length: All cable off the drums [m], (N, m).
         expected_error: Standard error of each parameter, in its unit, (P,).
         random_error: Median standard errors of sets of equally many random poses, (P,).
-        share_of_random: Ratio of the errors to those of random poses in the observable directions, geometric mean.
-            Errors of single parameters hide this ratio if a direction, such as a shift of the world, is unobservable.
-        gain: log det of the information of the first k poses, in the order of the choice, (N,).
-        enough: Number of poses after which another one reduces no error by more than 1 %; N if there is no such number.
+        share_of_random: Geometric mean ratio of the errors to the errors from random poses, in the observable
+            directions. Errors of single parameters do not show this ratio if a direction is unobservable, such as a
+            shift of the world.
+        gain: Log det of the information from the first k chosen poses, (N,).
+        enough: Smallest number of poses at which an additional pose reduces no error by more than 1 %; N if there is
+            none.
         most_helpful: Recommended measurement, in words.
     """
 
@@ -97,7 +99,7 @@ def poses_text(plan: CalibrationPoses, width: int = WIDTH) -> str:
 
 
 def poses_table(plan: CalibrationPoses, width: int = WIDTH) -> str:
-    """Poses and tensions in driving order, one pose per line; cables that do not fit continue on the next line."""
+    """Poses and tensions in driving order, one pose per line; a line that is too long continues on the next one."""
     position, tension = plan.poses.position, plan.frame_end_tension
     angles = np.degrees(plan.poses.rotation.as_euler("ZYX"))
     decimals = 1 if np.abs(position).max() >= FAR else 2
@@ -172,7 +174,7 @@ def _errors(plan: CalibrationPoses, width: int) -> Iterator[str]:
 def _advice(plan: CalibrationPoses, width: int) -> Iterator[str]:
     share, times = plan.share_of_random, plan.share_of_random**-2
     yield from wrap(
-        f"In the directions that readings observe, the errors are {n(share, '.2f')} of those of random poses; "
+        f"In the observable directions, the errors are {n(share, '.2f')} of those of random poses; "
         f"{n(times, '.2g')} times this number of random poses has the same errors.",
         width,
     )
@@ -188,8 +190,8 @@ MOST: Final = 1_000  # largest number of poses; more take days to measure
 MOST_CANDIDATES: Final = 20_000
 DRAWS: Final = 21  # sets of random poses, for a median
 ENOUGH: Final = 0.01  # relative improvement of an error; smaller ones are irrelevant
-SEEN: Final = 3.0  # ratio to the prior information that reduces an error by half
-LOOSE: Final = 10.0  # unit of a parameter without a prior, in usual deviations of an unknown value
+SEEN: Final = 3.0  # smallest ratio to the prior information of a direction; the prior error is then halved
+LOOSE: Final = 10.0  # unit of a parameter without a prior, relative to the usual deviation of an unknown value
 _CATENARY: Final = Catenary()
 
 
@@ -204,19 +206,19 @@ def calibration_poses(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> CalibrationPoses:
-    """Most informative poses and tension sets for the unknowns, before any measurement.
+    """Choose the most informative poses and tension sets for the unknowns, before any measurement.
 
-    The choice is D-optimal, greedy with exchanges, among feasible poses of a box with several sets of tensions each.
-    Sets of tensions at one pose follow each other.
+    The choice is D-optimal, by a greedy algorithm with exchanges. The candidates are feasible poses of a box, each with
+    several sets of tensions. All sets of tensions at one pose follow each other in the result.
 
     Args:
         robot: The robot before the calibration.
         count: Number of sets of readings, 1 to 1,000.
         unknowns: Parameters to estimate, as in `calibrate`.
-        sensors: Sensors with readings at every pose; None for load cells of 1 % of the median tension (or the
-            load_cell_deviation of the winches) and lengths with 0.5 mm.
+        sensors: Sensors with readings at every pose; None for lengths with a deviation of 0.5 mm, and load cells with
+            the load_cell_deviation of the winches, or 1 % of the median tension.
         box: Box of poses; None for the robot's test_box.
-        candidates: Number of poses and sets of tensions to choose from, `count` to 20,000.
+        candidates: Number of candidates (a pose with a set of tensions), `count` to 20,000.
         seed: Seed of the candidates and of the random poses for comparison.
         progress: Called after every few candidates with the number of finished poses and the number of all poses.
 
@@ -288,7 +290,7 @@ def _box(robot: Robot, box: PoseBox | None) -> PoseBox:
     found = optional(box, PoseBox, "box") or robot.test_box
     assert found is not None
     if found.tilt > 0.0 and robot.motion_pattern not in ROTATING:
-        allowed = f"0 rad, by motion_pattern {robot.motion_pattern}: its platform does not turn"
+        allowed = f"0 rad, because a platform with motion_pattern {robot.motion_pattern} cannot rotate"
         step = "Give box=PoseBox(low, high), without a tilt."
         raise InvalidValueError("box: tilt", f"{found.tilt:g} rad", allowed, step)
     return found
@@ -310,7 +312,7 @@ def _scale(parameters: Parameters, slopes: Array) -> tuple[Array, Array]:
 
 
 def _read(rows: Array) -> Array:
-    """Rows of sensors that observe something; one row of zeros without such sensors."""
+    """Rows of the sensors with readings; one row of zeros if no sensor has readings."""
     there = rows.any(axis=(0, 2))
     return np.ascontiguousarray(rows[:, there] if there.any() else rows[:, :1])
 
@@ -325,7 +327,7 @@ def _refuse(robot: Robot, parameters: Parameters, count: int, tried: int, rows: 
     for name in dict.fromkeys(parameters.names):
         mine = names == name
         if not observed[mine].any() and not parameters.stated[mine].any():
-            step = f"Leave it out, add sensors, or give a prior: Unknown('{name}', deviation=...)."
+            step = f"Omit this unknown, add sensors, or give a prior: Unknown('{name}', deviation=...)."
             raise InvalidValueError(f"unknown: {name}", "observed by no reading", "observed, or with a prior", step)
 
 
@@ -338,14 +340,14 @@ def _driving_order(chosen: CandidatePoses) -> Indices:
 
 
 def _random(rows: Array, usual: Flags, count: int, seed: int) -> list[Array]:
-    """Whitened rows at random poses: several sets of shape (count, k, P)."""
+    """Whitened rows (count, k, P) at several sets of random poses."""
     rng = np.random.default_rng((seed, 1))
     pool = np.flatnonzero(usual) if usual.sum() >= count else np.arange(len(rows))
     return [rows[rng.choice(pool, count, replace=False)] for _ in range(DRAWS)]
 
 
 def _share(known: Array, rows: Array, random: list[Array]) -> float:
-    """Ratio of errors to those of random poses, in directions whose errors the random poses at least halve."""
+    """Ratio of errors to errors from random poses, in directions with prior errors that random poses at least halve."""
     own, *others = (information_of(each) for each in (rows, *random))
     size, vectors = np.linalg.eigh(np.mean(others, axis=0))
     seen = vectors[:, size > SEEN]
@@ -356,7 +358,7 @@ def _share(known: Array, rows: Array, random: list[Array]) -> float:
 
 
 def _sufficient_count(choice: Choice) -> int:
-    """Number of poses after which another one reduces no error by more than 1 %."""
+    """Smallest number of poses at which an additional pose reduces no error by more than 1 %."""
     lowered = (1.0 - choice.deviation[1:] / choice.deviation[:-1]).max(axis=1)
     still = np.flatnonzero(lowered > ENOUGH)
     return int(still[-1]) + 2 if still.size else 1

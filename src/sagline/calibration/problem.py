@@ -21,8 +21,8 @@ from sagline.robot.robot import Robot
 from sagline.statics.tables import body_table, cable_table, pose_rows
 
 _PAIRS: Final = 3  # number of measured points that are required to align a measuring system
-_LINE: Final = 1e-3  # points closer to a line than this share of its length count as collinear
-_NONNEGATIVE: Final = ("pulley_radius", "dead_cable")  # kinds whose usual value is zero
+_LINE: Final = 1e-3  # points count as collinear if their distance from a line is less than this share of their extent
+_NONNEGATIVE: Final = ("pulley_radius", "dead_cable")  # kinds with a typical value of zero
 
 
 class ReadingsTable(NamedTuple):
@@ -87,7 +87,7 @@ class FitProblem(NamedTuple):
     def scale(self) -> Array:
         """Scale of each internal parameter (P,): the smaller of its prior and its usual deviation.
 
-        In larger units, rounding would hide the sums of squares of well-observed parameters.
+        With larger scales, rounding would hide the sums of squares of well-observed parameters.
         """
         usual = np.array([KINDS[name].assumed for name in self.parameters.names])
         return np.asarray(np.fmin(self.prior_deviation, usual))
@@ -120,10 +120,11 @@ class Normal(NamedTuple):
     Attributes:
         matrix: J^T W J of all poses, without the prior, (P, P).
         gradient: J^T W y, (P,).
-        squares: Sum of squares of each pose, infinite without an equilibrium, (N,).
+        squares: Sum of squares of each pose, (N,); infinite for a pose without an equilibrium.
         readings: Number of readings at each pose, (N,).
         weights: Weights of the poses, (N,).
-        rows: Whitened readings if the log has one block; None for a longer log, for which they are computed again.
+        rows: Whitened readings if the log has one block; None for a longer log, because storing them takes too much
+            memory.
     """
 
     matrix: Array
@@ -172,10 +173,10 @@ def reported_lengths(problem: FitProblem, machine: MachineTerms, part: slice) ->
 
 
 def start_of(problem: FitProblem, commanded: Pose | None) -> SearchState:
-    """Initial state: the priors, with the platform at commanded poses or at those from the reported lengths.
+    """Initial state: the priors, with the platform at commanded poses or at poses from the reported lengths.
 
-    The true lengths are those with the measured tensions at these poses. One millimeter of a steel cable changes its
-    tension by 90 N. Before the anchors are known, reported lengths therefore do not determine the tensions.
+    The true lengths follow from these poses and the measured tensions. One millimeter of a steel cable changes its
+    tension by 90 N. Reported lengths therefore do not determine the tensions as long as the anchors are inaccurate.
     """
     numbers = problem.prior
     machine = machine_at(problem, numbers)
@@ -187,7 +188,7 @@ def start_of(problem: FitProblem, commanded: Pose | None) -> SearchState:
 
 
 def held_lengths(problem: FitProblem, machine: MachineTerms, poses: Array, reported: Array) -> Array:
-    """Unstrained lengths [m] of cables with the measured tensions at poses; reported lengths without load cells."""
+    """Unstrained lengths [m] from the measured tensions at poses; the reported length where no tension is measured."""
     if problem.sensors.tension_deviation is None:
         return reported.copy()
     robot, cells = machine.robot, problem.log.cells
@@ -212,7 +213,7 @@ def held_lengths(problem: FitProblem, machine: MachineTerms, poses: Array, repor
 
 
 def _poses(problem: FitProblem, machine: MachineTerms, reported: Array, commanded: Pose | None) -> Array:
-    """Initial pose rows: measured, otherwise commanded, otherwise from forward kinematics of the reported lengths."""
+    """Initial pose rows: measured or else commanded poses, or else forward kinematics of the reported lengths."""
     if commanded is not None:
         poses = np.array(pose_rows(commanded))
         poses = np.broadcast_to(poses, (len(reported), poses.shape[1])).copy()
@@ -235,9 +236,9 @@ def _poses(problem: FitProblem, machine: MachineTerms, reported: Array, commande
 
 
 def _aligned(problem: FitProblem, numbers: Array, poses: Array) -> Array:
-    """Parameters with the measuring system aligned to the poses, if it is unknown and has enough readings.
+    """Parameters after alignment of the measuring system to the poses, if it is unknown and has enough readings.
 
-    Its rotation is the mean rotation between platform and measured rotations, or the rotation between measured points.
+    Its rotation is the mean of platform rotations relative to measured ones, or it aligns the measured points.
     """
     where = problem.parameters.where[kinds.SHIFT : kinds.TURN + 3, 0]
     if where[0] < 0:
@@ -260,7 +261,7 @@ def _aligned(problem: FitProblem, numbers: Array, poses: Array) -> Array:
 
 
 def _spans(points: Array) -> bool:
-    """True if points (N, 3) are not collinear, so that they determine a rotation."""
+    """True if points (N, 3) determine a rotation, because they are not collinear."""
     if len(points) < _PAIRS:
         return False
     sizes = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)

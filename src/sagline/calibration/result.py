@@ -27,17 +27,17 @@ from sagline.statics.tables import pose_rows
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class PoseError(Result):
-    """Expected errors of poses, for a single pose or with a leading axis N.
+    """Expected errors of the platform at commanded poses, for a single pose or with a leading axis N.
 
-    The errors are those of the platform if the winches take the calibrated robot's lengths for a commanded pose. They
-    follow from the covariance of all parameters and the deviation of the winches' lengths.
+    The winches are set to the lengths of the calibrated robot at the commanded pose. The errors follow from the
+    covariance of all parameters and the standard deviation of the winches' lengths.
 
     Attributes:
         pose: The commanded poses.
         covariance: Covariance of the displacement of the platform frame's origin and of its rotation vector, world
             axes, shape (..., 6, 6) [m^2, m rad, rad^2].
-        own_covariance: Covariance of errors relative to the robot itself: without the shift of the world and the
-            rotation about the vertical that all poses of the log have in common.
+        own_covariance: Covariance of errors in the robot's own frame. They exclude the shift and the rotation about the
+            vertical that are common to all poses of the log.
     """
 
     pose: Pose
@@ -74,15 +74,15 @@ def _root_of_trace(covariance: Array) -> Array:
     return locked(np.asarray(np.sqrt(np.trace(covariance, axis1=-2, axis2=-1))))
 
 
-MOST = 300  # largest number of poses for the motion that all poses have in common
-_NEGLIGIBLE = 1e-12  # relative to the largest slope: smaller slopes count as zero
-_WITHOUT_MOTION = ("measuring_frame", "target", "load_cell_gain", "load_cell_bias")  # unknowns without effect on poses
+MOST = 300  # largest number of poses from which the motion that is common to all poses is computed
+_NEGLIGIBLE = 1e-12  # slopes that are smaller, relative to the largest slope, count as zero
+_WITHOUT_MOTION = ("measuring_frame", "target", "load_cell_gain", "load_cell_bias")  # no effect on poses
 
 
 def motion_slopes(
     robot: Robot, model: CableModel, parameters: Parameters, poses: Array, lengths: Array
 ) -> tuple[Array, Array]:
-    """Slopes of origin and rotation vector [m, rad] at equilibria, by values (N, 6, P) and lengths (N, 6, m)."""
+    """Derivatives of origin and rotation vector [m, rad] at equilibria: by values (N, 6, P), by lengths (N, 6, m)."""
     m = robot.cable_count
     by_values, by_length = unwhitened_slopes(robot, model, parameters, Sensors(), poses, lengths)
     return np.where(np.isin(parameters.names, _WITHOUT_MOTION), 0.0, by_values[:, m:]), by_length[:, m:]
@@ -98,7 +98,7 @@ def _common_motions(poses: Array) -> Array:
 
 
 def _transformed_covariance(slopes: Array, covariance: Array, negligible: Array | float = 0.0) -> Array:
-    """Covariance (..., P, P) after a linear map (..., k, P); infinite along rows with an infinite term."""
+    """Covariance (..., k, k) after a linear map (..., k, P); infinite where an unobserved value has an effect."""
     infinite = np.isinf(np.diagonal(covariance, axis1=-2, axis2=-1))
     finite = np.where(infinite[..., :, None] | infinite[..., None, :], 0.0, covariance)
     found = np.asarray(slopes @ finite @ np.swapaxes(slopes, -1, -2))
@@ -161,8 +161,8 @@ class Calibration(Findings, Saved):
     def pose_error(self, pose: PoseLike) -> PoseError:
         """Expected error of the platform at a commanded pose, with this calibration.
 
-        The true robot takes the lengths that `inverse` computes for the calibrated robot. Errors of the calibration and
-        of the winches' lengths (`sensors.length_deviation`) displace the platform.
+        The winches of the true robot are set to the lengths that `inverse` computes for the calibrated robot. Errors of
+        the calibration and of the winches' lengths (`sensors.length_deviation`) displace the platform.
 
         Args:
             pose: A single pose or N.
@@ -205,7 +205,7 @@ class Calibration(Findings, Saved):
         covariance = np.full((len(rows), 6, 6), np.nan)
         covariance[there] = self._covariance(*self._slopes(pose_rows(found.pose)[there], rows[there]))
         reach = np.reshape(found.pose.matrix @ self.robot.center_of_mass, (-1, 3))
-        of_center = np.tile(np.eye(6), (len(rows), 1, 1))  # motion of the center of mass per motion of the origin
+        of_center = np.tile(np.eye(6), (len(rows), 1, 1))  # motion of the center of mass by motion of the origin
         for axis, unit in enumerate(np.eye(3)):
             of_center[:, :3, 3 + axis] = np.cross(unit, reach)
         covariance = _transformed_covariance(of_center, covariance)
@@ -215,14 +215,14 @@ class Calibration(Findings, Saved):
         return motion_slopes(self.robot, self.model, self.parameters, poses, lengths)
 
     def _covariance(self, by_values: Array, by_length: Array) -> Array:
-        """Covariance of origin and rotation vector (N, 6, 6), from those of the values and the winches' lengths."""
+        """Covariance of origin and rotation vector (N, 6, 6) from covariances of values and winch lengths."""
         size = np.abs(by_values).max(axis=(1, 2), keepdims=True)
         by_length = by_length * self.sensors.length_deviation
         known = _transformed_covariance(by_values, self.covariance, _NEGLIGIBLE * size)
         return np.asarray(known + by_length @ np.swapaxes(by_length, 1, 2))
 
     def _common_motion(self) -> Array:
-        """Derivatives by the values of the world shift and vertical rotation common to the poses of the log, (4, P)."""
+        """Derivatives (4, P) by the values: shift and vertical rotation that are common to all poses of the log."""
         poses = pose_rows(self.poses)
         part = np.unique(np.linspace(0, len(poses) - 1, min(len(poses), MOST)).round().astype(np.int64))
         by_values = self._slopes(poses[part], np.atleast_2d(self.unstrained_length)[part])[0][:, :3]

@@ -1,4 +1,4 @@
-"""Screening of a log: rows that are suitable for a calibration, and reasons for the omission of the others."""
+"""Screening of a log: rows that are suitable for a calibration, and the reason for the omission of every other row."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from sagline.kinematics.winches import lengths_from_counts
 from sagline.robot.robot import Robot
 
 SPEED_LIMIT: Final = 0.005  # [m/s], largest rate of a length at rest
-SOONEST: Final = 0.1 * (1.0 - 1e-9)  # [s], over a shorter time one encoder step looks like a moving platform
-LATEST: Final = 1.0  # [s], over a longer time the platform may have stopped between two rows
+SOONEST: Final = 0.1 * (1.0 - 1e-9)  # [s], shortest time between rows; one encoder step looks like a motion
+LATEST: Final = 1.0  # [s], longest time between rows; the platform may stop within a longer time
 PULLING: Final = 3.0  # smallest reading of a load cell, in standard deviations
-OTHERWISE: Final = 0.5  # if more than this share of the rows has a load cell's reading, all other rows must have it
+OTHERWISE: Final = 0.5  # if more than this share of the rows has a reading of a load cell, rows without one are omitted
 
 
 def screen(
@@ -28,16 +28,15 @@ def screen(
 ) -> tuple[WinchLog, Indices, Mapping[Omission, Indices]]:
     """Log of the rows with the platform at rest, taut cables and all readings, without repetitions.
 
-    Also returns the indices of these rows (N,), and the indices of the omitted rows by their first reason.
+    Also returns the indices of these rows (N,), and the indices of the omitted rows for each reason. Rows are omitted
+    for these reasons, in this order:
 
-    These rows are omitted, in this order:
-
-    - rows without a count or length of a cable, or without a reading of a load cell that more than half of the rows
-      have (measured positions and rotations may be missing anywhere);
-    - rows with exactly the readings of an earlier row;
-    - rows with a length that changes faster than the limit [m/s], compared with the nearest row in time that is at
-      least a tenth of a second and at most a second away; without times this check is skipped;
-    - rows with a load cell reading, minus bias, of at most three standard deviations: the cable may be slack.
+    - a missing count or length of a cable, or a missing reading of a load cell that has readings in more than half of
+      the rows (measured positions and rotations may be missing in any row);
+    - exactly the readings of an earlier row;
+    - a length that changes faster than the limit [m/s] between the row and the nearest row in time that is 0.1 s to 1 s
+      away; this check is skipped if the log has no times;
+    - a load cell reading, minus bias, of at most three standard deviations, because the cable may be slack.
 
     Raises an error if the log has another number of cables, or counts do not give lengths.
     """
@@ -63,7 +62,7 @@ def lengths_of(robot: Robot, log: WinchLog) -> Array:
     cables = instance(log, WinchLog, "log").readings.shape[1]
     if cables != m:
         step = "Give the log of this robot."
-        raise InvalidValueError("log", f"of {cables} cables", f"{m} cables, those of {robot.name}", step)
+        raise InvalidValueError("log", f"of {cables} cables", f"{m} cables, as many as {robot.name} has", step)
     if log.counts is None:
         return log.readings
     try:
@@ -76,7 +75,7 @@ def lengths_of(robot: Robot, log: WinchLog) -> Array:
 
 
 def reading_count(log: WinchLog) -> int:
-    """Number of informative readings; lengths are excluded, because every row has as many unknown lengths."""
+    """Number of informative readings, without the lengths, because every row has equally many unknown lengths."""
     cells, positions, rotations = (
         0 if values is None else int(np.count_nonzero(~np.isnan(values)))
         for values in (log.load_cells, log.position, None if log.rotation is None else log.rotation[:, :3])
@@ -121,13 +120,13 @@ def _moving(log: WinchLog, lengths: Array, limit: float) -> Flags:
         step = np.abs(time[other] - time)
         there = (near == other) & (step <= LATEST)
         change = np.abs(length[other] - length).max(axis=1, initial=0.0)
-        moving[order[there & (change > limit * step)]] = True  # NaN compares as false; such rows are omitted anyway
+        moving[order[there & (change > limit * step)]] = True  # False for NaN; such rows are omitted anyway
     return moving
 
 
 def _slack(robot: Robot, log: WinchLog) -> Flags:
     if log.load_cells is None:
         return np.zeros(len(log), dtype=np.bool_)
-    assert log.sensors.tension_deviation is not None  # the log has checked this
+    assert log.sensors.tension_deviation is not None  # the constructor of the log has checked this
     _, bias = load_cells_of(robot)
     return np.asarray((log.load_cells - bias <= PULLING * log.sensors.tension_deviation).any(axis=1))

@@ -1,4 +1,4 @@
-"""Search of a calibration. Poses that converge to another equilibrium are restarted once, then omitted."""
+"""Search of a calibration. A pose that converges to another equilibrium is restarted once; then it is omitted."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ from sagline.kinematics.forward import search
 from sagline.kinematics.forward_rows import solve_forward_rows
 from sagline.robot.pose import Pose
 
-STRANGE: Final = 1e-9  # smallest probability of a sum of squares due to noise
-FEW: Final = 0.1  # share of the poses; if more are at another equilibrium, slipped cables are not the cause
-FAR: Final = 0.03  # [m], a larger distance from the pose by the reported lengths means another equilibrium
+STRANGE: Final = 1e-9  # a sum of squares with a smaller probability is not due to noise
+FEW: Final = 0.1  # largest share of poses with an error of a single cable; more misfits have another cause
+FAR: Final = 0.03  # [m], at a larger distance from the pose by the reported lengths, a pose is another equilibrium
 
 
 class SearchResult(NamedTuple):
@@ -53,7 +53,7 @@ class SearchResult(NamedTuple):
 def search_from_priors(
     problem: FitProblem, commanded: Pose | None, *, robust: bool, progress: Progress | None = None
 ) -> SearchResult:
-    """Search from the priors; poses that end in another equilibrium are restarted once, then omitted."""
+    """Search from the priors; a pose that converges to another equilibrium is restarted once, then omitted."""
     state = start_of(problem, commanded)
     kept = np.ones(len(state.poses), dtype=np.bool_)
     current = evaluate_step(problem, state, None, kept)
@@ -65,7 +65,7 @@ def search_from_priors(
         kept &= ~lost
     if not kept.any():
         step = "Correct the lengths, or the robot: its anchors, and the zeros of its lengths."
-        raise InvalidValueError("log", "without a pose at which this robot rests", "one at least", step)
+        raise InvalidValueError("log", "without a pose at which this robot is in equilibrium", "one at least", step)
     fit = solve(problem, current, kept, robust=robust, progress=progress)
     if (improbable := _improbable(fit, kept)).any():
         current = evaluate_step(problem, _restart(problem, fit.state, improbable), None, kept)
@@ -94,7 +94,7 @@ def _without_equilibrium(current: Evaluated) -> Flags:
 
 
 def _improbable(fit: Fit, kept: Flags) -> Flags:
-    """Flags of the poses whose misfit noise does not explain, (N,)."""
+    """Flags of the poses with a misfit that is too large for noise, (N,)."""
     limit = exceeded_with(STRANGE, fit.normal.readings)
     return np.asarray(kept & (fit.normal.squares > limit))
 
@@ -111,9 +111,9 @@ def _restart(problem: FitProblem, state: SearchState, which: Flags) -> SearchSta
 
 
 def _single_cable_outliers(problem: FitProblem, state: SearchState, which: Flags) -> Flags:
-    """Flags of the poses of `which` with a misfit due to a single cable; none are flagged if `which` has many poses.
+    """Flags of the poses of `which` with a misfit due to a single cable; none if `which` has many poses.
 
-    Such a cable is an outlier. The pose remains in the fit, with a small weight.
+    Such a cable is an outlier, and its pose remains in the fit with a small weight.
     """
     rows, slipped = np.flatnonzero(which), np.zeros(len(which), dtype=np.bool_)
     if 0 < len(rows) <= min(EXAMINED, FEW * len(which)):
@@ -123,7 +123,7 @@ def _single_cable_outliers(problem: FitProblem, state: SearchState, which: Flags
 
 
 def _other_equilibrium(problem: FitProblem, state: SearchState, which: Flags) -> Flags:
-    """Flags of those of some poses that are far from the poses by forward kinematics of the reported lengths, (N,)."""
+    """Flags (N,) of the poses of `which` that are far from the forward kinematics of the reported lengths."""
     reported = reported_lengths(problem, state.machine, slice(None))[which]
     found = search(state.machine.robot, problem.model, locked(reported), NO_LOAD, None)
     far = which.copy()
@@ -134,10 +134,10 @@ def _other_equilibrium(problem: FitProblem, state: SearchState, which: Flags) ->
 def cross_validate(
     problem: FitProblem, found: SearchResult, folds: int, *, robust: bool, progress: Progress | None = None
 ) -> CrossValidation | None:
-    """Calibrate without each part of the poses in turn, and predict its readings from the reported lengths.
+    """Cross-validation: calibrate without each part of the poses, and predict the part's readings from its lengths.
 
-    Parts consist of consecutive poses, so that rows of one pose with several tensions remain together. The result is
-    None for fewer than two poses.
+    Parts consist of consecutive poses, so that rows of one pose with different tensions are in the same part. The
+    result is None for fewer than two poses.
     """
     places = np.flatnonzero(found.kept)
     folds = min(folds, len(places))
@@ -162,20 +162,20 @@ def cross_validate(
 
 
 def _root_mean_squares(sums: Array) -> tuple[float, float]:
-    """Root mean squares of load cells [N] and positions [m], NaN if missing, from sums by `_prediction_errors`."""
+    """Root mean squares of load cells [N] and positions [m] from sums of `_prediction_errors`; NaN if missing."""
     cells, cell_count, positions, position_count = sums.tolist()
     tension = float(np.sqrt(cells / cell_count)) if cell_count else np.nan
     return tension, float(np.sqrt(positions / position_count)) if position_count else np.nan
 
 
 def _prediction_errors(problem: FitProblem, machine: MachineTerms, starts: Array, which: Flags, whole: slice) -> Array:
-    """Squared errors of predictions from reported lengths: sum and count for load cells and for positions, (4,)."""
+    """Sums and numbers of squared prediction errors (4,): sum, number for load cells; sum, number for positions."""
     sums = np.zeros(4)
     for own in blocks(whole.stop - whole.start, BLOCK):
         part = slice(whole.start + own.start, whole.start + own.stop)
         try:
             reported = reported_lengths(problem, machine, part)
-        except InvalidValueError:  # lengths out of range because of large errors in the drum data
+        except InvalidValueError:  # large errors in the drum data give invalid lengths
             continue
         there = which[part] & np.isfinite(reported).all(axis=1) & (reported > 0.0).all(axis=1)
         asked = locked(np.where(there[:, None], reported, np.nan))

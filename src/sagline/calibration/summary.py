@@ -14,8 +14,8 @@ from sagline.core.arrays import Array, Indices
 from sagline.core.numbers import SPACE, counted, n, plus_minus
 
 WIDTH: Final = 80
-MOST_OUTLIERS: Final = 12  # largest number of listed items; the rest is counted
-MOST_ROWS: Final = 8  # largest number of listed rows of the log; the rest is counted
+MOST_OUTLIERS: Final = 12  # largest number of listed items; the number of further ones is given
+MOST_ROWS: Final = 8  # largest number of listed rows of the log; the number of further rows is given
 UNITS: Final = {"length": "m", "load cell": "N", "position": "m", "rotation": "rad"}
 ANCHORS: Final[tuple[Anchors, ...]] = ("frame_anchors", "platform_anchors")
 
@@ -37,7 +37,7 @@ def calibration_text(found: Findings, width: int = WIDTH) -> str:
 def table(found: Findings) -> str:
     """Every value with its standard error and its prior, one per line."""
     numbers = found.parameters
-    head = ("number", "found", "before", "moved by, of the error before")
+    head = ("number", "found", "before", "change, in prior deviations")
     rows = [head]
     for k, label in enumerate(numbers.labels):
         unit, prior = numbers.units[k], numbers.prior_deviation[k]
@@ -82,7 +82,7 @@ def chi_squared_text(found: Findings) -> str:
 
 
 def _verdict(found: Findings, width: int) -> Iterator[str]:
-    """Lines of the verdict; doubts come first."""
+    """Lines of the verdict, after the doubts."""
     source = found.log or "the log"
     what = f"{len(found.values)} numbers of {found.robot.name} from {counted(len(found.rows), 'pose')} of {source}"
     when = f", {found.date}" if found.date else ""
@@ -100,7 +100,7 @@ def _verdict(found: Findings, width: int) -> Iterator[str]:
 
 
 def _rows(found: Findings, width: int) -> Iterator[str]:
-    """Lines with the number of used rows, and the reasons for the omission of the others."""
+    """Lines with the number of used rows, and the number of omitted rows for each reason."""
     left = {reason: rows for reason, rows in found.left_out.items() if len(rows)}
     count = sum(map(len, left.values()))
     if not count:
@@ -191,7 +191,7 @@ def _in_columns(cells: list[str], columns: int) -> Iterator[str]:
 
 
 def _directions(directions: Sequence[Direction], head: str, width: int) -> Iterator[str]:
-    """Lines of directions, grouped by step, with the remaining share of their priors."""
+    """Lines of directions, grouped by recommended step, with the remaining share of the prior deviation."""
     if not directions:
         return
     yield from _wrapped(head, width)
@@ -203,7 +203,7 @@ def _directions(directions: Sequence[Direction], head: str, width: int) -> Itera
 
 
 def _together(directions: Sequence[Direction]) -> Iterator[str]:
-    """Names with the remaining share of the prior; names that differ only in the last word are joined."""
+    """Names with the remaining share of the prior deviation; names that differ only in the last word are joined."""
     ends: dict[tuple[str, str], list[str]] = {}
     for one in directions:
         head, _, end = one.name.rpartition(" ")
@@ -254,7 +254,7 @@ _TURNS: Final = {"frame_anchors": (2,), "platform_anchors": (0, 1, 2)}  # axes o
 
 
 def anchor_covariance(parameters: Parameters, covariance: Array, which: Anchors) -> Array | None:
-    """Covariance of all frame or platform anchors [m^2], (m, 3, m, 3), zero where known; None if all are known."""
+    """Covariance of all frame or platform anchors [m^2], (m, 3, m, 3); zero if known; None if all are known."""
     first = KINDS[which].first
     numbers = parameters.where[first : first + 3].T.reshape(-1).astype(np.int64)
     if (numbers < 0).all():
@@ -269,8 +269,8 @@ def anchor_covariance(parameters: Parameters, covariance: Array, which: Anchors)
 def without_motion(points: Array, which: Anchors) -> Array:
     """Projection (3 m, 3 m) of small changes of anchors (m, 3) without their common rigid motion.
 
-    The projection removes shifts, and rotations that no reading observes: those of the frame about the vertical, and
-    those of the platform about all axes, because its anchors define its own frame. It is an S-transformation with equal
+    The projection removes shifts and unobservable rotations. For the frame, these are rotations about the vertical. For
+    the platform, they are all rotations, because its anchors define its frame. It is an S-transformation with equal
     weights of all anchors (Baarda 1973).
     """
     m = len(points)
@@ -282,7 +282,7 @@ def without_motion(points: Array, which: Anchors) -> Array:
 
 
 def relative_covariance(points: Array, covariance: Array, which: Anchors) -> Array:
-    """Covariance (m, 3, m, 3) of anchors without their common rigid motion [m^2]; NaN if one is infinite."""
+    """Covariance (m, 3, m, 3) of anchors without their common rigid motion [m^2]; NaN if a variance is infinite."""
     if not np.isfinite(covariance).all():
         return np.full(covariance.shape, np.nan)
     kept, size = without_motion(points, which), points.size

@@ -1,7 +1,7 @@
-"""Symmetries of a robot: changes that no reading observes, as directions of the parameters.
+"""Symmetries of a robot: changes of the parameters that change no reading.
 
-The origins of the world and of the platform frame, the meter and the newton are conventions. Another choice changes
-every parameter that depends on it, but no reading. docs/model.md, section 14.
+The origins of the world and of the platform frame, the meter and the newton are conventions. Another convention changes
+parameters, but no reading. See docs/model.md, section 14.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ _FORCE: Final = "weigh the platform, or check a load cell with a known weight"
 
 
 class Generator(NamedTuple):
-    """A change of all parameters that no reading observes if all of them may change.
+    """A change of the parameters that changes no reading, if all parameters are unknowns.
 
     Attributes:
         name: Name of the quantity.
         step: Measurement that fixes the quantity.
-        change: Change of every row of `kernels.calibration.kinds`, (KIND_ROWS, m); of the logarithm if that is
+        change: Change of every row of `kernels.calibration.kinds`, (KIND_ROWS, m); relative where the logarithm is
             estimated.
         lengths: Relative change of the lengths off the drums.
     """
@@ -48,13 +48,13 @@ class Generator(NamedTuple):
 
 
 class Symmetries(NamedTuple):
-    """The symmetries of a robot, g in number, including the free parameters of its drums.
+    """The g symmetries of a robot, including changes of the zeros and radii of its drums.
 
     Attributes:
-        each: Symmetries with a name, which come first.
+        each: Symmetries with a name; the columns of the drums follow after these.
         table: Change of every row of `kinds`, (KIND_ROWS, m, g).
-        lengths: Excess lengths that the drums pay out, which must vanish, (2 m, g).
-        matters: Parameters that must not change if they are known, (KIND_ROWS, m).
+        lengths: Lengths that the drums pay out minus required lengths, (2 m, g); a combination must make them zero.
+        matters: True for parameters that a symmetry must not change if they are known, (KIND_ROWS, m).
     """
 
     each: tuple[Generator, ...]
@@ -64,7 +64,7 @@ class Symmetries(NamedTuple):
 
 
 def symmetries(robot: Robot, sensors: Sensors, turn: Array, *, counted: bool) -> Symmetries:
-    """Symmetries of a robot and its sensors, the most general first; turn: rotation vector of the frame [rad], (3,)."""
+    """Symmetries of a robot and its sensors; turn: rotation vector of the measuring system [rad], (3,)."""
     m, turning = robot.cable_count, bool(robot.freedom[:, 3:].any())
     each = [_scale(robot, sensors), _force(robot), _yaw(robot, sensors, turn)]
     each += [_turned(robot, sensors, axis) for axis in range(3)]
@@ -81,7 +81,7 @@ def symmetries(robot: Robot, sensors: Sensors, turn: Array, *, counted: bool) ->
     shift, share = (np.einsum("rm,rmg->mg", term, table) for term in _length_terms(robot, counted))
     matters = np.ones((kinds.KIND_ROWS, m), dtype=np.bool_)
     matters[kinds.PER_CABLE :, 1:] = False
-    # the measuring system and the target may change: few measured points leave more directions unobservable than many
+    # measuring system and target may change, because few measured points do not determine them
     matters[kinds.SHIFT :] = False
     if sensors.tension_deviation is None:
         matters[[kinds.GAIN, kinds.BIAS]] = False
@@ -91,7 +91,7 @@ def symmetries(robot: Robot, sensors: Sensors, turn: Array, *, counted: bool) ->
 
 
 def _length_terms(robot: Robot, counted: bool) -> tuple[Array, Array]:
-    """Coefficients a [m] and b of the length off each drum, a + b L, for every row of `kinds`, (KIND_ROWS, m)."""
+    """Derivatives a + b L of the length L off each drum, by each row of `kinds`: a [m] and b, (KIND_ROWS, m)."""
     shift, share = np.zeros((2, kinds.KIND_ROWS, robot.cable_count))
     if not counted:
         shift[kinds.ZERO] = 1.0
@@ -102,7 +102,7 @@ def _length_terms(robot: Robot, counted: bool) -> tuple[Array, Array]:
     if zero is None or radius is None or diameter is None or pitch is None:  # counts need these data
         raise InvalidValueError("robot", "without counts", "with drums and their zeros", "Give them in the robot file.")
     circle = (2.0 * np.pi * (radius + 0.5 * diameter)) ** 2
-    by_radius = circle / (circle + pitch**2) * radius / (radius + 0.5 * diameter)  # by the logarithm
+    by_radius = circle / (circle + pitch**2) * radius / (radius + 0.5 * diameter)  # by the log of the radius
     shift[kinds.ZERO] = 1.0 / stretch
     shift[kinds.DRUM], share[kinds.DRUM] = -by_radius * zero / stretch, by_radius
     share[kinds.STIFFNESS] = drums.rest_strain / stretch
@@ -141,7 +141,7 @@ def _cable_shift(robot: Robot, cable: int, axis: int) -> Generator:
 
 
 def _turned(robot: Robot, sensors: Sensors, axis: int) -> Generator:
-    """Rotation of the platform frame about the center of mass, which keeps its position."""
+    """Rotation of the platform frame about the center of mass."""
     change, unit = _empty(robot), np.eye(3)[axis]
     change[kinds.PLATFORM : kinds.PLATFORM + 3] = np.cross(unit, robot.platform_anchors - robot.center_of_mass).T
     change[kinds.TARGET : kinds.TARGET + 3] = np.cross(unit, sensors.target - robot.center_of_mass)[:, None]
@@ -149,7 +149,7 @@ def _turned(robot: Robot, sensors: Sensors, axis: int) -> Generator:
 
 
 def _scale(robot: Robot, sensors: Sensors) -> Generator:
-    """Scale of all lengths, with lighter cables per meter, so that forces do not change."""
+    """Scale of all lengths; the cables become lighter per meter, so that forces do not change."""
     change = _empty(robot)
     change[kinds.FRAME : kinds.FRAME + 3] = robot.frame_anchors.T
     change[kinds.PLATFORM : kinds.PLATFORM + 3] = robot.platform_anchors.T

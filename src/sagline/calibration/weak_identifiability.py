@@ -1,4 +1,4 @@
-"""Weakly identifiable parameters: combinations with little information beyond the prior, and correlated pairs."""
+"""Weakly identifiable parameters: combinations with little information from the readings, and correlated pairs."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from sagline.calibration.identifiability import PriorUnits, easiest_measurement,
 from sagline.calibration.parameters import Parameters
 from sagline.core.arrays import Array, Flags, Indices, locked
 
-LITTLE: Final = 0.5  # remaining share of the prior's deviation above which the readings are not informative
-ALIKE: Final = 0.98  # correlation at which two parameters have five times the error of their sum or difference
-_MOST: Final = 0.8  # share of a direction's square that the named parameters must contain
+LITTLE: Final = 0.5  # the readings are not informative if more than this share of the prior deviation remains
+ALIKE: Final = 0.98  # with this correlation, two parameters have five times the error of their sum or difference
+_MOST: Final = 0.8  # smallest share of the square of a direction in the named parameters
 _NAMES: Final = 3
-_SINGULAR: Final = 1e-10  # parameters whose effects differ by less than this share of all variances count as one
+_SINGULAR: Final = 1e-10  # effects are equal if they differ by less than this share of the sum of variances
 _TINY: Final = 1e-300
 
 
-Groups = dict[str, Indices]  # indices of the parameters of one kind and axis, by name such as "frame_anchors z"
+Groups = dict[str, Indices]  # name such as "frame_anchors z", and the indices of the parameters of this kind and axis
 
 
 def weak_directions(triangle: Array, parameters: Parameters, gauge: tuple[Direction, ...]) -> tuple[Direction, ...]:
-    """Weakly identifiable directions, without the unobservable ones.
+    """Weakly identifiable directions, without the unobservable directions.
 
-    The first directions are those with more than `LITTLE` of the prior deviation left, the least known first. Then
-    follow pairs of parameters with a correlation above `ALIKE`, and single parameters that the parameters of all cables
-    can substitute.
+    The first directions have more than `LITTLE` of the prior deviation left, in decreasing order. Pairs of parameters
+    with a correlation above `ALIKE` follow, and single parameters with the same effect as a combination of the
+    parameters of all cables.
     """
     frame = prior_units(parameters)
     complement = _complement(frame, gauge)
@@ -44,7 +44,7 @@ def weak_directions(triangle: Array, parameters: Parameters, gauge: tuple[Direct
 
 
 def _complement(frame: PriorUnits, gauge: tuple[Direction, ...]) -> Array:
-    """Orthonormal basis of the unknown and observable directions, in prior standard deviations, (P, k)."""
+    """Orthonormal basis of the observable directions of the unknowns, in prior standard deviations, (P, k)."""
     count = len(frame.scale)
     fixed = np.eye(count)[:, np.setdiff1d(np.arange(count), frame.free)]
     left = np.array([one.vector / frame.units for one in gauge]).reshape(len(gauge), count).T
@@ -65,7 +65,7 @@ def _groups(parameters: Parameters, frame: PriorUnits) -> Groups:
 def _little_observed(
     triangle: Array, seen: Array, complement: Array, parameters: Parameters, frame: PriorUnits, groups: Groups
 ) -> list[Direction]:
-    """Directions with little information; those of the same parameters are joined, with their count."""
+    """Directions with little information; directions with equal names become one direction, with their number."""
     _, sizes, rows = np.linalg.svd(seen, full_matrices=True)
     sizes = np.concatenate((sizes, np.zeros(len(rows) - len(sizes))))
     left = 1.0 / np.hypot(1.0, sizes)
@@ -89,9 +89,9 @@ def _little_observed(
 
 
 def _words(vector: Array, parameters: Parameters, groups: Groups, kinds: Indices, member: Array) -> tuple[str, ...]:
-    """Names of a direction (P,): kinds of parameters, or the axis or parameter that has nearly all of it.
+    """Names of a direction (P,): kinds of parameters, or the axis or parameter with nearly all of the direction.
 
-    kinds: rank of each parameter's kind (P,); member: 1 if a group has the parameter, else 0, (g, P).
+    kinds: rank of each parameter's kind (P,); member: 1 if the group contains the parameter, otherwise 0, (g, P).
     """
     square = vector**2
     shares = np.bincount(kinds, square, minlength=kinds.max() + 1)
@@ -112,7 +112,7 @@ def _words(vector: Array, parameters: Parameters, groups: Groups, kinds: Indices
 
 
 def _substitutes(scaled: Array, index: int, groups: Groups) -> tuple[str, ...]:
-    """One or two other groups with nearly the same effect on the readings as a parameter."""
+    """One or two groups without a parameter that have nearly the same effect on the readings as the parameter."""
     others = [name for name, members in groups.items() if index not in members]
     for count in (1, 2):
         best: tuple[str, ...] = ()
@@ -132,7 +132,7 @@ def _substitutes(scaled: Array, index: int, groups: Groups) -> tuple[str, ...]:
 def _correlated_pairs(
     seen: Array, complement: Array, parameters: Parameters, frame: PriorUnits, groups: Groups
 ) -> list[Direction]:
-    """Correlated pairs of parameters, the worst of every two groups; also single ones with groups as substitutes."""
+    """Most correlated parameters of every two groups, and single parameters with the effect of a group."""
     known = np.isfinite(parameters.prior_deviation)[:, None] * complement
     _, sizes, rows = np.linalg.svd(np.vstack((seen, known)), full_matrices=False)
     spread = complement @ rows.T / np.maximum(sizes, _TINY)
@@ -157,14 +157,14 @@ def _correlated_pairs(
 
 
 def _most_correlated(likeness: Array, first: Indices, second: Indices) -> tuple[int, int] | None:
-    """Most correlated parameters of two groups, None below `ALIKE`; likeness: absolute correlations."""
+    """Most correlated parameters of two groups; None if below `ALIKE`; likeness: absolute correlations."""
     block = likeness[first[:, None], second]
     row, column = divmod(int(block.argmax()), block.shape[1])
     return (int(first[row]), int(second[column])) if block[row, column] > ALIKE else None
 
 
 def _is_substituted(scatter: Array, many: Indices) -> Flags:
-    """True for parameters (P,) whose multiple correlation with the parameters of many cables exceeds `ALIKE`."""
+    """True for parameters (P,) with a multiple correlation above `ALIKE` with the parameters `many`."""
     within, between = scatter[np.ix_(many, many)], scatter[many]
     ridge = (_SINGULAR * float(np.trace(within)) + _TINY) * np.eye(len(many))
     share = np.sum(between * np.linalg.solve(within + ridge, between), axis=0)
@@ -183,7 +183,7 @@ def _least_known_combination(scatter: Array, members: Indices, names: tuple[str,
 def _direction(
     names: tuple[str, ...], many: str, vector: Array, left: float, frame: PriorUnits, *, alone: bool = False
 ) -> Direction:
-    """Direction from its names; for a single parameter with substitutes, the step is to measure this one."""
+    """Direction with its names; if a group has the effect of a single parameter, the step measures that parameter."""
     vector = vector * np.sign(vector[np.argmax(np.abs(vector))])
     step = easiest_measurement(re.split(r"[ .[]", name)[0] for name in (names[:1] if alone else names))
     name = " with ".join((names[0], " and ".join(names[1:]))) if names[1:] else names[0]

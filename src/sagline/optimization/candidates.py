@@ -1,4 +1,4 @@
-"""Candidates of a design search: points of the unit cube, their design variables, and the robots."""
+"""Candidates of a design search: points of the unit cube, values of the design variables, and robots."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from sagline.robot.robot import Robot
 from sagline.statics.tables import cable_table
 
 MOST_SAMPLES = 1000
-COINCIDENT = 1e-9  # [m], two cables with closer ends count as coincident
+COINCIDENT = 1e-9  # [m], cables are coincident if their ends are closer
 
 
 class Candidates:
@@ -34,7 +34,7 @@ class Candidates:
         names = [part.name for part in self.parts]
         for name in names:
             if names.count(name) > 1:
-                raise InvalidValueError(item, f"free twice in {name}", "each part once", "Leave one of them out.")
+                raise InvalidValueError(item, f"twice among {name}", "each part once", "Omit one of them.")
         self._table = cable_table(robot)[0]
         self._low = np.array([part.low for part in self.parts])
         self._high = np.array([part.high for part in self.parts])
@@ -46,18 +46,18 @@ class Candidates:
         return np.array([part.start for part in self.parts])
 
     def units(self, values: Array) -> Array:
-        """Points of the unit cube of design variables, both (N, d); a choice maps to the middle of its interval."""
+        """Points of the unit cube from design variables, both (N, d); a choice becomes the middle of its interval."""
         span = np.where(self._choices > 0, self._choices, self._high - self._low)
         return np.asarray((values - self._low + 0.5 * (self._choices > 0)) / span)
 
     def values(self, points: Array) -> Array:
-        """Design variables of points of the unit cube, both (N, d)."""
+        """Design variables from points of the unit cube, both (N, d)."""
         inside = np.minimum(self._low + points * (self._high - self._low), self._high)
         chosen = np.minimum(np.floor(points * self._choices), self._choices - 1)
         return np.asarray(np.where(self._choices > 0, chosen, inside))
 
     def cables(self, values: Array) -> Array:
-        """Cable tables (N, m, CABLE_COLUMNS) of design variables (N, d)."""
+        """Cable tables (N, m, CABLE_COLUMNS) from design variables (N, d)."""
         found = np.repeat(self._table[None], len(values), axis=0)
         self.write(found, values)
         return found
@@ -71,19 +71,19 @@ class Candidates:
             first = last
 
     def costs(self, values: Array) -> Array | None:
-        """Cost of a meter of cable, shape (N,); None without a catalogue, an error if an entry has no cost."""
+        """Cost of a meter of cable, shape (N,); None without a catalogue; raises an error if an entry has no cost."""
         for k, one in enumerate(self.free):
             if isinstance(one, FreeCable):
                 missing = [entry.name for entry in one.catalogue if entry.cost is None]
                 if missing:
-                    step = "The goal cable_cost needs it: give the cost of a meter."
+                    step = "Give the cost of a meter, because the goal cable_cost needs it."
                     raise InvalidValueError(f"free[{k}]: {missing[0]}", "without cost", "a number >= 0", step)
                 which = values[:, self._column(k)].astype(np.int64)
                 return np.array([entry.cost for entry in one.catalogue], dtype=np.float64)[which]
         return None
 
     def robots(self, values: Array, names: Sequence[str]) -> tuple[Robot, ...]:
-        """Robots of design variables (N, d), checked like any robot."""
+        """Robots from design variables (N, d); the constructor of the robot checks them."""
         return tuple(
             self._robot(table, own, name) for table, own, name in zip(self.cables(values), values, names, strict=True)
         )
@@ -137,10 +137,10 @@ def impossible(cables: Array) -> Flags:
 
 
 class PlatformBox:
-    """Box of the platform at G poses, which must not contain a frame anchor."""
+    """Box of the platform at G poses; a frame anchor inside is not allowed."""
 
     def __init__(self, robot: Robot, poses: Pose) -> None:
-        """Store the platform's size, or the extent of its anchors without a size."""
+        """Store the platform's size, or otherwise the extent of its anchors."""
         low, high = robot.platform_anchors.min(axis=0), robot.platform_anchors.max(axis=0)
         self._half = 0.5 * ((high - low) if robot.platform_size is None else robot.platform_size)
         self._middle = 0.5 * (low + high)
@@ -159,7 +159,7 @@ class PlatformBox:
         return found.reshape(points.shape[:-1])
 
     def holds_at(self, points: Array, poses: Pose) -> Flags:
-        """Mask (N,) of poses at which one of their own points (N, m, 3) [m] is inside the platform."""
+        """Mask (N,) of poses: True if one of the points of a pose, (N, m, 3) [m], is inside the platform."""
         found = np.zeros(len(points), dtype=np.bool_)
         away = points - poses.position[:, None]
         near = np.flatnonzero((np.abs(away) < self._reach).all(axis=-1).any(axis=-1))
@@ -171,12 +171,14 @@ class PlatformBox:
 
 @frozen(weakref_slot=False)
 class AnchorErrors:
-    """Sample of anchor errors, equal for all candidates, with independent normally distributed coordinates.
+    """Sample of anchor errors, which is the same for all candidates.
+
+    The errors of all coordinates are independent and normally distributed.
 
     Attributes:
         deviation: Standard deviation of each coordinate [m], > 0.
         samples: Number of robots with errors for each candidate, 1 to 1000.
-        take: Value of the candidate from those of its samples, "worst" or "mean".
+        take: Value of the candidate from the values of its samples, "worst" or "mean".
         seed: Seed of the sample, a whole number >= 0.
 
     Raises:
@@ -206,7 +208,7 @@ class AnchorErrors:
             Shape (N, samples, m, CABLE_COLUMNS).
         """
         many = np.repeat(cables[:, None], self.samples, axis=1)
-        ends = tables.PLATFORM_Z + 1  # the columns of both ends come first
+        ends = tables.PLATFORM_Z + 1  # the first columns are those of both ends
         errors = np.random.default_rng(self.seed).standard_normal((self.samples, cables.shape[1], ends))
         many[..., :ends] += self.deviation * errors
         return many

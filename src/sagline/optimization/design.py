@@ -46,7 +46,7 @@ def design(
     folder: Path | str | None = None,
     progress: Progress | None = None,
 ) -> Front:
-    """Search for a better robot than the given one, or for a Pareto front of such robots.
+    """Search for a robot that is better than the given robot, or for a Pareto front of better robots.
 
     The search begins with the robot itself and a seeded sample. Results for one seed are identical bit by bit.
     Candidates with a frame anchor inside the platform at a pose are dropped; their values are NaN.
@@ -55,32 +55,32 @@ def design(
         robot: Initial robot of the search.
         free: Design variables: `FreeAnchors`, `FreeCable`, `FreeLimit`.
         goals: Goals, or their names. "cma" and "differential_evolution" optimize the weighted sum of the goals. "nsga2"
-            finds robots of which none is better than another in every goal.
+            finds a Pareto front: no robot of the front is better than another one in every goal.
         wrenches: Set of loads at every pose, for example a `WrenchBox`; None for the weight alone.
         poses: Poses; None for a grid of level poses in a box.
         box: Box of the grid; None for the robot's test box, level.
         grid: Number of poses of the grid along x, y and z.
-        inner: Anchors that the machine itself moves from pose to pose, as `FreeAnchors`. They are shifted at each pose
-            to the largest margin.
-        robust: Errors of the anchors for the rating of a robot.
+        inner: Anchors that the machine moves during operation, as `FreeAnchors`. At each pose, they are at the
+            positions with the largest margin.
+        robust: Errors of the anchors that the rating of a robot includes.
         model: Cable model.
         optimizer: "cma", "differential_evolution" or "nsga2".
         evaluations: Largest number of robots that are rated.
         seed: Seed of all random numbers.
-        folder: Folder of the rated robots, from which an interrupted search, or a search with more evaluations,
-            continues; created if missing, in a folder that exists. None: no folder.
+        folder: Folder of the rated robots; created if missing, in a folder that exists. An interrupted search, or a
+            search with more evaluations, continues from this folder. None: no folder.
         progress: Called after each generation with the number of rated robots and the largest number.
 
     Returns:
-        Front. If no robot is better, it contains the initial robot and reports this.
+        Front. If no robot is better, the front contains the initial robot, and `better` is False.
 
     Raises:
         InvalidValueError: If an argument is of the wrong kind, a design variable does not exist in the robot or is out
             of its range, or the evaluations are too few for two generations.
-        FileError: If the folder holds another search, or cannot be written.
+        FileError: If the folder contains another search, or cannot be written.
 
     Examples:
-        Posts with variable heights, equal in pairs:
+        Posts with a variable height, equal for all posts:
 
         >>> import sagline as sl
         >>> robot = sl.load_robot("article-suspended")
@@ -102,7 +102,7 @@ def design(
     count = whole_number(evaluations, "evaluations", 1, MOST_EVALUATIONS)
     if count < 2 * population:
         allowed = f">= {2 * population:,}, two generations of {optimizer} for {dimensions} free numbers"
-        raise InvalidValueError("evaluations", f"{count:,}", allowed, "Allow more, or free less.")
+        raise InvalidValueError("evaluations", f"{count:,}", allowed, "Give more evaluations or fewer variables.")
     ledger = Ledger(request, candidates, count, progress)  # errors are raised before any file is written
     sample = latin_hypercube(population - 1, dimensions, request.seed)
     first = np.concatenate((candidates.units(candidates.start[None]), sample))

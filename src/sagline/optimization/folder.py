@@ -1,9 +1,9 @@
-"""Folder of a design search: rated candidates, from which the search continues, and the resulting robots.
+"""Folder of a design search: rated candidates and the resulting robots. A search continues from the rated candidates.
 
 `design.json` identifies the search by a digest of the request without the number of evaluations. `evaluations.csv` has
-one line with a checksum per candidate, and lines are appended generation by generation. A line that is incomplete after
-a crash or on a full disk is detected, removed and computed again. `front.csv` and the robot files are written at the
-end.
+one line with a checksum per candidate; lines are appended after each generation. After a crash, or on a full disk, the
+last line may be incomplete. The search detects such a line, removes it and computes it again. `front.csv` and the robot
+files are written at the end.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ from sagline.optimization.request import Request
 
 REQUEST, EVALUATIONS = "design.json", "evaluations.csv"
 LIMIT: Final = 1000.0  # largest file of evaluations [MB]
-ANOTHER: Final = "Name another folder, or remove this one."
+ANOTHER: Final = "Give another folder, or remove this one."
 
 
 class DesignFolder:
-    """Record of a design search: known candidates (K, d + g), and the file to which new candidates are appended."""
+    """Record of a design search: K known candidates, (K, d + g), and a file for new candidates."""
 
     def __init__(self, file: Path, handle: int, known: Array) -> None:
-        """Take over an open file."""
+        """Store an open file and the known candidates."""
         self._file, self._handle, self.known = file, handle, known
 
     def add(self, rows: Array) -> None:
@@ -62,7 +62,7 @@ class DesignFolder:
 
 @contextmanager
 def open_record(folder: Path | str, request: Request) -> Iterator[DesignFolder]:
-    """Open the record of a search in a folder, new or continued; an error for another search or process."""
+    """Open a new or an existing record in a folder; raises an error if it is of another search, or in use."""
     place = file_path(folder, "folder", folder=True)
     check_files(place, [REQUEST, EVALUATIONS])
     create_folder(place, parents=False)
@@ -74,7 +74,7 @@ def open_record(folder: Path | str, request: Request) -> Iterator[DesignFolder]:
     handle = os.open(file, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
     try:
         if not try_lock(handle, if_unknown=True):
-            raise FileError(place, "is in use: another process searches there", "Wait for it, or name another folder.")
+            raise FileError(place, "is in use by another process", "Wait for that process, or give another folder.")
         if not exists(place / REQUEST):
             stored = {"request": digest, "robot": request.robot.name, "optimizer": request.optimizer}
             write_text(place / REQUEST, json_text({**stored, "seed": request.seed}) + "\n")
@@ -89,7 +89,7 @@ def open_record(folder: Path | str, request: Request) -> Iterator[DesignFolder]:
 
 
 def digest_of(request: Request) -> str:
-    """Digest of a request, 64 hexadecimal digits; it does not depend on the number of evaluations."""
+    """Digest of a request without the number of evaluations, 64 hexadecimal digits."""
     return sha256(_canonical(request).encode()).hexdigest()
 
 
@@ -123,11 +123,11 @@ def _check_request(place: Path, digest: str, request: Request) -> None:
     if own != digest:
         asked = f"{request.robot.name} with {request.optimizer} and seed {request.seed}"
         reason = f"contains another search ({own[:8]}) than the requested one ({digest[:8]}): {asked}"
-        raise FileError(place, reason, "Ask for the same, or name another folder.", item="request")
+        raise FileError(place, reason, "Give the same request, or another folder.", item="request")
 
 
 def _read(file: Path, heads: list[str]) -> tuple[Array, int]:
-    """Rows of complete lines, and their size in bytes; only the last line may be incomplete and is then ignored."""
+    """Rows of complete lines, and their size in bytes. An incomplete last line is ignored."""
     none = np.zeros((0, len(heads)))
     lines = read_text(check_file(file), LIMIT).splitlines(keepends=True)
     if not lines:

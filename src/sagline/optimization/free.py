@@ -46,7 +46,7 @@ class Bound(NamedTuple):
 
     Attributes:
         parts: The K design variables.
-        write: Function that changes cable tables (N, m, CABLE_COLUMNS) in place, from the variables' values (N, K).
+        write: Function that writes the values of the variables (N, K) to cable tables (N, m, CABLE_COLUMNS), in place.
     """
 
     parts: tuple[DesignVariable, ...]
@@ -63,7 +63,7 @@ class Free(ByFields):
 
         Args:
             robot: Initial robot of the search.
-            item: Name of the object in messages.
+            item: Name of the design variable in messages.
 
         Returns:
             Design variables and the function that writes them.
@@ -75,7 +75,7 @@ class Free(ByFields):
 
 
 def check_order(low: Array, high: Array, unit: str, *, strictly: bool = False) -> None:
-    """Reject bounds with low above high, or with `strictly` equal bounds, shape (K,)."""
+    """Reject bounds (K,) if low is above high, or, with `strictly`, equal to high."""
     for k in np.flatnonzero(low >= high if strictly else low > high):
         where = f"[{k}]" if len(low) > 1 else ""
         allowed = f"< high{where}, {high[k]:g} {unit}" if strictly else f"<= high{where}, {high[k]:g} {unit}"
@@ -103,11 +103,11 @@ def cables_of_robot(cables: tuple[int, ...], robot: Robot, item: str) -> Indices
 
 
 def whose_text(cables: Indices, count: int) -> str:
-    """Suffix of a name for some of the cables; empty for all cables."""
+    """Suffix of a name, with the indices of the cables; empty for all cables."""
     return "" if len(cables) == count else f"[{' '.join(map(str, cables))}]"
 
 
-SAME: Final = 1e-9  # relative tolerance for a match of a robot's cable with a cable of a catalogue
+SAME: Final = 1e-9  # relative tolerance for equal cables of robot and catalogue
 
 
 def _one_cable(value: Any, item: str) -> Cable:
@@ -117,7 +117,7 @@ def _one_cable(value: Any, item: str) -> Cable:
         shape = f"of shape {cable.linear_density.shape}"
         raise InvalidValueError(item, shape, "one cable's material, numbers", "Give Cable(0.067, 44e3).")
     if not float(cable.linear_density) > 0.0:
-        raise InvalidValueError(f"{item}: linear_density", "0 kg/m", "> 0 kg/m", "Give its mass per length.")
+        raise InvalidValueError(f"{item}: linear_density", "0 kg/m", "> 0 kg/m", "Give the mass per length.")
     return cable
 
 
@@ -149,7 +149,7 @@ class FreeCable(Free):
     """The material of all cables, from a catalogue.
 
     Attributes:
-        catalogue: The cables, preferably sorted by weight, because the search tries neighbors one after the other.
+        catalogue: The cables, preferably sorted by weight, because the search assumes that neighbors are similar.
     """
 
     catalogue: tuple[CableChoice, ...]
@@ -161,7 +161,7 @@ class FreeCable(Free):
             catalogue: Two or more cables, including the robot's own.
 
         Raises:
-            InvalidValueError: If `catalogue` is not such a catalogue.
+            InvalidValueError: If `catalogue` has another form, or equal names.
         """
         given: Any = catalogue
         if not isinstance(given, Sequence) or isinstance(given, str) or len(given) < 2:
@@ -184,7 +184,7 @@ class FreeCable(Free):
                 return Bound((part,), partial(_write_cables, self.catalogue))
         density, stiffness = own.linear_density[0], own.axial_stiffness[0]
         value = f"{1e3 * density:g} g/m, {stiffness:g} N, up to {robot.tension_max[0]:g} N"
-        step = "Add the robot's own cable: the search begins with it."
+        step = "Add the robot's own cable, because the search begins with it."
         raise InvalidValueError(
             f"{item}: the robot's cable 0", value, "equal for all cables, and in the catalogue", step
         )
@@ -205,7 +205,7 @@ LIMITS: Final = {"tension_min": tables.TENSION_MIN, "tension_max": tables.TENSIO
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FreeLimit(Free):
-    """A variable tension limit with one value for all its cables.
+    """A variable tension limit; all cables of the variable have the same value.
 
     Attributes:
         which: "tension_min" or "tension_max".
@@ -247,7 +247,7 @@ class FreeLimit(Free):
         name = f"{self.which}{whose_text(cables, robot.cable_count)}"
         if len(set(own.tolist())) > 1:
             value = f"{own.min():g} to {own.max():g} N"
-            step = "Name the cables that share one: FreeLimit(..., cables=[0, 1])."
+            step = "Give cables with the same limit: FreeLimit(..., cables=[0, 1])."
             raise InvalidValueError(f"{item}: the robot's {name}", value, "the same for all of these cables", step)
         start = float(own[0])
         if not self.low <= start <= self.high:

@@ -1,4 +1,4 @@
-"""Design variables of anchors: shifts in a box or along lines, also mirrored, rotated about the vertical, or equal."""
+"""Design variables of anchors: shifts in a box or along lines, with or without a symmetry."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ _ON_PLANE: Final = 1e-9  # tolerance, relative to the extent of the anchors
 def _symmetric_shifts(
     symmetry: Symmetry | None, anchors: Array, along: Array, bounds: tuple[Array, Array], item: str
 ) -> list[tuple[int | None, Array]]:
-    """Shifts (K, c, 3) of anchors (c, 3) per meter of shift of a leading anchor along K directions, and its index.
+    """Index of each leading anchor, and shifts (K, c, 3) of all anchors per meter of its shift along K directions.
 
-    The index is None if all anchors have the same shift. An error is raised if an anchor could pass its mirror plane or
-    has no axis of rotation.
+    The index is None if there is a single leading anchor. Raises an error if an anchor could pass its mirror plane, or
+    is on the axis of rotation.
     """
     count = len(anchors)
     if symmetry is None:
@@ -54,7 +54,7 @@ def _symmetric_shifts(
 def _turned(anchors: Array, along: Array, item: str) -> Array:
     away = anchors[:, :2] - anchors[:, :2].mean(axis=0)
     if np.linalg.norm(away, axis=1).min() <= _ON_PLANE * max(float(np.ptp(anchors)), 1.0):
-        step = 'Choose "together", or leave the anchor on the axis out of cables.'
+        step = 'Choose "together", or omit the cable with the anchor on the axis.'
         raise InvalidValueError(f"{item}: symmetry", "'turned' with an anchor on the axis", "anchors around it", step)
     angle = np.arctan2(away[:, 1], away[:, 0])
     angle -= angle[0]
@@ -65,7 +65,7 @@ def _turned(anchors: Array, along: Array, item: str) -> Array:
 
 
 def _mirrored(symmetry: str, anchors: Array, along: Array, bounds: tuple[Array, Array], item: str) -> Array:
-    """Mirrored shifts (K, c, 3); the side of an anchor gives the sign, and an anchor on the plane remains on it."""
+    """Mirrored shifts (K, c, 3) with the sign of an anchor's side; an anchor on the plane remains on the plane."""
     shifts = np.repeat(along[:, None, :], len(anchors), axis=1)
     for axis in ("xyz".index(name) for name in symmetry):
         low, high = float(anchors[:, axis].min()), float(anchors[:, axis].max())
@@ -84,7 +84,7 @@ def _mirrored(symmetry: str, anchors: Array, along: Array, bounds: tuple[Array, 
                 f"up to {inward:g} m inward",
                 f"< {room:g} m, the distance to the plane {name} = {plane:g} m",
             )
-            step = f"Anchors would pass through those that mirror them: narrow the bounds along {name}."
+            step = f"Narrow the bounds along {name}, because anchors would pass their mirror images."
             raise InvalidValueError(f"{item}: the shift along {name}", value, allowed, step)
     return shifts
 
@@ -96,9 +96,9 @@ _AXES: Final = "xyz"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FreeAnchors(Free):
-    """Variable shifts of anchors from their positions in the robot: in a box or along lines, also with a symmetry.
+    """Variable shifts of anchors from their positions in the robot, in a box or along lines.
 
-    The dead length of guides is constant during the search, and adapted in the resulting robots.
+    The dead length of guides is constant during the search. It is adapted in the resulting robots.
 
     Attributes:
         end: "frame" or "platform".
@@ -106,9 +106,9 @@ class FreeAnchors(Free):
         high: Largest shifts [m], shape (K,), >= 0; a coordinate with low = high = 0 is fixed.
         along: Directions, world axes for the frame and platform axes for the platform, shape (K, 3), unit vectors.
         cables: Indices of the cables whose anchors are shifted, from 0; empty for all.
-        symmetry: Symmetry to the first of these anchors. "x", "xy" or other axes: mirrored at the planes normal to
-            these axes. "turned": rotated about the vertical by the angle between the anchors. "together": the same
-            shift. None: independent shifts.
+        symmetry: Relation of the shifts to the shift of the first anchor. "x", "xy" or other axes: mirrored at the
+            planes normal to these axes. "turned": rotated about the vertical by the angle between the anchors.
+            "together": equal. None: independent.
     """
 
     end: str
@@ -186,11 +186,11 @@ class FreeAnchors(Free):
                 parts.append(DesignVariable(named, "m", float(self.low[k]), float(self.high[k]), 0.0))
                 rates.append(rate)
         if not parts:
-            step = "Leave out the symmetry, or the directions across its planes."
-            raise InvalidValueError(f"{item}: symmetry", "one that fixes all anchors", "one that permits a shift", step)
+            step = "Omit the symmetry, or the directions across its planes."
+            raise InvalidValueError(f"{item}: symmetry", "fixes all anchors", "one that permits a shift", step)
 
         def write(tables_of_cables: Array, values: Array) -> None:
-            for k, rate in enumerate(rates):  # the order of the sum does not depend on the number of candidates
+            for k, rate in enumerate(rates):  # the number of candidates has no effect on the order of the sum
                 tables_of_cables += values[:, k, None, None] * rate
 
         return Bound(tuple(parts), write)
@@ -208,7 +208,9 @@ def _shifts(value: ArrayLike, item: str, count: int) -> Array:
     given = checked(value, item, "m")
     if given.shape not in ((), (count,)):
         allowed = f"a number, or {count} of them, one per direction"
-        raise InvalidValueError(item, f"of shape {given.shape}", allowed, "Give one for x, y and z, or use along.")
+        raise InvalidValueError(
+            item, f"of shape {given.shape}", allowed, "Give three numbers for x, y, z, or use along."
+        )
     return np.array(np.broadcast_to(given, (count,)))
 
 

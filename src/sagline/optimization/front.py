@@ -30,12 +30,14 @@ FRONT: Final = "front.csv"
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Front(Result):
-    """Result of `design`: better robots than the initial one, none of which is better than another in every goal.
+    """Result of `design`: robots that are better than the initial robot.
+
+    None of them is better than another one in every goal.
 
     Attributes:
         start: Initial robot of the search.
-        robots: The K better robots, sorted by the first goal, the best first; only the initial robot if none is better.
-            For optimizers other than "nsga2", this is only the robot with the best weighted sum.
+        robots: The K better robots, sorted by the first goal, with the best robot first. Only the initial robot, if no
+            robot is better. For optimizers other than "nsga2", only the robot with the best weighted sum.
         goals: The g goals.
         values: Goal values of the robots, each in its unit, shape (K, g).
         start_values: Goal values of the initial robot, shape (g,).
@@ -114,18 +116,18 @@ class Front(Result):
 
 
 def costs_of(values: Array, goals: tuple[Goal, ...], start: Array) -> Array:
-    """Costs (N, g) to minimize from goal values (N, g), scaled and limited to PENALTY; twice PENALTY for NaN."""
+    """Scaled costs (N, g), to minimize, from goal values (N, g); at most PENALTY, and twice PENALTY for NaN."""
     signs = np.array([-1.0 if goal.maximize else 1.0 for goal in goals])
     scales = np.array([_scale_of(goal, value) for goal, value in zip(goals, start, strict=True)])
     costs = np.nan_to_num(signs * values / scales, nan=2.0 * PENALTY, posinf=PENALTY, neginf=-PENALTY)
     return np.asarray(np.where(np.isnan(values), PENALTY * 2.0, np.clip(costs, -PENALTY, PENALTY)))
 
 
-PENALTY = 1e9  # largest cost of a goal, many times larger than normal values
+PENALTY = 1e9  # largest cost of a goal, much larger than normal values
 
 
 def _scale_of(goal: Goal, start: float) -> float:
-    """Scale of a goal in its unit: the goal's own scale, or the value of the first robot."""
+    """Scale of a goal in its unit: the given scale, or the value of the first robot."""
     if goal.scale is not None:
         return goal.scale
     return abs(float(start)) if np.isfinite(start) and start != 0.0 else 1.0
@@ -138,7 +140,7 @@ def _weighted_costs(costs: Array, goals: tuple[Goal, ...]) -> Array:
 
 
 def pareto_front(costs: Array) -> Indices:
-    """Indices of the Pareto-optimal candidates of costs (N, g); of equal candidates, the first one."""
+    """Indices of the Pareto-optimal candidates from costs (N, g); only the first one of equal candidates."""
     _, first = np.unique(costs, axis=0, return_index=True)
     kept = np.sort(first)
     own = costs[kept]
@@ -150,14 +152,14 @@ def _beaten(one: Array, others: Array) -> bool:
     return bool(((others <= one).all(axis=1) & (others < one).any(axis=1)).any())
 
 
-LONGEST: Final = 80  # number of letters of a robot's name before the added suffix; further letters are omitted
+LONGEST: Final = 80  # number of letters of a robot's name before the suffix
 
 
 class Ledger:
     """Rating of candidates for an optimizer.
 
     An optimizer with the same seed requests the same candidates again. Recorded candidates are not rated again. A
-    continued search therefore has the same result as one without interruption.
+    continued search therefore has the same result as a search without interruption.
     """
 
     def __init__(
@@ -184,11 +186,11 @@ class Ledger:
 
     @property
     def costs(self) -> int:
-        """Number of costs per candidate: one per goal for a front, else one."""
+        """Number of costs per candidate: one per goal for a front, otherwise 1."""
         return len(self._request.goals) if self._request.optimizer == "nsga2" else 1
 
     def rate(self, points: Array) -> Array:
-        """Costs (N, costs) of points of the unit cube (N, d); the very first point is the first robot."""
+        """Costs (N, costs) of points of the unit cube (N, d)."""
         values = self._candidates.values(points)
         values[(points == self._start).all(axis=1)] = self._candidates.start
         known = self._recalled(values)
@@ -241,14 +243,14 @@ class Ledger:
         return costs_of(rows[:, self._width :], self._request.goals, self._first)
 
     def _recalled(self, values: Array) -> Array:
-        """Recorded rows of the candidates before the first one without a record."""
+        """Recorded rows of the candidates; the rows end at the first candidate without a record."""
         if self.record is None:
             return np.zeros((0, self._rows.shape[1]))
         first = len(self._rows)
         known = self.record.known[first : first + len(values)]
         if not np.array_equal(known[:, : self._width], values[: len(known)]):
             wrong = int(np.argmax((known[:, : self._width] != values[: len(known)]).any(axis=1)))
-            allowed = "the robot of this search: packages or machine have changed since it began"
+            allowed = "the robot of this search; packages or machine may have changed since the search began"
             raise InvalidValueError(
                 f"row {first + wrong + 1} of the folder", "another robot", allowed, "Name another folder."
             )
@@ -259,7 +261,7 @@ class Ledger:
         for goal, value in zip(self._request.goals, self._first, strict=True):
             if np.isinf(value):
                 item = f"{goal.kind} of {self._request.robot.name}"
-                step = "Give it finite tension_max, or choose workspace_share."
+                step = "Give the robot a finite tension_max, or choose workspace_share."
                 if value < 0.0:
-                    step = "Leave out the poses where it is singular or a cable has no length."
+                    step = "Omit the poses at which the robot is singular or a cable has no length."
                 raise InvalidValueError(item, f"{value:g} {goal.unit}".rstrip(), "a finite number", step)

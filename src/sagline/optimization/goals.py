@@ -16,7 +16,7 @@ from sagline.core.results import set_fields
 
 
 class Measured(NamedTuple):
-    """Quantities of candidates at G poses, each with S samples of its anchors (one sample for exact anchors).
+    """Quantities of candidates at G poses, for S samples of the anchors of each candidate (1 for exact anchors).
 
     Attributes:
         margin: Margin of the wrench set [N], shape (N, S, G); -inf if a pose is singular or a cable has no length.
@@ -40,7 +40,7 @@ class _Kind(NamedTuple):
         unit: Unit of the goal; "" for a share or a currency.
         larger_is_better: True if it is maximized by default.
         needs: Field of `Measured` that the goal uses.
-        over_poses: Function from that field to the goal's value, over the last axis.
+        over_poses: Function of that field, over the last axis, with the goal's value as result.
         text: Description.
     """
 
@@ -74,7 +74,7 @@ def heading(name: str, unit: str) -> str:
 
 KINDS: Final = MappingProxyType(
     {
-        "workspace_share": _Kind("", True, "margin", _share, "share of the poses whose margin is not negative"),
+        "workspace_share": _Kind("", True, "margin", _share, "share of the poses with a nonnegative margin"),
         "mean_margin": _Kind("N", True, "margin", _mean, "mean margin of the poses"),
         "least_margin": _Kind("N", True, "margin", _least, "least margin of the poses"),
         "largest_tension": _Kind("N", False, "tension", _largest, "largest tension"),
@@ -90,17 +90,17 @@ AT_POSES: Final = ("tension", "sag", "stiffness")  # goals that require a tensio
 class Goal:
     """A quantity to maximize or minimize.
 
-    Tensions, sag and stiffness are those for the platform's weight and the middle of the wrench set, with the tension
-    distribution `MinimumNorm`. They are evaluated at the feasible poses of the initial robot. A robot for which one of
-    these poses is not feasible is rejected.
+    Tensions, sag and stiffness are for the platform's weight plus the middle of the wrench set, with the tension
+    distribution `MinimumNorm`. They are evaluated at the feasible poses of the initial robot. A candidate is rejected
+    if one of these poses is infeasible for it.
 
     Attributes:
-        kind: "workspace_share" (share of the poses with a margin that is not negative), "mean_margin" or "least_margin"
+        kind: "workspace_share" (share of the poses with a nonnegative margin), "mean_margin" or "least_margin"
             [N], "largest_tension" [N], "largest_sag" [m], "least_stiffness" [N/m] (against a force in any direction) or
-            "cable_cost" (catalogue cost of cables with the lengths of their longest chords).
+            "cable_cost" (catalogue cost of cables, each as long as its longest chord).
         maximize: True to maximize, False to minimize.
         weight: Weight relative to other goals, > 0.
-        scale: Unit size of the goal, in its unit; None for the first robot's value, or 1 if that is 0.
+        scale: Unit size of the goal, in its unit; None for the first robot's value, or 1 if this value is 0.
     """
 
     kind: str

@@ -1,4 +1,4 @@
-"""Moving anchors, which are placed for the largest margin at each pose."""
+"""Moving anchors, with positions for the largest margin at each pose."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def moving_anchors(
 ) -> MovingAnchors:
     """Move anchors of a robot to the positions with the largest margin at each pose.
 
-    The best positions of a sample are improved by steps along one coordinate after another.
+    A sample gives first positions. Steps along one coordinate after another improve them.
 
     Args:
         robot: The robot.
@@ -95,7 +95,7 @@ def moving_anchors(
         InvalidValueError: If an argument is of the wrong kind.
 
     Examples:
-        Posts whose anchors move up and down together:
+        Posts with anchors that move up and down together:
 
         >>> import sagline as sl
         >>> robot = sl.load_robot("article-suspended")

@@ -1,4 +1,4 @@
-"""Ratings of candidates: goals of a whole generation at once, from cable tables."""
+"""Ratings of candidates: goals of all candidates of a generation, from cable tables."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ def distribute(
 ) -> tuple[Array, Array, Array | None]:
     """Largest tension [N], largest sag [m] and, on request, least stiffness [N/m], by the minimum norm, each (N,).
 
-    Values are NaN without tensions. There is one table (m, CABLE_COLUMNS) per pose row, N in total. The stiffness is
-    that of the softest direction of a force on the center of mass.
+    Values are NaN without tensions. Each of the N pose rows has its own table (m, CABLE_COLUMNS). The stiffness is the
+    smallest one against a force on the center of mass.
     """
     method = MinimumNorm()
     options = kernel_options(robot, model, method.alone)
@@ -65,7 +65,7 @@ def distribute(
 
 
 def _sag(model: CableModel, gravity: float, results: Array, cables: Array) -> Array:
-    """Largest drop below the chord of each cable [m], (N, m)."""
+    """Sag of each cable [m], (N, m)."""
     length = results[tables.LENGTH]
     if len(results) > tables.BARE_ROWS:
         length = length - (results[tables.WRAPPED] + results[tables.DEAD])
@@ -100,17 +100,17 @@ def _stiffness(
     return np.asarray(np.where(known & (softest > 0.0), 1.0 / np.where(softest > 0.0, softest, 1.0), np.nan))
 
 
-Margins: TypeAlias = Callable[[Array, Array], Array]  # of tables (R, m, CABLE_COLUMNS) at pose rows (R, POSE_COLUMNS)
+Margins: TypeAlias = Callable[[Array, Array], Array]  # margins from cable tables and pose rows
 
-SPREAD: Final = 4  # sample points per coordinate
-STEP: Final = 0.25  # initial step, as a share of the distance of the bounds
+SPREAD: Final = 4  # number of sample points per coordinate
+STEP: Final = 0.25  # initial step, relative to the distance between the bounds
 ITERATIONS: Final = 14  # number of halvings of the step
 
 
 def move_anchors(inner: Candidates, margins: Margins, cables: Array, poses: Array) -> tuple[Array, Array]:
-    """Best anchor coordinates (R, q) of cable tables (R, m, CABLE_COLUMNS) at their pose rows, and margins (R,) [N].
+    """Best anchor coordinates (R, q) for R cable tables, each at its pose row, and margins (R,) [N].
 
-    The result is a local maximum: the best point of a sample, improved by a coordinate search with halved steps.
+    The result is a local maximum: a coordinate search with halved steps improves the best point of a sample.
     """
     count, q = len(poses), len(inner.parts)
 
@@ -158,12 +158,12 @@ class Rating:
         robust: AnchorErrors | None,
         inner: Candidates | None,
     ) -> None:
-        """Prepare; an error if a cost is missing, or if a goal on tensions has no feasible pose of the first robot."""
+        """Prepare; raises an error if a goal needs tensions, but no pose is feasible for the first robot."""
         self._candidates, self._goals, self._robust, self._inner = candidates, tuple(goals), robust, inner
         self._model, self._poses, self.rows = model, poses, pose_rows(poses)
         self._wrench = np.zeros(6) if wrenches is None else middle_wrench(wrenches)
         self._wrenches = NO_LOAD if wrenches is None else wrenches
-        # lever arm of the first robot, so that margins of candidates are comparable
+        # all candidates have the lever arm of the first robot, so that their margins are comparable
         self._arm = float(mean_arms(cable_table(candidates.robot), body_table(candidates.robot))[0])
         self._needs = {goal.needs for goal in self._goals}
         self._solid = PlatformBox(candidates.robot, poses)
@@ -174,16 +174,16 @@ class Rating:
     def __call__(self, values: Array) -> Array:
         """Values (N, g) of the goals for design variables (N, d).
 
-        Values are NaN for an impossible candidate: one with coincident cables, a lower limit above an upper limit, a
-        frame anchor inside the platform, or without tensions at a pose that is feasible for the first robot and
-        required by a goal.
+        Values are NaN for an impossible candidate: it has coincident cables, a lower limit above an upper limit, or a
+        frame anchor inside the platform. Values are also NaN if a goal needs tensions, and the candidate has none at a
+        pose that is feasible for the first robot.
         """
         size = max(1, ROWS // (len(self.rows) * (1 if self._robust is None else self._robust.samples)))
         parts = [self._rated(values[first : first + size]) for first in range(0, len(values), size)]
         return np.concatenate(parts)
 
     def margins(self, cables: Array, rows: Array) -> Array:
-        """Margins [N], (N,), of tables (R, m, CABLE_COLUMNS), each at its N/R pose rows of (N, POSE_COLUMNS).
+        """Margins (N,) [N] of tables (R, m, CABLE_COLUMNS) at pose rows (N, POSE_COLUMNS), N/R rows per table.
 
         The margin is -inf at a pose with a frame anchor inside the platform.
         """
@@ -206,7 +206,7 @@ class Rating:
         return found
 
     def _measured(self, cables: Array, values: Array) -> Measured:
-        """Quantities of feasible candidates that the goals require."""
+        """Quantities that the goals need, for candidates that are not impossible."""
         many = cables[:, None] if self._robust is None else self._robust.added(cables)
         shape = (*many.shape[:2], len(self.rows))
         robots = many.reshape(-1, *many.shape[2:])
@@ -233,17 +233,17 @@ class Rating:
         return Measured(margin, tension, sag, stiffness, cost)
 
     def _cost(self, cables: Array, values: Array) -> Array:
-        """Cost (N, S) of cables with the lengths of their longest chords; tables (N, S, G, m, CABLE_COLUMNS)."""
+        """Cost (N, S) of cables as long as their longest chords, from tables (N, S, G, m, CABLE_COLUMNS)."""
         costs = self._candidates.costs(values)
         if costs is None:
-            step = "Free the cable: FreeCable([CableChoice(name, cable, cost=1.5), ...])."
+            step = "Add the design variable FreeCable([CableChoice(name, cable, cost=1.5), ...])."
             raise InvalidValueError("goals: cable_cost", "without a catalogue", "a FreeCable with costs", step)
         ends = cables[..., tables.PLATFORM_X : tables.PLATFORM_Z + 1] @ np.swapaxes(self._poses.matrix, -1, -2)
         chords = np.linalg.norm(ends + self._poses.position[:, None] - cables[..., : tables.FRAME_Z + 1], axis=-1)
         return np.asarray(costs[:, None] * chords.max(axis=2).sum(axis=-1))
 
     def _in_platform(self, cables: Array) -> Flags:
-        """Mask (N,) of cable tables (N, m, CABLE_COLUMNS) with a frame anchor inside the platform at a pose."""
+        """Mask (N,): True if a frame anchor of a cable table (N, m, CABLE_COLUMNS) is inside the platform at a pose."""
         return np.asarray((self._solid.holds(cables[..., : tables.FRAME_Z + 1]) >= 0).any(axis=-1))
 
     def _held_at(self, cables: Array) -> Flags:

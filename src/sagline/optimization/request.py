@@ -27,15 +27,15 @@ MOST: Final = 100_000  # largest number of poses
 
 
 def poses_of(robot: Robot, poses: PoseLike | None, box: PoseBox | None, grid: Sequence[int]) -> Pose:
-    """Poses as a batch, or a grid of level poses over a box, by default the robot's test box."""
+    """The given poses as a batch, or a grid of level poses in a box, by default the robot's test box."""
     counts = _counts(grid)
     if poses is not None:
         if box is not None:
-            raise InvalidValueError("box", "given beside poses", "one of the two", "Leave one of them out.")
+            raise InvalidValueError("box", "given with poses", "one of the two", "Leave one of them out.")
         given = pose_of(poses, "poses")
         batch = given if given.shape else Pose.from_quaternion(given.position[None], given.quaternion[None])
         if not 0 < len(batch) <= MOST:
-            raise InvalidValueError("poses", f"{len(batch):,} of them", f"1 to {MOST:,}", "Give some of them.")
+            raise InvalidValueError("poses", f"{len(batch):,} of them", f"1 to {MOST:,}", "Give one pose or more.")
     else:
         batch = _grid(_box(robot, box), counts)
     check_reach(robot, batch, "poses")
@@ -46,11 +46,11 @@ def _box(robot: Robot, box: PoseBox | None) -> PoseBox:
     if box is None:
         if robot.test_box is None:
             step = "Give box=PoseBox(low, high), or poses."
-            raise InvalidValueError("box", f"missing, and {robot.name} names none", "a PoseBox", step)
+            raise InvalidValueError("box", f"missing, and {robot.name} has no test_box", "a PoseBox", step)
         return PoseBox(robot.test_box.low, robot.test_box.high)
     if instance(box, PoseBox, "box").tilt > 0.0:
         step = "Give poses for other orientations."
-        raise InvalidValueError("box: tilt", f"{box.tilt:g} rad", "0 rad: the grid is level", step)
+        raise InvalidValueError("box: tilt", f"{box.tilt:g} rad", "0 rad, because the grid is level", step)
     return box
 
 
@@ -88,7 +88,7 @@ class Request:
         wrenches: Set of loads; None for the weight alone.
         poses: Poses, a batch.
         model: Cable model.
-        inner: Anchors that move at each pose.
+        inner: Anchors that the machine moves from pose to pose.
         robust: Errors of the anchors, or None.
         optimizer: Name of the optimizer.
         seed: Seed of all random numbers.
@@ -107,7 +107,7 @@ class Request:
 
     @property
     def candidates(self) -> Candidates:
-        """The space of robots that the search covers."""
+        """The robots among which the search chooses."""
         return Candidates(self.robot, self.free)
 
 
@@ -136,8 +136,8 @@ def checked_request(
         if not isinstance(one, FreeAnchors):
             raise InvalidValueError(f"inner[{k}]", brief(one), "FreeAnchors", "Only anchors move from pose to pose.")
     if request.inner and not any(goal.needs == "margin" for goal in request.goals):
-        step = "Add Goal('mean_margin'): anchors move to where the margin is largest."
-        raise InvalidValueError("inner", "given without a goal of margins", "a goal of margins beside it", step)
+        step = "Add Goal('mean_margin'), because anchors move to the largest margin."
+        raise InvalidValueError("inner", "given without a goal on margins", "given with a goal on margins", step)
     if request.optimizer == "nsga2":
         _refuse_weights(request.goals)
     _check_platform(request)
@@ -162,17 +162,17 @@ def _goals(given: Any) -> tuple[Goal, ...]:
 def _refuse_weights(goals: tuple[Goal, ...]) -> None:
     for goal in goals:
         if goal.weight != 1.0:
-            step = 'Leave it out, or choose the optimizer "cma".'
+            step = 'Omit the weight, or choose the optimizer "cma".'
             allowed = "1: a front of robots has no weights"
             raise InvalidValueError(f"weight of {goal.kind}", f"{goal.weight:g}", allowed, step)
 
 
 def _check_platform(request: Request) -> None:
-    """Refuse a robot with a frame anchor inside the platform; the search drops candidates with this fault."""
+    """Refuse an initial robot with a frame anchor inside the platform; the search rejects such candidates later."""
     anchors = request.robot.frame_anchors
     poses = PlatformBox(request.robot, request.poses).holds(anchors)
     if (poses >= 0).any():
         cable = int(np.argmax(poses >= 0))
         item = f"the frame anchor of cable {cable}, at {', '.join(f'{x:.3g}' for x in anchors[cable])} m"
-        value, step = f"inside the platform at pose {int(poses[cable])}", "Leave the pose out, or correct the robot."
+        value, step = f"inside the platform at pose {int(poses[cable])}", "Omit the pose, or correct the robot."
         raise InvalidValueError(item, value, "outside the platform at all poses", step)

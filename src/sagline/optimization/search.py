@@ -14,14 +14,14 @@ from sagline.core.errors import InvalidValueError
 
 
 def _optional_module(module: str) -> Any:
-    """Module of an optional package of `sagline[design]`; the error says how to install it."""
+    """Module of an optional package of `sagline[design]`; the error contains the command that installs it."""
     try:
         return import_module(module)
     except ModuleNotFoundError as error:
         package = module.partition(".")[0]
         if error.name is None or error.name.partition(".")[0] != package:
             raise
-        step = 'Install it: pip install "sagline[design]"; or choose "differential_evolution", which needs nothing.'
+        step = 'Install it: pip install "sagline[design]"; or choose "differential_evolution", which needs no package.'
         raise InvalidValueError(f"the package {package}", "missing", "installed", step) from None
 
 
@@ -53,9 +53,9 @@ def latin_hypercube(count: int, dimensions: int, seed: int) -> Array:
     return np.asarray((intervals + random.random((count, dimensions))) / count)
 
 
-SPREAD: Final = 0.2  # first standard deviation, relative to the distance of the bounds
+SPREAD: Final = 0.2  # first standard deviation, relative to the distance between the bounds
 GROWTH: Final = 2  # factor of the population at each restart
-LEAST_DIMENSIONS: Final = 2  # the package fails with one variable; a second one without effect is then added
+LEAST_DIMENSIONS: Final = 2  # the package fails with one variable, so a second variable without effect is added
 
 
 def _search_cma(task: Task) -> None:
@@ -84,7 +84,7 @@ def _strategy(cma: Any, start: Array, random: np.random.Generator, population: i
     options = {
         "bounds": [0.0, 1.0],
         "randn": lambda *shape: random.standard_normal(shape),
-        "seed": np.nan,  # no seed, because randn has its own
+        "seed": np.nan,  # no seed, because randn has one
         "verbose": -9,
         **({} if population is None else {"popsize": population}),
     }
@@ -125,7 +125,7 @@ def _search_nsga2(task: Task) -> None:
     left = task.evaluations
     while left > 0:
         asked = algorithm.ask()
-        if asked is None or not 0 < len(asked) <= left:  # None if it finds no point that it has not tried
+        if asked is None or not 0 < len(asked) <= left:  # None if all points that it finds are known
             return
         costs = task.rate(asked.get("X"))
         evaluator.Evaluator().eval(static.StaticProblem(problem, F=costs), asked)

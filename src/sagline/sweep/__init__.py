@@ -1,4 +1,4 @@
-"""Sweeps: every robot at every pose under every wrench, computed by Dask workers into a folder."""
+"""Sweeps: Dask workers compute every robot at every pose under every wrench, and write the results to a folder."""
 
 from sagline.core.surface import group
 

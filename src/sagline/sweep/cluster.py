@@ -22,14 +22,14 @@ from sagline.sweep.work import task
 
 HERE: Final = "127.0.0.1"  # not reachable from other computers
 DASHBOARD: Final = 8787
-PATIENCE: Final = 15.0  # longest wait for the answer of a scheduler and for a worker [s]
-AHEAD: Final = 2  # number of tasks per worker, so that each worker has the next task when it finishes one
+PATIENCE: Final = 15.0  # longest wait for a scheduler, and for a worker [s]
+AHEAD: Final = 2  # number of tasks per worker, so that the next task is ready when one is finished
 LOOK: Final = 5.0  # time between two checks of the number of workers [s]
 SCHEMES: Final = ("tcp://", "tls://", "ws://", "wss://")
 LOGGERS: Final = ("distributed", "tornado", "bokeh", "asyncio")
 SILENT: Final = logging.CRITICAL + 1
 
-SETTINGS: Final = {  # setting of workers, which avoids that memory is released and allocated again for each array
+SETTINGS: Final = {  # this setting of workers avoids that memory is released and allocated again for each array
     "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 1 << 28,
     "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 1 << 28,
     "distributed.worker.profile.enabled": False,
@@ -48,7 +48,7 @@ def cores() -> int:
 
 @contextmanager
 def local_workers(workers: int, tell: Callable[[str], None]) -> Iterator[Any]:
-    """Worker processes of this computer, not reachable from others; `tell` receives the address of the dashboard."""
+    """Worker processes of this computer, not reachable from others; `tell` is called with the dashboard's address."""
     with _silence_dask():
         import dask.config
         import distributed
@@ -70,7 +70,7 @@ def local_workers(workers: int, tell: Callable[[str], None]) -> Iterator[Any]:
             with settings.set(SETTINGS):
                 cluster = api.LocalCluster(**given)
         except (RuntimeError, OSError, TimeoutError) as error:
-            step = 'In a script, call it below: if __name__ == "__main__":'
+            step = 'In a script, call run below the line if __name__ == "__main__":'
             raise SaglineError(f"The workers could not be started ({_first_line(error)}). {step}") from None
         with cluster, api.Client(cluster, set_as_default=False) as client:
             taken = "" if free else f"; port {DASHBOARD} is taken"
@@ -80,7 +80,7 @@ def local_workers(workers: int, tell: Callable[[str], None]) -> Iterator[Any]:
 
 @contextmanager
 def remote_workers(address: str) -> Iterator[Any]:
-    """The workers of a scheduler at an address, "tcp://10.0.0.1:8786"; SaglineError if there are none."""
+    """The workers of the scheduler at an address, "tcp://10.0.0.1:8786"; raises SaglineError if there are none."""
     check_address(address)
     check_package("distributed", "a scheduler")
     with _silence_dask():
@@ -109,11 +109,11 @@ def check_address(address: object) -> str:
         host, _, port = address.removeprefix(scheme or "").rpartition(":")
         if scheme and host and " " not in host and port.isdecimal() and 0 < int(port) < 1 << 16:
             return address
-    raise InvalidValueError("scheduler", brief(address), "an address, tcp://HOST:PORT", "Take the one it prints.")
+    raise InvalidValueError("scheduler", brief(address), "an address, tcp://HOST:PORT", "Give the scheduler's address.")
 
 
 def run_tasks(client: Any, job: Job, numbers: Iterable[int], finish: Finish, tell: Callable[[str], None]) -> None:
-    """Run tasks on the workers, with a few waiting per worker; after an error or Ctrl-C, running tasks are finished."""
+    """Run tasks on the workers, a few per worker at a time; after an error or Ctrl-C, running tasks are finished."""
     import distributed
 
     api: Any = distributed
@@ -134,7 +134,7 @@ def run_tasks(client: Any, job: Job, numbers: Iterable[int], finish: Finish, tel
             ahead.add(future)
 
     def take(future: Any) -> None:
-        if future.status == "lost":  # its worker ended before the result was fetched; the scheduler repeats the task
+        if future.status == "lost":  # the worker ended before the result was fetched; the scheduler repeats the task
             ahead.add(future)
             return
         number = which.pop(future)
@@ -159,13 +159,13 @@ def run_tasks(client: Any, job: Job, numbers: Iterable[int], finish: Finish, tel
 
 @contextmanager
 def _silence_dask() -> Iterator[None]:
-    """Silence Dask's loggers and warnings in the block, and its loggers after a failure, for late reports."""
+    """Silence Dask's loggers and warnings in the block; after a failure, the loggers remain silent for late reports."""
     loggers = [logging.getLogger(name) for name in LOGGERS]
     levels = [logger.level for logger in loggers]
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", module=rf"({'|'.join((*LOGGERS, 'dask'))})(\.|$)")
         if is_installed("distributed"):
-            import distributed  # noqa: F401 - the import sets up its loggers and would undo the following lines
+            import distributed  # noqa: F401 - the import configures the loggers, and must not follow the next lines
         for logger in loggers:
             logger.setLevel(SILENT)
         yield

@@ -26,14 +26,14 @@ from sagline.sweep.request import Request
 from sagline.tension.methods import method_of
 from sagline.workspaces.wrench_sets import WrenchBox, WrenchSet
 
-KEYS: Final = ("low", "high", "count")  # keys of an axis: its ends and its number of points
+KEYS: Final = ("low", "high", "count")  # keys of an axis: both ends and the number of points
 ANGLES: Final = ("alpha", "beta", "gamma")
 MOST: Final = 1_000_000  # largest number of points along an axis
 _POINT_BYTES: Final = 400.0  # bytes per point of a grid during the construction of poses
 
 
 class _Grid(YamlEntry):
-    """A grid of poses; each coordinate is one value or an axis."""
+    """A grid of poses; each coordinate is a value or an axis."""
 
     x: Any
     y: Any
@@ -49,7 +49,7 @@ class _Poses(YamlEntry):
 
 
 class _Loads(YamlEntry):
-    """A grid of forces and moments; each component is one value or an axis."""
+    """A grid of forces and moments; each component is a value or an axis."""
 
     force_x: Any = 0.0
     force_y: Any = 0.0
@@ -65,7 +65,7 @@ class _Wrenches(YamlEntry):
 
 
 class _Around(YamlEntry):
-    """Loads around each wrench: largest components of force and moment, as one or three numbers each."""
+    """Loads around each wrench: largest components of the force and of the moment, each as one or three numbers."""
 
     force: Any = 0.0
     moment: Any = 0.0
@@ -85,8 +85,8 @@ class _SweepEntry(YamlEntry):
 def load_sweep(file: os.PathLike[str] | str) -> Request:
     """Read the request of a sweep from a file.
 
-    A sweep file is YAML. A quantity is a number in SI or a text with its unit. A variable quantity is an axis with its
-    two ends and its number of points:
+    A sweep file is YAML. A quantity is a number in SI or a text with its unit. A variable quantity is an axis: both
+    ends and the number of points.
 
         robots: [cogiro, own_robot.yaml]       # presets, and files beside this one
         poses:
@@ -146,7 +146,7 @@ def _robots(given: Any, folder: Path) -> list[Robot]:
 
 
 def _beside(name: str, folder: Path) -> str | Path:
-    """Path relative to the folder of the sweep file, for names of robot files; other names unchanged."""
+    """Path of a robot file, relative to the folder of the sweep file; a name of a preset is not changed."""
     return folder / name if Path(name).suffix.lower() in (".yaml", ".yml") else name
 
 
@@ -201,7 +201,7 @@ def _axis(given: Any, item: str, unit: str) -> Array:
         return np.array([_one(given, item, unit)])
     if set(given) != set(KEYS):
         keys = ", ".join(map(str, given)) or "nothing"
-        raise InvalidValueError(item, f"given by {brief(keys)}", ", ".join(KEYS), "Give these three, or one value.")
+        raise InvalidValueError(item, f"given by {brief(keys)}", ", ".join(KEYS), "Give all three, or one value.")
     low, high = (_one(given[key], f"{item}.{key}", unit) for key in KEYS[:2])
     count = whole_number(given["count"], f"{item}.count", 1, MOST)
     if high < low or (high > low) != (count > 1):
@@ -211,7 +211,7 @@ def _axis(given: Any, item: str, unit: str) -> Array:
 
 
 def _product(axes: dict[str, Array]) -> Array:
-    """All points of a grid, the last axis fastest, shape (N, axes)."""
+    """All points of a grid, shape (N, axes); the last axis varies fastest."""
     count = int(np.prod([float(len(axis)) for axis in axes.values()]))
-    check_memory(f"a grid of {count:,} points", _POINT_BYTES * count, "Take fewer points.")
+    check_memory(f"a grid of {count:,} points", _POINT_BYTES * count, "Give fewer points.")
     return np.stack(np.meshgrid(*axes.values(), indexing="ij"), axis=-1).reshape(-1, len(axes))

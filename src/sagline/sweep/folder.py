@@ -1,7 +1,7 @@
-"""Folders of sweeps: a Zarr group that contains the request, and one chunk of each variable per task.
+"""Folders of sweeps: a Zarr group that contains the request, and for each task one chunk of each variable.
 
-The folder contains the exact request. A number therefore identifies a task on any computer with access to the folder.
-Each chunk contains a checksum, which detects incomplete chunks.
+The folder contains the exact request. Therefore a number is sufficient to identify a task on any computer with access
+to the folder. The checksum of a chunk shows if the chunk is incomplete.
 """
 
 from __future__ import annotations
@@ -58,11 +58,11 @@ SHAPES: Final = {  # dimensions of the parts of a set of loads
     "sizes": (-1,),
     "accelerations": (2,),
 }
-STEP: Final = "Free some space or correct the permissions, and run the same sweep again: it continues."
+STEP: Final = "Free some space or correct the permissions, and run the same sweep again to continue."
 
 
 class TaskSize(NamedTuple):
-    """Numbers of poses and wrenches of one robot in a task; fixed when the folder is created."""
+    """Numbers of poses and wrenches of a task, all for one robot; they are constant in a folder."""
 
     poses: int
     wrenches: int
@@ -90,7 +90,7 @@ class SweepFolder(NamedTuple):
         return math.prod(self.grid)
 
     def part(self, number: int) -> RequestBox:
-        """Box of requests that a task computes."""
+        """Box of requests of a task."""
         _, poses, wrenches = self.request.shape
         robot, row, column = (int(k) for k in np.unravel_index(number, self.grid))
         first, left = row * self.size.poses, column * self.size.wrenches
@@ -118,7 +118,7 @@ class SweepFolder(NamedTuple):
                 return None
             try:
                 numbers[variable.name] = np.asarray(array[robot, rows, columns])
-            except (ValueError, RuntimeError, OSError):  # errors of the checksum, of unpacking, and of the disk
+            except (ValueError, RuntimeError, OSError):  # errors of the checksum, the decompression, and the disk
                 return None
         return numbers
 
@@ -147,7 +147,7 @@ def make_folder(path: Path, request: Request, size: TaskSize) -> None:
             os.replace(place / path.name, path)
     except OSError as error:
         if error.errno in (errno.ENOTEMPTY, errno.EEXIST):
-            return  # another process has made it in the meantime; it is checked like any other when it is opened
+            return  # another process has created the folder in the meantime; it is checked when it is opened
         reason = f"cannot be made ({error.strerror or error})"
         raise FileError(path, reason, "Check its name, the permissions and the space on the disk.") from None
 
@@ -185,7 +185,7 @@ def open_folder(path: Path) -> SweepFolder:
             raise FileError.of(path, error) from None
         raise FileError(path, f"is damaged ({type(error).__name__}: {error})", CONTENT.again) from None
     if digest != request_digest(request) or min(size) < 1:
-        raise FileError(path, "has changed since it was made: its digest differs", CONTENT.again)
+        raise FileError(path, "has changed since its creation, because its digest differs", CONTENT.again)
     return SweepFolder(path, group, request, digest, size, made_by)
 
 
@@ -195,11 +195,11 @@ def request_digest(request: Request) -> str:
 
 
 def check_made_here(folder: SweepFolder) -> None:
-    """Raise FileError for a sweep of another version, whose numbers may differ."""
+    """Raise FileError for a sweep of another version, because its numbers may differ."""
     here = f"sagline {version('sagline')}"
     if folder.made_by != here:
-        step = f"Finish it with {folder.made_by}, or sweep into another folder."
-        raise FileError(folder.path, f"was begun by {folder.made_by}, and this is {here}", step)
+        step = f"Finish the sweep with {folder.made_by}, or sweep into another folder."
+        raise FileError(folder.path, f"was begun with {folder.made_by}, and this is {here}", step)
 
 
 def is_installed(package: str) -> bool:
@@ -208,14 +208,14 @@ def is_installed(package: str) -> bool:
 
 
 def check_package(name: str, purpose: str) -> None:
-    """Raise InvalidValueError, with the command that installs it, if an optional package is missing."""
+    """Raise InvalidValueError if an optional package is missing; the message contains the command that installs it."""
     if not is_installed(name):
         step = 'Install it: pip install "sagline[sweep]".'
         raise InvalidValueError(f"the package {name}", "not installed", f"installed, for {purpose}", step)
 
 
 def _options(request: Request) -> dict[str, Any]:
-    """JSON values of a request, without robots and arrays."""
+    """Values of a request for JSON, without robots and arrays."""
     options = {
         "quantities": list(request.quantities),
         **choice_attributes("model", request.model, MODELS),
@@ -227,7 +227,7 @@ def _options(request: Request) -> dict[str, Any]:
 
 
 def _set_of(written: Mapping[str, Any]) -> WrenchSet:
-    """Wrench set written by `_options`."""
+    """Wrench set from values that `_options` has written."""
     kinds = {name: np.int64 if name == "sizes" else np.float64 for name in SHAPES}
     return WrenchSet(*(locked(np.array(written[name], kinds[name]).reshape(SHAPES[name])) for name in SHAPES))
 

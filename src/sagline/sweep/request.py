@@ -84,11 +84,11 @@ QUANTITIES: Final = MappingProxyType(
 
 
 def variables_of(quantities: Iterable[str]) -> tuple[SweepArray, ...]:
-    """Variables of some quantities, without repetitions, in the order of the quantities."""
+    """Variables of some quantities, without repetitions, in the order of `quantities`."""
     return tuple(dict.fromkeys(variable for name in quantities for variable in QUANTITIES[name]))
 
 
-MOST: Final = 1 << 40  # largest number of requests, a year on a hundred cores
+MOST: Final = 1 << 40  # largest number of requests, about a year on a hundred cores
 _CATENARY: Final = Catenary()
 _MINIMUM_NORM: Final = MinimumNorm()
 
@@ -105,7 +105,7 @@ class Request(Result):
             "shortfall", "margin".
         model: Cable model.
         tension: Tension distribution method, applied to each request independently.
-        around: Loads around each wrench, for all of which the margin is computed.
+        around: Loads around each wrench; the margin is the margin of all of them.
         moment_arm: Lever arm of the margin's norm [m]; None for each robot's mean lever arm.
     """
 
@@ -133,7 +133,7 @@ class Request(Result):
         """Check the request.
 
         Args:
-            robots: A robot, or a sequence of robots, whose numbers of cables may differ.
+            robots: A robot, or a sequence of robots; their numbers of cables may differ.
             poses: A pose, or a batch.
             wrenches: Force [N], then moment [N m], shape (6,) or (W, 6); None for the weight alone.
             quantities: One or several of `sl.sweep.QUANTITIES`.
@@ -152,17 +152,17 @@ class Request(Result):
             batch = Pose.from_quaternion(batch.position[None], batch.quaternion[None])
         loads = np.atleast_2d(checked(np.zeros(6) if wrenches is None else wrenches, "wrenches", "N, N m", shape=(6,)))
         if loads.ndim > 2:
-            raise InvalidValueError("wrenches", f"of shape {loads.shape}", "shape (6,) or (W, 6)", "Flatten the axes.")
+            raise InvalidValueError("wrenches", f"of shape {loads.shape}", "shape (6,) or (W, 6)", "Reshape to (W, 6).")
         words = elements(quantities, str, "quantities", "Give quantities as a list.")
         chosen = {choice(word, f"quantities[{k}]", QUANTITIES) for k, word in enumerate(words)}
         if len(chosen) < len(words):
-            raise InvalidValueError("quantities", brief(list(words)), "each once", "Leave out what is there twice.")
+            raise InvalidValueError("quantities", brief(list(words)), "each once", "Omit repeated names.")
         parts: dict[str, Sized] = {"robots": machines, "poses": batch, "wrenches": loads, "quantities": chosen}
         for item, some in parts.items():
             if not len(some):
                 raise InvalidValueError(item, "empty", "one or more", f"Give {item}.")
         if (count := len(machines) * len(batch) * len(loads)) > MOST:
-            raise InvalidValueError("the sweep", f"of {count:,} requests", f"<= {MOST:,}", "Ask for fewer at a time.")
+            raise InvalidValueError("the sweep", f"of {count:,} requests", f"<= {MOST:,}", "Request fewer at a time.")
         model, method = model_of(model), method_of(tension).alone
         for one in machines:
             kernel_options(without_guides(one, "a sweep", "inverse"), model, method)
@@ -200,7 +200,7 @@ class Request(Result):
 
 
 class RequestBox(NamedTuple):
-    """A box of requests: index of the robot, ranges of poses and wrenches."""
+    """A box of requests: the index of a robot, and ranges of poses and wrenches."""
 
     robot: int
     poses: slice

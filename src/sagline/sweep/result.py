@@ -1,4 +1,4 @@
-"""State of a sweep on the disk: its results, and the file `done` with one line per finished task."""
+"""State of a sweep on the disk: the results, and the file `done` with one line per finished task."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ HEAD: Final = "#    task  seconds  feasible infeasible   unable     open     los
 
 
 class TaskMark(NamedTuple):
-    """Record of a finished task: computing time [s], 0 for an existing chunk, and outcomes of its requests."""
+    """Record of a finished task: computing time [s], or 0 for existing chunks, and outcomes of its requests."""
 
     seconds: float
     counts: Counts
 
 
 def _read_marks(folder: SweepFolder) -> dict[int, TaskMark]:
-    """Finished tasks by their numbers; damaged lines are ignored."""
+    """Marks of finished tasks, by the numbers of the tasks; damaged lines are ignored."""
     try:
         lines = (folder.path / NAME).read_bytes().decode("ascii", "replace").splitlines(keepends=True)
     except FileNotFoundError:
@@ -56,7 +56,7 @@ class TaskMarks:
     """The file `done` while a sweep runs, locked against other processes."""
 
     def __init__(self, folder: SweepFolder, file: IO[bytes], marks: dict[int, TaskMark]) -> None:
-        """Continue after the given marks; created by `open_marks`."""
+        """Continue after the given marks; `open_marks` calls this."""
         self._folder, self._file = folder, file
         self.marks = marks
 
@@ -71,7 +71,7 @@ class TaskMarks:
         self._write(text)
 
     def begin(self) -> None:
-        """Write the heads of the columns on a separate line."""
+        """Write the headings of the columns on a new line."""
         size = self._file.seek(0, 2)
         torn = False
         if size:
@@ -99,7 +99,7 @@ def open_marks(folder: SweepFolder) -> Iterator[TaskMarks]:
         raise FileError(path, f"cannot be written ({error.strerror or error})", STEP) from None
     with file:
         if not try_lock(file.fileno(), if_unknown=True):
-            raise FileError(folder.path, "is being worked on by another process", "Wait for it, or stop it.")
+            raise FileError(folder.path, "is in use by another process", "Wait for that process, or stop it.")
         marks = TaskMarks(folder, file, _read_marks(folder))
         marks.begin()
         yield marks
@@ -129,7 +129,7 @@ def _mark(line: str) -> tuple[int, TaskMark] | None:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Sweep(Result):
-    """Sweep in a folder, whose numbers are read when they are used.
+    """Sweep in a folder; its numbers are read when they are used.
 
     Attributes:
         folder: Path of the folder.
@@ -153,7 +153,7 @@ class Sweep(Result):
         return self.done == self.tasks
 
     def __str__(self) -> str:
-        """Request, number of finished tasks, and outcomes of the requests."""
+        """Text of the request, number of finished tasks, and outcomes of the requests."""
         ends = ", ".join(f"{count:,} {name}" for name, count in self.counts._asdict().items() if count)
         return f"{self.request}; {self.done:,} of {counted(self.tasks, 'task')} done" + f": {ends}" * bool(ends)
 
@@ -172,7 +172,7 @@ class Sweep(Result):
 
         Returns:
             Array of shape (R, P, W), for tensions and lengths (R, P, W, m), or the part selected by the index. Values
-            are NaN without a solution and before their computation; a status is -1 before its computation.
+            are NaN for requests without a solution. Before their computation, values are NaN and statuses are -1.
 
         Raises:
             InvalidValueError: If there is no such variable, the index is invalid, or more memory is required than is
@@ -183,7 +183,7 @@ class Sweep(Result):
         array: Any = open_folder(self.folder).group[name]
         parts = index if isinstance(index, tuple) else (index,)
         if not parts:
-            check_memory(f"all of {name}", 2.0 * array.nbytes, "Read a part, by an index.")
+            check_memory(f"all of {name}", 2.0 * array.nbytes, "Give an index, to read a part.")
         if len(parts) > array.ndim:
             allowed = f"at most {array.ndim} whole numbers and slices"
             raise InvalidValueError("index", brief(index), allowed, "Count robot, pose, wrench and cable.")
@@ -193,7 +193,7 @@ class Sweep(Result):
         except IndexError:
             raise InvalidValueError("index", brief(index), "slices upward", "Reverse the result.") from None
         except (ValueError, RuntimeError, OSError) as error:
-            step = "Run the sweep again: it repeats the damaged part."
+            step = "Run the sweep again, to repeat the damaged part."
             raise FileError(self.folder, f"{name} cannot be read ({error})", step) from None
 
     @property

@@ -28,7 +28,7 @@ from sagline.sweep.result import Sweep, TaskMark, TaskMarks, load, open_marks
 from sagline.sweep.work import Counts, found_counts, measured_size, task
 
 MOST_WORKERS: Final = 1024
-FEW: Final = 4  # number of tasks that take less time than the start of workers
+FEW: Final = 4  # so few tasks take less time than the start of workers
 Tell = Callable[[str], None]
 
 
@@ -43,26 +43,27 @@ def run(
 ) -> Sweep:
     """Run a sweep into a folder, or continue it.
 
-    The folder contains partial results from the first minute on, and a file `done` with one line per finished task. The
-    same call continues a stopped sweep; complete chunks are not computed again. Ctrl-C stops the sweep after the
+    The folder contains partial results after at most a minute, and a file `done` with one line per finished task. The
+    same call continues a stopped sweep, and does not compute complete chunks again. Ctrl-C stops the sweep after the
     running tasks. A killed worker is replaced, and its task is repeated.
 
     Args:
         request: The request.
         folder: Path of the folder; created if missing. It may contain the same sweep, but no other files.
-        workers: Number of processes of this computer; None for one per processor. This process computes the tasks one
-            after the other if the number is 1, Dask is missing, or there are at most four tasks.
-        scheduler: Address of Dask's scheduler of a cluster, "tcp://10.0.0.1:8786", instead of local workers; all its
-            workers must have access to the folder under the same name.
+        workers: Number of processes of this computer; None for one per processor. Without workers, this process
+            computes the tasks one after the other; this happens if the number is 1, Dask is missing, or there are at
+            most four tasks.
+        scheduler: Address of the Dask scheduler of a cluster, "tcp://10.0.0.1:8786", instead of local workers. All
+            workers of the cluster must have access to the folder under the same name.
         progress: Function that is called with the number of finished tasks and the number of all tasks.
         tell: Function that is called with messages, such as the address of the dashboard.
 
     Returns:
-        The sweep, as `load` reads it.
+        The sweep, as returned by `load`.
 
     Raises:
         InvalidValueError: If an argument is of the wrong kind, or Zarr is not installed.
-        FileError: If the folder contains something else or cannot be written; finished tasks are kept.
+        FileError: If the folder has other contents, or cannot be written; finished tasks are kept.
         SaglineError: If the workers or the scheduler fail; finished tasks are kept.
 
     Examples:
@@ -84,7 +85,7 @@ def run(
     report, say = callback(progress, "progress"), callback(tell, "tell") or (lambda text: None)
     check_package("zarr", "sweeps")
     with ExitStack() as entered:
-        # before the folder is made: without a scheduler nothing is written
+        # before the folder is created, because nothing must be written without a scheduler
         remote = None if scheduler is None else entered.enter_context(remote_workers(scheduler))
         opened = _open_or_make_folder(path, request)
         marks = entered.enter_context(open_marks(opened))
@@ -113,10 +114,10 @@ def run(
 
 
 def open_matching_folder(path: Path, request: Request) -> SweepFolder:
-    """Open the folder of a request; an error for the folder of another request."""
+    """Open the folder of a request; raises an error if it contains another request."""
     opened = open_folder(path)
     if opened.digest != request_digest(request):
-        step = "Give this one another folder, or remove that one."
+        step = "Give another folder, or remove this one."
         raise FileError(path, f"contains another sweep, of {len(opened.request):,} requests", step)
     return opened
 
@@ -135,7 +136,7 @@ def _open_or_make_folder(path: Path, request: Request) -> SweepFolder:
 
 
 def _waiting(folder: SweepFolder, marks: TaskMarks) -> list[int]:
-    """Remaining tasks; tasks with complete chunks on the disk are marked as finished."""
+    """Numbers of the remaining tasks; tasks with complete chunks on the disk are marked as finished."""
     waiting = []
     for number in range(folder.tasks):
         counts = found_counts(folder, number)
@@ -156,11 +157,11 @@ def _workers(count: int, tasks: int, tell: Tell) -> Iterator[Any]:
             yield client
     else:
         if count > 1 and tasks > FEW:
-            tell('Dask is not installed: one task after the other. For more, pip install "sagline[sweep]".')
+            tell('Tasks run one after the other without Dask. For parallel tasks, pip install "sagline[sweep]".')
         yield None
 
 
 def _check_not_imported() -> None:
-    """End a worker that imports the script of the sweep; the parent process reports the reason."""
+    """End a worker that runs the user's script again by its import; the parent process reports the reason."""
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         raise SystemExit(1)

@@ -1,8 +1,8 @@
-"""Verdicts on many loads at each pose, with shared proofs: the proof of one load is valid for all loads beyond it.
+"""Verdicts on many loads at each pose with shared proofs: the proof for one load is valid for a half-space of loads.
 
-The proof that a load w is infeasible is a direction y along which the cable forces are too small by a gap. For another
-load w' at the same pose, the gap is that of w minus y (w' - w). A positive gap proves that w' is infeasible, and it is
-a lower bound of the sufficient change of the force. One proof therefore decides a half-space of loads.
+The proof that a load w is infeasible is a direction y and a gap: along y, the cable forces are too small by the gap.
+For another load w' at the same pose, the gap changes by -y (w' - w). A positive gap proves that w' is infeasible. This
+gap is also a lower bound of the change of the force that makes w' feasible.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from sagline.robot.robot import Robot
 from sagline.statics.tables import robot_terms
 from sagline.tension.method import Options
 
-ITERATIONS: Final = 32  # number of loads per pose whose proofs are tried on the other loads
-TRUST: Final = 1e-8  # smallest gap relative to the forces, ten times the tolerance of a verdict and far above rounding
-PROVED: Final = 0  # column of the brackets
+ITERATIONS: Final = 32  # largest number of proofs per pose that are tried on the other loads
+TRUST: Final = 1e-8  # smallest gap relative to the forces; ten times the tolerance of a verdict, far above rounding
+PROVED: Final = 0  # column of the proved bound in the brackets
 
 
 def proofs_of(robot: Robot, options: Options, poses: Array, loads: Array, found: InverseRows) -> Array:
-    """Decide the requests that the tension distribution left open, and complete the feasible ones.
+    """Decide the requests without a verdict from the tension distribution, and complete the feasible ones.
 
     Poses are rows (P, POSE_COLUMNS), and loads have the shape (W, 6). The P W requests in `found` are all loads at the
-    first pose, then all loads at the next pose, and so on. Returns the proved least change of the force [N], (P W,); it
-    is 0 if the request is feasible, and NaN if the force is not the reason.
+    first pose, then all loads at the next pose, and so on. Returns a proved lower bound of the necessary change of the
+    force [N], (P W,); 0 if the request is feasible, and NaN if it fails for another reason.
     """
     proof = np.full(found.pose_status.size, np.nan)
     proof[found.pose_status == codes.POSE_SOLVED] = 0.0
@@ -54,12 +54,12 @@ def proofs_of(robot: Robot, options: Options, poses: Array, loads: Array, found:
 
 
 def _shares(robot: Robot, loads: Array) -> bool:
-    """True if proofs can be shared, with several loads and upper tension limits."""
+    """True if proofs can be shared: there are several loads, and all cables have upper tension limits."""
     return len(loads) > 1 and bool(np.isfinite(robot.tension_max).all())
 
 
 def _forces_at_hand(robot: Robot, loads: Array) -> Array:
-    """Size of the forces at each load [N], (W,), with moments divided by the least lever arm; not below a verdict's."""
+    """Upper estimate of the forces at each load [N], (W,); moments are divided by the smallest lever arm."""
     arms = np.linalg.norm(robot.platform_anchors - robot.center_of_mass, axis=1)
     arm = float(arms[arms > 0.0].min(initial=np.inf))
     moments = np.abs(loads[:, 3:]).sum(axis=1) / arm
@@ -69,7 +69,7 @@ def _forces_at_hand(robot: Robot, loads: Array) -> Array:
 
 
 def _gaps(verdicts: tuple[Array, Array, Flags], along: Array, columns: Indices) -> Array:
-    """Infeasibility gap of each load (K, W) [N] along the proof of one load per pose; -inf without proof."""
+    """Gap (K, W) [N] of all loads at K poses, for the proof of one load per pose; -inf without a proof."""
     proved, direction, known = verdicts
     own = proved + np.einsum("kn,kn->k", direction, along[columns])
     gap = own[:, None] - direction @ along.T
@@ -79,7 +79,7 @@ def _gaps(verdicts: tuple[Array, Array, Flags], along: Array, columns: Indices) 
 def _decide(
     robot: Robot, options: Options, poses: Array, loads: Array, found: InverseRows, which: Indices, proof: Array
 ) -> tuple[Array, Array, Flags]:
-    """Decide some requests; returns proved least changes, Farkas directions, and a mask of the proofs among these."""
+    """Decide some requests; returns proved lower bounds, Farkas directions, and a mask of the requests with a proof."""
     rows = locked(poses[which // len(loads)])
     wrenches = locked(loads[which % len(loads)])
     n, m = robot.degrees_of_freedom, robot.cable_count

@@ -1,4 +1,4 @@
-"""Tasks of a sweep, which are pure functions of the request and the number of the task."""
+"""Tasks of a sweep: pure functions of the request and the number of the task."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ from sagline.tension.method import kernel_options
 from sagline.workspaces.margin import MarginStatus
 from sagline.workspaces.margin_rows import MarginRows
 
-# statuses that count as feasible, infeasible, open and lost
+# statuses of feasible, infeasible, open and lost requests
 INVERSE_ENDS: Final = (PoseStatus.SOLVED, PoseStatus.INFEASIBLE, PoseStatus.BORDERLINE, PoseStatus.NOT_CONVERGED)
-MARGIN_ENDS: Final = (MarginStatus.FEASIBLE, MarginStatus.INFEASIBLE, MarginStatus.OPEN, -1)  # no status counts as lost
-ROWS: Final = 1 << 14  # requests per call, whose arrays fit the cache of the processor
+MARGIN_ENDS: Final = (MarginStatus.FEASIBLE, MarginStatus.INFEASIBLE, MarginStatus.OPEN, -1)  # a margin is never lost
+ROWS: Final = 1 << 14  # number of requests per call; their arrays fit the cache of the processor
 
 
 class Counts(NamedTuple):
-    """Numbers of requests by outcome.
+    """Number of requests for each outcome.
 
     Attributes:
         feasible: Number of requests with tensions within the limits.
         infeasible: Number of requests with a proof that no such tensions exist.
         unable: Number of requests without a result for another reason; see the status.
-        open: Number of requests too close to the boundary for a verdict.
+        open: Number of requests that are too close to the boundary for a verdict.
         lost: Number of requests without a verdict.
     """
 
@@ -129,7 +129,7 @@ class _Margins:
 
 
 def _rows(poses: Pose, part: slice) -> Array:
-    """Exact pose rows; a new Pose would normalize the quaternions again."""
+    """Poses with exactly these rows; the constructor of Pose would normalize the quaternions again."""
     return locked(np.concatenate((poses.position[part], poses.quaternion[part]), axis=1))
 
 
@@ -147,17 +147,17 @@ SOLVERS: Final[dict[type[_Inverse | _Margins], frozenset[str]]] = {
 
 SECONDS: Final = 0.75  # duration of a task [s], a hundred times the time of the scheduler for it
 LONGEST: Final = 10.0  # longest duration of a task [s], for a sweep of several days
-TASKS: Final = 4000  # upper limit of the number of tasks, until tasks reach this duration
+TASKS: Final = 4000  # largest number of tasks; tasks become longer, up to the longest duration
 LARGEST: Final = 1 << 26  # largest output of a task [bytes]
-SAMPLES, SAMPLE = 16, 4096  # number of timed parts, and number of requests in each
+SAMPLES, SAMPLE = 16, 4096  # number of timed parts, and number of requests per part
 TIMED: Final = 0.5  # [s], sufficient to measure the time per request
 
 
 def task(folder: str, digest: str, number: int) -> tuple[float, tuple[int, ...]]:
-    """Compute one task of the folder with a digest and write its chunks; returns its seconds and outcomes."""
+    """Compute one task of a folder and write its chunks; returns time [s] and outcomes."""
     start = time.perf_counter()
     opened = _opened(folder, digest)
-    numbers = opened.read(number)  # complete output of a worker that ended before its report
+    numbers = opened.read(number)  # complete chunks of a worker that ended before its report
     if numbers is None:
         numbers = compute_variables(opened.request, opened.part(number))
         opened.write(number, numbers)
@@ -166,7 +166,7 @@ def task(folder: str, digest: str, number: int) -> tuple[float, tuple[int, ...]]
 
 @lru_cache(maxsize=4)
 def _opened(folder: str, digest: str) -> SweepFolder:
-    """Open folder, which is kept from task to task."""
+    """Open a folder with a check of its digest; it stays open for the next tasks."""
     found = open_folder(Path(folder))
     if found.digest != digest:
         step = "Give all workers access to the same folder under the same name."
@@ -176,13 +176,13 @@ def _opened(folder: str, digest: str) -> SweepFolder:
 
 
 def found_counts(folder: SweepFolder, number: int) -> Counts | None:
-    """Counts of a task with complete chunks on the disk; None if one is missing or incomplete."""
+    """Counts of a task from its chunks on the disk; None if a chunk is missing or incomplete."""
     numbers = folder.read(number)
     return None if numbers is None else count_outcomes(numbers)
 
 
 def measured_size(request: Request) -> TaskSize:
-    """Task size of suitable duration, from the measured time of some requests."""
+    """Task size for a suitable duration, from the measured time of some requests."""
     places = np.linspace(0, len(request) - 1, min(SAMPLES, len(request))).astype(np.int64)
     parts = [_sample(place, request) for place in np.transpose(np.unravel_index(places, request.shape))]
     compute_variables(request, parts[0])  # loads the machine code
@@ -202,7 +202,7 @@ def measured_size(request: Request) -> TaskSize:
 
 
 def _size(rows: int, poses: int, wrenches: int) -> TaskSize:
-    """Task size for a number of requests; wrenches before poses, because the loads of a pose share proofs."""
+    """Task size for a number of requests; a task has all wrenches of a pose if possible, because they share proofs."""
     wide = min(wrenches, rows)
     return TaskSize(min(poses, max(1, rows // wide)), wide)
 

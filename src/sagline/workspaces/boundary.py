@@ -29,9 +29,9 @@ from sagline.workspaces.surface import Components, Surface, components_of, norma
 from sagline.workspaces.walks import labels_of
 
 MOST_CELLS: Final = 128  # along an axis
-MOST_HALVED: Final = 256  # largest number of cells along an axis: 17 million nodes, half a gigabyte
+MOST_HALVED: Final = 256  # largest number of cells along an axis; this gives 17 million nodes, 0.5 GB
 MOST_HALVINGS: Final = 3
-AT_NODE: Final = 1e-10  # a vertex closer to a node than this share of a grid edge counts as at the node
+AT_NODE: Final = 1e-10  # a vertex is moved to a node if it is closer than this share of a grid edge
 FACES: Final = ("x low", "x high", "y low", "y high", "z low", "z high")
 
 
@@ -40,14 +40,13 @@ class Boundary(Result):
     """Result of `boundary`.
 
     Attributes:
-        surface: The boundary, closed along the faces of the box; vertices off these faces are on the boundary to 1e-10
-            of a cell.
+        surface: The boundary, closed along the faces of the box; other vertices are on the boundary to 1e-10 of a cell.
         volume: Volume of the set within the box [m^3]: enclosed volume of the surface plus volume between its triangles
             and the boundary.
-        volume_error: Error bound of the volume [m^3]. It does not include parts and gaps of the set that are thinner
-            than two cells of the finest grid.
+        volume_error: Error bound of the volume [m^3]. The bound neglects parts and gaps that are thinner than two cells
+            of the finest grid.
         grid: Values of the function at the nodes of the grid before refinement.
-        components: Components of the set. Parts between which a walk was found are one component.
+        components: Components of the set. Parts are one component if a walk between them was found.
         open_faces: Faces of the box that the set reaches, for example "x low"; the set may continue beyond them.
         evaluations: Number of positions at which the function was evaluated.
     """
@@ -80,12 +79,13 @@ def boundary(
     cells: int | tuple[int, int, int] = 32,
     refine: bool | int = True,
 ) -> Boundary:
-    """Boundary of the set where a function of positions (N, 3) [m] is not negative, within a box [m].
+    """Boundary, within a box [m], of the set where a function of positions (N, 3) [m] is nonnegative.
 
     The function may have jumps and infinite values, but not NaN. It is evaluated at the nodes of a grid with `cells`
-    along the longest side, or along each axis. Cells that the boundary crosses are then halved `refine` times. Marching
-    cubes on the signs gives a closed net of triangles with vertices on the edges of the grid. The distances of the
-    triangles' centers from the boundary give the remaining volume and its error bound.
+    along the longest side, or along each axis. Cells that the boundary crosses are then halved `refine` times. The
+    method of marching cubes gives a closed net of triangles from the signs at the nodes. Its vertices are on the edges
+    of the grid. The volume between net and boundary, and the error bound, follow from the distances between triangles'
+    centers and boundary.
     """
     corners = exactly(low, "low", "m", (3,)), exactly(high, "high", "m", (3,))
     for name, a, b in zip("xyz", *corners, strict=True):
@@ -114,14 +114,14 @@ def boundary(
     return Boundary(surface, volume, error, first, components, open_faces, counted.count)
 
 
-INWARD: Final = 0.01  # distance from a vertex to the position of its slope, relative to a cell
+INWARD: Final = 0.01  # distance, relative to a cell, from a vertex to the position at which the slope is computed
 
 
 def uncertain_volume(level: Level, surface: Surface, uncertainty: Array, cell: float) -> float:
-    """Volume between the boundaries at levels that differ from zero by an uncertainty at each vertex (V,) [m^3].
+    """Volume between the boundaries for levels that differ by `uncertainty` (V,) [m^3].
 
-    The slope of the function is that from each vertex to a position inside. cell: edge of a cell [m], which limits the
-    distance of the boundaries.
+    The slope at a vertex is computed from a position inside. cell: edge of a cell [m], the largest distance of the
+    boundaries.
     """
     k = np.flatnonzero(uncertainty > 0.0)
     if not len(k):
@@ -149,7 +149,7 @@ def _cells_of(cells: int | tuple[int, int, int], size: Array) -> tuple[int, int,
 def _place_vertices(
     net: Net, grid: Grid, level: Level, *, precision: float = 1e-10, narrow: float = 1e-12
 ) -> tuple[Net, Array, Array]:
-    """Net, vertices on the exact boundary (V, 3) [m], and decrease of the function along their edges (V,) [1/m]."""
+    """Net, vertices (V, 3) [m] on the exact boundary, and decrease of the function along their edges (V,) [1/m]."""
     inner, outer = grid.positions(net.inner), grid.positions(net.outer)
     at_inner, at_outer = grid.values[tuple(net.inner.T)], grid.values[tuple(net.outer.T)]
     k = np.flatnonzero((net.inner != net.outer).any(axis=1))
@@ -162,13 +162,13 @@ def _place_vertices(
         return net, vertices, slope
     one = merge_vertices(net.inner, np.where(at_node[:, None], net.inner, net.outer), net.faces, grid.values.shape)
     kept = Surface(vertices[one.first], one.faces)
-    if not kept.closed:  # the two sides of a sheet without thickness remain separate
+    if not kept.closed:  # the two sides of a sheet without thickness are not merged
         return net, vertices, slope
     return one, kept.vertices, np.where(at_node, np.nan, slope)[one.first]
 
 
 def _slopes(vertices: Array, faces: Indices, net: Net, slope: Array) -> Array:
-    """Decrease of the function along the normal of each triangle [1/m], by least squares from its vertices' edges."""
+    """Decrease of the function along the normal of each triangle [1/m], by least squares from the vertices' slopes."""
     normals = normals_of(vertices, faces)
     with np.errstate(invalid="ignore", divide="ignore"):
         normals = np.abs(normals) / np.linalg.norm(normals, axis=1)[:, None]
@@ -186,13 +186,13 @@ def _faces_on_box(surface: Surface, grid: Grid) -> list[NDArray[np.bool_]]:
     return [(corners[:, :, k] == axis[end]).all(axis=1) for k, axis in enumerate(grid.axes) for end in (0, -1)]
 
 
-MEAN: Final = 3.0 / 4.0  # mean distance relative to that at the center of a curved triangle
-MISSED: Final = 5.0 / 12.0  # largest value of this share
+MEAN: Final = 3.0 / 4.0  # ratio of the mean distance to the distance at the center, for a curved triangle
+MISSED: Final = 5.0 / 12.0  # largest relative error of the mean distance
 FLAT: Final = 1e-6  # smaller distances, relative to the reach, are ignored
 
 
 def _bulge_volumes(level: Level, vertices: Array, faces: Indices, slope: Array, grid: Grid) -> tuple[Array, Array]:
-    """Volume between each triangle and the boundary [m^3], negative inward, and its error bar; both (F,)."""
+    """Volume between each triangle and the boundary, (F,) [m^3], negative inward, and its error bar, (F,) [m^3]."""
     normals = normals_of(vertices, faces)
     area = np.linalg.norm(normals, axis=1)
     normals = normals / np.maximum(area, np.finfo(np.float64).tiny)[:, None]
@@ -208,7 +208,7 @@ def _bulge_volumes(level: Level, vertices: Array, faces: Indices, slope: Array, 
 def _distances_to_boundary(
     level: Level, points: Array, normals: Array, slope: Array, outward: Array, inward: Array
 ) -> Array:
-    """Distances of points (N, 3) from the boundary along normals [m], (N,), to a few percent; NaN beyond reach."""
+    """Distances (N,) [m] of points (N, 3) from the boundary along normals, to a few percent; NaN if out of reach."""
     at_points = level_values(level, points)
     reach = np.where(at_points >= 0.0, outward, inward)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -225,7 +225,7 @@ def _distances_to_boundary(
 
 
 def _between(level: Level, ends: Brackets) -> Array:
-    """Position of the sign change in brackets, by linear interpolation, or by iteration if an end is infinite."""
+    """Position of the sign change in a bracket, by interpolation, or by iteration if an end value is infinite."""
     inner, outer, at_inner, at_outer = (part[ends.k] for part in ends[:4])
     with np.errstate(invalid="ignore"):
         share = at_inner / (at_inner - at_outer)
@@ -234,7 +234,7 @@ def _between(level: Level, ends: Brackets) -> Array:
     return np.asarray(inner + share[:, None] * (outer - inner))
 
 
-PRECISE: Final = 1e-4  # precision relative to the level at the nearer node, and to a grid edge at jumps; not visible
+PRECISE: Final = 1e-4  # precision for display, relative to the level at the nearer node, or to an edge at jumps
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -247,8 +247,8 @@ class Outline(Result):
         cable: Limiting cable at each vertex, -1 for none, shape (V,).
         on_box: True for triangles on a face of the box, shape (F,).
         open_faces: Faces of the robot's box that the workspace reaches, for example "x low".
-        volume: Volume [m^3], or area of a plane [m^2], without the volume between flat triangles and the boundary.
-        parts: Number of components between which no walk was found.
+        volume: Volume [m^3], or area in a plane [m^2], enclosed by the triangles.
+        parts: Number of components, without walks between them.
         grid: The level at the nodes.
     """
 
@@ -263,7 +263,7 @@ class Outline(Result):
 
     @property
     def shares(self) -> dict[int, float]:
-        """Share of the boundary within the box per limiting cable, largest first; each corner counts for a third."""
+        """Share of the boundary for each limiting cable, without the faces of the box, largest first."""
         areas = vertex_areas(self.surface.vertices, self.surface.faces[~self.on_box])
         k = np.flatnonzero(areas > 0.0)
         cables, place = np.unique(self.cable[k], return_inverse=True)
@@ -272,7 +272,7 @@ class Outline(Result):
 
 
 def outline(levels: Levels, region: Region) -> Outline:
-    """Boundary of the set of positions whose level is not negative, from the nodes of the region's grid."""
+    """Boundary of the set of positions with a nonnegative level, from the nodes of the region's grid."""
     grid = sample_grid(levels, region.low, region.high, region.cells)
     net, vertices, _ = _place_vertices(triangulate(grid.inside), grid, levels, precision=PRECISE, narrow=PRECISE)
     surface = Surface(locked(vertices), locked(net.faces))

@@ -1,6 +1,6 @@
 """Criteria of a workspace: margin, sag, position error, stiffness, frequency, clearance and frame.
 
-The tensions for criteria on tensions balance the middle load of the wrench set.
+Criteria on tensions use the tensions for the middle load of the wrench set.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ from sagline.statics.slopes import cable_slopes
 from sagline.statics.stiffness import compliance_of, modes
 from sagline.workspaces.criterion import NOT_NEGATIVE, POSITIVE, Criterion, Given, Judged
 
-_PRECISION: Final = 1e-6  # [m], largest jump of the clearance function from pose to pose
+_PRECISION: Final = 1e-6  # [m], a smaller jump of the clearance function between poses is acceptable
 _CABLE: Final = re.compile(r"cable (\d+)")
 _CORNERS: Final = 0.5 * np.array(list(product((-1.0, 1.0), repeat=3)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LeastMargin(Criterion):
-    """The cables balance every wrench of the set with a reserve in any direction.
+    """The cables balance every wrench of the set, with a reserve in any direction.
 
-    Every workspace includes this criterion with zero reserve; `workspace` puts it first.
+    Every workspace has this criterion, as the first one, with zero reserve by default.
 
     Attributes:
         limit: Reserve [N], >= 0.
@@ -52,11 +52,11 @@ class LeastMargin(Criterion):
 
     @property
     def always(self) -> bool:
-        """True for zero reserve, which every workspace includes."""
+        """True for zero reserve, because every workspace includes this criterion."""
         return self.limit == 0.0
 
     def judge(self, given: Given) -> Judged:
-        """Margins above the reserve [N], and the cables that limit them."""
+        """Margins minus the reserve [N], and the cables that limit them."""
         return Judged(locked(given.margin - self.limit), given.cable)
 
     def scale(self, robot: Robot) -> float:
@@ -93,8 +93,8 @@ class MaximumSag(Criterion):
 class PositionError(Criterion):
     """The position error of a simpler cable model is within a limit.
 
-    The simpler model gives tensions and lengths for the middle load of the set. The platform then rests at the
-    equilibrium of exact cables with these lengths, as in `confirm`.
+    The simpler model gives tensions and lengths for the middle load of the set. The actual pose is the equilibrium of
+    exact cables with these lengths, as in `confirm`.
 
     Attributes:
         model: Cable model, for example `Straight()`.
@@ -119,7 +119,7 @@ class PositionError(Criterion):
         return f"{super(PositionError, self).__str__()} with {type(self.model).__name__}"
 
     def judge(self, given: Given) -> Judged:
-        """Limit minus position error [m]; NaN if the model has no lengths, or no equilibrium at its lengths."""
+        """Limit minus position error [m]; NaN if the model has no lengths, or no equilibrium exists at the lengths."""
         found = confirm(given.planned(self.model))
         error = np.where(found.held, np.linalg.norm(found.position_error, axis=1), np.nan)
         return Judged(given.spread(self.limit - error))
@@ -129,8 +129,8 @@ class PositionError(Criterion):
 class LeastStiffness(Criterion):
     """The stiffness against a force on the center of mass is above a limit in any direction.
 
-    It is the stiffness in the softest direction, with fixed lengths and a platform that is free to rotate; 0 without a
-    stable equilibrium. The load is the middle load of the set.
+    The value is the stiffness in the softest direction, at fixed lengths. The platform can rotate freely. The value is
+    0 without a stable equilibrium. The load is the middle load of the set.
 
     Attributes:
         limit: Smallest stiffness [N/m], > 0.
@@ -151,7 +151,7 @@ class LeastStiffness(Criterion):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LeastFrequency(Criterion):
-    """The lowest natural frequency of the platform on massless cables, as by `modes`, is above a limit.
+    """The lowest natural frequency of the platform on massless cables is above a limit; see `modes`.
 
     The load is the middle load of the set. The frequency is 0 Hz without a stable equilibrium.
 
@@ -177,7 +177,8 @@ class LeastFrequency(Criterion):
 class Clearance(Criterion):
     """The distances between cables, platform and obstacles are above a limit.
 
-    Cables have their sag under the middle load of the set; the measured pairs are those of `clearance`.
+    The shapes of the cables are those under the middle load of the set. The pairs of bodies are the same as in
+    `clearance`.
 
     Attributes:
         limit: Smallest distance [m], > 0.
@@ -208,14 +209,14 @@ class Clearance(Criterion):
         return f"{super(Clearance, self).__str__()} ({counts})"
 
     def judge(self, given: Given) -> Judged:
-        """Least distance minus the limit [m], and the cable (the first of two) of the nearest pair."""
+        """Least distance minus the limit [m], and the first cable of the nearest pair."""
         rows = _clearance_rows(given.robot, self.obstacles)
         value, pair = rows.least(given.state)
         cables = np.array([*map(_cable_of, rows.pairs.names), -1])
         return Judged(given.spread(value - self.limit), given.spread_cables(cables[pair]))
 
     def excluded(self, robot: Robot, pose: Pose, half: Array) -> Flags:
-        """Boxes of positions at all of which an obstacle is nearer to the platform than the limit."""
+        """True for boxes of positions with an obstacle that is nearer than the limit at every position."""
         return np.asarray(_clearance_rows(robot, self.obstacles).of_platform(pose, half) < self.limit)
 
 
@@ -223,7 +224,7 @@ class Clearance(Criterion):
 class InFrame(Criterion):
     """The platform's box and anchors keep a distance from the faces of the frame.
 
-    The frame is the robot's frame_size, or the box of its anchors down to the floor. For a planar robot, only
+    The frame is the robot's frame_size, or otherwise the box around its anchors and the floor. For a planar robot, only
     directions in its plane are used.
 
     Attributes:
@@ -257,7 +258,7 @@ class InFrame(Criterion):
 
 @lru_cache(maxsize=4)
 def _clearance_rows(robot: Robot, obstacles: Obstacle | Sequence[Obstacle]) -> ClearanceRows:
-    """Measurement of a robot's clearances, prepared once for all its poses."""
+    """Clearance measurement, prepared once for all poses of the robot."""
     return ClearanceRows(robot, check_obstacles(obstacles, robot), precision=_PRECISION)
 
 
@@ -267,9 +268,9 @@ def _cable_of(pair: tuple[str, str]) -> int:
 
 
 def _least_stiffness(freedom: Array, matrix: Array) -> Array:
-    """Stiffness of the softest direction of a force on the center of mass [N/m], (N,): 0 if unstable, NaN for NaN.
+    """Stiffness against a force on the center of mass in the softest direction [N/m], (N,); 0 if unstable.
 
-    Free motions (n, 6); stiffness matrices of the platform in world axes (N, 6, 6).
+    Arguments: free motions (n, 6), and stiffness matrices of the platform in world axes (N, 6, 6), which may be NaN.
     """
     lost = np.asarray(np.isnan(matrix).any(axis=(1, 2)))
     own = freedom @ np.where(lost[:, None, None], np.eye(6), matrix) @ freedom.T

@@ -31,8 +31,8 @@ CONTINUOUS: Final = "MinimumNorm, QuadraticProgram, PNorm, AnalyticCenter, Centr
 class Given:
     """N poses of a robot at which criteria are evaluated.
 
-    Tensions are computed on first use, for the K poses with a nonnegative margin. They balance one wrench, the middle
-    of the wrench set of the margin.
+    Tensions are computed on first use, for the K poses with a nonnegative margin. They balance the middle wrench of the
+    wrench set.
 
     Attributes:
         robot: The robot.
@@ -63,31 +63,31 @@ class Given:
 
     @cached_property
     def held(self) -> Flags:
-        """True at held poses, whose margin is not negative, shape (N,)."""
+        """True for the K poses with a nonnegative margin, shape (N,)."""
         return np.asarray(self.margin >= 0.0)
 
     @cached_property
     def plan(self) -> Plan:
-        """Tensions and lengths at the K held poses."""
+        """Tensions and lengths at the K poses."""
         return self.planned(self.model)
 
     def planned(self, model: CableModel) -> Plan:
-        """Tensions and lengths of another cable model at the K held poses."""
+        """Tensions and lengths of another cable model at the K poses."""
         return inverse(self.robot, self.pose[self.held], model, self.tension, self.wrench)
 
     @property
     def state(self) -> Equilibrium:
-        """Equilibria at the K held poses."""
+        """Equilibria at the K poses."""
         return self.plan.state
 
     def spread(self, values: Array) -> Array:
-        """Values of all poses (N,) from those of the held poses (K,); NaN at the others."""
+        """Values (N,) at all poses from values (K,) at the K poses; NaN at the other poses."""
         found = np.full(len(self), np.nan)
         found[self.held] = values
         return locked(found)
 
     def spread_cables(self, cables: Indices) -> Indices:
-        """Indices of cables of all poses (N,) from those of the held poses (K,); -1 at the others."""
+        """Indices of cables (N,) at all poses from indices (K,) at the K poses; -1 at the other poses."""
         found = np.full(len(self), -1)
         found[self.held] = cables
         return locked(found)
@@ -114,7 +114,7 @@ class Criterion:
         title: Name in tables and figures.
         unit: Unit of its values.
         needs_tensions: True if the criterion depends on the tensions.
-        sense: "≤" or "≥" of the limit; "" without a limit.
+        sense: Relation to the limit, "≤" or "≥"; "" without a limit.
         _limit_range: Range of the field `limit`, as in `number`; empty if it is not checked.
     """
 
@@ -169,7 +169,7 @@ class Criterion:
         """
 
     def excluded(self, robot: Robot, pose: Pose, half: Array) -> Flags:
-        """Boxes of positions, each of which is proved not to meet the criterion with any tensions.
+        """Proof for boxes of positions that no tensions meet the criterion at any position of the box.
 
         Args:
             robot: The robot.
@@ -177,13 +177,13 @@ class Criterion:
             half: Half edges of the boxes [m], shape (3,).
 
         Returns:
-            True if the criterion is met at no position of the box, shape (N,).
+            True for a box with a proof, shape (N,).
         """
         return np.zeros(len(pose), dtype=np.bool_)
 
     @property
     def always(self) -> bool:
-        """True if every workspace includes the criterion, so that reports omit it."""
+        """True if every workspace includes the criterion; reports then omit it."""
         return False
 
     def __str__(self) -> str:
@@ -209,6 +209,6 @@ def check_continuous(method: TensionMethod, criteria: Sequence[Criterion]) -> No
     first = next((one for one in criteria if one.needs_tensions), None)
     if first is None or not (jumps or isinstance(method, Closest)):
         return
-    jump = "has tensions that jump from pose to pose" if jumps else "depends on the pose before"
+    jump = "has tensions that jump from pose to pose" if jumps else "depends on the previous pose"
     step = f"{type(first).__name__} needs tensions that are continuous."
     raise InvalidValueError("tension", f"{type(method).__name__}, which {jump}", CONTINUOUS, step)

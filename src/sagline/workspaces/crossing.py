@@ -1,4 +1,4 @@
-"""Sign changes of a function of positions along many lines together."""
+"""Sign changes of a function of positions, along many lines at the same time."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from sagline.core.arrays import Array, Indices
 from sagline.workspaces.grid import Level, level_values
 
-TRIAL = 3  # steps of regula falsi, after which a bracket must have shrunk to an eighth
+TRIAL = 3  # number of steps of regula falsi in which the width of a bracket must fall to an eighth
 ITERATIONS = 100  # largest number of steps; a jump takes about 45 by bisection, a continuous function 5 to 8
 
 
 class Brackets(NamedTuple):
-    """Pairs of positions on N rays between which a function changes its sign.
+    """A pair of positions on each of N rays; a function changes its sign between the two positions.
 
     Attributes:
         inner: Position inside [m], shape (N, 3).
@@ -41,7 +41,7 @@ class Brackets(NamedTuple):
 def brackets(
     level: Level, points: Array, outward: Array, at_points: Array, step: Array, outer_limit: Array, inner_limit: Array
 ) -> Brackets:
-    """Search from points (N, 3) [m], outward from inside points, else inward, in steps that triple up to a limit."""
+    """Search outward from inside points (N, 3) [m], inward from others, in steps that triple up to a limit."""
     is_inside = at_points >= 0.0
     limit = np.where(is_inside, outer_limit, inner_limit)
     away = np.where(is_inside, 1.0, -1.0)[:, None] * outward
@@ -71,7 +71,7 @@ def crossings(
     precision: float = 1e-10,
     narrow: float = 1e-12,
 ) -> Array:
-    """Share of each line that is inside, (V,): `crossings_of` with the same function for all lines."""
+    """Inside share of each of V lines, (V,), by `crossings_of` with the same function for all lines."""
 
     def values(_: Indices, positions: Array) -> Array:
         return level_values(level, positions)
@@ -89,12 +89,12 @@ def crossings_of(
     precision: float = 1e-10,
     narrow: float = 1e-12,
 ) -> Array:
-    """Share of each of V lines that is inside, (V,), by regula falsi with reduced weight of an end that does not move.
+    """Inside share of each of V lines, (V,), by regula falsi with a reduced weight of an end that does not move.
 
-    `values` evaluates the functions of lines, given their indices, at one position each. A bracket is bisected if an
-    end is infinite, and several times if regula falsi is slower than bisection, for example at jumps. `precision` is
-    relative to the smaller end value, `narrow` to the line. Weights: Anderson & Björck 1973 (the Illinois method's are
-    1/2).
+    `values` has two arguments, indices of lines and one position on each line, and returns the function of each line. A
+    bracket is bisected if an end value is infinite. It is bisected several times if regula falsi is slower than
+    bisection, for example at jumps. `precision` is relative to the smaller end value, `narrow` to the length of the
+    line. The weights follow Anderson & Björck 1973; those of the Illinois method are 1/2.
     """
     low, high = np.zeros(len(inner)), np.ones(len(inner))
     at_low, at_high = at_inner.copy(), at_outer.copy()
@@ -127,7 +127,7 @@ def crossings_of(
 
 
 class _BisectionSchedule:
-    """Bisection steps due for each bracket, doubled each time a trial of regula falsi is slower than bisection."""
+    """Number of bisection steps for each bracket; it doubles after every slow trial of regula falsi."""
 
     def __init__(self, count: int) -> None:
         self._width = np.ones(count)  # width of the bracket at the start of a trial
@@ -135,7 +135,7 @@ class _BisectionSchedule:
         self._next = np.ones(count, dtype=np.int64)
 
     def due(self, k: Indices) -> NDArray[np.bool_]:
-        """True for brackets k whose next step is a bisection."""
+        """True for brackets k if the next step is a bisection."""
         return np.asarray(self._due[k] > 0)
 
     def update(self, k: Indices, halved: NDArray[np.bool_], width: Array) -> None:
@@ -151,7 +151,7 @@ class _BisectionSchedule:
 
 
 def distance_to_box(points: Array, directions: Array, low: Array, high: Array) -> Array:
-    """Distances from positions (3,) or (N, 3) in a box to its surface along unit directions (N, 3) [m], (N,)."""
+    """Distances (N,) [m] from positions (3,) or (N, 3) in a box to the box surface along unit directions (N, 3)."""
     walls = np.where(directions > 0.0, high - points, low - points)
     with np.errstate(divide="ignore", invalid="ignore"):
         lengths: Array = np.where(directions != 0.0, walls / directions, np.inf).min(axis=1)

@@ -1,8 +1,8 @@
-"""Grid of values of a function of positions, with refinement where its sign changes, and the net around its inside.
+"""Grid of values of a function of positions, refinement where the sign changes, and the net around the inside.
 
-The net is that of marching cubes. It depends only on signs. The position of a vertex on its edge is computed afterwards
-with the exact function. Nodes inside are connected along the edges of the grid. Nodes outside are also connected across
-faces and corners, which closes the net everywhere.
+The method of marching cubes gives the net, which depends only on signs. The position of a vertex on its edge is
+computed afterwards with the exact function. Inside nodes are connected along the edges of the grid. Outside nodes are
+also connected across faces and corners, so that the net is closed everywhere.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Level = Callable[[Array], Array]
 Mask = NDArray[np.bool_]
 
 _CELL = tuple(product((0, 1), repeat=3))  # the corners of a cell
-_HALVED = tuple(product((0, 1, 2), repeat=3))  # indices of the nodes of a cell with halved edges
+_HALVED = tuple(product((0, 1, 2), repeat=3))  # indices of the nodes of a cell after its edges are halved
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,8 +35,8 @@ class Grid(Result):
         y: The same along y, shape (ny,).
         z: The same along z, shape (nz,).
         values: The function, >= 0 inside, shape (nx, ny, nz).
-        evaluated: True if the function was evaluated, shape (nx, ny, nz); at other nodes only the sign is valid, and
-            the value is that of a neighbor.
+        evaluated: True if the function was evaluated, shape (nx, ny, nz). Other nodes have the value of a neighbor, and
+            only its sign is valid.
     """
 
     x: Array
@@ -61,12 +61,12 @@ class Grid(Result):
         return np.array([(axis[-1] - axis[0]) / (len(axis) - 1) for axis in self.axes])
 
     def positions(self, nodes: NDArray[np.int64]) -> Array:
-        """Positions [m], shape (N, 3), of nodes given by their indices along x, y and z, shape (N, 3)."""
+        """Positions (N, 3) [m] of nodes, from the indices of the nodes along x, y and z, shape (N, 3)."""
         return np.stack([axis[nodes[:, k]] for k, axis in enumerate(self.axes)], axis=1)
 
 
 def level_values(level: Level, positions: Array) -> Array:
-    """Values (N,) of a level function at positions (N, 3) [m]; an error if NaN or of another shape."""
+    """Values (N,) of a level function at positions (N, 3) [m]; raises an error for NaN or another shape."""
     if not len(positions):
         return np.zeros(0)
     values = np.asarray(level(locked(np.ascontiguousarray(positions))), dtype=np.float64)
@@ -82,7 +82,7 @@ def level_values(level: Level, positions: Array) -> Array:
 
 
 def sample_grid(level: Level, low: Array, high: Array, cells: tuple[int, int, int]) -> Grid:
-    """Values of a function at all nodes of a grid of cells between two corners of a box [m], shape (3,)."""
+    """Values of a function at all nodes of a grid of cells in a box; low, high: corners of the box [m], shape (3,)."""
     axes = [np.linspace(a, b, n + 1) for a, b, n in zip(low, high, cells, strict=True)]
     positions = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     shape = tuple(n + 1 for n in cells)
@@ -110,7 +110,7 @@ def refine_grid(grid: Grid, level: Level) -> Grid:
 
 
 def _crossed_cells(inside: Mask, nodes: tuple[tuple[int, ...], ...] = _CELL, stride: int = 1) -> Mask:
-    """Mask of the cells that the boundary crosses: with nodes inside and nodes outside."""
+    """Mask of the cells with nodes inside and nodes outside; the boundary crosses them."""
     parts = list(_views(inside, nodes, stride))
     return np.asarray(np.logical_or.reduce(parts) & ~np.logical_and.reduce(parts))
 
@@ -156,7 +156,7 @@ def triangulate(inside: Mask) -> Net:
     except ModuleNotFoundError:
         raise FileError.not_installed("scikit-image", "Workspaces need it", "workspace") from None
     padded = np.pad(np.where(inside, np.float32(1.0), np.float32(-1.0)), 1, constant_values=-1.0)
-    # the older table uses only signs, and has vertices only on edges
+    # this older method uses only signs, and its vertices are on edges
     middle, faces, _, _ = marching_cubes(  # type: ignore[no-untyped-call]
         padded, 0.0, method="lorensen", gradient_direction="ascent"
     )
@@ -169,7 +169,7 @@ def triangulate(inside: Mask) -> Net:
 
 
 def merge_vertices(inner: Indices, outer: Indices, faces: Indices, shape: tuple[int, ...]) -> Net:
-    """Net with one vertex for each edge or node of the grid, without triangles that become degenerate."""
+    """Net with a single vertex per edge or node of the grid, without triangles that are then degenerate."""
     node = np.ravel_multi_index(tuple(np.minimum(inner, outer).T), shape)
     direction = np.abs(outer - inner) @ np.array([1, 2, 3])
     _, first, place = np.unique(4 * node.astype(np.int64) + direction, return_index=True, return_inverse=True)

@@ -33,8 +33,8 @@ class Details(NamedTuple):
         criterion: Index of the limiting criterion, shape (N,).
         cable: Limiting cable, -1 for none, shape (N,).
         rotation: Index of the limiting rotation, shape (N,).
-        uncertainty: Bound of the difference of a level near zero from the exact one, for which the margin is the
-            limiting criterion; 0 if the sign of the level is certain, shape (N,).
+        uncertainty: Bound of the error of the level, shape (N,). It is 0 if the sign of the level is certain, or if the
+            margin is not the limiting criterion.
     """
 
     level: Array
@@ -49,8 +49,8 @@ class Details(NamedTuple):
 class Levels:
     """Smallest value of all criteria, each divided by its scale, at positions of the platform: >= 0 inside.
 
-    If the margin is negative, criteria on tensions are ignored, because there are no tensions. Among the rotations the
-    smallest level is taken, or the largest one if any rotation is sufficient.
+    If the margin is negative, criteria on tensions are ignored, because there are no tensions. The level at a position
+    is the smallest level of all rotations, or the largest one if a single feasible rotation is sufficient.
 
     Attributes:
         robot: The robot.
@@ -60,10 +60,10 @@ class Levels:
         model: Cable model.
         tension: Tension distribution method.
         moment_arm: Lever arm as in `margin` [m].
-        held: Axis along which all positions have the same coordinate, and this coordinate [m]; None if there is none.
+        held: Normal axis of a planar workspace, and the coordinate of its plane [m]; None otherwise.
         on_block: Called after each block with its number of poses.
-        hull: "exact" for the margin; "inner" and "outer" for its lower and its upper bound.
-        middle: Middle of the wrench set, which the tensions balance, shape (6,).
+        hull: "exact" for the margin, "inner" for its lower bound, "outer" for its upper bound.
+        middle: Middle of the wrench set, shape (6,); the tensions balance this wrench.
     """
 
     robot: Robot
@@ -84,11 +84,11 @@ class Levels:
         self._scales = [one.scale(self.robot) for one in self.criteria]
 
     def __call__(self, positions: Array) -> Array:
-        """Levels at positions (N, 3) of the platform origin [m], shape (N,); -inf if no distance is known."""
+        """Levels (N,) at positions (N, 3) of the platform origin [m]; -inf if a criterion has no value."""
         return self.details(positions).level
 
     def details(self, positions: Array) -> Details:
-        """Levels, and limiting criterion, cable and rotation, at positions (N, 3) of the platform origin [m]."""
+        """Levels with limiting criterion, cable and rotation, at positions (N, 3) of the platform origin [m]."""
         count = len(positions)
         level, margin, uncertainty = np.empty((3, count))
         criterion, cable, rotation = np.full((3, count), -1)
@@ -102,7 +102,7 @@ class Levels:
         return Details(*map(locked, found))
 
     def in_plane(self, positions: Array) -> Array:
-        """Positions (N, 3) [m]; for a planar workspace their projections into the plane."""
+        """Positions (N, 3) [m]; for a planar workspace, their projections onto the plane."""
         if self.held is None:
             return positions
         axis, where = self.held
@@ -111,7 +111,7 @@ class Levels:
         return flat
 
     def margins_of(self, wrenches: WrenchSet, positions: Array, rotation: Indices) -> Array:
-        """Margins of another wrench set [N], (N,), at positions (N, 3) [m] in the rotations of these indices (N,)."""
+        """Margins (N,) [N] of another wrench set at positions (N, 3) [m]; rotation: indices of the rotations, (N,)."""
         rows = np.hstack((self.in_plane(positions), self.orientations.quaternion[rotation]))
         return MarginRows(self.robot, wrenches, self.model, self.moment_arm).rows(rows).value
 
@@ -136,18 +136,18 @@ class Levels:
             if one.needs_tensions and not given.held.any():
                 continue
             judged = one.judge(given)
-            # A pose at which the tension method does not find existing tensions counts as outside. Near the border of
-            # feasibility and outside, the margin decides.
+            # If tensions exist but the tension method does not find them, the pose counts as outside. At other poses
+            # without tensions, the margin decides.
             lost = np.isnan(judged.value) & (bracket.low >= 0.0)
             value = np.where(lost, -np.inf, judged.value / scale)
-            least = value < level  # NaN compares as false
+            least = value < level  # False for NaN
             level[least], criterion[least] = value[least], index
             cable[least] = -1 if judged.cable is None else judged.cable[least]
         uncertainty = np.where(criterion == 0, self._uncertainty(bracket), 0.0)
         return Details(level, margin, criterion, cable, np.full(len(rows), rotation, dtype=np.int64), uncertainty)
 
     def _uncertainty(self, bracket: Bracket) -> Array:
-        """Distance of the reserve from the farther bound of the margin, if it is between them, over the scale."""
+        """Distance from reserve to farther bound of the margin, in scales; 0 if the reserve is outside the bounds."""
         reserve = self.criteria[0].limit if isinstance(self.criteria[0], LeastMargin) else 0.0
         unsure = (bracket.low < reserve) & (reserve <= bracket.high)
         if reserve == 0.0:
@@ -159,7 +159,7 @@ class Levels:
 
 
 def middle_wrench(wrenches: WrenchSet) -> Array:
-    """Middle of a wrench set, for polytopes the mean of the corners: force [N], moment [N m], shape (6,)."""
+    """Middle of a wrench set: force [N], moment [N m], shape (6,). For a polytope, it is the mean of the corners."""
     ends = np.cumsum(wrenches.sizes)
     means = [wrenches.corners[end - size : end].mean(axis=0) for end, size in zip(ends, wrenches.sizes, strict=True)]
     return locked(wrenches.center + sum(means, start=np.zeros(6)))

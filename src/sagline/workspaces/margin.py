@@ -1,4 +1,4 @@
-"""Signed margin of a wrench set: the additional load that a pose can support; positive inside the workspace."""
+"""Signed margin of a wrench set: the additional load that the cables can balance; positive inside the workspace."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class MarginStatus(Status):
     FEASIBLE = codes.MARGIN_FEASIBLE, "the cables balance every load of the set within their limits, sag included"
     INFEASIBLE = (
         codes.MARGIN_INFEASIBLE,
-        "the cables cannot balance a load of the set within their limits, whatever their sag; move the "
+        "the cables cannot balance a load of the set within their limits with any sag; move the "
         "platform, widen the limits of the limiting cable, or reduce the load",
     )
     OPEN = (
@@ -69,18 +69,19 @@ class Margin(Result):
         pose: The poses.
         wrenches: The set of loads.
         moment_arm: Lever arm that converts moments to forces [m]; None for each robot's mean lever arm.
-        value: Largest additional load that can still be balanced in any direction [N], shape () or (N,); a moment
-            counts as a force at the lever arm. A negative value is the excess of the set. It is never NaN: infinite for
-            straight cables without limits, -infinite if the status has no margin or a cable has no admissible tension.
-            It is continuous, except for small jumps while the exact curves of sagging cables decide its sign.
-        low: Lower bound of the margin for all sag forces [N], with the shape of value. If it is not negative, every
-            load of the set is proved feasible. Without sag, both bounds are equal to the value.
-        high: Upper bound [N]; if it is negative, a load of the set is proved infeasible.
-        direction: Normal of the facet whose distance is the value, shape (..., 6): force part, and moment part [1/m],
-            in world axes. Its length is 1 if the moment part is multiplied by the lever arm. Of additional loads of
-            equal size, the load opposite to this direction is the first that the cables cannot balance. A force part of
-            zero means that this load is a moment alone.
-        limiting_cable: The cable whose limit changes the value fastest, -1 if there is none, with the shape of value.
+        value: Largest additional load that can be balanced in every direction [N], shape () or (N,). A moment counts as
+            a force at the lever arm. A negative value is the excess of the load. The value is infinite for straight
+            cables without limits. It is -infinite if the status has no margin or a cable has no admissible tension. It
+            is never NaN. It is continuous, except for small jumps where its sign comes from the exact curves of sagging
+            cables.
+        low: Lower bound of the margin for all sag forces [N], with the shape of value. If the bound is nonnegative,
+            every load of the set is proved feasible. Without sag, both bounds are equal to the value.
+        high: Upper bound of the margin [N]; if the bound is negative, a load of the set is proved infeasible.
+        direction: Normal of the nearest facet, shape (..., 6): force part, and moment part [1/m], in world axes. Its
+            length is 1 if the moment part is multiplied by the lever arm. An additional load opposite to this direction
+            exceeds the limits first. If the force part is zero, this load is a pure moment.
+        limiting_cable: The cable with a tension limit that has the largest effect on the value; -1 if there is none;
+            with the shape of value.
         status: Codes of `MarginStatus`, with the shape of value.
     """
 
@@ -101,14 +102,14 @@ class Margin(Result):
         return locked(np.asarray(self.status == MarginStatus.FEASIBLE))
 
     def __str__(self) -> str:
-        """Margin of a single pose; for many poses, the number of each status, and the smallest and largest margin."""
+        """Margin of a single pose; for a batch, the number of poses per status, and smallest and largest margin."""
         if self.value.ndim == 0:
             cable = f", cable {int(self.limiting_cable)}" * (int(self.limiting_cable) >= 0)
             status = MarginStatus(int(self.status))
             alone = -np.inf < float(self.value) < 0.0 and not self.direction[:3].any()
             return (
                 f"{_newtons(self.value)}{cable}: {status.name}, {status.text}"
-                + "; the moments alone are too much" * alone
+                + "; the moments alone are infeasible" * alone
             )
         kinds, counts = np.unique(self.status, return_counts=True)
         each = ", ".join(f"{count:,} {MarginStatus(int(kind)).name}" for kind, count in zip(kinds, counts, strict=True))
@@ -137,19 +138,19 @@ def margin(
     """Signed margin of a set of loads at each pose, with a bracket for the cables' sag.
 
     The margin is also valid at poses without a tension distribution. With sag, the bracket is proved for all tensions.
-    low >= 0 means that every load of the set can be balanced within the limits, and high < 0 that at least one load
-    cannot. Where the bracket leaves this open, the decision of `inverse` for a single load narrows it. The admissible
-    tensions are those of `inverse`: a sagging cable is at most fifteen times as long as its chord, and a cable without
-    upper limit is stretched to at most twice its length.
+    If low >= 0, every load of the set can be balanced within the limits. If high < 0, at least one load cannot be
+    balanced. If zero is within the bracket, the result of `inverse` for a single load narrows the bracket. The
+    admissible tensions are the same as in `inverse`: a sagging cable is at most fifteen times as long as its chord, and
+    a cable without upper limit is stretched to at most twice its length.
 
     Args:
         robot: The robot, or a sequence of N robots, one per pose.
         pose: A single pose or N.
         wrenches: The set of loads; None for the weight alone.
         model: Cable model; with `Straight()` both ends of the bracket are equal to the value.
-        moment_arm: Lever arm at which a moment counts like a force [m], >= 0. None: the mean distance of the platform
-            anchors from the center of mass. 0: only forces count, as in the capacity margin of `capacity_margin`; the
-            value is then -infinite if a moment alone is infeasible.
+        moment_arm: Lever arm [m], >= 0; a moment counts as a force at this arm. None: the mean distance of the platform
+            anchors from the center of mass. 0: only forces count, as in `capacity_margin`; the value is then -infinite
+            if a moment alone is infeasible.
         progress: Called after every few thousand poses with the number of finished poses and the number of all poses.
 
     Returns:
@@ -157,7 +158,7 @@ def margin(
 
     Raises:
         InvalidValueError: If an argument is of the wrong kind, the robot has fewer cables than degrees of freedom, or
-            its motion pattern does not lead from the first pose to another.
+            its motion pattern does not allow the motion from the first pose to another pose.
 
     Examples:
         >>> import sagline as sl

@@ -1,4 +1,4 @@
-"""Margins of rows of poses: robots and wrench sets prepared once for repeated calls."""
+"""Margins of pose rows; robots and wrench sets are prepared once for repeated calls."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ _CATENARY = Catenary()
 
 
 class Bracket(NamedTuple):
-    """Margins of N poses; `Margin` has these fields together with robot and poses.
+    """Margins of N poses; `Margin` has these fields, and also the robot and the poses.
 
     Attributes:
         value: Continuous margin between `low` and `high` [N], (N,).
         low: Lower bound of the margin for all sag forces [N], (N,).
         high: Upper bound [N], (N,).
-        cable: Cable whose limit changes the value most, -1 for none, (N,).
+        cable: Cable with a limit that has the largest effect on the value, -1 for none, (N,).
         status: Codes of `MarginStatus`, (N,).
-        direction: Normal of the facet whose distance is the value, (N, 6).
+        direction: Normal of the nearest facet, (N, 6).
     """
 
     value: Array
@@ -48,10 +48,10 @@ class Bracket(NamedTuple):
 
 
 class MarginRows:
-    """Margins of rows of poses, for one robot or for many with the same motion pattern, gravity and number of cables.
+    """Margins of pose rows, for one robot or for robots with the same motion pattern, gravity and number of cables.
 
-    All pose-independent data are prepared once; `rows` then costs a few microseconds per call and a few per pose.
-    Several threads may call it at the same time.
+    All pose-independent data are prepared once. A call of `rows` then takes a few microseconds, plus a few microseconds
+    per pose. Several threads may call it at the same time.
     """
 
     __slots__ = ("_given", "cable_count", "robot_count")
@@ -66,7 +66,7 @@ class MarginRows:
     ) -> None:
         """Prepare one robot or R robots; moment_arm [m] as in `margin`.
 
-        With `cables`, R robots that differ from the given robot only in these cable tables (R, m, CABLE_COLUMNS).
+        If `cables` is given, the R robots are copies of the given robot with these cable tables (R, m, CABLE_COLUMNS).
         """
         robots = together(robot)
         shared = first_of(robots)
@@ -92,7 +92,7 @@ class MarginRows:
         )
 
     def about(self, wrench: Array) -> MarginRows:
-        """Margins of the wrench set shifted by a wrench [N, N m], shape (6,), unchecked; all other data are shared."""
+        """Margins for the wrench set plus an unchecked wrench [N, N m], shape (6,); all other data are shared."""
         model, limits, terms, (center, half, others, ellipsoids, corners, sizes, rates, inertias), arms = self._given
         there = _locked(center + wrench)
         moved = object.__new__(MarginRows)
@@ -102,7 +102,7 @@ class MarginRows:
         return moved
 
     def rows(self, poses: NDArray[np.float64], progress: Progress | None = None) -> Bracket:
-        """Margins at pose rows (N, 7), unchecked; NaN has status NO_CHORD. The first N/R rows are the first robot's."""
+        """Margins at unchecked pose rows (N, 7), N/R rows per robot; the status of a row with NaN is NO_CHORD."""
         rows = np.ascontiguousarray(poses, dtype=np.float64).view()
         count = len(rows)
         if count % self.robot_count:
@@ -138,7 +138,7 @@ def mean_arms(table: Array, bodies: Array) -> Array:
 
 
 def _arms(table: Array, bodies: Array, moment_arm: float | None) -> tuple[Array, Array]:
-    """Lever arms of the norm, and positive lever arms by which moments are divided [m]."""
+    """Lever arms of the norm [m], and positive lever arms for the division of moments [m]."""
     means = mean_arms(table, bodies)
     own = means if moment_arm is None else np.array([number(moment_arm, "moment_arm", "m", low=0.0)])
     return locked(own), locked(np.where(means > 0.0, means, 1.0))

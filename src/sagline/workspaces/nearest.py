@@ -21,8 +21,8 @@ _STARTS: Final = 3  # number of best grid points from which the search starts
 _STEP: Final = 0.1  # initial step, as a share of the box
 _EVALUATIONS: Final = 300  # largest number of evaluations from each start
 _PRECISION: Final = 1e-4  # precision of the position [m]
-_FAR: Final = 1e6  # replaces levels of minus infinity, because the search needs finite numbers
-_UNHELD: Final = 1e3  # reduction of the levels at infeasible poses
+_FAR: Final = 1e6  # finite value in place of an infinite level, for the search
+_UNHELD: Final = 1e3  # reduction of the merit at infeasible poses, if criteria need tensions
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -51,7 +51,7 @@ class Nearest(Result):
 
 
 def nearest_to(levels: Levels, grid: Grid, low: Array, high: Array) -> Nearest:
-    """Pose of largest level: the best nodes of a grid, then a simplex search in the box from low to high [m], (3,)."""
+    """Pose with the largest level, by simplex searches from the best nodes of a grid; low, high: box corners [m]."""
     nodes = np.stack(np.unravel_index(np.arange(grid.values.size), grid.values.shape), axis=1)
     positions = np.clip(grid.positions(nodes), low, high)
     values = _merit(levels, positions)
@@ -70,9 +70,9 @@ def nearest_to(levels: Levels, grid: Grid, low: Array, high: Array) -> Nearest:
 
 
 def _merit(levels: Levels, positions: Array) -> Array:
-    """Finite merit of positions: their levels, or the feasible fraction of the load if the full load is not feasible.
+    """Finite merit of positions: level, or a value from the feasible fraction of the load if it is infeasible.
 
-    Margins alone would lead to singular poses, where all margins are small.
+    Margins alone would lead to singular poses, because all margins are small there.
     """
     found = levels.details(positions)
     bare = levels.margins_of(NO_LOAD, positions, found.rotation)
@@ -80,17 +80,17 @@ def _merit(levels: Levels, positions: Array) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
         short = np.where(bare > 0.0, _share(bare, found.margin), bare / weight) - 1.0
     tensions = any(one.needs_tensions for one in levels.criteria)
-    short -= _UNHELD if tensions else 0.0  # with tensions the value is more accurate
+    short -= _UNHELD if tensions else 0.0  # levels with tensions are always above
     return np.maximum(np.where(found.margin >= 0.0, found.level, short), -_FAR)
 
 
 def _share(bare: Array, margin: Array) -> Array:
-    """Proved feasible fraction of the load if the weight alone is feasible, because margins are concave in the load."""
+    """Lower bound of the feasible fraction of the load, because margins are concave in the load."""
     return np.asarray(bare / (bare - margin))
 
 
 def _simplex_search(levels: Levels, start: Array, low: Array, high: Array) -> tuple[Array, float]:
-    """Position of a local maximum of the merit, by simplex search, and the merit."""
+    """Position of a local maximum of the merit by a simplex search, and the merit there."""
     from scipy.optimize import minimize  # the import takes a quarter of a second
 
     free = np.flatnonzero(high > low)
@@ -112,7 +112,7 @@ def _simplex_search(levels: Levels, start: Array, low: Array, high: Array) -> tu
 
 
 def _reason(levels: Levels, pose: Pose, details: Details) -> tuple[tuple[int, ...], str]:
-    """Cables that make a pose infeasible, and the reason as a sentence."""
+    """Cables that make a pose infeasible, and a sentence with the reason."""
     place = ", ".join(n(x, ".3f") for x in pose.position)
     at = f"at ({place}) m"
     if details.level[0] >= 0.0:

@@ -1,4 +1,4 @@
-"""Orientations of the platform in a workspace: level, all of some rotations, or any of them."""
+"""Orientations of the platform in a workspace: level, or rotations of which all or any must be feasible."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ if TYPE_CHECKING:
 
 Need = Literal["all", "any"]
 _NEEDS: Final = ("all", "any")
-_SHARES: Final = np.array([-1.0, -0.5, 0.5, 1.0])  # rotations of a planar platform, as shares of the angle
+_SHARES: Final = np.array([-1.0, -0.5, 0.5, 1.0])  # rotations of a planar platform, relative to the angle
 _CORNERS: Final = np.array([one for one in product((-1.0, 0.0, 1.0), repeat=3) if any(one)])
 _AXES: Final = _CORNERS / np.linalg.norm(_CORNERS, axis=1, keepdims=True)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Orientations:
-    """Rotations of the platform, all or any of which must be feasible at a position.
+    """Rotations of the platform; all of them, or any of them, must be feasible at a position.
 
     A continuous set of rotations is represented by the listed samples.
 
@@ -109,8 +109,8 @@ class Orientations:
 class Tilts:
     """Rotations about any axis by up to an angle; all of them must be feasible at a position.
 
-    The samples are the level orientation, and the full angle about 26 axes spread over all directions; for a planar
-    robot, the angle and its half in both directions.
+    The samples are the level orientation, and rotations by the full angle about 26 axes in all directions. For a planar
+    robot, they are rotations by the angle and by half of it, in both directions.
 
     Attributes:
         angle: Largest angle of rotation [rad], 0 to pi.
@@ -122,7 +122,7 @@ class Tilts:
         """Check the angle."""
         angle = number(self.angle, "angle", "rad", low=0.0)
         if angle > np.pi:
-            step = "Give it in radians: no rotation turns by more than half a turn."
+            step = "Give the angle in radians, at most half a turn."
             raise InvalidValueError("angle", f"{angle:.6g} rad", "0 to pi rad", step)
         object.__setattr__(self, "angle", angle)
 
@@ -158,12 +158,12 @@ def check_tilt(robot: Robot, angle: float, item: str) -> None:
     """Reject a tilt by an angle [rad] if the platform's motion pattern has no rotation; `item` is for messages."""
     if angle > 0.0 and robot.motion_pattern not in ROTATING:
         value, step = f"{np.degrees(angle):.4g} deg", "Leave the tilt out."
-        allowed = f"none, by motion_pattern {robot.motion_pattern}: its platform does not turn"
+        allowed = f"none, because a platform with motion_pattern {robot.motion_pattern} cannot rotate"
         raise InvalidValueError(item, value, allowed, step)
 
 
 def orientations_of(robot: Robot, given: Any, tilt: float) -> Orientations:
-    """Orientations of a workspace from the argument, or from the tilt of the box [rad]; checked against the robot."""
+    """Orientations from the argument of `workspace`, or from the tilt of the box [rad]; checked for the robot."""
     if given is not None and tilt > 0.0:
         step = "Give the tilt of the box, or orientations."
         value = f"given with a box of tilt {np.degrees(tilt):.4g} deg"
@@ -180,7 +180,7 @@ def orientations_of(robot: Robot, given: Any, tilt: float) -> Orientations:
 
 
 def _check_turns(robot: Robot, given: Orientations) -> None:
-    """Reject rotations, relative to level, that the robot's motion pattern does not have."""
+    """Reject rotations that the robot's motion pattern does not allow."""
     turns = forbidden_turn(robot, Pose.from_quaternion(np.zeros(3), given.quaternion), LEVEL)
     wrong = np.flatnonzero(np.linalg.norm(turns, axis=1) > ROUNDING)
     if wrong.size:

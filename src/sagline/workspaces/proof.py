@@ -31,16 +31,16 @@ from sagline.workspaces.wrench_sets import WrenchSet, load_of
 class ProofVerdict(Status):
     """Verdict on a box of poses, or on a part of one."""
 
-    OPEN = OPEN, "the whole box is proved neither inside nor outside: see the shares; a longer budget decides more"
+    OPEN = OPEN, "without a proof for the whole box: see the shares; a longer budget proves more cells"
     PROVED_INSIDE = INSIDE, "at every pose every load is balanced by tensions within the limits"
     PROVED_OUTSIDE = OUTSIDE, "at every position, at least one load cannot be balanced by tensions within the limits"
 
 
-BLOCK: Final = 1 << 11  # boxes per block, some hundredths of a second; interrupts are handled between blocks
+BLOCK: Final = 1 << 11  # boxes per block, about 0.03 s; interrupts are handled between blocks
 MOST_CELLS: Final = 4_000_000  # largest number of waiting cells, 100 MB
-OBLONG: Final = 0.6  # edges longer than this share of the longest edge are halved with it
-PARTS: Final = (1, 4, 8, 16)  # tried numbers of cubes of rotation vectors along an edge; two are hardly smaller
-PRECISION: Final = (1.0, 1e-12)  # full weight of nonlinear terms; relative error of a sum of a thousand terms
+OBLONG: Final = 0.6  # an edge is halved if it is longer than this share of the longest edge
+PARTS: Final = (1, 4, 8, 16)  # numbers of parts of an edge; parts by two are hardly smaller
+PRECISION: Final = (1.0, 1e-12)  # weight of nonlinear terms; relative rounding error of a sum of a thousand terms
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,12 +59,12 @@ class Cells(Result):
 
 
 class Prover:
-    """Proofs for rows of boxes, with all box-independent data prepared once.
+    """Proofs for rows of boxes; all box-independent data are prepared once.
 
     Attributes:
         size: Approximate mean length of a chord [m].
         axes: Axes about which the platform may rotate, shape (1 or 3, 3).
-        deadline: Time on the monotonic clock after which no further block is proved [s].
+        deadline: End of the proofs on the monotonic clock [s].
         tried: Number of boxes that were tried.
     """
 
@@ -76,7 +76,7 @@ class Prover:
         precision: tuple[float, float] = PRECISION,
         progress: Progress | None = None,
     ) -> None:
-        """Prepare the proofs; the robot must not have pulleys, and only tests change the precision."""
+        """Prepare the proofs for a robot without pulleys; only tests change `precise`."""
         limits = (LIMITS_OF[robot.tension_limits_of], np.nan)
         self._given = (
             (model.code, *model.parameters), limits, robot_terms(robot), _load_terms(wrenches, robot), precision,
@@ -120,7 +120,7 @@ class Prover:
 
 
 def _bisect(prover: Prover, box: PoseBox, smallest: float) -> Cells:
-    """Bisect a box breadth-first, down to the smallest edge [m], until no cell is open or the time is over."""
+    """Bisect a box breadth-first, until all cells are proved, the smallest edge [m] is reached, or the time is over."""
     half = 0.5 * (box.high - box.low)
     waiting = (box.low + half)[None]
     done: list[tuple[Array, Array, Codes]] = []
@@ -141,13 +141,13 @@ def _bisect(prover: Prover, box: PoseBox, smallest: float) -> Cells:
 
 
 def _decide(prover: Prover, middle: Array, half: Array, tilt: float) -> Codes:
-    """Verdicts of cells of positions, level or at all tilts up to one.
+    """Verdicts of cells of positions, for level poses or for all tilts up to a largest one.
 
     Tilts are rotation vectors in a ball, which is covered by cubes. For a planar robot they are rotations about the
-    normal of its plane, and their range is divided into intervals. The rotation between the middle of a cube and
-    another vector of the cube is at most the difference of the two vectors. A cell is outside if one orientation is
-    infeasible, and inside if all orientations are feasible. Cubes remain larger than the rotation of the cables within
-    a cell, which is the cell's size divided by a chord.
+    normal of its plane, and their range is divided into intervals. The angle between the rotation at the middle of a
+    cube and another rotation of the cube is at most the length of the difference of the two rotation vectors. A cell is
+    outside if one orientation is infeasible, and inside if all orientations are feasible. A cube is not divided further
+    if it is smaller than the rotation of the cables within a cell, that is, the cell's size divided by a chord.
     """
     if tilt == 0.0:
         return prover.verdicts(middle, half)
@@ -175,9 +175,9 @@ def _decide(prover: Prover, middle: Array, half: Array, tilt: float) -> Codes:
 
 
 def _smaller_cubes(cells: Indices, vectors: Array, edges: Array, parts: int, more: int) -> tuple[Indices, Array]:
-    """Parts of each cube that intersect the ball of tilts, with the cell of each part.
+    """Parts of each cube that intersect the ball of tilts, and the cell of each part.
 
-    Half edges of the cube around the whole ball are given, one per row.
+    edges: half edges of the cube around the whole ball, one per row.
     """
     count = more // parts
     steps = (2.0 * np.arange(count) + 1.0 - count) / more
@@ -189,7 +189,7 @@ def _smaller_cubes(cells: Indices, vectors: Array, edges: Array, parts: int, mor
 
 
 def _children(half: Array) -> tuple[Array, Array]:
-    """Centers of the parts of a box, relative to its own center, and their half edges; all long edges are bisected."""
+    """Centers of the parts of a box relative to the center of the box, and half edges; all long edges are bisected."""
     long = (half >= OBLONG * half.max()) & (half > 0.0)
     halved = np.where(long, 0.5 * half, half)
     steps = [np.array([-1.0, 1.0]) * halved[k] if long[k] else np.zeros(1) for k in range(3)]
@@ -197,7 +197,7 @@ def _children(half: Array) -> tuple[Array, Array]:
 
 
 def _load_terms(wrenches: WrenchSet, robot: Robot) -> tuple[Any, ...]:
-    """Wrench set in the form of the kernel: corners relative to their mean, accelerations as loads when level."""
+    """Wrench set in the form of the kernel: corners relative to their mean, inertial loads of a level platform."""
     center, corners, first = wrenches.center.copy(), wrenches.corners.copy(), 0
     for size in wrenches.sizes:
         mean = corners[first : first + size].mean(axis=0)
@@ -229,8 +229,8 @@ class Proof(Result):
         wrenches: The set of loads.
         model: Cable model of the proofs.
         verdict: Verdict on the whole box.
-        inside: Share of the box, 0 to 1, with a proof that every load can be balanced within the limits.
-        outside: Share of the box with a proof that some load cannot be balanced.
+        inside: Share of the box, 0 to 1, in which every load is proved feasible.
+        outside: Share of the box in which a load is proved infeasible.
         open: Share without a proof.
         cells: The cells.
         tried: Number of boxes that were tried.
@@ -249,7 +249,7 @@ class Proof(Result):
 
     @property
     def volume(self) -> float:
-        """Volume of positions of the whole box [m^3], the reference of the shares. Zero for a flat box."""
+        """Volume of the whole box of positions [m^3], to which the shares refer; zero for a flat box."""
         return float(np.prod(self.box.high - self.box.low))
 
     @property
@@ -288,18 +288,18 @@ def prove(
 
     Without a tilt of the box, poses are level. With a tilt, the orientations of a position are all rotations by at most
     this angle about any axis (for a planar platform, about the normal of its plane). A position is inside if all its
-    orientations are feasible, and outside if one of them is not. The box is halved along its edges repeatedly until a
-    proof succeeds for each cell. Cells without a proof at the end of the budget are open; no cell is guessed. With
-    `Catenary()` the proofs are valid for the exact cables, at tensions of the same range as in `margin`.
+    orientations are feasible, and outside if one of them is not. The box is halved along its edges repeatedly until
+    every cell is proved. Cells without a proof at the end of the budget are open. With `Catenary()`, the proofs are
+    valid for the exact cables, with the same admissible tensions as in `margin`.
 
     Args:
         robot: The robot, without pulleys.
         box: Positions, and the largest tilt of the platform.
-        wrenches: Set of loads, all of which must be balanced; None for the weight alone.
-        budget: Time after which no further cells are examined [s], > 0.
+        wrenches: Set of loads; the cables must balance all of them. None for the weight alone.
+        budget: Time limit for the proofs [s], > 0.
         model: Cable model.
-        smallest: Cells are not halved if their longest edge would become shorter than this [m]; None for no limit
-            except the budget.
+        smallest: Shortest allowed longest edge of a cell [m]; smaller cells are not examined. None: only the budget is
+            a limit.
         progress: Called after every few thousand cells with the number of finished cells and the number of known cells.
 
     Returns:
@@ -345,10 +345,10 @@ def prove(
 
 
 def check_provable(robot: Robot) -> None:
-    """Reject robots without proofs: with pulleys, or with fewer cables than degrees of freedom."""
+    """Reject robots with pulleys, or with fewer cables than degrees of freedom; proofs do not support them."""
     check_cable_count(robot)
     if robot.winches is not None and (robot.winches.pulley_radius > 0.0).any():
         cable = int(np.argmax(robot.winches.pulley_radius > 0.0))
         radius = f"{robot.winches.pulley_radius[cable]:g} m"
-        step = "Prove it for the robot without them: robot.replace(winches=None)."
+        step = "Prove the box for the robot without pulleys: robot.replace(winches=None)."
         raise InvalidValueError(f"{robot.name}: pulley_radius[{cable}]", radius, "0 m: proofs have no pulleys", step)

@@ -26,9 +26,9 @@ class Region(NamedTuple):
         box: The given box, or the robot's own box.
         low: Lowest corner of the region [m], shape (3,).
         high: Highest corner [m], which is higher along every axis.
-        flat: The axis along which the box has no extent; None if there is none. Positions are then in this plane, and
-            the region has a thickness, by which a volume is divided to obtain an area.
-        thickness: Thickness of the region along this axis [m]; 1 without such an axis.
+        flat: Index of the axis along which the box has no extent; None if there is none. With a flat axis, the
+            positions are in a plane, and the region has a thickness. A volume divided by the thickness is an area.
+        thickness: Thickness of the region along the flat axis [m]; 1 without a flat axis.
         cells: Number of cells along each axis.
     """
 
@@ -46,7 +46,7 @@ class Region(NamedTuple):
 
 
 def region_of(robot: Robot, box: PoseBox | None, cells: int) -> Region:
-    """Region of a box, by default of the robot's frame and test box; for a planar robot, in the plane of its cables."""
+    """Region of a box; the default box contains frame and test box, and is flat for a planar robot."""
     plane = _plane_axis(robot)
     optional(box, PoseBox, "box")
     if box is None:
@@ -58,7 +58,7 @@ def region_of(robot: Robot, box: PoseBox | None, cells: int) -> Region:
     flat = np.flatnonzero(extent <= ROUNDING)
     if flat.size > 1:
         value = f"without extent along {' and '.join(AXES[axis] for axis in flat)}"
-        raise InvalidValueError("box", value, "extent along two axes at least", "Give a larger one.")
+        raise InvalidValueError("box", value, "extent along two axes at least", "Give a larger box.")
     if plane is not None and plane not in flat:
         where = _place_of_plane(robot, plane)
         value = f"{extent[plane]:.4g} m thick along plane_normal, {AXES[plane]}"
@@ -74,7 +74,7 @@ def region_of(robot: Robot, box: PoseBox | None, cells: int) -> Region:
 
 
 def _own(robot: Robot) -> tuple[Array, Array]:
-    """Corners of the frame and of the test box together [m]."""
+    """Corners of the smallest box around frame and test box [m]."""
     low, high = bounds(robot)
     if robot.test_box is None:
         return low.copy(), high.copy()
@@ -82,13 +82,13 @@ def _own(robot: Robot) -> tuple[Array, Array]:
 
 
 def flat_axis(box: PoseBox) -> tuple[int, float] | None:
-    """First axis along which a box has no extent, and its coordinate there [m]; None if there is none."""
+    """First axis along which a box has no extent, and the coordinate of the box along it [m]; None if there is none."""
     flat = np.flatnonzero(box.high - box.low <= ROUNDING)
     return (int(flat[0]), float(box.low[flat[0]])) if flat.size else None
 
 
 def _plane_axis(robot: Robot) -> int | None:
-    """Axis of a planar robot's plane normal; an error if it is not along an axis."""
+    """Axis of a planar robot's plane normal; raises an error if the normal is not along an axis."""
     if robot.plane_normal is None:
         return None
     axis = int(np.argmax(np.abs(robot.plane_normal)))
@@ -104,7 +104,7 @@ def _place_of_plane(robot: Robot, axis: int) -> float:
     return float(robot.frame_anchors[:, axis].mean() - robot.platform_anchors[:, axis].mean())
 
 
-_IN_PLANE: Final = ((1, 2), (0, 2), (0, 1))  # horizontal and vertical axis of a drawing, by its normal axis
+_IN_PLANE: Final = ((1, 2), (0, 2), (0, 1))  # horizontal and vertical axis of a drawing, for each normal axis
 
 
 class Plane(NamedTuple):
@@ -128,7 +128,7 @@ class Plane(NamedTuple):
         return f"{AXES[self.normal]} = {self.at:.3g} m"
 
     def positions(self, across: Array, up: Array) -> Array:
-        """Positions (U C, 3) [m] of a grid in the plane, row by row, from columns (C,) and rows (U,) [m]."""
+        """Positions (U C, 3) of a grid in the plane, row by row, from coordinates of columns (C,) and rows (U,) [m]."""
         places = np.empty((up.size, across.size, 3))
         first, second = self.axes
         places[..., self.normal] = self.at
@@ -148,8 +148,8 @@ class Slice:
         across: Coordinates of the columns [m], shape (C,).
         up: Coordinates of the rows [m], shape (U,).
         level: >= 0 inside of the workspace, shape (U, C).
-        margin: Signed margins [N], negative if the loads are infeasible, minus infinity if the robot is singular, shape
-            (U, C).
+        margin: Signed margins [N], shape (U, C): negative if the loads are infeasible, -infinite if the robot is
+            singular.
         criterion: Index of the deciding criterion, shape (U, C).
         cable: Limiting cable, -1 for none, shape (U, C).
     """
@@ -164,7 +164,7 @@ class Slice:
 
 
 def slice_of(find: Find, plane: Plane, low: Array, high: Array, shape: tuple[int, int]) -> Slice:
-    """Slice of a function of positions, `Levels.details` for instance, between two corners of a box [m], shape (3,)."""
+    """Slice of a function of positions, for example `Levels.details`, in a box; low, high: box corners (3,) [m]."""
     first, second = plane.axes
     across, up = np.linspace(low[first], high[first], shape[0]), np.linspace(low[second], high[second], shape[1])
     found = find(plane.positions(across, up))

@@ -1,4 +1,4 @@
-"""Proofs that no path in the box of a workspace leads from one component to another."""
+"""Proofs that no path in the box of a workspace connects two components."""
 
 from __future__ import annotations
 
@@ -20,32 +20,32 @@ from sagline.workspaces.levels import Levels
 from sagline.workspaces.proof import Prover, check_provable
 from sagline.workspaces.surface import Components
 
-PARTS: Final = (1, 2, 4)  # numbers of parts of the edge of a cell that are tried
-MOST_CELLS: Final = 1 << 25  # largest number of parts, 33 MB
-MOST_BOXES: Final = 60_000  # largest number of boxes, about a second
+PARTS: Final = (1, 2, 4)  # numbers of parts into which the edges of a cell are divided, one after another
+MOST_CELLS: Final = 1 << 25  # largest number of parts, which take 33 MB
+MOST_BOXES: Final = 60_000  # largest number of boxes, which take about a second
 MOST_LAYERS: Final = 16  # largest number of layers of cells around a component
 _AROUND: Final = np.array(list(product((-1, 0, 1), repeat=3)))
 
 Exclude = Callable[[Array, Array], Flags]
-"""A function of boxes, with centers (N, 3) and half edges (3,) [m]: True (N,) if no position of a box is in the set."""
+"""A function of centers (N, 3) and half edges (3,) of boxes [m]: True (N,) if no position of a box is in the set."""
 
 
 def separated(components: Components, exclude: Exclude | None) -> Flags:
     """Mask (K,) of the components that a closed layer of excluded boxes separates from all others.
 
-    From each component, cells are searched outward, up to cells that are excluded. The component is separated if the
-    search ends before it reaches a cell at another component. Otherwise it is repeated with smaller cells.
+    The search starts at each component and continues outward, up to excluded cells. The component is separated if the
+    search ends before it reaches another component. Otherwise the search is repeated with smaller cells.
     """
     found = np.zeros(components.count, dtype=np.bool_)
     if exclude is not None:
         search = _Search(components, exclude)
-        found[1:] = [search.is_enclosed(k) for k in range(1, components.count)]  # the largest is the first
+        found[1:] = [search.is_enclosed(k) for k in range(1, components.count)]  # the first component is the largest
         found[0] = found[1:].all()
     return locked(found)
 
 
 class _Search:
-    """Searches from components, with a limit of the number of boxes for all of them."""
+    """Searches from components, with a common limit for the number of boxes."""
 
     def __init__(self, components: Components, exclude: Exclude) -> None:
         self._components, self._exclude = components, exclude
@@ -54,7 +54,7 @@ class _Search:
         self._parts = [parts for parts in PARTS if parts**3 * cells <= MOST_CELLS]
 
     def is_enclosed(self, one: int) -> bool:
-        """True if the search from a component ends before it reaches another one."""
+        """True if the search from a component ends before it reaches another component."""
         nodes = self._components.nodes
         own, others = np.argwhere(nodes == one), np.argwhere((nodes >= 0) & (nodes != one))
         distance, nearest = KDTree(others).query(own)
@@ -71,7 +71,7 @@ class _Search:
         return np.asarray(np.minimum(cells, parts * (np.array(self._components.nodes.shape) - 1) - 1))
 
     def _is_enclosed(self, one: int, parts: int) -> bool:
-        """The same with cells whose edges are divided into some parts."""
+        """The same as `separated`, with the edges of the cells divided into some parts."""
         own = self._components.nodes == one
         reached, other = _cells_at(own, parts), _cells_at((self._components.nodes >= 0) & ~own, parts)
         layer = _beside(np.argwhere(reached), reached)
@@ -93,7 +93,7 @@ class _Search:
 
 
 def _beside(cells: Indices, asked: Flags) -> Indices:
-    """Cells (K, 3) beside some cells, across faces, edges and corners, without those of a mask."""
+    """Neighbors (K, 3) of some cells across faces, edges and corners, without the cells of a mask."""
     near = (cells[:, None] + _AROUND).reshape(-1, 3)
     near = near[((near >= 0) & (near < asked.shape)).all(axis=1)]
     near = near[~asked[tuple(near.T)]]
@@ -101,7 +101,7 @@ def _beside(cells: Indices, asked: Flags) -> Indices:
 
 
 def _cells_at(nodes: Flags, parts: int) -> Flags:
-    """Mask of the parts of cells that are at a node of a mask, or whose cell has all nodes in the mask."""
+    """Mask of the parts of cells: True if a corner of the part, or all nodes of its cell, are nodes of the mask."""
     inner, at = nodes, np.zeros([parts * (count - 1) for count in nodes.shape], dtype=np.bool_)
     for axis in range(3):
         inner = np.asarray(np.logical_and(*(np.delete(inner, end, axis=axis) for end in (0, -1))))
@@ -114,7 +114,7 @@ def _cells_at(nodes: Flags, parts: int) -> Flags:
 
 
 def exclusion(levels: Levels) -> Exclude | None:
-    """Proofs that boxes are outside: by the margin, and by criteria that no tensions can meet; None without proofs."""
+    """Proofs that boxes are outside, by the margin and by criteria for any tensions; None if there are no proofs."""
     turned, robot = levels.orientations, levels.robot
     vectors = Rotation.from_quat(turned.quaternion).as_rotvec()
     prover = _prover(levels) if not vectors.any() or levels.wrenches.accelerations[1] == 0.0 else None
@@ -140,7 +140,7 @@ def exclusion(levels: Levels) -> Exclude | None:
 
 
 def _prover(levels: Levels) -> Prover | None:
-    """Proofs by the margin; None for robots without them."""
+    """Proofs by the margin; None for robots for which there are none."""
     try:
         check_provable(levels.robot)
     except InvalidValueError:

@@ -24,10 +24,10 @@ from sagline.workspaces.surface import Components, Surface, vertex_areas
 from sagline.workspaces.wrench_sets import WrenchSet
 
 HULLS: Final[dict[Hull, str]] = {
-    "inner": "inner: all its positions are proved feasible",
-    "outer": "outer: all positions beyond it are proved infeasible",
+    "inner": "inner: all positions inside are proved feasible",
+    "outer": "outer: all positions outside are proved infeasible",
 }
-BY_BOX: Final = -1  # value in `limiting` for a face of the box
+BY_BOX: Final = -1  # value of `limiting` on a face of the box
 MOST_LIMITS: Final = 10  # largest number of printed shares
 _MOST_PARTS: Final = 5  # largest number of components with printed volumes
 _WIDTH: Final = 80  # width of the printed text, in columns
@@ -58,8 +58,8 @@ class Limit(NamedTuple):
 class Workspace(Result, Saved):
     """Result of `workspace`.
 
-    For a planar robot, and in a box without extent along one axis, the workspace is a part of a plane. The volume is
-    then an area [m2], and the surface encloses a slab around it.
+    For a planar robot, and in a box without extent along one axis, the workspace is a part of a plane. Then the volume
+    is an area [m2], and the surface encloses a slab around the area.
 
     Attributes:
         robot: The robot.
@@ -70,19 +70,19 @@ class Workspace(Result, Saved):
         model: Cable model.
         tension: Tension distribution method, for criteria on tensions.
         moment_arm: Lever arm as in `margin` [m]; None for the mean lever arm.
-        hull: "exact", or "inner" or "outer" by the lower or the upper bound of the margin.
+        hull: "exact" by the margin, "inner" by its lower bound, or "outer" by its upper bound.
         unit: Unit of the volume, "m³" or "m²".
         volume: Volume or area in this unit.
-        volume_error: Error bound of the volume: distances between triangles and boundary, and bounds of the margin at
-            vertices where its sign is not certain. It excludes parts and gaps that are thinner than two cells of the
-            finest grid; 0 for an empty workspace.
+        volume_error: Error bound of the volume; 0 for an empty workspace. It includes the volume between triangles and
+            boundary, and the uncertainty of the margin at vertices. It excludes parts and gaps that are thinner than
+            two cells of the finest grid.
         components: Components of the workspace.
         surface: The closed boundary, including the faces of the box that the workspace reaches.
         limiting: Index of the limiting criterion at each vertex of the surface, shape (V,); -1 on a face of the box.
         limiting_cable: Limiting cable at each vertex, shape (V,); -1 if there is none.
         margin: Margin of the loads at each vertex [N], shape (V,).
-        open_faces: Faces of the box through which the workspace continues, for example "x low". The volume is only that
-            of the part in the box.
+        open_faces: Faces of the box that the workspace reaches, for example "x low". The workspace may continue beyond
+            them, and the volume is that of the part in the box.
         x: Coordinates of the nodes of the grid [m], shape (X,).
         y: The same along y, shape (Y,).
         z: The same along z, shape (Z,).
@@ -121,8 +121,8 @@ class Workspace(Result, Saved):
 
     @property
     def limits(self) -> tuple[Limit, ...]:
-        """Criteria and cables that limit the workspace, with the largest share of its surface first."""
-        inner = (self.limiting[self.surface.faces] != BY_BOX).any(axis=1)  # a face with all corners on the box is its
+        """Criteria and cables that limit the workspace; the one with the largest share of the surface is the first."""
+        inner = (self.limiting[self.surface.faces] != BY_BOX).any(axis=1)  # False for triangles on the box
         areas = vertex_areas(self.surface.vertices, self.surface.faces[inner])
         k = np.flatnonzero((self.limiting != BY_BOX) & (areas > 0.0))
         pairs, place = np.unique(
@@ -145,8 +145,7 @@ class Workspace(Result, Saved):
     def levels(self) -> Levels:
         """Signed feasibility function of the position.
 
-        Returns:
-            A function of positions (N, 3) [m] that gives levels (N,), with `details`.
+        Returns: A function of positions (N, 3) [m] that returns levels (N,), and has a method `details`.
         """
         return Levels(
             self.robot,
@@ -207,7 +206,7 @@ def facts_of(space: Workspace) -> list[tuple[str, str]]:
         facts.append(("parts", f"{listed}; {_separation_text(space.components)}"))
     if space.open_faces:
         faces = ", ".join(space.open_faces)
-        facts.append(("open", f"it reaches the box at {faces}: only its part in this box is known"))
+        facts.append(("open", f"the workspace reaches the box at {faces}: only its part in this box is known"))
     if space.nearest is not None:
         facts.append(("nearest", space.nearest.reason))
     return facts
@@ -217,9 +216,9 @@ def _separation_text(components: Components) -> str:
     """Proof that the parts are separate, or the state of the search."""
     proved = int(components.separate.sum())
     if proved == components.count:
-        return "proved: no path in the box leads from one to another"
-    rest = "the robot may be able to go from one to another: neither a path nor a proof was found"
-    return f"{proved} proved separate; of the others, {rest}" if proved else rest
+        return "proved: no path in the box leads from one part to another"
+    rest = "the robot may be able to go from one part to another, because neither a path nor a proof was found"
+    return f"{proved} proved separate; for the others, {rest}" if proved else rest
 
 
 def span_of(box: PoseBox) -> str:

@@ -17,7 +17,7 @@ from sagline.workspaces.grid import Grid
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Surface(Result):
-    """A surface of triangles, whose corners are counterclockwise as seen from outside.
+    """A surface of triangles with corners that are counterclockwise as seen from outside.
 
     Attributes:
         vertices: Positions [m], shape (V, 3).
@@ -62,20 +62,20 @@ class Surface(Result):
                 existing file is replaced.
 
         Raises:
-            FileError: If the suffix is another one, a package is missing, or the file cannot be written; an existing
-                file is then unchanged.
+            FileError: If the suffix is unknown, a package is missing, or the file cannot be written. An existing file
+                is then unchanged.
         """
         formats().save(self, file)
 
 
 def normals_of(vertices: Array, faces: Indices) -> Array:
-    """Outward normals (F, 3) of triangles, each with the triangle's area as its length [m^2]."""
+    """Outward normals (F, 3) of triangles; the length of a normal is the area of its triangle [m^2]."""
     first, second, third = (vertices[faces[:, k]] for k in range(3))
     return np.asarray(np.cross(second - first, third - first) / 2.0)
 
 
 def volumes_of(vertices: Array, faces: Indices) -> Array:
-    """Contribution of each triangle to the enclosed volume [m^3], (F,): the signed volume of a pyramid over it."""
+    """Contribution of each triangle to the enclosed volume, (F,) [m^3]: signed volume of the tetrahedron over it."""
     if not len(faces):
         return np.zeros(0)
     top = vertices.mean(axis=0)  # reference point near the surface, which reduces cancellation
@@ -86,14 +86,14 @@ _TOLD: Final = 8  # largest number of printed volumes
 
 
 def vertex_areas(vertices: Array, faces: Indices) -> Array:
-    """Area of the surface per vertex [m^2], (V,): a third of the area of each of its triangles."""
+    """Area of the surface for each vertex, (V,) [m^2]: a third of the area of all triangles at the vertex."""
     areas = np.linalg.norm(normals_of(vertices, faces), axis=1) / 3.0
     return np.asarray(np.bincount(faces.ravel(), np.repeat(areas, 3), minlength=len(vertices)), dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Components(Result):
-    """The components of a set, the largest first; a cavity belongs to the component around it.
+    """The components of a set in decreasing order of volume; a cavity belongs to the component around it.
 
     Attributes:
         volume: Volume of each component [m^3], shape (K,).
@@ -136,8 +136,8 @@ class Components(Result):
             position: Positions [m], shape (..., 3), each in the set.
 
         Returns:
-            Index of the component, shape (...,): that of the nearest node of the cell that is in a component; -1 if
-            there is no such node.
+            Index of the component, shape (...,), from the nearest node of the cell that is in a component; -1 if the
+            cell has no such node.
 
         Raises:
             InvalidValueError: If a position does not have this form.
@@ -159,10 +159,10 @@ class Components(Result):
 
 
 def components_of(grid: Grid, nodes: NDArray[np.int32], inner: Indices, faces: Indices, volumes: Array) -> Components:
-    """Components of a set, none of them proved separate from the others.
+    """Components of a set, without proofs of their separation.
 
-    Given are the grid, the labels of its nodes from 1 on, the inner nodes and triangles of the set's net, and volumes
-    (F,) [m^3].
+    Arguments: the grid, the labels of its nodes (1 and higher in the set), the inner nodes and triangles of the set's
+    net, and volumes (F,) [m^3].
     """
     count = int(nodes.max())
     vertices = nodes[tuple(inner.T)] - 1

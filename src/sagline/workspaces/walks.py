@@ -1,8 +1,8 @@
-"""Walks between the components of a set on a grid: paths of positions in the set, closer together than the nodes.
+"""Walks between the components of a set on a grid: paths of positions in the set, with steps smaller than the grid's.
 
-A thin part of a set can lie between the nodes of a grid, so that the nodes inside form several components. The path of
-nodes with the highest values between two components leads along such a part. Its positions outside the set are moved
-into it, across the path. The path is halved until its positions are close together, and all of them are in the set.
+A thin part of a set can be between the nodes of a grid, so that the inside nodes form several components. The path of
+nodes with the highest values between two components leads along such a part. Positions of the path that are outside the
+set are moved into the set, across the path. The path is divided until all positions are in the set and close together.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from sagline.core.arrays import Array, Indices
 from sagline.workspaces.grid import Grid, Level, level_values
 
 FINE: Final = 32  # neighboring positions of a walk are closer than the cell's longest edge divided by this number
-MOST_WALKS: Final = 256  # largest number of components from which a walk is searched
-_MOST_NODES: Final = 4096  # largest number of nodes on the way that are examined
-_MOST_DIVISIONS: Final = 24  # 6 to 8 without failures
+MOST_WALKS: Final = 256  # largest number of components for which walks are searched
+_MOST_NODES: Final = 4096  # largest number of nodes that are examined
+_MOST_DIVISIONS: Final = 24  # largest number of divisions of a path; a successful walk takes 6 to 8
 _TRIALS: Final = 40  # largest number of steps of a position toward the set
-_SMALLEST: Final = 1e-4  # smallest step, relative to the distance of the neighboring positions
+_SMALLEST: Final = 1e-4  # smallest step, relative to the distance between neighboring positions
 
 _NEIGHBORS: Final = np.array([offset for offset in product((-1, 0, 1), repeat=3) if any(offset)])
 _DIRECTIONS: Final = _NEIGHBORS / np.linalg.norm(_NEIGHBORS, axis=1)[:, None]
@@ -33,7 +33,7 @@ _Node = tuple[int, int, int]
 
 
 def labels_of(level: Level, grid: Grid) -> tuple[Labels, int, tuple[Array, ...]]:
-    """Label of the component of each node (0 outside, 1 to count), the count, and the walks that connect parts."""
+    """Component label of each node (0 outside, 1 to count inside), the count, and the walks that connect parts."""
     from scipy.ndimage import binary_erosion, label  # the import takes a fifth of a second
 
     nodes, count = label(grid.inside)  # nodes are connected along the axes, as in the net
@@ -58,9 +58,10 @@ def labels_of(level: Level, grid: Grid) -> tuple[Labels, int, tuple[Array, ...]]
 
 
 def _widest_path(values: Array, labels: Labels, start: Indices, ends: Indices) -> Indices | None:
-    """Nodes (K, 3) from one of some nodes to one with another label, with the highest least value; None if not found.
+    """Path of nodes (K, 3) from the nodes `start` to a node of another component; None if not found.
 
-    Nodes are visited in descending order of their values.
+    Nodes are visited in descending order of their values, so that the smallest value along the path is as high as
+    possible.
     """
     shape, others = values.shape, set(ends.tolist()) - {0}
     before: dict[_Node, _Node | None] = dict.fromkeys((x, y, z) for x, y, z in start.tolist())
@@ -84,7 +85,7 @@ def _widest_path(values: Array, labels: Labels, start: Indices, ends: Indices) -
 
 
 def _walk(level: Level, path: Array, step: Array) -> Array | None:
-    """Positions (K, 3) in the set along a path whose ends are in the set, close to each other; None if not found."""
+    """Positions (K, 3) in the set, close to each other, along a path with both ends in the set; None if not found."""
     turn = np.random.default_rng(0)
     path, at = path.copy(), level_values(level, path).copy()
     if len(path) > 2:
@@ -101,14 +102,14 @@ def _walk(level: Level, path: Array, step: Array) -> Array | None:
         between, at = _moved_inside(level, between, level_values(level, between), along[k], turn)
         found = at >= 0.0
         path = np.insert(path, k[found] + 1, between[found], axis=0)
-        share = 0.5 if found.all() else turn.uniform(0.2, 0.8)  # another place if one of the divisions fails
+        share = 0.5 if found.all() else turn.uniform(0.2, 0.8)  # another position after a division has failed
     return None
 
 
 def _moved_inside(
     level: Level, points: Array, at_points: Array, along: Array, turn: np.random.Generator
 ) -> tuple[Array, Array]:
-    """Positions (N, 3) moved across directions (N, 3) until the function is not negative, and its values (N,)."""
+    """Positions (N, 3), moved across directions (N, 3) until the function is nonnegative, and its values (N,)."""
     points, at_points = points.copy(), at_points.copy()
     size = np.linalg.norm(along, axis=1)
     unit = along / np.maximum(size, np.finfo(np.float64).tiny)[:, None]

@@ -30,8 +30,8 @@ from sagline.workspaces.space import BY_BOX, Workspace
 from sagline.workspaces.wrench_sets import WrenchSet, load_of
 
 LEAST_CELLS: Final = 4
-_CROSSED: Final = 100  # approximate number of evaluated poses in a cell that the boundary crosses
-ON_BOX: Final = 1e-9  # a vertex closer to a face than this share of the box is on the face
+_CROSSED: Final = 100  # approximate number of evaluated poses per cell at the boundary
+ON_BOX: Final = 1e-9  # a vertex counts as on a face if its distance, relative to the box, is smaller
 _CATENARY, _MINIMUM_NORM = Catenary(), MinimumNorm()
 
 
@@ -52,13 +52,13 @@ def workspace(
 ) -> Workspace:
     """Workspace: the positions at which the cables can balance every load of a set, and all criteria are met.
 
-    The boundary is computed for sagging cables from the sign of `margin`. It can have any shape and any number of
-    parts. Its vertices are on the exact boundary. The surface is flat between them. The error bar includes the effect
-    of this, and the bounds of the margin at vertices where its sign is not certain. Parts thinner than a cell can be
-    missed; only `prove` is certain for a whole box.
+    The boundary is computed for sagging cables from the sign of `margin`. The workspace can have any shape and any
+    number of parts. The vertices of the surface are on the exact boundary, with flat triangles between them. The error
+    bar of the volume includes the effect of the flat triangles, and the uncertainty of the margin at vertices. Parts
+    that are thinner than a cell can be missed; only `prove` is certain for a whole box.
 
     Args:
-        robot: The robot. For a planar robot, whose plane_normal must be along x, y or z, the workspace is an area.
+        robot: The robot. The workspace of a planar robot is an area; its plane_normal must be along x, y or z.
         box: Box of positions; a box without extent along an axis is a part of a plane. Its tilt has the meaning of
             `Tilts`. None: the whole frame of the robot, or the box of its anchors down to the floor.
         wrenches: Loads on the platform in addition to its weight; None if there are none.
@@ -70,9 +70,9 @@ def workspace(
         cells: Number of cells along the box's longest edge, 4 to 128.
         refine: Number of times that cells on the boundary are halved, up to 3; True for once.
         moment_arm: Lever arm that converts moments to forces in the margin [m]; None for the mean lever arm.
-        hull: "exact" for the boundary by the sign of the margin. "inner" for the positions whose loads are proved
-            feasible, by the lower bound of the margin; "outer" for those whose loads are not proved infeasible, by the
-            upper bound.
+        hull: "exact" for the boundary by the sign of the margin. "inner" for the positions at which all loads are
+            proved feasible, by the lower bound of the margin. "outer" for the positions at which no load is proved
+            infeasible, by the upper bound.
         progress: Called between blocks with the number of finished poses and the expected total number.
 
     Returns:
@@ -140,7 +140,7 @@ def workspace(
 
 
 def _progress_of(progress: Progress, cells: tuple[int, int, int]) -> Callable[[int], None]:
-    """Progress of an estimated number of poses: all nodes, and the poses in cells that the boundary crosses."""
+    """Progress for an estimated number of poses: all nodes, and the poses in cells at the boundary."""
     x, y, z = cells
     about, done = (x + 1) * (y + 1) * (z + 1) + _CROSSED * (x * y + y * z + z * x), 0
 

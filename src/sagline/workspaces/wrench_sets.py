@@ -1,7 +1,7 @@
 """Sets of loads on a platform, each described by its support function.
 
-The margin uses only the extent of a set W against a direction y, h_W(y) = max over w in W of -y . w. Every set here is
-a sum of four kinds, whose support functions add: segments, ellipsoids, polytopes, and inertial loads.
+The margin uses only the extent of a set W against a direction y: h_W(y) = max over w in W of -y . w. Every set of this
+module is a sum of four kinds: segments, ellipsoids, polytopes, and inertial loads. Their support functions are added.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from sagline.core.results import ByFields, set_fields
 
 
 def _wrench(wrench: Array) -> str:
-    """Text of a wrench, without zero force or moment."""
+    """Text of a wrench; a zero force or moment is omitted."""
     halves = ((wrench[:3], "N"), (wrench[3:], "N m"))
     return ", ".join(f"({', '.join(n(value) for value in half)}) {unit}" for half, unit in halves if half.any())
 
 
 def _segments(segments: Array) -> str:
-    """Text of segments: sizes of segments along the axes, and number of the others."""
+    """Text of segments: sizes of the segments along axes, and number of the other segments."""
     along = np.count_nonzero(segments, axis=1) == 1
     sizes = np.abs(segments[along]).sum(axis=0)
     parts = [f"±{_each(own, unit)}" for own, unit in ((sizes[:3], "N"), (sizes[3:], "N m")) if own.any()]
@@ -50,7 +50,7 @@ class WrenchSet(ByFields):
 
     Attributes:
         center: A wrench [N, N m], shape (6,).
-        segments: Segments; each adds all wrenches between minus and plus itself, shape (S, 6).
+        segments: Vectors s, shape (S, 6); each adds all wrenches between -s and s.
         ellipsoids: Matrices A; each adds A s for all s with length at most 1, shape (E, 6, 6).
         corners: Corners of the polytopes [N, N m], polytope by polytope, shape (C, 6).
         sizes: Number of corners of each polytope, shape (P,).
@@ -166,7 +166,7 @@ class WrenchEllipsoid(WrenchSet):
         """
         axes = _six(force, moment)
         if matrix is not None and axes.any():
-            raise InvalidValueError("matrix", "given beside semi-axes", "one of the two", "Leave out the others.")
+            raise InvalidValueError("matrix", "given with semi-axes", "one of the two", "Leave out the others.")
         own = np.diag(axes) if matrix is None else exactly(matrix, "matrix", "N, N m", (6, 6))
         self._fill(center=_center(center), ellipsoids=own[None])
 
@@ -188,7 +188,7 @@ class WrenchPolytope(WrenchSet):
         """Check the corners.
 
         Args:
-            corners: Wrenches [N, N m], shape (C, 6), C >= 1; wrenches between the others are allowed.
+            corners: Wrenches [N, N m], shape (C, 6), C >= 1; wrenches inside of the hull are allowed.
 
         Raises:
             InvalidValueError: If a number is not finite, or there are no corners.
@@ -203,8 +203,8 @@ class WrenchPolytope(WrenchSet):
 class Accelerations(WrenchSet):
     """Inertial loads of an accelerating platform, from the robot's mass, inertia and orientation.
 
-    The loads are those of the center of mass's acceleration and of the angular acceleration. The gyroscopic moment,
-    which does not need an acceleration, is not included.
+    The loads come from the acceleration of the center of mass and the angular acceleration. The gyroscopic moment is
+    not included, because it does not depend on an acceleration.
 
     Examples:
         >>> import sagline as sl
@@ -230,7 +230,7 @@ class Accelerations(WrenchSet):
         self._fill(accelerations=np.array(both))
 
 
-NO_LOAD: Final[WrenchSet] = Accelerations()  # only the point 0, for the weight alone
+NO_LOAD: Final[WrenchSet] = Accelerations()  # the set contains only zero: the weight alone
 
 
 def load_of(value: object) -> WrenchSet:
