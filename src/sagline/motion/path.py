@@ -15,17 +15,17 @@ from sagline.robot.pose import Pose, PoseLike, pose_of
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Path(Shown):
-    """The motion of the platform frame over time, in N samples at different times.
+    """Motion of the platform frame over time, in N samples.
 
     Attributes:
         time: Time of each sample [s], shape (N,), strictly increasing.
         pose: Poses of the platform frame, a batch of N.
-        twist: Velocity of the platform's origin [m/s], then its angular velocity [rad/s], in world axes, shape (N, 6).
-        twist_rate: Acceleration of the platform's origin [m/s^2], then its angular acceleration [rad/s^2],
-            in world axes, shape (N, 6).
-        jerk: d(twist_rate)/dt [m/s^3, rad/s^3], shape (N, 6); None if not known, for example for sampled poses.
-        rests: Times at which the platform is at rest between two segments [s], first and last time included, shape
-            (R,); they can differ from the sample times. None if not known, for example for sampled poses.
+        twist: Velocity of the platform's origin [m/s] and angular velocity [rad/s], in world axes, shape (N, 6).
+        twist_rate: Acceleration of the platform's origin [m/s^2] and angular acceleration [rad/s^2], in world axes,
+            shape (N, 6).
+        jerk: d(twist_rate)/dt [m/s^3, rad/s^3], shape (N, 6); None if unknown, for example for sampled poses.
+        rests: Times of rest between two segments [s], including first and last time, shape (R,); not necessarily sample
+            times. None if unknown, for example for sampled poses.
     """
 
     time: Array
@@ -44,7 +44,7 @@ class Path(Shown):
         jerk: ArrayLike | None = None,
         rests: ArrayLike | None = None,
     ) -> None:
-        """Check the fields against each other.
+        """Path from its fields.
 
         Args:
             time: Time of each sample [s], shape (N,), strictly increasing.
@@ -78,11 +78,11 @@ class Path(Shown):
 
     @property
     def duration(self) -> float:
-        """Time from the first sample to the last [s]."""
+        """Time between the first and the last sample [s]."""
         return float(self.time[-1] - self.time[0])
 
     def __reduce__(self) -> tuple[type[Path], tuple[Array, Pose, Array, Array, Array | None, Array | None]]:
-        """Pickle through the constructor, so that a loaded path is checked and locked too."""
+        """Pickle through the constructor, which checks and locks a loaded path."""
         return Path, (self.time, self.pose, self.twist, self.twist_rate, self.jerk, self.rests)
 
 

@@ -13,7 +13,7 @@ from sagline.motion.segments import QUINTIC, SEPTIC, RestProfile, Segments
 from sagline.robot.pose import Pose, PoseLike, pose_of
 
 LIMITS = ("speed", "acceleration", "angular_speed", "angular_acceleration")
-MOST_SAMPLES = 100_000_000  # 21 GB of path; with more samples, a duration or the rate probably has the wrong unit
+MOST_SAMPLES = 100_000_000  # 21 GB; more samples are probably due to a wrong unit of a duration or of the rate
 SAMPLE_BYTES = 300.0  # peak memory per sample during construction of the path
 
 
@@ -29,16 +29,16 @@ def quintic_path(
 ) -> Path:
     """Path through waypoints, with rest at each waypoint.
 
-    At the time s T of a segment of duration T, the platform has covered the share 10 s^3 - 15 s^4 + 6 s^5 of the
-    segment. The position moves along a straight line and the orientation rotates about one fixed axis. Velocity and
-    acceleration vanish at both ends; the jerk does not (see `septic_path`). A rotation of exactly 180 degrees has two
-    equally short directions; the path takes the direction of scipy's `Rotation.as_rotvec`.
+    In a segment of duration T, the platform has covered the share 10 s^3 - 15 s^4 + 6 s^5 of the segment at the time s
+    T. The position moves along a straight line, and the orientation rotates about one fixed axis. Velocity and
+    acceleration vanish at both ends; the jerk does not (see `septic_path`). For a rotation of exactly 180 degrees, both
+    directions are equally short. The path uses the direction of scipy's `Rotation.as_rotvec`.
 
-    Give either `durations` or limits. With limits, each segment takes the shortest time that satisfies all of them; the
-    slower of translation and rotation determines it.
+    Give either `durations` or limits. With limits, each segment has the shortest duration that satisfies all limits of
+    translation and rotation.
 
-    The samples are at 0, 1/rate, 2/rate, ... and at the end time, so that the last step can be shorter. A waypoint can
-    lie between two samples.
+    The samples are at 0, 1/rate, 2/rate, ... and at the end time. The last step can therefore be shorter. A waypoint
+    can be between two samples.
 
     Args:
         waypoints: At least two poses, as a batch or a sequence; or positions [m] of shape (N, 3), orientation identity.
@@ -50,8 +50,8 @@ def quintic_path(
         rate: Samples per second [1/s], > 0.
 
     Returns:
-        Path that starts at time 0. Its jerk is discontinuous at every waypoint, where it has the value of the next
-        segment.
+        Path that starts at time 0. Its jerk is discontinuous at every waypoint; the jerk at a waypoint is the value of
+        the next segment.
 
     Raises:
         InvalidValueError: If a value is out of range, both or neither of durations and limits are given, a limit is
@@ -84,9 +84,9 @@ def septic_path(
 ) -> Path:
     """Path through waypoints, with rest at each waypoint and continuous jerk.
 
-    Same as `quintic_path`, except that the share of the segment is 35 s^4 - 84 s^5 + 70 s^6 - 20 s^7. Velocity,
-    acceleration and jerk are zero at both ends of each segment, so that cables and winches have no sudden changes. For
-    the same duration, the peak speed is 7/6 and the peak acceleration 1.30 of that of the quintic.
+    The function is `quintic_path` with the share 35 s^4 - 84 s^5 + 70 s^6 - 20 s^7. Velocity, acceleration and jerk are
+    zero at both ends of each segment, so that cables and winches have no sudden changes. For the same duration, the
+    peak speed is 7/6 of the quintic's peak speed, and the peak acceleration is 1.30 of the quintic's.
 
     Args:
         waypoints: At least two poses, as a batch or a sequence; or positions [m] of shape (N, 3), orientation identity.
@@ -125,7 +125,7 @@ def _rest_to_rest(
     limits: tuple[float | None, float | None, float | None, float | None],
     rate: float,
 ) -> Path:
-    """Path of segments with one profile and given durations or limits; limits in the order of `LIMITS`."""
+    """Path of segments with one profile, and with given durations or limits (in the order of `LIMITS`)."""
     segments = Segments.between(_as_pose(waypoints), profile)
     given = [name for name, value in zip(LIMITS, limits, strict=True) if value is not None]
     if (durations is None) == (not given):
@@ -133,7 +133,7 @@ def _rest_to_rest(
             "the timing of the path",
             f"given by durations and {given[0]}" if given else "missing",
             "either durations, or limits of speed and acceleration",
-            "Leave one of them out." if given else "Give durations=... or speed=...",
+            "Omit one of them." if given else "Give durations=... or speed=...",
         )
     times = segments.durations_within(*limits) if durations is None else _checked_durations(durations, len(segments))
     ends = np.cumsum(times)
@@ -164,7 +164,7 @@ def _checked_durations(durations: ArrayLike, segments: int) -> Array:
 
 
 def _check_sampled(grid: Array, ends: Array, times: Array, moves: Flags) -> None:
-    """Refuse a moving segment without a sample between its ends, because its motion would be missing in all results."""
+    """Refuse a moving segment without a sample between its ends; its motion would be missing in all results."""
     rounding = 1e-9 * ends[-1]
     inside = np.searchsorted(grid, ends - rounding) - np.searchsorted(grid, ends - times + rounding)
     if (unseen := np.flatnonzero((inside < 1) & moves)).size:
@@ -178,7 +178,7 @@ def _check_sampled(grid: Array, ends: Array, times: Array, moves: Flags) -> None
 
 
 def time_grid(total: float, rate: float) -> Array:
-    """Times k/rate from 0 to the total time, with the total time as the last [s].
+    """Times k/rate, starting at 0, then the total time [s].
 
     Shapes: total [s]; rate [1/s]; returns (N,).
     """
@@ -194,7 +194,7 @@ def time_grid(total: float, rate: float) -> Array:
     check_memory(
         f"a path of {steps:.4g} samples", SAMPLE_BYTES * steps, "Check the units of durations, limits and rate."
     )
-    # a total that is a multiple of 1/rate, except for rounding, does not get an extra sample
+    # a total that is a multiple of 1/rate, except for rounding, gets no extra sample
     last = round(steps) if abs(steps - round(steps)) <= 1e-9 * steps else int(np.ceil(steps))
     return np.append(np.arange(last) / rate, total)
 
@@ -205,11 +205,11 @@ DURATIONS = (9.0, 11.0, 10.0, 11.0, 10.0, 9.0)  # durations [s]
 
 
 def article_path(rate: float = 100.0) -> Path:
-    """The article's planar motion: at z = 1.5 m, without rotation, from rest to rest.
+    """Planar motion of the article: at z = 1.5 m, without rotation, from rest to rest.
 
-    The article gives only the height and the zero angles (its Figure 18); the remaining values are assumed. The path
-    leads from the center to the corner (+5, +3.5) m, counter-clockwise around the rectangle of x = +-5 m, y = +-3.5 m,
-    and back to the center; 60 s in total, peak acceleration 0.48 m/s^2, peak speed 1.70 m/s.
+    The article gives only the height and the zero angles (its Figure 18). All other values are assumed. The path starts
+    at the center, goes to the corner (+5, +3.5) m, counter-clockwise around the rectangle x = +-5 m, y = +-3.5 m, and
+    back to the center. It takes 60 s. Peak acceleration is 0.48 m/s^2, peak speed is 1.70 m/s.
 
     Args:
         rate: Samples per second [1/s], > 0; 100 gives 6,001 poses.

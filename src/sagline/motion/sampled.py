@@ -1,4 +1,4 @@
-"""A path from samples of time and pose: velocities and accelerations by splines."""
+"""A path from timed poses, with velocities and accelerations from splines."""
 
 from __future__ import annotations
 
@@ -14,13 +14,14 @@ from sagline.robot.pose import PoseLike, pose_of
 def path_from_samples(time: ArrayLike, pose: PoseLike) -> Path:
     """Path from timed poses.
 
-    Position and quaternion are interpolated by cubic splines with continuous second derivatives; the path keeps the
-    given poses and computes velocity and acceleration from the splines. At both ends the spline is the cubic through
-    the first (last) four samples (not-a-knot), so that the path need not start or end at rest. Two samples give a
-    constant velocity, and three samples give a parabola.
+    Cubic splines with continuous second derivatives interpolate position and quaternion. The path has the given poses,
+    and velocities and accelerations from the splines. At both ends the spline is the cubic through the first (last)
+    four samples (not-a-knot). The path therefore need not start or end at rest. Two samples give a constant velocity,
+    and three samples give a parabola.
 
-    Errors of the samples reduce the accuracy of the acceleration: position errors up to d [m] at time steps of h [s]
-    cause acceleration errors up to 12 d/h^2, which is 0.06 m/s^2 for micrometers (d = 0.5e-6 m) at 100 samples/s.
+    Errors of the samples reduce the accuracy of the acceleration. Position errors up to d [m] at time steps of h [s]
+    cause acceleration errors up to 12 d/h^2. For positions rounded to micrometers (d = 0.5e-6 m) and 100 samples/s,
+    this is 0.06 m/s^2.
 
     Args:
         time: Time of each sample [s], shape (N,), strictly increasing, N >= 2.
@@ -67,7 +68,7 @@ def spline_rates(time: Array, values: Array) -> tuple[Array, Array]:
 
 
 def _without_sign_changes(quaternion: Array) -> Array:
-    """Continuous quaternions: each has the sign closer to its predecessor (q and -q are the same rotation)."""
+    """Continuous quaternions. Each gets the sign that is closer to its predecessor (q and -q are the same rotation)."""
     aligned = np.sum(quaternion[1:] * quaternion[:-1], axis=1) >= 0.0
     sign = np.cumprod(np.concatenate(([1.0], np.where(aligned, 1.0, -1.0))))
     continuous: Array = quaternion * sign[:, None]
@@ -77,15 +78,15 @@ def _without_sign_changes(quaternion: Array) -> Array:
 def _angular_rates(time: Array, quaternion: Array) -> tuple[Array, Array]:
     """Angular velocity [rad/s] and acceleration [rad/s^2] in world axes of a spline through unit quaternions.
 
-    With q' = (omega, 0) q / 2 for the normalized quaternion, and |q| = 1 at the samples, the spline's derivatives give
-    omega = 2 vec(q' q*) and omega' = 2 vec(q'' q*) - 2 omega (q . q').
+    The normalized quaternion has q' = (omega, 0) q / 2, and |q| = 1 at the samples. The derivatives of the spline
+    therefore give omega = 2 vec(q' q*) and omega' = 2 vec(q'' q*) - 2 omega (q . q').
 
-    scipy's RotationSpline is not used, because it starts and ends with the mean velocity of the outermost steps. This
-    causes an error of the acceleration there that does not decrease with smaller steps.
+    scipy's RotationSpline is not used. Its first and last velocities are means over the outermost steps, which causes
+    an error of the acceleration at both ends. Smaller steps do not decrease this error.
     """
     rate, curvature = spline_rates(time, quaternion)
     velocity = 2.0 * _vector_of_product_with_conjugate(rate, quaternion)
-    growth = np.sum(quaternion * rate, axis=1, keepdims=True)  # rate of the norm, which a spline does not keep at 1
+    growth = np.sum(quaternion * rate, axis=1, keepdims=True)  # rate of the norm, which is not constant along a spline
     return velocity, 2.0 * _vector_of_product_with_conjugate(curvature, quaternion) - 2.0 * growth * velocity
 
 

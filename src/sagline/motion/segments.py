@@ -18,12 +18,13 @@ from sagline.robot.pose import Pose
 class RestProfile:
     """Polynomial from 0 to 1 for s from 0 to 1; k derivatives vanish at both ends.
 
-    With u = s (1 - s), its derivative is c u^k, so that its first k derivatives vanish at both ends; the degree is 2 k
-    + 1.
+    The derivative of the polynomial is c u^k with u = s (1 - s). The first k derivatives therefore vanish at both ends.
+    The degree is 2 k + 1.
 
     Attributes:
-        order: k, >= 2: 2 for the quintic (acceleration vanishes at the ends), 3 for the septic (jerk too).
-        tail: Coefficients of the polynomial after its factor s^(k + 1), constant first.
+        order: k, >= 2: 2 for the quintic (acceleration vanishes at the ends), 3 for the septic (acceleration and jerk
+            vanish).
+        tail: Coefficients of the polynomial without its factor s^(k + 1), constant first.
 
     Source:
         c u^k integrated by the binomial theorem; docs/model.md, section 7.
@@ -34,7 +35,7 @@ class RestProfile:
 
     @classmethod
     def of_order(cls, order: int) -> RestProfile:
-        """The profile whose first `order` derivatives vanish at both ends."""
+        """Profile with `order` vanishing derivatives at both ends."""
         k = order
         scale = factorial(2 * k + 1) // factorial(k) ** 2
         binomials = (factorial(k) // factorial(i) // factorial(k - i) for i in range(k + 1))
@@ -42,7 +43,7 @@ class RestProfile:
 
     @property
     def slope(self) -> float:
-        """C = (2 k + 1)!/(k!)^2, which makes the integral of c u^k equal to one."""
+        """Constant c = (2 k + 1)!/(k!)^2, for which the integral of c u^k is one."""
         return float(factorial(2 * self.order + 1) // factorial(self.order) ** 2)
 
     @property
@@ -58,7 +59,7 @@ class RestProfile:
         return float(self.slope * k * (0.25 * (1.0 - q)) ** (k - 1) * np.sqrt(q))
 
     def share(self, s: Array) -> Array:
-        """Covered share of the segment."""
+        """Share of the segment covered at s."""
         total: Array = np.full_like(s, self.tail[-1])
         for coefficient in self.tail[-2::-1]:
             total = coefficient + s * total
@@ -77,7 +78,7 @@ QUINTIC: Final = RestProfile.of_order(2)  # 10 s^3 - 15 s^4 + 6 s^5
 SEPTIC: Final = RestProfile.of_order(3)  # 35 s^4 - 84 s^5 + 70 s^6 - 20 s^7
 
 
-STILL = 1e-9  # [m] and [rad], a shorter motion is a rounding error of a waypoint
+STILL = 1e-9  # [m] and [rad]; a smaller motion is a rounding error of a waypoint
 BLOCK = 1 << 16  # samples per block; limits the temporary arrays to a few MB
 
 
@@ -91,8 +92,8 @@ class Segments:
         move: Displacement to the end [m], shape (S, 3).
         turn: Rotation vector from start to end in world axes [rad], shape (S, 3).
         start_quaternion: Orientation q at the start, scalar last, shape (S, 4).
-        side_quaternion: The quaternion product of the unit rotation axis and q, shape (S, 4): the orientation after a
-            rotation by angle a is cos(a/2) q + sin(a/2) side.
+        side_quaternion: Product `side` of the unit rotation axis and q, shape (S, 4). The orientation after a rotation
+            by the angle a is cos(a/2) q + sin(a/2) side.
     """
 
     profile: RestProfile
@@ -104,7 +105,7 @@ class Segments:
 
     @classmethod
     def between(cls, stops: Pose, profile: RestProfile) -> Segments:
-        """The segments from each pose of a batch to the next."""
+        """Segments between consecutive poses of a batch."""
         move, kept = np.diff(stops.position, axis=0), stops.quaternion[:-1]
         if np.array_equal(kept, stops.quaternion[1:]):  # no rotation: the axis is not needed
             return cls(profile, stops.position[:-1], move, np.zeros_like(move), kept, np.zeros_like(kept))
@@ -148,8 +149,8 @@ class Segments:
             raise InvalidValueError(
                 f"waypoints[{k + 1}]",
                 f"the same as waypoints[{k}]",
-                "a different pose, because limits give the time",
-                "Remove it, or give durations=... to dwell there.",
+                "a different pose, because limits determine the time",
+                "Remove this waypoint, or give durations=... to dwell at it.",
             )
         moving = self._least_time(distance, "moves", "speed", "m", speed, acceleration)
         turning = self._least_time(angle, "turns", "angular_speed", "rad", angular_speed, angular_acceleration)
@@ -174,7 +175,8 @@ class Segments:
             move, turn, turned = self.move[k], self.turn[k], share * half_angle[k]
             position[block] = self.start[k] + share * move
             quaternion[block] = np.cos(turned) * self.start_quaternion[k] + np.sin(turned) * self.side_quaternion[k]
-            # because the axis is fixed, the derivatives of the rotation vector are exactly those of the orientation
+            # because the axis is fixed, the derivatives of the rotation vector are the exact derivatives of the
+            # orientation
             for order, by_share in enumerate(self.profile.rates(s)):
                 rate = by_share / T ** (order + 1)
                 rates[order, block, :3], rates[order, block, 3:] = rate * move, rate * turn

@@ -42,8 +42,7 @@ def inertial_wrench(robot: Robot | Sequence[Robot], pose: PoseLike, twist: Array
         (6001, 6)
 
     Source:
-        Newton and Euler; docs/model.md, section 4. The equations use the angular velocity itself, not Euler-angle
-        rates.
+        Newton and Euler; docs/model.md, section 4. The equations use the angular velocity, not Euler-angle rates.
     """
     pose = pose_of(pose)
     if not pose.shape:
@@ -67,7 +66,7 @@ def inertial_wrench(robot: Robot | Sequence[Robot], pose: PoseLike, twist: Array
 
 
 def external_wrench(wrench: ArrayLike | None, count: int | None) -> Array:
-    """The caller's wrench, checked; zeros for None.
+    """Checked wrench of a caller; zeros for None.
 
     Shapes: wrench [N]; returns (6,) or (N, 6).
     """
@@ -81,7 +80,7 @@ def external_wrench(wrench: ArrayLike | None, count: int | None) -> Array:
 
 
 class ArticleBalance(NamedTuple):
-    """The article's system H t_x + b = [F; tau], with force and moment about the center of mass, without gravity.
+    """System H t_x + b = [F; tau] of the article: force and moment about the center of mass, without gravity.
 
     Attributes:
         h: The matrix H of (50), shape (..., 6, m).
@@ -107,10 +106,10 @@ def structure_matrix(robot: Robot | Sequence[Robot], pose: PoseLike) -> Array:
         pose: One pose or a batch of N.
 
     Returns:
-        Columns (u_i; r_i x u_i) along the platform's free motions, shape (n, m) or (N, n, m).
+        Matrix with the columns (u_i; r_i x u_i) along the platform's free motions, shape (n, m) or (N, n, m).
 
     Raises:
-        InvalidValueError: If there is not one robot per pose, or several robots do not fit together.
+        InvalidValueError: If the number of several robots is not N, or the robots do not fit together.
         CableGeometryError: If both ends of a cable coincide, or one is inside its pulley; the message names pose and
             cable.
 
@@ -135,11 +134,10 @@ def structure_matrix(robot: Robot | Sequence[Robot], pose: PoseLike) -> Array:
 
 
 def article_balance(robot: Robot, pose: PoseLike, k_h: float = 4.845) -> ArticleBalance:
-    """The article's own H and b, in the horizontal tensions t_x, for comparison.
+    """Matrix H and vector b of the article, for the horizontal tensions t_x; for comparison with `structure_matrix`.
 
-    H and b follow the article's equations with the levers b_i = B_i - P from the center of mass, with the corrected
-    sign of b_pi (erratum 1) and with gravity counted once (erratum 2). They are infinite directly under an anchor
-    (erratum 8).
+    The equations of the article are used with the levers b_i = B_i - P from the center of mass, with the corrected sign
+    of b_pi (erratum 1), and with gravity once (erratum 2). H and b are infinite directly under an anchor (erratum 8).
 
     Args:
         robot: The robot.

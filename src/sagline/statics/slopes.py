@@ -106,12 +106,12 @@ def platform_end_forces(state: Equilibrium) -> Array:
 
 
 def frame_end_forces(state: Equilibrium) -> Array:
-    """Forces in the cables of a single state at their frame ends, toward the platform, world axes [N], (m, 3)."""
+    """Forces of the cables of a single state on their frame ends, toward the platform, world axes [N], (m, 3)."""
     weight = state.cables.cable_weight[:, None] * np.array([0.0, 0.0, 1.0])
     return np.asarray(platform_end_forces(state) - weight)
 
 
-_LONGER = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])  # the last column is a change of the cable's own length by 1 m
+_LONGER = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])  # the last column is a change of the cable length by 1 m
 
 
 class TensionSlopes(NamedTuple):
@@ -120,7 +120,7 @@ class TensionSlopes(NamedTuple):
     # with respect to (displacement of the center of mass, rotation vector) at fixed lengths, shape (..., m, 6) [N/m,
     # N/rad]
     by_motion: Array
-    by_length: Array  # with respect to the cable's own length, platform fixed, shape (..., m) [N/m]
+    by_length: Array  # with respect to the length of the same cable, with a fixed platform, shape (..., m) [N/m]
 
 
 def tension_slopes(state: Equilibrium, slopes: CableSlopes) -> TensionSlopes:
@@ -142,7 +142,7 @@ def _at_anchors(state: Equilibrium, slopes: CableSlopes, forces: Array) -> Array
     at_frame, forces = slopes.force.copy(), forces.copy()
     at_frame[..., 2] -= cables.cable_weight
     forces[..., 2] -= _weight(state)[..., None] * _LONGER
-    # a cable without force does not have a direction
+    # a cable without force has no direction
     direction = at_frame / np.maximum(np.linalg.norm(at_frame, axis=-1, keepdims=True), _TINY)
     slope: Array = np.einsum("...ik,...ijk->...ij", direction, forces)
     return slope

@@ -1,4 +1,4 @@
-"""Stiffness of the platform on its cables, sensitivities of its pose, and its natural modes."""
+"""Stiffness of the platform on its cables, sensitivities of the pose, and natural modes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from sagline.statics.slopes import CableSlopes, cable_slopes, on_platform, tensi
 from sagline.statics.strings import strings_below, strings_of
 
 _SINGULAR = 1e-14  # smallest determinant of a regular matrix with diagonal elements of 1
-# relative to the largest squared frequency: smaller positive or negative values count as zero
+# relative to the largest squared frequency; values of smaller magnitude count as zero
 NEUTRAL, UNSTABLE = 1e-13, 1e-10
 _STIFFNESS_BYTES, _MODES_BYTES = 2500.0, 800.0  # memory per cable of a state, during the calculation
 
@@ -24,33 +24,32 @@ _STIFFNESS_BYTES, _MODES_BYTES = 2500.0, 800.0  # memory per cable of a state, d
 class Stiffness(Result):
     """Result of `stiffness`, single or with a leading axis N.
 
-    Motions are (displacement of the center of mass [m], rotation vector [rad]); wrenches are (force [N], moment [N m])
-    about this center. All are in world axes. Sensitivities are zero for motions outside the robot's motion pattern, and
-    NaN if the stiffness is singular.
+    A motion is (displacement of the center of mass [m], rotation vector [rad]). A wrench is (force [N], moment [N m])
+    about the center of mass. Both are in world axes. Sensitivities are zero for motions outside the robot's motion
+    pattern, and NaN if the stiffness is singular.
 
     Attributes:
         state: The equilibrium of the calculation.
         matrix: -d(wrench of the cables)/d(motion) at fixed lengths, shape (..., 6, 6): elastic, sag and geometric
-            stiffness. It is symmetric except for half the given moment, whose direction does not rotate with the
-            platform.
+            stiffness. Its skew part is half the given moment, because this moment does not rotate with the platform.
         compliance: d(motion)/d(wrench on the platform), shape (..., 6, 6).
         length_sensitivity: d(motion)/dL of each cable, shape (..., 6, m) [m/m, rad/m].
         density_sensitivity: d(motion)/d(linear density) of each cable, shape (..., 6, m) [m^2/kg, rad m/kg].
         stiffness_sensitivity: d(motion)/d(axial stiffness) of each cable, shape (..., 6, m) [m/N, rad/N].
         pulley_radius_sensitivity: d(motion)/d(pulley radius) of each cable at constant length off the drum, shape (...,
-            6, m) [m/m, rad/m]; available for the shallow models too, like dead_cable_sensitivity.
+            6, m) [m/m, rad/m].
         dead_cable_sensitivity: d(motion)/d(dead length) at constant length off the drum, shape (..., 6, m) [m/m,
             rad/m].
-        cable_stiffness: dT/dB of each cable, T the force on its platform end, B the position of this end, world axes,
-            shape (..., m, 3, 3) [N/m].
+        cable_stiffness: dT/dB of each cable, with the force T on its platform end and the position B of this end, world
+            axes, shape (..., m, 3, 3) [N/m].
         frame_anchor_sensitivity: d(motion)/d(frame anchor, world axes) at fixed lengths, shape (..., 6, m, 3)
             [m/m, rad/m].
         platform_anchor_sensitivity: d(motion)/d(platform anchor, platform frame) at fixed lengths, shape (..., 6, m, 3)
             [m/m, rad/m].
         tension_sensitivity: d(tension at the frame end of cable i)/dL_j with the platform in equilibrium, shape (...,
             m, m) [N/m].
-        null_lengths: First-order changes of length that do not move the platform, as orthonormal columns, shape (...,
-            m, m - n), with n the number of free motions. There are no columns if m <= n.
+        null_lengths: Orthonormal columns of length changes that do not move the platform (first order), shape (..., m,
+            m - n), with n the number of free motions; without columns if m <= n.
     """
 
     state: Equilibrium
@@ -86,10 +85,10 @@ class Modes(Result):
 
     @property
     def above_strings(self) -> Flags:
-        """True for modes above the lowest string frequency of any cable with both ends fixed.
+        """True for modes above the lowest frequency of a cable with fixed ends.
 
-        Above this frequency the platform modes do not approximate the modes of the robot, because the cables vibrate
-        too (see `vibration`). The shape is (..., n); the value is False for a motion without stiffness.
+        Above this frequency the cables vibrate, and the platform modes do not approximate the modes of the robot (see
+        `vibration`). The shape is (..., n); the value is False for a motion without stiffness.
         """
         frequency = np.nan_to_num(self.frequency.reshape(-1, self.frequency.shape[-1]))
         below = strings_below(strings_of(self.state), frequency)
@@ -98,7 +97,7 @@ class Modes(Result):
 
 @of_equilibrium
 def stiffness(state: Equilibrium) -> Stiffness:
-    """Stiffness of the platform at fixed unstrained lengths, and sensitivities of its pose; all analytic.
+    """Stiffness of the platform at fixed unstrained lengths, and sensitivities of the pose, from analytic derivatives.
 
     Args:
         state: An equilibrium, single or N of them; a plan or a solution; or a robot and its poses.
@@ -148,13 +147,13 @@ def stiffness(state: Equilibrium) -> Stiffness:
 
 
 def _by_frame_anchor(slopes: CableSlopes, compliance: Array) -> Array:
-    """Frame anchor sensitivity (..., 6, m, 3); a motion da of a frame end acts like -da of the platform end."""
+    """Frame anchor sensitivity (..., 6, m, 3). A motion da of the frame end acts like -da at the platform end."""
     columns = [compliance @ on_platform(slopes.blocks[..., k], slopes.levers) for k in range(3)]
     return np.stack(columns, axis=-1)
 
 
 def _by_platform_anchor(state: Equilibrium, slopes: CableSlopes, compliance: Array) -> Array:
-    """Platform anchor sensitivity: a change db moves the platform end and its force by Q db, shape (..., 6, m, 3)."""
+    """Platform anchor sensitivity (..., 6, m, 3). A change db moves the platform end, and its force, by Q db."""
     rotation = state.pose.matrix[..., None, :, :]
     columns = []
     for k in range(3):
@@ -233,10 +232,10 @@ def smallest_stiffness(state: Equilibrium) -> Array:
 
 
 def natural_frequency(squares: Array) -> Array:
-    """Frequencies [Hz] from squares of angular frequencies, shape (..., n), n per platform.
+    """Frequencies [Hz] from squared angular frequencies, shape (..., n).
 
-    A motion without stiffness, such as a rotation about a single rope, has 0 Hz, because its square is only a rounding
-    error. The frequency of an unstable motion is NaN.
+    A motion without stiffness, such as a rotation about a single rope, has 0 Hz. Its square is only a rounding error.
+    The frequency of an unstable motion is NaN.
     """
     largest = np.abs(squares).max(axis=-1, keepdims=True, initial=0.0)
     known = np.where(squares > NEUTRAL * largest, squares, np.where(squares < -UNSTABLE * largest, np.nan, 0.0))
@@ -245,7 +244,7 @@ def natural_frequency(squares: Array) -> Array:
 
 def _check_state(state: Equilibrium, cable_bytes: float) -> None:
     size = state.cables.unstrained_length.size
-    check_memory("state", cable_bytes * size, "Take the poses in parts: state[:1000].")
+    check_memory("state", cable_bytes * size, "Split the poses into parts: state[:1000].")
 
 
 def compliance_of(freedom: Array, matrix: Array) -> Array:

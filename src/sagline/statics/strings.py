@@ -17,9 +17,9 @@ from sagline.robot.batch import anchors_of, cables_of, first_of
 from sagline.robot.equilibrium import Equilibrium
 from sagline.statics.tables import cable_table
 
-FOLD = 1e-6  # minimum tension relative to weight, below which a cable is folded and has no linear vibration
-COUNTING = 0.75 * np.pi  # phase of an element for the mode count [rad], below pi; the relative frequency error is 1e-13
-# minimum tension relative to EA, below which a cable is slack; its two stiffnesses differ too much for the computation
+FOLD = 1e-6  # smallest tension relative to the weight; below it a cable is folded and has no linear vibration
+COUNTING = 0.75 * np.pi  # phase of an element for the mode count [rad], < pi; gives a relative frequency error of 1e-13
+# smallest tension relative to EA; below it a cable is slack, and its two stiffnesses differ too much to compute
 SLACK = 1e-7
 _TINY = 1e-300
 

@@ -1,4 +1,4 @@
-"""Robots and poses in the form for kernels, and chord geometry of the cables."""
+"""Robots and poses as arrays for kernels, and chord geometry of the cables."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def pose_rows(pose: Pose) -> Array:
 
 
 def robot_terms(robot: Robots) -> tuple[Array, Array, Array]:
-    """Data of one robot or of several in the form for kernels.
+    """Arrays for kernels of one or several robots.
 
     Returns (n, 6).
     """
@@ -50,7 +50,7 @@ def robot_terms(robot: Robots) -> tuple[Array, Array, Array]:
 
 
 def _cable_rows(robot: Robot) -> Array:
-    """One robot's rows of `cable_table`, (m, CABLE_COLUMNS)."""
+    """Rows of `cable_table` for one robot, (m, CABLE_COLUMNS)."""
     columns = (
         robot.frame_anchors,
         robot.platform_anchors,
@@ -64,7 +64,7 @@ def _cable_rows(robot: Robot) -> Array:
 
 
 def _behind(robot: Robot) -> Array:
-    """Routing data of the cables: pulley radius, entry, dead length and its rise, (m, 4)."""
+    """Routing data of the cables: pulley radius, entry, dead length and dead rise, (m, 4)."""
     none = np.zeros(robot.cable_count)
     run = (none, none) if robot.winches is None else (robot.winches.dead_cable, robot.winches.dead_rise)
     return np.stack((*pulleys_of(robot), *run), axis=1)
@@ -109,7 +109,7 @@ def refuse_missing_chords(robot: Robots, pose: Pose, geometry: Array | None = No
         f"{item}: distance between its ends",
         f"{round(float(chord[row, cable]), 12):g} m",
         f">= {SHORTEST_CHORD:g} m",
-        "Move the platform away from the anchor, or the anchor away from the path.",
+        "Move the platform or the anchor, so that they are apart.",
     )
 
 

@@ -18,14 +18,14 @@ BLOCK = 1 << 12  # poses per block, about 0.1 s; interrupts are handled between 
 
 @of_equilibrium
 def limit_margin(state: Equilibrium) -> Array:
-    """Distance of the tensions of each pose to their nearest limit.
+    """Distance between the tensions of each pose and their nearest limit.
 
     Args:
         state: An equilibrium, single or N of them; a plan or a solution; or a robot and its poses.
 
     Returns:
-        Smallest distance [N] of the tension of a cable to its limits, shape () or (N,). It is 0 if a cable is at its
-        limit, and NaN without tensions. It depends on the tension distribution.
+        Smallest distance [N] between the tension of a cable and its limits, shape () or (N,); 0 if a cable is at its
+        limit, NaN without tensions. The distance depends on the tension distribution.
 
     Raises:
         InvalidValueError: If the state is not one of these.
@@ -42,7 +42,7 @@ def limit_margin(state: Equilibrium) -> Array:
 
 
 def cable_margins(state: Equilibrium) -> Array:
-    """Distance of the tension of each cable to its nearest limit; `limit_margin` is the smallest of them.
+    """Distance between the tension of each cable and its nearest limit; `limit_margin` is the smallest distance.
 
     Returns (m,) or (N, m) [N].
     """
@@ -56,8 +56,8 @@ def capacity_margin(state: Equilibrium) -> Array:
     """Largest additional force in any direction that tensions within the limits can balance at each pose.
 
     The moment does not change. The result is exact for weightless cables. For sagging cables, the sag forces of the
-    state are constant. The computing time is proportional to the number of faces, which is the binomial coefficient of
-    m over n - 1. Eight cables have 56 faces, which take about twenty microseconds per pose.
+    state are kept constant. The computing time is proportional to the number of faces, the binomial coefficient of m
+    over n - 1. For eight cables, 56 faces take about twenty microseconds per pose.
 
     Args:
         state: An equilibrium, single or N of them; a plan or a solution; or a robot and its poses.

@@ -1,4 +1,4 @@
-"""Interface of all tension distribution methods, and their data in the form for kernels."""
+"""Interface of all tension distribution methods, and their data for kernels."""
 
 from __future__ import annotations
 
@@ -31,19 +31,19 @@ PREFERENCE_ROWS = 2
 
 @dataclass(frozen=True, slots=True)
 class TensionMethod:
-    """Rule that selects one of the feasible tension sets: a code for the kernels, and its options.
+    """Rule that selects one feasible set of tensions: a code for the kernels, and options.
 
     Attributes:
         code: Code of the method in the kernels (`sagline.kernels.codes`).
         needs_upper_limits: True if every cable must have a finite upper limit.
         most_redundant: Largest number of redundant cables of the method; None for any number.
         continuous: True if tensions follow the pose without jumps.
-        variable: The tension variable of the method: "chord" (default), "horizontal", the article's T_x, or
-            "frame_end", the tension at the winch's load cell. The minimum-norm results of the variables differ. A
-            vertical cable does not have a horizontal tension. A pose directly under an anchor is therefore singular in
-            this variable.
-        lowest_point_margin: The article's T_adj of (54) [N]. It requires T_x >= w D/(2 |tan phi|) + T_adj, so that the
-            lowest point of each cable is outside its span. None (default): no such bound.
+        variable: The tension variable of the method: "chord" (default), "horizontal" (T_x of the article), or
+            "frame_end" (the tension at the load cell of the winch). Minimum-norm results depend on the variable. A
+            vertical cable has no horizontal tension. A pose directly under an anchor is therefore singular in the
+            variable "horizontal".
+        lowest_point_margin: T_adj of (54) in the article [N]: the bound T_x >= w D/(2 |tan phi|) + T_adj keeps the
+            lowest point of each cable outside its span. None (default): no such bound.
     """
 
     code: ClassVar[int]
@@ -56,7 +56,7 @@ class TensionMethod:
     def __post_init__(self) -> None:
         """Check the options."""
         if type(self) is TensionMethod:
-            step = "Choose one of the methods, MinimumNorm() for instance."
+            step = "Choose a tension method, for instance MinimumNorm()."
             raise InvalidValueError("TensionMethod()", "the abstract base class", "a tension distribution method", step)
         object.__setattr__(self, "variable", choice(self.variable, "variable", VARIABLES))
         if self.lowest_point_margin is not None:
@@ -65,16 +65,16 @@ class TensionMethod:
 
     @property
     def alone(self) -> TensionMethod:
-        """The method for a pose without a previous pose; methods without memory do not change."""
+        """This method for a pose without a previous pose; only `Closest` changes."""
         return self
 
     @property
     def parameter(self) -> float:
-        """The numerical parameter of some methods: an exponent, or the code of an optimum."""
+        """Numerical parameter of some methods: an exponent, or the code of an optimum."""
         return 0.0
 
     def preference(self, cables: int) -> Array:
-        """Root weights and targets of the cables in the form for kernels.
+        """Root weights and targets of the cables, for kernels.
 
         Args:
             cables: Number of cables m.
@@ -93,7 +93,7 @@ class TensionMethod:
 
     @property
     def validity(self) -> float:
-        """T_adj in the form for kernels: NaN for None."""
+        """T_adj for kernels: NaN for None."""
         return float("nan") if self.lowest_point_margin is None else float(self.lowest_point_margin)
 
 
@@ -129,7 +129,7 @@ def kernel_options(robot: Robots, model: CableModel, tension: TensionMethod) -> 
     else:
         for index, one in enumerate(robot):
             check_sharing(one, tension, f"robot[{index}]")
-    # the tension of a weightless cable is the same everywhere, and linear even at zero tension
+    # the tension of a weightless cable is equal along the cable, so that the frame-end tension is the chord tension
     alike = model.weightless and tension.variable == "frame_end"
     variable = codes.CHORD_TENSION if alike else tension.variable_code
     weight, goal = (locked(row) for row in tension.preference(shared.cable_count))
@@ -141,7 +141,7 @@ def kernel_options(robot: Robots, model: CableModel, tension: TensionMethod) -> 
 
 
 def takes_default_kernel(tension: TensionMethod) -> bool:
-    """True if the method minimizes the distance to a reference in a linear variable; its kernel is compiled first."""
+    """True if the method minimizes the distance to a reference in a linear variable, which uses a shorter kernel."""
     return tension.code <= codes.QUADRATIC_PROGRAM and tension.variable_code != codes.FRAME_END_TENSION
 
 
@@ -151,7 +151,7 @@ def check_sharing(robot: Robot, tension: TensionMethod, name: str | None = None)
     called = name or robot.name
     item = f"{called}: number of cables"
     if m < n:
-        step = "Add cables, or choose a motion pattern with fewer freedoms."
+        step = "Add cables, or choose a motion pattern with fewer degrees of freedom."
         raise InvalidValueError(item, m, f">= {n} for {robot.motion_pattern}", step)
     method = type(tension).__name__
     most = tension.most_redundant

@@ -1,4 +1,4 @@
-"""The twelve tension distribution methods, and a table of all of them by name."""
+"""The twelve tension distribution methods, and a table of the methods by name."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from sagline.tension.method import GOAL, PREFERENCE_ROWS, ROOT_WEIGHT, TensionMe
 
 @dataclass(frozen=True, slots=True)
 class MinimumNorm(TensionMethod):
-    """The feasible tensions with the smallest Euclidean norm: the projection of 0 onto the feasible set.
+    """Feasible tensions with the smallest Euclidean norm: the projection of 0 onto the feasible set.
 
-    The result depends only on the pose. A closed path therefore ends with the initial tensions. Cables that are not
-    needed are at their lower limits. Choose this method for repeated motions and for low tensions in general.
+    The result depends only on the pose. A closed path therefore ends with the initial tensions. Unneeded cables are at
+    their lower limits. Choose this method for repeated motions, and for low tensions in general.
 
     Source:
         Gia Luan & Truong Thinh 2020, (53); docs/model.md, section 5.
@@ -32,10 +32,10 @@ class MinimumNorm(TensionMethod):
 
 @dataclass(frozen=True, slots=True)
 class Closest(TensionMethod):
-    """The article's choice (55): the tensions nearest to the previous ones, by projection onto the feasible polygon.
+    """Tensions nearest to the previous tensions, by projection onto the feasible set: (55) of the article.
 
-    Tensions change smoothly along a path but depend on it. The first pose takes the minimum norm. After a gap of
-    infeasible poses, the last feasible tensions are the reference. In a batch of poses, each pose is solved
+    The tensions change smoothly along a path, but depend on the path. The first pose has the minimum norm. After a gap
+    of infeasible poses, the last feasible tensions are the reference. In a batch of poses, each pose is solved
     independently. Choose this method for the smoothest tensions along one path.
 
     Source:
@@ -46,7 +46,7 @@ class Closest(TensionMethod):
 
     @property
     def alone(self) -> TensionMethod:
-        """The minimum norm: there is no previous tension set."""
+        """Minimum norm, because previous tensions do not exist."""
         return MinimumNorm(self.variable, self.lowest_point_margin)
 
 
@@ -54,9 +54,9 @@ class Closest(TensionMethod):
 class QuadraticProgram(TensionMethod):
     """The feasible tensions with the smallest weighted sum of squared distances to targets.
 
-    For tensions scaled by the root weights, this is a projection onto the feasible set. It is exact, continuous, and
-    without iterations for up to two redundant cables. Choose this method to keep a pretension, or to reduce the load of
-    some cables.
+    For tensions times the root weights, the method is a projection onto the feasible set. It is exact and continuous.
+    For up to two redundant cables it needs no iterations. Choose this method to keep a pretension, or to reduce the
+    load of some cables.
 
     Attributes:
         weights: Weight of each cable, > 0, shape () or (m,).
@@ -108,10 +108,10 @@ class QuadraticProgram(TensionMethod):
 class LowestSum(TensionMethod):
     """The feasible tensions with the smallest 1-norm: a corner of the feasible set.
 
-    The method minimizes the total motor torque. At least as many cables as the redundancy are at their limits. The
+    The method minimizes the total motor torque. The number of cables at their limits is at least the redundancy. The
     tensions are not continuous: along a path the optimum can jump to another corner. If all points of a side are
-    optimal, the one with the smallest norm is taken (for more than two redundant cables, one of its corners). Choose
-    this method for static loads.
+    optimal, the point with the smallest norm is selected (a corner, for more than two redundant cables). Choose this
+    method for static loads.
 
     Source:
         Borgstrom, Jordan, Sukhatme, Batalin & Kaiser 2009, "Rapid computation of optimally safe tension
@@ -124,11 +124,10 @@ class LowestSum(TensionMethod):
 
 @dataclass(frozen=True, slots=True)
 class LowestMaximum(TensionMethod):
-    """The feasible tensions with the smallest infinity-norm; if not unique, those with the smallest Euclidean norm.
+    """Feasible tensions with the smallest infinity-norm; if not unique, with the smallest Euclidean norm among these.
 
-    The method minimizes the largest cable load, and thus the required size of the winches. The largest tension is
-    continuous, but the other tensions are not. Choose this method to size cables and drives. For motions take `PNorm`,
-    a smooth approximation.
+    The method minimizes the largest cable load, and thus the required size of the winches. Only the largest tension is
+    continuous. Choose this method to size cables and drives. For motions use `PNorm`, a smooth approximation.
 
     Source:
         Gosselin & Grenier 2011, "On the determination of the force distribution in overconstrained cable-driven
@@ -139,12 +138,12 @@ class LowestMaximum(TensionMethod):
     continuous: ClassVar[bool] = False
 
 
-LARGEST = 32.0  # largest exponent; with larger ones, rounding hides powers of small tensions in Newton's method
+LARGEST = 32.0  # largest exponent; above it, rounding hides the powers of small tensions in Newton's method
 
 
 @dataclass(frozen=True, slots=True)
 class PNorm(TensionMethod):
-    """The feasible tensions with the smallest p-norm, the p-th root of the sum of their p-th powers.
+    """Feasible tensions with the smallest p-norm, the p-th root of the sum of p-th powers.
 
     The tensions are continuous for every p. p = 2 is `MinimumNorm`, and large p approximates `LowestMaximum` without
     its jumps. Choose this method, with p from 4 to 8, to reduce the largest cable load of a moving platform.
@@ -164,7 +163,7 @@ class PNorm(TensionMethod):
         TensionMethod.__post_init__(self)
         p = number(self.p, "p", "", low=2.0)
         if p > LARGEST:
-            raise InvalidValueError("p", f"{p:g}", f"2 to {LARGEST:g}", "For larger p take LowestMaximum.")
+            raise InvalidValueError("p", f"{p:g}", f"2 to {LARGEST:g}", "For larger p use LowestMaximum.")
         object.__setattr__(self, "p", p)
 
     @property
@@ -178,9 +177,9 @@ class Centroid(TensionMethod):
     """The centroid (barycenter) of the feasible polygon; the center of the interval for one redundant cable.
 
     The tensions are continuous and far from all limits, so that slackness and overload are unlikely. They are higher
-    than necessary. The result is the same in every variable. For more than two redundant cables take `AnalyticCenter`.
-    Choose this method for a stiff, robust setup without regard to energy. A pose with an unbounded set does not have a
-    centroid and gets the status UNBOUNDED.
+    than necessary. The result is the same in every variable. For more than two redundant cables use `AnalyticCenter`.
+    Choose this method for a stiff, robust setup if energy is unimportant. If the feasible set is unbounded, it has no
+    centroid, and the pose gets the status UNBOUNDED.
 
     Source:
         Mikelsons, Bruckmann, Hiller & Schramm 2008, "A real-time capable force calculation algorithm for redundant
@@ -195,10 +194,11 @@ class Centroid(TensionMethod):
 class AnalyticCenter(TensionMethod):
     """The feasible tensions with the largest product of distances to all limits.
 
-    The tensions are smooth wherever the feasible set has an interior, because no limit ever becomes active. Near the
-    border of the workspace, the set shrinks to a point, and the result converges to it. The method supports any number
-    of redundant cables, and the result is the same in every variable. Choose this method for controllers that require
-    differentiable tensions. A pose with an unbounded set does not have a center and gets the status UNBOUNDED.
+    The tensions are smooth wherever the feasible set has an interior, because limits never become active. Near the
+    border of the workspace, the set shrinks to a point, and the tensions converge to this point. The method supports
+    any number of redundant cables. The result is the same in every variable. Choose this method for controllers that
+    require differentiable tensions. If the feasible set is unbounded, it has no center, and the pose gets the status
+    UNBOUNDED.
 
     Source:
         Di Paola, Goldsztejn, Zoso & Caro 2023, "Analytic center based tension distribution for cable-driven
@@ -225,11 +225,11 @@ class ClosedForm(TensionMethod):
 
 @dataclass(frozen=True, slots=True)
 class ImprovedClosedForm(TensionMethod):
-    """The closed form with iterations: each fixes the cable with the largest violation at its limit.
+    """Closed form with iterations; each iteration fixes the cable with the largest violation at its limit.
 
-    The number of iterations is at most the number of redundant cables. Nearly all feasible poses get a result; the
-    others have the status NOT_COVERED. The tensions are continuous except when the fixed cable changes. Choose this
-    method if ClosedForm fails too early.
+    The number of iterations is at most the number of redundant cables. Nearly all feasible poses get a result. The
+    other feasible poses get the status NOT_COVERED. The tensions are continuous except where the fixed cable changes.
+    Choose this method if ClosedForm fails too early.
 
     Source:
         Pott 2014, "An improved force distribution algorithm for over-constrained cable-driven parallel robots".
@@ -244,8 +244,8 @@ class ImprovedClosedForm(TensionMethod):
 class Puncture(TensionMethod):
     """First point within the limits on the line from the minimum-norm solution to the (improved) closed form.
 
-    The method gives low tensions in the computing time of a closed form, for the same poses as `ImprovedClosedForm`.
-    Rare feasible poses therefore get no result and the status NOT_COVERED: 2 of 1,200 in a test with ipanema-3. Choose
+    The method gives low tensions in the computing time of a closed form. It solves the same poses as
+    `ImprovedClosedForm`: a few feasible poses get the status NOT_COVERED, 2 of 1,200 in a test with ipanema-3. Choose
     this method for low tensions on hardware that is too slow for a polygon.
 
     Source:
@@ -263,10 +263,10 @@ _OPTIMA = {"1-norm": WALK_SUM, "2-norm": WALK_NORM, "centroid": WALK_CENTROID}
 
 @dataclass(frozen=True, slots=True)
 class PolygonWalk(TensionMethod):
-    """The algorithm for n + 2 cables: a walk around the feasible polygon to its best point.
+    """Algorithm for n + 2 cables: a walk around the feasible polygon to its best point.
 
-    Its results equal those of `LowestSum`, `MinimumNorm` and `Centroid`, which are faster because they clip the polygon
-    instead. Choose this method for comparison with the published algorithm.
+    The results are equal to the results of `LowestSum`, `MinimumNorm` and `Centroid`. These methods clip the polygon,
+    which is faster. Choose this method for comparison with the published algorithm.
 
     Attributes:
         optimum: "1-norm", "2-norm" (default) or "centroid".

@@ -1,4 +1,4 @@
-"""The feasible tensions of one pose for plotting: a polygon in the null space, for up to two redundant cables."""
+"""Feasible tensions of one pose, for plots: a polygon in the null space, for up to two redundant cables."""
 
 from __future__ import annotations
 
@@ -26,26 +26,25 @@ class Side(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TensionPolygon(Result):
-    """All tensions within their limits that balance one pose: tensions = origin + lambda basis.
+    """All tensions within their limits that balance one pose: origin + lambda basis, with lambda in the polygon.
 
-    For sagging cables the balance depends on the tensions. The polygon is then that of the last linearization, with the
-    sag forces T_z - tau sin phi at the minimum-norm tensions (docs/model.md, section 5).
+    For sagging cables the balance depends on the tensions. The polygon then uses the sag forces T_z - tau sin phi at
+    the minimum-norm tensions (docs/model.md, section 5).
 
     Attributes:
-        vertices: The article's Omega_lambda: corners, counter-clockwise, in coordinates of the null space [N], shape
-            (h, 2). For one redundant cable, these are the ends of an interval, possibly infinite, shape (2, 1). Without
-            redundant cables, this is one point without coordinates, shape (1, 0). If no tensions are feasible, the
-            shape is (0, r).
-        tensions: The article's Omega_t: tensions at the vertices [N], in the tension variable, shape (h, m).
-        sides: The limit of each side, from vertex k to vertex k + 1 (at vertex k for an interval); None for a side at
-            which the polygon is unbounded. The vertices at both ends of such a side represent infinity.
+        vertices: Corners, counter-clockwise, in coordinates of the null space [N], shape (h, 2); Omega_lambda of the
+            article. For one redundant cable, the ends of an interval, possibly infinite, shape (2, 1). Without
+            redundant cables, one point without coordinates, shape (1, 0). If no tensions are feasible, the shape is (0,
+            r).
+        tensions: Tensions at the vertices [N], in the tension variable, shape (h, m); Omega_t of the article.
+        sides: The limit of side k, which connects vertices k and k + 1 (for an interval, the limit at vertex k). None
+            for a side at infinity, where the polygon is unbounded; the vertices of this side represent infinity.
         bounded: True if every side is a limit.
         basis: Orthonormal basis of the null space, shape (r, m).
         origin: The minimum-norm tensions that balance the wrench, without limits [N], shape (m,).
-        scale: Factor of the tension variable, which is scale times chord tension plus offset, shape (m,). It is 1 for
-            the chord tension, cos phi for the horizontal tension, and the derivative of the frame-end tension for this
-            tension.
-        offset: Zero except for the frame-end tension [N], shape (m,).
+        scale: Factor in: tension variable = scale * chord tension + offset, shape (m,). It is 1 for the chord tension,
+            cos phi for the horizontal tension, and the derivative by the chord tension for the frame-end tension.
+        offset: Offset in this equation [N], shape (m,); zero except for the frame-end tension.
     """
 
     vertices: Array
@@ -58,7 +57,7 @@ class TensionPolygon(Result):
     offset: Array
 
     def coordinates(self, chord_tension: ArrayLike) -> Array:
-        """Coordinates in the polygon of given tensions at this pose.
+        """Coordinates of given tensions in the polygon.
 
         Args:
             chord_tension: Chord tensions that balance the pose [N], shape (..., m), as in `Plan.chord_tension`.

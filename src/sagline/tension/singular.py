@@ -1,4 +1,4 @@
-"""Singular poses: the unconstrained motion of the platform."""
+"""Unconstrained motion of the platform at a singular pose."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from sagline.statics.balance import structure_matrix
 
 
 class UnresistedMotion(NamedTuple):
-    """The motion that the cables of a pose constrain least.
+    """The platform motion that the cables constrain least.
 
     Attributes:
         twist: Velocity of the center of mass and angular velocity, world axes, shape (6,). Its angular part has length
             1; if the platform does not rotate, its linear part has length 1.
-        resistance: Largest rate of a cable's length in this motion, relative to the rate in the most constrained
-            motion. At a singular pose it is 0, except for rounding.
+        resistance: Largest rate of a cable length in this motion, relative to the most constrained motion; 0 at a
+            singular pose, except for rounding.
         text: Description of the motion.
     """
 
@@ -30,7 +30,7 @@ class UnresistedMotion(NamedTuple):
 
 
 def unresisted_motion(robot: Robot, pose: PoseLike) -> UnresistedMotion:
-    """The motion of the platform that changes the cable lengths least (not at all at a singular pose).
+    """Motion of the platform with the smallest change of the cable lengths. At a singular pose this change is zero.
 
     Args:
         robot: The robot.
