@@ -270,7 +270,7 @@ def test_guides_that_nothing_passes_are_refused_by_name() -> None:
 @pytest.mark.parametrize(
     ("winding", "parts"),
     [
-        (0.5 * np.ones(8), ("winding[0]", "0.5", "1 winding in, -1 paying out, or 0 standing")),
+        (0.5 * np.ones(8), ("winding[0]", "0.5", "1 winding in, -1 paying out, or 0 at rest")),
         ([1, 1, 1, 2, 1, 1, 1, 1], ("winding[3]", "2")),
         (np.ones(7), ("winding", "of shape (7,)", "shape (8,) or (2, 8)")),
         (np.ones((3, 8)), ("winding", "of shape (3, 8)")),

@@ -1,4 +1,4 @@
-"""Inverse kinematics (motion to tensions and lengths) and forward kinematics (lengths to poses)."""
+"""Inverse kinematics: tensions and lengths from a motion. Forward kinematics: poses from lengths."""
 
 from sagline.core.surface import group
 

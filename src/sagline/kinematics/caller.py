@@ -1,4 +1,4 @@
-"""Fast copies of a control loop's numbers into and out of work arrays, checked within tens of nanoseconds.
+"""Fast copies between the arrays of a control loop and work arrays, with checks that take tens of nanoseconds.
 
 A memoryview accepts only an array of its own type and size, and this check is faster than a numpy copy.
 """
@@ -32,7 +32,7 @@ def copy_in(memory: Any, given: Any, item: str, unit: str) -> None:
             memory[WHOLE] = array("d", given)
             return
     except (TypeError, ValueError, NotImplementedError, OverflowError):
-        pass  # other type or shape: integers and similar are converted, all others are refused with a reason
+        pass  # other type or shape: integers and similar types are converted; any other type is refused with a reason
     memory[WHOLE] = exactly(given, item, unit, (len(memory),))
 
 

@@ -27,11 +27,11 @@ BLOCK = 1 << 14  # poses per block, to limit memory
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Confirmation(Result):
-    """A plan, and the exact equilibrium at its lengths.
+    """A plan, and the exact equilibria at its lengths.
 
     Attributes:
         plan: The plan, of any cable model.
-        pose: Equilibrium with catenary cables of the planned lengths; NaN if the plan has no solution.
+        pose: Equilibrium pose with catenary cables of the planned lengths; NaN if the plan has no solution.
         status: Codes of `ForwardStatus`, shape () or (N,).
         wrench_residual: Norms of the unbalanced force [N] and moment [N m] at this pose, shape (2,) or (N, 2).
     """
@@ -53,10 +53,9 @@ class Confirmation(Result):
 
     @property
     def rotation_error(self) -> Array:
-        """Angle between the platform's orientation and the planned one [rad], shape () or (N,)."""
+        """Angle between equilibrium orientation and planned orientation [rad], shape () or (N,)."""
         planned, real = self.plan.state.pose.quaternion, self.pose.quaternion
-        # The angle is computed from sine and cosine of half the angle, which is precise for very small angles, unlike
-        # the cosine alone.
+        # Sine and cosine of half the angle give a precise angle even if it is very small. The cosine alone would not.
         sine = 0.5 * np.linalg.norm(real - planned, axis=-1) * np.linalg.norm(real + planned, axis=-1)
         cosine = np.abs(np.einsum("...i,...i->...", real, planned))
         return locked(np.asarray(2.0 * np.arctan2(sine, cosine)))
@@ -65,11 +64,11 @@ class Confirmation(Result):
 def confirm(plan: Plan, *, progress: Progress | None = None) -> Confirmation:
     """Equilibrium of the platform with catenary cables of the planned lengths.
 
-    Inertia and external wrench are those of the plan; the search starts at the planned poses.
+    Inertia and external wrench are taken from the plan. The search starts at the planned poses.
 
     Args:
-        plan: A plan of any cable model. The pose errors are caused by this model; with the exact model they are only
-            rounding errors.
+        plan: A plan of any cable model. The cable model of the plan causes the pose errors; with the exact model they
+            are only rounding errors.
         progress: Called about every tenth of a second: number of confirmed poses, total number.
 
     Returns:
@@ -102,7 +101,7 @@ def confirm(plan: Plan, *, progress: Progress | None = None) -> Confirmation:
 
 
 def _forward(state: Equilibrium, progress: Progress | None) -> ForwardSolution:
-    """Forward kinematics of the lengths of a state, with its friction."""
+    """Forward kinematics with lengths and friction of a state."""
     robot, winding = state.robot, None if state.contact is None else state.contact.winding
     if not differs(robot, winding):
         return forward(robot, state.unstrained_length, state.pose, wrench=state.wrench, progress=progress)
@@ -114,5 +113,5 @@ def _forward(state: Equilibrium, progress: Progress | None) -> ForwardSolution:
 
 
 def _from(first: int, count: int, progress: Progress) -> Progress:
-    """Progress callback for a part that starts at a given pose, relative to all poses."""
+    """Progress callback for a part of the poses; it adds the number of poses before the part."""
     return lambda done, _: progress(first + done, count)

@@ -25,7 +25,7 @@ from sagline.robot.routing import differs, with_routing
 from sagline.statics.balance import external_wrench
 
 START_BYTES = 250.0  # memory per cable and start during the solution
-_SAME = 1e-6  # poses with a smaller distance, relative to the mean length and in radians, are the same
+_SAME = 1e-6  # largest distance of equal poses, relative to the mean length and in radians
 _KEPT = (*STABLE, ForwardStatus.FITTED)
 _CATENARY = Catenary()
 
@@ -36,9 +36,8 @@ class Equilibria(Result):
 
     Attributes:
         solutions: The equilibria, a batch of K.
-        reached: Number of starts that ended in each equilibrium, shape (K,); this measures start orientations, not
-            probabilities.
-        starts: Number of starts; the remaining starts ended at an unstable equilibrium or did not converge.
+        reached: Number of starts that ended in each equilibrium, shape (K,). It is not a probability.
+        starts: Number of all starts. Some starts may end at an unstable equilibrium or may not converge.
     """
 
     solutions: ForwardSolution
@@ -46,7 +45,7 @@ class Equilibria(Result):
     starts: int
 
     def __len__(self) -> int:
-        """K, the number of equilibria."""
+        """Number K of equilibria."""
         return len(self.reached)
 
 
@@ -60,16 +59,16 @@ def equilibria(
 ) -> Equilibria:
     """Stable equilibria of a robot at given lengths, found by a search over orientations.
 
-    For a fixed orientation the energy is convex in the position. Therefore only orientations are searched. Starts are
-    uniformly random over all orientations; each start is at the unique equilibrium position for its orientation. A
-    robot without rotations has exactly one equilibrium. For other robots the list can be incomplete, because an
-    equilibrium that no start reaches is missing.
+    For a fixed orientation the energy is convex in the position. Therefore only orientations are searched. The
+    orientations of the starts are uniformly random. The position of a start is the only equilibrium position for its
+    orientation. A robot without rotations has exactly one equilibrium. For other robots the list can be incomplete,
+    because no start may reach an equilibrium.
 
     Args:
         robot: The robot, with m cables.
         unstrained_length: L [m], > 0, shape (m,).
-        model: Cable model. The shallow models do not have an energy, and their equilibria are sorted by the number of
-            starts. For straight cables, the results are local least-squares fits, sorted by misfit.
+        model: Cable model. The shallow models have no energy; their equilibria are sorted by the number of starts. For
+            straight cables, the results are local least-squares fits, sorted by misfit.
         wrench: External plus inertial wrench about the center of mass, world axes [N, N m], shape (6,); None for zero.
         starts: Number of initial orientations, >= 1.
         seed: Seed of the random orientations.
@@ -98,7 +97,7 @@ def equilibria(
             "unstrained_length", f"of shape {lengths.shape}", f"({robot.cable_count},), no NaN", "Give one sample."
         )
     starts, seed = whole_number(starts, "starts", 1), whole_number(seed, "seed", 0)
-    check_memory("starts", START_BYTES * starts * robot.cable_count, "Ask for fewer starts.")
+    check_memory("starts", START_BYTES * starts * robot.cable_count, "Choose fewer starts.")
     load = external_wrench(wrench, None)
     quaternions = _quaternions(robot, starts, seed)
     samples = locked(np.repeat(lengths[None], len(quaternions), axis=0))
@@ -113,7 +112,7 @@ def equilibria(
 
 
 def _quaternions(robot: Robot, count: int, seed: int) -> Array:
-    """Level and tilted starts first, then uniformly random orientations within the free rotations, (K, 4)."""
+    """Start orientations (K, 4): first level and tilted, then uniformly random within the free rotations."""
     known = start_quaternions(robot)
     if robot.motion_pattern not in ROTATING or count <= len(known):
         return known[:count]
@@ -129,7 +128,7 @@ def _quaternions(robot: Robot, count: int, seed: int) -> Array:
 
 
 def _distinct(found: ForwardRows, length: float) -> tuple[Indices, Indices]:
-    """One index per distinct stable equilibrium, lowest energy first, and number of starts that reached it."""
+    """One index per stable equilibrium, in order of energy, and number of starts that reached this equilibrium."""
     kept = np.flatnonzero(np.isin(found.pose_status, _KEPT))
     chosen: list[int] = []
     counts: list[int] = []

@@ -1,4 +1,4 @@
-"""Forward kinematics: from unstrained lengths to the equilibrium pose, with or without an initial pose."""
+"""Forward kinematics: equilibrium pose from unstrained lengths, with or without an initial pose."""
 
 from __future__ import annotations
 
@@ -40,21 +40,21 @@ from sagline.robot.routing import differs, with_routing
 from sagline.statics.balance import external_wrench
 from sagline.statics.tables import pose_rows
 
-_TILTS = (25.0, 60.0)  # tilts that are tried if the level start fails [degree]
+_TILTS = (25.0, 60.0)  # tilts of further starts if the level start fails [degree]
 DEPTH = 0.1  # depth of the first position below the center, relative to the mean length
-_LIMIT_SLACK = 0.01  # a measured tension may be outside its limits by this share
-_POOR = np.array([0, 1, 2, 3, 4, 5, 6, 0])  # rank of each status; a fitted sample has the rank of a solved one
+_LIMIT_SLACK = 0.01  # largest relative excess of a tension that counts as within its limits
+_POOR = np.array([0, 1, 2, 3, 4, 5, 6, 0])  # rank of each status; FITTED has the rank of SOLVED
 
 
 def search(
     robot: Robots, model: CableModel, lengths: Array, wrenches: Array, progress: Progress | None = None
 ) -> ForwardRows:
-    """Forward kinematics without initial poses; each sample has an independent search.
+    """Forward kinematics without initial poses; every sample is searched independently.
 
-    With fixed orientation the platform has a single equilibrium, because the energy is convex in the position. This
-    equilibrium is found from any start. The search over all motions then starts from it. The first start orientation is
-    level. Samples without a stable equilibrium within the tension limits are repeated from tilted starts. The best
-    result is kept. It has the better status, then fewer cables outside their limits, then the lower energy.
+    With a fixed orientation the platform has a single equilibrium, because the energy is convex in the position. Any
+    start leads to this equilibrium. The search over all motions then starts there. The first start orientation is
+    level. Without a stable equilibrium within the tension limits, a sample is repeated from tilted starts. The best
+    result is kept: first by status, then by the number of cables outside their limits, then by energy.
 
     lengths: unstrained lengths (N, m), rows of NaN are skipped; wrenches: external plus inertial (1 or N, 6); progress:
     called after each block with the number of finished samples and the total number.
@@ -88,7 +88,7 @@ def _search_block(robot: Robots, model: CableModel, lengths: Array, wrenches: Ar
 def from_orientations(
     robot: Robots, model: CableModel, lengths: Array, wrenches: Array, quaternion: Array
 ) -> ForwardRows:
-    """Solve from the middle of the frame: first the position alone, then all motions.
+    """Solve from the middle of the frame: first only the position, then all motions.
 
     lengths: unstrained lengths (N, m); wrenches: external plus inertial (1 or N, 6); quaternion: initial orientation
     (x, y, z, w), shape (4,), or one per sample (N, 4).
@@ -106,7 +106,7 @@ def from_orientations(
 def starting_positions(robot: Robots, lengths: Array, quaternion: Array) -> Array:
     """Positions slightly below the center of the frame ends, within the free motions of the platform.
 
-    The center itself is not suitable, because the two ends of a single cable must not coincide.
+    The center is not suitable: the two ends of a single cable would coincide.
 
     lengths: unstrained lengths (N, m); quaternion: orientation of the platform, shape (4,) or (N, 4). Returns positions
     of the platform origin [m], shape (N, 3).
@@ -145,9 +145,9 @@ def start_quaternions(robot: Robot) -> Array:
 
 
 def outside_limits(robot: Robots, model: CableModel, found: ForwardRows) -> Indices:
-    """Number of cables per sample outside the tension limits of the robot.
+    """Number of cables outside the tension limits of the robot, for each sample.
 
-    Returns counts (N,); 0 for straight cables, whose tensions are not known.
+    Returns counts (N,); 0 for straight cables, whose tensions are unknown.
     """
     limits = limits_of(robot)
     cables, contact = cables_of_results(robot, model, found.results, found.cable_status, found.pose_status.shape)
@@ -188,26 +188,27 @@ def forward(
     winding: ArrayLike | None = None,
     progress: Progress | None = None,
 ) -> ForwardSolution:
-    """The equilibrium pose of the platform on cables of given unstrained lengths.
+    """Equilibrium pose of the platform on cables of given unstrained lengths.
 
     Args:
         robot: The robot, with m cables; or a sequence of N robots, one per sample. The robots must have the same number
-            of cables, motion pattern with plane, type of tension limits and gravity; all other data may differ.
+            of cables, motion pattern, plane normal, type of tension limits and gravity; all other data may differ.
         unstrained_length: L [m], > 0, shape (m,) for one sample or (N, m). A row of NaN, as in a plan at an infeasible
             pose, gets the status NO_LENGTHS.
         start: Initial pose. With a batch of N poses, each sample has its own start. With a single pose and N samples,
-            the samples are a trajectory: the first sample starts at this pose, and each following one at the previous
-            result. With None, every sample is searched independently from the level platform. Of several equilibria,
-            the first one found within the tension limits of the robot is taken (see `equilibria` for the others).
+            the samples are a trajectory: the first sample starts at this pose, and each following sample at the
+            previous result. With None, every sample is searched independently from the level platform. If several
+            equilibria exist, the result is the first one within the tension limits of the robot (`equilibria` finds
+            others).
         model: Cable model; the default is exact.
         wrench: External plus inertial wrench on the platform about its center of mass in world axes, without gravity:
             force [N], then moment [N m], shape (6,) or (N, 6). None for zero.
-        tension_measured: Load cell data. Lengths are then treated as measured too. Lengths and tensions are corrected
-            within their deviations so that they fit each other, and the result has the covariance of the pose.
+        tension_measured: Load cell data. Lengths then also count as measured. Lengths and tensions are corrected within
+            their deviations until they agree, and the result has the covariance of the pose.
         winding: Last direction of the drums, for the friction of pulleys and guides: +1 winding in, -1 paying out, 0 at
-            rest, shape (m,) or (N, m). None: no friction. Friction and guides change the lengths by iteration; with
-            load cells, this change is computed once, at the measured lengths. With high friction and soft cables,
-            several nearby poses can be equilibria.
+            rest, shape (m,) or (N, m). None: no friction. An iteration computes the change of the lengths due to
+            friction and guides. With load cells, this change is computed only once, at the measured lengths. With high
+            friction and soft cables, several nearby poses can be equilibria.
         progress: Called about every tenth of a second: number of solved samples, total number.
 
     Returns:
@@ -260,7 +261,7 @@ def forward(
 
 
 def checked_lengths(robot: Robots, lengths: ArrayLike) -> Array:
-    """The caller's lengths, shape (m,) or (N, m), positive and longer than the dead length, or whole rows of NaN.
+    """Lengths of a caller, shape (m,) or (N, m), positive and longer than the dead length, or whole rows of NaN.
 
     robot: gives number of cables, dead length, and name for messages; or one robot per sample; lengths: the caller's
     lengths [m]. Returns write-locked array of shape (m,) or (N, m).
@@ -286,7 +287,7 @@ def checked_lengths(robot: Robots, lengths: ArrayLike) -> Array:
             "> 0 m, finite; or NaN for all cables of a sample",
             "Correct the length of this cable.",
         )
-    fitting = dead.shape[:-1] in ((), array.shape[:-1])  # other numbers of lengths are refused later
+    fitting = dead.shape[:-1] in ((), array.shape[:-1])  # a wrong number of lengths is refused later
     if fitting and ((array <= dead) & (dead > 0.0)).any():
         raise dead_only(array, np.broadcast_to(dead, array.shape))
     return locked(array)
@@ -296,7 +297,7 @@ def dead_only(lengths: Array, dead: Array) -> InvalidValueError:
     """Error for a length that is not longer than the dead length.
 
     lengths: unstrained lengths [m], shape (m,) or (N, m); dead: dead length [m], of the same shape; at least one length
-    does not exceed it. Returns the error, to be raised: it names the cable and, in a batch, the sample.
+    does not exceed it. Returns the error, to be raised. It names the cable and, in a batch, the sample.
     """
     index = tuple(int(i) for i in np.argwhere((lengths <= dead) & (dead > 0.0))[0])
     sample = f"sample {index[0]}, " if lengths.ndim == 2 else ""
@@ -304,7 +305,7 @@ def dead_only(lengths: Array, dead: Array) -> InvalidValueError:
         f"{sample}cable {index[-1]}: unstrained length",
         f"{lengths[index]:.9g} m",
         f"> {dead[index]:.9g} m, the dead length behind its pulley",
-        "Give all cable off the drum, or correct its dead_cable.",
+        "Give the length of all cable off the drum, or correct dead_cable.",
     )
 
 

@@ -1,4 +1,4 @@
-"""Forward kinematics in rows: arguments and results of the kernels, and the solution of a batch."""
+"""Forward kinematics as arrays: arguments and results of the kernels, and the solution of a batch."""
 
 from __future__ import annotations
 
@@ -36,16 +36,16 @@ from sagline.statics.tables import body_table, cable_table
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ForwardSolution(Result):
-    """Result of `forward`: a single sample, or N of them with a leading axis.
+    """Result of `forward`, single or with a leading axis N.
 
     Attributes:
         state: Robot, poses, wrench and cables in equilibrium; NaN if the lengths are NaN.
         status: Codes of `ForwardStatus`, shape () or (N,).
         stiffness_min: Smallest stiffness of the platform against its free motions [N/m], shape () or (N,). A rotation
             is measured by its arc length at the root mean square distance of the platform ends from the center of mass.
-        energy: Potential energy of cables, weight and given force [J], shape () or (N,); the heights of frame ends and
-            world origin are the zero levels. It is NaN for the shallow models, which do not have an energy. For
-            straight cables, it is their objective, half the sum of squared length errors [m^2].
+        energy: Potential energy of cables, weight and given force [J], shape () or (N,). Heights of cables count from
+            the frame ends; all other heights count from the world origin. NaN for the shallow models, which have no
+            energy. For straight cables, the objective of the fit: half the sum of squared length errors [m^2].
         wrench_residual: Norms of the unbalanced force [N] and moment [N m] in the platform's free motions,
             shape (2,) or (N, 2).
         iterations: Number of Newton steps, shape () or (N,).
@@ -68,17 +68,17 @@ class ForwardSolution(Result):
 
     @property
     def solved(self) -> Flags:
-        """True if each sample is a stable equilibrium in which the cables hold the platform, shape () or (N,)."""
+        """True for a stable equilibrium in which the cables hold the platform, shape () or (N,)."""
         return np.asarray(self.status == ForwardStatus.SOLVED)
 
     @property
     def stable(self) -> Flags:
-        """True if each sample is a stable equilibrium, fully constrained by the cables or not, shape () or (N,)."""
+        """True for any stable equilibrium, even if the cables do not fully constrain the platform, shape () or (N,)."""
         return np.isin(self.status, STABLE)
 
     @property
     def slack(self) -> Flags:
-        """True for slack cables, shape (m,) or (N, m): tau at most half the weight of a cable of chord length.
+        """True for slack cables, shape (m,) or (N, m): tau is at most half the weight of a cable of chord length.
 
         Such a cable sags by a quarter of its chord or more. A weightless cable is slack if its tension is zero.
         """
@@ -100,7 +100,7 @@ class ForwardRows(NamedTuple):
     pose_status: Codes
 
     def keep(self, samples: Indices | slice, other: ForwardRows, which: Indices | slice = slice(None)) -> None:
-        """Replace the results of some samples (k,) by those of some samples (k,) of another batch."""
+        """Replace the results of some samples (k,) by results of another batch (k,)."""
         self.poses[samples] = other.poses[which]
         self.results[:, samples] = other.results[:, which]
         self.cable_status[samples] = other.cable_status[which]
@@ -118,19 +118,19 @@ class ForwardRows(NamedTuple):
         )
 
     def last_pose(self, before: Array) -> Array:
-        """The last pose row found, (1, POSE_COLUMNS); the given previous row if none was found."""
+        """Last pose row with a result, (1, POSE_COLUMNS), or the given previous row."""
         found = ~np.isin(self.pose_status, (codes.FORWARD_NOT_CONVERGED, codes.FORWARD_NO_LENGTHS))
         which = np.flatnonzero(found)[-1:]
         return locked(self.poses[which]) if which.size else before
 
     @property
     def arrays(self) -> SolutionArrays:
-        """Plain tuple of the arrays: kernels accept it fastest."""
+        """Plain tuple of the arrays, which kernels accept fastest."""
         return self.poses, self.results, self.cable_status, self.numbers, self.pose_status
 
     @classmethod
     def empty(cls, count: int, cables: int, behind: bool | None) -> ForwardRows:
-        """Arrays for a batch, to be filled; behind: True with pulleys or dead lengths."""
+        """Empty arrays for a batch; behind: True with pulleys or dead lengths."""
         return cls(
             np.empty((count, tables.POSE_COLUMNS)),
             np.empty((tables.RESULT_ROWS if behind else tables.BARE_ROWS, count, cables)),
@@ -141,7 +141,7 @@ class ForwardRows(NamedTuple):
 
     @property
     def stable(self) -> Flags:
-        """True if each sample is a stable equilibrium, (N,)."""
+        """True for samples in stable equilibrium, (N,)."""
         return np.isin(self.pose_status, STABLE)
 
     def solution(
@@ -152,7 +152,7 @@ class ForwardRows(NamedTuple):
         shape: tuple[int, ...],
         covariance: Array | None = None,
     ) -> ForwardSolution:
-        """The batch in the caller's shape, () or (N,).
+        """Result of `forward` in the shape of the arguments, () or (N,).
 
         load: external plus inertial wrench, shape (6,) or (N, 6); shape: () for a single sample, (N,) for a batch;
         covariance: of the poses, shape (N, 6, 6), or None.
@@ -187,7 +187,8 @@ def solve_forward_rows(
 
     lengths: unstrained lengths (N, m); starts: pose rows (1 or N, POSE_COLUMNS); wrenches: external plus inertial (1 or
     N, 6); chained: True if each sample starts at the result of the previous one; freedom: free motions (n, 6); None for
-    those of the robot; progress: called after each block with the number of finished samples and the total number.
+    the free motions of the robot; progress: called after each block with the number of finished samples and the total
+    number.
     """
     count, m = lengths.shape
     allowed = first_of(robot).freedom if freedom is None else freedom
@@ -209,7 +210,7 @@ def solve_forward_rows(
 
 
 def new_chain(cables: int, freedoms: int) -> LastEquilibriumArrays:
-    """Initial memory of a chain of samples: NaN."""
+    """Memory of a chain of samples at its start: NaN."""
     return (
         np.full((CABLE_ROWS, cables), np.nan),
         np.full((freedoms, freedoms), np.nan),

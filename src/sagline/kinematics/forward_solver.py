@@ -1,4 +1,4 @@
-"""Forward kinematics one sample at a time, for a control loop."""
+"""Forward kinematics of single samples, for a control loop."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from sagline.statics.tables import body_table, cable_table, pose_rows
 
 
 class ForwardStep(NamedTuple):
-    """Result for one sample.
+    """Result of one sample.
 
     Attributes:
         position: Position of the platform origin [m], shape (3,).
         quaternion: Rotation platform -> world, scalar last, shape (4,).
         chord_tension: tau of the cables [N], shape (m,).
-        status: Type of equilibrium, or reason of the failure.
+        status: Type of equilibrium, or reason for the failure.
         stiffness_min: Smallest stiffness [N/m], as in `ForwardSolution`.
         force_residual: Norm of the unbalanced force [N].
         moment_residual: Norm of the unbalanced moment [N m].
@@ -50,10 +50,10 @@ class ForwardStep(NamedTuple):
 
 
 class ForwardSolver:
-    """Solver for successive samples; each sample starts from the last stable equilibrium.
+    """Solver for successive samples. Each sample starts from the last stable equilibrium.
 
-    The solver owns its work arrays and stores the last equilibrium; `reset` clears it. Use one solver per control loop;
-    do not share it between threads.
+    The solver owns its work arrays. It stores the last equilibrium, which `reset` clears. Use one solver per control
+    loop, and do not share a solver between threads.
     """
 
     def __init__(self, robot: Robot, model: CableModel | str | None = None, start: PoseLike | None = None) -> None:
@@ -150,7 +150,7 @@ class ForwardSolver:
         )
 
     def _checked(self, unstrained_length: ArrayLike) -> Array:
-        """Lengths of shape (m,), positive and finite; checked as a list, which is fastest for few numbers."""
+        """Lengths of shape (m,), positive and finite; the check of a list is fastest for few numbers."""
         given, shape = unstrained_length, self._lengths.shape[1:]
         if type(given) is np.ndarray and given.dtype == np.float64 and given.shape == shape:
             values = given.tolist()
@@ -166,9 +166,9 @@ class ForwardSolver:
     def step_into(
         self, unstrained_length: Array, position: Array, quaternion: Array, wrench: Array | None = None
     ) -> ForwardStatus:
-        """Solve one sample and write the result to the caller's arrays; no allocation after the first solved pose.
+        """Solve one sample and fill given arrays, without allocation after the first solved pose.
 
-        A wrong length or wrench is reported by the status, not by an error.
+        The status reports a wrong length or wrench; no error is raised.
 
         Args:
             unstrained_length: L [m], shape (m,).

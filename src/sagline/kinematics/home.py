@@ -1,4 +1,4 @@
-"""Homing: the zeros of counts and lengths, from a pose with known tensions."""
+"""Homing: zeros of counts and lengths from a pose with known tensions."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from sagline.robot.winch import Winch
 from sagline.statics.tables import body_table, cable_table, pose_rows, refuse_missing_chords
 
 _CATENARY = Catenary()
-MISSED: Final = 1e-9  # a cable with a larger error, relative to the tension, cannot have this tension
-LARGEST_STRAIN: Final = 0.5  # a strain larger than that of any rope, which shows that a measured value has another unit
+MISSED: Final = 1e-9  # largest relative error of a tension; a cable with a larger error cannot have this tension
+LARGEST_STRAIN: Final = 0.5  # above the strain of any rope; a larger strain is due to a wrong unit of a measured value
 HALVINGS: Final = 50  # largest number of bisections for the smallest tension of a cable
 PRECISION: Final = 1e-4  # relative precision of this smallest tension
 
@@ -43,15 +43,15 @@ def home(
     Args:
         robot: A robot with winches.
         pose: Pose of the platform, a single one.
-        frame_end_tension: Load cell values at the frame ends at this pose [N], a number or shape (m,). The tension is
-            this value minus load_cell_bias, divided by load_cell_gain. The tensions need not balance the platform
-            exactly, because each cable is evaluated separately.
+        frame_end_tension: Load cell values at this pose [N], a number or shape (m,). The frame-end tension is (value -
+            load_cell_bias) / load_cell_gain. The tensions need not balance the platform exactly, because each cable is
+            evaluated separately.
         counts: Encoder counts at this pose, a number or shape (m,).
         model: Cable model; the default is exact.
         temperature: Cable temperature at this pose minus the temperature for which the lengths are valid [K].
 
     Returns:
-        The robot with `count_zero` and `length_zero` of its winches replaced.
+        The robot with new `count_zero` and `length_zero` of its winches.
 
     Raises:
         InvalidValueError: If the robot has no winches, or they have guides, the pose is a batch or has the wrong type,
@@ -74,7 +74,7 @@ def home(
     """
     winches = instance(robot, Robot, "robot").winches
     if winches is None:
-        step = "Give it winches first: robot.replace(winches=Winch(drum_radius=..., ...))."
+        step = "Add winches to the robot: robot.replace(winches=Winch(drum_radius=..., ...))."
         raise InvalidValueError("winches", "not given", "those of the robot", step)
     if winches.guides is not None:
         step = "Set length_zero to unstrained_length (1 + winding_tension/EA) of inverse(robot, pose) instead."
@@ -93,7 +93,7 @@ def home(
 
 
 def _tensions(robot: Robot, winches: Winch, reading: Array) -> Array:
-    """Tensions from load cell values; refuses tensions that a cable cannot have."""
+    """Tensions from load cell values; refuses impossible tensions."""
     bias, gain, most = winches.load_cell_bias, winches.load_cell_gain, winches.load_cell_range
     if most is not None:
         _check_readings(
@@ -101,7 +101,7 @@ def _tensions(robot: Robot, winches: Winch, reading: Array) -> Array:
         )
     tension = (reading - bias) / gain
     least = [f"> {b:g} N{', its load_cell_bias' if b else ''}" for b in bias]
-    _check_readings(~(tension > 0.0), reading, least, "A cable pulls; correct the reading.")
+    _check_readings(~(tension > 0.0), reading, least, "A cable only pulls; correct the reading.")
     strongest = LARGEST_STRAIN * robot.cables.axial_stiffness
     holds = [f"<= {r:.6g} N, where it is {LARGEST_STRAIN:.0%} longer" for r in strongest * gain + bias]
     _check_readings(tension > strongest, reading, holds, "Correct the reading, its unit, or axial_stiffness.")
@@ -140,7 +140,7 @@ def _lengths_and_reached(robot: Robot, pose: Pose, tension: Array, model: CableM
 
 
 def _least_tension(robot: Robot, pose: Pose, model: CableModel, cable: int, low: float) -> float | None:
-    """Smallest tension >= `low` that a cable can have at a pose; None if there is none."""
+    """Smallest tension >= `low` that a cable can have at a pose, or None."""
     high = LARGEST_STRAIN * float(robot.cables.axial_stiffness[cable])
 
     def can(tension: float) -> bool:
@@ -153,7 +153,7 @@ def _least_tension(robot: Robot, pose: Pose, model: CableModel, cable: int, low:
             break
         centered_positions = math.sqrt(low * high)
         low, high = (low, centered_positions) if can(centered_positions) else (centered_positions, high)
-    return high * (1.0 + PRECISION)  # rounded up, so that the number in the message, with five digits, is large enough
+    return high * (1.0 + PRECISION)  # rounded up, so that the five digits in the message are large enough
 
 
 def _check_whole(winches: Winch, length: Array) -> None:

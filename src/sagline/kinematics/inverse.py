@@ -1,4 +1,4 @@
-"""Inverse kinematics: from a motion of the platform to tensions and unstrained lengths."""
+"""Inverse kinematics: tensions and unstrained lengths from a motion of the platform."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from sagline.statics.tables import pose_rows, refuse_missing_chords, robot_terms
 from sagline.tension.method import TensionMethod, Variable, kernel_options, shared_tension
 from sagline.tension.methods import Closest, method_of
 
-STANDING: Final = 1e-7  # slower cables, relative to the fastest cable, are at rest; rates are accurate to 1e-8
+STANDING: Final = 1e-7  # relative to the fastest cable; a slower cable is at rest (rates are accurate to 1e-8)
 _CATENARY = Catenary()
 _CLOSEST = Closest()
 
@@ -55,27 +55,27 @@ def inverse(
 
     Args:
         robot: The robot, with m cables and n degrees of freedom, m >= n; or a sequence of N robots, one per pose. The
-            robots must have the same number of cables, motion pattern with plane, type of tension limits and gravity;
-            all other data may differ.
+            robots must have the same number of cables, motion pattern, plane normal, type of tension limits and
+            gravity; all other data may differ.
         motion: A path of N samples, whose inertia is included; or a pose or batch of N poses at rest.
         model: Cable model; the default is exact.
         tension: Tension distribution method. `Closest` keeps its reference only along a path; in a batch of poses, each
             pose is solved independently.
         wrench: External wrench on the platform about its center of mass in world axes, without gravity and inertia:
             force [N], then moment [N m], shape (6,) or (N, 6). None for zero.
-        previous: A plan that this one continues, from whose last feasible tensions `Closest` starts; or such tensions,
-            in the tension variable [N], shape (m,).
+        previous: Plan before this one; `Closest` starts with its last feasible tensions. Or tensions, in the tension
+            variable [N], shape (m,).
         winding: Direction of the drums, for the friction of pulleys and guides: +1 winding in, -1 paying out, 0 at
             rest, shape (m,) or (N, m); or "path": the direction of the length changes along the path without friction.
-            It affects only wrapped and dead lengths. None: no friction.
-        stability: True to check that every equilibrium is stable. False saves about a tenth of the time, and no pose
-            gets the status UNSTABLE.
+            Friction affects only wrapped and dead lengths. None: no friction.
+        stability: True to check the stability of every equilibrium. False saves about a tenth of the time; the status
+            UNSTABLE is then not used.
         progress: Called every few hundredths of a second: number of finished poses (solved, or infeasible with known
             reason), total number.
 
     Returns:
         Plan with fields of shape (m,) for a single pose, (N, m) otherwise. At a pose without a solution, feasible is
-        False, the status gives the reason, and the values are NaN. An unstable equilibrium has values, and the status
+        False, the status is the reason, and the values are NaN. An unstable equilibrium has values and the status
         UNSTABLE.
 
     Raises:
@@ -148,7 +148,7 @@ def inverse(
 
 
 def equilibrium_at(robot: Robot, pose: PoseLike) -> Equilibrium:
-    """Equilibrium at a pose, or at a batch; InvalidValueError at a single pose without one, with the shortfall."""
+    """Equilibrium at a pose, or at a batch; InvalidValueError with the shortfall at an infeasible single pose."""
     plan = inverse(robot, pose)
     if not plan.state.pose.shape and not plan.feasible:
         why, short = PoseStatus(int(plan.status)), float(plan.shortfall)
@@ -158,7 +158,7 @@ def equilibrium_at(robot: Robot, pose: PoseLike) -> Equilibrium:
 
 
 def _given_winding(winding: Winding | None, motion: Path | Pose) -> ArrayLike | None:
-    """Winding directions of the caller, checked; None if not given, or if they follow from the path."""
+    """Checked winding directions of the caller; None if not given, or if they follow from the path."""
     if not isinstance(winding, str):
         return winding
     if choice(winding, "winding", ("path",)) and isinstance(motion, Path):
@@ -168,7 +168,7 @@ def _given_winding(winding: Winding | None, motion: Path | Pose) -> ArrayLike | 
 
 
 def _with_path_friction(plan: Plan) -> Plan:
-    """The plan with friction according to the direction of its length changes."""
+    """The plan with friction in the direction of its length changes."""
     if plan.state.contact is None or plan.length_rate is None:
         return plan
     rate = np.nan_to_num(plan.length_rate)
@@ -190,7 +190,7 @@ def _in_world(components: Array, robot: Robot) -> Array:
 
 
 def _reference(robot: Robot, previous: Plan | ArrayLike | None, variable: Variable) -> Array:
-    """Initial reference tensions in the tension variable (m,): given, the last feasible ones of a plan, or NaN."""
+    """Initial reference tensions in the tension variable (m,): given, from the last feasible pose of a plan, or NaN."""
     if previous is None:
         return np.full(robot.cable_count, np.nan)
     if not isinstance(previous, Plan):
@@ -208,7 +208,7 @@ def _reference(robot: Robot, previous: Plan | ArrayLike | None, variable: Variab
 
 
 def last_tensions(plan: Plan, variable: Variable) -> Array | None:
-    """Last tensions of a plan that the distribution method computed, (m,) [N]; None if there are none."""
+    """Last tensions of a plan that the distribution method computed, (m,) [N], or None."""
     at_border = np.zeros_like(plan.feasible) if plan.at_border is None else plan.at_border
     feasible = np.flatnonzero(np.atleast_1d(plan.feasible & ~at_border))
     if not feasible.size:

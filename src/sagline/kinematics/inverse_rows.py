@@ -1,4 +1,4 @@
-"""Inverse kinematics in rows: robot, poses and wrenches in the form for kernels, and their results."""
+"""Inverse kinematics as arrays: arguments of the kernels, and their results."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from sagline.tension.method import Options, TensionMethod, takes_default_kernel
 
 UNDECIDED = (codes.POSE_INFEASIBLE, codes.POSE_NOT_CONVERGED)  # statuses of poses without a result from the iterations
 SOLVED = (codes.POSE_SOLVED, codes.UNPROVED_STABILITY)  # statuses of poses with a result
-BLOCK = 1 << 12  # poses per block of the solution, at most 0.1 s; interrupts are handled between blocks
+BLOCK = 1 << 12  # poses per block of the solution, which takes at most 0.1 s; interrupts are handled between blocks
 DECIDED = 1 << 10  # poses per block of the feasibility decision, which takes longer per pose
 
 
 class InverseRows(NamedTuple):
-    """Results of the kernel, in its order; the first axis is the N poses except in results (RESULT_ROWS, N, m)."""
+    """Results of the kernel, in its order. The first axis is the N poses, except in results (RESULT_ROWS, N, m)."""
 
     results: Array
     cable_status: Codes
@@ -35,7 +35,7 @@ class InverseRows(NamedTuple):
 
     @classmethod
     def empty(cls, count: int, cables: int, freedoms: int, behind: bool) -> InverseRows:
-        """Arrays for a batch, to be filled; behind: True with pulleys or dead lengths."""
+        """Empty arrays for a batch; behind: True with pulleys or dead lengths."""
         return cls(
             np.empty((tables.RESULT_ROWS if behind else tables.BARE_ROWS, count, cables)),
             np.empty((count, cables), dtype=np.int8),
@@ -45,7 +45,7 @@ class InverseRows(NamedTuple):
         )
 
     def reject_slack(self, verdicts: Verdicts, lengths: Array) -> bool:
-        """Mark solved poses as TOO_SLACK if lengths (N, m) between guides are NaN; return True if there are any."""
+        """Mark solved poses as TOO_SLACK if lengths (N, m) between guides are NaN; returns True if any is marked."""
         slack = np.isnan(np.atleast_2d(lengths)) & np.isfinite(self.results[tables.LENGTH])
         lost = np.isin(self.pose_status, SOLVED) & slack.any(axis=-1)
         if not lost.any():
@@ -76,9 +76,9 @@ def solve_inverse_rows(
     """Run the kernel over poses.
 
     rows: pose rows (N, POSE_COLUMNS); loads: external plus inertial wrenches (1 or N, 6); reference: initial tensions
-    of `Closest`, in its variable (m,), or NaN; changed to the last feasible ones; stability: True to mark solved poses
-    without a proof of stability as UNPROVED_STABILITY; progress: called after each block
-    with the number of finished poses, without undecided ones, and the total number.
+    of `Closest`, in its variable (m,), or NaN; replaced by the last feasible tensions; stability: True to mark solved
+    poses without a proof of stability as UNPROVED_STABILITY; progress: called after each block with the number of
+    finished poses, without undecided ones, and the total number.
     """
     shared = first_of(robot)
     behind = has_routing(robot)
@@ -96,15 +96,15 @@ def solve_inverse_rows(
 
 
 class Verdicts(NamedTuple):
-    """Proofs of infeasible poses; the first axis of all arrays is the N poses."""
+    """Proofs for infeasible poses. The first axis of all arrays is the N poses."""
 
-    # Proved and sufficient value of the smallest change of the force [N], (N, 2): 0 at a solved pose, NaN if the load
-    # is not the cause of the failure.
+    # Lower bound and sufficient value of the smallest change of the force [N], (N, 2): 0 at a solved pose, NaN if the
+    # load is not the cause of the failure.
     brackets: Array
     reliefs: Array  # sufficient change of the force along the free motions [N], (N, n); NaN if not needed or unknown
     farkas: Array  # Farkas vectors along the free motions, (N, n)
     blocking: Flags  # cables whose limits oppose the needed wrench, (N, m)
-    at_border: Flags  # True for poses solved by this search instead of the tension distribution method, (N,)
+    at_border: Flags  # True for poses that this search solved in place of the tension distribution method, (N,)
 
     @classmethod
     def empty(cls, count: int, cables: int, freedoms: int) -> Verdicts:
@@ -119,7 +119,7 @@ class Verdicts(NamedTuple):
 
     @property
     def shortfall(self) -> Array:
-        """Smallest known sufficient change of the force [N], (N,); infinite only if it is proved that none exists."""
+        """Smallest known sufficient change of the force [N], (N,); infinite only with a proof that none exists."""
         proved, enough = self.brackets[:, PROVED], self.brackets[:, ENOUGH]
         return np.where(np.isinf(enough) & np.isfinite(proved), np.nan, enough)
 
@@ -130,7 +130,7 @@ class Verdicts(NamedTuple):
 
 
 def covers_all(method: int, redundant: int) -> bool:
-    """True if a distribution method finds tensions whenever feasible ones exist, unlike closed-form methods.
+    """True if a distribution method solves every feasible pose; closed-form methods do not.
 
     redundant: number of cables beyond the degrees of freedom.
     """
@@ -140,9 +140,9 @@ def covers_all(method: int, redundant: int) -> bool:
 def decide_rows(
     terms: RobotTerms, options: Options, rows: Array, loads: Array, found: InverseRows, progress: Progress | None = None
 ) -> Verdicts:
-    """Decide the feasibility of the poses without a result from the iterations; fill in the results of feasible poses.
+    """Decide the feasibility of poses without a result from the iterations, and fill the results of feasible poses.
 
-    terms: those of `robot_terms`; rows: pose rows (N, POSE_COLUMNS); loads: external plus inertial wrenches (1 or N,
+    terms: from `robot_terms`; rows: pose rows (N, POSE_COLUMNS); loads: external plus inertial wrenches (1 or N,
     6); progress: called after each block with the number of finished poses, including feasible ones, and their total.
     """
     count, n = found.needed.shape
@@ -163,7 +163,7 @@ def decide_rows(
 
 
 def decide_stability(robot: Robots, options: Options, rows: Array, found: InverseRows, verdicts: Verdicts) -> None:
-    """Decide whether the solved poses without a proof are stable; the others get the status UNSTABLE.
+    """Decide the stability of solved poses without a proof; unstable poses get the status UNSTABLE.
 
     rows: pose rows (N, POSE_COLUMNS).
     """

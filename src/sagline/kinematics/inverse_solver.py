@@ -1,4 +1,4 @@
-"""Inverse kinematics one pose at a time, for a control loop."""
+"""Inverse kinematics of single poses, for a control loop."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from sagline.tension.method import TensionMethod, kernel_options, takes_default_
 from sagline.tension.methods import Closest, method_of
 
 _STATUSES = tuple(sorted(PoseStatus))  # statuses by code; a lookup takes a tenth of the time of a conversion
-# A struct accepts exactly this number of real numbers, and is faster than an array assignment from a tuple.
+# A struct accepts exactly this number of real numbers. It is faster than the assignment of a tuple to an array.
 _POSE = struct.Struct(f"{tables.POSE_COLUMNS}d").pack_into
 QUATERNION_TOLERANCE = 1e-6  # largest relative deviation of the length of a quaternion, as in `Pose.from_quaternion`
 _PLAIN = (tuple, list)
@@ -39,7 +39,7 @@ ROUNDING = 1e-15  # relative deviation of the length below which no normalizatio
 
 
 class InverseStep(NamedTuple):
-    """Result for one pose; NaN without a solution. An unstable equilibrium has values.
+    """Result of one pose; NaN without a solution. An unstable equilibrium has values.
 
     Attributes:
         unstrained_length: L [m], shape (m,).
@@ -59,10 +59,10 @@ class InverseStep(NamedTuple):
 
 
 class InverseSolver:
-    """Solver for successive poses without repeated setup.
+    """Solver for successive poses, prepared once.
 
-    The solver owns its work arrays and, for `Closest`, stores the last feasible tensions; `reset` clears them. Use one
-    solver per control loop; do not share it between threads.
+    The solver owns its work arrays. For `Closest` it stores the last feasible tensions, which `reset` clears. Use one
+    solver per control loop, and do not share a solver between threads.
 
     Examples:
         >>> import sagline as sl
@@ -86,8 +86,8 @@ class InverseSolver:
             robot: The robot, with at least as many cables as degrees of freedom.
             model: Cable model; the default is the exact one.
             tension: Tension distribution method; the default is `Closest`, relative to the previous step.
-            stability: True to check that every equilibrium is stable. False saves a tenth of a microsecond per step,
-                and no step gets the status UNSTABLE.
+            stability: True to check the stability of every equilibrium. False saves a tenth of a microsecond per step;
+                the status UNSTABLE is then not used.
 
         Raises:
             InvalidValueError: If the robot has too few cables, its winches have guides, the method does not support its
@@ -147,8 +147,8 @@ class InverseSolver:
             A new result whose arrays belong to the caller.
 
         Raises:
-            InvalidValueError: If an argument is not finite or of the wrong shape, or the quaternion is not of length 1
-                to 1e-6.
+            InvalidValueError: If an argument is not finite or has the wrong shape, or the length of the quaternion
+                differs from 1 by more than 1e-6.
         """
         load = None if wrench is None else exactly(wrench, "wrench", "N or N m", (6,))
         lengths = np.empty(self._reference.size)
@@ -167,7 +167,7 @@ class InverseSolver:
     def step_into(
         self, position: ArrayLike, quaternion: ArrayLike, out: Array, wrench: ArrayLike | None = None
     ) -> PoseStatus:
-        """Solve one pose and write the result to the caller's array; no allocation; the status reports wrong numbers.
+        """Solve one pose and fill a given array, without allocation; the status reports wrong numbers.
 
         Args:
             position: Position of the platform origin [m], shape (3,).
@@ -194,7 +194,7 @@ class InverseSolver:
             else:
                 raise TypeError
         except (struct.error, TypeError, ValueError, NotImplementedError, OverflowError):
-            # converts integers and similar, or raises an error with the reason
+            # converts integers and similar types, or raises an error with the reason
             copy_in(self._position, place, "position", "m")
             copy_in(self._quaternion, turn, "quaternion", "")
         if wrench is not None:

@@ -1,4 +1,4 @@
-"""Pose from lengths and load cells together: a least-squares fit of both noisy measurements."""
+"""Pose from measured lengths and tensions: a least-squares fit of both."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from sagline.statics.stiffness import stiffness
 
 _STEPS = 100
 _HALVINGS = 20
-# predicted gain relative to the sum of squares; a smaller gain means less than 1e-4 standard deviations to the optimum
+# smallest predicted gain, relative to the sum of squares; the optimum is then closer than 1e-4 standard deviations
 _TOLERANCE = 1e-8
 
 
@@ -52,14 +52,14 @@ class MeasuredTension(Result):
 def fit_measurements(
     robot: Robots, model: CableModel, found: ForwardRows, loads: Array, measured: MeasuredTension
 ) -> Array:
-    """Replace equilibria at measured lengths by the best fits to lengths and tensions; return covariances of the poses.
+    """Replace equilibria at measured lengths by best fits to lengths and tensions; returns covariances of the poses.
 
-    For each sample, Gauss-Newton iterations find the lengths L_true that minimize sum ((L_true - L)/sigma_L)^2 + sum
-    ((T_A - reading)/sigma_T)^2 with the platform in equilibrium.
+    For each sample, Gauss-Newton iterations find the lengths L_true with the smallest sum ((L_true - L)/sigma_L)^2 +
+    sum ((T_A - reading)/sigma_T)^2. The platform is in equilibrium at L_true.
 
-    found: equilibria at the measured lengths (N samples), the starts of the search; changed in place; loads: external
-    plus inertial wrenches (1 or N, 6). Returns covariance of displacement of the center of mass and rotation vector,
-    (N, 6, 6); NaN without a solution.
+    found: equilibria at the measured lengths (N samples), where the search starts; replaced in place; loads: external
+        plus inertial wrenches (1 or N, 6). Returns the covariances of (displacement of the center of mass, rotation
+        vector), (N, 6, 6); NaN without a solution.
     """
     if model.code == codes.STRAIGHT:
         raise InvalidValueError("model", "Straight()", "a model with forces", "Use Catenary() with measured tensions.")
@@ -102,7 +102,7 @@ class _Fit(NamedTuple):
     length_deviation: Array
 
     def best(self, found: ForwardRows) -> tuple[ForwardRows, Array]:
-        """The best fit and the covariance of its pose; starts at the equilibrium at the measured lengths."""
+        """Best fit and covariance of its pose; the search starts at the equilibrium at the measured lengths."""
         known = ~np.isnan(self.readings)
         covariance = np.full((6, 6), np.nan)
         for _ in range(_STEPS):
@@ -131,7 +131,7 @@ class _Fit(NamedTuple):
         return np.concatenate((lengths, tensions[~np.isnan(tensions)]))
 
     def moved(self, found: ForwardRows, step: Array) -> ForwardRows | None:
-        """The equilibrium after a step, which is halved until the fit improves; None if it never improves."""
+        """Equilibrium after a step, which is halved until the fit improves; None if it does not improve."""
         lengths = found.results[tables.LENGTH]
         now = self.misfit(found)
         for _ in range(_HALVINGS):

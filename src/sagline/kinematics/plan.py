@@ -1,4 +1,4 @@
-"""The plan: cable tensions and unstrained lengths for a motion of the platform."""
+"""Plan: cable tensions and unstrained lengths for a motion of the platform."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ class Gap(NamedTuple):
         first: Index of the first pose.
         last: Index of the last pose.
         status: Reason for the missing solution at the first pose, or UNSTABLE.
-        shortfall: Largest finite shortfall in the gap [N]; infinite if all shortfalls are infinite, NaN if there are
-            none.
+        shortfall: Largest finite shortfall in the gap [N]; infinite if all shortfalls are infinite, NaN if none is
+            known.
         cables: Indices of the cables whose limits oppose the wrench at any pose of the gap.
-        hopeless: Number of poses that no change of the force alone makes feasible.
+        hopeless: Number of poses that need more than a change of the force to become feasible.
     """
 
     first: int
@@ -49,35 +49,33 @@ class Plan(Result, Saved):
 
     Attributes:
         state: Robot, poses, wrench and cables; forces and lengths are NaN at poses without a solution.
-        path: The path of the plan, or None for poses alone.
+        path: The path of the plan; None for poses without times.
         tension: Tension distribution method.
         status: Codes of `PoseStatus`, shape () or (N,).
-        shortfall: Smallest change of the force on the platform that makes the pose feasible [N], shape () or (N,), with
-            tensions within their limits. It is 0 for a feasible pose, infinite if it is proved that no force alone is
-            sufficient, and NaN if the force is not the cause or no value was found.
+        shortfall: Smallest change of the force on the platform that makes the pose feasible [N], shape () or (N,); 0
+            for a feasible pose, infinite if a proof shows that a change of only the force is not sufficient, NaN if the
+            force is not the cause or no value was found.
         wrench_residual: Norms of the unbalanced force [N] and moment [N m] in the platform's free motions,
             shape (2,) or (N, 2).
         blocking: True for cables at a limit that opposes the needed wrench, shape (m,) or (N, m); a wider limit would
             reduce the shortfall.
-        farkas: Proof of each infeasible pose, shape (6,) or (N, 6), NaN elsewhere. With y = farkas, the component of
-            the cable wrench along y, the sum of y . (J_i tau_i - G_i pull_i(tau_i)), is less than y . (needed - the sag
-            forces in it) for all chord tensions within their limits, on the exact catenaries; J is the structure
-            matrix, pull_i the sag force and G_i its wrench matrix. Tensions below a tenth of a cable's weight are
-            excluded. Without an upper limit, tensions that stretch the cable to more than twice its length are also
-            excluded. The force part of y has length 1, so that the difference is in newtons. It is also NaN if no
-            single direction is a proof, because tension ranges were narrowed or split. None for a plan from an old file
-            without this field.
-        needed: The wrench J tau that the chord tensions must supply, shape (6,) or (N, 6): weight, given wrench and the
-            cables' sag forces T_z - tau sin phi. Without a solution, the sag forces are those at the tensions that
-            minimize the remaining wrench. None for a plan from an old file.
-        bracket: Proved and sufficient value of the shortfall [N], shape (2,) or (N, 2); infinite if no sufficient value
-            was found. None for a plan from an old file.
-        relief: Change of the force, with the sufficient value of the shortfall as its magnitude, in world axes [N],
-            shape (3,) or (N, 3). Added to the wrench, it makes the pose feasible. It is NaN if not needed or not known.
-            None for a plan from an old file.
-        at_border: True for poses so close to the border of feasibility that the iterations found no tensions, shape ()
-            or (N,). Their tensions were then computed on the exact catenaries without the tension distribution method.
-            None for a plan from an old file.
+        farkas: Proof of each infeasible pose, shape (6,) or (N, 6), NaN at other poses. Let y = farkas, J the structure
+            matrix, s_i(tau_i) the sag force of cable i, and G_i s_i its wrench. Along y, the cables supply the sum of y
+            . (J_i tau_i - G_i s_i(tau_i)). For all chord tensions within their limits, this sum is less than y .
+            (needed without its sag forces). The proof uses exact catenaries. It excludes tensions below a tenth of the
+            cable's weight and, without an upper limit, tensions that stretch a cable to more than twice its length. The
+            force part of y has length 1, so that the difference is in newtons. NaN if one direction is not sufficient
+            for the proof. None for a plan from an old file.
+        needed: The wrench J tau that the chord tensions must supply, shape (6,) or (N, 6), due to weight, given wrench,
+            and the sag forces T_z - tau sin phi. Without a solution, the sag forces belong to the tensions with the
+            smallest unbalanced wrench. None for a plan from an old file.
+        bracket: Proved lower bound and sufficient value of the shortfall [N], shape (2,) or (N, 2); infinite if no
+            sufficient value was found. None for a plan from an old file.
+        relief: Change of the force that makes the pose feasible, in world axes [N], shape (3,) or (N, 3). Its magnitude
+            is the sufficient value of the shortfall. NaN if not needed or unknown. None for a plan from an old file.
+        at_border: True for feasible poses at which the iterations found no tensions, close to the border of
+            feasibility, shape () or (N,). Their tensions balance the platform, but the tension distribution method did
+            not select them. None for a plan from an old file.
     """
 
     state: Equilibrium
@@ -95,12 +93,12 @@ class Plan(Result, Saved):
 
     @property
     def feasible(self) -> NDArray[np.bool_]:
-        """True if tensions within the limits balance the platform, stable or not, shape () or (N,)."""
+        """True if tensions within the limits balance the platform, even without stability, shape () or (N,)."""
         return np.isin(self.status, BALANCED)
 
     @property
     def solved(self) -> NDArray[np.bool_]:
-        """True if the pose is feasible and its equilibrium is not unstable, shape () or (N,)."""
+        """True if the pose is feasible and its equilibrium is stable, shape () or (N,)."""
         return np.asarray(self.status == PoseStatus.SOLVED)
 
     @property
@@ -125,7 +123,7 @@ class Plan(Result, Saved):
 
     @property
     def free_length(self) -> Array:
-        """Unstrained length of the free spans [m], from their exit points to their platform ends."""
+        """Unstrained length of the free spans [m], between exit points and platform ends."""
         return self.state.free_length
 
     @property
@@ -140,10 +138,10 @@ class Plan(Result, Saved):
 
     @property
     def length_rate(self) -> Array | None:
-        """Length rate dL/dt [m/s], shape (N, m), along the path; None for poses without a path.
+        """Rate dL/dt of `unstrained_length` along the path [m/s], shape (N, m); None without a path.
 
-        The rate of `unstrained_length` due to platform motion and tension changes; NaN if the plan has no solution. It
-        is computed at each call. See docs/model.md, section 7.
+        The rate is due to platform motion and tension changes; NaN where the plan has no solution. It is computed at
+        each call. See docs/model.md, section 7.
         """
         return None if self.path is None else length_rate(self.state, self.path, self.tension, self.feasible)
 
@@ -152,14 +150,14 @@ class Plan(Result, Saved):
         """Smallest stiffness of the platform against its free motions [N/m], shape () or (N,).
 
         A rotation is measured by its arc at the root mean square distance of the platform ends from the center of mass,
-        as in `ForwardSolution`. The value is not positive for an unstable equilibrium. It is NaN without a solution and
+        as in `ForwardSolution`. The value is zero or negative for an unstable equilibrium, NaN without a solution and
         for straight cables. It is computed at each call.
         """
         return smallest_stiffness(self.state)
 
     @property
     def gaps(self) -> tuple[Gap, ...]:
-        """Gaps: consecutive poses that are not solved, in order; a single pose counts as a batch of one.
+        """Gaps in order: consecutive poses that are not solved. A single pose counts as a batch of one.
 
         Infeasible and unstable poses next to each other are separate gaps.
         """
@@ -169,7 +167,7 @@ class Plan(Result, Saved):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Warnings: a rotation that is not free, poses at the border of feasibility or outside a model's validity."""
+        """Warnings: rotation that is not free, poses at the border of feasibility, poses outside a model's validity."""
         return (*self._turned_away(), *self._at_the_border(), *self._below_validity())
 
     def _turned_away(self) -> tuple[str, ...]:

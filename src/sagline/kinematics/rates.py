@@ -1,4 +1,4 @@
-"""Rates of lengths and tensions of a plan, from its motion shortly before and after each sample."""
+"""Rates of lengths and tensions of a plan, from the motion shortly before and after each sample."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from sagline.statics.tables import pose_rows
 from sagline.tension.method import TensionMethod, kernel_options, shared_tension
 from sagline.tension.methods import Closest
 
-SHARE = 1e-5  # step relative to the time scale of the motion, for which finite differences are accurate to 1e-9
+SHARE = 1e-5  # step relative to the time scale of the motion; finite differences are then accurate to 1e-9
 LONGEST = 1e-2  # largest step relative to the time between samples
 _CONSTANT = 1e-9  # smaller differences of a wrench, relative to its largest component, count as zero
 
 
 class _Instant(NamedTuple):
-    """Poses, a batch of N, and external plus inertial wrenches (N, 6), at one instant close to every sample."""
+    """Poses, a batch of N, and external plus inertial wrenches (N, 6), at a time close to every sample."""
 
     pose: Pose
     wrench: Array
@@ -39,7 +39,7 @@ class _Instant(NamedTuple):
 
 
 class _Instants(NamedTuple):
-    """Instants one step [s] before, one step after and two steps after every sample."""
+    """States of motion one step [s] before, one step after and two steps after every sample."""
 
     before: _Instant
     after: _Instant
@@ -73,7 +73,7 @@ def _rate(time: Array, values: Array) -> Array:
 
 
 def _step(path: Path, jerk: Array) -> float:
-    """Step [s], a small share of the time for a change by 1 m or 1 rad and of the time between samples."""
+    """Step [s]: a small share of the time for a change by 1 m or 1 rad, and of the time between samples."""
     rates = (path.twist, path.twist_rate, jerk)
     quickest = max(float(np.abs(rate).max()) ** (1.0 / order) for order, rate in enumerate(rates, start=1))
     between = float(np.diff(path.time).min()) if len(path) > 1 else 1.0
@@ -81,7 +81,7 @@ def _step(path: Path, jerk: Array) -> float:
 
 
 def _poses_later(path: Path, jerk: Array, h: float) -> Pose:
-    """The poses after a time h: third order in position, second in orientation, whose third-order term is even in h."""
+    """Poses after a time h: third order in position, second order in orientation (third if its axis is fixed)."""
     from scipy.spatial.transform import Rotation  # this import takes a third of the load time of sagline
 
     move = h * (path.twist + 0.5 * h * (path.twist_rate + h / 3.0 * jerk))
@@ -93,12 +93,12 @@ def _poses_later(path: Path, jerk: Array, h: float) -> Pose:
 
 TENSION_STEP = 1e-5  # relative step of a tension, for derivatives at a fixed pose
 LEAST_STEP = 1e-6  # smallest step [N], used at zero tension
-AT_LIMIT = 1e-8  # a smaller distance to a limit, relative to the tension, counts as at the limit
-OUTWARD = 1e-9  # a slower approach, relative to the largest rate, does not cross a limit
+AT_LIMIT = 1e-8  # largest distance from a limit that counts as at the limit, relative to the tension
+OUTWARD = 1e-9  # a slower approach to a limit, relative to the largest rate, does not cross the limit
 
 
 class _PlacedCables(NamedTuple):
-    """Cables at given chord tensions and poses, and the matrices of their forces."""
+    """Cables at given chord tensions and poses, and matrices of their forces."""
 
     cables: CableState  # their state, fields of shape (N, m)
     pull: Array  # T_z - tau sin phi [N], shape (N, m)
@@ -128,9 +128,9 @@ def _held_limit_rates(
 ) -> Array:
     """Rates of the chord tensions of `Closest` along the path.
 
-    `Closest` chooses each set of tensions nearest to the previous set. In the limit of small steps, the rates are the
-    smallest rates, in the tension variable, that keep the balance and do not cross a limit. Cables that would cross a
-    limit at these rates are held at the limit, starting with the largest violation.
+    `Closest` selects the tensions nearest to the previous tensions. In the limit of small steps, the rates of the
+    tension variable are the smallest rates that keep the balance and do not cross a limit. Cables that would cross a
+    limit are held at the limit, starting with the largest violation.
 
     step: the step [s]. Returns d(tau)/dt [N/s], shape (N, m).
     """
@@ -146,7 +146,7 @@ def _held_limit_rates(
     )
 
     def slopes(values: Callable[[_PlacedCables], Array]) -> tuple[Array, Array]:
-        """Derivatives by tau at a fixed pose, and by time at fixed tensions."""
+        """Derivatives with respect to tau at a fixed pose, and with respect to time at fixed tensions."""
         by_tau, drift = ((values(last) - values(first)) / by for first, last, by in (by_tension, by_time))
         return by_tau, drift
 
@@ -169,7 +169,7 @@ def _held_limit_rates(
 class _RateConditions(NamedTuple):
     """Conditions on the rates x of the chord tensions."""
 
-    structure: Array  # structure matrix J, whose rows combine to the rates of the tension variable, shape (N, n, m)
+    structure: Array  # structure matrix J; rates of the tension variable combine its rows, shape (N, n, m)
     matrix: Array  # balance condition: matrix x = right, shape (N, n, m)
     right: Array  # right side of this condition, shape (N, n)
     scale: Array  # the rate of the tension variable, scale x + drift, is minimized; shape (N, m)
@@ -182,7 +182,8 @@ class _RateConditions(NamedTuple):
         count, n, m = self.matrix.shape
         system, right = np.zeros((count, m + n, m + n)), np.empty((count, m + n))
         index = np.arange(m)
-        # scale (scale x + drift) = J^T multipliers: the gradient of half the square is a combination of the rows
+        # scale (scale x + drift) = J^T multipliers, because the gradient of half the square is a combination of the
+        # rows
         system[:, :m, m:] = -np.swapaxes(self.structure, 1, 2)
         system[:, :m][held] = 0.0
         system[:, index, index] = np.where(held, self.gap_slope, self.scale**2)
@@ -191,7 +192,7 @@ class _RateConditions(NamedTuple):
         right[:, m:] = self.right
         try:
             found: Array = np.linalg.solve(system, right[..., None])[:, :m, 0]
-        except np.linalg.LinAlgError:  # at some sample the balance itself determines the tension of a held cable
+        except np.linalg.LinAlgError:  # at some sample the balance determines the tension of a held cable
             found = (np.linalg.pinv(system) @ right[..., None])[:, :m, 0]
         return found
 
@@ -230,7 +231,7 @@ def _supplied_wrench(cables: _PlacedCables, tension: Array) -> Array:
 def _nearest_limits(
     here: _PlacedCables, state: Equilibrium, method: TensionMethod
 ) -> tuple[Array, Callable[[_PlacedCables], Array]]:
-    """Distance of each cable from its nearest limit (N, m), and this distance as a function for other tensions."""
+    """Distance of each cable from its nearest limit (N, m), and a function of the tensions for this distance."""
     limits = limits_of(state.robot)
 
     def gaps(at: _PlacedCables) -> Array:
@@ -239,7 +240,7 @@ def _nearest_limits(
         limited = limited_tension(state.robot, cables)
         found = [limited - limits.low, limits.high - limited]
         if method.lowest_point_margin is not None:
-            with np.errstate(divide="ignore", invalid="ignore"):  # a horizontal cable does not have this bound
+            with np.errstate(divide="ignore", invalid="ignore"):  # a horizontal cable has no such bound
                 weight = 0.5 * cables.cable.linear_density * cables.gravity * cables.chord
                 bound = weight * cables.chord / np.abs(cables.rise)
                 if method.lowest_point_margin > 0.0:  # on a vertical cable, a bound of zero remains zero
@@ -258,16 +259,16 @@ def _nearest_limits(
 def length_rate(state: Equilibrium, path: Path, tension: TensionMethod, feasible: Flags) -> Array:
     """Rate of the unstrained lengths along the path with the planned tension distribution.
 
-    Geometry and tensions both change: L(t) = L(pose(t), tau(t)). A method that depends on the pose alone is solved
+    Geometry and tensions both change: L(t) = L(pose(t), tau(t)). Most methods depend only on the pose. They are solved
     again shortly before and after each sample, at poses extrapolated by the path's twist, twist rate and jerk.
-    `Closest` depends on its previous tensions, so the rates of its tensions are computed instead: the smallest rates
-    that keep the balance, with cables held at the limits that they would cross. With pulleys, `Closest` is solved again
-    for two steps after each sample instead.
+    `Closest` depends on its previous tensions. Its rates are the smallest rates of the tensions that keep the balance,
+    with cables held at the limits that they would cross. With pulleys, `Closest` is solved again for two steps after
+    each sample.
 
     state: robot, poses, wrench and cables along the path; path: the path; if it has no jerk, a spline through its
     accelerations gives it; feasible: True for samples with a solution, shape (N,). Returns dL/dt [m/s], shape (N, m),
     accurate to 1e-8 of its largest value; NaN where the plan has no solution. At a discontinuity of the rate, for
-    example where a cable reaches a limit, the value is that of one of the two sides.
+    example where a cable reaches a limit, the value belongs to one of the two sides.
 
     Source:
         docs/model.md, section 7.
@@ -285,7 +286,7 @@ def length_rate(state: Equilibrium, path: Path, tension: TensionMethod, feasible
 
 
 def _resolved_rates(state: Equilibrium, tension: TensionMethod, near: _Instants) -> Array:
-    """Rates from poses solved again shortly before and after; one-sided at the border of feasibility."""
+    """Rates from solutions shortly before and after each sample; one-sided at the border of feasibility."""
     options, lengths = kernel_options(state.robot, state.cables.model, tension), state.unstrained_length
     none = np.full(first_of(state.robot).cable_count, np.nan)
     before, after = (
@@ -303,7 +304,7 @@ def _resolved_rates(state: Equilibrium, tension: TensionMethod, near: _Instants)
 
 
 def _one_sided_rates(state: Equilibrium, tension: TensionMethod, near: _Instants) -> Array:
-    """Rates of `Closest` with pulleys, from two forward steps: a backward step would cross the active limits."""
+    """Rates of `Closest` with pulleys, from two forward steps; a backward step would cross the active limits."""
     options, lengths = kernel_options(state.robot, state.cables.model, tension), state.unstrained_length
     held, moments = shared_tension(state, tension.variable), (near.after, near.later)
     rows = np.stack([pose_rows(moment.pose) for moment in moments], axis=1)

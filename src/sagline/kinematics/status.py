@@ -1,4 +1,4 @@
-"""Status of a pose of a plan, and of a sample of a forward solution, with the next step."""
+"""Status of a pose of a plan, status of a sample of a forward solution, and the next step."""
 
 from __future__ import annotations
 
@@ -94,5 +94,5 @@ class ForwardStatus(Status):
 
 # Statuses of poses with tensions and lengths.
 BALANCED = (PoseStatus.SOLVED, PoseStatus.UNSTABLE)
-# Statuses of stable equilibria, which the platform does not leave by itself.
+# Statuses of stable equilibria.
 STABLE = (ForwardStatus.SOLVED, ForwardStatus.LOOSE, ForwardStatus.OVERSTRETCHED)

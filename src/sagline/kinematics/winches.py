@@ -1,4 +1,4 @@
-"""Encoder counts, speeds and torques of the winches for a plan, and lengths from counts."""
+"""Encoder counts, speeds and torques of the winches for a plan; lengths from counts."""
 
 from __future__ import annotations
 
@@ -26,17 +26,16 @@ LARGEST: Final = 2.0**53  # [counts], larger whole numbers are not exact as floa
 def encoder_counts(
     plan: Plan, winding: Winding = "constant", *, temperature: ArrayLike = 0.0, creep: Creep | None = None
 ) -> Array:
-    """Encoder counts at which the lengths off the drums are those of a plan.
+    """Encoder counts for the lengths of a plan.
 
     Args:
         plan: A plan of a robot whose winches have a drum, counts, and the zeros of counts and lengths.
-        winding: State of the cable on the drum. "constant": all cable was wound at the winches' winding_tension.
-            "remembered": cable that is wound in along the plan keeps its tension at the drum at that time; the cable
-            below it, on the drum since the first sample, was wound at winding_tension.
+        winding: State of the cable on the drum. "constant": all cable was wound at the winding_tension of the winches.
+            "remembered": cable that is wound in along the plan keeps the tension that it had at the drum; the cable on
+            the drum at the first sample was wound at winding_tension.
         temperature: Temperature of the cables minus the temperature for which the winch lengths are valid [K], a number
             or one per cable.
-        creep: Creep of the cables along the path of the plan, zero at its first sample, under the plan's
-            `chord_tension`; None: no creep.
+        creep: Creep of the cables due to `chord_tension` along the path, zero at the first sample; None: no creep.
 
     Returns:
         Whole counts, shape (m,) or (N, m), as floats; NaN where the plan has no solution.
@@ -91,14 +90,14 @@ def lengths_from_counts(
     drum_tension: ArrayLike | None = None,
     temperature: ArrayLike = 0.0,
 ) -> Array:
-    """Unstrained lengths off the drums from encoder counts: the input of `forward`.
+    """Unstrained lengths off the drums from encoder counts, for `forward`.
 
     Args:
         robot: A robot whose winches have a drum, counts, and the zeros of counts and lengths.
-        counts: Encoder counts, shape (m,) or (N, m); NaN if not known.
+        counts: Encoder counts, shape (m,) or (N, m); NaN if unknown.
         winding: Same as in `encoder_counts`; "remembered" needs the tensions.
-        drum_tension: Tension of the cables where they leave the drum, at each sample [N], of the shape of counts; only
-            for winding="remembered". For a plan: `winch_rates(plan).drum_tension`.
+        drum_tension: Tension of the cables at the drum for each sample [N], of the shape of counts; only for
+            winding="remembered". For a plan, use `winch_rates(plan).drum_tension`.
         temperature: Temperature of the cables minus the temperature for which the winch lengths are valid [K].
 
     Returns:
@@ -126,7 +125,7 @@ def lengths_from_counts(
     if (winding == "remembered") != (drum_tension is not None):
         given = "not given" if drum_tension is None else "given"
         allowed = 'given with winding="remembered", and only then'
-        step = "Give the tensions of the plan, winch_rates(plan).drum_tension, or measured ones; or leave both out."
+        step = "Give winch_rates(plan).drum_tension or measured tensions; or omit both arguments."
         raise InvalidValueError("drum_tension", given, allowed, step)
     if drum_tension is None:
         length = path / (1.0 + drums.rest_strain)
@@ -140,13 +139,13 @@ def lengths_from_counts(
 
 
 def _remembered_lengths(drums: Drums, robot: Robot, given: Array, tension: Array, *, unstrained: bool) -> Array:
-    """Lengths with the tensions stored in the cable on the drums, (N, m)."""
+    """Lengths (N, m) with the tensions that the cable keeps on the drums."""
     strain = np.atleast_2d(tension / robot.cables.axial_stiffness)
     if (loose := strain <= -1.0).any():
         p, i = (int(index) for index in np.argwhere(loose)[0])
         shown = f"{np.atleast_2d(tension)[p, i]:g} N"
         raise InvalidValueError(
-            f"sample {p}, cable {i}: drum_tension", shown, ">= 0 N", "No cable is pushed; correct the tension."
+            f"sample {p}, cable {i}: drum_tension", shown, ">= 0 N", "A cable only pulls; correct the tension."
         )
     found, paths = np.empty(given.shape), kernel_input(given, given.shape)
     follow_memory(
@@ -162,7 +161,7 @@ def _remembered_lengths(drums: Drums, robot: Robot, given: Array, tension: Array
 
 def _creep_strain(plan: Plan, creep: Creep) -> Array:
     if plan.path is None:
-        step = "Plan along a Path, or leave creep out."
+        step = "Plan along a Path, or omit creep."
         raise InvalidValueError("creep", "given for a plan without a path", "a path with times", step)
     return creep.strain(plan.path.time, plan.chord_tension)
 
@@ -187,20 +186,19 @@ def _rows(robot: Robot, value: ArrayLike, item: str, unit: str) -> Array:
 class WinchRates(Result):
     """Speeds and torques of the winches along a path, arrays of shape (N, m); NaN where the plan has no solution.
 
-    Drum speeds are positive while cable is paid out. Motor quantities are positive in the direction in which the
-    encoder on the motor shaft counts up. With a positive gear both directions agree, and a motor that holds a cable at
-    rest has a negative torque.
+    Drum speeds are positive while cable is paid out. Motor quantities are positive if the encoder on the motor shaft
+    counts up. With a positive gear both signs agree. A motor that holds a cable at rest then has a negative torque.
 
     Attributes:
         drum_speed: Speed of the drum [rad/s].
         motor_speed: Speed of the motor's shaft [rad/s]: drum_speed times gear.
-        motor_acceleration: Acceleration of the motor's shaft [rad/s^2]: from differences of the length rates between
+        motor_acceleration: Acceleration of the motor's shaft [rad/s^2], from differences of the length rates of the
             samples, without the jump at the end of a layer.
         drum_tension: Tension of the cable where it leaves the drum [N], with friction if the plan has winding
             directions.
-        motor_torque: Torque of the motor at its shaft [N m]: inertia torque, minus the cable tension times the lever of
-            the drum divided by the gear, plus the drive friction opposite to the motion (none at rest). None if the
-            inertia of the winches is not known.
+        motor_torque: Torque of the motor at its shaft [N m]: inertia torque, minus the torque of the cable tension
+            (tension times lever divided by gear), plus the friction torque against the motion (zero at rest). None if
+            the inertia of the winches is unknown.
         count_rate: Count rate of the encoder [1/s]; None if counts_per_turn is not known.
         too_fast: True where motor_speed exceeds the winches' speed_limit; None if the limit is not known.
         too_strong: True where motor_torque exceeds their torque_limit; None if torque or limit is not known.
@@ -229,9 +227,9 @@ def winch_rates(plan: Plan) -> WinchRates:
     """Speeds and torques of the winches along a plan, and samples at which they exceed their limits.
 
     The lever of the cable is the change of its length per drum turn divided by 2 pi, so that power is conserved. It
-    differs from the pitch radius of the layer by two effects. The pitch of the helix adds about 0.01 %. The moving exit
-    adds the groove pitch times the slant of the cable to the pulley, for example 0.06 % for a groove pitch of 4 mm, 40
-    mm off center at a distance of 0.8 m. The cable on the drums is at winding_tension. If neither groove_pitch nor the
+    differs from the pitch radius of the layer for two reasons. The pitch of the helix adds about 0.01 %. The moving
+    exit adds the groove pitch times the slant of the cable. For a groove pitch of 4 mm and an exit 40 mm off center at
+    a distance of 0.8 m, this is 0.06 %. The cable on the drums is at winding_tension. If neither groove_pitch nor the
     diameter of the cables is known, the lever is drum_radius, as in `fastest`.
 
     Args:
@@ -291,7 +289,7 @@ def winch_rates(plan: Plan) -> WinchRates:
 
 
 def _levers(robot: Robot, length: Array) -> tuple[Winch, Array, Array]:
-    """The winches, the stretch of the cable on the drums, and the levers of the cables [m], (N, m)."""
+    """The winches, the stretch of the cable on the drums, and the levers of the cables (N, m) [m]."""
     winches, cables = robot.winches, robot.cables
     bare = cables.diameter is None and winches is not None and winches.groove_pitch is None
     if bare and winches is not None and winches.drum_radius is not None:
@@ -310,7 +308,7 @@ def _differences(time: Array, values: Array) -> Array:
     """Rates of values (N, m) within each range of consecutive valid samples; NaN for an isolated sample."""
     found = np.full(values.shape, np.nan)
     kept = np.isfinite(values).all(axis=-1)
-    gradient: Any = np.gradient  # its type annotations do not support arrays of two axes
+    gradient: Any = np.gradient  # the type annotations do not support arrays with two axes
     edges = np.flatnonzero(np.diff(np.concatenate(([False], kept, [False])).astype(np.int8))).reshape(-1, 2)
     for first, end in edges:
         if end - first > 1:

@@ -28,8 +28,8 @@ _OPEN = (codes.FORWARD_NOT_CONVERGED, codes.FORWARD_NO_LENGTHS)
 def checked_winding(winding: ArrayLike, shape: tuple[int, ...], cables: int) -> Array:
     """Winding directions, one per cable.
 
-    winding: the caller's directions: +1, -1 and 0; shape: () for a single pose, (N,) for N. Returns array of shape (m,)
-    or (N, m).
+    winding: directions +1, -1 and 0; shape: () for a single pose, (N,) for N poses. Returns an array of shape (m,) or
+        (N, m).
     """
     array = checked(winding, "winding", "")
     shapes = [(cables,)] + [(*shape, cables)] * bool(shape)
@@ -39,7 +39,7 @@ def checked_winding(winding: ArrayLike, shape: tuple[int, ...], cables: int) -> 
     wrong = ~np.isin(array, (-1.0, 0.0, 1.0))
     if wrong.any():
         index = tuple(int(i) for i in np.argwhere(wrong)[0])
-        allowed = "1 winding in, -1 paying out, or 0 standing"
+        allowed = "1 winding in, -1 paying out, or 0 at rest"
         raise InvalidValueError(
             f"winding[{', '.join(map(str, index))}]", f"{array[index]:g}", allowed, "Give the sign of the motion."
         )
@@ -47,7 +47,7 @@ def checked_winding(winding: ArrayLike, shape: tuple[int, ...], cables: int) -> 
 
 
 def without_guides(robot: Robot, solver: str, instead: str) -> Robot:
-    """The robot, unchanged; a robot whose cables sag between guides is refused.
+    """Return the robot unchanged, but refuse a robot with guides.
 
     solver: name of the function that does not support guides, for the message.
     """
@@ -68,10 +68,10 @@ def iterate_routing(
 ) -> ForwardRows:
     """Equilibria at lengths that include the actual routing.
 
-    The lengths for the kernels are the given lengths minus the correction for guides and friction at the tensions of
-    the previous iteration. This is repeated until convergence.
+    The lengths for the kernels are the given lengths minus the correction for guides and friction. Each iteration
+    computes the correction at the last tensions, until convergence.
 
-    found: equilibria for a straight guided run without friction, at the lengths minus the initial correction; lengths:
+    found: equilibria for straight guided cables without friction, at the lengths minus the initial correction; lengths:
     unstrained lengths (N, m); loads: external plus inertial wrenches (1 or N, 6); winding: directions of friction,
     shape (m,) or (N, m), or None; taken: initial correction for guides and friction [m], (N, m); None for zero. Returns
     the results; NOT_CONVERGED if the iteration does not converge, or a cable is too slack for a catenary between its
