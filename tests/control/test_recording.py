@@ -1,4 +1,4 @@
-"""What a tape keeps: every number of every cycle, whatever the room that was made."""
+"""What a table keeps: every number of every cycle, whatever the room that was made."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import pytest
 import sagline as sl
 from sagline.control.execution import ExecutionStatus, execution_of
 from sagline.control.link import Command, Missing, Mode, Sample
-from sagline.control.recording import Recorded, Tape
+from sagline.control.recording import CycleTable, Recorded
 from sagline.control.states import State
 
 M, G = 3, 2
@@ -35,12 +35,12 @@ def made(k: int) -> Recorded:
 
 @pytest.mark.parametrize("expected", [1, 3, 9])
 def test_everything_that_was_put_in_comes_out(expected: int) -> None:
-    tape, cycles = Tape(M, G, expected), [made(k) for k in range(8)]
+    table, cycles = CycleTable(M, G, expected), [made(k) for k in range(8)]
     for cycle in cycles:
-        tape.add(cycle)
-    assert len(tape) == 8
+        table.add(cycle)
+    assert len(table) == 8
     robot = sl.load_robot("cogiro")
-    done = execution_of(tape, robot, None, ExecutionStatus.DONE, "", 0.01, np.full(M, 0.25), ())
+    done = execution_of(table, robot, None, ExecutionStatus.DONE, "", 0.01, np.full(M, 0.25), ())
     assert len(done) == 8
     assert done.answered.tolist() == [True, True, False, *5 * [True]]
     assert done.mode.tolist() == [2, -1, *6 * [2]]
@@ -64,11 +64,11 @@ def test_everything_that_was_put_in_comes_out(expected: int) -> None:
 
 
 def test_what_was_taken_out_stays_while_more_comes() -> None:
-    tape, cycles = Tape(M, G, 2), [made(k) for k in range(4)]
+    table, cycles = CycleTable(M, G, 2), [made(k) for k in range(4)]
     for cycle in cycles[:2]:
-        tape.add(cycle)
-    column, before = tape.column("winch_rate"), tape.column("winch_rate").copy()
+        table.add(cycle)
+    column, before = table.column("winch_rate"), table.column("winch_rate").copy()
     for cycle in cycles[2:]:
-        tape.add(cycle)
+        table.add(cycle)
     assert np.array_equal(column, before)
-    assert len(tape.column("winch_rate")) == 4
+    assert len(table.column("winch_rate")) == 4

@@ -2,7 +2,7 @@
 
 import pytest
 
-from sagline.control.states import HOLDS_GRANT, TABLE, RefusedError, State, check_transition
+from sagline.control.states import OWNING, TABLE, RefusedError, State, check_transition
 
 
 def test_every_state_has_one_row_in_the_order_of_the_codes() -> None:
@@ -11,12 +11,12 @@ def test_every_state_has_one_row_in_the_order_of_the_codes() -> None:
 
 def test_every_state_that_holds_a_grant_and_is_no_end_stops_on_a_fault() -> None:
     after = {State.STOPPING, State.FAULT, State.EMERGENCY}
-    for state in HOLDS_GRANT - after:
+    for state in OWNING - after:
         assert State.STOPPING in TABLE[state][1]
 
 
 def test_every_state_with_a_grant_leads_to_emergency_and_only_off_leads_away() -> None:
-    for state in HOLDS_GRANT - {State.EMERGENCY}:  # while it connects the brakes are on: it is refused
+    for state in OWNING - {State.EMERGENCY}:  # while it connects the brakes are on: it is refused
         assert State.EMERGENCY in TABLE[state][1]
     assert list(TABLE[State.EMERGENCY][1]) == [State.OFF]
     assert list(TABLE[State.OFF][1]) == [State.CONNECTING]

@@ -10,7 +10,7 @@ from sagline import Plan
 from sagline.control import Command, Event, EventKind, Missing, Mode, Recorded, Sample, State
 from sagline.control.execution import Execution, ExecutionStatus, execution_of
 from sagline.control.link import PERIOD, groups_of
-from sagline.control.recording import Tape
+from sagline.control.recording import CycleTable
 
 
 @cache
@@ -67,9 +67,9 @@ def execution(seconds: float = 2.0) -> Execution:
     plan = plan_of(seconds)
     cycles = list(cycles_of(plan))
     robot = plan.state.one_robot
-    tape = Tape(robot.cable_count, len(groups_of(robot.cable_count)), len(cycles))
+    table = CycleTable(robot.cable_count, len(groups_of(robot.cable_count)), len(cycles))
     for cycle in cycles:
-        tape.add(cycle)
+        table.add(cycle)
     return execution_of(
-        tape, robot, plan, ExecutionStatus.DONE, "the end of the plan", PERIOD, cycles[0].zero, events_of()
+        table, robot, plan, ExecutionStatus.DONE, "the end of the plan", PERIOD, cycles[0].zero, events_of()
     )

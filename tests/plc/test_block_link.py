@@ -250,7 +250,7 @@ def test_a_plc_that_begins_anew_with_a_connection_is_believed_at_once_and_on_the
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(block_link, "RETRY", 0.0)
-    gone = WireError(Refusal("the connection is closed at once", "Check it"))
+    gone = WireError(Refusal("the PLC closes the connection at once", "Check it"))
     assert heard(block(1000), gone, block(1), block(2))[0] == [1000, 1000, 1, 2]
     assert heard(block(1000), block(1), block(2))[0] == [1000, 1000, 1000]
 

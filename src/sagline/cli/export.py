@@ -62,7 +62,7 @@ def export_scl(
 ) -> None:
     """Write SCL source for the PLCs of a robot, for TIA Portal: data blocks, limits, and the program of a group.
 
-    The program grants control to one controller at a time, keeps to the limits, and slows the winches down when
+    The program accepts commands of one controller at a time, enforces the limits, and slows the winches down when
     commands are missing. It has not been compiled yet; its head lists the settings of the CPU.
 
     For example:

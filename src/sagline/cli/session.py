@@ -291,7 +291,7 @@ class OperatorSession:
         show_text(f"lengths [m]      {' '.join(f'{x:8.4f}' for x in sample.length + control.zero)}", whole=True)
         tensions = (f"{x:8.1f}" if np.isfinite(x) else "       –" for x in sample.filtered)
         show_text(f"tensions [N]     {' '.join(tensions)}", whole=True)
-        show_text(f"grants           {' '.join('mine' if x == control.owner else str(x) for x in sample.owner)}")
+        show_text(f"owners           {' '.join('mine' if x == control.owner else str(x) for x in sample.owner)}")
         if control.pace is not None:
             often, most = control.pace.lateness.quantile(0.999), control.pace.lateness.longest
             show_text(f"cycles late      {1e3 * often:.1f} ms (999 of 1000), {1e3 * most:.1f} ms at most")

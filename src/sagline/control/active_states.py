@@ -19,13 +19,13 @@ from sagline.control.states import RefusedError, State
 from sagline.core.arrays import Array
 from sagline.kinematics.status import ForwardStatus
 
-LEAVING: Final = 0.3  # longest time until all grants are given back [s]
+LEAVING: Final = 0.3  # longest time until the ownership of all groups is given up [s]
 LOOP_ON: Final = frozenset({State.IDLE, State.MOVING, State.PAUSING})
 POSE_LOST: Final = "the pose of the platform is not known; home again"
 
 
 class ActiveState(ABC):
-    """State of a controller as an object; `context.state` is its name.
+    """State of a controller as an object; `context.state` is the name of the state.
 
     Attributes:
         context: Shared by all states.
@@ -34,7 +34,7 @@ class ActiveState(ABC):
     """
 
     def __init__(self, context: Context, point: SetPoint | None = None, source: SetPointSource | None = None) -> None:
-        """Take over set points from the previous state."""
+        """Begin with the set point of the previous state."""
         self.context, self.point, self.source = context, point, source
 
     @abstractmethod
@@ -75,10 +75,10 @@ class ActiveState(ABC):
 
 
 class Off(ActiveState):
-    """OFF: the controller gives all grants back, and then sends no commands."""
+    """OFF: the controller gives up the ownership of all groups, and then sends no commands."""
 
     def __init__(self, context: Context, reason: str = "", point: SetPoint | None = None) -> None:
-        """Begin to give the grants back, after the command of a set point; without a reason there are no grants yet."""
+        """Begin to give up the ownership of all groups; an empty reason means that no group is owned yet."""
         super().__init__(context, point)
         self._cycles = 0
         if reason:
@@ -89,12 +89,12 @@ class Off(ActiveState):
             context.enter(State.OFF, reason)
 
     def next(self, answer: Sample | Missing) -> ActiveState:
-        """Give the grants back."""
+        """Command LEAVE, or nothing."""
         self.leave(self.context.sample)
         return self
 
     def leave(self, sample: Sample | None) -> None:
-        """Command LEAVE as long as the controller has the grant of a group."""
+        """Command LEAVE as long as the controller owns a group."""
         self._cycles = max(self._cycles - 1, 0)
         if self._cycles and (sample is None or bool((sample.owner == self.context.owner).any())):
             self.rest(Mode.LEAVE, enabled=False)
@@ -188,13 +188,13 @@ class HomingState(ActiveState):
         context.enter(State.HOMING, "the operator named the pose")
         super().__init__(context)
         self.homing = homing
-        self._largest_tension = np.full(len(context.zero), np.inf)  # tension limits during a jog [N]
+        self._largest_tension = np.full(len(context.zero), np.inf)  # upper limits of the tensions during a jog [N]
 
     def jog(self, winch: int, by: float) -> None:
-        """Begin to jog one winch [m]; the other winches have no power, and the controller monitors only tensions."""
+        """Begin to jog one winch by a length [m]; the other winches have no power. Only the tensions are monitored."""
         c = self.context
         if c.sample is None or self.source is not None:
-            raise RefusedError("the jog", "another winch is being jogged", "Wait until it stands.")
+            raise RefusedError("the jog", "another winch is being jogged", "Wait until it stops.")
         self._largest_tension = jog_tension_limits(self.homing, c.sample)
         length, still = c.sample.length + c.zero, np.zeros(len(c.zero))
         begin = SetPoint(length, still, c.unknown, c.sender.tension, None, None, np.nan, False)
@@ -202,7 +202,7 @@ class HomingState(ActiveState):
         c.say(EventKind.NOTE, "jog", f"winch {winch} by {1e3 * by:+g} mm")
 
     def next(self, answer: Sample | Missing) -> ActiveState:
-        """Continue the jog, or compare tensions at rest; IDLE if they agree."""
+        """Continue the jog, or compare tensions at rest; IDLE if the tensions agree with the plan."""
         c, sample, homing = self.context, self.context.sample, self.homing
         if sample is None:
             pass
@@ -221,7 +221,7 @@ class HomingState(ActiveState):
             c.estimator.begin_at(homing.state.pose)
             c.previous_plan = homing.plan
             basis = "the operator confirmed the pose" if homing.confirmed else "the tensions agree"
-            reason = f"{basis}; lengths set to the plan's, by up to {1e3 * np.abs(homing.apart).max():.2f} mm"
+            reason = f"{basis}; lengths set to those of the plan, by up to {1e3 * np.abs(homing.apart).max():.2f} mm"
             return Following(c, State.IDLE, reason, None, homing.standing).next(answer)
         self.rest(Mode.HOLD, enabled=True)
         return self
@@ -249,7 +249,7 @@ class HomingState(ActiveState):
 
 
 class Following(ActiveState):
-    """IDLE, MOVING, JOGGING or PAUSING: each cycle sends one set point of a source."""
+    """IDLE, MOVING, JOGGING or PAUSING: a source gives the set point of each cycle."""
 
     def __init__(
         self, context: Context, state: State, text: str, point: SetPoint | None, source: SetPointSource
@@ -291,7 +291,7 @@ class Following(ActiveState):
 
 
 class Stopping(ActiveState):
-    """STOPPING: all rates go to zero together, starting from the last set point that was sent.
+    """STOPPING: all rates decrease to zero in the same time, from the last set point that was sent.
 
     Attributes:
         after: State at the end of the ramp.
@@ -339,7 +339,7 @@ class Stopping(ActiveState):
 
 
 def idle_at(context: Context, found: Standing | ForwardStatus, reason: str) -> Following | None:
-    """IDLE at an equilibrium; without one, None, and the pose becomes unknown."""
+    """IDLE at an equilibrium; if there is no equilibrium, None, and the pose becomes unknown."""
     context.previous_plan = None
     if isinstance(found, Standing):
         return Following(context, State.IDLE, reason, found.step(), found)

@@ -23,10 +23,10 @@ from sagline.tension.method import TensionMethod
 
 START: Final = 2e-3  # [m], largest distance of the first pose of a path from the platform
 ON_TICK: Final = 1e-6  # largest distance of a sample from a tick, as a share of a period
-LARGEST_LEAD: Final = 5e-3  # [m], equal to the largest correction of the tension loop
+LARGEST_LEAD: Final = 5e-3  # [m], the same as the largest correction of the tension loop
 ROUNDING: Final = 5e-6  # [m], allowed difference between a plan's lengths and rates, without accelerations
 LARGEST_STEP: Final = 1e-3  # [m], larger steps count as a jump of an encoder
-AT_REST: Final = 1e-3  # [m/s] and [rad/s], a faster start or end of a path would cause a shock at the winches
+AT_REST: Final = 1e-3  # [m/s] and [rad/s], largest speed at both ends of a path, without a shock for the winches
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,7 +35,7 @@ class Motion:
 
     Attributes:
         period: Period of a cycle, and between two rows [s].
-        plan: Plan at the ticks, the last tick at or after the path's end; None for a jog.
+        plan: Plan at the ticks; the last tick is at the end of the path or after it. None for a jog.
         state: Robot, poses and cables at the rows.
         length: Unstrained lengths off the drums [m], shape (N, m).
         rate: Their rates [m/s], shape (N, m); zero in the last row.
@@ -73,14 +73,14 @@ def plan_motion(
     method: TensionMethod,
     previous: Plan | Array | None = None,
 ) -> Motion:
-    """Plan a path and check it completely; period [s]; previous as in `inverse`."""
+    """Plan a path and check the plan completely; period: [s]; previous: as in `inverse`."""
     _check_rest(path)
     ticked = _at_ticks(path, period)
     plan = inverse(robot, ticked, model, method, previous=previous)
     _check_feasible(plan, ticked)
     rate, drum = plan.length_rate, drum_tension(plan.state)
     if rate is None:
-        raise RefusedError("the path", "its plan has no rates of the lengths", "Give one with times and twists.")
+        raise RefusedError("the path", "the plan has no rates of the lengths", "Give a path with times and twists.")
     _check_winches(robot, ticked, plan.unstrained_length, rate, drum)
     _check_steps(np.minimum(ticked.time, path.time[-1] - path.time[0]), plan.unstrained_length, rate)
     last = np.array(rate)
@@ -102,14 +102,14 @@ def check_motion(motion: Motion, robot: Robot, period: float) -> None:
     """Reject a motion that was planned for another robot or another period [s]."""
     step = "Plan it with this controller: control.plan(path)."
     if abs(motion.period - period) > ON_TICK * period:
-        reason = f"it was planned for cycles of {1e3 * motion.period:g} ms; they take {1e3 * period:g} ms"
+        reason = f"its plan is for cycles of {1e3 * motion.period:g} ms; they take {1e3 * period:g} ms"
         raise RefusedError("the path", reason, step)
     if motion.robot is not robot:
-        raise RefusedError("the path", f"it was planned for another robot, {motion.robot.name}", step)
+        raise RefusedError("the path", f"its plan is for another robot, {motion.robot.name}", step)
 
 
 def check_lead(what: str, lead: Array) -> None:
-    """Reject lengths at rest that are too far from the first lengths of a plan; lead: their difference [m], (m,)."""
+    """Reject a plan with first lengths that are too far from the lengths at rest; lead: difference [m], (m,)."""
     i = int(np.argmax(np.abs(lead)))
     if not abs(lead[i]) <= LARGEST_LEAD:
         away, allowed = f"{1e3 * lead[i]:+.3g} mm", f"{1e3 * LARGEST_LEAD:g} mm"
@@ -118,13 +118,13 @@ def check_lead(what: str, lead: Array) -> None:
 
 
 def check_start(robot: Robot, here: Pose, start: Pose) -> None:
-    """Reject a motion that begins at another pose."""
+    """Reject a motion that does not begin at the present pose."""
     points = np.vstack((np.zeros(3), robot.platform_anchors))
     jump = float(np.linalg.norm(start.transform(points) - here.transform(points), axis=1).max())
     if not jump <= START:
         place = ", ".join(f"{x:.4f}" for x in here.position)
         away = f"it begins {1e3 * jump:.3g} mm from the pose of the platform; allowed: {1e3 * START:g} mm"
-        raise RefusedError("the path", away, f"Go to its first pose, or begin it at ({place}) m.")
+        raise RefusedError("the path", away, f"Go to the first pose, or begin the path at ({place}) m.")
 
 
 def _at_ticks(path: Path, period: float) -> Path:
@@ -137,11 +137,11 @@ def _at_ticks(path: Path, period: float) -> Path:
     if missing.any():
         at = float(ticks[np.argmax(missing)])
         reason = f"it has no sample at {at:g} s; every cycle of {1e3 * period:g} ms needs one"
-        raise RefusedError("the path", reason, f"Make it with rate={1.0 / period:g}, or a multiple of it.")
+        raise RefusedError("the path", reason, f"Make the path with rate={1.0 / period:g}, or a multiple of it.")
     if time[-1] - ticks[-1] > ON_TICK * period:
         chosen, ticks = np.append(chosen, len(time) - 1), np.append(ticks, [period * count])
     if len(ticks) < 2:
-        raise RefusedError("the path", f"it takes {time[-1]:g} s, no cycle", "Give one that moves.")
+        raise RefusedError("the path", f"it takes {time[-1]:g} s, no cycle", "Give a path with a motion.")
     return _path_at(path, chosen, ticks)
 
 
@@ -155,7 +155,7 @@ def _check_rest(path: Path) -> None:
         speed = float(np.abs(path.twist[row]).max())
         if not speed <= AT_REST:
             reason = f"it {end} at {speed:.3g} m/s or rad/s; allowed: {AT_REST:g}"
-            raise RefusedError("the path", reason, "Make it from rest to rest, with quintic_path for instance.")
+            raise RefusedError("the path", reason, "Make a path from rest to rest, for example with quintic_path.")
 
 
 def _check_feasible(plan: Plan, path: Path) -> None:
@@ -164,14 +164,14 @@ def _check_feasible(plan: Plan, path: Path) -> None:
         return
     gap = gaps[0]
     place = ", ".join(f"{x:.3f}" for x in plan.state.pose.position[gap.first])
-    more = f" and {len(gaps) - 1} more stretches" if len(gaps) > 1 else ""
+    more = f" and {len(gaps) - 1} more sections" if len(gaps) > 1 else ""
     reason = f"at {path.time[gap.first]:.2f} s, ({place}) m,{more} its status is {PoseStatus(gap.status).name}"
     cables = f", cables {', '.join(map(str, gap.cables))} at their limits" if gap.cables else ""
-    raise RefusedError("the path", reason + cables, "Change its course, make it slower, or check it with inverse().")
+    raise RefusedError("the path", reason + cables, "Change the path, make it slower, or check it with inverse().")
 
 
 def _check_winches(robot: Robot, path: Path, length: Array, rate: Array, drum: Array) -> None:
-    """Reject speeds and torques beyond the known limits of the winches."""
+    """Reject speeds and torques above the known limits of the winches."""
     winches = robot.winches
     lever = drum_lever(robot, length)  # this call raises an error for missing data
     if winches is None:
@@ -187,12 +187,12 @@ def _check_winches(robot: Robot, path: Path, length: Array, rate: Array, drum: A
 
 
 def _check_steps(time: Array, length: Array, rate: Array) -> None:
-    """Reject lengths that jump relative to their rates: the twist of the path then contradicts its poses.
+    """Reject a path with twists that contradict its poses, so that lengths jump relative to their rates.
 
-    A step deviates from the mean rate times h by at most half the difference of the two rates times h, if the rate
-    within the step is between the rates at its ends. The largest difference among the adjacent steps is used. A
-    deviation above the allowed jump of an encoder is never accepted. The times are those of the path, which may end
-    before a tick.
+    If the rate within a step h is between the rates at both ends, the step of the length differs from h times the mean
+    rate by at most h/2 times the difference of the rates. The largest difference among the adjacent steps is used. A
+    deviation above the allowed jump of an encoder is never accepted. The times are those of the path, because it may
+    end before a tick.
     """
     h = np.diff(time)[:, None]
     off = np.abs(np.diff(length, axis=0) - 0.5 * h * (rate[1:] + rate[:-1]))
@@ -207,9 +207,7 @@ def _check_steps(time: Array, length: Array, rate: Array) -> None:
         f"from {time[k]:g} s to {time[k + 1]:g} s the length of cable {i} differs from its rate by "
         f"{1e3 * off[k, i]:.3g} mm; allowed: {1e3 * allowed[k, i]:.3g} mm"
     )
-    raise RefusedError(
-        "the path", reason, "Its poses jump, or its twist does not match its poses: use path_from_samples."
-    )
+    raise RefusedError("the path", reason, "Use path_from_samples, because poses jump, or twists do not match them.")
 
 
 def _refuse_beyond(path: Path, verb: str, values: Array, limit: Array | None, unit: str) -> None:
@@ -217,4 +215,4 @@ def _refuse_beyond(path: Path, verb: str, values: Array, limit: Array | None, un
         return
     k, i = (int(index) for index in np.unravel_index(np.argmax(np.abs(values) / limit), values.shape))
     reason = f"at {path.time[k]:.2f} s the motor of winch {i} would {verb} {abs(values[k, i]):.3g} {unit}"
-    raise RefusedError("the path", f"{reason}; allowed: {limit[i]:.3g} {unit}", "Make it slower, or lighter.")
+    raise RefusedError("the path", f"{reason}; allowed: {limit[i]:.3g} {unit}", "Move slower, or with a smaller mass.")

@@ -1,4 +1,4 @@
-"""Commands of a controller, and the claim of all groups' grants."""
+"""Commands of a controller, and the claim of the ownership of all groups."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from sagline.control.link import (
 from sagline.control.states import RefusedError
 from sagline.core.arrays import Array, Flags
 
-VALID_FOR: Final = HEARTBEAT  # validity of a command for a PLC [s]
+VALID_FOR: Final = HEARTBEAT  # time for which a PLC may use a command [s]
 MOST_OWNER: Final = 2**31
 
 
@@ -71,14 +71,14 @@ class Sender:
         self.command = Command(self.counter, self.owner, mode, VALID_FOR, length, rate, positive, enable, claims)
 
 
-CLAIMING: Final = OWNER_TIMEOUT + 0.7  # longest time until all grants are available [s]
+CLAIMING: Final = OWNER_TIMEOUT + 0.7  # longest time until the controller owns all groups [s]
 SILENT: Final = 7.0  # longest time until every group has answered once [s]
-GIVING_BACK: Final = 0.05  # longest time with an incomplete set of grants [s]
+GIVING_BACK: Final = 0.05  # longest time with the ownership of some groups only [s]
 LONGEST_WAIT: Final = 0.6  # upper limit of the random wait before the next claim [s]
 TRIES: Final = 4
 FRESH: Final = 3  # largest age of a sample [cycles]
 AGREEING: Final = 5  # consecutive cycles in which all groups must agree
-SURE: Final = 20  # [cycles], a cause that persists longer did not exist before the claim
+SURE: Final = 20  # [cycles], a cause that persists longer is not from the time before the claim
 BEHIND: Final = 10  # largest lag of an echo [commands]
 _LOCKED, _PRESSED, _READY = int(GroupStatus.LOCKED), int(GroupStatus.EMERGENCY), int(GroupStatus.READY)
 _AGAIN: Final = "Try again; if it continues, check the program of the PLC."
@@ -105,10 +105,10 @@ class Disagreement(NamedTuple):
 def disagreement(
     sample: Sample, owner: int, counter: int, groups: tuple[tuple[int, ...], ...], period: float = PERIOD
 ) -> Disagreement | None:
-    """Reason why not all groups agree, most general first; None if all agree.
+    """First reason why a group does not agree, from the most general reason on; None if all groups agree.
 
-    A group agrees if its sample is fresh, this controller has its grant, its drives are ready, without fault and not
-    locked, and it has accepted one of the last commands.
+    A group agrees if its sample is fresh, this controller owns it, its drives are ready, without fault and not locked,
+    and it has accepted one of the last commands.
     """
     status, other = sample.status, sample.owner
     faulty = (sample.winch_fault != 0) | (sample.state == int(WinchState.FAULT))
@@ -126,12 +126,12 @@ def disagreement(
             True,
         ),
         ((status & _LOCKED) != 0, "the drums are locked", "Unlock the drums at the machine, then connect again.", True),
-        (stranger, f"belongs to another controller, {foreign}", "Stop that one, then connect again.", False),
-        (other != owner, "no controller has the grant", "Connect again.", False),
+        (stranger, f"belongs to another controller, {foreign}", "Stop the other one, then connect again.", False),
+        (other != owner, "no controller owns it", "Connect again.", False),
         (tripped, "a drive has tripped", "Repair and reset it at the machine.", False),
         ((status & _READY) == 0, "a drive is not ready", "Repair and reset it at the machine.", False),
         (sample.fault != 0, stops, "Remove the cause, and wait 0.3 s for the PLC.", False),
-        ((counter - sample.echo) % COUNTERS > BEHIND, "does not take commands", _AGAIN, False),
+        ((counter - sample.echo) % COUNTERS > BEHIND, "does not accept commands", _AGAIN, False),
     )
     for there, reason, step, lasting in causes:
         if there.any():
@@ -141,7 +141,7 @@ def disagreement(
 
 
 class Claim:
-    """Claim of the grants of all groups.
+    """Claim of the ownership of all groups.
 
     Attributes:
         mode: Mode of the next command; None if nothing is sent.
@@ -187,7 +187,7 @@ class Claim:
         return self._cycles * self._period >= CLAIMING
 
     def _give_back(self) -> None:
-        """Leave for a random time, because a controller with the missing grants may wait for the present ones."""
+        """Leave for a random time, because another controller may own the other groups and wait for these groups."""
         self._tries += 1
         self.mode = Mode.LEAVE
         longest = LONGEST_WAIT / self._period

@@ -17,7 +17,7 @@ from sagline.control.execution import Execution, ExecutionStatus, execution_of
 from sagline.control.faults import faults_of
 from sagline.control.link import PERIOD, Link, Sample
 from sagline.control.real_time import Garbage, Pace
-from sagline.control.recording import Event, EventKind, Journal, Recorded, Recorder, Tape
+from sagline.control.recording import CycleTable, Event, EventKind, Journal, Recorded, Recorder
 from sagline.control.set_points import Along, Standing, standing_at
 from sagline.control.states import MOTION, RefusedError, State, check_transition
 from sagline.control.tension_loop import TensionLoop, TensionSettings
@@ -35,7 +35,7 @@ from sagline.tension.methods import Closest, method_of
 
 MOST_SEED: Final = 2**128
 SAME: Final = 1e-9  # tolerance of the period, as a share of it
-MARGIN: Final = 500  # cycles on the tape in addition to those of the plan, for ramps and pauses
+MARGIN: Final = 500  # number of cycles in the table in addition to the plan, for ramps and pauses
 
 
 class Estimator:
@@ -76,7 +76,7 @@ class Estimator:
 
 
 class _Run:
-    """The present or last motion, and its record.
+    """The present or the last motion, and its record.
 
     Attributes:
         motion: Planned motion; None for a platform jog, or before the first motion.
@@ -84,8 +84,8 @@ class _Run:
         status: Final status; RUNNING before its end.
         reason: Reason of the status in one line.
         first_event: Number of events before the motion.
-        tape: Table of its cycles.
-        recording: True if cycles are added to the tape.
+        table: Table of the cycles.
+        recording: True if cycles are added to the table.
         announced: True if the recorder has received the plan but not yet its end.
     """
 
@@ -95,7 +95,7 @@ class _Run:
         self.paused: Along | None = None
         self.status, self.reason = ExecutionStatus.RUNNING, ""
         self.first_event = 0
-        self.tape: Tape | None = None
+        self.table: CycleTable | None = None
         self.recording = self.announced = False
 
 
@@ -108,7 +108,7 @@ class Context:
         zero: Offset from homing, added to lengths of samples [m], shape (m,).
         homed: True if the pose of the platform is known.
         run: Present or last motion.
-        previous_plan: Plan at whose end the platform rests, which the next plan continues; None elsewhere.
+        previous_plan: Plan that the next plan continues, because the platform rests at its end; None otherwise.
         correction: Correction of the tension loop, added to the lengths of the plan [m], shape (m,).
         number: Index of the cycle, from 0.
         time: Time on the link's clock [s].
@@ -126,14 +126,14 @@ class Context:
         shadow: bool,
         seed: int | None,
     ) -> None:
-        """Check the arguments, which are those of `Controller`; nothing is sent."""
+        """Check the arguments of `Controller`; nothing is sent."""
         self.robot = instance(robot, Robot, "robot")
         m = robot.cable_count
         _check_link(link)
         drum_lever(robot, np.ones(m))  # raises an error if data of the winches are missing
         if sorted(winch for group in link.groups for winch in group) != list(range(m)):
             count = sum(map(len, link.groups))
-            raise InvalidValueError("link", f"of {count} winches", f"{m}, as {robot.name} has", "Check its addresses.")
+            raise InvalidValueError("link", f"of {count} winches", f"{m}, as {robot.name} has", "Check the link.")
         self.link, self.pace = link, optional(pace, Pace, "pace")
         self.period = PERIOD if pace is None else pace.period
         _check_period(link, self.period)
@@ -169,7 +169,7 @@ class Context:
             self.say(EventKind.FAULT, "recording stopped", line)
 
     def tell(self, what: Callable[[Recorder], object]) -> None:
-        """Call a method of the recorder, if there is one."""
+        """Call a method of the recorder, if a recorder exists."""
         if line := self.journal.tell(what):
             self.say(EventKind.FAULT, "recording stopped", line)
 
@@ -182,7 +182,7 @@ class Context:
     # samples, faults and estimate
 
     def check_agreement(self, what: str) -> Sample:
-        """Newest sample for a request to all groups; an error if one of them does not agree."""
+        """Newest sample, for a request to all groups; raises an error if a group does not agree."""
         if self.sample is None:
             raise RefusedError(what, "no group has answered", "Connect first.")
         why = disagreement(self.sample, self.owner, self.sender.counter, self.link.groups, self.period)
@@ -191,7 +191,7 @@ class Context:
         return self.sample
 
     def locate(self, sample: Sample, wrench: Array | None) -> str:
-        """Estimate the pose, with the tension loop's correction as an encoder error; message if it is lost."""
+        """Estimate the pose from lengths minus the tension loop's correction; returns a message if it is lost."""
         length = sample.length + self.zero
         length -= self.correction
         lost = self.estimator.locate(length, wrench)
@@ -202,7 +202,7 @@ class Context:
         return line
 
     def find_faults(self, cycle: Cycle) -> tuple[Reaction, str]:
-        """Strongest reaction of the fault rules in a cycle, and the message of the first fault with this reaction."""
+        """Strongest reaction among the faults of a cycle, and the message of the first fault with this reaction."""
         reaction, first, homing = Reaction.EVENT, "", False
         for fault in self.faults:
             line = fault.look(cycle)
@@ -218,7 +218,7 @@ class Context:
         return reaction, first
 
     def clear_faults(self) -> None:
-        """Start with a new set of rules."""
+        """Start with a new set of fault rules."""
         self.faults: tuple[Fault, ...] = faults_of(
             self.robot, self.period, groups=self.link.groups, largest_correction=self.settings.largest
         )
@@ -232,7 +232,7 @@ class Context:
         self.correction = np.zeros(m)
 
     def find_equilibrium(self, length: Array) -> Standing | ForwardStatus:
-        """Equilibrium at these lengths [m], shape (m,); takes 1 ms, with an unknown pose up to 10 ms."""
+        """Equilibrium at these lengths [m], shape (m,); takes 1 ms, or up to 10 ms if the pose is unknown."""
         return standing_at(self.robot, length, self.estimator.pose, self.model)
 
     # the running motion
@@ -242,10 +242,10 @@ class Context:
         run = self.run
         run.motion, run.paused = motion, None
         count = MARGIN + (0 if motion is None else len(motion))
-        run.tape = Tape(self.robot.cable_count, len(self.link.groups), count)
+        run.table = CycleTable(self.robot.cable_count, len(self.link.groups), count)
         run.first_event = len(self.journal.events)
         if run.announced:
-            self._announce_end()  # ends the record of a paused plan
+            self._announce_end()  # this ends the record of a paused plan
         plan = None if motion is None else motion.plan
         if self.journal.watched and plan is not None:
             run.announced = True
@@ -265,8 +265,8 @@ class Context:
     def keep(self, cycle: Recorded) -> None:
         """Add a cycle to the table of the motion, and pass it to the recorder."""
         run = self.run
-        if run.recording and run.tape is not None:
-            run.tape.add(cycle)
+        if run.recording and run.table is not None:
+            run.table.add(cycle)
             run.recording = self.state in MOTION
         self.tell(lambda record: record.cycle(cycle))
         if run.announced and not run.recording and run.paused is None:
@@ -277,19 +277,19 @@ class Context:
         self.tell(lambda record: record.ends(self.run.status, self.run.reason))
 
     def execution(self) -> Execution | None:
-        """Record of the last motion up to now; None before the first."""
+        """Record of the last motion until now; None before the first motion."""
         run = self.run
-        if run.tape is None:
+        if run.table is None:
             return None
         plan, events = None if run.motion is None else run.motion.plan, tuple(self.journal.events[run.first_event :])
-        return execution_of(run.tape, self.robot, plan, run.status, run.reason, self.period, self.zero, events)
+        return execution_of(run.table, self.robot, plan, run.status, run.reason, self.period, self.zero, events)
 
 
 def _check_link(link: object) -> None:
     """Reject an object that is not a link."""
     has = all(hasattr(link, name) for name in ("groups", "period")) and callable(getattr(link, "exchange", None))
     if isinstance(link, type) or not has:
-        step = "Take that of a machine, machine.link(), or make one: sl.plc.S7Link(addresses, robot)."
+        step = "Give machine.link() of a machine, or sl.plc.S7Link(addresses, robot)."
         raise InvalidValueError("link", brief(link), "a Link", step)
 
 
@@ -298,5 +298,5 @@ def _check_period(link: Link, period: float) -> None:
     own = number(link.period, "link.period", "s", above=0.0)
     if abs(own - period) > SAME * period:
         step = f"Give the machine period={period:g}, or the controller pace=Pace({own:g})."
-        allowed = f"{1e3 * period:g} ms, the controller's"
+        allowed = f"{1e3 * period:g} ms, as the controller"
         raise InvalidValueError("link", f"of PLCs with a period of {1e3 * own:g} ms", allowed, step)

@@ -31,15 +31,15 @@ from sagline.tension.method import TensionMethod
 
 SPEED: Final = 0.1  # default speed of go_to [m/s]
 TURNING: Final = 0.2  # default angular speed of go_to [rad/s]
-SPEEDING_UP: Final = 0.5  # shortest time to full speed [s], which makes short paths slow
+SPEEDING_UP: Final = 0.5  # shortest time to full speed [s]; it makes short paths slow
 
 
 class Controller(Preparation):
     """Controller of a robot through a `Link`.
 
     All data are from samples, and each `cycle` sends one checked command. The methods that begin an action (`start`,
-    `begin_homing`, `start_jog`, `claim`) return immediately, and the caller must call `cycle` each period. The methods
-    that wait (`execute`, `go_to`, `home`, `jog`, `connect`) call it themselves until the motion ends.
+    `begin_homing`, `start_jog`, `claim`) return immediately. The caller must then call `cycle` every period. The
+    methods that wait (`execute`, `go_to`, `home`, `jog`, `connect`) call `cycle` themselves until the motion ends.
     """
 
     def __init__(
@@ -60,15 +60,15 @@ class Controller(Preparation):
         Args:
             robot: Robot for planning. Its winches must have at least drum_radius.
             link: Connection to the machine.
-            pace: Real time. None for lockstep: every cycle begins when the previous one ends, and the machine and its
-                clock wait for the controller.
+            pace: Pace of cycles in real time. None for lockstep: a cycle begins when the previous cycle ends, and the
+                machine with its clock waits for the controller.
             model: Cable model; the default is exact.
             tension: Tension distribution method; the default is `Closest`.
-            loop: Settings of the tension loop. A robot without redundancy has none.
-            record: Receives every cycle and event.
+            loop: Settings of the tension loop. A robot without redundancy has no tension loop.
+            record: Recorder of all cycles and events.
             shadow: True for read-only operation: nothing is ever sent, and the state remains OFF.
-            seed: Seed of the id and of random waiting times; None for a seed of the system, so that every controller
-                differs.
+            seed: Seed of the id and of random waiting times; None for a seed of the system, which is different for
+                every controller.
 
         Raises:
             InvalidValueError: If data of the winches are missing, the link is for another number of winches, or an
@@ -109,7 +109,7 @@ class Controller(Preparation):
         """Begin to follow a path.
 
         Args:
-            path: Path from rest to rest, with a sample at every tick, from the pose of the platform; or an already
+            path: Path from rest to rest that begins at the pose of the platform, with a sample at every tick; or a
                 planned motion.
 
         Raises:
@@ -161,7 +161,7 @@ class Controller(Preparation):
         pose = single_pose(pose)
         points = self.robot.platform_anchors
         if float(np.abs(pose.transform(points) - here.transform(points)).max()) < 1e-6:
-            raise RefusedError("the way", "the platform is there already", "Name another pose.")
+            raise RefusedError("the way", "the platform is already there", "Give another pose.")
         work = partial(
             septic_path,
             [here, pose],
@@ -227,7 +227,7 @@ class Controller(Preparation):
         self._run_while(lambda: self.moving)
 
     def start_jog_platform(self, by: ArrayLike) -> None:
-        """Begin to jog the platform along a straight line; each cycle solves its pose.
+        """Begin to jog the platform along a straight line; each cycle computes the next pose.
 
         Args:
             by: Displacement [m], and optionally a rotation vector [rad], world axes, shape (3,) or (6,).
@@ -292,7 +292,7 @@ class Controller(Preparation):
         check_transition(self.state, State.MOVING, "resuming")
         run = self._context.run
         if run.paused is None:
-            raise RefusedError("resuming", "no path was paused here", "Begin one with start(path).")
+            raise RefusedError("resuming", "no path was paused here", "Begin a path with start(path).")
         self._context.check_agreement("resuming")
         check_start(self.robot, self.estimate, run.paused.pose)
         source, run.paused = run.paused, None
@@ -315,11 +315,11 @@ class Controller(Preparation):
         """Set point at rest, from which a motion begins."""
         point = self._loop.active.point
         if point is None:
-            raise RefusedError(what, "there is no set point to begin from", "Home first: home(pose).")
+            raise RefusedError(what, "there is no set point from which it can begin", "Home first: home(pose).")
         return point
 
     def _here(self) -> Pose:
-        """Planned pose of the platform at rest; the estimate differs from it only by noise."""
+        """Planned pose of the platform at rest; the estimated pose differs only by noise."""
         source = self._loop.active.source
         pose = source.pose if isinstance(source, Standing) else None
         return self.estimate if pose is None else pose

@@ -19,17 +19,17 @@ MOVING: Final = 1e-3  # [m/s], a faster change of a set point is a motion
 
 
 class Cycle(NamedTuple):
-    """One cycle, between its sample and the next command.
+    """Data of one cycle, between the sample and the next command.
 
     Attributes:
         sample: The newest sample.
         before: Sample of the previous cycle; None in the first.
         command: Command sent in the previous cycle; None if nothing was sent.
-        tension: T_A, planned for this cycle [N], shape (m,); NaN without a plan, for example before homing.
-        gains: Row of the plan's gains at this time; None if there is none.
+        tension: Planned T_A for this cycle [N], shape (m,); NaN without a plan, for example before homing.
+        gains: Gains of the tension loop at this time of the plan; None without gains.
         correction: Correction of the plan's lengths by the tension loop [m], shape (m,).
-        late: Delay of the start of the cycle [s]; 0 on the clock of a machine in the same process.
-        recording: Reason why recording has stopped; "" while it continues, or without recording.
+        late: Delay of the start of the cycle [s]; 0 in lockstep.
+        recording: Reason why recording has stopped; "" otherwise.
     """
 
     sample: Sample
@@ -48,33 +48,33 @@ class Cycle(NamedTuple):
         return command is not None and command.mode == Mode.FOLLOW and bool(abs(command.rate).max() > MOVING)
 
 
-SLACK_SHARE: Final = 0.3  # share of the lower limit: a cable with less tension is slack
-PLANNED_SHARE: Final = 0.9  # share of the lower limit: a cable with a larger planned tension is taut
-PULLING: Final = 0.5  # share of the planned tension: a motor with a larger torque holds a taut cable
+SLACK_SHARE: Final = 0.3  # a cable is slack if its tension is below this share of the lower limit
+PLANNED_SHARE: Final = 0.9  # a cable is taut in the plan if the planned tension is above this share of the lower limit
+PULLING: Final = 0.5  # a cable is taut if the motor torque is above this share of the planned tension
 STEADY_TIME: Final = 0.5  # time constant of the filter for the constant part of the tension errors [s]
 QUICK_TIME: Final = 0.1  # time constant of the filter for the comparison with the platform's force balance [s]
-MOST_CHANGE: Final = 6.0  # limit of the quick filter's change [N per cycle], which suppresses single outliers
+MOST_CHANGE: Final = 6.0  # limit of the quick filter's change [N per cycle]; it suppresses single outliers
 _TRIPPED: Final = int(WinchState.FAULT)
 
 
 class Evidence:
-    """Tensions of this cycle and data of the machine, shared by one set of rules.
+    """Tensions of this cycle and data of the machine, which all rules of a set use.
 
     Attributes:
         group_of: Index of the group of each winch, shape (m,).
         period: Period of a cycle [s].
         largest: Correction of a length above which there is a fault [m].
         noise: Standard deviation of a reading [N].
-        sigma: Standard deviation of a reading including the bias of a good cell [N].
+        sigma: Standard deviation of a reading, including the bias of a good cell [N].
         limit: Upper limits of T_A [N], shape (m,).
         full_scale: Full scale of the cells [N], infinite if unknown, shape (m,).
-        believed: Cells that are not ignored, shape (m,).
-        tension: T_A [N], shape (m,): the reading of the cell if it is finite and not ignored; otherwise the planned
-            tension, or, without a plan, a value between slack and tight.
+        believed: True for cells that are not ignored, shape (m,).
+        tension: T_A [N], shape (m,): the reading if it is finite and the cell is not ignored; otherwise the planned
+            tension. Without a plan, a value between the limits for slack and tight cables.
         plain: True if no cell is ignored and all readings are finite.
         stopped: True while a reported fault stops the motion and the winches still move.
-        broken: Cables found broken, shape (m,).
-        jumped: Encoders that have jumped, shape (m,).
+        broken: True for broken cables, shape (m,).
+        jumped: True for encoders that have jumped, shape (m,).
         least: Smallest tension [N].
         most: Largest tension [N].
         oldest: Age of the oldest group's sample [s].
@@ -83,9 +83,9 @@ class Evidence:
         faulted: True if a PLC reports a fault.
         tripped: True if a drive reports a fault.
         states: Codes of the winches' states, as plain numbers.
-        low: Number of consecutive new readings for which a cable is slack but taut in the plan, shape (m,).
-        before_low: Last reading before these readings [N], shape (m,).
-        steady: T_A minus the plan after the slow filter, which stops while a cable is slack [N], shape (m,).
+        low: Number of consecutive new readings of a slack cable that is taut in the plan, shape (m,).
+        before_low: Last reading before the readings of a slack cable [N], shape (m,).
+        steady: T_A minus the plan after the slow filter [N], shape (m,); constant while a cable is slack.
         quick: T_A minus the plan after the quick filter [N], shape (m,).
         compared: True if tensions can be compared with a plan.
     """
@@ -98,7 +98,7 @@ class Evidence:
         cell: tuple[float, float],
         largest: float,
     ) -> None:
-        """Begin without evidence; period [s]; cell: deviation and bias [N]; largest correction [m]."""
+        """Begin without evidence; period: [s]; cell: deviation and bias [N]; largest: largest correction [m]."""
         m, winch = robot.cable_count, robot.winches
         self.group_of = np.zeros(m, dtype=np.int64)
         for g, members in enumerate(groups_of(m) if groups is None else groups):
@@ -123,7 +123,7 @@ class Evidence:
         self.compared = self.any_low = self.stopped = False
         self.plain, self._all_believed = True, True
         self._still, self._settled = 0, round(RAMP / period)
-        # full-size arrays, because numpy takes three times as long with a number or a column
+        # full-size arrays, because numpy is three times slower with a number or a column
         self._shares = np.array([[period / (time + period)] * m for time in (STEADY_TIME, QUICK_TIME)])
         self.cycle: Cycle | None = None
         self.tension = np.full(m, math.nan)
@@ -133,7 +133,7 @@ class Evidence:
         self.faulted = self.tripped = False
 
     def _set_up_motors(self, robot: Robot) -> None:
-        """Factors from motor torque to cable tension, if drum and gear are known."""
+        """Ratios of cable tension to motor torque, if drum and gear are known."""
         winch, m = robot.winches, robot.cable_count
         self._pull_of_torque: Array | None = None
         self._friction = np.zeros(m)
@@ -163,17 +163,17 @@ class Evidence:
         self._all_believed = False
 
     def stop(self) -> None:
-        """Store that a fault stops the motion. Until the winches stop, later faults are mostly its consequences."""
+        """Store that a fault stops the motion; until the winches stop, later faults are mostly its consequences."""
         self.stopped, self._still = True, 0
 
     def _wait(self, cycle: Cycle) -> None:
-        """Check if the winches have stopped, from their set points, or from new rates without set points."""
+        """Check if the winches have stopped: from the set points, or without set points, from new rates."""
         moves = cycle.moving if cycle.command is not None else largest(cycle.sample.rate * self.fresh) > MOVING
         self._still = 0 if moves else self._still + 1
         self.stopped = self._still <= self._settled
 
     def _read(self, cycle: Cycle) -> None:
-        """Store the readings, except of cells that are ignored."""
+        """Store the readings of all cells that are not ignored."""
         self.tension = tension = cycle.sample.tension
         self.least, self.most = extrema(tension)
         self.plain = self._all_believed and math.isfinite(self.least) and math.isfinite(self.most)
@@ -216,14 +216,14 @@ class Evidence:
         change[:] = error
         change -= self._filtered
         change *= self._shares
-        if (most := largest(change[1])) > MOST_CHANGE:  # one factor for all errors: a load remains a load
+        if (most := largest(change[1])) > MOST_CHANGE:  # one factor for all errors keeps their direction
             change[1] *= MOST_CHANGE / most
         if self.any_low:
             change[0] = 0.0
         self._filtered += change
 
     def pull(self, cycle: Cycle) -> Array:
-        """Cable tension from the motor torque [N], with an error due to friction; NaN for unknown drums, shape (m,)."""
+        """Cable tension from the motor torque [N], shape (m,); it includes friction, and is NaN for unknown drums."""
         torque = cycle.sample.torque
         return np.full(torque.shape, np.nan) if self._pull_of_torque is None else self._pull_of_torque * torque
 
@@ -234,7 +234,7 @@ class Evidence:
 
 
 class Reaction(IntEnum):
-    """Reaction to a fault; among several faults, the largest counts."""
+    """Reaction to a fault; the largest reaction among several faults is executed."""
 
     EVENT = 0  # reported and recorded
     DEGRADED = 1  # the tension loop keeps its correction; the motion continues
@@ -243,19 +243,19 @@ class Reaction(IntEnum):
 
 
 class Fault(ABC):
-    """One fault rule. `faults_of` makes a new set without memory, for use after the operator has acknowledged a fault.
+    """One fault rule. `faults_of` makes a set of new rules, for example after the operator has acknowledged a fault.
 
     Attributes:
         name: Name of its events.
         rule: Its condition as text.
         reaction: Reaction of the controller.
         within: Time until detection, as text.
-        homing: True if a length is unreliable, so that the robot must be homed again.
-        lasting: True if the fault remains until a new set of rules; each item is reported once.
+        homing: True if the robot must be homed again, because a length is unreliable.
+        lasting: True if the fault remains until the next set of rules; each item is reported once.
         quiet: Time after a report during which repeats are only counted [s].
-        present: True if the condition holds; during a stop by another fault, it is set only after the winches have
+        present: True if the condition holds; during a stop by another fault, it is updated after the winches have
             stopped.
-        seen: Evidence of the whole set of rules.
+        seen: Evidence that all rules of the set use.
     """
 
     name: ClassVar[str]
@@ -270,27 +270,25 @@ class Fault(ABC):
         """Begin without findings.
 
         Args:
-            seen: Evidence shared by the whole set.
+            seen: Evidence that all rules of the set use.
         """
         self.seen, self.present = seen, False
         self._for = np.zeros(len(seen.group_of), dtype=np.int64)  # consecutive samples, for rules that count them
         self._since_report, self._suppressed = 10**9, 0  # cycles since the last report, and suppressed repeats
 
     def look(self, cycle: Cycle) -> str | None:
-        """Check a cycle; call this once for every cycle, in order.
+        """Check a cycle; to be called once for every cycle, in order.
 
         Args:
             cycle: The cycle.
 
         Returns:
-            Message for the operator when the fault begins: fault, item, value, limit, next step. Otherwise None, also
-            while the fault persists, and while another fault stops the motion. In the latter case, the report follows
-            when the winches have stopped.
+            Message for the operator when the fault begins: fault, item, value, limit, next step. None in all other
+            cycles, and while another fault stops the motion. A fault that persists after the stop is then reported.
         """
         if cycle is not self.seen.cycle:  # the first rule computes it for all others
             self.seen.at(cycle)
-        # a fault after a stop is mostly a consequence of the stop; a fault that makes a length unreliable is still
-        # reported
+        # a fault during a stop is mostly a consequence of the stop, but a fault with an unreliable length is reported
         waits = False
         if self.seen.stopped and self.reaction is Reaction.STOPPING and not self.homing:
             if self.lasting:  # each item is reported once
@@ -323,7 +321,7 @@ class Fault(ABC):
 
     @abstractmethod
     def found(self, cycle: Cycle) -> str | None:
-        """Operator message in every cycle in which the rule holds; for a lasting fault, only for a new item.
+        """Message for the operator in every cycle in which the rule holds; for a lasting fault, only for a new item.
 
         Args:
             cycle: Readings and set points of the cycle.

@@ -1,4 +1,4 @@
-"""Executions on a machine: set points, samples, estimates and events of each cycle, and their errors."""
+"""Executions on a machine: set points, samples, estimates and events of all cycles; position and tension errors."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from sagline.control.recording import (
     REAL_OWN,
     WHOLE_OF_GROUPS,
     WHOLE_OF_WINCHES,
+    CycleTable,
     Event,
-    Tape,
 )
 from sagline.control.tension_loop import TensionSettings
 from sagline.core.arguments import instance, whole_number
@@ -35,8 +35,8 @@ class ExecutionStatus(Status):
 
     DONE = 0, "the plan was executed to its end"
     PAUSED = 1, "the platform is on the path; resume() continues"
-    STOPPED = 2, "the operator stopped it; plan again from the pose of the platform"
-    FAULT = 3, "a fault stopped it: read the events, repair it, acknowledge"
+    STOPPED = 2, "the operator stopped the motion; plan again from the pose of the platform"
+    FAULT = 3, "a fault stopped the motion: read the events, repair the cause, acknowledge"
     EMERGENCY = 4, "the drums are locked: read the events, unlock them at the machine, connect and home again"
     UNKNOWN = 5, "the record ends before the motion; check the machine"
     RUNNING = 6, "the motion is running"
@@ -44,9 +44,9 @@ class ExecutionStatus(Status):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Samples(Result):
-    """N samples of a machine, with names and units as in `Sample`.
+    """N samples of a machine; the fields have the meanings and units of `Sample`.
 
-    In cycles without a sample, floats are NaN and integers 0.
+    In cycles without a sample, floats are NaN, and integers are 0.
 
     Attributes:
         time: Shape (N,).
@@ -108,12 +108,12 @@ class Samples(Result):
 class Execution(Result, Saved):
     """Execution of a plan on a machine, in N cycles of m winches.
 
-    The command and the sample of a cycle were exchanged in that cycle, so the sample does not include the effect of the
-    command yet.
+    The command and the sample of a cycle are exchanged at the same time. The sample therefore does not include the
+    effect of the command.
 
     Attributes:
         robot: Robot of the controller.
-        plan: Whole plan; None without a plan, as for a jog.
+        plan: Whole plan; None without a plan, for example for a jog.
         status: Status at the end.
         reason: Reason for the end in one line.
         period: Period of a cycle [s].
@@ -127,13 +127,13 @@ class Execution(Result, Saved):
         samples: Samples of the machine.
         position: Position of the platform's origin, estimated from the encoders [m], shape (N, 3).
         quaternion: Rotation platform -> world, estimated from the encoders, scalar last, shape (N, 4).
-        estimate: Codes of `ForwardStatus` of these estimates, -1 if there is none, shape (N,).
-        mode: Codes of `Mode` of the commands, -1 if none was sent, shape (N,).
+        estimate: Codes of `ForwardStatus` of the estimates, -1 without an estimate, shape (N,).
+        mode: Codes of `Mode` of the commands, -1 without a command, shape (N,).
         set_length: Set points of the unstrained lengths, with the zero of homing [m], shape (N, m).
         set_rate: Set points of their rates [m/s], shape (N, m).
         set_tension: Set points of the tensions at the drums [N], shape (N, m).
-        planned_tension: T_A planned for the time of each sample [N], shape (N, m); NaN without a plan.
-        correction: Correction of the tension loop in the set points [m], shape (N, m).
+        planned_tension: Planned T_A at the time of each sample [N], shape (N, m); NaN without a plan.
+        correction: Correction by the tension loop, included in the set points [m], shape (N, m).
     """
 
     robot: Robot
@@ -175,15 +175,15 @@ class Execution(Result, Saved):
 
     @property
     def pose(self) -> Pose:
-        """Poses estimated from the encoders, N of them; NaN if there is none."""
+        """N poses, estimated from the encoders; NaN without an estimate."""
         return Pose._adopt(self.position, self.quaternion)
 
 
-_COLUMNS: Final = (*REAL_OWN, *(name for name, _ in PLACE), *ASKED)  # columns of a tape with the same names
+_COLUMNS: Final = (*REAL_OWN, *(name for name, _ in PLACE), *ASKED)  # same names in `CycleTable` and `Execution`
 
 
 def execution_of(
-    tape: Tape,
+    table: CycleTable,
     robot: Robot,
     plan: Plan | None,
     status: ExecutionStatus,
@@ -192,9 +192,9 @@ def execution_of(
     zero: Array,
     events: tuple[Event, ...],
 ) -> Execution:
-    """Execution from the data of a tape; period [s], zero [m] (m,)."""
-    arrays: dict[str, Any] = {name: locked(tape.column(name)) for name in _COLUMNS}
-    arrays |= {name: locked(tape.column(name).astype(np.int8)) for name in ("state", "estimate", "mode")}
+    """Execution from a table of cycles; period [s], zero [m] (m,)."""
+    arrays: dict[str, Any] = {name: locked(table.column(name)) for name in _COLUMNS}
+    arrays |= {name: locked(table.column(name).astype(np.int8)) for name in ("state", "estimate", "mode")}
     return Execution(
         robot=robot,
         plan=plan,
@@ -203,17 +203,17 @@ def execution_of(
         period=period,
         zero=locked(zero.copy()),
         events=events,
-        answered=locked(tape.column("answered").astype(np.bool_)),
-        samples=_samples(tape),
+        answered=locked(table.column("answered").astype(np.bool_)),
+        samples=_samples(table),
         **arrays,
     )
 
 
-def _samples(tape: Tape) -> Samples:
+def _samples(table: CycleTable) -> Samples:
     columns = {f"group_{name}": name for name in REAL_OF_GROUPS + WHOLE_OF_GROUPS}
     columns |= {f"winch_{name}": name for name in REAL_OF_WINCHES + WHOLE_OF_WINCHES}
-    arrays: dict[str, Any] = {name: locked(tape.column(column)) for column, name in columns.items()}
-    return Samples(time=locked(tape.column("time")), **arrays)
+    arrays: dict[str, Any] = {name: locked(table.column(column)) for column, name in columns.items()}
+    return Samples(time=locked(table.column("time")), **arrays)
 
 
 def planned_position(execution: Execution) -> Array:
@@ -264,10 +264,10 @@ def null_space_error(execution: Execution, filter_time: float | None = None) -> 
 
     Args:
         execution: N cycles.
-        filter_time: Time constant of the input filter [s]; None for that of the tension loop.
+        filter_time: Time constant of the input filter [s]; None for the default of the tension loop.
 
     Returns:
-        e_N = K_A N_L G f with f the filtered T_A minus the planned T_A [N], shape (N, m); NaN outside the plan, and for
+        e_N = K_A N_L G f [N], shape (N, m); f is the filtered T_A minus the planned T_A. NaN outside the plan, and for
         a robot without redundancy.
 
     Examples:

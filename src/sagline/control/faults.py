@@ -28,7 +28,7 @@ from sagline.robot.robot import Robot
 
 LARGEST_CORRECTION: Final = TensionSettings().largest  # largest correction of the tension loop [m]
 
-# order of evaluation: a lost or dead cell must be found before its cable counts as slack
+# in the order of evaluation; a lost or dead cell must be found before its cable counts as slack
 FAULTS: Final[tuple[type[Fault], ...]] = (
     EmergencyStop,
     OwnerLost,
@@ -55,7 +55,7 @@ FAULTS: Final[tuple[type[Fault], ...]] = (
 
 
 class FaultRow(NamedTuple):
-    """One fault, in the form for the documentation.
+    """Row of the fault table in the documentation.
 
     Attributes:
         name: Name of its events.
@@ -75,16 +75,14 @@ class FaultRow(NamedTuple):
 _ELSEWHERE: Final = (
     FaultRow(
         "controller dead",
-        "its command counter does not change for 100 ms",
+        "the command counter does not change for 100 ms",
         "ramp of 0.2 s, hold",
         "300 ms",
         "each PLC",
     ),
-    FaultRow(
-        "foreign block", "magic, version, group or size differ while connecting", "OFF", "1 cycle", "the connection"
-    ),
-    FaultRow("second controller", "another has a grant while connecting", "OFF", "1 cycle", "the connection"),
-    FaultRow("set point infeasible", "the plan's own status", "refused before it is sent", "", "the check of the plan"),
+    FaultRow("foreign block", "magic, version, group or size differ on connection", "OFF", "1 cycle", "the connection"),
+    FaultRow("second controller", "another controller owns a group on connection", "OFF", "1 cycle", "the connection"),
+    FaultRow("set point infeasible", "the plan's status", "refused before it is sent", "", "the check of the plan"),
 )
 FAULT_TABLE: Final = (
     *(FaultRow(kind.name, kind.rule, kind.reaction.name, kind.within, "the controller") for kind in FAULTS),
@@ -101,15 +99,15 @@ def faults_of(
     cell_bias: float | None = None,
     largest_correction: float = LARGEST_CORRECTION,
 ) -> tuple[Fault, ...]:
-    """New set of rules without memory; a controller creates one each time that it leaves OFF, FAULT or homing.
+    """New set of fault rules. A controller creates a new set each time that it leaves OFF, FAULT or homing.
 
     Args:
         robot: Robot for planning.
         period: Period of a cycle [s], > 0.
         groups: Winches of each group, as in the link; None for groups of two neighbors.
-        cell_deviation: Standard deviation of a good load cell [N], > 0; None for that of the robot's winches, or 1 N if
-            they have none.
-        cell_bias: Bias that a good load cell may have [N], >= 0; None for that of the winches, at least 2 N.
+        cell_deviation: Standard deviation of a good load cell [N], > 0; None for the value of the robot's winches, or 1
+            N without such a value.
+        cell_bias: Largest bias of a good load cell [N], >= 0; None for the value of the winches, at least 2 N.
         largest_correction: Largest correction of a length by the tension loop [m], > 0.
 
     Returns:
@@ -149,4 +147,4 @@ def _check_groups(groups: object, cable_count: int) -> None:
         fits = False
     if not fits:
         allowed = f"tuples with each winch from 0 to {cable_count - 1} once"
-        raise InvalidValueError("groups", brief(groups), allowed, "Take those of the link: link.groups.")
+        raise InvalidValueError("groups", brief(groups), allowed, "Give the groups of the link: link.groups.")

@@ -13,16 +13,16 @@ from sagline.control.link import Mode
 from sagline.control.null_space import SIGMAS
 from sagline.core.arrays import Array
 
-NEAR: Final = 0.9  # share of the upper limit; a larger planned tension stops the motion
+NEAR: Final = 0.9  # share of the upper limit; the motion stops if the tension is larger for some samples
 NEAR_SAMPLES, SLACK_SAMPLES = 5, 3
-SUDDEN: Final = 0.5  # share of the planned tension: smallest tension one sample before a broken cable became slack
+SUDDEN: Final = 0.5  # share of the planned tension; a broken cable had at least this tension one sample before
 
 
 class OverTension(Fault):
     """Cable tension too large."""
 
     name = "over-tension"
-    rule = f"T_A above its upper limit in 1 sample, or above {NEAR:g} of this limit in {NEAR_SAMPLES} samples"
+    rule = f"T_A above its upper limit in one sample, or above {NEAR:g} of this limit in {NEAR_SAMPLES} samples"
     reaction = Reaction.STOPPING
     within = "10 to 50 ms"
 
@@ -47,7 +47,7 @@ class OverTension(Fault):
         cable = int(cables[np.argmax(tension[cables] / seen.limit[cables])])
         return (
             f"cable {cable} has {tension[cable]:.4g} N; allowed: up to {self._near[cable]:.0f} N, "
-            f"{seen.limit[cable]:.0f} N for an instant. Check what blocks it, then jog it out."
+            f"{seen.limit[cable]:.0f} N for an instant. Check what blocks the cable, then let it out by a jog."
         )
 
 
@@ -56,7 +56,7 @@ class CableBroken(Fault):
 
     name = "cable broken"
     rule = (
-        f"slack from one sample to the next after more than {SUDDEN:g} of its planned tension, while the deviations of "
+        f"slack in one sample, with more than {SUDDEN:g} of its planned tension one sample before; the deviations of "
         f"the other cables from the plan change by > {SIGMAS:g} sigma of their noise"
     )
     reaction = Reaction.EMERGENCY
@@ -65,7 +65,7 @@ class CableBroken(Fault):
     lasting = True
 
     def found(self, cycle: Cycle) -> str | None:
-        """First cable that has just broken."""
+        """First cable that is newly broken."""
         seen = self.seen
         if not (seen.any_low and seen.compared):
             return None
@@ -92,7 +92,7 @@ class Slack(Fault):
     name = "slack"
     rule = (
         f"T_A < {SLACK_SHARE:g} of its lower limit ({SIGMAS:g} sigma if the limit is 0) in {SLACK_SAMPLES} samples, "
-        f"while the plan has at least {PLANNED_SHARE:g} of the limit and its motor does not pull either (if the limit "
+        f"while the plan has at least {PLANNED_SHARE:g} of the limit, and the motor does not pull (if the limit "
         f"is a chord tension, which differs from T_A: 2 x {SIGMAS:g} sigma)"
     )
     reaction = Reaction.STOPPING
@@ -115,15 +115,15 @@ class Slack(Fault):
 
 STUCK_SAMPLES: Final = 50
 ODD_TIME: Final = 0.35  # duration of the contradiction [s]; ramps and oscillations of the platform are shorter
-DISPROVED: Final = 0.5  # share of full scale; a motor torque for less tension disproves the reading
-_STEP: Final = "The tension loop is off. Check cell, plug and amplifier when the platform stands, then acknowledge."
+DISPROVED: Final = 0.5  # share of full scale; a full-scale reading is wrong if the motor torque gives less tension
+_STEP: Final = "The tension loop is off. Check cell, plug and amplifier when the platform is at rest, then acknowledge."
 
 
 class CellLost(Fault):
-    """Load cell without a reading, in a motion: nothing monitors the tension of its cable any more."""
+    """Load cell without a reading during a motion, so that the tension of its cable is not monitored."""
 
     name = "cell lost"
-    rule = "a reading that is not a number, in a motion; its PLC does not wind in this cable any more"
+    rule = "a reading that is not a number, in a motion; the PLC then does not wind in this cable"
     reaction = Reaction.STOPPING
     within = "1 sample"
     lasting = True
@@ -140,7 +140,7 @@ class CellLost(Fault):
         seen.ignore_cells(lost)
         cell = int(np.argmax(lost))
         return (
-            f"the load cell of cable {cell} gives no reading; planned: {cycle.tension[cell]:.4g} N. Its PLC does not "
+            f"the load cell of cable {cell} gives no reading; planned: {cycle.tension[cell]:.4g} N. The PLC does not "
             "wind in this cable. Check cell, plug and amplifier, then acknowledge."
         )
 
@@ -217,7 +217,7 @@ class CellOff(Fault):
     """Load cell that contradicts the force balance of the platform."""
 
     name = "cell wrong"
-    rule = f"for {ODD_TIME:g} s the parity of the cells is > {SIGMAS:g} sigma and names this cell, for any load"
+    rule = f"for {ODD_TIME:g} s the largest parity of the cells is > {SIGMAS:g} sigma, independent of the load"
     reaction = Reaction.DEGRADED
     within = "0.5 s"
     lasting = True
@@ -226,11 +226,11 @@ class CellOff(Fault):
         """Begin without suspected cells."""
         super().__init__(seen)
         self._samples = round(ODD_TIME / seen.period)
-        self._side = np.zeros(len(seen.group_of))  # sign of each error beyond the limit in the previous cycle
+        self._side = np.zeros(len(seen.group_of))  # sign of each error above the limit in the previous cycle, or 0
         self._quiet = True
 
     def found(self, cycle: Cycle) -> str | None:
-        """Wrong cell, reported once; the other cells cannot be compared while one cell is in doubt."""
+        """Wrong cell, reported once. While one cell is wrong, the other cells cannot be compared."""
         seen = self.seen
         error = self._error(cycle)
         limit = SIGMAS * seen.sigma
@@ -240,7 +240,7 @@ class CellOff(Fault):
                 self._side.fill(0.0)
                 self._quiet = True
             return None
-        # oscillations of the platform change sign within ODD_TIME, and the filter is fast enough to show this
+        # oscillations of the platform change their sign within ODD_TIME; the filter is fast enough for this
         side = np.sign(error) * (np.abs(error) > limit)
         self._for = np.where(side != 0.0, np.where(side == self._side, self._for + 1, 1), 0)
         self._side = side

@@ -14,15 +14,15 @@ from sagline.control.link import CHECK, COUNTERS, Command, GroupStatus, Mode, Sa
 from sagline.core.arrays import Array
 
 JUMP: Final = 1e-3  # largest jump [m per cycle]
-OFF_BEAT: Final = 1.5  # allowed difference between a PLC's clock and its accepted commands [cycles]
+OFF_BEAT: Final = 1.5  # allowed difference of elapsed cycles and accepted commands of a PLC
 CATCHING_UP: Final = 10  # wait after a larger difference [cycles]
 FOLLOWING: Final = 5e-3  # largest distance from a set point [m]
 SATURATED: Final = 0.2  # duration of the fault [s]
-IDLE: Final = 3  # number of samples within which a group must begin to follow
+IDLE: Final = 3  # largest number of samples until a group begins to follow
 _AT_LIMIT, _ENABLED = int(WinchState.SATURATED), int(WinchState.ENABLED)
 _FOLLOWING, _FOLLOW = int(GroupStatus.FOLLOWING), int(Mode.FOLLOW)
-REMEMBERED: Final = 32  # [commands], more than can be in transit
-LONGEST: Final = 1.0  # longest time between two samples of a PLC [s]; a longer time means that its clock was reset
+REMEMBERED: Final = 32  # [commands], more commands than can be in transit
+LONGEST: Final = 1.0  # longest time between two samples of a PLC [s]; after a longer time, the clock was reset
 
 
 class EncoderJump(Fault):
@@ -30,9 +30,9 @@ class EncoderJump(Fault):
 
     name = "encoder jump"
     rule = (
-        f"|change of length - rate x time| > {1e3 * JUMP:g} mm per cycle between two samples, for the rate in "
+        f"|change of length - rate x time| > {1e3 * JUMP:g} mm per cycle between two samples, both for the rate in "
         "the first sample and for the rate of the set points, if the drive has power and is not at its limit, and its "
-        f"PLC got its commands in time for the last {CATCHING_UP} cycles; or the length is not a number"
+        f"PLC received its commands in time for the last {CATCHING_UP} cycles; or the length is not a number"
     )
     reaction = Reaction.STOPPING
     within = "10 ms"
@@ -60,7 +60,7 @@ class EncoderJump(Fault):
         return self._jump(cycle, sample, before) if known and before is not None else None
 
     def _jump(self, cycle: Cycle, sample: Sample, before: Sample) -> str | None:
-        """Message if a length jumps relative to the previous rate, else None; the rate after a jump may include it."""
+        """Message if a length jumps relative to the previous rate; the rate after a jump may be wrong."""
         passed = (sample.plc_time - before.plc_time)[self.seen.group_of]
         change = sample.length - before.length
         jump = change - before.rate * passed
@@ -69,10 +69,10 @@ class EncoderJump(Fault):
         jump = np.abs(jump)
         if cycle.command is not None:
             jump = np.minimum(jump, np.abs(change - cycle.command.rate * passed))
-        # a locked drum stops immediately, and a drive at its force limit moves with the cable
+        # only drives that can follow: a locked drum stops immediately, a drive at its force limit moves with the cable
         free = (sample.state == _ENABLED) & (before.state == _ENABLED)
         free &= (passed >= 0.0) & (passed < LONGEST)
-        # after some cycles without commands, a drive moves to the next set point at its largest speed
+        # a drive without commands for some cycles moves to the next set point at its largest speed
         free &= (self._regular >= CATCHING_UP)[self.seen.group_of]
         allowed = JUMP * np.maximum(1.0, passed / self.seen.period)  # rates may have changed more during a gap
         jumped = free & ~(jump <= allowed)
@@ -117,7 +117,7 @@ class FollowingError(Fault):
         winch = int(np.argmax(np.where(far, away, 0.0)))
         return (
             f"winch {winch} is {1e3 * away[winch]:.4g} mm from its set point; allowed: {1e3 * FOLLOWING:g} mm. "
-            "Check what blocks it, acknowledge, and home again."
+            "Check what blocks the winch, acknowledge, and home again."
         )
 
     def _away(self, cycle: Cycle) -> Array:
@@ -130,13 +130,13 @@ class FollowingError(Fault):
         away = np.zeros(length.size)
         for g, echo in enumerate(cycle.sample.echo.tolist()):
             k = sent.get(echo, 0)
-            if k == 0 or not cycle.sample.status[g] & _FOLLOWING:  # not known: no previous command, or not following
+            if k == 0 or not cycle.sample.status[g] & _FOLLOWING:  # unknown: no previous command, or not in follow mode
                 continue
             mine = self.seen.group_of == g
             last, first = self._sent[k], self._sent[k - 1]
             low, high = np.minimum(first.length, last.length), np.maximum(first.length, last.length)
             out = np.maximum(np.maximum(low - length, length - high), 0.0)
-            # a length that is not finite has an infinite distance
+            # infinite for a length that is not finite
             away[mine & last.enable] = np.where(np.isfinite(out), out, np.inf)[mine & last.enable]
         return away
 
@@ -146,7 +146,7 @@ class NotFollowing(Fault):
 
     name = "group does not follow"
     rule = (
-        f"a group has accepted none of the last {BEHIND} follow commands, or {IDLE + 1} samples in succession do not "
+        f"a group has accepted none of the last {BEHIND} follow commands, or {IDLE + 1} consecutive samples do not "
         "report that the group follows them"
     )
     reaction = Reaction.STOPPING
@@ -173,10 +173,10 @@ class NotFollowing(Fault):
             return None
         asked = {int(group) for group in self.seen.group_of[command.enable]}
         for g in sorted(asked):
-            missed = behind[g] - round(float(sample.age[g]) / self.seen.period)  # without later ones
+            missed = behind[g] - round(float(sample.age[g]) / self.seen.period)  # without later commands
             if missed > BEHIND:
                 return (
-                    f"group {g} has taken no command for {missed} cycles; allowed: {BEHIND}. {CHECK}, then acknowledge."
+                    f"group {g} accepts no command for {missed} cycles; allowed: {BEHIND}. {CHECK}, then acknowledge."
                 )
             if self._idles(cycle, g) > IDLE:
                 return (
@@ -222,7 +222,7 @@ class ServoSaturated(Fault):
 
 
 class CorrectionAtLimit(Fault):
-    """Fault: a correction of the tension loop is larger than the error of any good encoder."""
+    """Fault: a correction of the tension loop is so large that no good encoder can have this error."""
 
     name = "correction at its limit"
     rule = "the tension loop has changed a length by the allowed maximum, 5 mm by default"

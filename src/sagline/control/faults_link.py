@@ -1,4 +1,4 @@
-"""Faults between controller and machine: blocks, grants, PLCs, clock, recording."""
+"""Faults between controller and machine: blocks, ownership, PLCs, clock, recording."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ STALE, SILENT = 3, 10  # largest age [cycles]
 WINDOW: Final = 100  # length of the evaluated window [cycles]
 LATE, LATE_OFTEN, LOST = 0.02, 0.005, 0.1  # delay of a late cycle [s]
 OFTEN: Final = 3  # largest number of late cycles per window
-ROUNDING: Final = 1e-6  # tolerance, as a share of an age
+ROUNDING: Final = 1e-6  # relative tolerance of an age
 
-# plain integers, because members of an enumeration make each array operation four times slower
+# plain integers, because array operations with members of an enumeration are four times slower
 _LOCKED, _EMERGENCY, _PRESSED = int(GroupStatus.LOCKED), int(GroupStatus.EMERGENCY), int(GroupFault.EMERGENCY_STOP)
 _TRIPPED, _LEAVE = int(WinchState.FAULT), int(Mode.LEAVE)
 
-_FREE: Final = "Free this computer of other work."
+_FREE: Final = "Stop other programs on this computer."
 
 
 class _Old(Fault):
@@ -44,14 +44,12 @@ class GroupStale(_Old):
     """Fault: a group is late; the tension loop is off until the group answers again."""
 
     name = "group stale"
-    rule = (
-        f"the newest sample of a group is {STALE} cycles old: it is silent, or its blocks are repeated, late or invalid"
-    )
+    rule = f"the newest sample of a group is {STALE} cycles old, as blocks are missing, repeated, late or invalid"
     reaction = Reaction.DEGRADED
     within = "30 ms"
     quiet = 1.0
     cycles = STALE
-    step = "The tension loop is off until it is back."
+    step = "The tension loop is off until the group answers."
 
 
 class GroupSilent(_Old):
@@ -66,10 +64,10 @@ class GroupSilent(_Old):
 
 
 class BlockDiscarded(Fault):
-    """Fault: a group sends invalid blocks; without valid ones, it becomes stale."""
+    """Fault: a group sends invalid blocks; a group without valid blocks becomes stale."""
 
     name = "block discarded"
-    rule = "torn or foreign (by its counters, magic, version or size), repeated, or older than an earlier block"
+    rule = "incomplete or foreign (by its counters, magic, version or size), repeated, or older than an earlier block"
     reaction = Reaction.EVENT
     within = "1 cycle"
 
@@ -79,7 +77,7 @@ class BlockDiscarded(Fault):
         self._quiet, self._line = WINDOW, ""
 
     def found(self, cycle: Cycle) -> str | None:
-        """Group and number of its discarded blocks; the fault ends after one second without another one."""
+        """Group and number of its discarded blocks; the fault ends after one second without a discarded block."""
         sample, before = cycle.sample, cycle.before
         self._quiet += 1
         if before is not None and sample.discarded.tolist() != before.discarded.tolist():
@@ -93,15 +91,15 @@ class BlockDiscarded(Fault):
 
 
 class OwnerLost(Fault):
-    """Grant lost."""
+    """Ownership lost."""
 
     name = "owner lost"
-    rule = "the grant of a group changes after the connection had all grants"
+    rule = "the owner of a group changes after the controller owned all groups"
     reaction = Reaction.STOPPING
     within = "1 cycle"
 
     def found(self, cycle: Cycle) -> str | None:
-        """First group whose grant belongs to another owner or to none."""
+        """First group that another controller or no controller owns."""
         command = cycle.command
         if command is None or command.mode == _LEAVE:
             return None
@@ -109,7 +107,7 @@ class OwnerLost(Fault):
         if owners.count(command.owner) == len(owners):
             return None
         group, owner = next((g, owner) for g, owner in enumerate(owners) if owner != command.owner)
-        who = f"controller {owner} has its grant" if owner else "no controller has its grant"
+        who = f"controller {owner} owns it" if owner else "no controller owns it"
         return f"group {group}: {who}; expected: {command.owner}. Stop the other controller, then connect again."
 
 
@@ -191,7 +189,7 @@ class CycleLate(Fault):
         self._late: deque[tuple[int, float]] = deque()  # times and delays in the window
 
     def found(self, cycle: Cycle) -> str | None:
-        """Latest cycle of the last second, or the number of late ones."""
+        """Text of the latest cycle of the last second, or of the number of late cycles."""
         self._cycle += 1
         late = self._late
         if LATE_OFTEN < cycle.late <= LOST:
@@ -242,6 +240,4 @@ class RecordingStopped(Fault):
         if not cycle.recording:
             return None
         why = cycle.recording if len(cycle.recording) <= 120 else cycle.recording[:117] + "..."
-        return (
-            f"recording has stopped: {why}. The motion continues; written data are kept. Free space for the next one."
-        )
+        return f"recording has stopped: {why}. The motion continues; written data are kept. Free some disk space."

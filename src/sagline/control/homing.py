@@ -1,4 +1,4 @@
-"""Homing: the operator names the pose of the platform, and jogs winches until the tensions agree with it."""
+"""Homing: the operator states the pose of the platform, and jogs winches until the tensions agree with this pose."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from sagline.robot.robot import Robot
 from sagline.statics.stiffness import stiffness
 from sagline.tension.method import TensionMethod
 
-WINDOW: Final = 50  # number of samples at rest for the mean
-MOST: Final = 1.2  # largest ratio to the plan's tension; a larger tension ends a jog
+WINDOW: Final = 50  # number of samples in a mean at rest
+MOST: Final = 1.2  # ratio to the planned tension; a jog ends at a larger tension
 
 
 class Homing:
-    """Plan at the named pose, and comparison of tensions and lengths with it.
+    """Plan at the stated pose, and comparison of tensions and lengths with the plan.
 
     Attributes:
         plan: Plan of the robot at that pose.
@@ -34,22 +34,22 @@ class Homing:
         tension: T_A at the pose [N], shape (m,).
         sigma: Standard deviation of the load cells [N], shape (m,).
         off: Mean of the measured minus the planned tensions [N], shape (m,).
-        tolerance: Largest difference of a length without confirmation [m], shape (m,); infinite if the machine has no
-            valid lengths.
-        apart: Lengths of the machine minus those of the plan [m], shape (m,).
+        tolerance: Largest difference of a length that needs no confirmation [m], shape (m,); infinite if the machine
+            has no valid lengths.
+        apart: Lengths of the machine minus lengths of the plan [m], shape (m,).
         zero: Offset added to the lengths of samples after homing [m], shape (m,).
         agrees: True if every tension is within 5 sigma.
-        confirmed: True if the operator has confirmed the pose against the lengths of the machine.
+        confirmed: True if the operator has confirmed the pose, although lengths of the machine differ.
     """
 
     def __init__(
         self, robot: Robot, pose: Pose, model: CableModel, method: TensionMethod, zero: Array | float = 0.0
     ) -> None:
-        """Plan the named pose; zero: present offset of the lengths, not zero after an earlier homing [m], (m,)."""
+        """Plan the stated pose; zero: present offset of the lengths from an earlier homing [m], (m,)."""
         self.plan = inverse(robot, pose, model, method)
         if not self.plan.solved:
             gap = self.plan.gaps[0]
-            step = "Name another pose: every cable must pull there."
+            step = "State another pose, at which every cable is under tension."
             reason = "is unstable" if self.plan.feasible else "has no tensions within the limits"
             raise RefusedError("homing", f"the pose {reason}, {gap.status.name}", step)
         self.state = self.plan.state
@@ -68,7 +68,7 @@ class Homing:
 
     @property
     def conflicts(self) -> bool:
-        """True if the tensions agree, but a length of the machine does not, and the operator has not confirmed this."""
+        """True if the tensions agree, but a length does not agree and the operator has not confirmed the pose."""
         return self.agrees and not self._accepted
 
     @property
@@ -89,7 +89,7 @@ class Homing:
     def look(self, sample: Sample) -> bool:
         """Add a sample at rest; returns True if the samples are sufficient and agree with the plan."""
         if self._counter.size and bool((sample.counter == self._counter).any()):
-            return False  # a group repeats its previous sample
+            return False  # a group has repeated its sample
         self._counter = sample.counter
         self._count += 1
         self._lengths += sample.length
@@ -125,11 +125,11 @@ class Homing:
 
     @property
     def _place(self) -> str:
-        """Pose of the platform by the lengths of the machine."""
+        """Text of the platform's pose from the lengths of the machine."""
         return place_of(self._robot, self.state.unstrained_length + self.apart, self._pose, self._model)
 
     def _conflict(self) -> RefusedError:
-        """Error with both values of the length that differs most, and the pose for the lengths of the machine."""
+        """Error with both values of the length that differs most, and the pose from the lengths of the machine."""
         ratio = np.abs(self.apart) / self.tolerance
         i = int(np.argmax(np.where(np.isfinite(self.apart), ratio, np.inf)))
         there, planned = self.state.unstrained_length + self.apart, self.state.unstrained_length
@@ -139,7 +139,7 @@ class Homing:
             f"cable {i}: {1e3 * there[i]:.1f} mm in the machine, {1e3 * planned[i]:.1f} mm from homing, allowed "
             f"difference {1e3 * self.tolerance[i]:.1f} mm; {self._place}"
         )
-        step = "Measure the pose; home there, or confirm: home --confirm, confirm_homing() in Python."
+        step = "Measure the pose; home at the measured pose, or confirm: home --confirm, confirm_homing() in Python."
         return RefusedError("homing", reason, step)
 
     def _jog(self, off: Array) -> tuple[int, float]:
@@ -152,7 +152,7 @@ class Homing:
 
 
 class HomingJog:
-    """Set points of a jog of one winch while the pose is unknown."""
+    """Set points for a jog of one winch at an unknown pose of the platform."""
 
     def __init__(self, point: SetPoint, winch: int, by: float, period: float) -> None:
         """Begin at the lengths of the winches; by: change [m]; period [s]."""
@@ -174,5 +174,5 @@ class HomingJog:
 
 
 def jog_tension_limits(homing: Homing, sample: Sample) -> Array:
-    """Tension limits of a jog [N], shape (m,): 1.2 times the plan, or the present tension if that is larger."""
+    """Tension limits of a jog [N], (m,): 1.2 times the planned tension, or the present tension if it is larger."""
     return np.maximum(MOST * homing.tension, sample.tension + 3.0 * homing.sigma)

@@ -50,10 +50,10 @@ def winch_lengths(length: Array, winch: int, by: float, period: float) -> tuple[
 def winch_jog(
     robot: Robot, length: Array, here: Pose, winch: int, by: float, period: float, model: CableModel
 ) -> Motion:
-    """Plan and check a jog of one winch by a length [m] from lengths at rest (m,); the platform moves too."""
+    """Plan and check a jog of one winch by a length [m] from lengths at rest (m,); this moves the platform."""
     lengths, rates = winch_lengths(length, winch, by, period)
     found = forward(robot, lengths, here, model)
-    what, step = f"a jog of winch {winch} by {1e3 * by:+g} mm", "Jog it by less, or another one."
+    what, step = f"a jog of winch {winch} by {1e3 * by:+g} mm", "Jog it by less, or jog another winch."
     if not found.solved.all():
         k = int(np.argmin(found.solved))
         reason = f"after {1e3 * abs(lengths[k, winch] - lengths[0, winch]):.2g} mm the platform has no equilibrium"
@@ -63,7 +63,7 @@ def winch_jog(
         ("tension_min", robot.tension_min, tension < robot.tension_min),
         ("tension_max", robot.tension_max, tension > robot.tension_max),
     ):
-        leaves = wrong & ~wrong[0]  # a winch beyond the limit can be jogged back
+        leaves = wrong & ~wrong[0]  # a cable beyond its limit may be jogged back
         if leaves.any():
             k, i = (int(index) for index in np.argwhere(leaves)[0])
             reason = f"cable {i} would have {tension[k, i]:.3g} N; allowed: its {name}, {limit[i]:.3g} N"
@@ -82,7 +82,7 @@ def winch_jog(
 
 
 class PlatformJog:
-    """Jog of the platform along a straight line; each pose is solved in its cycle."""
+    """Jog of the platform along a straight line; each cycle computes one pose."""
 
     def __init__(
         self,
@@ -114,7 +114,7 @@ class PlatformJog:
         self._fade = Fade(lead, period)
 
     def step(self) -> SetPoint:
-        """Set point of the next cycle; if its pose has no solution, the last set point, with the reason in `failed`."""
+        """Set point of the next cycle; for a pose without solution, the last set point, and the reason in `failed`."""
         self._cycle = min(self._cycle + 1, self._count)
         share = self._cycle / self._count
         found = self._solver.step(*self._at(smooth(share)))
@@ -157,10 +157,10 @@ class PlatformJog:
 
 
 def checked_displacement(by: ArrayLike) -> Array:
-    """Checked displacement and rotation vector of the platform, shape (6,); a rotation that is not given is zero."""
+    """Checked displacement and rotation vector of the platform, shape (6,); the default rotation is zero."""
     given = checked(by, "by", "m or rad")
     if given.shape not in ((3,), (6,)):
-        step = "Give a displacement, or that and a rotation vector."
+        step = "Give a displacement, or a displacement and a rotation vector."
         raise InvalidValueError("by", f"of shape {given.shape}", "shape (3,) or (6,)", step)
     whole = np.zeros(6)
     whole[: given.size] = given
@@ -172,4 +172,4 @@ def checked_displacement(by: ArrayLike) -> Array:
 def _at_most(by: float, unit: str, most: float) -> float:
     if abs(by) <= most:
         return by
-    raise InvalidValueError("by", f"{by:g} {unit}", f"up to {most:g} {unit} at a time", "Jog in parts, or go there.")
+    raise InvalidValueError("by", f"{by:g} {unit}", f"up to {most:g} {unit} at a time", "Jog in parts, or use go_to.")

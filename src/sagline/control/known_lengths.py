@@ -1,4 +1,4 @@
-"""Lengths that a machine has, as evidence in homing: their tolerance, and the pose that they give."""
+"""Lengths of a machine as evidence in homing: tolerance of the lengths, and pose from the lengths."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from sagline.robot.robot import Robot
 from sagline.robot.tolerances import UNCERTAIN
 from sagline.robot.winch import Winch
 
-_SHARE: Final = 1e-3  # step of the derivatives, as a share of a standard deviation
-_READING: Final = ("length_zero", "drum_radius")  # quantities that determine the length for a count
+_SHARE: Final = 1e-3  # step of the derivatives, in standard deviations
+_READING: Final = ("length_zero", "drum_radius")  # quantities that convert counts to lengths
 
 
 def length_tolerance(robot: Robot, state: Equilibrium, model: CableModel) -> Array:
-    """Largest difference between the lengths of a machine and those of homing, 5 sigma [m], shape (m,).
+    """Largest difference between lengths of a machine and lengths from homing, 5 sigma [m], shape (m,).
 
-    Sources of the difference: the load cells, the encoders' resolution, and the tolerances of the robot, or the
-    standard errors of its calibration if they are smaller. Each error is propagated to the length at the pose of the
-    state for the tensions of the state.
+    The sources of the difference are the load cells, the resolution of the encoders, and the tolerances of the robot,
+    or the standard errors of its calibration if they are smaller. Each error changes the length at the pose and the
+    tensions of the state.
     """
     winches = robot.winches
     assert winches is not None  # a controller needs the drums
@@ -41,7 +41,7 @@ def length_tolerance(robot: Robot, state: Equilibrium, model: CableModel) -> Arr
         variance += np.square(errors.get("drum_radius", 0.0) * (length - winches.length_zero) / lever)
     if winches.counts_per_turn is not None:
         count = 2.0 * np.pi * lever / np.abs(winches.gear * winches.counts_per_turn)
-        variance += count**2 / 12.0  # a rounded value is distributed uniformly over one count
+        variance += count**2 / 12.0  # rounding error: uniform distribution over one count
     return np.asarray(SIGMAS * np.sqrt(variance))
 
 
@@ -53,7 +53,7 @@ def _at_pose(robot: Robot, state: Equilibrium, model: CableModel) -> Iterator[Ar
     stretch = 1.0 + winches.winding_tension / robot.cables.axial_stiffness
 
     def change(other: Robot, more: Array | float = 0.0) -> Array:
-        """Change of the lengths of homing, for another robot or larger readings [N], per `_SHARE`."""
+        """Change of the lengths from homing with another robot or larger readings [N], divided by `_SHARE`."""
         there, here = (
             _zeros(home(some, state.pose, read, model=model).winches)
             for some, read in ((other, reading + more), (robot, reading))
@@ -62,7 +62,7 @@ def _at_pose(robot: Robot, state: Equilibrium, model: CableModel) -> Iterator[Ar
 
     yield change(robot, _SHARE * cell_sigma(robot))
     for name, error in _standard_errors(robot).items():
-        if name in _READING or not UNCERTAIN[name].each:  # the load has no influence at known tensions
+        if name in _READING or not UNCERTAIN[name].each:  # the load has no effect, because the tensions are known
             continue
         if not np.isfinite(error).all():
             yield np.full(robot.cable_count, math.inf)
@@ -79,7 +79,7 @@ def _zeros(winches: Winch | None) -> Array:
 
 
 def _standard_errors(robot: Robot) -> dict[str, Array]:
-    """Tolerances by name, or finite standard errors of the calibration where they are smaller."""
+    """Standard errors by name: the tolerances, or the errors of the calibration if they are finite and smaller."""
     errors = dict(robot.tolerances)
     for name, error in {} if robot.calibration is None else robot.calibration.standard_error.items():
         errors[name] = np.minimum(error, errors.get(name, np.where(np.isfinite(error), error, 0.0)))
@@ -97,12 +97,12 @@ def _varied(robot: Robot, name: str, change: Array) -> Robot:
 
 
 def place_of(robot: Robot, length: Array, stated: Pose, model: CableModel) -> str:
-    """Pose for given lengths [m] (m,), and its distance from the stated pose, as text."""
+    """Text of the pose for given lengths [m] (m,), and of the distance from the stated pose."""
     found = forward(robot, length, start=stated, model=model)
     if not found.stable:
-        return "by its lengths the platform has no equilibrium near the stated pose"
+        return "at its lengths, the platform has no equilibrium near the stated pose"
     x, y, z = np.round(found.pose.position, 3) + 0.0  # no negative zero
     apart = 1e3 * float(np.linalg.norm(found.pose.position - stated.position))
     turn = 2.0 * math.acos(min(abs(float(found.pose.quaternion @ stated.quaternion)), 1.0))
     away = f"{apart:.1f} mm and {math.degrees(turn):.1f} degrees away"
-    return f"by its lengths the platform is at ({x:.3f}, {y:.3f}, {z:.3f}) m, {away}"
+    return f"at its lengths, the platform is at ({x:.3f}, {y:.3f}, {z:.3f}) m, {away}"

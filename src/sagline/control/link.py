@@ -15,20 +15,20 @@ Whole: TypeAlias = NDArray[np.int64]
 
 PERIOD: Final = 0.01  # period of the controller's cycle [s]; the article uses 100 samples per second
 GROUP_SIZE: Final = 2  # number of winches per PLC
-COUNTERS: Final = 2**31 - 1  # counters of commands and blocks run from 1 to this value, then start at 1 again
-HEARTBEAT: Final = 0.1  # [s], a PLC ramps its winches down and holds if the command counter is unchanged for this time
-OWNER_TIMEOUT: Final = 0.5  # [s], another controller may take over if the command counter is unchanged for this time
-CHECK: Final = "Check that its PLC or the twin runs, and its connection"  # next step about a silent group
-RAMP: Final = 0.2  # duration of the ramp of rates to zero, here and in a PLC [s]
+COUNTERS: Final = 2**31 - 1  # largest counter of commands and blocks; counters start at 1 again after this value
+HEARTBEAT: Final = 0.1  # [s], a PLC stops its winches with a ramp if the command counter does not change for this time
+OWNER_TIMEOUT: Final = 0.5  # [s], another controller may become the owner if the counter does not change for this time
+CHECK: Final = "Check that its PLC or the twin runs, and its connection"  # next step for a silent group
+RAMP: Final = 0.2  # duration of the ramp of rates to zero, in the controller and in a PLC [s]
 
 
 class Mode(IntEnum):
     """Task of the drives in a command."""
 
-    LEAVE = 0  # brakes on; the grant is given back
+    LEAVE = 0  # brakes on; the controller gives up the ownership
     HOLD = 1  # hold the present position
     FOLLOW = 2  # follow the set points
-    LOCK = 3  # stop the drums immediately, and keep them locked until the operator of the machine releases them
+    LOCK = 3  # stop the drums immediately; they stay locked until the operator of the machine releases them
 
 
 class GroupStatus(IntFlag):
@@ -50,10 +50,10 @@ class GroupFault(Status):
     HEARTBEAT = 1, "no command came for 100 ms"  # the counter did not change, or a command was no longer valid
     OVER_TENSION = (
         2,
-        "a tension was too large, or its cell had no finite reading, while a cable was wound in",
-    )  # the winch only pays out cable
-    FOLLOWING_ERROR = 3, "a drive lagged too far behind its set points"
-    SET_POINT = 4, "a set point or a tension of a command was out of its range"
+        "a tension was too large, or a load cell had no finite reading, while the cable was wound in",
+    )  # the winch can then only pay out cable
+    FOLLOWING_ERROR = 3, "a drive was too far from its set points"
+    SET_POINT = 4, "a set point or a tension of a command was out of range"
     EMERGENCY_STOP = 5, "the emergency stop is pressed"
     DRIVE = 6, "a drive tripped"
 
@@ -83,9 +83,9 @@ class Command(NamedTuple):
         valid_for: Time for which a PLC may use the command [s].
         length: Set points of the unstrained lengths off the drums at the end of the cycle [m], shape (m,).
         rate: Their rates [m/s], shape (m,).
-        tension: Expected tensions at the drums, feedforward of the motors [N], shape (m,).
+        tension: Expected tensions at the drums, for the feedforward of the motors [N], shape (m,).
         enable: Drives that may move, shape (m,).
-        claims: True if the command claims grants of other owners; a command to leave never does so.
+        claims: True if the command claims groups of other owners; a command to leave claims no group.
     """
 
     counter: int
@@ -116,23 +116,24 @@ class Sample(NamedTuple):
 
     Attributes:
         time: Time of the request, on the link's clock [s].
-        age: Time since the newest valid block of each group arrived [s], shape (G,).
+        age: Time since the arrival of the newest valid block of each group [s], shape (G,).
         counter: Counter of each group's blocks, shape (G,).
-        plc_time: Time of writing, on the clock of each PLC [s], shape (G,).
-        owner: Owner of each grant, 0 for none, shape (G,).
+        plc_time: Time at which the block was written, on the clock of each PLC [s], shape (G,).
+        owner: Id of the controller that owns each group, 0 for none, shape (G,).
         echo: Counter of the last command accepted by each PLC, shape (G,).
         status: Bits of `GroupStatus`, shape (G,).
         fault: Codes of `GroupFault`, shape (G,).
         length: Unstrained lengths off the drums, from the encoders [m], shape (m,).
         rate: Their rates [m/s], shape (m,).
-        torque: Torque of the motors at their shafts, positive if it pays out cable [N m], shape (m,).
+        torque: Torque of the motors at their shafts [N m], shape (m,); positive in the direction that pays out cable.
         tension: T_A, tension at the frame ends measured by the load cells [N], shape (m,).
         filtered: T_A after the PLC's filter [N], shape (m,).
         counts: Encoder counts, shape (m,).
         state: Codes of `WinchState`, shape (m,).
         winch_fault: Fault codes of the drives, 0 for none, shape (m,).
         discarded: Number of invalid blocks of each group so far, shape (G,).
-        reasons: Reason of the last invalid block of each group, None before the first; empty if the link knows none.
+        reasons: Reason of the last invalid block of each group, None before the first one; empty if the link gives no
+            reasons.
     """
 
     time: float
@@ -187,8 +188,8 @@ class Link(Protocol):
     def exchange(self, command: Command | None) -> Sample | Missing:
         """Send a command and return the newest sample, without waiting for an answer.
 
-        `sent_to` returns the message for each group. A group receives the command only if the command's owner has the
-        grant.
+        `sent_to` returns the message for each group. A group receives the command only if the sender of the command
+        owns the group.
 
         Args:
             command: Command to send; None to read only.
@@ -207,27 +208,27 @@ class Sent(Enum):
 
 
 def sent_to(owner: int, command: Command) -> Sent:
-    """Message to a group whose grant has an owner; 0 for no owner."""
+    """Message to a group with this owner (0 for no owner) in a cycle; None for no message."""
     if owner == command.owner:
         return Sent.COMMAND
     return Sent.CLAIM if command.claims and command.mode != Mode.LEAVE else Sent.NOTHING
 
 
 def newer(counter: int, known: int) -> bool:
-    """True if a counter is ahead of another by less than half of the range."""
+    """True if a counter is ahead of another one by less than half of the range."""
     return 0 < (counter - known) % COUNTERS < COUNTERS // 2
 
 
 def no_news(counter: int, known: int) -> Refusal:
-    """Reason why a block with a counter that is not ahead of the newest one is discarded."""
+    """Reason to discard a block, because its counter is not ahead of the newest counter."""
     if counter == known:
         step = "Check that its PLC runs, and that a scan takes less than a cycle"
         return Refusal(f"its counter {counter} is repeated", step)
-    step = "Check that one PLC has this address, and that it does not restart"
-    return Refusal(f"it is older than the block before: its counter is {counter} after {known}", step)
+    step = "Check that only one PLC has this address, and that it does not restart"
+    return Refusal(f"it is older than the previous block: its counter is {counter} after {known}", step)
 
 
 def groups_of(cable_count: int) -> tuple[tuple[int, ...], ...]:
-    """Winches of each group: two neighbors share a PLC, the last winch may be alone."""
+    """Winches of each group: two neighbors have the same PLC, and the last winch may be alone."""
     winches = range(cable_count)
     return tuple(tuple(winches[i : i + GROUP_SIZE]) for i in range(0, cable_count, GROUP_SIZE))

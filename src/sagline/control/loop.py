@@ -1,4 +1,4 @@
-"""The control loop: one exchange, estimate, check for faults and next command in each cycle."""
+"""The control loop: each cycle exchanges data, estimates the pose, checks for faults and prepares the next command."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from sagline.control.execution import ExecutionStatus
 from sagline.control.link import Command, Missing, Mode, Sample
 from sagline.control.recording import EventKind, Recorded
 from sagline.control.set_points import SetPoint
-from sagline.control.states import HOLDS_GRANT, MOTION, State
+from sagline.control.states import MOTION, OWNING, State
 from sagline.core.arrays import Array
 
 FOLLOWING = (MOTION - {State.HOMING}) | {State.IDLE}
@@ -33,7 +33,7 @@ class Loop:
         self.active: ActiveState = Off(context)
 
     def cycle(self) -> None:
-        """One cycle; on any exception the drives hold, and the exception is raised again."""
+        """Run one cycle; after any exception, the drives hold and the exception is raised again."""
         try:
             self._cycle()
         except BaseException as error:
@@ -117,7 +117,7 @@ class Loop:
         return found[0] if found else ""
 
     def _break_off(self, error: BaseException) -> None:
-        """Command the PLCs to ramp the rates to zero, because the next cycle may never be called."""
+        """Command the PLCs to ramp the rates to zero, because there may be no next cycle."""
         c = self.context
         c.garbage.go_on()
         line = f"a cycle ended with {type(error).__name__}: {' '.join(str(error).split())[:160]}. The drives hold."
@@ -126,7 +126,7 @@ class Loop:
             off = Off(c, line)
             off.leave(None)
             self.active = off
-        elif c.state in HOLDS_GRANT and c.state is not State.EMERGENCY:
+        elif c.state in OWNING and c.state is not State.EMERGENCY:
             c.end_run(ExecutionStatus.FAULT, line)
             c.sender.stand_at(c.sample)
             c.run.paused = None
@@ -140,7 +140,7 @@ class Loop:
 
 
 def _aged(known: Sample | None, missing: Missing) -> Sample | None:
-    """Previous sample with a larger age if a link has no new sample; None if there was no sample before."""
+    """Previous sample with a larger age, if the link has no new sample; None without a previous sample."""
     if known is None:
         return None
     return known._replace(time=missing.time, age=known.age + (missing.time - known.time))

@@ -17,7 +17,7 @@ from sagline.robot.robot import Robot
 
 
 class Monitor:
-    """State, samples, events, estimate and execution of a controller; base of `Controller`."""
+    """State, samples, events, estimate and execution of a controller; base class of `Controller`."""
 
     def __init__(self, context: Context) -> None:
         """Begin with a loop in OFF."""
@@ -45,7 +45,7 @@ class Monitor:
 
     @property
     def zero(self) -> Array:
-        """Offsets of the measured lengths, from homing [m], shape (m,)."""
+        """Offsets that homing adds to the measured lengths [m], shape (m,)."""
         return self._context.zero
 
     @property
@@ -87,7 +87,7 @@ class Monitor:
 
     @property
     def clock(self) -> tuple[float, float] | None:
-        """Time on the path, and its duration [s]; None if no path is followed."""
+        """Time on the path, and duration of the path [s]; None if no path is followed."""
         source = self._loop.active.source
         if not isinstance(source, Along):
             return None
@@ -95,7 +95,7 @@ class Monitor:
 
     @property
     def execution(self) -> Execution | None:
-        """Last motion, or its cycles up to now; None before the first."""
+        """Last motion, or the cycles of a running motion until now; None before the first motion."""
         return self._context.execution()
 
     @property

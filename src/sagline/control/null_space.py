@@ -22,7 +22,7 @@ SIGMAS: Final = 5.0  # tolerance of a reading, in standard deviations
 OWN_DEVIATION: Final = 1.0  # deviation of a load cell without data [N]
 BIAS: Final = 2.0  # bias of a load cell without data [N], 0.1 % of 2 kN
 _LIFT: Final = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-_HIDDEN: Final = 1e-6  # an error counts as invisible if its visible part is below this share
+_HIDDEN: Final = 1e-6  # an error is not visible if its visible part is below this share
 
 
 def cell_sigma(robot: Robot) -> Array:
@@ -31,17 +31,17 @@ def cell_sigma(robot: Robot) -> Array:
 
 
 def cell_errors(robot: Robot) -> tuple[Array, Array]:
-    """Standard deviations of good load cells, and their largest biases [N], both of shape (m,)."""
+    """Standard deviations and largest biases of good load cells [N], both of shape (m,)."""
     winches, none = robot.winches, np.zeros(robot.cable_count)
     own, bias = (none, none) if winches is None else (winches.load_cell_deviation, np.abs(winches.load_cell_bias))
     return np.where(own > 0.0, own, OWN_DEVIATION), np.maximum(bias, BIAS)
 
 
 def balance_slope(state: Equilibrium) -> Array:
-    """Free components of d(wrench)/d(tension) at the frame ends, with a fixed platform, (..., n, m) [N/N, N m/N]."""
+    """Derivatives (..., n, m) [1, m] of the wrench by the tensions at the frame ends, with a fixed platform."""
     slopes = cable_slopes(state)
     wrench = on_platform(slopes.by_length, slopes.levers) / tension_slopes(state, slopes).by_length[..., None, :]
-    found: Array = -first_of(state.robot).freedom @ wrench  # the slopes refer to the force on the cable
+    found: Array = -first_of(state.robot).freedom @ wrench  # minus, because the slopes are of the force on the cable
     return found
 
 
@@ -49,11 +49,10 @@ def balance_slope(state: Equilibrium) -> Array:
 def parity(state: Equilibrium) -> Array:
     """Parity matrix for fault detection of load cells, independent of the weight of the load.
 
-    At rest, tension errors must not change the wrench, except in the direction of the load, whose weight may differ
-    from the plan. V is the projection onto all other changes of the wrench. Row i is V_i/sqrt(V_ii). Its product with
-    the tensions minus the plan is the best-fitting error of cell i, as far as the error is visible. The cell with the
-    largest product is reported. Without the exception for the load's direction, a load of another weight would look
-    like a wrong cell.
+    At rest, the measured tensions must give the planned wrench. Only the vertical force may differ, because the weight
+    of the load may be unknown. V is the projection onto all other changes of the wrench. Row i of the matrix is
+    V_i/sqrt(V_ii). The product of row i with the measured minus the planned tensions is the visible part of the
+    best-fitting error of cell i. The cell with the largest product is reported.
 
     Args:
         state: An equilibrium, single or N of them; a plan or a solution; or a robot and its poses.
@@ -89,13 +88,14 @@ def parity(state: Equilibrium) -> Array:
 
 
 class NullSpace(NamedTuple):
-    """Null-space and parity matrices at a pose, with N_L = `null_lengths` and K_A = `tension_sensitivity`.
+    """Null-space and parity matrices at a pose; N_L is `null_lengths`, and K_A is `tension_sensitivity`.
 
     Attributes:
-        projection: Pi = N_L N_L^T, projection of lengths onto those that do not move the platform, shape (..., m, m).
-        visible: K_A N_L G, projection of tensions onto those that such lengths change, shape (..., m, m); G = (K_A
-            N_L)^+.
-        correction: N_L G, lengths that compensate such tensions, shape (..., m, m) [m/N].
+        projection: Pi = N_L N_L^T, projection of changes of length onto changes that do not move the platform, shape
+            (..., m, m).
+        visible: K_A N_L G with G = (K_A N_L)^+, projection of tension errors onto errors that such changes of length
+            can correct, shape (..., m, m).
+        correction: N_L G, changes of length that correct such errors, shape (..., m, m) [m/N].
         parity: Parity matrix of the load cells, shape (..., m, m): see `parity`.
     """
 
@@ -109,9 +109,8 @@ class NullSpace(NamedTuple):
 def null_space(state: Equilibrium) -> NullSpace:
     """Changes of length that do not move the platform, to first order, and their effect on the tensions.
 
-    For eight cables, six of the eight directions of a tension error correspond to a wrench that is not in the plan,
-    such as a payload or an error of a load cell. Lengths that compensate such an error would move the platform. They
-    are excluded.
+    With eight cables, six of the eight directions of a tension error correspond to a wrench that is not in the plan,
+    for example of a payload. A correction of such an error would move the platform. Such corrections are excluded.
 
     Args:
         state: An equilibrium, single or N of them; a plan or a solution; or a robot and its poses.
@@ -142,7 +141,7 @@ def null_space(state: Equilibrium) -> NullSpace:
     return NullSpace(locked(projection), locked(slope @ inverse), locked(basis @ inverse), parity(state))
 
 
-EVERY: Final = 0.5  # time between rows [s]; 3 cm at the article's speed
+EVERY: Final = 0.5  # time between rows [s]; the platform moves 3 cm at the article's speed
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -156,7 +155,7 @@ class Gains:
 
     time: Array
     rows: tuple[NullSpace, ...]
-    _changes: tuple[float, ...]  # times with equal distances to two rows, R - 1 of them
+    _changes: tuple[float, ...]  # R - 1 middles between the times of the rows
 
     def at(self, time: float) -> NullSpace:
         """Matrices of the nearest pose in time.
@@ -172,11 +171,11 @@ def gains_along(plan: Plan, every: float = EVERY) -> Gains | None:
 
     Args:
         plan: Plan along a path, or of a single pose; feasible.
-        every: Time between two rows [s], > 0; the plan's samples nearest to these times are used.
+        every: Time between two rows [s], > 0; each row is at the nearest sample of the plan.
 
     Returns:
-        The table; None for a robot without redundancy, which has no tension loop, because its tensions follow from the
-        load.
+        The table. None for a robot without redundancy: it has no tension loop, because the load determines the
+        tensions.
 
     Raises:
         InvalidValueError: If the plan is of poses without a path, or has a pose without lengths.
@@ -199,7 +198,7 @@ def gains_along(plan: Plan, every: float = EVERY) -> Gains | None:
         return None
     if plan.path is None:
         if state.pose.shape:
-            raise InvalidValueError("plan", "of poses without a path", "a plan with times", "Plan a path of them.")
+            raise InvalidValueError("plan", "of poses without a path", "a plan with times", "Plan a path of the poses.")
         time, row = np.zeros(1), null_space(state)
         spaces = [row]
     else:

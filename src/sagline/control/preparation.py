@@ -1,4 +1,4 @@
-"""Requests other than motions: connecting, homing, stopping, acknowledging faults, and switching off."""
+"""Requests for connecting, homing, stopping, acknowledging faults, and switching off."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from sagline.control.states import RefusedError, State, check_transition
 from sagline.robot.pose import PoseLike, pose_of
 
 T = TypeVar("T")
-SETTLING: Final = 3.0  # longest time in which homing compares tensions [s]
+SETTLING: Final = 3.0  # longest time for the comparison of tensions in homing [s]
 
 
 class Preparation(Monitor):
-    """Connecting, homing, stopping, acknowledging and switching off; base of `Controller`."""
+    """Connecting, homing, stopping, acknowledging and switching off; base class of `Controller`."""
 
     def cycle(self) -> None:
         """Run one cycle: exchange data, estimate the pose, check for faults, and prepare the next command.
@@ -37,7 +37,7 @@ class Preparation(Monitor):
             RefusedError: If the controller is already connected, or is read-only.
         """
         if self._context.shadow:
-            raise RefusedError("connecting", "this controller only reads", "Make one without shadow.")
+            raise RefusedError("connecting", "this controller only reads", "Make a controller without shadow.")
         check_transition(self.state, State.CONNECTING, "connecting")
         self._loop.active = Connecting(self._context)
 
@@ -45,13 +45,13 @@ class Preparation(Monitor):
         """Connect, and wait until all groups agree.
 
         Raises:
-            RefusedError: If the groups do not agree; with the reason.
+            RefusedError: If the groups do not agree; the message contains the reason.
         """
         self.claim()
         connecting = self._loop.active
         self._run_while(lambda: self.state is State.CONNECTING or self._leaving)
         if self.state is not State.READY:
-            step = "Check the machine and who else controls it, then try again."
+            step = "Check the machine, and if another controller owns it; then try again."
             refused = connecting.claim.refused if isinstance(connecting, Connecting) else None
             raise (refused or Disagreement(self._context.run.reason, step)).refusal("connecting")
 
@@ -68,9 +68,9 @@ class Preparation(Monitor):
         if not isinstance(active, HomingState):
             check_transition(self.state, State.HOMING, "homing")
         elif active.source is not None:
-            raise RefusedError("homing", "a winch is being jogged", "Wait until it stands.")
+            raise RefusedError("homing", "a winch is being jogged", "Wait until it stops.")
         place = pose_of(pose)
-        present = c.zero - c.correction  # the tension loop has corrected the lengths, too
+        present = c.zero - c.correction  # the tension loop has also corrected the lengths
         homing = self._result_of(partial(Homing, c.robot, place, c.model, c.method, present))
         c.zero, c.homed = present, False
         c.reset_tension_loop()
@@ -89,28 +89,28 @@ class Preparation(Monitor):
             pose: A single pose.
 
         Raises:
-            RefusedError: If the tensions do not agree, and the message recommends a jog; or if they agree, but the
-                lengths of the machine do not. The state remains HOMING, and no length changes.
+            RefusedError: If the tensions do not agree; the message recommends a jog. Also if only the lengths of the
+                machine do not agree. The state remains HOMING, and no length changes.
         """
         self.begin_homing(pose)
         self._compare()
 
     def confirm_homing(self) -> None:
-        """Confirm the pose of `home` against the lengths of the machine, and wait until the tensions agree again.
+        """Confirm the pose of `home` although lengths of the machine differ, and wait until the tensions agree again.
 
         Raises:
-            RefusedError: If the last call of `home` did not report a difference of lengths, a winch has moved since, or
-                the tensions do not agree any more.
+            RefusedError: If the last call of `home` did not report a difference of lengths, a winch has moved after it,
+                or the tensions do not agree.
         """
         active = self._loop.active
         if not isinstance(active, HomingState) or not active.homing.conflicts:
-            reason = "no difference of lengths was reported, or a winch has moved since"
+            reason = "no difference of lengths was reported, or a winch has moved after the report"
             raise RefusedError("confirming", reason, "Home first: home(pose).")
         active.homing.confirmed, active.homing.agrees = True, False
         self._compare()
 
     def _compare(self) -> None:
-        """Wait until homing ends; raise an error if it does not."""
+        """Wait until homing ends; raise an error if it does not succeed."""
         last = self._context.number + round(SETTLING / self.period)
 
         def waits() -> bool:
@@ -126,7 +126,7 @@ class Preparation(Monitor):
             raise RefusedError("homing", reason, "Read the events.")
 
     def stop(self) -> None:
-        """Ramp all rates to zero, from the next cycle on; no effect if nothing moves."""
+        """Ramp all rates to zero from the next cycle on, if the robot moves."""
         self._loop.request_stop()
 
     def acknowledge(self) -> None:
@@ -135,7 +135,7 @@ class Preparation(Monitor):
         If the robot is idle and degraded, the load cells are used again.
 
         Raises:
-            RefusedError: In any other state, or if not all groups agree yet; with the reason.
+            RefusedError: In any other state, or if a group does not agree yet; the message contains the reason.
         """
         c, what = self._context, "acknowledging"
         if self.state is State.IDLE and self.degraded:
@@ -152,7 +152,7 @@ class Preparation(Monitor):
             self._loop.active = idle_at(c, found, "the pose is still known") or self._loop.active
 
     def off(self) -> None:
-        """Give all grants back, and wait until this is done; the brakes engage.
+        """Give up the ownership of all groups, and wait until this is done; the brakes engage.
 
         Raises:
             RefusedError: If the robot moves.
@@ -166,7 +166,7 @@ class Preparation(Monitor):
 
     @property
     def _leaving(self) -> bool:
-        """True in OFF until all grants are given back."""
+        """True in OFF until the ownership of all groups is given up."""
         return self.state is State.OFF and self._context.sender.command is not None
 
     def _run_while(self, condition: Callable[[], bool]) -> None:

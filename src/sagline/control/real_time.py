@@ -54,11 +54,11 @@ class Histogram:
 
     @property
     def counts(self) -> Indices:
-        """Number of durations in each bin, shape (1001,); the last bin has all durations from 100 ms on."""
+        """Number of durations in each bin, shape (1001,); the last bin contains all durations of 100 ms and more."""
         return locked(np.array(self._counts))
 
     def quantile(self, share: float) -> float:
-        """Quantile of the durations, rounded up to the end of its bin [s]; 0 without durations.
+        """Quantile of the durations [s], rounded up to the end of a bin; 0 without durations.
 
         Args:
             share: Share of all durations, 0 to 1.
@@ -67,7 +67,7 @@ class Histogram:
             InvalidValueError: If `share` is not a number in this range.
         """
         if not number(share, "share", "", low=0.0) <= 1.0:
-            raise InvalidValueError("share", f"{share:g}", "0 to 1", "Give 0.999 for what 999 of 1000 do not exceed.")
+            raise InvalidValueError("share", f"{share:g}", "0 to 1", "Give 0.999 for the limit of 999 of 1000 cycles.")
         counts = np.cumsum(self._counts)
         if not counts[-1]:
             return 0.0
@@ -76,10 +76,10 @@ class Histogram:
 
 
 class Pace:
-    """Wait for the next tick of a clock without drift; ticks are one period apart for any duration of a cycle.
+    """Wait for the next tick of a clock without drift; the duration of a cycle has no effect on the ticks.
 
-    The wait sleeps and does not spin, because threads of the link require the time. If a cycle is late by more than a
-    period, the ticks start again at that time, so that missed set points are not sent in a burst.
+    The thread sleeps during the wait, because threads of the link need the processor. If a cycle is late by more than a
+    period, the ticks start again at that time, so that missed set points are not sent all at once.
     """
 
     def __init__(self, period: float = PERIOD) -> None:
@@ -89,7 +89,7 @@ class Pace:
             period: Time between two ticks [s], > 0.
 
         Raises:
-            InvalidValueError: If `period` is not such a number.
+            InvalidValueError: If `period` is not a positive number.
         """
         self.period = number(period, "period", "s", above=0.0)
         self.lateness = Histogram()
@@ -124,7 +124,7 @@ def set_priority(priority: int) -> None:
         priority: 1 to 99; the kernel's own threads have 50.
 
     Raises:
-        InvalidValueError: If the priority is out of its range, the right is missing, or this system has no such
+        InvalidValueError: If the priority is out of range, the permission is missing, or this system has no such
             scheduler.
     """
     level = whole_number(priority, "priority", 1, 99)
@@ -139,7 +139,7 @@ def set_priority(priority: int) -> None:
 
 
 class Garbage:
-    """Switch of the garbage collection, which is off during motion because it takes longer than a cycle."""
+    """Switch of the garbage collection. It is off during motion, because it can take longer than a cycle."""
 
     def __init__(self) -> None:
         """Begin without a change."""
@@ -160,7 +160,7 @@ class Garbage:
 
 @contextmanager
 def interrupt_calls(stop: Callable[[], object]) -> Iterator[None]:
-    """Context of the main thread in which the first Ctrl-C calls a function; KeyboardInterrupt is raised at the end."""
+    """Context of the main thread: the first Ctrl-C calls a function, and KeyboardInterrupt is raised at the end."""
     before = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or not callable(before):
         yield
@@ -212,7 +212,7 @@ HEIGHTS = (0.25, 0.5, 0.1, 0.75)  # depths below the frame anchors, as shares of
 
 
 def load_kernels(robot: Robot, period: float, model: CableModel, method: TensionMethod) -> None:
-    """Run homing, a path and jogs once near the middle of a robot to load their kernels; rejections are ignored."""
+    """Run homing, a path and jogs once near the middle of a robot, to load the kernels; rejections are ignored."""
     middle, homing = _first_feasible(robot, model, method)
     beside = Pose.from_euler(middle.position + np.array([MOVE, 0.0, 0.0]), 0.0, 0.0, 0.0)
     path, by = septic_path([middle, beside], speed=0.1), np.full(6, 1e-3)
@@ -231,7 +231,7 @@ def load_kernels(robot: Robot, period: float, model: CableModel, method: Tension
 
 
 def _first_feasible(robot: Robot, model: CableModel, method: TensionMethod) -> tuple[Pose, Homing | None]:
-    """First position with tensions within the limits; otherwise the middle, and None."""
+    """First position with tensions within the limits, and its plan; without such a position, the middle and None."""
     for place in _probable_positions(robot):
         pose = Pose.from_euler(place, 0.0, 0.0, 0.0)
         with suppress(SaglineError):

@@ -24,7 +24,7 @@ class EventKind(StrEnum):
 
     STATE = "state"  # change of state
     FAULT = "fault"
-    NOTE = "note"  # note for the operator, without consequences
+    NOTE = "note"  # note for the operator; no effect on the controller
 
 
 class Event(NamedTuple):
@@ -34,7 +34,7 @@ class Event(NamedTuple):
         time: Time on the link's clock [s].
         cycle: Index of the controller's cycle, from 0.
         kind: State, fault or note.
-        name: The state that was entered, or the fault.
+        name: Name of the new state, or of the fault.
         state: State of the controller after the event.
         text: One line for the operator.
     """
@@ -47,7 +47,7 @@ class Event(NamedTuple):
     text: str
 
 
-# record of a cycle with m winches and G groups: real numbers, then whole numbers
+# record of a cycle with m winches and G groups: names of real numbers, then of whole numbers
 REAL_OWN: Final = ("time", "late", "clock")
 PLACE: Final = (("position", 3), ("quaternion", 4))
 REAL_OF_GROUPS: Final = ("age", "plc_time")
@@ -59,7 +59,7 @@ WHOLE_OF_WINCHES: Final = ("counts", "state", "winch_fault")
 
 
 class Recorded(NamedTuple):
-    """Record of one cycle. Its arrays are not modified later.
+    """Record of one cycle. The arrays are not modified later.
 
     Attributes:
         number: Index of the cycle, from 0.
@@ -71,10 +71,10 @@ class Recorded(NamedTuple):
         answer: Answer of the link.
         position: Position of the platform's origin, from the encoders [m], shape (3,); NaN before homing.
         quaternion: Rotation platform -> world from the encoders, scalar last, shape (4,).
-        estimate: Code of the `ForwardStatus`; -1 if there is none.
+        estimate: Code of the `ForwardStatus`; -1 without an estimate.
         zero: Offset from homing, added to lengths of samples and subtracted from set points [m], shape (m,).
-        planned_tension: T_A planned for the time of the answer [N], shape (m,); NaN without a plan.
-        correction: Correction of the tension loop in the set points that were sent [m], shape (m,).
+        planned_tension: Planned T_A at the time of the answer [N], shape (m,); NaN without a plan.
+        correction: Correction by the tension loop, included in the set points that were sent [m], shape (m,).
     """
 
     number: int
@@ -94,11 +94,11 @@ class Recorded(NamedTuple):
 
 @runtime_checkable
 class Recorder(Protocol):
-    """Receiver of cycles and events, such as a log or a status line. It must never block; the loop waits for it."""
+    """Receiver of cycles and events, for example a log. It must never block, because the loop waits for it."""
 
     @property
     def stopped(self) -> str:
-        """Reason why the recorder has stopped, "" while it runs: `Cycle.recording` of the fault rules."""
+        """Reason why the recorder has stopped, "" while it runs; the fault rules check it."""
 
     def begins(self, plan: Plan) -> None:
         """Receive a plan before its first cycle.
@@ -130,7 +130,7 @@ class Recorder(Protocol):
         """
 
 
-class Tape:
+class CycleTable:
     """Table of cycles, in preallocated memory."""
 
     def __init__(self, cable_count: int, group_count: int, expected: int) -> None:
@@ -173,7 +173,7 @@ class Tape:
         own = (answer.time, cycle.late, cycle.clock)
         sight = (cycle.position, cycle.quaternion)
         np.concatenate((own, *sight, *read, *asked, cycle.planned_tension, cycle.correction), out=self._numbers[k])
-        # plain integers, which numpy converts ten times as fast as members of an enumeration
+        # plain integers, because numpy converts members of an enumeration ten times slower
         about = (int(answer.__class__ is Sample), int(cycle.state), cycle.estimate, int(mode))
         np.concatenate((about, *codes), out=self._codes[k])
         self._count = k + 1
@@ -209,7 +209,7 @@ class Journal:
 
     def __init__(self, record: Recorder | None) -> None:
         """Begin without events."""
-        given: object = record  # a caller without type checks may give anything
+        given: object = record  # for callers without type checks
         if given is not None and not isinstance(given, Recorder):
             step = "Give an object with the methods of control.Recorder, or None."
             raise InvalidValueError("record", brief(given), "a receiver of cycles and events", step)
@@ -227,7 +227,7 @@ class Journal:
         return self.tell(lambda record: record.event(event))
 
     def tell(self, what: Callable[[Recorder], object]) -> str:
-        """Call a method of the recorder; if it raises, remove it and return a message, else ""."""
+        """Call a method of the recorder; returns "". After an exception, the recorder is removed; returns a message."""
         if self._record is None:
             return ""
         try:

@@ -19,8 +19,8 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
-LEAD_SPEED: Final = 0.01  # [m/s], largest rate of the transition from the lengths at rest to a plan's first lengths
-WHOLE: Final = 1e-9  # tolerance, as a share of a row
+LEAD_SPEED: Final = 0.01  # [m/s], largest rate of the transition from lengths at rest to the first lengths of a plan
+WHOLE: Final = 1e-9  # tolerance, in rows
 
 
 class SetPoint(NamedTuple):
@@ -31,13 +31,13 @@ class SetPoint(NamedTuple):
         rate: Their rates [m/s], shape (m,).
         tension: T_A planned for the set point [N], shape (m,); NaN if unknown.
         drum_tension: Expected tension at the drums [N], shape (m,).
-        wrench: External plus inertial wrench on the platform [N, N m], shape (6,); None for none.
-        row: Matrices of the tension loop at the set point; None if there are none.
+        wrench: External plus inertial wrench on the platform [N, N m], shape (6,); None for zero.
+        row: Matrices of the tension loop at the set point; None without matrices.
         clock: Time on the plan [s]; NaN outside a plan.
         done: True if the source ends here.
         enable: Drives that may move, shape (m,); None for all.
-        leading: True while the lengths at rest still change to those of a plan; tensions are then not yet the planned
-            ones.
+        leading: True during the transition from the lengths at rest to the lengths of a plan. The tensions then differ
+            from the planned tensions.
     """
 
     length: Array
@@ -56,7 +56,7 @@ class SetPointSource(Protocol):
     """Source of one set point in each cycle."""
 
     def step(self) -> SetPoint:
-        """Next set point; after the end, the last one again with rates of zero."""
+        """Next set point; after the end, the last set point with zero rates."""
 
 
 class Standing:
@@ -94,13 +94,13 @@ class Standing:
 
 
 def standing_at(robot: Robot, length: Array, start: Pose | None, model: CableModel) -> Standing | ForwardStatus:
-    """Constant set point at lengths [m] (m,), with the pose from forward kinematics; the status if no pose is found."""
+    """Constant set point at lengths (m,) [m] with the pose from forward kinematics; the status if no pose is found."""
     found = forward(robot, length, start, model)
     return Standing.at(found.state) if found.status in STABLE else ForwardStatus(int(found.status))
 
 
 class Fade:
-    """Smooth transition from the lengths at rest to those of a plan."""
+    """Smooth transition from the lengths at rest to the lengths of a plan."""
 
     def __init__(self, lead: Array, period: float) -> None:
         """Begin with the whole difference; lead: [m], (m,); period [s]."""
@@ -114,7 +114,7 @@ class Fade:
         return self._cycle >= self._cycles
 
     def step(self) -> tuple[Array, Array] | None:
-        """Remaining difference at the end of the next cycle [m] and its rate [m/s], (m,); None if it is zero."""
+        """Remaining difference at the end of the next cycle [m], and its rate [m/s], both (m,); None if it is zero."""
         self._cycle += 1
         if self.done:
             return None
@@ -181,7 +181,7 @@ class Along:
         done = self.at_end or (self._wanted == 0.0 and self._speed == 0.0)
         clock, gains = self.clock, motion.gains
         at = None if gains is None else gains.at(clock)
-        on_plan = clock if motion.plan is not None else np.nan  # a jog does not have one
+        on_plan = clock if motion.plan is not None else np.nan  # None for a jog
         return SetPoint(length, rate, tension, drum, motion.wrench[k], at, on_plan, done, None, left is not None)
 
     def _between(self, k: int, u: float) -> tuple[Array, Array, Array, Array]:

@@ -11,16 +11,16 @@ from sagline.core.status import Status
 class State(Status):
     """State of the controller."""
 
-    OFF = 0, "brakes on, no grant held; connect() begins"
+    OFF = 0, "brakes on, no group is owned; connect() begins"
     CONNECTING = 1, "the controller claims the groups and waits until all of them agree; brakes on"
     READY = 2, "the drives hold; home(pose) sets the pose of the platform"
-    HOMING = 3, "one winch at a time is jogged until tensions and lengths are those of the plan at home"
-    IDLE = 4, "the platform stands and its pose is known; a path, a pose or a jog may begin"
+    HOMING = 3, "one winch at a time is jogged until tensions and lengths agree with the plan at the stated pose"
+    IDLE = 4, "the platform is at rest at a known pose; a path, a pose or a jog may begin"
     MOVING = 5, "set points follow the plan"
     JOGGING = 6, "set points follow the operator"
-    PAUSING = 7, "the path's clock slows down; resume() continues from there"
-    STOPPING = 8, "all rates go to zero together"
-    FAULT = 9, "the drives hold; the operator reads the reason, repairs it and acknowledges"
+    PAUSING = 7, "the platform slows down along the path; resume() continues the path"
+    STOPPING = 8, "all rates decrease to zero in the same time"
+    FAULT = 9, "the drives hold; the operator reads the reason, repairs the cause and acknowledges"
     EMERGENCY = 10, "drums locked; the operator unlocks them at the machine, then connects and homes again"
 
 
@@ -29,12 +29,12 @@ _FAULT: Final = {State.STOPPING: "a fault"}
 _STOP: Final = {State.STOPPING: "stop, or a fault"}
 _EMERGENCY: Final = {State.EMERGENCY: "emergency stop, or a broken cable"}
 
-# for each state: the action of the winches, and the conditions of its transitions by next state
+# for each state: the action of the winches, and for each possible next state the condition of the transition
 TABLE: Final[dict[State, tuple[str, dict[State, str]]]] = {
     State.OFF: ("brakes", {State.CONNECTING: "the operator"}),
     State.CONNECTING: (
         "brakes",
-        {State.READY: "layouts, counters and grants agree", State.OFF: "they do not"},
+        {State.READY: "layouts, counters and owners agree", State.OFF: "they do not agree"},
     ),
     State.READY: (
         "hold",
@@ -48,7 +48,7 @@ TABLE: Final[dict[State, tuple[str, dict[State, str]]]] = {
     ),
     State.HOMING: (
         "jog, one at a time",
-        {State.IDLE: "tensions and lengths within 5 sigma of the plan at home", **_OFF, **_STOP, **_EMERGENCY},
+        {State.IDLE: "tensions and lengths within 5 sigma of the plan", **_OFF, **_STOP, **_EMERGENCY},
     ),
     State.IDLE: (
         "hold, tension loop on",
@@ -67,14 +67,14 @@ TABLE: Final[dict[State, tuple[str, dict[State, str]]]] = {
     State.JOGGING: ("set points of the jog", {State.IDLE: "the end of the jog", **_STOP, **_EMERGENCY}),
     State.PAUSING: (
         "ramp on the path's clock, tension loop on",
-        {State.IDLE: "the clock stands", **_STOP, **_EMERGENCY},
+        {State.IDLE: "the platform is at rest", **_STOP, **_EMERGENCY},
     ),
     State.STOPPING: (
         "coordinated ramp",
         {
-            State.IDLE: "they stand, the operator stopped",
-            State.READY: "they stand, the operator stopped homing",
-            State.FAULT: "they stand, a fault stopped",
+            State.IDLE: "at rest, after a stop by the operator",
+            State.READY: "at rest, after a stop of homing by the operator",
+            State.FAULT: "at rest, after a stop by a fault",
             **_EMERGENCY,
         },
     ),
@@ -82,17 +82,17 @@ TABLE: Final[dict[State, tuple[str, dict[State, str]]]] = {
     State.EMERGENCY: ("drums locked", _OFF),
 }
 MOTION: Final = frozenset({State.HOMING, State.MOVING, State.JOGGING, State.PAUSING, State.STOPPING})
-HOLDS_GRANT: Final = frozenset(State) - {State.OFF, State.CONNECTING}
+OWNING: Final = frozenset(State) - {State.OFF, State.CONNECTING}
 
 
 class RefusedError(SaglineError):
-    """Rejected request with the reason; nothing was sent.
+    """A request is rejected for a reason; nothing was sent.
 
     Attributes:
         what: Rejected request.
         reason: Reason of the rejection.
         next_step: Next step for the reader.
-        item: Equal to `what`; all errors have this attribute.
+        item: The same as `what`, because all errors have this attribute.
     """
 
     def __init__(self, what: str, reason: str, next_step: str) -> None:
@@ -116,4 +116,4 @@ def check_transition(state: State, to: State, what: str) -> None:
     if to in exits:
         return
     ways = ", ".join(f"{after.name} ({condition})" for after, condition in exits.items())
-    raise RefusedError(what, f"{state.name} does not lead to {to.name}", f"It leads to {ways}.")
+    raise RefusedError(what, f"{state.name} does not lead to {to.name}", f"Next states: {ways}.")

@@ -16,7 +16,7 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.fields import NumberFields, rule
 
 MOST_CABLES: Final = 10**6
-MOST_GAIN: Final = 0.1  # largest gain per cycle; a loop with five cycles of delay is unstable from 0.17 on
+MOST_GAIN: Final = 0.1  # largest gain per cycle; a loop with a delay of five cycles is unstable above 0.17
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,8 +26,9 @@ class TensionSettings(NumberFields):
     Attributes:
         filter_time: Time constant of the input filter [s], > 0.
         gain: Share of the error that is corrected in each cycle, >= 0, at most 0.1; 0 switches the loop off.
-        act_above: Largest tension error in the null space above which the loop begins to act [N].
-        rest_below: Largest tension error below which the loop stops acting [N], >= 0, less than `act_above`.
+        act_above: The loop begins to act if the largest tension error in the null space exceeds this value [N].
+        rest_below: The loop stops acting if the largest tension error is below this value [N], >= 0, less than
+            `act_above`.
         largest: Limit of the correction of a length [m], > 0.
 
     Raises:
@@ -44,7 +45,7 @@ class TensionSettings(NumberFields):
         """Check the values."""
         super(TensionSettings, self).__post_init__()
         if self.gain > MOST_GAIN:
-            step = "Take 0.01; with more it hunts on the friction of the drives."
+            step = "Give 0.01; with a larger value, friction in the drives causes oscillations."
             raise InvalidValueError("gain", f"{self.gain:g}", f"0 to {MOST_GAIN:g}", step)
         if self.rest_below >= self.act_above:
             allowed = f"less than act_above, {self.act_above:g} N"
@@ -52,10 +53,10 @@ class TensionSettings(NumberFields):
 
 
 class TensionLoop:
-    """Correction of lengths that brings the tensions back to the plan; it remains for a session, like length errors.
+    """Correction of lengths that reduces the tension errors.
 
-    f <- f + h/(tau + h) (T - T_plan - f), and while the loop acts delta <- delta - k N_L G f; docs/model.md, section
-    12.
+    It is kept for a session, because the length errors remain. In each cycle, f <- f + h/(tau + h) (T - T_plan - f).
+    While the loop acts, delta <- delta - k N_L G f. See docs/model.md, section 12.
 
     Attributes:
         settings: Gain, filter and limits.
@@ -76,7 +77,7 @@ class TensionLoop:
         m = whole_number(cable_count, "cable_count", 1, MOST_CABLES)
         self.settings = TensionSettings() if settings is None else instance(settings, TensionSettings, "settings")
         cycle = number(period, "period", "s", above=0.0)
-        self._share = np.full(m, cycle / (self.settings.filter_time + cycle))  # numpy is slower with single numbers
+        self._share = np.full(m, cycle / (self.settings.filter_time + cycle))  # an array is faster than a number
         self._row: NullSpace | None = None
         self._filtered, self._correction = np.zeros(m), np.zeros(m)
         self._error, self._change = np.empty(m), np.empty(m)
@@ -99,19 +100,19 @@ class TensionLoop:
             tension: T_A, tension measured by the load cells [N], shape (m,).
             planned: Planned tension at the same time [N], shape (m,).
             row: Row of the plan's gains at this time.
-            frozen: True if the tensions are old or doubtful. They are then not used, but the present correction is
-                still adapted to the pose.
+            frozen: True if the tensions are old or doubtful. The correction is then only adapted to the pose, without
+                the tensions.
 
         Returns:
             Correction of the lengths of the plan [m], shape (m,), an array owned by the caller.
         """
-        if row is not self._row:  # lengths in the null space at one pose move the platform at the next pose
+        if row is not self._row:  # a correction in the null space of one pose would move the platform at the next pose
             if self._row is not None:
                 np.matmul(row.projection, self._correction, out=self._change)
                 self._correction[:] = self._change
             self._row = row
         np.subtract(tension, planned, out=self._error)
-        if not frozen and finite(self._error):  # NaN would remain in the filter forever
+        if not frozen and finite(self._error):  # a NaN would stay in the filter
             self._learn(row)
         return self._correction.copy()
 
@@ -128,5 +129,5 @@ class TensionLoop:
         row.correction.dot(self._filtered, change)
         change *= settings.gain
         self._correction -= change
-        if (most := largest(self._correction)) > settings.largest:  # a fault reports it
-            self._correction *= settings.largest / most  # one common factor; separate limits would move the platform
+        if (most := largest(self._correction)) > settings.largest:  # a fault reports the limit
+            self._correction *= settings.largest / most  # separate limits would move the platform

@@ -45,8 +45,8 @@ STOP: Final = """\
 def export_scl(robot: Robot, file: str | os.PathLike[str]) -> Path:
     """Write the SCL source for the PLCs of a robot (TIA Portal): data blocks, limits and program.
 
-    The program grants and withdraws control, accepts commands and enforces the limits. Without commands, it slows the
-    winches down by itself. Its header lists the settings of the CPU. It has not been compiled yet.
+    The program accepts commands of the controller that owns the group, and enforces the limits. Without commands, it
+    slows the winches down by itself. Its header lists the settings of the CPU. It has not been compiled yet.
 
     Args:
         robot: The robot used for planning; its winches need drum_radius and counts_per_turn.

@@ -59,7 +59,7 @@ CYCLES: Final = (
     _real("age", GROUP, "s", "since the newest good block came in", "samples.age"),
     _integer("counter", GROUP, "of the blocks", "samples.counter"),
     _real("plc_time", GROUP, "s", "time of the PLC's block, on the clock of the PLC", "samples.plc_time"),
-    _integer("owner", GROUP, "who has the grant; 0: none", "samples.owner"),
+    _integer("owner", GROUP, "id of the controller that owns the group; 0: none", "samples.owner"),
     _integer("echo", GROUP, "counter of the last command that the PLC took", "samples.echo"),
     _integer("group_status", GROUP, "bits of the PLC's status", "samples.status"),
     _integer("group_fault", GROUP, "code of the reason why the PLC acts by itself; 0: none", "samples.fault"),

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from sagline.control.execution import ExecutionStatus, execution_of
 from sagline.control.link import PERIOD, groups_of
-from sagline.control.recording import Event, Recorded, Tape
+from sagline.control.recording import CycleTable, Event, Recorded
 from sagline.core.arguments import file_path, instance
 from sagline.core.arrays import Array
 from sagline.core.errors import FileError
@@ -341,8 +341,8 @@ class Recorder:
         self._mcap.block(columns, self._plan, self._zero, partial(time.sleep, 0.0))
         self._tape, self._degraded = self._blank(), []
 
-    def _blank(self) -> Tape:
-        return Tape(self._robot.cable_count, self._groups, BLOCK)
+    def _blank(self) -> CycleTable:
+        return CycleTable(self._robot.cable_count, self._groups, BLOCK)
 
 
 def _reason(error: OSError) -> str:

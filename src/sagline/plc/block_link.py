@@ -1,4 +1,4 @@
-"""Link to PLCs by data blocks, with one thread for each group that waits for its socket."""
+"""Link to PLCs by data blocks; each group has a thread that waits for the PLC's socket."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class _Newest(NamedTuple):
     """Newest valid block of a group.
 
     Attributes:
-        values: Values by name of the row.
+        values: Values of the rows, by name.
         arrived: Time of arrival, on the link's clock [s].
         round_trip: Time since the request or the command [s].
     """
@@ -69,7 +69,7 @@ class GroupThread(Thread):
         discarded: Number of invalid blocks.
         reason: Reason of the last invalid block; None before the first.
         trouble: Last error; None without an error.
-        settled: Event that is set when the PLC has answered, validly or not.
+        settled: Event that is set after the first answer of the PLC, valid or not.
     """
 
     def __init__(self, number: int, winches: int, wire: Wire, clock: Callable[[], float]) -> None:
@@ -85,11 +85,11 @@ class GroupThread(Thread):
         self._wire = wire
         self._clock = clock
         self._kick = Event()
-        self._outgoing: deque[_Outgoing] = deque(maxlen=1)  # a new block replaces one that is not yet written
+        self._outgoing: deque[_Outgoing] = deque(maxlen=1)  # a new block replaces a block that is not yet written
         self._ending = Event()
 
     def hand_over(self, block: Block, data: bytes) -> None:
-        """Replace the block that waits for writing, and read the PLC's block."""
+        """Queue a block for writing in place of the queued one, and read the PLC's block."""
         self._outgoing.append(_Outgoing(block, data, self._clock()))
         self._kick.set()
 
@@ -99,16 +99,16 @@ class GroupThread(Thread):
         self._kick.set()
 
     def finish(self) -> None:
-        """Stop after the queued block is written."""
+        """Stop the thread after it has written the queued block."""
         self._ending.set()
         self._kick.set()
 
     def abort(self) -> None:
-        """Stop immediately."""
+        """Stop the thread immediately."""
         self._wire.abort()
 
     def silence(self, waited: float) -> Refusal:
-        """Message about a PLC that has not answered for a time [s]."""
+        """Reason and next step for a PLC that has not answered for a time [s]."""
         if self._wire.reached():
             return Refusal(f"the port is open, but there was no response for {waited:g} s", "Check the port")
         return Refusal(f"no response for {waited:g} s", "Check address and cables, and that the PLC or the twin runs")
@@ -119,7 +119,7 @@ class GroupThread(Thread):
             try:
                 self._wire.open()
                 self._serve()
-            except Exception as error:  # any exception: only this thread can reconnect
+            except Exception as error:  # any exception, because only this thread can reconnect
                 self.trouble = error.refusal if isinstance(error, WireError) else _unexpected(error)
                 self.settled.set()
             finally:
@@ -132,7 +132,7 @@ class GroupThread(Thread):
             asked = self._clock()
             if self._outgoing:
                 outgoing = self._outgoing.popleft()
-                if asked - outgoing.since < HEARTBEAT:  # a command from before the connection is obsolete
+                if asked - outgoing.since < HEARTBEAT:  # an older command is obsolete after a connection
                     asked = outgoing.since
                     self._wire.write(outgoing.block, outgoing.data)
             if self._ending.is_set():
@@ -155,7 +155,7 @@ class GroupThread(Thread):
         self.settled.set()
 
     def _mismatch(self, values: dict[str, Any]) -> Refusal | None:
-        """Reason why a valid block is not from the expected PLC; None if it is."""
+        """Reason why a valid block is not from the expected PLC; None if it is from this PLC."""
         group = values["group"] - 1  # counters of blocks start at 1
         if group != self.number:
             who = f"is group {group}" if group >= 0 else "has no group number"
@@ -169,7 +169,7 @@ class GroupThread(Thread):
         return None
 
     def _no_news(self, counter: int, arrived: float, connected: float) -> Refusal | None:
-        """Reason why a block is not newer than the newest, or None; after a long silence the PLC may have restarted."""
+        """Reason to discard a block that is not new, or None; after a long silence, the PLC may have restarted."""
         newest = self.newest
         if newest is None:
             return None
@@ -183,18 +183,18 @@ def _unexpected(error: Exception) -> Refusal:
     return Refusal(f"the exchange failed with {type(error).__name__} ({text})", "Report it, if it happens again")
 
 
-LONGEST: Final = 3600.0  # upper limit for the timeout of the first answers [s]
+LONGEST: Final = 3600.0  # largest timeout for the first answers [s]
 
 
 class BlockLink:
-    """Link (`sagline.control.link.Link`) over one wire for each group; base of `S7Link` and `ModbusLink`."""
+    """Link (`sagline.control.link.Link`) with one connection per group; base class of `S7Link` and `ModbusLink`."""
 
     def __init__(self, addresses: Sequence[Address], robot: Robot | int, wires: Sequence[Wire], timeout: float) -> None:
         """Connect to all groups together; timeout: of the first answers [s]."""
         patience = number(timeout, "timeout", "s", above=0.0)
         if patience > LONGEST:
             raise InvalidValueError(
-                "timeout", f"{patience:g} s", f"above 0 s, to {LONGEST:g} s", "2 s do for most networks."
+                "timeout", f"{patience:g} s", f"above 0 s, to {LONGEST:g} s", "2 s are sufficient in most networks."
             )
         self._groups = groups_at(addresses, robot)
         self._addresses = tuple(addresses)
@@ -219,14 +219,14 @@ class BlockLink:
 
     @property
     def round_trip(self) -> Array:
-        """Time from command to answer of each group's newest sample [s], shape (G,); NaN before the first."""
+        """Time from command to answer for the newest sample of each group [s], shape (G,); NaN without a sample."""
         return np.array([np.nan if g.newest is None else g.newest.round_trip for g in self._exchanges])
 
     def exchange(self, command: Command | None) -> Sample | Missing:
-        """Pass a command to the groups' threads and return their newest data, without waiting.
+        """Pass a command to the groups' threads and return the newest data, without waiting.
 
-        A group that `command.owner` does not control receives the claim, if the command has one, instead of the
-        command.
+        A group that another controller owns does not receive the command. It receives the claim, if `command.claims` is
+        True.
 
         Args:
             command: Set points of all winches; None to read only.
@@ -257,7 +257,7 @@ class BlockLink:
         """Write the last command, and disconnect."""
         for group in self._exchanges:
             group.finish()
-        for patience in (0.5, 0.2):  # time for writing and for the end of the threads [s]
+        for patience in (0.5, 0.2):  # time until the last block is written and the threads end [s]
             until = perf_counter() + patience
             for group in self._exchanges:
                 group.join(max(0.0, until - perf_counter()))

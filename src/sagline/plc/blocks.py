@@ -1,4 +1,4 @@
-"""Data blocks shared by a PLC and a controller: one table for packing, servers and SCL."""
+"""Data blocks between a PLC and a controller: one table for packing, servers and SCL."""
 
 from __future__ import annotations
 
@@ -30,7 +30,8 @@ class Field(NamedTuple):
 
     Attributes:
         name: Name in packing and SCL.
-        type: One of `TYPES`; or the rows of a structure for each winch, in an array from 1.
+        type: One of `TYPES`. Or the rows of a structure; the value is then an array of such structures, one per winch,
+            from 1.
         offset: Offset from the start of the block, or of the structure [bytes].
         meaning: Meaning and unit.
     """
@@ -43,7 +44,7 @@ class Field(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Data block with standard (not optimized) access, in which the table defines the offset of every byte.
+    """Data block with standard (not optimized) access; the table defines the offset of every byte.
 
     Attributes:
         number: Number of the data block in the PLC.
@@ -63,7 +64,7 @@ class Block:
 
     @cached_property
     def rows(self) -> tuple[tuple[str, str, int], ...]:
-        """Name, type and offset of every plain value; names of winch values are from `winch_row`."""
+        """Name, type and offset of every plain value; `winch_row` gives the names of winch values."""
         rows: list[tuple[str, str, int]] = []
         for name, kind, offset, _ in self.fields:
             if isinstance(kind, str):
@@ -94,7 +95,7 @@ class Block:
         return self.packer.pack(*[known.get(name, 0) for name in self.names])
 
     def read(self, data: bytes) -> dict[str, Any] | Refusal:
-        """Values by name of the row, or the reason why the bytes are not this block."""
+        """Values of the rows by name, or the reason why the bytes are not this block."""
         block = f"DB{self.number}"
         if len(data) != self.size:
             return Refusal(f"{block} has {len(data)} bytes instead of {self.size}", LOAD)
@@ -136,8 +137,8 @@ FROM_PLC: Final = Block(
         Field("version", "UInt", 8, "of this layout"),
         Field("group", "UInt", 10, "number of the group of this PLC plus 1, 0 if not set"),
         Field("time", "LReal", 12, "of the PLC [us]"),
-        Field("owner", "UDInt", 20, "owner of the grant, 0 for none"),
-        Field("echo", "UDInt", 24, "counter of the last command taken"),
+        Field("owner", "UDInt", 20, "id of the controller that owns this group, 0 for none"),
+        Field("echo", "UDInt", 24, "counter of the last accepted command"),
         Field("status", "DWord", 28, "bits: ready, braked, following, ramping, holding, locked, emergency"),
         Field("fault", "UInt", 32, "reason why the PLC has stopped its winches"),
         Field("winches", "UInt", 34, "number of winches of this PLC"),
@@ -146,7 +147,7 @@ FROM_PLC: Final = Block(
             (
                 Field("length", "LReal", 0, "unstrained, off the drum [m]"),
                 Field("rate", "Real", 8, "of the length [m/s]"),
-                Field("torque", "Real", 12, "at the motor's shaft, positive lets out [N m]"),
+                Field("torque", "Real", 12, "at the motor's shaft, positive if it pays out cable [N m]"),
                 Field("tension", "Real", 16, "of the load cell, raw [N]"),
                 Field("filtered", "Real", 20, "of the load cell, filtered [N]"),
                 Field("counts", "DInt", 24, "of the encoder"),
@@ -172,7 +173,7 @@ TO_PLC: Final = Block(
         Field("version", "UInt", 8, "of this layout"),
         Field("mode", "UInt", 10, "0 leave, 1 hold, 2 follow, 3 lock"),
         Field("owner", "UDInt", 12, "id of the controller"),
-        Field("valid_for", "Time", 16, "time for which the PLC may use it [ms]"),
+        Field("valid_for", "Time", 16, "time for which the PLC may use the command [ms]"),
         Field(
             "winch",
             (
@@ -196,7 +197,7 @@ CLAIM: Final = Block(
     size=8,
     fields=(
         Field("magic", "DWord", 0, "SAGC"),
-        Field("owner", "UDInt", 4, "id of the controller that claims the grant; the PLC resets it to 0"),
+        Field("owner", "UDInt", 4, "id of the controller that claims the group; the PLC resets it to 0"),
     ),
 )
 
@@ -204,7 +205,7 @@ BLOCKS: Final = (FROM_PLC, TO_PLC, CLAIM)
 
 
 def claim_block(owner: int) -> bytes:
-    """Block of a controller that requests a grant."""
+    """Block of a controller that claims the ownership of a group."""
     return CLAIM.pack({"owner": owner})
 
 
@@ -245,7 +246,7 @@ def sample_of(
 
 
 def winch_rows(names: Sequence[str], columns: Sequence[Sequence[Any]]) -> dict[str, Any]:
-    """Values of a group's winches by name of the row."""
+    """Values of a group's winches, by name of the row."""
     return {
         winch_row(i, name): value for name, column in zip(names, columns, strict=True) for i, value in enumerate(column)
     }

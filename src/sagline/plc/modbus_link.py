@@ -28,7 +28,7 @@ logging.getLogger("pymodbus").addHandler(logging.NullHandler())  # the link repo
 class ModbusLink(BlockLink):
     """The link (`sagline.control.link.Link`) to PLCs over Modbus TCP, or to a twin.
 
-    The blocks are those of `S7Link`, byte for byte: DB101 from holding register 0, DB102 from 100, DB103 from 200.
+    The blocks have the same bytes as in `S7Link`: DB101 from holding register 0, DB102 from 100, DB103 from 200.
 
     Examples:
         >>> link = sl.plc.ModbusLink("192.168.0.11,192.168.0.12,192.168.0.13,192.168.0.14", robot)
@@ -48,7 +48,7 @@ class ModbusLink(BlockLink):
             timeout: Longest time to the first answers [s].
 
         Raises:
-            InvalidValueError: If the number of addresses is not that of the groups, or two addresses are equal.
+            InvalidValueError: If the number of addresses is not the number of groups, or two addresses are equal.
             LinkError: If a PLC does not answer with sagline's blocks.
             FileError: If pymodbus is not installed.
         """
@@ -58,7 +58,7 @@ class ModbusLink(BlockLink):
 
 
 class ModbusWire:
-    """A connection to one PLC with its blocks in holding registers, two bytes each, the same bytes as over S7."""
+    """A connection to one PLC; the holding registers contain its blocks, two bytes each, the same bytes as over S7."""
 
     def __init__(self, host: str, port: int, device: int) -> None:
         """Keep the address; `open` connects."""
@@ -88,7 +88,7 @@ class ModbusWire:
             answer = self._client.read_holding_registers(block.register, count=count, device_id=self._device)
             registers = _good(answer, block).registers
             return struct.pack(f">{len(registers)}H", *registers)
-        except Exception as error:  # the library may raise any error for a foreign answer
+        except Exception as error:  # the library may raise any exception for a foreign answer
             raise _failed(error) from error
 
     def write(self, block: Block, data: bytes) -> None:
@@ -105,7 +105,7 @@ class ModbusWire:
             self._client.close()  # type: ignore[no-untyped-call]
 
     def abort(self) -> None:
-        """End all waiting, from another thread."""
+        """End all waiting; for a call from another thread."""
         connection = self._client.socket
         with suppress(OSError):
             if connection is not None:

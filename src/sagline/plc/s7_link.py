@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from snap7 import Client
 
 PORT: Final = 102
-PDU: Final = 240  # [bytes], of an S7-1200; each block fits in one request
+PDU: Final = 240  # [bytes], PDU size of an S7-1200; each block fits in one request
 RACK: Final = 0
 FORBIDDEN: Final = 0x8104  # answer of a CPU whose settings do not permit PUT or GET
-_NAME: Final = "Connection"  # of the class that knows IPv6
+_NAME: Final = "Connection"  # names of the class with IPv6
 _CLOSED: Final = Refusal("the connection was closed", "Connect again")
 SLOT: Final = 1  # rack and slot of every S7-1200 and S7-1500
 
@@ -46,7 +46,7 @@ class S7Link(BlockLink):
             timeout: Longest time to the first answers [s].
 
         Raises:
-            InvalidValueError: If the number of addresses is not that of the groups, or two addresses are equal.
+            InvalidValueError: If the number of addresses is not the number of groups, or two addresses are equal.
             LinkError: If a PLC does not answer with sagline's blocks.
             FileError: If python-snap7 is not installed.
         """
@@ -64,7 +64,7 @@ class S7Wire:
             import snap7.client
         client: Any = snap7.client
         if ":" in host and client.ISOTCPConnection.__name__ != _NAME:
-            client.ISOTCPConnection = _with_ipv6(client.ISOTCPConnection)  # the library itself knows only IPv4
+            client.ISOTCPConnection = _with_ipv6(client.ISOTCPConnection)  # the library itself supports only IPv4
         self._library = snap7
         self._host = host
         self._port = port
@@ -77,7 +77,7 @@ class S7Wire:
             client.set_param(self._library.type.Parameter.PDURequest, PDU)
             client.connect(self._host, RACK, SLOT, tcp_port=self._port)
             _socket(client).settimeout(ANSWER)
-        except Exception as error:  # the library may raise any error for a foreign answer
+        except Exception as error:  # the library may raise any exception for a foreign answer
             raise WireError(refusal_of(error, "S7")) from error
 
     def read(self, block: Block) -> bytes:
@@ -108,7 +108,7 @@ class S7Wire:
         return self._client
 
     def abort(self) -> None:
-        """End all waiting, from another thread."""
+        """End all waiting; for a call from another thread."""
         client = self._client
         with suppress(OSError, WireError):
             if client is not None:
@@ -125,7 +125,7 @@ class S7Wire:
 
 
 def _with_ipv6(library: Any) -> Any:
-    """Connection of the library that knows IPv6, too."""
+    """Connection of the library, with support for IPv6."""
 
     def connect(self: Any) -> None:
         self.socket = socket.create_connection((self.host, self.port), self.timeout)
@@ -135,7 +135,7 @@ def _with_ipv6(library: Any) -> Any:
 
 
 def _socket(client: Client) -> socket.socket:
-    """Socket of the library, because the library has no setting for the waiting time."""
+    """Socket of the library; a timeout is set here, because the library has no setting for it."""
     connection = client.connection
     if connection is None or connection.socket is None:
         raise WireError(_CLOSED)

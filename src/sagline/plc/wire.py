@@ -1,4 +1,4 @@
-"""Addresses of PLCs, connections to them, and errors of both."""
+"""Addresses of PLCs, connections to PLCs, and errors of addresses and connections."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from sagline.plc.blocks import Block
 from sagline.robot.robot import Robot
 
 LAST_PORT: Final = 65535
-MOST_ADDRESSES: Final = 10_000  # largest number of addresses, and of characters of all addresses
+MOST_ADDRESSES: Final = 10_000  # largest number of addresses, and largest number of characters of all addresses
 
 
 class Address(NamedTuple):
@@ -38,7 +38,7 @@ def addresses_of(given: str | Sequence[str], port: int) -> tuple[Address, ...]:
     """Addresses of the groups, in their order."""
     items: Any = given
     if not isinstance(items, Sequence) or isinstance(items, bytes) or not 0 < len(items) <= MOST_ADDRESSES:
-        step = "Give a list of them, or one text with commas between."
+        step = "Give a list of addresses, or one text with commas between them."
         raise InvalidValueError("addresses", brief(items), f"a text, or 1 to {MOST_ADDRESSES} of them", step)
     texts = items.split(",") if isinstance(items, str) else list(items)
     addresses: list[Address] = []
@@ -56,7 +56,7 @@ def addresses_of(given: str | Sequence[str], port: int) -> tuple[Address, ...]:
 
 
 def groups_at(addresses: Sequence[Address], robot: Robot | int) -> tuple[tuple[int, ...], ...]:
-    """The winches of each group; an error if the number of addresses is not that of the groups."""
+    """The winches of each group; raises an error if the number of addresses is not the number of groups."""
     known: Any = robot
     winches = known.cable_count if isinstance(known, Robot) else whole_number(known, "robot", 1, MOST_ADDRESSES)
     groups = groups_of(winches)
@@ -65,7 +65,7 @@ def groups_at(addresses: Sequence[Address], robot: Robot | int) -> tuple[tuple[i
             "number of PLC addresses",
             len(addresses),
             f"{len(groups)}: two winches per group, {winches} winches",
-            "Give one address per group, in the groups' order, with commas between.",
+            "Give one address per group, in the groups' order, with commas between them.",
         )
     return groups
 
@@ -89,13 +89,13 @@ def _address(index: int, text: object, port: int) -> Address:
             f"address of group {index}",
             brief(text),
             f"host, host:port or [IPv6]:port, port 1 to {LAST_PORT}",
-            "The twin prints its addresses; a PLC has its own in TIA Portal.",
+            "The twin prints its addresses; TIA Portal shows the address of a PLC.",
         )
     return Address(host, int(number) if colon else port)
 
 
 def _is_ipv6(host: str) -> bool:
-    """True for an IPv6 address, also with a zone."""
+    """True for an IPv6 address, with or without a zone."""
     try:
         IPv6Address(host)
     except ValueError:
@@ -103,11 +103,11 @@ def _is_ipv6(host: str) -> bool:
     return True
 
 
-ANSWER: Final = 0.5  # time without an answer, after which the connection is opened again [s]
+ANSWER: Final = 0.5  # the connection is opened again after this time without an answer [s]
 
 
 class LinkError(SaglineError):
-    """Unusable PLC.
+    """A PLC cannot be used.
 
     Attributes:
         item: Group and address ("group 2 at 192.168.0.12:102").
@@ -136,16 +136,16 @@ class WireError(Exception):
     """
 
     def __init__(self, refusal: Refusal) -> None:
-        """Keep the refusal."""
+        """Store the refusal."""
         super().__init__(refusal)
         self.refusal = refusal
 
 
 class Wire(Protocol):
-    """A connection to one PLC; all methods except `abort` and `reached` belong to one thread and raise `WireError`."""
+    """A connection to one PLC. One thread calls all methods except `abort` and `reached`; they raise `WireError`."""
 
     def open(self) -> None:
-        """Connect; waits for the time of the protocol."""
+        """Connect; waits as long as the protocol permits."""
 
     def read(self, block: Block) -> bytes:
         """The bytes of a block."""
@@ -157,7 +157,7 @@ class Wire(Protocol):
         """Disconnect without errors."""
 
     def abort(self) -> None:
-        """End all waiting, from another thread."""
+        """End all waiting; for a call from another thread."""
 
     def reached(self) -> bool:
         """True if the connection is open."""
@@ -183,7 +183,7 @@ def refusal_of(error: BaseException | None, protocol: str) -> Refusal:
     if isinstance(cause, socket.gaierror):
         return Refusal("the host is not known", "Check the address")
     if isinstance(cause, ConnectionResetError | BrokenPipeError) or "closed" in text:
-        return Refusal("the connection is closed at once", "Check the port, and the number of its other clients")
+        return Refusal("the PLC closes the connection at once", "Check the port, and the number of its other clients")
     if isinstance(cause, TimeoutError) or "timeout" in text.lower() or "No response" in text:
         return Refusal("it does not answer", "Check address and port, and that the PLC or the twin runs")
     if isinstance(cause, OSError):

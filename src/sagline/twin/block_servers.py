@@ -16,7 +16,7 @@ LOOPBACK: Final = "127.0.0.1"
 
 
 class BlockServers(ABC):
-    """Servers of the data blocks of all PLCs, which any client may read and write.
+    """Servers of the data blocks of all PLCs; any client may read and write the blocks.
 
     Attributes:
         addresses: "host:port" of each group.
@@ -43,7 +43,7 @@ class BlockServers(ABC):
                     self._memory[group][FROM_PLC][:] = block
 
     def written(self) -> list[tuple[bytes, bytes]]:
-        """Contents of DB102 and DB103 of each group; claims are then erased, as in a PLC."""
+        """Contents of DB102 and DB103 of each group; reading erases the claims, as in a PLC."""
         found = []
         for group, memory in enumerate(self._memory):
             with self._locked(group, TO_PLC):
@@ -68,16 +68,16 @@ class BlockServers(ABC):
 
 
 def _check_free(host: str, port: int) -> str:
-    """Address of a host at which a port is free; python-snap7 shares ports, so two twins would share clients."""
+    """Address of a host with a free port; checked here, because python-snap7 lets two twins share a port."""
     try:
         number = host.strip("[]") if ":" in host else socket.gethostbyname(host)
         with socket.create_server((number, port), family=socket.AF_INET6 if ":" in number else socket.AF_INET):
             return number
-    except (OSError, OverflowError, ValueError, TypeError) as error:  # the last two are for invalid names
+    except (OSError, OverflowError, ValueError, TypeError) as error:  # the last two exceptions are for invalid names
         reason = getattr(error, "strerror", None) or str(error)
         raise InvalidValueError(
             "address of the twin",
             f"{host!r}, port {port} ({reason})",
             "a free port at an address of this machine",
-            "Choose another with --port, or stop the program that listens there.",
+            "Choose another port with --port, or stop the program that uses the port.",
         ) from None

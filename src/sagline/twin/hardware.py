@@ -14,17 +14,17 @@ from sagline.robot.robot import Robot
 from sagline.twin.start import Start
 
 FILTER: Final = 0.05  # time constant of the PLCs' filters of load cells [s]
-LENGTH, RATE, TORQUE, CELL, FILTERED = range(5)  # rows of the readings
+LENGTH, RATE, TORQUE, CELL, FILTERED = range(5)  # indices of the rows of the readings
 
 
 class Hardware:
     """Drives, sensors and plant.
 
     Attributes:
-        read: Readings at the end of a period, shape (5, m). Rows: LENGTH, unstrained lengths off the nominal drums from
-            the encoder counts [m]; RATE, mean rates of these over the period [m/s]; TORQUE, torques of the motors at
-            their shafts, positive in the direction that lets cable out [N m]; CELL, readings of the load cells [N];
-            FILTERED, filtered readings [N].
+        read: Readings at the end of a period, shape (5, m). The rows are LENGTH: unstrained lengths off the nominal
+            drums from the encoder counts [m]; RATE: mean rates of the lengths over the period [m/s]; TORQUE: torques of
+            the motors at their shafts [N m], positive in the direction that pays out cable; CELL: readings of the load
+            cells [N]; FILTERED: filtered readings [N].
         counts: Encoder counts, whole numbers as floats, shape (m,).
     """
 
@@ -38,10 +38,10 @@ class Hardware:
         self._full = np.full(m, np.inf) if winch.load_cell_range is None else winch.load_cell_range
         self._lever = drum_lever(robot, reading.length) / np.abs(winch.gear)
         self._weight, self._gravity, self._slip = np.zeros(6), robot.gravity, np.zeros(m)
-        self._wrong: dict[int, tuple[float, float]] = {}  # factor of the reading of faulty load cells, and offset [N]
+        self._wrong: dict[int, tuple[float, float]] = {}  # factor and offset [N] of the readings of faulty load cells
         self._powered, self._torque_of_force = [False] * m, np.zeros(m)
         self._periods, self._shares = np.full(m, period), np.full(m, period / (FILTER + period))
-        self._load_changed = True  # True if the simulator needs the new load
+        self._load_changed = True  # True if the simulator does not have the new load yet
         self.read = np.zeros((5, m))
         self._rows = tuple(self.read)
         self.read[FILTERED] = reading.load_cell
@@ -54,7 +54,7 @@ class Hardware:
         return self._simulator.reading
 
     def simulate_period(self, length: list[float], tension: list[float], powered: list[bool]) -> None:
-        """Simulate a period in which the set points change linearly to new ones: length [m], tension [N]."""
+        """Simulate a period with a linear change of the set points to new values: length [m], tension [N]."""
         if powered != self._powered:
             self._switch(powered)
         counts = np.rint(self._nominal.counts(np.array(length)))
@@ -63,7 +63,7 @@ class Hardware:
         self._take(self._simulator.step(targets, self._period, tension=tension, wrench=weight))
 
     def _switch(self, powered: list[bool]) -> None:
-        """Switch the power of drives."""
+        """Switch the power of drives on or off."""
         changed = [i for i, (now, before) in enumerate(zip(powered, self._powered, strict=True)) if now != before]
         if on := [i for i in changed if powered[i]]:
             self._simulator.release(*on)
@@ -87,14 +87,14 @@ class Hardware:
 
     @property
     def saturated(self) -> Array:
-        """Nonzero for drives at a limit of torque or speed, (m,)."""
+        """Flags (m,), nonzero for drives at a limit of torque or speed."""
         return self._simulator.reading.saturated
 
     def spoil_cell(self, cell: int, words: str | None, value: float) -> None:
         """Give a load cell one of the faults of `KINDS`, or remove it."""
         if words is None:
             self._wrong.pop(cell, None)
-            self.read[FILTERED, cell] = self.reading.load_cell[cell]  # a filter without a value begins again
+            self.read[FILTERED, cell] = self.reading.load_cell[cell]  # the filter begins again
         elif words == "is wrong by #":
             self._wrong[cell] = (1.0, value)
         else:
@@ -106,13 +106,13 @@ class Hardware:
         self._simulator.cut(cable)
 
     def shift_encoder(self, winch: int, length: float) -> None:
-        """Shift the count of an encoder by a length of cable [m]; the drive then winds in this length."""
+        """Shift the count of an encoder by a length of cable [m]; the drive then moves the cable by this length."""
         slip = np.rint(length * self._nominal.per_meter[winch])
         self._slip[winch] += slip
         self._simulator.shift(-slip / self._true.per_meter[winch], winch)
 
     def limit_force(self, winch: int, force: float) -> None:
-        """Limit the force of a drive at the cable [N]."""
+        """Limit the cable force of a drive [N]."""
         self._simulator.limit_force(force, winch)
 
     def add_load(self, mass: float) -> None:

@@ -1,4 +1,4 @@
-"""Injected faults of a machine, each written as one line of text."""
+"""Injected faults of a machine, each as one line of text."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ class _FaultKind(NamedTuple):
     sense: str  # meaning as text
     unit: str = ""  # unit of the value, in texts
     scale: float = 1.0  # factor from the unit of the value to SI
-    for_good: bool = False  # True if the fault cannot end without a reset
+    for_good: bool = False  # True if the fault ends only by a reset
 
     @property
     def numbered(self) -> bool:
-        """True if a machine has several parts of this kind, distinguished by a number."""
+        """True if a machine has several parts of this kind, with numbers."""
         return self.item in ("cell", "cable", "encoder", "servo", "group")
 
 
@@ -34,13 +34,13 @@ KINDS: Final = MappingProxyType(
         f"{kind.item} {kind.words}".strip(): kind
         for kind in (
             _FaultKind("cell", "sticks", "repeats its last reading"),
-            _FaultKind("cell", "reads #", "reads this value, whatever the tension is", "N"),
+            _FaultKind("cell", "reads #", "reads this value, at any tension", "N"),
             _FaultKind("cell", "saturates", "reads its full scale"),
             _FaultKind("cell", "fails", "gives no reading: its value is not a number"),
-            _FaultKind("cell", "is wrong by #", "reads too much, by this value", "N"),
+            _FaultKind("cell", "is wrong by #", "reads this value too much", "N"),
             _FaultKind("cable", "breaks", "has no tension and no weight", for_good=True),
             _FaultKind("encoder", "jumps by #", "counts this additional length of cable", "mm", 1e-3, True),
-            _FaultKind("servo", "is limited to #", "limits its force at the cable to this value", "N", 1.0, True),
+            _FaultKind("servo", "is limited to #", "has a cable force of at most this value", "N", 1.0, True),
             _FaultKind("servo", "trips", "has no power until the operator resets the machine", for_good=True),
             _FaultKind("load", "grows by #", "is added at the center of mass; removed if less than 0", "kg"),
             _FaultKind("emergency stop", "", "is pressed until the operator resets the machine", for_good=True),
@@ -48,11 +48,11 @@ KINDS: Final = MappingProxyType(
             _FaultKind("group", "repeats", "its last block arrives again and again"),
             _FaultKind("group", "doubles", "each of its blocks arrives twice"),
             _FaultKind("group", "swaps", "two of its blocks arrive in the wrong order"),
-            _FaultKind("group", "goes back", "older and older blocks arrive"),
+            _FaultKind("group", "goes back", "its earlier blocks arrive in reverse order"),
             _FaultKind("group", "is torn", "the counters at the two ends of its blocks differ"),
             _FaultKind("group", "is foreign", "its blocks are of another program"),
             _FaultKind("group", "stops", "its PLC stops: its block stays unchanged, its drives have no power"),
-            _FaultKind("group", "is taken", "another controller has its grant"),
+            _FaultKind("group", "is taken", "another controller owns it"),
             _FaultKind("commands", "stop", "none arrives at any PLC"),
             _FaultKind("commands", "repeat", "the last one arrives again and again"),
             _FaultKind("commands", "are torn", "the counters at the two ends of their blocks differ"),
@@ -60,7 +60,7 @@ KINDS: Final = MappingProxyType(
         )
     }
 )
-TINY: Final = 1e-9  # tolerance for rounding of times [s]
+TINY: Final = 1e-9  # tolerance for rounding errors of times [s]
 _TAIL: Final = re.compile(r"(?: at (?P<time>\S+) s)?(?: for (?P<duration>\S+) s)?$")
 _NUMBER: Final = r"(?P<value>\S+)"
 
@@ -72,8 +72,8 @@ class Injected:
     Attributes:
         kind: One of `KINDS`, for example "cell sticks".
         which: Index of the cell, cable, encoder, servo or group, from 0; 0 for a single part.
-        value: Value in SI units; 0 for a kind without one.
-        time: Time of its beginning, since the start of the machine [s].
+        value: Value in SI units; 0 for a kind without a value.
+        time: Time of the beginning of the fault, since the start of the machine [s].
         duration: Duration [s]; infinite by default.
     """
 
@@ -113,7 +113,7 @@ def fault(text: str) -> Injected:
     """
     given: Any = text
     if not isinstance(given, str):
-        raise InvalidValueError("fault", brief(given), "a text", 'Write it as "cell 3 sticks at 40 s".')
+        raise InvalidValueError("fault", brief(given), "a text", 'Write the fault as "cell 3 sticks at 40 s".')
     words = " ".join(given.lower().split())
     tail = _TAIL.search(words)
     assert tail is not None  # the match may be empty
@@ -127,14 +127,14 @@ def fault(text: str) -> Injected:
         if match := re.fullmatch(f"{kind.item}{number} {happens}".strip(), what, re.ASCII):
             found = match.groupdict()
             if kind.for_good and duration < math.inf:
-                raise _refused(text, "no duration, because this fault does not recover by itself")
+                raise _refused(text, "no duration, because this fault ends only by a reset")
             value = _number(text, found.get("value"), 0.0, kind.unit) * kind.scale
             return Injected(name, int(found.get("which") or 0), value, time, duration)
     raise _unknown(text, what)
 
 
 def _unknown(text: str, what: str) -> InvalidValueError:
-    """Error for unknown words, with a list of the words for the item, or of the items."""
+    """Error for unknown words, with a list of the known faults of the part, or of the parts."""
     items = sorted({kind.item for kind in KINDS.values()})
     first = what.split(" ")[0] if what else ""
     item = next((item for item in items if item.split(" ")[0] == first), None)

@@ -1,4 +1,4 @@
-"""In-process link: commands and samples over a network with delay, jitter and losses, in lockstep with the machine."""
+"""In-process link in lockstep with the machine, with delay, jitter and losses of commands and samples."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sagline.core.errors import InvalidValueError
 from sagline.plc.blocks import LOAD, TORN
 from sagline.twin.plc_program import Order
 
-TINY: Final = 1e-9  # tolerance for rounding of times [s]
+TINY: Final = 1e-9  # tolerance for rounding errors of times [s]
 
 
 class Network:
@@ -35,7 +35,7 @@ class Network:
         self._generator = np.random.default_rng((seed, 1))
 
     def arrival(self, now: float) -> float | None:
-        """Arrival time of a message that is sent now [s]; None if it is lost."""
+        """Arrival time of a message that is sent now [s]; None if the message is lost."""
         if self.ideal:
             return now
         lost, late = self._generator.random(2)
@@ -65,7 +65,7 @@ class DelayLine:
         return found
 
 
-FIRST: Final = 2  # index of the first array of `PlcBlocks` with one column per group instead of one per winch
+FIRST: Final = 2  # index of the first array of `PlcBlocks` with one column per group, not per winch
 
 COUNTS, STATE, DRIVE_FAULT = range(3)  # rows of the second array
 COUNTER, OWNER, ECHO, STATUS, FAULT = range(5)  # rows of the third array
@@ -77,13 +77,13 @@ class PlcBlocks:
     Attributes:
         arrays: Length, rate, torque, tension, filtered (5, m); counts, state, winch fault (3, m); counter, owner,
             echo, status, fault (5, G); the PLCs' clocks [s] (G,).
-        owners: Owners of the grants, as plain numbers.
+        owners: Ids of the owners of the groups, as plain numbers.
     """
 
     __slots__ = ("arrays", "owners")
 
     def __init__(self, arrays: tuple[Array, Whole, Whole, Array]) -> None:
-        """Keep the arrays."""
+        """Store the arrays."""
         self.arrays = arrays
         self.owners: list[int] = arrays[FIRST][OWNER].tolist()
 
@@ -139,11 +139,11 @@ class Report(NamedTuple):
     winch_fault: list[int]
 
 
-INVALID: Final = {  # reasons of the blocks of two faults
-    "is torn": Refusal("it is torn: its two counters differ", TORN),
+INVALID: Final = {  # reasons to discard the blocks of two injected faults
+    "is torn": Refusal("it is incomplete, because its two counters differ", TORN),
     "is foreign": Refusal("it is of another program", f"Check the address. {LOAD}"),
 }
-HISTORY: Final = 100  # earlier blocks, which the fault "goes back" can send
+HISTORY: Final = 100  # number of earlier blocks for the fault "goes back"
 
 
 class _Driven(Protocol):
@@ -169,7 +169,7 @@ class _Driven(Protocol):
 
 
 class MachineLink:
-    """`Link` to a machine in the same process, without own delays and threads."""
+    """`Link` to a machine in the same process, without a thread."""
 
     def __init__(self, machine: _Driven, network: Network, moves: bool) -> None:
         """Begin without data of any group; use `Machine.link`."""
@@ -251,7 +251,7 @@ class MachineLink:
         self._past.append(snapshot)
 
     def _blocks(self, group: int, snapshot: PlcBlocks, how: str | None) -> list[PlcBlocks | Refusal]:
-        """Blocks that a group sends in a scan; the reason for an invalid one."""
+        """Blocks that a group sends in a scan, and the reason why one of them is invalid."""
         held, self._held[group] = self._held[group], None
         if how == "goes back":
             self._steps_back[group] += 1
@@ -270,7 +270,7 @@ class MachineLink:
         return [snapshot, snapshot] if how == "doubles" else [snapshot, held] if held is not None else [snapshot]
 
     def _take(self, group: int, arrival: float, block: PlcBlocks | Refusal) -> None:
-        """Accept a block, if it is valid and newer than the previous block."""
+        """Accept a block if it is valid and newer than the previous block."""
         known, reason = self._newest[group], block if isinstance(block, Refusal) else None
         if isinstance(block, PlcBlocks) and known is not None:
             counters = block.counter(group), known.counter(group)
@@ -291,7 +291,7 @@ class MachineLink:
         else:
             silent = tuple(group for group, block in enumerate(newest) if block is None)
             if silent:
-                return Missing(now, silent, ("no block has come yet",) * len(silent))
+                return Missing(now, silent, ("no block has arrived yet",) * len(silent))
             floats, whole, groups, clock = self._mixed([block for block in newest if block is not None])
         age = now - self._arrival
         counter, owner, echo, status, fault = groups

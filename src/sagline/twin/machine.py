@@ -1,4 +1,4 @@
-"""Whole machine in one process: the true robot, its drives, its PLCs and the network."""
+"""Whole machine in one process: the true robot, drives, PLCs and network."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ from sagline.twin.start import check_step, initial_state, winch_limits
 LOSSES: Final = Damping(loss_time=1e-3, air_damping=0.2)  # assumed damping; 2 N s/m of air damping on the prototype
 MOST_SEED: Final = 2**63 - 1
 LARGEST_ID: Final = 2**32 - 1
-RIVAL: Final = 2**31 - 2  # id of a controller that takes a grant without permission
+RIVAL: Final = 2**31 - 2  # id of a controller that becomes an owner without permission
 TRIPPED: Final = 1  # fault code of a tripped drive
 
 
 class Machine:
-    """Simulated machine in steps of one period, driven by a controller or through a server.
+    """Simulated machine in steps of one period, for a controller in this process or for a server.
 
     A controller in the same process uses `link`; each exchange advances the machine by a period. A server for other
     processes makes these calls in every period:
@@ -53,9 +53,9 @@ class Machine:
         machine.report(group)            # present block of the group; None: leave the block unchanged
 
     Each PLC runs its program at the beginning of a period, and converts set points to counts with the nominal drums.
-    Its drives move linearly until the end of the period, and the true drums convert counts to cable length. The inner
-    control loops use the drum angles every millisecond without quantization. Only readings have the resolution of the
-    encoders (nanometers).
+    The drives move linearly until the end of the period, and the true drums convert counts to cable length. The inner
+    control loops use the exact drum angles every millisecond. Only the readings have the resolution of the encoders
+    (nanometers).
 
     Attributes:
         robot: The true robot.
@@ -84,13 +84,12 @@ class Machine:
 
         Args:
             robot: The true robot, with all data of its winches and encoders.
-            nominal: The planned robot, whose data the PLCs use for counts and limits; None for the true one. The
-                difference of the two values of `length_zero` is the zero error of an encoder, which is zero if one of
-                them is missing.
+            nominal: The planned robot; the PLCs use its data for counts and limits. None for the true robot. The zero
+                error of an encoder is the difference of `length_zero` of the two robots, or zero if a value is missing.
             start: Pose at which the encoders were set; None for the middle of the nominal robot's test_box. The
-                platform is at the equilibrium for the nominal lengths at this pose. Additional lengths of the true
-                robot on pulleys and dead lengths are not counted.
-            surveyed: True if the true platform was at this pose when the encoders were set.
+                platform is at the equilibrium for the nominal lengths at this pose. The nominal lengths do not include
+                differences of the true robot in dead lengths and lengths on pulleys.
+            surveyed: True if the true platform was exactly at this pose when the encoders were set.
             seed: Seed of noise, clocks and the network.
             period: Period of controller and PLCs [s], a whole multiple of the step.
             step: Step of the simulation of the plant [s].
@@ -115,7 +114,7 @@ class Machine:
         self.nominal = optional(nominal, Robot, "nominal") or robot
         if self.nominal.cable_count != robot.cable_count:
             allowed = f"of {robot.cable_count} cables, as {robot.name} has"
-            raise InvalidValueError("nominal", f"of {self.nominal.cable_count} cables", allowed, "Give its own plan's.")
+            raise InvalidValueError("nominal", f"of {self.nominal.cable_count} cables", allowed, "Give as many.")
         self.groups, self.period = groups_of(robot.cable_count), number(period, "period", "s", above=0.0)
         size = number(step, "step", "s", above=0.0)
         losses = optional(damping, Damping, "damping") or LOSSES
@@ -129,7 +128,7 @@ class Machine:
         self._clocks = np.random.default_rng((noise, 2)).uniform(0.0, 1e3, len(self.groups))
         self._group_rows = np.zeros((5, len(self.groups)), dtype=np.int64)
         self._whole = np.zeros((3, robot.cable_count), dtype=np.int64)
-        self._reported: Any = None  # last report, without counters
+        self._reported: Any = None  # last reports, without counters
         self._cycles = self._counter = 0
         self._links: list[MachineLink] = []
         self._schedule, self._commands = Schedule(), ""
@@ -174,7 +173,7 @@ class Machine:
         return link
 
     def claim(self, group: int, owner: int) -> None:
-        """Request the grant of a PLC.
+        """Claim the ownership of the group of a PLC.
 
         Args:
             group: Index of the group, from 0.
@@ -226,7 +225,7 @@ class Machine:
             self._programs[group].take(message)
 
     def advance(self) -> None:
-        """Simulate one period: due faults, scans of the PLCs, drives and plant, and readings at the end."""
+        """Simulate one period: due faults, scans of the PLCs, drives and plant, and the readings at the end."""
         now = self.time
         if self._schedule.waiting:
             self._apply_due_faults()
@@ -256,7 +255,7 @@ class Machine:
         hardware.simulate_period(length, tension, powered)
 
     def _written(self, before: PlcBlocks | None) -> PlcBlocks:
-        """Blocks of all groups; those of a stopped PLC do not change."""
+        """Blocks of all groups; the block of a stopped PLC does not change."""
         hardware, programs, groups = self._hardware, self._programs, self._group_rows
         self._counter = self._counter % COUNTERS + 1
         groups[COUNTER] = self._counter
@@ -311,7 +310,7 @@ class Machine:
         kind = KINDS[choice(found.kind, "fault: kind", KINDS)]
         parts = len(self.groups) if kind.item == "group" else self.robot.cable_count
         if kind.numbered and not 0 <= found.which < parts:
-            raise InvalidValueError("fault", brief(str(found)), f"{kind.item} 0 to {parts - 1}", "They count from 0.")
+            raise InvalidValueError("fault", brief(str(found)), f"{kind.item} 0 to {parts - 1}", "Numbers begin at 0.")
         self._schedule.plan(found)
 
     def _apply_due_faults(self) -> None:
@@ -355,15 +354,16 @@ class Machine:
             self._spoiled[group] = words
 
     def emergency_stop(self) -> None:
-        """Press the emergency stop: hardware locks the drums and cuts the power; the PLCs only report it.
+        """Press the emergency stop.
 
-        The contact that the PLCs read is normally closed, so that a broken wire has the same effect.
+        Hardware locks the drums and cuts the power, and the PLCs only report the stop. The PLCs read a normally closed
+        contact, so that a broken wire has the same effect.
         """
         for program in self._programs:
             program.contact = False
 
     def reset(self) -> None:
-        """Release the emergency stop and the drums and clear the drives, as the operator at the machine does."""
+        """Release the emergency stop and the drums, and clear the faults of the drives, as by the operator."""
         for program in self._programs:
             program.contact = True
             program.reset()

@@ -23,7 +23,7 @@ class ModbusServers(BlockServers):
     """Data blocks of all PLCs in holding registers."""
 
     def __init__(self, blocks: Sequence[bytes], host: str = LOOPBACK, port: int = 0) -> None:
-        """Start the thread and the servers; arguments of `BlockServers`."""
+        """Start the thread and the servers; same arguments as `BlockServers`."""
         self._locks = [Lock() for _ in blocks]
         self._servers: list[ModbusTcpServer] = []
         self._loop = asyncio.new_event_loop()
@@ -53,7 +53,7 @@ class ModbusServers(BlockServers):
             count: int,
             registers: list[int],
             values: list[int] | list[bool] | None,
-        ) -> ExcCodes | None:  # pymodbus calls this function with these names; values: data to write, None for reading
+        ) -> ExcCodes | None:  # pymodbus uses these argument names; values: data to write, None for reading
             with self._locks[group]:
                 for block, data in self._memory[group].items():
                     first, end = block.register, block.register + block.size // 2

@@ -1,4 +1,4 @@
-"""Program in the PLC of one group: grant, heartbeat, ramp, limits, hold.
+"""Program in the PLC of one group: ownership, heartbeat, ramp, limits, hold.
 
 The SCL source has the same statements in the same order. The program uses plain numbers, so that a scan takes
 microseconds.
@@ -25,7 +25,7 @@ FOLLOWING: Final = 0.01  # largest distance between set point and encoder [m]; t
 TINY: Final = 1e-9  # tolerance for rounding [m] and [s]
 LEFT: Final = 0.1  # shortest free cable [m]
 
-# plain numbers, which Python compares ten times as fast as members of an enumeration
+# plain numbers, because Python compares members of an enumeration ten times slower
 _EMERGENCY: Final = int(GroupStatus.EMERGENCY | GroupStatus.LOCKED | GroupStatus.BRAKED)
 _LOCKED: Final = int(GroupStatus.READY | GroupStatus.LOCKED | GroupStatus.BRAKED)
 _READY, _BRAKED, _RAMPING = int(GroupStatus.READY), int(GroupStatus.BRAKED), int(GroupStatus.RAMPING)
@@ -52,26 +52,26 @@ class PlcLimits(NamedTuple):
     least: list[float]  # shortest set points [m]
     most: list[float]  # longest set points [m]
     speed: list[float]  # largest rates [m/s]
-    tension: list[float]  # largest tensions at which cable is wound in, and largest expected tensions [N]
+    tension: list[float]  # largest tensions during winding in, and largest expected tensions [N]
 
 
 class Program:
     """Program of one group.
 
-    Its inputs are the command, the encoders and the load cells; its outputs are the attributes below.
+    The inputs of the program are the command, the encoders and the load cells. The outputs are the attributes.
 
     Attributes:
-        owner: Owner of the grant, 0 for none.
+        owner: Id of the controller that owns the group, 0 for none.
         echo: Counter of the last accepted command, 0 before the first.
-        fault: Reason of an automatic stop. A command to hold acknowledges it after the end of the ramp, and after at
-            least 100 ms.
+        fault: Reason of an automatic stop. A command to hold acknowledges the fault after the end of the ramp, and
+            after at least 100 ms.
         powered: True for each drive that has power and a released brake.
         length: Set points at the end of the scan's period [m].
         tension: Expected tensions at the drums [N].
         drive_fault: Fault codes of the drives, 0 for none.
-        contact: State of the normally closed contact of the emergency stop: False if it is pressed, or if its wire is
-            broken.
-        emergency: True from the opening of the contact to the next reset with a closed contact.
+        contact: State of the normally closed contact of the emergency stop: False if the stop is pressed, or if the
+            wire is broken.
+        emergency: True after the contact has opened, until a reset with a closed contact.
         locked: True if the drums are locked until the operator releases them.
     """
 
@@ -82,7 +82,7 @@ class Program:
         self.winches = range(count)
         self.owner, self.echo, self.fault = 0, 0, GroupFault.NONE
         self.powered = [False] * count
-        self._loaded = [False] * count  # True for each drive that has built up its tension
+        self._loaded = [False] * count  # True for each drive that has the expected tension
         self.length, self.tension = [0.0] * count, [0.0] * count
         self.drive_fault = [0] * count
         self.contact, self.emergency, self.locked = True, False, False
@@ -97,24 +97,24 @@ class Program:
         self._mode = _LEAVE
 
     def claim(self, owner: int, now: float) -> None:
-        """Grant ownership if it is free, or if the owner's counter has not changed for OWNER_TIMEOUT; now: time [s]."""
+        """Set an owner if there is none, or its counter has not changed for OWNER_TIMEOUT; now: time [s]."""
         if owner > 0 and owner != self.owner and (not self.owner or now - self._moved >= OWNER_TIMEOUT - TINY):
             self.seize(owner, now)
 
     def seize(self, owner: int, now: float) -> None:
-        """Grant ownership without conditions."""
+        """Set a new owner without conditions."""
         self.owner, self.echo, self._moved = owner, 0, now
         self._order, self._fresh = None, False
         if any(self._rate) and not self._ramp:
             self._stop(GroupFault.HEARTBEAT)
 
     def take(self, order: Order) -> None:
-        """Accept a command if it is from the owner and newer than the last one."""
+        """Accept a command if it is from the owner and newer than the last command."""
         if self.owner and order.owner == self.owner and (not self.echo or newer(order.counter, self.echo)):
             self.echo, self._order, self._fresh = order.counter, order, True
 
     def reset(self) -> None:
-        """Release the drums and clear the drive faults, like the operator; the brakes remain on."""
+        """Release the drums and clear the drive faults, as by the operator; the brakes remain on."""
         self.emergency = self.locked = False
         self.drive_fault = [0] * len(self.drive_fault)
         self.fault, self._order = GroupFault.NONE, None
@@ -152,7 +152,7 @@ class Program:
             self._brake()
             return
         if self._lags(encoder):
-            if self.fault == GroupFault.FOLLOWING_ERROR:  # set point at the drive's own position: no hold
+            if self.fault == GroupFault.FOLLOWING_ERROR:  # set points are at the drives' positions
                 self.locked = True
                 self._brake()
                 return
@@ -165,7 +165,7 @@ class Program:
             self.fault = GroupFault.NONE
             if order.enable != self.powered:
                 self._switch(order, encoder)
-                waited = 0.0  # a drive that starts at its position has no lag to make up for
+                waited = 0.0  # a drive that starts at its position is not too far from its set point
             self._obey(order, waited, cell)
             return
         elif order is not None and waited >= min(HEARTBEAT, order.valid_for) - TINY:
@@ -186,7 +186,7 @@ class Program:
         return True
 
     def _move_to_drives(self, encoder: list[float], cell: list[float]) -> None:
-        """Set each set point that is too far from its drive to the position of the drive, and use the cell tensions."""
+        """Replace set points that are too far from their drives by the drives' positions; use the cell tensions."""
         read = self._valid_tensions([max(reading, 0.0) for reading in cell])
         self.length, self._rate, self.tension = list(self.length), list(self._rate), list(self.tension)
         for i in self.winches:
@@ -202,7 +202,7 @@ class Program:
     def _switch(self, order: Order, encoder: list[float]) -> None:
         """Switch on the enabled drives at their present lengths, and switch off the others.
 
-        A drive builds up the expected tension first; its brake is released with the next command.
+        A drive first produces the expected tension; its brake is released with the next command.
         """
         self.length, self._target, self._rate = list(self.length), list(self._target), list(self._rate)
         for i in self.winches:
@@ -219,7 +219,7 @@ class Program:
         if order.mode == _FOLLOW and any(self.powered):
             self._follow(order, waited, cell)
             return
-        known = self._valid_tensions(order.tension)  # a drive that holds keeps its tension
+        known = self._valid_tensions(order.tension)  # the tension of a holding drive does not change
         self.tension = [old if has else new for has, old, new in zip(self.powered, self.tension, known, strict=True)]
         if self._mode == _FOLLOW and any(self._rate):
             self._ramp = RAMP
@@ -227,7 +227,7 @@ class Program:
         self._slow_down(cell)
 
     def _valid_tensions(self, tension: list[float]) -> list[float]:
-        """Expected tensions; a tension outside its limits is replaced by the previous one."""
+        """Expected tensions; the previous tension replaces a tension outside the limits."""
         rows = zip(tension, self.tension, self.limits.tension, strict=True)
         return [new if 0.0 <= new <= most and isfinite(new) else old for new, old, most in rows]
 
@@ -236,7 +236,7 @@ class Program:
         least, most, speed, tightest = self.limits
         lengths, rates, tensions, before = order.length, order.rate, order.tension, self._target
         self._mode, self._ramp = _FOLLOW, 0.0
-        waited = max(waited, 0.0) + PERIOD  # the previous command may have been late, but not this one
+        waited = max(waited, 0.0) + PERIOD  # the previous command may have been late
         for i in self.winches:
             length, fastest = lengths[i], speed[i]
             if self.powered[i]:
@@ -259,8 +259,8 @@ class Program:
     def _drive(self, cell: list[float]) -> None:
         """Advance the set points by a scan, unless this winds in a cable beyond its tension limit.
 
-        They move linearly to those of the last command within one cycle, and then continue at its rates, both within
-        the limits of lengths and rates.
+        The set points move linearly to those of the last command within one cycle. After that, they continue at the
+        rates of the command. Lengths and rates stay within their limits.
         """
         limit, length, powered, target, rate = self.limits.tension, self.length, self.powered, self._target, self._rate
         left, period, moved = self._left, self.period, []
@@ -275,7 +275,7 @@ class Program:
                 else:
                     at = target[i] + rate[i] * beyond
                 at = self._within_limits(i, at)
-                if not cell[i] <= limit[i] and at < length[i]:  # NaN counts as too large
+                if not cell[i] <= limit[i] and at < length[i]:  # True for NaN
                     self._stop(GroupFault.OVER_TENSION)
                     self._slow_down(cell)
                     return
@@ -283,7 +283,7 @@ class Program:
         self.length, self._left = moved, max(left - period, 0.0)
 
     def _within_limits(self, i: int, length: float) -> float:
-        """Next set point of a winch, limited in rate; a set point out of range may only move towards the range."""
+        """Next set point of a winch, with a limited rate; a set point out of range may only move toward the range."""
         at, farthest = self.length[i], self.limits.speed[i] * self.period + TINY
         if length > at + farthest:
             length = at + farthest
@@ -301,7 +301,7 @@ class Program:
             self._ramp = RAMP if any(self._rate) and not self._ramp else self._ramp
 
     def _slow_down(self, cell: list[float]) -> None:
-        """Reduce the rates to zero linearly; a cable beyond its tension limit is not wound in."""
+        """Reduce the rates linearly to zero; a cable beyond its tension limit is not wound in."""
         if self._ramp <= 0.0:
             return
         share, period = self._ramp / RAMP, min(self.period, self._ramp)
@@ -317,7 +317,7 @@ class Program:
 
     @property
     def _was_reported(self) -> bool:
-        """True if the ramp has ended, and the fault has been reported for a heartbeat."""
+        """True if the ramp has ended, and the fault has been reported for at least the heartbeat time."""
         return not self._ramp and self._now - self._since >= HEARTBEAT - TINY
 
     @property
@@ -337,7 +337,7 @@ class Program:
         return ready | _FOLLOWING if self._mode == _FOLLOW else ready
 
     def states(self, saturated: list[float]) -> tuple[list[int], list[int]]:
-        """Codes of `WinchState`, from flags of drives at a limit and the drives' fault codes."""
+        """Codes of `WinchState`, from flags of drives at a limit and from the drives' fault codes."""
         states = [WinchState.SATURATED if full else WinchState.ENABLED for full in saturated]
         for i in self.winches:
             if self.drive_fault[i]:

@@ -28,7 +28,7 @@ from sagline.twin.machine import Machine
 if TYPE_CHECKING:
     from sagline.dynamics.simulation.simulator import Reading
 
-SCAN: Final = 0.005  # scan period of a twin's PLCs [s]; half a control cycle, so that each cycle reads a new block
+SCAN: Final = 0.005  # scan period of a twin's PLCs [s]: half a control cycle, so that each cycle reads a new block
 SILENT: Final = bytes(FROM_PLC.size)
 HALF: Final = 2**31
 MODES: Final = frozenset(Mode)
@@ -51,9 +51,9 @@ class Server:
         """Start the servers.
 
         Args:
-            machine: Machine of the PLCs, whose period is the scan period.
+            machine: Machine of the PLCs; its period is the scan period of the PLCs.
             host: Address to listen at; by default this computer only.
-            port: Port of the first group; the others follow. 0 for any free ports.
+            port: Port of the first group; the next groups have the next ports. 0 for any free ports.
             modbus: True if the servers use Modbus TCP instead of S7.
 
         Raises:
@@ -79,8 +79,8 @@ class Server:
         """Serve until interrupted.
 
         Args:
-            watch: Function that is called after every scan with the machine's time [s] and the true state, which the
-                next scan overwrites.
+            watch: Function that is called after every scan with the machine's time [s] and the true state. The next
+                scan overwrites the state.
         """
         while True:
             self._pace.wait()
@@ -94,7 +94,7 @@ class Server:
             asked = CLAIM.read(claim)
             if not isinstance(asked, Refusal):
                 self.machine.claim(group, asked["owner"])
-            if command != self._seen[group]:  # a command from before the grant is ignored
+            if command != self._seen[group]:  # a command from before the claim is ignored
                 self._seen[group] = command
                 order = self._command(group, command)
                 if order is not None:
@@ -134,7 +134,7 @@ class Server:
 
 
 def check_first_port(port: int, robot: Robot) -> None:
-    """Refuse a port of the first group (0: any free ports) that leaves no ports for the other groups of a robot."""
+    """Refuse a first port that leaves no ports for the other groups of a robot; 0 means any free ports."""
     count = len(groups_of(robot.cable_count))
     last = LAST_PORT + 1 - count
     if port > last:
@@ -157,7 +157,7 @@ def block_of(group: int, report: Report) -> bytes:
     }
     if report.foreign:
         head["magic"] = 0
-    counts = [(count + HALF) % (2 * HALF) - HALF for count in report.counts]  # the counters of a PLC overflow too
+    counts = [(count + HALF) % (2 * HALF) - HALF for count in report.counts]  # as in a PLC, counters overflow
     columns: list[list[Any]] = [*report[8:13], counts, report.state, report.winch_fault]
     return FROM_PLC.pack(head | winch_rows(ROWS, columns))
 
@@ -173,7 +173,7 @@ def _block_servers(blocks: list[bytes], host: str, port: int, modbus: bool) -> B
         return S7Servers(blocks, host, port)
 
 
-SWITCHING_ON: Final = 60.0  # longest time of the start [s]; kernels may have to be read from the disk
+SWITCHING_ON: Final = 60.0  # longest time of the start [s], including the loading of kernels from the disk
 
 
 class _RemoteMachine(NamedTuple):
@@ -205,7 +205,7 @@ def machine_in_process(robot: Robot, nominal: Robot, start: Pose, *, seed: int =
 
 
 def _receive_addresses(pipe: Connection) -> tuple[str, ...]:
-    """Addresses from the other process; raises its error."""
+    """Addresses from the other process; raises the error of that process."""
     answer: tuple[str, ...] | SaglineError | None = None
     with suppress(EOFError):
         answer = pipe.recv() if pipe.poll(SWITCHING_ON) else None
@@ -214,11 +214,11 @@ def _receive_addresses(pipe: Connection) -> tuple[str, ...]:
     if answer is not None:
         raise answer
     step = "Try again, or use this process."
-    raise InvalidValueError("the twin's process", "not running, or silent for a minute", "one that answers", step)
+    raise InvalidValueError("the twin's process", "not running, or silent for a minute", "a process that answers", step)
 
 
 def _serve(robot: Robot, nominal: Robot, start: Pose, seed: int, pipe: Connection, place: Any) -> None:
-    """Run the machine until killed; SIGINT is ignored, because the controller stops the robot first."""
+    """Run the machine until killed; SIGINT is ignored, because the controller must first stop the robot."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         machine = Machine(robot, nominal=nominal, start=start, seed=seed, period=SCAN)

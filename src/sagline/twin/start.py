@@ -25,7 +25,7 @@ from sagline.twin.plc_program import LEFT, PlcLimits
 
 
 class _EncoderScale:
-    """Conversion between lengths and encoder counts, (m,), from the turns of known drums, else one radius each.
+    """Conversion between lengths and encoder counts, from the turns of known drums, or with a constant radius.
 
     Attributes:
         per_meter: Counts per meter of unstrained cable let out, at the reference lengths, (m,).
@@ -35,7 +35,7 @@ class _EncoderScale:
         """Reference lengths [m] (m,) and counts (m,) of a robot's encoders."""
         winch = robot.winches
         if winch is None or winch.counts_per_turn is None:
-            step = "Give it in the robot file, or with robot.replace(winches=Winch(counts_per_turn=...))."
+            step = "Give counts_per_turn in the robot file, or with robot.replace(winches=Winch(counts_per_turn=...))."
             raise InvalidValueError("winches: counts_per_turn", "not given", "known if encoder counts are used", step)
         stretch = 1.0 + winch.winding_tension / robot.cables.axial_stiffness
         each = winch.gear * winch.counts_per_turn
@@ -73,8 +73,8 @@ class _EncoderScale:
 
 
 SHARE: Final = 0.2  # largest phase of the highest mode in a step [rad]
-NEAR: Final = 1e-6  # largest deviation from whole steps, as a share of a period
-REACH: Final = 2.0  # longest cable if cable_length is unknown, relative to the largest distance of frame anchors
+NEAR: Final = 1e-6  # largest deviation from a whole number of steps, in periods
+REACH: Final = 2.0  # length of the cable if cable_length is unknown, relative to the largest distance of frame anchors
 
 
 class Start(NamedTuple):
@@ -82,7 +82,7 @@ class Start(NamedTuple):
 
     state: Equilibrium  # equilibrium of the true robot
     nominal: _EncoderScale  # conversion of the encoders in the PLCs
-    true: _EncoderScale  # true conversion of the encoders
+    true: _EncoderScale  # conversion of the encoders at the true drums
 
 
 def initial_state(true: Robot, nominal: Robot, start: Any, surveyed: bool) -> Start:
@@ -106,7 +106,7 @@ def initial_state(true: Robot, nominal: Robot, start: Any, surveyed: bool) -> St
 
 
 def _start_pose(robot: Robot, start: Any) -> Pose:
-    """Pose at which encoders are set; by default the middle of the robot's test_box, without rotation."""
+    """Pose at which the encoders are set; by default the middle of the robot's test_box, without a rotation."""
     if start is not None:
         return single_pose(start, "start")
     if robot.test_box is None:
@@ -117,7 +117,7 @@ def _start_pose(robot: Robot, start: Any) -> Pose:
 
 
 def winch_limits(robot: Robot, scale: _EncoderScale) -> PlcLimits:
-    """Limits of a robot's winches in the PLCs, each one list over all winches."""
+    """Limits of a robot's winches in the PLCs; each limit is a list over all winches."""
     winch, anchors = robot.winches, robot.frame_anchors
     assert winch is not None
     apart = np.linalg.norm(anchors[:, None] - anchors, axis=-1).max()
@@ -138,7 +138,7 @@ def check_step(robot: Robot, state: Equilibrium, step: float, period: float) -> 
     if not (parts := period / step) >= 0.5 or abs(parts - round(parts)) > NEAR * parts:
         raise InvalidValueError("period", f"{period:g} s", f"a whole multiple of {step:g} s, the step", "Correct it.")
     if period > HEARTBEAT:
-        step_to = "Give 0.01, the article's."
+        step_to = "Give 0.01, as in the article."
         raise InvalidValueError("period", f"{period:g} s", f"<= {HEARTBEAT:g} s, the heartbeat", step_to)
     length = state.unstrained_length
     pose = Pose.from_quaternion(state.pose.position[None], state.pose.quaternion[None])
@@ -164,13 +164,13 @@ def _rest_at(robot: Robot, length: Array, pose: Pose) -> Equilibrium:
     dead = dead_cable(robot) + np.zeros(robot.cable_count)
     found = forward(robot, length, start=pose) if (length > dead).all() else None
     if found is None or not found.stable:
-        allowed, step = "a robot in equilibrium near the start", "Change it by less, or give surveyed=True."
-        raise InvalidValueError("robot", "one without equilibrium at the nominal lengths", allowed, step)
+        allowed, step = "a robot with an equilibrium near the start", "Change the robot by less, or give surveyed=True."
+        raise InvalidValueError("robot", "without equilibrium at the nominal lengths", allowed, step)
     return found.state
 
 
 def _zero_errors(true: Robot, nominal: Robot) -> Array:
-    """Zero errors of the encoders: length off the drums beyond their reading [m], shape (m,)."""
+    """Zero errors of the encoders: true minus indicated length off the drums [m], shape (m,)."""
     error = np.zeros(true.cable_count)
     if true.winches is not None and nominal.winches is not None:
         there, thought = true.winches.length_zero, nominal.winches.length_zero
@@ -188,6 +188,6 @@ def _routed_length(robot: Robot, pose: Pose) -> Array:
 
 
 def plc_limits(robot: Robot) -> PlcLimits:
-    """Limits of a robot's winches in the PLCs, each one list over all winches."""
+    """Limits of a robot's winches in the PLCs; each limit is a list over all winches."""
     planned = _feasible_lengths(inverse(robot, _start_pose(robot, None)).unstrained_length, robot, "test_box")
     return winch_limits(robot, _EncoderScale(robot, planned, np.zeros(robot.cable_count)))

@@ -145,7 +145,8 @@ class Workspace(Result, Saved):
     def levels(self) -> Levels:
         """Signed feasibility function of the position.
 
-        Returns: A function of positions (N, 3) [m] that returns levels (N,), and has a method `details`.
+        Returns:
+            A function of positions (N, 3) [m] that returns levels (N,), and has a method `details`.
         """
         return Levels(
             self.robot,
