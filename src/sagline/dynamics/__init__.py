@@ -1,4 +1,4 @@
-"""Vibration of robots whose cables have mass, motion in time, and trajectories without residual vibration."""
+"""Dynamics: vibration of robots whose cables have mass, simulation, and trajectories without residual vibration."""
 
 from sagline.core.surface import group
 

@@ -1,1 +1,1 @@
-"""Simulation of the robot's motion in time."""
+"""Simulation of the motion of a robot."""

@@ -27,11 +27,11 @@ from sagline.kernels.dynamics.progress import COUNTERS, FAILED
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoadedPlatform:
-    """Rigid body of the platform and the point masses at its cable ends, in its own principal axes."""
+    """Whole body: the platform with point masses at its cable ends, in the principal axes of the whole body."""
 
-    inertia: Array  # mass and principal moments of the whole body, infinite for a blocked rotation, (4,)
-    center: Array  # its center of mass relative to that of the platform, principal axes of the platform [m], (3,)
-    axes: Array  # its principal axes in those of the platform, one per column, (3, 3)
+    inertia: Array  # mass and principal moments of the whole body, (4,); infinite for a blocked rotation
+    center: Array  # center of the whole body relative to the platform's center of mass, platform axes [m], (3,)
+    axes: Array  # principal axes of the whole body in the principal axes of the platform, one per column, (3, 3)
 
     @classmethod
     def of(cls, inertia: Array, masses: Array, ends: Array) -> LoadedPlatform:
@@ -49,7 +49,7 @@ class LoadedPlatform:
         return cls(np.array([mass, *moments]), center, axes)
 
     def levers(self, ends: Array) -> Array:
-        """Positions on the platform (m, 3) relative to the center of the whole body, in its axes."""
+        """Positions on the platform (m, 3) relative to the center of the whole body, in the axes of the whole body."""
         levers: Array = (ends - self.center) @ self.axes
         return levers
 
@@ -85,11 +85,11 @@ def _about(masses: Array, places: Array) -> Array:
 
 
 FEWEST, MOST = 4, 500  # elements per cable
-# stability limit of the step while the element at the frame has length 0.4 l, relative to l sqrt(rho/EA)
+# stability limit of the step for an element of length 0.4 l at the frame, relative to l sqrt(rho/EA)
 SHORTEST: Final = 0.86
 SPARE: Final = 8  # spare nodes per cable
-TRAVELS: Final = 20.0  # a cable is slack after this time without tension, in travel times of a stretch wave
-STRETCH: Final = 1.1  # memory for nodes relative to the longest required length, because winches may overshoot
+TRAVELS: Final = 20.0  # time without tension after which a cable is slack, in travel times of a stretch wave
+STRETCH: Final = 1.1  # memory for nodes, relative to the longest required length; winches may overshoot
 
 
 class _ChainRecords(Records):
@@ -102,7 +102,7 @@ class _ChainRecords(Records):
 
     @property
     def arrays(self) -> tuple[Array, ...]:
-        """The arrays in the form for the kernel."""
+        """The arrays for the kernel."""
         assert self.points is not None
         return *super().arrays, self.points
 
@@ -110,8 +110,8 @@ class _ChainRecords(Records):
 class ChainPlant(Plant):
     """State of a robot with lumped-mass cables during a simulation.
 
-    The kernel moves the platform together with half an element of each cable; its records are converted to the motion
-    of the platform alone.
+    The kernel moves the whole body: the platform with half an element of each cable. The records are converted to the
+    motion of the platform.
 
     Attributes:
         nodes: Elements per cable at the start.
@@ -189,7 +189,7 @@ class ChainPlant(Plant):
         return _ChainRecords(count, len(self.cables), self.nodes + 1)
 
     def platform_states(self, states: Array) -> Array:
-        """Convert recorded states to states of the platform alone."""
+        """Convert recorded states of the whole body to states of the platform."""
         return self._carrier.platform_states(states)
 
     def remove_cable(self, cable: int) -> None:
@@ -234,7 +234,7 @@ def _chain_table(given: InitialConditions, place: Array, nodes: int, losses: Dam
     table[:, c.ELEMENT] = state.free_length / nodes
     table[:, c.DENSITY], table[:, c.STIFFNESS] = material.linear_density, material.axial_stiffness
     table[:, c.LOSS_TIME], table[:, c.AIR_RATE] = losses.loss_time, losses.air_damping / material.linear_density
-    # the cable between exit and drum has the strain of the element at the exit
+    # the cable between exit point and drum has the strain of the element at the exit point
     table[:, c.BEHIND] = state.unstrained_length - state.free_length
     last = np.linalg.norm(place[:, :, -1] - place[:, :, -2], axis=1)
     table[:, c.RUN] = table[:, c.BEHIND] * last / table[:, c.ELEMENT]
@@ -248,7 +248,7 @@ def checked_nodes(nodes: Any) -> int:
 
 
 def check_lumped(given: InitialConditions) -> None:
-    """Reject cables that the lumped model does not support."""
+    """Reject cables for which the lumped model is not valid."""
     if given.model.code != codes.CATENARY:
         name, step = f"{type(given.model).__name__}()", 'Plan with Catenary(), or give cable_mass="none".'
         raise InvalidValueError("start: model", name, 'Catenary() where cable_mass="lumped"', step)
@@ -259,7 +259,7 @@ def check_lumped(given: InitialConditions) -> None:
 
 
 def wave_frequency(given: InitialConditions, nodes: int) -> float:
-    """Highest angular frequency of cables in elements, with the shortest possible element included [rad/s]."""
+    """Highest angular frequency of chains, including the shortest possible element [rad/s]."""
     material = given.robot.cables
     element = given.state.free_length / nodes
     return float((2.0 / SHORTEST / element * np.sqrt(material.axial_stiffness / material.linear_density)).max())

@@ -1,4 +1,4 @@
-"""Equilibrium of the platform on lumped-mass cables of given lengths; its error is of order nodes^-2."""
+"""Equilibrium of the platform on lumped-mass cables of given lengths, with an error of the order nodes^-2."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from sagline.robot.pose import Pose
 from sagline.statics.slopes import platform_end_forces
 
 STEPS = 60
-NEAR = 1e-8  # relative error of a length or force, after which one more Newton step reaches rounding error
-NEUTRAL = 1e-12  # relative to the largest stiffness: smaller stiffnesses count as zero
-# largest step relative to a force; longer steps are shortened, so that a chain with a distant start does not fold
+NEAR = 1e-8  # relative error of a length or force; one more Newton step then reaches rounding error
+NEUTRAL = 1e-12  # relative to the largest stiffness; a smaller stiffness counts as zero
+# largest step relative to a force; after a longer step, a chain with a distant start could fold
 LONGEST_STEP = 0.2
 
 
@@ -39,7 +39,7 @@ class _LumpedCables(NamedTuple):
     nodes: int  # elements per cable
 
     def elements(self, force: Array) -> tuple[Array, Array]:
-        """Element forces, starting at the platform: forces in the cable at element centers, and their magnitudes."""
+        """Element forces, starting at the platform: forces at the element centers, and their magnitudes."""
         # shapes: force (m, 3) [N]; returns (m, nodes, 3) [N]
         below = (np.arange(self.nodes) + 0.5) * (self.weight * self.element)[:, None]
         forces = np.repeat(force[:, None, :], self.nodes, axis=1)
@@ -63,8 +63,8 @@ class _LumpedCables(NamedTuple):
 
 def chains_at_rest(state: Equilibrium, nodes: int) -> _ChainsAtRest:
     """Chains for the cables of an equilibrium, at rest with the same lengths."""
-    # The force in an element is that of the exact cable at the element's center. The position of the chain's end
-    # therefore follows from the midpoint rule, and pose and forces have errors of the order of nodes^-2. The wrench is
+    # The force in an element is the force of the exact cable at the center of the element. The end of the chain
+    # therefore follows from the midpoint rule, and pose and forces have errors of the order nodes^-2. The wrench is
     # balanced to rounding. Source: docs/model.md, section 11
     robot, exits = state.one_robot, state.exit_point
     length, material = state.free_length, state.cables.cable
@@ -102,7 +102,7 @@ def _refuse_slack(force: Array, chains: _LumpedCables) -> None:
 
 
 def _no_rest(item: str, value: str) -> InvalidValueError:
-    step = 'Start elsewhere, or with cable_mass="none".'
+    step = 'Start at another pose, or with cable_mass="none".'
     return InvalidValueError(item, value, "taut cables that hold the platform", step)
 
 
@@ -117,7 +117,7 @@ def _solve_chains(chains: _LumpedCables, chord: Array, force: Array) -> Array:
         if near:
             return force
         near = bool(share.max() <= NEAR)
-    raise _no_rest("start", "an equilibrium with a cable so slack that its chain folds")
+    raise _no_rest("start", "an equilibrium with a very slack cable, whose chain folds")
 
 
 def _size(levers: Array) -> float:
@@ -127,9 +127,8 @@ def _size(levers: Array) -> float:
 
 
 def _balancing_motion(unbalance: Array, stiffness: Array, freedom: Array, size: float) -> Array:
-    """The motion that balances the wrench; zero in directions without stiffness."""
-    # for example, stiffness and unbalance are both zero, except for rounding, for the rotation of a pendulum about its
-    # cable
+    """Motion that balances the wrench; zero in directions without stiffness."""
+    # example: for the rotation of a pendulum about its cable, stiffness and unbalance are zero, except for rounding
     units = np.array([1.0, 1.0, 1.0, size, size, size])
     slope = freedom @ (stiffness / np.outer(units, units)) @ freedom.T
     found = np.linalg.lstsq(slope, -freedom @ (unbalance / units), rcond=NEUTRAL)[0]

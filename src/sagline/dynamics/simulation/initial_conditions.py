@@ -30,7 +30,7 @@ TableInTime = ArrayLike | tuple[ArrayLike, ArrayLike]  # one row, or times and o
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TimeTable:
-    """Time table of n numbers: cubic between instants, with given values and rates; constant before and after."""
+    """Time table of n numbers, cubic between instants, with given values and rates; constant outside the table."""
 
     time: Array  # instants [s], shape (K,), increasing
     value: Array  # shape (K, n)
@@ -56,7 +56,7 @@ class TimeTable:
 
     @property
     def arrays(self) -> CubicTableArrays:
-        """Arrays in the form for kernels: read-only, C-contiguous."""
+        """Arrays for kernels: read-only, C-contiguous."""
         time, value, begin, end = (
             locked(np.ascontiguousarray(array, dtype=np.float64).view())
             for array in (self.time, self.value, self.begin, self.end)
@@ -68,12 +68,12 @@ class TimeTable:
         return TimeTable(self.time, self.value[:, columns], self.begin[:, columns], self.end[:, columns])
 
     def joined_columns(self, other: TimeTable) -> TimeTable:
-        """Time table of these numbers followed by those of another time table with the same instants."""
+        """Time table of these numbers, then of the numbers of another time table with the same instants."""
         pairs = ((self.value, other.value), (self.begin, other.begin), (self.end, other.end))
         return TimeTable(self.time, *(np.concatenate(pair, axis=1) for pair in pairs))
 
     def at(self, time: float | Array) -> tuple[Array, Array]:
-        """Values and rates (..., n) at times (...); at a discontinuity, the rate after it."""
+        """Values and rates (..., n) at times (...); at a discontinuity, the rate after the discontinuity."""
         at = np.asarray(time)
         if len(self.time) == 1:
             value = np.zeros((*at.shape, 1)) + self.value[0]
@@ -108,7 +108,7 @@ class TimeTable:
         return TimeTable(times, values, begin, end)
 
     def with_stop(self, time: float, duration: float, columns: Any) -> TimeTable:
-        """Time table with some rates decreasing linearly to zero from a given time on, during a duration [s]."""
+        """Time table in which some rates decrease linearly to zero, from a given time on, during a duration [s]."""
         table = self.with_instant(time).with_instant(time + duration)
         (start, rate), stop = table.at(time), time + duration
         later = np.flatnonzero(table.time >= time)
@@ -140,12 +140,12 @@ def checked_time_table(given: Any, item: str, unit: str, columns: int, begin: fl
     if time[0] > begin:
         allowed = f"a time <= {begin:g} s, the start"
         raise InvalidValueError(
-            f"{item}: time[0]", f"{time[0]:g} s", allowed, "Begin the table at the start of the simulation."
+            f"{item}: time[0]", f"{time[0]:g} s", allowed, "Start the table at the start of the simulation."
         )
     return TimeTable.linear(time, rows) if time.size > 1 else TimeTable.constant(rows[0])
 
 
-ROUNDING = 1e-12  # relative to the largest force and moment: smaller values count as zero
+ROUNDING = 1e-12  # relative to the largest force and moment; smaller values count as zero
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -157,7 +157,7 @@ class InitialConditions:
     state: Equilibrium  # initial state, single
     poses: Pose  # poses along the motion, a batch
     twist: Array  # initial velocity of the platform's origin and angular velocity, world axes, (6,)
-    rate: Array  # initial dL/dt [m/s], (m,): that of a plan, otherwise zero
+    rate: Array  # initial dL/dt [m/s], (m,), of a plan; otherwise zero
     lengths: TimeTable  # set points of the unstrained lengths [m]
     tensions: TimeTable  # expected tensions at the drums [N], at the same instants
     wrench: TimeTable  # external wrench on the platform
@@ -171,7 +171,7 @@ def initial_conditions(
     """Checked initial conditions and inputs of `simulate`, with the duration in s."""
     if isinstance(start, Plan) and (start.path is not None or start.state.pose.shape):
         if unstrained_length is not None:
-            step = "Give plan.state[0] to wind other lengths than the plan's."
+            step = "Give plan.state[0] to simulate lengths that differ from the plan."
             raise InvalidValueError("unstrained_length", "given with a plan", "None", step)
         initial = _from_plan(start)
     else:
@@ -182,7 +182,7 @@ def initial_conditions(
         end = initial.begin + number(duration, "duration", "s", above=0.0)
     elif not end > initial.begin:
         raise InvalidValueError(
-            "duration", "not given", "> 0 s for a robot at rest", "Give duration=10.0 for instance."
+            "duration", "not given", "> 0 s for a robot at rest", "Give for instance duration=10.0."
         )
     table = initial.wrench
     if wrench is not None:
@@ -202,10 +202,10 @@ def _from_plan(plan: Plan) -> InitialConditions:
     if lost.size:
         k = int(lost[0])
         why = PoseStatus(plan.status[k]).text
-        step = "Plan a path that is feasible throughout."
+        step = "Plan a path on which all poses are feasible."
         raise InvalidValueError(f"start: sample {k}, {path.time[k]:g} s", f"without a solution ({why})", "solved", step)
     if plan.state.contact is not None and differs(robot, plan.state.contact.winding):
-        step = "Plan without winding: a simulation neglects friction of pulleys."
+        step = "Plan without winding, because a simulation neglects the friction of pulleys."
         raise InvalidValueError("start: winding", "given", "None", step)
     inertial = inertial_wrench(robot, path.pose, path.twist, path.twist_rate)
     given = plan.state.wrench - inertial
@@ -231,7 +231,7 @@ def _from_equilibrium(state: Equilibrium, table: Any) -> InitialConditions:
     """Initial conditions of a robot at rest."""
     if state.pose.shape:
         item = f"a batch of {len(state)} equilibria"
-        raise InvalidValueError("start", item, "a single equilibrium, or a plan", "Give one of them: state[0].")
+        raise InvalidValueError("start", item, "a single equilibrium, or a plan", "Give a single one: state[0].")
     robot, length = state.one_robot, state.unstrained_length
     if np.isnan(length).any():
         step = "Give a pose that is feasible."

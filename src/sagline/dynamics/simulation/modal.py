@@ -1,4 +1,4 @@
-"""Small motion about an equilibrium, cables with mass: decoupled modal response."""
+"""Small motion about an equilibrium with cable mass: decoupled modal response."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.statics.slopes import frame_end_forces, motions_of_ends
 from sagline.statics.stiffness import Stiffness, modes, stiffness
 
-UP_TO: Final = 1.5  # in units of the highest massless frequency: higher modes respond quasi-statically
+UP_TO: Final = 1.5  # in units of the highest massless frequency; modes above it respond quasi-statically
 SHARE: Final = 0.1  # largest step times highest angular frequency [rad]
 LONGEST: Final = 1e-3  # s
 MOST_STEPS: Final = 10**9
@@ -53,7 +53,7 @@ def modal_model(state: Equilibrium, damping: Damping) -> _ModalModel:
     # source: docs/model.md, section 11
     found = vibration(state, up_to=UP_TO * float(np.nanmax(modes(state).frequency)), damping=damping)
     if found.status is not VibrationStatus.SOLVED:
-        step = 'Start elsewhere, or give cable_mass="lumped" or "none".'
+        step = 'Start at another pose, or give cable_mass="lumped" or "none".'
         raise InvalidValueError("start", found.status.text, 'a state with linear vibrations for "modal"', step)
     rest, square = stiffness(state), (2.0 * np.pi * found.frequency) ** 2
     force = _forces_at_frame(state, found, rest)
@@ -74,7 +74,7 @@ def modal_model(state: Equilibrium, damping: Damping) -> _ModalModel:
 
 def _forces_at_frame(state: Equilibrium, found: Vibration, rest: Stiffness) -> Array:
     """Changes of the frame-end forces in every mode, world axes, (K, m, 3) [N/(m sqrt(kg))]."""
-    # along a cable f = f_0 - g with g' = rho omega^2 u, and the displacement of its end is the integral of C f
+    # along a cable f = f_0 - g with g' = rho omega^2 u; the displacement of the cable end is the integral of C f
     material, length = state.cables.cable, state.free_length
     at_frame, points = frame_end_forces(state), found.cable_shape.shape[2]
     square = (2.0 * np.pi * found.frequency) ** 2
@@ -96,7 +96,7 @@ def _forces_at_frame(state: Equilibrium, found: Vibration, rest: Stiffness) -> A
 
 
 def modal_response(frequency: Array, ratio: Array, force: Array, step: float) -> _ModalMotion:
-    """Response of modes, initially at rest, to piecewise linear forces: exact except for rounding."""
+    """Response of modes to piecewise linear forces, from rest; exact except for rounding."""
     # shapes: frequency (K,) [rad/s]; ratio (K,); force (N, K); step [s]
     ringing = frequency * np.sqrt(1.0 - ratio * ratio)
     root = -ratio * frequency + 1j * ringing
@@ -123,7 +123,7 @@ def modal_response(frequency: Array, ratio: Array, force: Array, step: float) ->
 
 
 def modal_simulation(given: InitialConditions, damping: Damping, step: Any, record: float) -> Simulation:
-    """Small motion of a robot about its initial equilibrium; step and record in s."""
+    """Small motion of a robot about its initial equilibrium; step and record [s]."""
     state = given.state
     _check(given)
     model = modal_model(state, damping)
@@ -173,16 +173,16 @@ def modal_simulation(given: InitialConditions, damping: Damping, step: Any, reco
 
 
 def check_modal_arguments(others: list[str]) -> None:
-    """Reject arguments that the modal model does not support."""
+    """Reject arguments that do not apply to the modal model."""
     if others:
-        step = 'Leave it out, or give cable_mass="lumped".'
+        step = 'Omit it, or give cable_mass="lumped".'
         raise InvalidValueError(others[0], "given", 'not given for cable_mass="modal"', step)
 
 
 def _check(given: InitialConditions) -> None:
     """Reject initial conditions without modes."""
     if given.state.contact is not None:
-        step = 'Leave winches out of the robot, or give cable_mass="lumped".'
+        step = 'Remove the winches of the robot, or give cable_mass="lumped".'
         raise InvalidValueError("start", "a robot with pulleys or dead length", 'none for cable_mass="modal"', step)
     if given.model.code != codes.CATENARY:
         step = 'Plan with Catenary(), or give cable_mass="none".'

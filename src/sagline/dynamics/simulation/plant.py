@@ -26,7 +26,7 @@ from sagline.statics.tables import cable_table
 
 MARGIN: Final = 5.0  # [m], cable beyond the required length for which a drum stores the strain
 BROKEN: Final = 1e-12  # share of the stiffness and weight of a cable that remains after it is cut
-NOTES: Final = 1000  # number of recorded events without schedule above which a run pauses to store them
+NOTES: Final = 1000  # number of recorded unscheduled events after which a run pauses to store them
 
 
 class Records:
@@ -37,8 +37,8 @@ class Records:
         tensions: Tensions at the frame ends [N], (N, m).
         lengths: Unstrained lengths [m], (N, m).
         energies: Kinetic, potential, supplied and lost energy [J], (N, 4).
-        notes: Events, see `sagline.kernels.dynamics.progress`, (NOTES + 2 m, NOTE_COLUMNS); with more than NOTES
-            events, a run pauses to store them.
+        notes: Events, see `sagline.kernels.dynamics.progress`, (NOTES + 2 m, NOTE_COLUMNS). After NOTES events, a run
+            pauses to store them.
         points: Points of cables with mass [m], (N, m, points, 3); None without cable mass.
     """
 
@@ -53,14 +53,14 @@ class Records:
 
     @property
     def arrays(self) -> tuple[Array, ...]:
-        """The arrays in the form for the kernel."""
+        """The arrays for the kernel."""
         return self.states, self.tensions, self.lengths, self.energies, self.notes
 
 
 class Plant:
-    """State of a robot during a simulation; mutable, with its own memory.
+    """State of a robot during a simulation, mutable, in its own memory.
 
-    In this class the platform axes are its principal axes, with the origin at the center of mass.
+    In this class the platform axes are the principal axes of the platform, with the origin at the center of mass.
 
     Attributes:
         robot: The robot at the start.
@@ -77,7 +77,7 @@ class Plant:
         audit: Sums over the run, (AUDIT_SIZE,).
         counters: Counters of the kernel, (COUNTERS,).
         layers: Strain of the cable on the drums, (m, B).
-        kernel: Integrator, called with `arguments`, arrays of records, number of steps, and steps per record.
+        kernel: Integrator; its arguments are `arguments`, arrays of records, number of steps, and steps per record.
         cable_mass: Cable mass option of `simulate`.
     """
 
@@ -85,7 +85,7 @@ class Plant:
     cable_mass: ClassVar[str] = "none"
 
     def __init__(self, robot: Robot, model: CableModel, pose: Pose, twist: Array, length: Array, data: Array) -> None:
-        """Place a robot at a pose; twist (6,); length (m,) [m]; data (DATA_ROWS, m)."""
+        """Put a robot at a pose; twist (6,); length (m,) [m]; data (DATA_ROWS, m)."""
         m = robot.cable_count
         self.robot, self.model, self.data = robot, model, data
         moments, self.axes = _principal_axes(robot, pose)
@@ -115,7 +115,7 @@ class Plant:
     def arguments(
         self, rules: tuple[int, int, int, int, int], numbers: tuple[float, float, float, float], inputs: Any
     ) -> Any:
-        """Arguments of the kernel before records and step counts; valid until a cable breaks or the mass changes."""
+        """First arguments of the kernel (without records and step counts), until a cable breaks or the mass changes."""
         lengths, wrenches, winds = inputs
         wide = lengths.value.shape[1]
         needed = 6 * 6 + 3 * body.STATE_COLUMNS + 4 * len(self.cables) + 2 * wide + 9
@@ -137,7 +137,7 @@ class Plant:
         return states
 
     def failure(self, time: float, step: float) -> InvalidValueError:
-        """Error for a kernel that stopped at a given time [s] with a given step [s]."""
+        """Error for a kernel that stopped, at a time [s], with a step [s]."""
         return energy_error(step, time, int(self.cables[int(self.counters[k.FAILED]) - 1]))
 
     def remove_cable(self, cable: int) -> None:
@@ -149,19 +149,19 @@ class Plant:
         self.rows, self.now, self.data = (np.delete(array, place, axis=1) for array in (self.rows, self.now, self.data))
 
     def cut(self, places: Any) -> None:
-        """Break cables during a run, by their current indices; the kernel's arrays keep their size."""
+        """Break cables during a run, by their present indices; the arrays of the kernel keep their size."""
         # one factor reduces stiffness and weight, so that the cable keeps its shape at nearly zero force
         for column in (tables.STIFFNESS, tables.DENSITY):
             self._table[places, column] *= BROKEN
         self.counters[k.READY] = 0  # compute all forces and energies again
 
     def lock_winches(self, places: Any) -> None:
-        """Lock winches, by their current indices; their kinetic energy is lost immediately."""
+        """Lock winches, by their present indices; their kinetic energy is lost immediately."""
         self.now[d.HELD, places] = 1.0
         self.now[d.RATE, places] = 0.0
 
     def with_mass(self, mass: float, *, at_rest: bool) -> None:
-        """Change the mass [kg] and the inertia in proportion; a mass picked up at rest adds no momentum."""
+        """Change the mass [kg], and the inertia in proportion; a picked-up mass at rest adds no momentum."""
         factor = mass / self.inertia[0]
         self.inertia = self.inertia * factor
         if at_rest:
@@ -206,6 +206,6 @@ def _principal_axes(robot: Robot, pose: Pose) -> tuple[Array, Array]:
 
 
 def energy_error(step: float, time: float, cable: int) -> InvalidValueError:
-    """Error for a run with energy drift; step and time in s."""
+    """Error for a run with energy drift; step and time [s]."""
     value = f"{step:g} s, with which the energy grows or fades without a cause: at {time:.6g} s mostly in cable {cable}"
-    return InvalidValueError("step", value, "a step that keeps the energy", f"Give step={0.2 * step:.3g}.")
+    return InvalidValueError("step", value, "a step that conserves the energy", f"Give step={0.2 * step:.3g}.")

@@ -1,4 +1,4 @@
-"""Events during a simulation, and its result."""
+"""Result of a simulation, and events during a simulation."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ TIME, MASS = rule("s"), rule("kg", above=0.0)
 
 @dataclass(frozen=True, slots=True)
 class Break(NumberFields):
-    """Break of a cable. The cable is removed together with its energy, which is added to `energy.removed`.
+    """Break of a cable. The cable is removed. Its energy is added to `energy.removed`.
 
     Attributes:
         cable: Index of the cable, from 0.
@@ -37,7 +37,7 @@ class Break(NumberFields):
 
 @dataclass(frozen=True, slots=True)
 class Stall(NumberFields):
-    """Sudden stop of a winch. It remains stopped while the other winches continue.
+    """Sudden stop of a winch. The other winches continue.
 
     Attributes:
         winch: Index of the winch, from 0.
@@ -50,9 +50,9 @@ class Stall(NumberFields):
 
 @dataclass(frozen=True, slots=True)
 class Brake(NumberFields):
-    """Linear decrease of the length rates of one winch, or of all winches together, to zero for the rest of the time.
+    """Brake of one winch or of all winches: the length rates decrease linearly to zero and remain zero.
 
-    With the same duration for all winches, the platform stays on its path direction.
+    If all winches brake together, the platform keeps the direction of its path.
 
     Attributes:
         time: Time of the event [s].
@@ -67,10 +67,10 @@ class Brake(NumberFields):
 
 @dataclass(frozen=True, slots=True)
 class Drop(NumberFields):
-    """Loss of a part of the platform's mass; the inertia decreases in proportion, the center of mass is unchanged.
+    """Loss of a part of the platform's mass. The inertia decreases in proportion; the center of mass is unchanged.
 
     Attributes:
-        mass: Mass [kg], > 0, less than the platform's.
+        mass: Mass [kg], > 0, less than the mass of the platform.
         time: Time of the event [s].
     """
 
@@ -80,7 +80,7 @@ class Drop(NumberFields):
 
 @dataclass(frozen=True, slots=True)
 class PickUp(NumberFields):
-    """Pick-up of a mass at rest; the total momentum of platform and mass is conserved.
+    """Pick-up of a mass at rest. The total momentum of platform and mass is conserved.
 
     The inertia increases in proportion to the mass; the center of mass is unchanged.
 
@@ -108,13 +108,13 @@ def checked_events(events: Any, robot: Robot, begin: float, end: float) -> tuple
     for k, event in enumerate(elements(events, Event, "events", "Give sl.Break(cable=3, time=2.5), or several.")):
         if not isinstance(event, Event):
             names = ", ".join(kind.__name__ for kind in KINDS)
-            step = "Give sl.Break(cable=3, time=2.5) for instance."
+            step = "Give for instance sl.Break(cable=3, time=2.5)."
             raise InvalidValueError(f"events[{k}]", brief(event), f"one of {names}", step)
         cable = event_cable(event)
         if cable is not None and cable >= robot.cable_count:
             name = "cable" if isinstance(event, Break) else "winch"
             allowed = f"0 to {robot.cable_count - 1}, as {robot.name} has"
-            raise InvalidValueError(f"events[{k}]: {name}", cable, allowed, "They count from 0.")
+            raise InvalidValueError(f"events[{k}]: {name}", cable, allowed, "Indices start at 0.")
         if not begin <= event.time <= end:
             step = "Correct it, or give a longer duration."
             raise InvalidValueError(f"events[{k}]: time", f"{event.time:g} s", f"{begin:g} to {end:g} s", step)
@@ -143,7 +143,7 @@ def _check_order(events: list[Event], robot: Robot) -> None:
         if isinstance(event, PickUp):
             mass += event.mass
     if len(broken) == robot.cable_count:
-        step = "Keep one: a platform without cables only falls."
+        step = "Keep at least one cable: a platform without cables only falls."
         raise InvalidValueError("events", "a break of every cable", "at least one left", step)
 
 
@@ -154,14 +154,14 @@ class EnergyBalance(Result):
     Attributes:
         kinetic: Kinetic energy of platform, cables and drums.
         potential: Potential energy of the platform's weight, and of strain and height of the cables off the drums. The
-            zero heights are the origin for the platform and the frame ends for the cables.
+            height of the platform counts from the origin, the heights of the cables from their frame ends.
         supplied: Work done on the robot since the start by winches, external forces and wind.
-        lost: Energy lost since the start by damping, friction, slip of strain on drums, and creation and merging of
-            chain nodes.
-        removed: Energy of broken cables and dropped loads since the start, minus the energy added by picked-up loads.
-            Heights are measured as in `potential`, so the value can have either sign.
-        error: Numerical energy error of the integrator: kinetic + potential - supplied + lost + removed, minus the
-            initial value of this sum.
+        lost: Energy lost since the start due to damping, friction, averaged strains on drums, and new and merged chain
+            nodes.
+        removed: Energy of broken cables and dropped loads since the start, minus the energy of picked-up loads. Heights
+            count as in `potential`, so that the value can have either sign.
+        error: Numerical energy error of the integrator: change of the sum kinetic + potential - supplied + lost +
+            removed.
     """
 
     kinetic: Array
@@ -178,8 +178,8 @@ class Occurrence:
 
     Attributes:
         time: Time of the event [s].
-        kind: "break", "stall", "brake", "drop" or "pick up" for scheduled events; "saturate" or "slack" for events
-            without schedule.
+        kind: "break", "stall", "brake", "drop" or "pick up" for scheduled events; "saturate" or "slack" for other
+            events.
         cable: Index of the cable or winch, or None for the platform.
         tension_before: Largest tension of this cable, or of all cables, before the event [N].
         tension_after: Largest tension of any cable after the event, until the next event or the end [N].
@@ -198,7 +198,7 @@ class Simulation(Result, Saved):
 
     Attributes:
         robot: The robot.
-        time: Times of the samples [s], increasing, shape (N,): at a fixed number of steps, and at the end.
+        time: Times of the samples [s], increasing, shape (N,): after each fixed number of steps, and at the end.
         pose: Poses of the platform, a batch of N.
         twist: Velocity of the platform's origin and angular velocity, world axes [m/s, rad/s], shape (N, 6).
         tensions: Tensions at the frame ends [N], shape (N, m).
@@ -213,8 +213,8 @@ class Simulation(Result, Saved):
         winches: "ideal", "robot" or SecondOrder(...).
         winding: "constant" or "remembered".
         damping: Energy losses of the cables.
-        largest_tension: Largest tension of each cable at the frame end at any step, including steps between samples
-            [N], shape (m,); None if not known.
+        largest_tension: Largest frame-end tension of each cable at any step, including steps between samples [N], shape
+            (m,); None if unknown.
     """
 
     robot: Robot
@@ -236,7 +236,7 @@ class Simulation(Result, Saved):
 
 
 def energy_balance(kinetic: Array, potential: Array, supplied: Array, lost: Array, removed: Array) -> EnergyBalance:
-    """The energy balance from five energies [J], each of shape (N,)."""
+    """Energy balance from five energies [J], each of shape (N,)."""
     total = kinetic + potential - supplied + lost + removed
     return EnergyBalance(*map(locked, (kinetic, potential, supplied, lost, removed, total - total[0])))
 
@@ -250,7 +250,7 @@ def displaced_pose(pose: Pose, robot: Robot, motion: Array) -> Pose:
 
 
 def twist_of_origin(robot: Robot, pose: Pose, velocity: Array, spin: Array) -> Array:
-    """Twists of the platform frame's origin, as in a path, from motions of the center of mass."""
+    """Twists of the origin of the platform frame, as in `Path`, from motions of the center of mass."""
     # shapes: velocity (N, 3) [m/s]; spin (N, 3) [rad/s]; returns (N, 6)
     lever = pose.matrix @ robot.center_of_mass
     return locked(np.concatenate((velocity - np.cross(spin, lever), spin), axis=1))

@@ -54,10 +54,10 @@ class SimulationRun:
         self._record = plant.records(-(-steps // every) + 1)  # includes the last step
         self._record.tensions[:] = 0.0
         self._record.lengths[:] = np.nan
-        self._removed = np.zeros(len(self._record.energies))  # removed energy, which the kernel counts as lost
+        self._removed = np.zeros(len(self._record.energies))  # removed energy; the kernel counts it as lost
         self._occurrences: list[Occurrence] = []
         self._largest = np.zeros(plant.robot.cable_count)
-        self._marks: list[int] = []  # indices of the scheduled events in the event list
+        self._marks: list[int] = []  # indices of scheduled events in the list of events
         self._arguments: Any = plant.arguments(rules, numbers, inputs)
         self._advance(0)
 
@@ -107,7 +107,7 @@ class SimulationRun:
         self._record.lengths[rows, plant.cables] = records.lengths[kept]
 
     def _store_notes(self, records: Records) -> None:
-        """Store the events noted by the kernel."""
+        """Store the events that the kernel has recorded."""
         for row in records.notes[: int(self.plant.counters[k.NOTES])]:
             cable = int(self.plant.cables[int(row[k.NOTE_CABLE])])
             kind = NAMES[row[k.NOTE_KIND]]
@@ -191,7 +191,7 @@ class SimulationRun:
         return math.ceil((event.time - float(self.plant.audit[d.BEGIN])) / self.step - 1e-9)
 
     def _result(self, count: int) -> Simulation:
-        """Result from the records so far."""
+        """Result from the present records."""
         plant, states, removed = self.plant, self._record.states[:count], self._removed[:count]
         kinetic, potential, supplied, lost = (column.copy() for column in self._record.energies[:count].T)
         steps = np.minimum(self.every * np.arange(count), self.steps)

@@ -1,4 +1,4 @@
-"""Simulation of a robot: motion of the platform under winches, wrenches, wind and events."""
+"""Simulation of a robot: motion of the platform due to winches, wrenches, wind and events."""
 
 from __future__ import annotations
 
@@ -57,18 +57,18 @@ def simulate(
     damping: Damping | None = None,
     record: float | None = None,
 ) -> Simulation:
-    """Simulate a robot in time. The platform is a free body on exact cables, and the winches change the cable lengths.
+    """Simulate a robot. The platform is a free body on exact cables, and the winches change the cable lengths.
 
     Without cable mass ("none"), cables are static catenaries at every instant, with the pulleys and dead lengths of the
-    robot. Their lengths determine whether they are taut or slack.
+    robot. They become slack if their lengths are too long.
 
-    The set points are the lengths of the plan at its samples. Between samples they are cubics with the plan's
-    `length_rate` as derivatives. More samples follow the exact lengths more closely: give the path at 1 kHz.
+    The set points are the lengths of the plan at its samples. Between samples they are cubics with the derivatives
+    `length_rate` of the plan. With more samples the set points are closer to the exact lengths: give the path at 1 kHz.
 
     Args:
-        start: A plan along a path, a single equilibrium at rest, a plan of one, or a robot, which rests at a pose.
-            With a path, the simulation starts at the initial pose and speed of the plan. The wrench of the plan acts
-            without the inertial wrench of the path.
+        start: A plan along a path, a single equilibrium, a plan of a single pose, or a robot, which rests at `pose`.
+            With a path, the simulation starts at the initial pose and speed of the plan. The external wrench of the
+            plan acts on the platform, without the inertial wrench of the path.
         pose: Pose of a robot at rest, with the tensions of `inverse`.
         duration: Duration [s]; lengths are constant after the end of the plan or table. None: duration of the plan or
             of the table of lengths.
@@ -79,28 +79,28 @@ def simulate(
             cable is paid out, and merged while it is wound in. A chain keeps the initial exit point of its pulley.
             "modal": small motion about an equilibrium, with decoupled modes of `vibration`; lengths and wrench may
             change, and `Damping` may have modal_damping. Not supported: pulleys, events, winches, wind.
-        nodes: Elements per cable with mass, at the start, 4 to 500. At rest the pose differs from the exact one by the
-            order of nodes^-2.
-        integrator: "runge-kutta", of order 4, or "splitting", symplectic, of order 2, whose energy has no drift in long
-            runs. None: "runge-kutta"; "splitting" for winches="robot", which requires it.
-        winches: "ideal": lengths equal their set points. SecondOrder(...): lengths lag behind them. "robot": the
-            robot's winches with inertia, limits of torque and speed, friction, and position and speed loops with a
-            period of 1 ms; from the start they expect the tensions of the plan.
-        winding: Tension of the cable on the drums. "constant": the winches' winding_tension. "remembered": cable keeps
-            the tension at which it was wound in, until it is paid out. Only for winches="robot".
+        nodes: Elements per cable with mass at the start, 4 to 500. The pose error at rest is of the order nodes^-2.
+        integrator: "runge-kutta" (order 4), or "splitting" (symplectic, order 2, without energy drift in long runs).
+            None: "runge-kutta", except for winches="robot", which requires "splitting".
+        winches: "ideal": lengths equal their set points. SecondOrder(...): lengths lag behind their set points.
+            "robot": the robot's winches with inertia, limits of torque and speed, friction, and position and speed
+            loops with a period of 1 ms. Their motors counteract the planned tensions from the start.
+        winding: Tension of the cable on the drums. "constant": the winding_tension of the winches. "remembered": cable
+            keeps the tension of its winding until it is paid out. Only for winches="robot".
         unstrained_length: Length set points for an equilibrium: times [s] (K,) and lengths [m] (K, m), linear in
             between; or one row (m,), constant from the start.
         events: Events, each applied at the first step at or after its time: `Break`, `Stall`, `Brake`, `Drop`,
             `PickUp`.
-        wrench: Wrench on the platform, replaces that of the start: one row (6,) [N, N m], or times and rows (K, 6).
-        wind: Velocity of the air [m/s], (3,), or times and rows (K, 3). Half of its force on a cable, computed for a
-            straight cable, acts on the platform; requires the cable diameters. Give the wind force on the platform
-            itself as a wrench.
+        wrench: Wrench on the platform, in place of the wrench of `start`: one row (6,) [N, N m], or times and rows (K,
+            6).
+        wind: Velocity of the air [m/s], (3,), or times and rows (K, 3); requires the cable diameters. Half of the wind
+            force on a cable, computed for a straight cable, acts on the platform. Give the wind force on the platform
+            as a wrench.
         damping: Energy losses of the cables; None: no losses.
         record: Interval of the records [s], rounded to whole steps; None: 0.01.
 
     Returns:
-        Simulation. Its events also list when a cable became slack, and when a winch reached a limit.
+        Simulation. Its events include the times at which a cable became slack or a winch reached a limit.
 
     Raises:
         InvalidValueError: If a plan has samples without a solution (the message names the first), the step exceeds the
@@ -195,7 +195,7 @@ def _set_points(given: InitialConditions, plant: Plant, kind: int) -> TimeTable:
 def initial_plant(
     given: InitialConditions, winches: Winches, with_wind: bool, elements: int = 0, losses: Damping | None = None
 ) -> Plant:
-    """Plant at the start, with the winches at the required speeds."""
+    """Plant at the start, with winches at their initial speeds."""
     length = given.state.unstrained_length
     data = drive_data(given.robot, winches, length, with_wind)
     if elements:
@@ -209,10 +209,10 @@ def initial_plant(
 
 
 def checked_damping(damping: Damping | None) -> Damping:
-    """Damping of a simulation in time; no damping for None."""
+    """Damping of a simulation; no damping for None."""
     found = optional(damping, Damping, "damping") or Damping()
     if found.modal_damping > 0.0:
-        step = "Give loss_time or air_damping, which act on cables; a ratio belongs to a mode."
+        step = "Give loss_time or air_damping; modal damping needs modes."
         raise InvalidValueError("damping: modal_damping", f"{found.modal_damping:g}", "0 in time", step)
     return found
 
@@ -222,10 +222,10 @@ def integrator_code(integrator: Any, kind: int, elements: int = 0) -> int:
     if integrator is not None:
         choice(integrator, "integrator", get_args(Integrator))
     if kind == d.DRUMS and integrator == "runge-kutta":
-        step = "Leave integrator out: static friction needs a non-smooth method."
+        step = "Omit integrator: static friction needs a non-smooth method."
         raise InvalidValueError("integrator", '"runge-kutta"', '"splitting" for winches="robot"', step)
     if elements and integrator == "runge-kutta":
-        step = "Leave integrator out: long runs of stiff chains need a method that preserves energy."
+        step = "Omit integrator: long runs of stiff chains need a method that conserves energy."
         raise InvalidValueError("integrator", '"runge-kutta"', '"splitting" for cables with mass', step)
     return k.SPLITTING if kind == d.DRUMS or elements or integrator == "splitting" else k.RUNGE_KUTTA
 
@@ -242,7 +242,7 @@ def time_step(
 ) -> float:
     """Checked step [s] for the lightest platform after all events; waves: highest frequency of the cables [rad/s].
 
-    Losses limit the step of massless cables only: those of cables with mass are implicit.
+    Losses limit only the step of massless cables. The losses of cables with mass are implicit.
     """
     robot, lengths = given.robot, given.lengths.value
     platform = platform_frequency(robot, given.poses, lengths) * _lightness(robot.mass, events)

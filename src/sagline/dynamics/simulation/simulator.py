@@ -1,4 +1,4 @@
-"""Simulator for a controller, period by period, without allocation."""
+"""Simulator of a machine for a controller: one period per call, without allocation."""
 
 from __future__ import annotations
 
@@ -48,18 +48,18 @@ MOST_SEED: Final = 2**128
 
 
 class Reading(NamedTuple):
-    """Sensor values and true values in read-only arrays, which the simulator's next step overwrites.
+    """Sensor values and true values, in read-only arrays that the next step of the simulator overwrites.
 
     Attributes:
         counts: Encoder counts, whole numbers as floats, shape (m,); None if data for counts are missing.
         load_cell: Measured tensions of the load cells [N], shape (m,).
         position: Position of the platform's origin [m], shape (3,).
         quaternion: Rotation platform -> world, scalar last, shape (4,).
-        twist: Velocity of that origin and angular velocity, world axes [m/s, rad/s], shape (6,).
+        twist: Velocity of the platform's origin and angular velocity, world axes [m/s, rad/s], shape (6,).
         tension: Tensions at the frame ends [N], shape (m,).
         length: Unstrained lengths off the drums [m], shape (m,).
         force: Motor forces on the cables, positive outward [N], shape (m,); 0 without the robot's winches.
-        saturated: Nonzero where a drive is at a limit of torque or speed, shape (m,).
+        saturated: Nonzero for a drive at a limit of torque or speed, shape (m,).
     """
 
     counts: Array | None
@@ -76,8 +76,8 @@ class Reading(NamedTuple):
 class Simulator:
     """Simulated machine for a controller: winches, cables without mass, platform and sensors.
 
-    For equal periods, its motion equals that of `simulate` bit by bit. If the same inputs are tabulated at other times,
-    it differs by rounding. Do not share a simulator between threads.
+    If the inputs of `simulate` are tabulated at the periods, both motions are bitwise equal. With other tables they
+    differ by rounding. Do not share a simulator between threads.
     """
 
     def __init__(
@@ -93,12 +93,12 @@ class Simulator:
         load_cell_filter: float = 0.0,
         seed: int = 0,
     ) -> None:
-        """Place a robot at rest.
+        """Simulator of a robot at rest.
 
         Args:
-            robot: The simulated robot, which may differ from the robot used for planning.
-            start: A pose, at which the robot rests with the tensions of `inverse`; or a single equilibrium, which gives
-                pose, lengths off the drums and wrench.
+            robot: The simulated robot, which may differ from the robot of the plan.
+            start: A pose, at which the robot rests with the tensions of `inverse`; or a single equilibrium with pose,
+                lengths off the drums and wrench.
             winches: Same as in `simulate`.
             winding: Same as in `simulate`.
             integrator: Same as in `simulate`.
@@ -151,7 +151,7 @@ class Simulator:
         self._read()
 
     def _set_up_course(self, given: InitialConditions, m: int) -> None:
-        """Prepare lengths between the last and the next set points; for drums, expected tensions too."""
+        """Prepare the lengths between the last and the next set points, and the expected tensions of drums."""
         drums = self._kind == d.DRUMS
         stretch = 1.0 + self._plant.data[d.WINDING_STRAIN] if drums else np.ones(m)
         lengths = np.repeat(given.lengths.value, 2, axis=0)
@@ -164,7 +164,7 @@ class Simulator:
             self._length_table.value[:, m:] = given.tensions.value
         self._wrench_table = TimeTable(np.zeros(1), given.wrench.value.copy(), np.empty((0, 6)), np.empty((0, 6)))
         table, counters = self._length_table, self._plant.counters
-        # new set points, copied to the run if all are valid
+        # new set points; copied to the run if all are valid
         self._given = np.zeros(m), np.zeros(wide - m), np.zeros(6)
         self._asked, self._expected, self._wrench = (array.data for array in self._given)
         writable = (table.time, table.value, table.begin, table.end)
@@ -194,13 +194,13 @@ class Simulator:
         tension: ArrayLike | None = None,
         wrench: ArrayLike | None = None,
     ) -> Reading:
-        """Simulate one period with a linear change of the set points to the given set points.
+        """Simulate one period, with set points that change linearly to the given set points.
 
         Args:
             unstrained_length: Set points at the end of the period [m], shape (m,).
             dt: Period [s], > 0, a whole number of steps.
-            tension: Expected tensions at the drums at the end of the period [N], shape (m,), which the motors
-                counteract; None: unchanged. Only for winches="robot".
+            tension: Expected tensions at the drums at the end of the period [N], shape (m,); the motors counteract
+                these tensions. None: unchanged. Only for winches="robot".
             wrench: Wrench on the platform during the whole period [N, N m], shape (6,); None: unchanged.
 
         Returns:
@@ -208,8 +208,8 @@ class Simulator:
 
         Raises:
             InvalidValueError: If the period is not a whole number of steps, a length is not longer than its dead
-                length, or an argument has the wrong type or shape; the state is then unchanged. Also if the energy
-                grows without input.
+                length, or an argument has the wrong type or shape (the state is then unchanged); or if the energy grows
+                without input.
         """
         count = self._count(dt)
         copy_in(self._asked, unstrained_length, "unstrained_length", "m")
@@ -250,29 +250,29 @@ class Simulator:
         if 1 <= count <= MOST_STEPS and abs(parts - count) <= NEAR:
             return count
         allowed = f"a whole multiple of {self._step:g} s, the step, up to {MOST_STEPS:.0e}"
-        raise InvalidValueError("dt", f"{period:g} s", allowed, "Choose another, or give Simulator a step.")
+        raise InvalidValueError("dt", f"{period:g} s", allowed, "Choose another period, or give Simulator a step.")
 
     def hold(self, *winches: int) -> None:
-        """Lock drums immediately, like brakes; they remain locked until `release`.
+        """Lock drums immediately, like a brake. They remain locked until `release`.
 
         Args:
             winches: Indices of the winches, from 0; none for all.
 
         Raises:
-            InvalidValueError: If there is no such winch.
+            InvalidValueError: If a winch does not exist.
         """
         self._plant.lock_winches(self._chosen(winches))
 
     def release(self, *winches: int) -> None:
-        """Release locked drums. Their set points change linearly from the values at the lock to the next given values.
+        """Release locked drums. Their set points change linearly to the next given values.
 
-        The integral of a motor's loop starts at zero: at first it only holds the expected tension.
+        The integral part of a motor's controller starts at zero: at first the motor only holds the expected tension.
 
         Args:
             winches: Indices of the winches, from 0; none for all.
 
         Raises:
-            InvalidValueError: If there is no such winch.
+            InvalidValueError: If a winch does not exist.
         """
         plant, chosen = self._plant, np.zeros(len(self._asked), dtype=np.bool_)
         chosen[self._chosen(winches)] = True
@@ -284,14 +284,14 @@ class Simulator:
             self._length_table.value[1, : len(freed)][freed] = stood[freed]
 
     def shift(self, length: float, *winches: int) -> None:
-        """Shift set points suddenly, like an encoder that loses counts. The drives follow according to their gains.
+        """Shift set points suddenly, as if an encoder lost counts. The drives follow according to their gains.
 
         Args:
-            length: Shift of the current set points [m]. The next set points are approached from the shifted ones.
+            length: Shift of the present set points [m]. The next set points are approached from the shifted set points.
             winches: Indices of the winches, from 0; none for all.
 
         Raises:
-            InvalidValueError: If there is no such winch, or the length is not a number.
+            InvalidValueError: If a winch does not exist, or the length is not a number.
         """
         chosen, by = self._chosen(winches), number(length, "length", "m")
         drums = self._kind == d.DRUMS
@@ -300,25 +300,25 @@ class Simulator:
         own[chosen] += by * (1.0 + self._plant.data[d.WINDING_STRAIN, chosen] if drums else 1.0)
 
     def cut(self, *cables: int) -> None:
-        """Break cables: their forces and weights vanish; their drums still follow the set points.
+        """Break cables. Their forces and weights vanish, but their drums still follow the set points.
 
         Args:
             cables: Indices of the cables, from 0; none for all.
 
         Raises:
-            InvalidValueError: If there is no such cable.
+            InvalidValueError: If a cable does not exist.
         """
         self._plant.cut(self._chosen(cables, "cables"))
 
     def limit_force(self, force: float, *winches: int) -> None:
-        """Limit the force of drives, for instance of a motor that is too hot.
+        """Limit the force of drives, for instance for a hot motor.
 
         Args:
             force: Largest force at the cable [N], >= 0.
             winches: Indices of the winches, from 0; none for all.
 
         Raises:
-            InvalidValueError: If there is no such winch, the force is not a number >= 0, or the winches have no motors.
+            InvalidValueError: If a winch does not exist, the force is not a number >= 0, or the winches have no motors.
         """
         if self._kind != d.DRUMS:
             step = "Leave it out: these winches have no motors."
@@ -329,7 +329,7 @@ class Simulator:
         m = len(self._asked)
         for winch in winches:
             if (found := integer(winch)) is None or not 0 <= found < m:
-                raise InvalidValueError(item, brief(winch), f"0 to {m - 1}", "They count from 0.")
+                raise InvalidValueError(item, brief(winch), f"0 to {m - 1}", "Indices start at 0.")
         return [integer(winch) for winch in winches] if winches else slice(None)
 
     def _new_reading(self) -> Reading:
@@ -354,5 +354,5 @@ def _at_rest(robot: Robot, start: Any) -> Equilibrium:
     state = equilibrium_of(start, item="start")
     if state.cables.shape[-1:] != (robot.cable_count,):
         allowed = f"{robot.cable_count}, as {robot.name} has"
-        raise InvalidValueError("start", f"of {state.cables.shape[-1]} cables", allowed, "Give one of this robot.")
+        raise InvalidValueError("start", f"of {state.cables.shape[-1]} cables", allowed, "Give a state of this robot.")
     return replace(state, robot=robot)

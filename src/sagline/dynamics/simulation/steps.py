@@ -1,4 +1,4 @@
-"""Time step of a simulation, from the highest frequency of the robot with taut cables and of its winches."""
+"""Time step of a simulation, from the highest frequency of robot (with taut cables) and winches."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from sagline.robot.robot import Robot
 
 LIMIT: Final = {SPLITTING: 2.0, RUNGE_KUTTA: 2.0 * math.sqrt(2.0)}  # limit of step times highest angular frequency
 SHARE: Final = 0.2  # default step times highest angular frequency [rad]
-# relative to the limit 0.4 l sqrt(rho/EA) of cables with mass; small, because a break excites the shortest waves
+# default step relative to the limit 0.4 l sqrt(rho/EA) of chains; small, because a break excites the shortest waves
 WAVE_SHARE: Final = 0.465
 LONGEST: Final = 1e-3  # s
 
@@ -33,7 +33,7 @@ def platform_frequency(robot: Robot, poses: Pose, lengths: Array) -> float:
     along = chords / np.maximum(distance, 1e-300)
     rows = np.concatenate((along, np.cross(levers, along)), axis=-1) @ freedom.T
     taut = np.maximum(distance[..., 0], 1e-300)
-    with np.errstate(over="ignore", invalid="ignore"):  # too short lengths, refused below
+    with np.errstate(over="ignore", invalid="ignore"):  # lengths that are too short are refused below
         springs = robot.cables.axial_stiffness / (np.minimum(lengths.min(axis=0), taut) if len(poses) == 1 else taut)
         stiffness = np.swapaxes(rows, 1, 2) @ (springs[..., None] * rows)
     if not np.isfinite(stiffness).all():
@@ -60,10 +60,10 @@ def checked_step(
         what = "cables with mass" if waves > highest else "massless cables taut"
         at = f"{max(highest, waves) / (2.0 * math.pi):.3g} Hz, {what}"
         allowed = f"<= {limit:.3g} s, the limit of stability at {at}"
-        raise InvalidValueError("step", f"{given:g} s", allowed, "Leave it out, or give a tenth of that.")
+        raise InvalidValueError("step", f"{given:g} s", allowed, "Omit step, or give a tenth of the limit.")
     parts = LONGEST / given
     if stride and (parts < 0.5 or abs(parts - round(parts)) > 1e-9 * parts):
-        step_to = "Give 1e-3, 5e-4 or the like; drives close their loops every millisecond."
+        step_to = "Give for instance 1e-3 or 5e-4, because drives close their loops every millisecond."
         raise InvalidValueError("step", f"{given:g} s", "a whole part of 0.001 s", step_to)
     return LONGEST / round(parts) if stride else given
 
@@ -76,11 +76,11 @@ def _limit(integrator: int, highest: float, damping: Damping) -> float:
 
 
 def frequency_with_winches(platform: float, kind: int, data: Array, lengths: Array, stiffness: Array) -> float:
-    """Highest angular frequency of a platform and its winches together [rad/s]."""
+    """Highest angular frequency of the system of platform and winches [rad/s]."""
     # shapes: platform [rad/s]; data (DATA_ROWS, m); lengths (K, m) [m]; stiffness (m,) [N]
     if kind == d.SECOND_ORDER:
         return max(platform, float(data[d.BANDWIDTH].max() * max(1.0, 2.0 * data[d.RATIO].max())))
-    if kind == d.DRUMS:  # the largest eigenvalue with both masses is at most the sum of those with one mass each
+    if kind == d.DRUMS:  # the largest eigenvalue is at most the sum of the eigenvalues with only one mass
         drums = stiffness / (lengths.min(axis=0) * data[d.INERTIA])
         return math.hypot(platform, math.sqrt(float(drums.max())))
     return platform

@@ -24,9 +24,9 @@ NEEDED: Final = ("drum_radius", "inertia", "position_gain", "speed_gain", "integ
 
 @dataclass(frozen=True, slots=True)
 class SecondOrder(NumberFields):
-    """Winches whose lengths follow their set points like a damped second-order system.
+    """Winches as damped second-order systems, whose lengths follow their set points.
 
-    For a set point with constant rate, the lag is 2 damping_ratio / (2 pi bandwidth) times that rate.
+    For a set point with constant rate, the lag is the rate times 2 damping_ratio / (2 pi bandwidth).
 
     Attributes:
         bandwidth: Natural frequency [Hz], > 0.
@@ -55,16 +55,16 @@ def winch_kind(winches: Any) -> int:
 
 
 def checked_winding(winding: Any, kind: int) -> Winding:
-    """The checked winding; remembered winding is rejected for winches without drums."""
+    """Checked winding; remembered winding is rejected for winches without drums."""
     found: Winding = choice(winding, "winding", get_args(Winding))
     if found == "remembered" and kind != d.DRUMS:
-        step = 'Give winches="robot" too, or leave winding out.'
+        step = 'Also give winches="robot", or omit winding.'
         raise InvalidValueError("winding", '"remembered"', '"constant" for winches without drums', step)
     return found
 
 
 def drive_data(robot: Robot, winches: Winches, length: Array, with_wind: bool) -> Array:
-    """The drives in the form for kernels, (DATA_ROWS, m); length (m,) [m]."""
+    """Data of the drives for kernels, (DATA_ROWS, m); length (m,) [m]."""
     data = np.zeros((d.DATA_ROWS, robot.cable_count))
     if isinstance(winches, SecondOrder):
         data[d.BANDWIDTH] = 2.0 * np.pi * winches.bandwidth
@@ -74,7 +74,7 @@ def drive_data(robot: Robot, winches: Winches, length: Array, with_wind: bool) -
         data[d.BEHIND_RISE] = robot.winches.dead_rise
     if with_wind:
         if robot.cables.diameter is None:
-            step = "Give it in the robot file or with Cable(..., diameter=...), or leave wind out."
+            step = "Give it in the robot file or with Cable(..., diameter=...), or omit wind."
             raise InvalidValueError("cables: diameter", "not given", "known if there is wind", step)
         data[d.DRAG] = 0.5 * AIR * ROUND * robot.cables.diameter
     if winch_kind(winches) == d.DRUMS:
@@ -83,7 +83,7 @@ def drive_data(robot: Robot, winches: Winches, length: Array, with_wind: bool) -
 
 
 def _fill_drums(data: Array, robot: Robot, length: Array) -> None:
-    """Inertia, limits and gains referred to the cable, on the initial layer of each drum."""
+    """Inertia, limits and gains, referred to the cable on the initial layer of each drum."""
     winch = robot.winches
     missing = [f"winches: {name}" for name in NEEDED if winch is None or getattr(winch, name) is None]
     if winch is None or missing:
@@ -97,7 +97,7 @@ def _fill_drums(data: Array, robot: Robot, length: Array) -> None:
     data[d.POSITION_GAIN] = winch.position_gain
     data[d.SPEED_GAIN] = winch.speed_gain
     data[d.INTEGRAL_GAIN] = winch.integral_gain
-    most = 2.0 * data[d.INERTIA] / d.LOOP_PERIOD  # a larger correction in one period reverses and increases the error
+    most = 2.0 * data[d.INERTIA] / d.LOOP_PERIOD  # a larger correction per period would reverse and increase the error
     if (wild := data[d.SPEED_GAIN] >= most).any():
         i = int(np.argmax(wild))
         allowed = f"< {most[i]:.4g} N s/m for {data[d.INERTIA, i]:.4g} kg at the cable, closed every millisecond"

@@ -1,4 +1,4 @@
-"""The fastest motion along a path's curve within the tension limits."""
+"""Fastest motion along the curve of a path within the tension limits."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ _PLACES: Final = 201  # number of positions along a segment at which limits are 
 _ITERATIONS: Final = 8  # largest number of iterations for the sag forces
 _CONVERGED: Final = 1e-7  # relative change of the time in an iteration
 _INSTANTS: Final = 4001  # number of instants of a segment for the final check of the limits
-# relative increase of the time after the first violation of a limit; it is four times as large after each further one
+# relative increase of the time after the first violation of a limit; each further violation multiplies it by four
 _SLOWER: Final = 1e-6
 _TRIES: Final = 12
-_GENTLE: Final = 8  # number of first tries that lengthen the time by the cube root of the excess speed
+_GENTLE: Final = 8  # number of first attempts that increase the time by the cube root of the excess speed
 _ROUNDING: Final = 1e-12
 
 
 @dataclass(frozen=True, slots=True)
 class _TimedSegment:
-    """A segment with its new motion: curve parameter over time, slightly slower than the computed optimum."""
+    """A segment with its new motion, which is slightly slower than the computed optimum."""
 
     curve: Curve
     motion: SpeedProfile | JerkProfile
@@ -64,31 +64,30 @@ def fastest(
     angular_jerk: float | None = None,
     progress: Progress | None = None,
 ) -> Path:
-    """Fastest motion along the path's curve within the tension limits, with each segment from rest to rest.
+    """Fastest motion along the curve of a path within the tension limits; each segment is from rest to rest.
 
-    The limits hold exactly, with sagging cables. At each sample and at 4,000 instants of each segment, `inverse` finds
-    tensions that keep the given margin from the limits. Without a jerk bound the acceleration is discontinuous, and no
-    winch can follow it. With a jerk bound, each segment has 100 pieces in which the jerk of the curve parameter is
-    constant. Its time is within about 0.1 % of the optimum.
+    The limits are satisfied exactly, with sagging cables. At each sample and at 4,000 instants of each segment,
+    `inverse` finds tensions with the given margin to the limits. Without a jerk bound the acceleration is
+    discontinuous, and winches cannot follow it. With a jerk bound, each segment has 100 pieces with constant jerk of
+    the curve parameter. The time of the segment is within about 0.1 % of the optimum.
 
-    Speed limits of the robot's winches apply to the platform motion. With a jerk bound they also include the elastic
+    Speed limits of the robot's winches apply to the platform motion. With a jerk bound they also apply to the elastic
     length changes, for the tension distribution of `Closest`.
 
     Args:
         robot: The robot. Its tension_min and tension_max apply to the tension named in tension_limits_of.
-        path: Path whose curve is followed. Its times have no effect. The new path is at rest at the same poses as this
-            path.
+        path: Path with the curve. Its times have no effect. The new path is at rest at the same poses as this path.
         margin: Distance from both limits [N], >= 0.
         jerk: Largest jerk of the platform's origin [m/s^3], > 0; None for no bound.
         angular_jerk: Largest second derivative of the angular velocity [rad/s^3], > 0; None for no bound.
         progress: Called after each segment: number done, total number.
 
     Returns:
-        Path at the sample rate of the given one. Its jerk is None if no bound was given.
+        Path at the sample rate of the given path. Its jerk is None without a jerk bound.
 
     Raises:
         InvalidValueError: If the path is in motion at an end or reverses in the middle of a curve, the robot cannot
-            hold one of its poses at rest with this margin (the message names it), an argument is out of its range, or
+            hold a pose at rest with this margin (the message names the pose), an argument is out of its range, or
             winches with a speed_limit have no drum_radius.
 
     Source:
@@ -169,7 +168,7 @@ def _fastest_segment(
 
 
 def _checked(robot: Robot, timed: _TimedSegment, limits: tuple[float, float]) -> _TimedSegment:
-    """Segment that satisfies its limits also between the positions; slowed down slightly if necessary."""
+    """Segment that also satisfies its limits between the positions, slowed down slightly if necessary."""
     for again in range(_TRIES):
         pose, twists = timed.at(np.linspace(0.0, timed.duration, _INSTANTS))
         plan = inverse(robot, pose, wrench=inertial_wrench(robot, pose, twists[0], twists[1]))
@@ -229,7 +228,7 @@ def _fastest_rates(robot: Robot, length: Array) -> Array:
 
 
 def _speed_excess(plan: Plan) -> float:
-    """Largest ratio of a winch's speed to its limit, at least 1."""
+    """Largest ratio of a winch speed to its limit, at least 1."""
     assert plan.length_rate is not None
     limits = _fastest_rates(plan.state.one_robot, plan.unstrained_length)
     ratio = float(np.nanmax(np.abs(plan.length_rate) / limits))

@@ -1,4 +1,4 @@
-"""Bounds on acceleration and speed along a curve by the tension limits, and the fastest motion within them."""
+"""Bounds on acceleration and speed along a curve due to tension limits, and the fastest motion within the bounds."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from sagline.kinematics.plan import Plan
 from sagline.robot.robot import Robot
 from sagline.statics.balance import inertial_wrench, structure_matrix
 
-_NOTHING: Final = 1e-11  # relative to the largest component of a direction: smaller values count as zero
+_NOTHING: Final = 1e-11  # relative to the largest component of a direction; smaller values count as zero
 _BLOCK: Final = 40_000  # matrices per block
-_WIDER: Final = (1.0, 0.03)  # [N], extensions of the limits that are tried for poses on their border
+_WIDER: Final = (1.0, 0.03)  # [N], trial extensions of the limits for poses on the border of feasibility
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,7 +38,7 @@ class ForceBalance:
     """Force balance of the platform at K positions of a curve, with sag forces at nearby tensions.
 
     J tau = needed - u w_u - x w_x, with u the acceleration and x the squared speed of the curve parameter. The sag
-    forces are those at the last computed tensions. They are exact there and nearly constant nearby.
+    forces are exact at the last computed tensions, and nearly constant close to these tensions.
     """
 
     robot: Robot  # the robot, with the tension limits
@@ -81,7 +81,7 @@ class ForceBalance:
         """Force balance with the sag forces of a plan for motions (K, 2); infeasible poses keep their sag forces."""
         assert plan.needed is not None
         found, freedom = plan.feasible[:, None], self.robot.freedom.T
-        # a frame-end limit is converted to a chord limit with the current difference of the two tensions
+        # a frame-end limit becomes a chord limit with the present difference of the two tensions
         chords = self.robot.tension_limits_of == "chord"
         below = 0.0 if chords else plan.state.cables.frame_end_tension - plan.chord_tension
         return replace(
@@ -92,9 +92,9 @@ class ForceBalance:
         )
 
     def near_motion(self, motion: Array) -> ForceBalance:
-        """Force balance with the sag forces at motions (K, 2), on the border of the limits or a little outside."""
-        # on the border the tensions are nearly unique, and rounding may make the pose infeasible; the limits are
-        # therefore widened slightly, by the smallest extension with a solution
+        """Force balance with the sag forces at motions (K, 2), on the border of the limits or slightly outside."""
+        # on the border the tensions are nearly unique, and rounding may make the pose infeasible; the smallest
+        # extension of the limits with a solution is therefore used
         found, wrench = self, self.wrench(motion)
         for by in _WIDER:
             low, high = np.maximum(self.robot.tension_min - by, 0.0), self.robot.tension_max + by
@@ -113,8 +113,7 @@ class ForceBalance:
 
 def _normals(matrix: Array) -> Iterator[Array]:
     """Both normals of all planes spanned by n - 1 columns of matrices (K, n, m), shape (K, 2 S, n), in blocks."""
-    # they include the normals to all facets of the zonotope of the columns with bounded coefficients; for dependent
-    # columns any normal is taken, whose bound is valid too
+    # these include the normals of all facets of the zonotope; for dependent columns any normal gives a valid bound
     n, m = matrix.shape[1:]
     sets = np.array(list(combinations(range(m), n - 1)), dtype=np.intp).reshape(-1, n - 1)
     step = max(1, _BLOCK // len(sets))
@@ -124,7 +123,7 @@ def _normals(matrix: Array) -> Iterator[Array]:
         yield np.concatenate((normal, -normal), axis=1)
 
 
-_FLAT = 1e-12  # relative to the largest rate: smaller rates count as zero
+_FLAT = 1e-12  # relative to the largest rate; smaller rates count as zero
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -132,7 +131,7 @@ class SpeedProfile:
     """Constant acceleration of the parameter between neighboring positions."""
 
     place: Array  # parameters, shape (K,)
-    square: Array  # squared speeds there, shape (K,)
+    square: Array  # squared speeds at the parameters, shape (K,)
     time: Array  # times of the positions [s], shape (K,)
 
     @classmethod
@@ -148,7 +147,7 @@ class SpeedProfile:
 
     @property
     def acceleration(self) -> Array:
-        """Acceleration from each position to the next, shape (K - 1,)."""
+        """Acceleration between consecutive positions, shape (K - 1,)."""
         rate: Array = 0.5 * np.diff(self.square) / np.diff(self.place)
         return rate
 
@@ -159,7 +158,7 @@ class SpeedProfile:
         return np.stack((np.append(rate, rate[-1]), self.square), axis=1)
 
     def at(self, time: Array) -> Array:
-        """Parameter and its first three time derivatives, shape (4, N); the third is 0 within each piece."""
+        """Parameter and its first three time derivatives, shape (4, N); the third derivative is 0 within each piece."""
         k = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, len(self.place) - 2)
         since, rate, speed = time - self.time[k], self.acceleration[k], np.sqrt(self.square[k])
         place = self.place[k] + since * (speed + 0.5 * since * rate)
@@ -168,10 +167,10 @@ class SpeedProfile:
 
 def fastest_speed_profile(place: Array, planes: HalfPlanes) -> SpeedProfile | None:
     """Rest-to-rest profile with the largest speed within the bounds at each position; place (K,)."""
-    # The backward pass computes squared speeds from which the end can be reached. The forward pass takes the largest
-    # acceleration that stays within them. A bound that is met at both ends of a step is also met within the step, apart
-    # from a small error due to the curvature of the bound. Source: Pham & Pham, A new approach to time-optimal path
-    # parameterization based on reachability analysis, 2018
+    # The backward pass computes the squared speeds from which the end can be reached. The forward pass uses the largest
+    # acceleration within these speeds. A bound that is satisfied at both ends of a step is also satisfied within the
+    # step, except for a small error due to the curvature of the bound. Source: Pham & Pham, A new approach to
+    # time-optimal path parameterization based on reachability analysis, 2018
     steps, last = np.diff(place), len(place) - 1
     reach = np.zeros((len(place), 2))
     for i in range(last - 1, -1, -1):
@@ -191,7 +190,7 @@ def fastest_speed_profile(place: Array, planes: HalfPlanes) -> SpeedProfile | No
 
 
 def _rows(planes: HalfPlanes, i: int, step: float, reach: Array) -> tuple[Array, Array]:
-    """Bounds on (acceleration, squared speed) at position i: those at i, at the next position, and for reachability."""
+    """Bounds on (acceleration, squared speed) at position i: at i, at the next position, and due to reachability."""
     sheared = planes.rates[i + 1].copy()
     sheared[:, 0] += 2.0 * step * sheared[:, 1]  # the squared speed grows by 2 step times the acceleration
     ahead = np.array([[2.0 * step, 1.0], [-2.0 * step, -1.0], [0.0, -1.0]])
@@ -202,7 +201,7 @@ def _rows(planes: HalfPlanes, i: int, step: float, reach: Array) -> tuple[Array,
 
 
 def _range(rates: Array, bound: Array) -> tuple[float, float]:
-    """Smallest and largest value of the second variable for which the first variable has a feasible value.
+    """Smallest and largest value of the second variable with a feasible value of the first variable.
 
     If the bounds have no solution, the first result is larger than the second.
     """

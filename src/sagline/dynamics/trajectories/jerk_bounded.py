@@ -19,7 +19,7 @@ Bounds: TypeAlias = Callable[[Array], HalfPlanes]  # additional half planes at g
 PIECES: Final = 100  # number of pieces of constant jerk
 _ITERATIONS: Final = 40
 _CONVERGED: Final = 1e-6  # relative change of the time in an iteration
-_SLOWER: Final = 1.2  # initial time of the iterations, relative to the smallest time
+_SLOWER: Final = 1.2  # initial time of the iterations, relative to the time without jerk bound
 _NOTHING: Final = 1e-30
 _SIDES: Final = 32  # number of directions in which a polygon's border is sampled
 
@@ -65,8 +65,8 @@ def fastest_jerk_profile(
 ) -> JerkProfile | None:
     """Fastest rest-to-rest profile found within tension limits and jerk bounds."""
     # The problem is linear in the jerk and in the squared time, except for three quantities: the position at each share
-    # of the time, its squared speed, and the third power of the time. Iterations update these quantities, and each
-    # iteration solves a linear program. Units: limits [m/s^3]; least [s]
+    # of the time, the squared speed at this position, and the third power of the time. Each iteration updates these
+    # quantities and solves a linear program. Units: limits [m/s^3]; least [s]
     from scipy.optimize import linprog  # this import takes longer than the rest of dynamics
 
     course = _first(curve, limits, least)
@@ -114,7 +114,7 @@ def _first(curve: Curve, limits: tuple[float, float], least: float) -> JerkProfi
 
 
 def _within(planes: HalfPlanes, state: Array, speed: Array) -> tuple[Array, Array]:
-    """Rows of a linear program in (jerk, squared time): the half planes at each knot, shape (K r, P + 1)."""
+    """Rows of a linear program in (jerk, squared time) for the half planes at each knot, shape (K r, P + 1)."""
     by_rate, by_square = (planes.rates[..., k, None] for k in range(2))
     left = by_rate * state[2][:, None] + by_square * 2.0 * speed[:, None, None] * state[1][:, None]
     rows = np.concatenate((left, -planes.bound[..., None]), axis=-1).reshape(-1, PIECES + 1)
@@ -126,11 +126,11 @@ def _within(planes: HalfPlanes, state: Array, speed: Array) -> tuple[Array, Arra
 
 def _jerk_rows(rates: Array, state: Array, course: JerkProfile, limit: float) -> tuple[Array, Array]:
     """Rows that limit the jerk R1 s''' + 3 R2 s' s'' + R3 s'^3 in some directions at all knots."""
-    # the directions are along and across the curve and along the current jerk, so that the magnitude of the final jerk
-    # is within the limit; shapes: rates (3, P + 1, 3)
+    # directions along the curve, across the curve and along the present jerk limit the magnitude of the final jerk;
+    # shapes: rates (3, P + 1, 3)
     _, speed, rate = (values[:, None] for values in state @ course.jerk)
     first, second, third = rates
-    rest = 3.0 * second * speed * rate + third * speed**3  # current value; it changes little between iterations
+    rest = 3.0 * second * speed * rate + third * speed**3  # present value, which changes little between iterations
     rows, bounds = [], []
     square = course.duration**2
     for knots in (slice(None, -1), slice(1, None)):  # both ends of each piece
@@ -153,7 +153,7 @@ def _unit(vectors: Array) -> Array:
 
 
 def _without_redundant(planes: HalfPlanes) -> HalfPlanes:
-    """Half planes that contain the origin, without those that do not bound the polygon in any sampled direction."""
+    """Half planes that contain the origin and bound the polygon in some sampled direction."""
     normed = planes.rates / np.maximum(planes.bound, _NOTHING)[..., None]  # 0 for an infinite bound
     scale = np.maximum(np.abs(normed).max(axis=1, keepdims=True), _NOTHING)
     angle = np.linspace(-0.5 * np.pi, 0.5 * np.pi, _SIDES)

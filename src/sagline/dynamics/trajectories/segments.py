@@ -18,7 +18,7 @@ from sagline.motion.segments import QUINTIC, Segments
 from sagline.robot.pose import Pose
 
 _STOPPED: Final = 1e-6  # relative to the largest speed
-# relative to the mean step: smallest distance of spline knots, for example at the start of a motion
+# smallest distance of spline knots, for example at the start of a motion, relative to the mean step
 _NARROW: Final = 0.2
 
 
@@ -46,13 +46,13 @@ class Curve(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _LineCurve:
-    """Straight line with a rotation about a fixed axis; its parameter is the covered share of length and angle."""
+    """Straight line with a rotation about a fixed axis. The parameter is the covered share of length and angle."""
 
     ends: Segments  # a single segment
 
     @classmethod
     def between(cls, pose: Pose) -> _LineCurve:
-        """The line from the first pose of a batch to the last."""
+        """Line between the first and the last pose of a batch."""
         return cls(Segments.between(pose[np.array([0, -1])], QUINTIC))
 
     @property
@@ -97,7 +97,7 @@ class SplineCurve:
 
     @classmethod
     def through(cls, pose: Pose, parameter: Array) -> SplineCurve:
-        """Splines through poses at ascending parameters; poses whose parameters are too close are left out."""
+        """Splines through poses at ascending parameters, without poses whose parameters are too close."""
         from scipy.interpolate import make_interp_spline  # this import takes longer than the rest of motion
 
         least, knots = _NARROW * parameter[-1] / len(parameter), [0]
@@ -136,9 +136,9 @@ def _arc_lengths(time: Array, twist: Array, twist_rate: Array) -> Array:
         k = int(np.argmax(inside)) + 1
         raise InvalidValueError(
             f"the path at {time[k]:g} s",
-            "with zero speed in the middle of a curve",
+            "with zero speed inside a curve",
             "moves along a straight line, or without stops",
-            "Make it of two paths, each from rest to rest.",
+            "Split it into two paths, each from rest to rest.",
         )
     growth = np.sum(twist * twist_rate, axis=1) / np.where(speed > 0.0, speed, 1.0)
     growth[[0, -1]] = np.linalg.norm(twist_rate[[0, -1]], axis=1) * (1.0, -1.0)  # position
@@ -154,7 +154,7 @@ def _vector(a: Array, b: Array) -> Array:
 
 
 def piecewise(knots: Array, values: Array, at_end: int) -> Any:
-    """Piecewise polynomial with given derivatives at both ends of each piece; degree 7 for four per end."""
+    """Piecewise polynomial with given derivatives at both ends of each piece; four per end give degree 7."""
     # shapes: knots (n,); values (K, n)
     from scipy.interpolate import PPoly  # this import takes longer than the rest of motion
 
@@ -183,8 +183,7 @@ def _pieces(left: Array, right: Array) -> Array:
 
 # tolerance for rest in splines through samples, relative to the path's largest speed or acceleration
 RESTING: Final = 1e-3
-# stricter tolerance between the ends, relative to the path's largest speed, because the platform might only reverse
-# there
+# stricter tolerance between the ends, relative to the largest speed of the path; the platform may only reverse there
 _STANDING: Final = 1e-9
 _ON_A_LINE: Final = 1e-7  # largest distance of samples from a line, relative to its length
 TINY: Final = 1e-300
@@ -208,8 +207,8 @@ class RestToRestSegment:
 
     def rates(self, time: Array) -> Array:
         """Parameter of the curve and its first three derivatives at given times since the start, shape (4, N)."""
-        # Before the start and after the end, the platform is at rest. At a discontinuity, a derivative has its value
-        # after it.
+        # Before the start and after the end, the platform is at rest. At a discontinuity, a derivative has the value
+        # after the discontinuity.
         assert self.progress is not None
         held = np.clip(time, 0.0, self.duration)
         values = np.stack([self.progress(held, order) for order in range(4)])
@@ -255,7 +254,7 @@ def _standing(path: Path) -> Array:
 
 
 def _segment(path: Path, begin: float, end: float) -> RestToRestSegment:
-    """Segment between two rests; the adjacent polynomials are extended to rests between samples."""
+    """Segment between two rests; adjacent polynomials are extended to a rest that is between samples."""
     near = _SAME_TIME * max(path.duration, abs(begin))
     first, last = np.searchsorted(path.time, (begin - near, end + near))
     part = slice(int(first), int(last))
@@ -265,13 +264,13 @@ def _segment(path: Path, begin: float, end: float) -> RestToRestSegment:
     if time.size < 2:
         value = f"of {time.size} samples"
         raise InvalidValueError(
-            f"the move from {begin:g} s to {end:g} s", value, ">= 2", "Give the path a higher rate."
+            f"the move from {begin:g} s to {end:g} s", value, ">= 2", "Sample the path at a higher rate."
         )
     rates = [path.twist[part], path.twist_rate[part], *([] if path.jerk is None else [path.jerk[part]])]
     curve, values = _parametrized(time, path.pose[part], rates)
     standing, over = abs(time[0]) <= near, abs(time[-1] - (end - begin)) <= near
-    # a sample at a rest may belong only to the next segment; quintic paths are exact with 3 of 4 derivatives, septic
-    # paths have an error of order h^7
+    # a sample at a rest may belong only to the next segment; with 3 of 4 derivatives, quintic paths are exact, and
+    # septic paths have an error of the order h^7
     at_end = 3 if path.jerk is not None or part.stop == len(path) else 2
     progress = piecewise(time, values, at_end if over else len(values))
     if not (standing and over):
@@ -305,7 +304,7 @@ def _parametrized(time: Array, pose: Pose, rates: list[Array]) -> tuple[Curve, A
 
 
 def sample_time(path: Path) -> float:
-    """Typical time between samples [s]; a sample rate close to a whole number is rounded to it."""
+    """Typical time between samples [s]; a sample rate close to a whole number is rounded."""
     if len(path) < 2:
         raise InvalidValueError("path", "of one sample", "two or more, from rest to rest", "Give a longer path.")
     rate = 1.0 / float(np.median(np.diff(path.time)))
@@ -320,9 +319,9 @@ def joined_path(
     *,
     with_jerk: bool,
 ) -> Path:
-    """Segments of a path with new durations [s], at its sample rate."""
-    # `motion` takes the index of a moving segment and times since its start; it returns poses and twists with their
-    # first two derivatives, (3, N, 6).
+    """Segments of a path with new durations [s], at the sample rate of the path."""
+    # The arguments of `motion` are the index of a moving segment and times since its start. It returns poses, and
+    # twists with their first two derivatives, (3, N, 6).
     ends = np.cumsum(durations)
     rests = np.append(0.0, ends)
     time = time_grid(float(ends[-1]), 1.0 / sample_time(path))

@@ -27,9 +27,9 @@ _ROUNDING: Final = 1e-9  # tolerance of the sum of the amplitudes
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shaper(Result):
-    """Impulses for convolution with a motion; the result is a sum of scaled and delayed copies of the motion.
+    """Impulses for the convolution with a motion. The result is a sum of scaled and delayed copies of the motion.
 
-    The product of two shapers is their convolution. It cancels the vibrations that each of them cancels.
+    The product of two shapers is their convolution. It cancels the vibrations of both.
 
     Attributes:
         time: Times of the impulses [s], shape (K,), ascending, the first >= 0.
@@ -73,7 +73,7 @@ class Shaper(Result):
         return float(self.time[-1])
 
     def __mul__(self, other: Shaper) -> Shaper:
-        """Convolution of the two shapers, in any order.
+        """Convolution of two shapers; the order has no effect.
 
         Args:
             other: A shaper.
@@ -96,15 +96,15 @@ class Shaper(Result):
         return Shaper(times[first], merged, np.concatenate((self.frequency, theirs.frequency)))
 
     def residual(self, frequency: ArrayLike, damping_ratio: float = 0.0) -> Array:
-        """Residual vibration at the end of a motion, relative to that of the unshaped motion.
+        """Residual vibration at the end of a motion, relative to the unshaped motion.
 
         Args:
             frequency: Undamped frequency of the vibration [Hz], >= 0, of any shape.
             damping_ratio: Damping ratio of the vibration, >= 0, < 1.
 
         Returns:
-            |sum A_j exp((zeta w + i w_d) t_j)| exp(-zeta w t_K), w = 2 pi frequency, w_d = w sqrt(1 - zeta^2), of the
-            shape of the frequency: 1 without a shaper.
+            |sum A_j exp((zeta w + i w_d) t_j)| exp(-zeta w t_K) with w = 2 pi frequency and w_d = w sqrt(1 - zeta^2),
+            of the shape of the frequency. The value 1 means no effect.
 
         Raises:
             InvalidValueError: If an argument is out of its range.
@@ -121,7 +121,7 @@ class Shaper(Result):
 
 
 def ZV(frequency: ArrayLike, damping_ratio: ArrayLike = 0.0) -> Shaper:  # noqa: N802
-    """Zero vibration: two impulses half a period apart cancel the vibration at the frequency.
+    """Zero vibration: two impulses, half a period apart, cancel the vibration at the frequency.
 
     Args:
         frequency: Natural frequency [Hz], > 0; for several, shape (F,), the product of their shapers.
@@ -146,7 +146,7 @@ def ZV(frequency: ArrayLike, damping_ratio: ArrayLike = 0.0) -> Shaper:  # noqa:
 
 
 def ZVD(frequency: ArrayLike, damping_ratio: ArrayLike = 0.0) -> Shaper:  # noqa: N802
-    """Zero vibration and derivative: like `ZV`, but with little vibration even for small frequency errors.
+    """Zero vibration and derivative: as `ZV`, with little vibration also for small frequency errors.
 
     Args:
         frequency: Natural frequency [Hz], > 0; for several, shape (F,), the product of their shapers.
@@ -171,7 +171,7 @@ def ZVD(frequency: ArrayLike, damping_ratio: ArrayLike = 0.0) -> Shaper:  # noqa
 
 
 def EI(frequency: ArrayLike, tolerance: ArrayLike = 0.05) -> Shaper:  # noqa: N802
-    """Extra insensitive: the residual vibration is the tolerance at the frequency and zero slightly above and below it.
+    """Extra insensitive: residual vibration `tolerance` at the frequency, zero slightly above and below the frequency.
 
     Args:
         frequency: Natural frequency [Hz], > 0, of a vibration with very low damping; for several, shape (F,), the
@@ -234,7 +234,7 @@ def _extra_insensitive(frequency: float, tolerance: float) -> Shaper:
 def _frequencies(frequency: ArrayLike) -> Array:
     found = checked(frequency, "frequency", "Hz", above=0.0)
     if found.ndim != 1:
-        raise InvalidValueError("frequency", f"of shape {found.shape}", "shape (F,)", "Give a list of them.")
+        raise InvalidValueError("frequency", f"of shape {found.shape}", "shape (F,)", "Give a list of shapers.")
     return found
 
 
@@ -249,16 +249,16 @@ _BYTES: Final = 300.0  # bytes of memory per sample and impulse during shaping
 
 
 def shaped(path: Path, shaper: Shaper) -> Path:
-    """Shaped path, which follows the same curve with a delay and does not excite the shaper's frequencies.
+    """Path along the same curve that does not excite the frequencies of a shaper.
 
     The curve parameter over time is convolved with the shaper's impulses, separately for each rest-to-rest segment.
     Each segment starts at the delayed end of the previous segment. Along a straight line with a rotation about a fixed
-    axis, this convolves the acceleration itself, and a linear vibration cancels exactly. Along a curve the platform
-    stays on the curve, and most of the vibration cancels.
+    axis, this also convolves the acceleration, and a linear vibration cancels exactly. Along a curve the platform stays
+    on the curve, and most of the vibration cancels.
 
-    Paths of `quintic_path` and `septic_path` are represented exactly, up to rounding. For other paths, splines of 5th
-    or 7th degree connect the samples; along a curve, the pose error is proportional to the sixth power of the distance
-    between samples.
+    Paths of `quintic_path` and `septic_path` are represented exactly, except for rounding. For other paths, splines of
+    5th or 7th degree connect the samples. Along a curve, the pose error is proportional to the sixth power of the
+    distance between samples.
 
     Args:
         path: A path from rest to rest. If its rests are not given (see `Path.rests`), samples with zero velocity and
@@ -266,7 +266,7 @@ def shaped(path: Path, shaper: Shaper) -> Path:
         shaper: Shaper of the convolution: `ZV`, `ZVD` or `EI` of a frequency, or a product of these.
 
     Returns:
-        Path at the same sample rate; each of its segments is longer by the shaper's duration.
+        Path at the same sample rate. Each segment is longer by the duration of the shaper.
 
     Raises:
         InvalidValueError: If the path is in motion at an end or reverses in the middle of a curve, or a frequency of
@@ -287,7 +287,7 @@ def shaped(path: Path, shaper: Shaper) -> Path:
     fastest = instance(shaper, Shaper, "shaper").frequency.max(initial=0.0)
     if fastest > 0.5 / step:
         limit = f"<= {0.5 / step:g} Hz, half the path's sample rate"
-        raise InvalidValueError("the shaper's frequency", f"{fastest:g} Hz", limit, "Give the path a higher rate.")
+        raise InvalidValueError("the shaper's frequency", f"{fastest:g} Hz", limit, "Sample the path at a higher rate.")
     segments = segments_of(path)
     longer = [segment.duration + (0.0 if segment.curve is None else shaper.duration) for segment in segments]
     check_memory("the shaped path", _BYTES * (sum(longer) / step) * shaper.time.size, "Shape a shorter path.")
