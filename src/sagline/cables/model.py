@@ -209,7 +209,7 @@ class CableModel:
         return placed.points(whole_number(points, "points", 2))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class CableState(Result):
     """Ends, forces and lengths of cables: results of a cable model.
 

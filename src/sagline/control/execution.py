@@ -42,7 +42,7 @@ class ExecutionStatus(Status):
     RUNNING = 6, "the motion is running"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Samples(Result):
     """N samples of a machine; the fields have the meanings and units of `Sample`.
 
@@ -104,7 +104,7 @@ class Samples(Result):
         return Sample(**{name: value.copy() for name, value in values.items()} | {"time": float(values["time"])})
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Execution(Result, Saved):
     """Execution of a plan on a machine, in N cycles of m winches.
 

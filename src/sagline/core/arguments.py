@@ -75,7 +75,9 @@ class _Brief(Repr):
     def repr_instance(self, x: Any, level: int) -> str:
         if isinstance(x, np.ndarray) and x.size > 3:
             return f"an array of {x.dtype} of shape {x.shape}"
-        if type(x).__module__.startswith("sagline") and len(repr(x)) > self.maxother:
+        # the short text of a result would need a summary, which may compute
+        short = getattr(type(x).__repr__, "__module__", "") == "sagline.core.results"
+        if short or (type(x).__module__.startswith("sagline") and len(repr(x)) > self.maxother):
             return f"a {type(x).__name__}"
         return super().repr_instance(x, level)
 
@@ -115,12 +117,17 @@ def choice(value: Any, item: str, allowed: Iterable[str]) -> Any:
     raise InvalidValueError(item, brief(value), ", ".join(words), step)
 
 
+def word_of(name: str) -> str:
+    """Name of a class in words, as on the command line: minimum-norm of MinimumNorm."""
+    return re.sub("(?<!^)(?=[A-Z])", "-", name).lower()
+
+
 def named(value: str | T, kind: type[T], kinds: Mapping[str, type[T]], item: str) -> T:
     """An object of a type unchanged; a name in words, for example "minimum-norm", gives one with default options."""
     if not isinstance(value, str):
         return instance(value, kind, item)
-    words = {re.sub("(?<!^)(?=[A-Z])", "-", name).lower(): name for name in kinds}
-    return kinds[words[choice(value, item, words)]]()
+    words = {word_of(name): kind for name, kind in kinds.items()}
+    return words[choice(value, item, words)]()
 
 
 def text(value: Any, item: str) -> str:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import re
 from contextlib import suppress
 from dataclasses import fields
 from importlib import import_module
+from inspect import getdoc
 from typing import Any, Final
 
 import numpy as np
@@ -14,6 +16,7 @@ from sagline.core.arrays import locked
 
 # imported by name at the first display, because a normal import would be circular
 _PAGES = "sagline.notebook.html"
+_SUMMARIES = "sagline.present.summaries"
 # imported by name when a result is saved, because the formats import all results
 _FORMATS: Final = "sagline.files.format"
 
@@ -23,6 +26,16 @@ def formats() -> Any:
     return import_module(_FORMATS)
 
 
+def documented_units(kind: type[Any], name: str) -> list[str]:
+    """Units in the documentation of an attribute of a class, in order: N and N m of "force [N], moment [N m]"."""
+    own = getattr(kind, name, None)
+    text = own.__doc__ if isinstance(own, property) else None
+    if text is None:
+        found = re.search(rf"^    {name}: (.*(?:\n     .*)*)", getdoc(kind) or "", re.MULTILINE)
+        text = found[1] if found else ""
+    return [" ".join(unit.split()) for unit in re.findall(r"\s\[([^\[\]]+)\]", text or "")]
+
+
 def set_fields(target: object, **values: Any) -> None:
     """Set the fields of a frozen object under construction."""
     for name, value in values.items():
@@ -30,9 +43,17 @@ def set_fields(target: object, **values: Any) -> None:
 
 
 class Shown:
-    """Base class of results with a display in Jupyter: a summary with a figure instead of the ordinary text."""
+    """Base class for the display as a short summary, in Jupyter with a figure.
+
+    Classes with long arrays do not generate a representation: `dataclass(repr=False)`.
+    """
 
     __slots__ = ()
+
+    def __repr__(self) -> str:
+        """Summary in at most 12 lines, the verdict first."""
+        text: str = import_module(_SUMMARIES).text_of(self)
+        return text
 
     def _repr_html_(self) -> str | None:
         """Summary and figure as HTML; None if not available, so that Jupyter displays the ordinary text."""
@@ -61,7 +82,9 @@ class Result(ByFields, Shown):
     __slots__ = ()
 
     def __repr__(self) -> str:
-        """First line of the text; for results with long arrays, together with `dataclass(repr=False)`."""
+        """First line of the text of a class that has its own text; otherwise the summary."""
+        if type(self).__str__ is object.__str__:
+            return super().__repr__()
         return f"<{type(self).__name__}: {str(self).splitlines()[0]}>"
 
 

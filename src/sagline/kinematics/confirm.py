@@ -25,7 +25,7 @@ _CATENARY = Catenary()
 BLOCK = 1 << 14  # poses per block, to limit memory
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Confirmation(Result):
     """A plan, and the exact equilibria at its lengths.
 

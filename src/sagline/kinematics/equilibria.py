@@ -30,7 +30,7 @@ _KEPT = (*STABLE, ForwardStatus.FITTED)
 _CATENARY = Catenary()
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Equilibria(Result):
     """Result of `equilibria`: K stable equilibria, in order of increasing energy.
 

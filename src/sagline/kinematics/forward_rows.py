@@ -34,7 +34,7 @@ from sagline.robot.pose import Pose
 from sagline.statics.tables import body_table, cable_table
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class ForwardSolution(Result):
     """Result of `forward`, single or with a leading axis N.
 

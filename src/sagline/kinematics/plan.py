@@ -43,7 +43,7 @@ class Gap(NamedTuple):
     hopeless: int = 0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Plan(Result, Saved):
     """Result of `inverse`: a single pose with fields of shape (m,), or N poses with fields of shape (N, m).
 

@@ -182,7 +182,7 @@ def _rows(robot: Robot, value: ArrayLike, item: str, unit: str) -> Array:
     return array
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class WinchRates(Result):
     """Speeds and torques of the winches along a path, arrays of shape (N, m); NaN where the plan has no solution.
 

@@ -13,7 +13,7 @@ from sagline.core.results import Shown
 from sagline.robot.pose import Pose, PoseLike, pose_of
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Path(Shown):
     """Motion of the platform frame over time, in N samples.
 

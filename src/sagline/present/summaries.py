@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from functools import singledispatch
-from typing import TYPE_CHECKING, Any, NamedTuple
+from textwrap import shorten, wrap
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from sagline.cables.cable import Cable
+from sagline.cables.model import CableModel
 from sagline.calibration.result import Calibration
 from sagline.calibration.summary import chi_squared_text
+from sagline.core.arguments import word_of
 from sagline.core.numbers import n
-from sagline.core.results import Result
+from sagline.core.results import Result, Shown, documented_units
 from sagline.dynamics.simulation.results import Simulation
 from sagline.dynamics.vibration.vibration import Vibration
 from sagline.kinematics.confirm import Confirmation
@@ -19,13 +25,18 @@ from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
 from sagline.motion.path import Path
+from sagline.robot.batch import first_of
+from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
+from sagline.tension.method import TensionMethod
 from sagline.workspaces.space import Workspace
 
 if TYPE_CHECKING:
     from sagline.core.arrays import Array
 
+MOST_LINES: Final = 12  # largest number of lines of the text of a result
+WIDTH: Final = 80  # largest number of columns of its lines
 MOST_GAPS = 5  # largest number of listed items
 MOST_MODES = 8
 LAST = 1.0  # time at the end of a simulation for the residual vibration [s]
@@ -75,6 +86,47 @@ class Summary(NamedTuple):
         return {row.key: row.value for row in self.rows}
 
 
+def text_of(thing: object) -> str:
+    """Title, verdict, values and notes of a result in at most 12 lines."""
+    found = summary_of(thing) or _summary_of_fields(thing)
+    head = f"{found.title}: {found.verdict}" if found.verdict else found.title
+    lines = [line for text in (head, *found.lines) for line in wrap(text, WIDTH, subsequent_indent="  ")]
+    if len(lines) > MOST_LINES:
+        lines[MOST_LINES - 1 :] = [f"... and {len(lines) - MOST_LINES + 1} more lines"]
+    return "\n".join(lines)
+
+
+def _summary_of_fields(thing: Any) -> Summary:
+    """Shapes and ranges of the arrays of a result, and its other values."""
+    robot = getattr(getattr(thing, "state", thing), "robot", None)
+    lines = []
+    for name in (field.name for field in fields(thing)):
+        value = getattr(thing, name)
+        if isinstance(value, np.ndarray):
+            lines.append(f"{name} {value.shape or ''}: {_extent(value, documented_units(type(thing), name))}")
+        elif isinstance(value, Pose):
+            lines.append(f"{name}: {f'{len(value):,} poses' if value.shape else f'at {_place(value)} m'}")
+        elif not isinstance(value, Shown | Cable) and value is not None:
+            lines.append(f"{name}: {shorten(str(value), WIDTH, placeholder=' ...')}")
+    whose = f" of {robot.name}" if isinstance(robot, Robot) else ""
+    return Summary(f"{type(thing).__name__}{whose}", "", None, tuple(lines))
+
+
+def _extent(values: NDArray[Any], units: list[str]) -> str:
+    """Smallest and largest of some numbers, with their unit, or with the units of their parts in brackets."""
+    if values.dtype.kind == "b":
+        return f"{np.count_nonzero(values)} of {values.size} true"
+    unit = ", ".join(units)
+    if values.dtype.kind not in "fi":
+        return f"{values.size} values" + (f" [{unit}]" if unit else "")
+    return _range(values, unit) if "," not in unit else f"{_range(values, '')} [{unit}]"
+
+
+def _place(pose: Pose) -> str:
+    """Position of a single pose."""
+    return f"({', '.join(n(each, '.4f') for each in pose.position.reshape(-1))})"
+
+
 @singledispatch
 def summary_of(thing: object) -> Summary | None:
     """Summary of a robot, a path, a plan or a result; None for other objects."""
@@ -107,7 +159,7 @@ def _(robot: Robot) -> Summary:
 def middle_plan(robot: Robot) -> Plan | None:
     """Plan of the middle of a robot's test box; None without a box."""
     box = robot.test_box
-    if box is None:
+    if box is None or robot.cable_count < robot.degrees_of_freedom:
         return None
     return inverse(robot, Pose(0.5 * (box.low + box.high), np.eye(3)))
 
@@ -116,7 +168,8 @@ def middle_plan(robot: Robot) -> Plan | None:
 def _(plan: Plan) -> Summary:
     feasible, name = np.atleast_1d(plan.feasible), plan.state.one_robot.name
     good, count = bool(plan.solved.all()), feasible.size
-    lines = [f"chord tensions {_range(plan.chord_tension)}"] if feasible.any() else []
+    how = method_text(plan.tension, plan.state.cables.model)
+    lines = [f"chord tensions {_range(plan.chord_tension)} ({how})" if feasible.any() else how]
     if np.isfinite(stiffness := plan.stiffness_min).any():
         lines.append(f"least stiffness {n(np.nanmin(stiffness), '.3g', 'N/m')}")
     gaps = plan.gaps if feasible.size > 1 else ()
@@ -143,6 +196,17 @@ def _when(plan: Plan, first: int, last: int) -> str:
 
 
 @summary_of.register
+def _(state: Equilibrium) -> Summary:
+    known = np.isfinite(state.unstrained_length).all(axis=-1)
+    where = f"at {_place(state.pose)} m" if not known.shape else f"{known.sum():,} of {known.size:,} with lengths"
+    lines = (
+        f"chord tensions {_range(state.chord_tension)}",
+        f"cable model {word_of(type(state.cables.model).__name__)}",
+    )
+    return Summary(f"Equilibrium of {first_of(state.robot).name}", where, None, lines)
+
+
+@summary_of.register
 def _(proof: Confirmation) -> Summary:
     held, planned = np.atleast_1d(proof.held), np.atleast_1d(proof.plan.feasible)
     good, size = bool(held[planned].all()), 1e3 * float(np.nanmax(proof.plan.unstrained_length, initial=0.0))
@@ -159,8 +223,7 @@ def _(found: ForwardSolution) -> Summary:
     verdict = f"{int(solved.sum()):,} of {solved.size:,} solved, {int((solved & stable).sum()):,} stable"
     lines = []
     if solved.size == 1 and solved[0]:
-        place = ", ".join(n(each, ".4f") for each in found.pose.position.reshape(-1))
-        lines = [f"at ({place}) m, least stiffness {n(np.min(found.stiffness_min), '.3g', 'N/m')}"]
+        lines = [f"at {_place(found.pose)} m, least stiffness {n(np.min(found.stiffness_min), '.3g', 'N/m')}"]
     return Summary(f"Equilibrium of {found.state.one_robot.name}", verdict, bool((solved & stable).all()), tuple(lines))
 
 
@@ -240,7 +303,13 @@ def _(found: Calibration) -> Summary:
     return Summary(f"Calibration of {found.robot.name}", verdict, None, tuple(str(found).splitlines()))
 
 
-def _range(tensions: object) -> str:
-    values = np.asarray(tensions, dtype=np.float64)
+def _range(numbers: object, unit: str = "N") -> str:
+    values = np.asarray(numbers, dtype=np.float64)
     known = values[np.isfinite(values)]
-    return f"{n(known.min(), '.4g', 'N')} to {n(known.max(), '.4g', 'N')}" if known.size else "unknown"
+    return f"{n(known.min(), '.4g', unit)} to {n(known.max(), '.4g', unit)}" if known.size else "unknown"
+
+
+def method_text(tension: TensionMethod, model: CableModel) -> str:
+    """Tension distribution method and cable model, as on the command line."""
+    of = "" if tension.variable == "chord" else f" of {tension.variable.replace('_', '-')} tensions"
+    return f"{word_of(type(tension).__name__)}{of}, {word_of(type(model).__name__)}"

@@ -36,7 +36,7 @@ _R_co = TypeVar("_R_co", covariant=True)
 _INVERSE: Final = "sagline.kinematics.inverse"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Contact(Result):
     """Cables on pulleys, and their dead lengths; fields of shape (m,) or (N, m).
 
@@ -67,7 +67,7 @@ class Contact(Result):
         return Contact(**{name: locked(field[index, ...]) for name, field in known.items()})
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Equilibrium(Result):
     """Equilibrium of a robot, the input of stiffness, vibration, viewer and files.
 

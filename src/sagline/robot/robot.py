@@ -25,7 +25,7 @@ from sagline.robot.winch import Winch
 TensionLimitsOf = Literal["chord", "frame_end"]
 
 
-@frozen(eq=False, weakref_slot=False)
+@frozen(eq=False, repr=False, weakref_slot=False)
 class Robot(Shown):
     """A cable-driven parallel robot. Cable i runs from frame_anchors[i] to platform_anchors[i].
 

@@ -20,7 +20,7 @@ NEUTRAL, UNSTABLE = 1e-13, 1e-10
 _STIFFNESS_BYTES, _MODES_BYTES = 2500.0, 800.0  # memory per cable of a state, during the calculation
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Stiffness(Result):
     """Result of `stiffness`, single or with a leading axis N.
 
@@ -67,7 +67,7 @@ class Stiffness(Result):
     null_lengths: Array
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Modes(Result):
     """Result of `modes`, single or with a leading axis N; n is the number of free motions.
 

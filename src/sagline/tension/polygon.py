@@ -24,7 +24,7 @@ class Side(NamedTuple):
     limit: str
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class TensionPolygon(Result):
     """All tensions within their limits that balance one pose: origin + lambda basis, with lambda in the polygon.
 

@@ -35,7 +35,7 @@ AT_NODE: Final = 1e-10  # a vertex is moved to a node if it is closer than this 
 FACES: Final = ("x low", "x high", "y low", "y high", "z low", "z high")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Boundary(Result):
     """Result of `boundary`.
 
@@ -237,7 +237,7 @@ def _between(level: Level, ends: Brackets) -> Array:
 PRECISE: Final = 1e-4  # precision for display, relative to the level at the nearer node, or to an edge at jumps
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Outline(Result):
     """Boundary of a workspace for display, without error bar.
 

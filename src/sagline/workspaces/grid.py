@@ -26,7 +26,7 @@ _CELL = tuple(product((0, 1), repeat=3))  # the corners of a cell
 _HALVED = tuple(product((0, 1, 2), repeat=3))  # indices of the nodes of a cell after its edges are halved
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Grid(Result):
     """Values of a function at the nodes of a grid.
 

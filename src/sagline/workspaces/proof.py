@@ -43,7 +43,7 @@ PARTS: Final = (1, 4, 8, 16)  # numbers of parts of an edge; parts by two are ha
 PRECISION: Final = (1.0, 1e-12)  # weight of nonlinear terms; relative rounding error of a sum of a thousand terms
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Cells(Result):
     """The K cells of a divided box of poses.
 

@@ -185,7 +185,7 @@ def test_what_is_refused() -> None:
     cases: tuple[tuple[Any, *tuple[str, ...]], ...] = (
         (plan.state, "a batch of 2", "a single state"),
         (plan.state[1], "one without lengths", "a state that was solved"),
-        (plan, "a Plan", "an Equilibrium", "Give plan.state."),
+        (plan, "a batch of 2", "a single state"),
         (sl.vibration(plan.state[1], up_to=1.0), "one whose status is NO_LENGTHS"),
     )
     for given, *parts in cases:

@@ -147,7 +147,7 @@ def _check_order(events: list[Event], robot: Robot) -> None:
         raise InvalidValueError("events", "a break of every cable", "at least one left", step)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class EnergyBalance(Result):
     """Energy balance of a simulation [J]; each of shape (N,).
 
@@ -192,7 +192,7 @@ class Occurrence:
     tension_after: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Simulation(Result, Saved):
     """Result of `simulate`: N samples of a motion.
 

@@ -38,7 +38,7 @@ _CLOSEST: Final = Closest()
 _ONE_PERCENT: Final = Damping(modal_damping=0.01)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class FrequencyMap(Result, Saved):
     """Result of `frequency_map` at N poses.
 

@@ -27,7 +27,7 @@ from sagline.robot.equilibrium import Equilibrium, HasState, equilibrium_of
 from sagline.statics.stiffness import modes
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class FrequencySlopes(Result):
     """Result of `frequency_slopes`: derivatives of K frequencies, including the platform's motion to a new equilibrium.
 

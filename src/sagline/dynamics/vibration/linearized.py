@@ -37,7 +37,7 @@ _WRENCHES = (*(f"force {axis}" for axis in "xyz"), *(f"moment {axis}" for axis i
 _WRENCH_UNITS = ("N",) * 3 + ("N m",) * 3
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Linearized(Result):
     """Result of `linearized`: dx/dt = A x + B u, y = C x + D u for deviations from a state, with massless cables.
 

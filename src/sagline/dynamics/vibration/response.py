@@ -25,7 +25,7 @@ CHECKS: Final = 8  # frequencies at which the response is compared with the exac
 _BYTES: Final = 20_000.0  # bytes per frequency
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class FrequencyResponse(Result):
     """Result of `frequency_response` at F frequencies.
 

@@ -88,7 +88,7 @@ def excitation(robot: Robot, segment: RestToRestSegment, frequency: Array, shape
     return seen
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Vibration(Result):
     """Result of `vibration`: all modes below a frequency, of platform and strings.
 
