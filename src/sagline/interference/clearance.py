@@ -1,4 +1,4 @@
-"""Least distances between a robot's cables, its platform and obstacles."""
+"""Least distances between cables, platform and obstacles."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class _Distances(NamedTuple):
 
 
 class ClearanceRows:
-    """Distances at batches of poses, with all pose-independent data prepared once.
+    """Distances at batches of poses; all data that do not depend on the pose are prepared once.
 
     Attributes:
         pairs: Names and indices of the measured pairs, and the omitted pairs.
@@ -76,11 +76,11 @@ class ClearanceRows:
             self._meshed = Meshed(self.pairs, (self._platform, *obstacles), precision)
 
     def distances(self, state: Equilibrium, *, together: bool = False) -> _Distances:
-        """Least distance of every pair at every pose; with `together`, only the least of all distances is exact."""
+        """Least distance of every pair at every pose; with `together`, only the least distance of a pose is exact."""
         single = not state.pose.shape
         count, several = 1 if single else len(state), len(self.pairs.names)
         out = _Distances(np.empty((count, several)), np.empty((count, several)), np.empty((count, several, 2, 3)))
-        known, memory = len(self.pairs.by_kernel), work_arrays_for_pieces()  # own arrays: threads may measure at once
+        known, memory = len(self.pairs.by_kernel), work_arrays_for_pieces()  # new arrays, because of threads
         for part in blocks(count, BLOCK):
             own = state if single else state[part]
             moving = self._moving(own)
@@ -107,10 +107,10 @@ class ClearanceRows:
         return np.where(lost, np.nan, found.min(axis=1)), pair
 
     def of_platform(self, pose: Pose, half: Array) -> Array:
-        """Upper bound (N,) [m] of the platform's distance from the obstacles at positions up to `half` (3,) [m] away.
+        """Upper bound (N,) [m] of the platform's distance from obstacles, at positions up to `half` (3,) [m] away.
 
-        The platform is a box, smaller by `half`: it is a part of the platform at each of these positions. Meshes are
-        left out.
+        The platform is replaced by a box that is smaller by `half`. This box is a part of the platform at each of these
+        positions. Meshes are omitted.
         """
         first = len(self.pairs.parts)
         pairs = self.pairs.by_kernel
@@ -144,11 +144,11 @@ def _box_row(one: Box | Mesh) -> Array:
 
 
 def _platform_of(robot: Robots) -> Box | None:
-    """Platform as a box of its size around its anchors; None without a size; error if the robots of a batch differ."""
+    """Platform as a box of its size around its anchors, None without a size; an error if robots of a batch differ."""
     one = first_of(robot)
     for other in () if isinstance(robot, Robot) else robot[1:]:
         if not all(_alike(getattr(one, name), getattr(other, name)) for name in ("platform_size", "platform_anchors")):
-            step = "Measure them robot by robot, or give the platform's form: platform=Box(...)."
+            step = "Measure each robot separately, or give the form of the platform: platform=Box(...)."
             raise InvalidValueError("platform_size", "not the same for all robots", "one platform", step)
     if one.platform_size is None:
         return None
@@ -160,25 +160,25 @@ def _alike(one: Array | None, other: Array | None) -> bool:
     return one is other is None or (one is not None and other is not None and np.array_equal(one, other))
 
 
-NO_TENSIONS = "no tensions are known, so the cables have no shape: take a feasible pose"
+NO_TENSIONS = "no tensions are known, so that the cables have no shape; use a feasible pose"
 NOTHING = "nothing is measured"
 _SHOWN = 8  # number of printed pairs per pose, and of lines about omitted pairs
-_TOO_LARGE = 100.0  # a mesh larger than this, relative to the robot, must be in millimeters
-_NUMBERS = 9  # number of values per pair and pose: distance, bound and two points
+_TOO_LARGE = 100.0  # largest mesh relative to the robot; a larger mesh must be in millimeters
+_NUMBERS = 9  # number of values per pair and pose: distance, lower bound and two points
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Clearances(Result):
-    """Least distances at one pose or N, between cables with their sag, the platform and obstacles.
+    """Least distances between sagging cables, platform and obstacles, at one pose or N poses.
 
     Attributes:
         pairs: P pairs of names of measured bodies.
-        pair_distance: Least distance of each pair [m], minus cable radii if they are known, shape (P,) or (N, P); 0 or
-            less for contact (the depth is not measured), NaN if a pose has no tensions.
-        pair_low: Proved lower bound of each distance [m], with this shape.
+        pair_distance: Least distance of each pair [m], minus known cable radii, shape (P,) or (N, P). Values <= 0 mean
+            contact; the depth is not measured. NaN if a pose has no tensions.
+        pair_low: Proved lower bound of each distance [m], of the same shape.
         nearest: Nearest points of each pair, on the center lines of cables and rods [m], shape (P, 2, 3) or (N, P, 2,
             3).
-        left_out: Omitted pairs, with the reason.
+        left_out: Omitted pairs, with the reasons.
         precision: Largest difference between distance and proved bound [m].
     """
 
@@ -201,7 +201,7 @@ class Clearances(Result):
 
     @property
     def between(self) -> Any:
-        """Nearest pair: two names, or N times two names for N poses; a sentence if there is none."""
+        """Nearest pair: two names, or two names for each of N poses; a sentence if no distance is known."""
         return self._between(self.pair_distance) if self._single else tuple(map(self._between, self.pair_distance))
 
     def __str__(self) -> str:
@@ -253,23 +253,24 @@ def clearance(
     platform: Box | Mesh | None = None,
     from_anchor: float | None = None,
 ) -> Clearances:
-    """Least distances between cables with their sag, the platform and obstacles.
+    """Least distances between sagging cables, platform and obstacles.
 
     Cables have the shape of their model, such as a catenary, and begin at the exit point of their pulley. The distances
-    have an accuracy of about 1e-12 m (with meshes 1e-7 m). A proof shows that no other points are closer than these
-    distances by more than the precision.
+    are accurate to about 1e-12 m (with meshes 1e-7 m). A proof shows that other points are at most closer by the
+    precision.
 
     Args:
         state: An equilibrium, single or N of them; a plan or a solution; or a robot and its poses.
-        obstacles: One or several obstacles: Box, Capsule, Sphere and Mesh. They are solid: a body inside is in contact.
+        obstacles: One or several obstacles: Box, Capsule, Sphere and Mesh. Obstacles are solid: a body inside is in
+            contact.
         precision: Largest difference between a distance and its proved bound [m], > 0.
         cable_radius: Radius of the cables [m], one for all or one per cable, >= 0; None for the radius of the robot's
             cables if known, else 0.
-        platform: Shape of the platform in its own frame; None for a box of the robot's platform_size around its
-            anchors, if that is known.
+        platform: Shape of the platform in the platform frame. None: a box of the robot's platform_size around its
+            anchors, if this size is known.
         from_anchor: Length of cable next to an anchor that the measurement ignores [m], > 0. It applies to two cables
-            with a common anchor, to cables and the platform, and to obstacles near frame anchors. None omits pairs with
-            a common anchor, and pairs of a cable and the platform, completely; `left_out` lists the omitted pairs.
+            with a common anchor, to cables and platform, and to obstacles near frame anchors. None: pairs of cables
+            with a common anchor, and of cable and platform, are omitted and listed in `left_out`.
 
     Returns:
         Clearances.
@@ -300,7 +301,7 @@ def clearance(
     near = number(precision, "precision", "m", above=0.0)
     rows = ClearanceRows(robot, things, precision=near, cable_radius=radius, platform=platform, from_anchor=some)
     shape = state.pose.shape
-    check_memory("clearances", 8.0 * _NUMBERS * prod(shape) * len(rows.pairs.names), "Take the poses in parts.")
+    check_memory("clearances", 8.0 * _NUMBERS * prod(shape) * len(rows.pairs.names), "Split the poses into parts.")
     value, low, nearest = (locked(field.reshape(*shape, *field.shape[1:])) for field in rows.distances(state))
     return Clearances(rows.pairs.names, value, low, nearest, rows.pairs.left_out, near)
 
@@ -320,13 +321,13 @@ def obstacles_of(given: Any, item: str) -> tuple[Obstacle, ...]:
     several = isinstance(some, Sequence) and not isinstance(some, str)
     wrong = [one for one in some if not isinstance(one, Obstacle)] if several else [given]
     if wrong:
-        step = 'Make them: Sphere(center, radius), Box(size, center), load_mesh("hall.stl").'
+        step = 'Create them: Sphere(center, radius), Box(size, center), load_mesh("hall.stl").'
         raise InvalidValueError(item, brief(wrong[0]), "Box, Capsule, Sphere or Mesh, one or several", step)
     return tuple(some)
 
 
 def _check_size(mesh: Mesh, robot: Robot) -> None:
-    """Reject a mesh that is so large that its unit must be wrong."""
+    """Reject a very large mesh, whose unit must be wrong."""
     own, size = np.ptp(mesh.bounds, axis=0).max(), np.subtract(*reversed(bounds(robot))).max()
     if own > _TOO_LARGE * size:
         value = f"{extent_text(mesh.bounds)} large, and the robot {size:.4g} m"

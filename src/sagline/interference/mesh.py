@@ -1,4 +1,4 @@
-"""A solid of any shape, given by the triangles of its surface."""
+"""A solid of any shape with a surface of triangles."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _AT_ONCE: Final = 1 << 19  # triangles times points
 
 
 def _as_faces(value: ArrayLike) -> Indices:
-    """Faces without a change: a converter that only declares the type of the argument."""
+    """Return faces unchanged: a converter that only declares the type of the argument."""
     return value  # type: ignore[return-value]
 
 
@@ -39,8 +39,8 @@ class Mesh(Result):
         name: Name in messages and results.
 
     Raises:
-        InvalidValueError: If a face has an invalid corner index, there are fewer than 4 or more than a million faces,
-            or the surface is not closed; the message gives its extent.
+        InvalidValueError: If a face has an invalid corner index, the number of faces is below 4 or above a million, or
+            the surface is not closed; the message gives the extent.
 
     Examples:
         >>> import sagline as sl
@@ -56,7 +56,7 @@ class Mesh(Result):
     name: str = field(default="mesh", metadata=checked_by(label))
 
     def __attrs_post_init__(self) -> None:
-        """Check the fields, and that the surface is closed."""
+        """Check the fields, and check that the surface is closed."""
         corners = checked(self.vertices, "vertices", "m", shape=(None, 3))
         if corners.ndim != 2:
             step = "Give one mesh at a time."
@@ -66,7 +66,7 @@ class Mesh(Result):
         check_fields(self)
         if wrong := _open_edges(triangles):
             value = f"not closed ({wrong} edges of {len(triangles)} triangles lack a neighbor that faces the same way)"
-            step = "Close its holes and turn its faces outward in the program that made it."
+            step = "Use its CAD program to close its holes and to turn its faces outward."
             raise InvalidValueError(self.name, f"{value}, {extent_text(corners)}", "a closed surface", step)
         set_fields(self, vertices=corners, faces=triangles)
 
@@ -105,8 +105,7 @@ class Mesh(Result):
     def encloses(self, points: ArrayLike) -> Flags:
         """True for points in the solid.
 
-        The result follows from the winding number of the surface, which is reliable for points near edges and corners
-        too.
+        The result follows from the winding number of the surface, which is also reliable near edges and corners.
 
         Args:
             points: Points in the frame of the mesh [m], shape (..., 3).
@@ -118,7 +117,7 @@ class Mesh(Result):
             InvalidValueError: If a coordinate is not finite.
         """
         given = checked(points, "points", "m", shape=(3,))
-        check_memory("points", 40.0 * given.size, "Ask for fewer points at once.")
+        check_memory("points", 40.0 * given.size, "Give fewer points at once.")
         flat, low, high = given.reshape(-1, 3), *self.bounds
         near = np.flatnonzero(((flat >= low) & (flat <= high)).all(axis=1))
         found = np.zeros(len(flat), dtype=np.bool_)
@@ -153,7 +152,7 @@ def _open_edges(faces: Indices) -> int:
 
 
 def check_coordinates(corners: Array) -> None:
-    """Refuse corners [m] that are far beyond all machines."""
+    """Refuse corners [m] that are too far away for any machine."""
     if (far := float(np.abs(corners).max(initial=0.0))) > FARTHEST:
         step = "Correct them, or the unit of their file."
         raise InvalidValueError("vertices", f"up to {far:g} m away", f"up to {FARTHEST:g} m", step)

@@ -1,8 +1,8 @@
-"""Least distances from meshes with python-fcl. Cables use branch and bound on the chords of their pieces.
+"""Least distances from meshes with python-fcl; for cables by branch and bound on the chords of their pieces.
 
-fcl computes the distance of triangles from triangles or from a segment with full precision. The bulge of a cable piece
-is an upper bound of its distance from its chord. Boxes are twelve triangles and balls are segments of zero length,
-because fcl's own boxes and capsules are accurate only to 1e-7.
+fcl computes the distance between triangles, and between triangles and a segment, with full precision. The bulge of a
+cable piece is an upper bound of its distance from its chord. A box is twelve triangles and a sphere is a segment of
+zero length, because the boxes and capsules of fcl are accurate only to 1e-7.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ from sagline.robot.pose import Pose
 Form = Box | Capsule | Sphere | Mesh
 MISSING: Final = 'Meshes need python-fcl, which is not installed. Run: pip install "sagline[workspace]"'
 ROUNDING: Final = 1e-12  # margin of a lower bound for rounding, relative to the coordinates
-_PIECES: Final = 4000  # largest number of cable pieces that are examined for one distance
+_PIECES: Final = 4000  # largest number of examined cable pieces per distance
 _SEARCHES: Final = 60  # iterations for the nearest point of a cable, to full precision
 _SIGNS: Final = np.array(list(product((-0.5, 0.5), repeat=3)))  # signs of a box's corners, and indices of its triangles
 _FACES: Final = np.reshape([int(n) for n in "013032467475045051237276026064157173"], (12, 3))
 
 
 class _Solid(NamedTuple):
-    """A body in the form of fcl.
+    """A body for fcl.
 
     Attributes:
         geometry: Geometry of the body.
@@ -73,7 +73,7 @@ class Meshed:
         self._known: dict[tuple[int, bytes], bool] = {}
 
     def measure(self, pose: Pose, moving: Array, least: Array | None, out: tuple[Array, Array, Array]) -> None:
-        """Distances of all pairs at every pose into `out`; pairs farther than `least` (N,) [m] may be skipped."""
+        """Fill the distances of all pairs at every pose; pairs farther than `least` (N,) [m] may be skipped."""
         turns, places = pose.matrix.reshape(-1, 3, 3), np.atleast_2d(pose.position)
         value, low, nearest = out
         for n in range(len(moving)):
@@ -111,7 +111,7 @@ class Meshed:
         return self._fcl.CollisionObject(solid.geometry, self._fcl.Transform(*at.get(number, solid.place)))
 
     def _apart(self, one: Any, other: Any) -> tuple[float, Array, Array]:
-        """Distance of two bodies [m], 0 for contact, and their nearest points, with the point of a mesh first."""
+        """Distance of two bodies [m], 0 for contact, and their nearest points; the point of a mesh is the first."""
         request, result = self._fcl.DistanceRequest(True), self._fcl.DistanceResult()
         distance = max(float(self._fcl.distance(one, other, request, result)), 0.0)
         return distance, *result.nearest_points
@@ -125,7 +125,7 @@ class Meshed:
         return _Nearest(distance - radii, _proved(distance, distance, a) - radii, a, b)
 
     def _within(self, point: Array, of: int, number: int, at: dict[int, tuple[Array, Array]]) -> bool:
-        """True if a point of a body, in its own frame, is inside the solid of another body."""
+        """True if a point of a body, in the frame of the body, is inside another solid body."""
         mesh = self._solids[number].mesh
         if mesh is None:
             return False
@@ -186,7 +186,7 @@ class Meshed:
 
 
 def package() -> ModuleType:
-    """python-fcl, loaded on first use; the error says how to install it."""
+    """Module python-fcl, loaded at the first use; the error names the command that installs it."""
     try:
         import fcl
     except ImportError:
@@ -202,7 +202,7 @@ def _pieces(row: Array, ranges: list[tuple[float, float]]) -> Array:
 
 
 def _along(start: Array, end: Array) -> tuple[tuple[Array, Array], float]:
-    """Placement of a capsule of fcl (along z around its middle) between two points, and its length."""
+    """Placement of an fcl capsule (along z around its middle) between two points, and length of the capsule."""
     run = end - start
     length = sqrt(float(run @ run))
     x, y, z = (run / length).tolist() if length > 0.0 else (0.0, 0.0, 1.0)
@@ -220,7 +220,7 @@ def _polished(
     nearest: tuple[float, float, Array, Array],
     row: Array,
 ) -> tuple[float, float, Array, Array]:
-    """Nearest point of a cable close to a given point, by golden sections and parabolas (Brent)."""
+    """Nearest point of a cable near a start point, by golden sections and parabolas (Brent)."""
     from scipy.optimize import minimize_scalar
 
     reach = 0.02 * float(row[shapes.LAST] - row[shapes.FIRST])

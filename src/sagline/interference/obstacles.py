@@ -1,4 +1,4 @@
-"""Obstacles of simple form: boxes, capsules and spheres at rest in the world, and the beams of a frame."""
+"""Obstacles of simple form: boxes, capsules, spheres, and the beams of a frame."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ROUNDING: Final = 1e-14  # tolerance for products of unit vectors
 
 
 def _rotation(value: ArrayLike, item: str) -> Array:
-    """Checked rotation matrix without a change, or the nearest rotation matrix if it differs by more than rounding."""
+    """Checked rotation matrix, replaced by the nearest rotation matrix if it differs by more than rounding."""
     matrix = exactly(value, item, "", (3, 3))
     nearest = Pose(np.zeros(3), matrix).matrix
     return matrix if np.abs(matrix.T @ matrix - np.eye(3)).max() < ROUNDING else nearest
@@ -35,7 +35,7 @@ class Box(Result):
     Attributes:
         size: Lengths of the edges [m], shape (3,), > 0.
         center: Middle in the world [m], shape (3,); for a platform, in the platform frame.
-        orientation: Rotation from its edges to the world, shape (3, 3).
+        orientation: Directions of the edges in world axes, as columns of a rotation matrix (3, 3).
         name: Name in messages and results.
 
     Raises:
@@ -56,14 +56,14 @@ class Box(Result):
 
     @property
     def bounds(self) -> Array:
-        """Lowest and highest corner of the body's extent along the axes [m], shape (2, 3)."""
+        """Lowest and highest corner [m] of the box around the body, along the world axes, shape (2, 3)."""
         reach = 0.5 * np.abs(self.orientation) @ self.size
         return np.stack((self.center - reach, self.center + reach))
 
 
 @frozen(eq=False, weakref_slot=False)
 class Capsule(Result):
-    """A solid rod with round ends: a pole, a pipe, a lamp.
+    """A solid rod with round ends, such as a pole, a pipe or a lamp.
 
     Attributes:
         start: One end of the center line in the world [m], shape (3,).
@@ -89,7 +89,7 @@ class Capsule(Result):
 
     @property
     def bounds(self) -> Array:
-        """Lowest and highest corner of the body's extent along the axes [m], shape (2, 3)."""
+        """Lowest and highest corner [m] of the box around the body, along the world axes, shape (2, 3)."""
         low, high = np.minimum(self.start, self.end), np.maximum(self.start, self.end)
         return np.stack((low - self.radius, high + self.radius))
 
@@ -120,23 +120,23 @@ class Sphere(Result):
 
     @property
     def bounds(self) -> Array:
-        """Lowest and highest corner of the body's extent along the axes [m], shape (2, 3)."""
+        """Lowest and highest corner [m] of the box around the body, along the world axes, shape (2, 3)."""
         return np.stack((self.center - self.radius, self.center + self.radius))
 
 
 def frame_beams(robot: Robot, radius: float) -> tuple[Capsule, ...]:
-    """The twelve edges of a robot's frame as beams with round ends.
+    """Twelve beams with round ends at the edges of a robot's frame.
 
-    The frame is the frame of the drawings: a box with the robot's frame_size below its highest anchors, or the box of
-    its anchors down to the floor. Frame anchors are on the frame or near it. Therefore, exclude the first part of each
-    cable with `from_anchor` of `clearance`.
+    The frame is the same as in drawings: a box with the robot's frame_size below its highest anchors, or the box of its
+    anchors down to the floor. Frame anchors are on the frame or near it. Therefore exclude the first part of each cable
+    with the argument `from_anchor` of `clearance`.
 
     Args:
         robot: The robot.
         radius: Half the beams' thickness [m], >= 0.
 
     Returns:
-        Twelve capsules, whose names describe their places.
+        Twelve capsules; their names describe their positions.
 
     Raises:
         InvalidValueError: If radius is negative.

@@ -1,4 +1,4 @@
-"""Bodies as rows of numbers for the kernels, as in kernels.interference.shapes, and the pairs to measure."""
+"""Bodies as rows of numbers for the kernels (`kernels.interference.shapes`), and the pairs to measure."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from sagline.robot.pose import Pose
 
 
 class _CablePart(NamedTuple):
-    """A whole cable, or a cable without its end at the frame, at the platform, or at both."""
+    """A whole cable, or a cable without a part at its frame end, at its platform end, or at both ends."""
 
     cable: int
     off_frame: bool = False
@@ -27,7 +27,7 @@ class _CablePart(NamedTuple):
 
 
 def cable_rows(state: Equilibrium, radius: Array) -> Array:
-    """Rows of cables from the exit point on, radius (m,) or (N, m) [m]; NaN without tension."""
+    """Rows of cables, starting at the exit point; radius (m,) or (N, m) [m]; NaN without tension."""
     cables, ends = state.cables, _platform_ends(state)
     exits = state.exit_point
     out = np.zeros((*cables.shape, shapes.COLUMNS))
@@ -106,13 +106,13 @@ _NO_LENGTH = "cables and platform: give from_anchor, the length of cable at its 
 
 
 class Pairs(NamedTuple):
-    """Pairs of bodies, which are numbered: parts of cables, then the platform (with or without shape), then obstacles.
+    """Pairs of numbered bodies: parts of cables, then the platform (with or without shape), then obstacles.
 
     Attributes:
         parts: Parts of cables that occur in pairs.
         by_kernel: Numbers of the pairs that kernels measure, shape (P, 2).
-        with_mesh: Numbers of the pairs of which at least one is a mesh, shape (Q, 2).
-        names: Names of all pairs, in this order.
+        with_mesh: Numbers of the pairs with at least one mesh, shape (Q, 2).
+        names: Names of all pairs, in the order of their numbers.
         left_out: Pairs that are not measured, with the reason.
     """
 
@@ -129,7 +129,7 @@ Body = _CablePart | int  # part of a cable, -1 for the platform, or number of an
 def pairs_of(
     robot: Robots, obstacles: tuple[Obstacle, ...], platform: Box | Mesh | None, *, from_anchor: bool
 ) -> Pairs:
-    """All pairs of a robot and its obstacles; pairs with a common anchor are omitted unless `from_anchor`."""
+    """All pairs of a robot and its obstacles; without `from_anchor`, pairs with a common anchor are omitted."""
     at_frame, at_platform = (_together(anchors) for anchors in anchors_of(robot))
     cables = range(len(at_frame))
     found: list[tuple[Body, Body]] = []  # part of a cable, -1 for the platform, or number of an obstacle

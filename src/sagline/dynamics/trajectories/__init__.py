@@ -1,1 +1,1 @@
-"""Shaped and time-optimal motion along paths."""
+"""Trajectories along paths: shaped and time-optimal motion."""

@@ -1,4 +1,4 @@
-"""Fixed-end modes of every cable and their participation factors: the components of a robot's modes."""
+"""Component modes: modes of every cable with fixed ends, and their participation factors."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def _lobatto() -> Lobatto:
 
 
 def _slopes(nodes: Array, last: Array) -> Array:
-    """Derivatives at the nodes of the Lagrange polynomials; last: Legendre polynomial of highest degree there."""
+    """Derivatives of the Lagrange polynomials at the nodes; last: values of the highest Legendre polynomial."""
     apart = nodes[:, None] - nodes
     np.fill_diagonal(apart, 1.0)
     slopes = last[:, None] / last / apart
@@ -50,7 +50,7 @@ def _slopes(nodes: Array, last: Array) -> Array:
 
 
 def _integrals(weights: Array, values: Array) -> Array:
-    """Integrals of the Lagrange polynomials from -1 to the nodes; values: Legendre polynomials, one degree more."""
+    """Integrals of the Lagrange polynomials from -1 to the nodes; values: Legendre polynomials, up to degree p + 1."""
     p = weights.size - 1
     scale = np.arange(p + 1) + 0.5
     scale[p] = 0.5 * p  # the quadrature rule overestimates the square of the last polynomial
@@ -64,7 +64,7 @@ _TINY = 1e-300
 
 
 class CableComponents(NamedTuple):
-    """Fixed-end modes of the t taut cables of one state, T in total; in-plane modes come first.
+    """Fixed-end modes of the t taut cables of one state: T modes, in-plane modes first.
 
     Attributes:
         square: Squared angular frequencies [1/s^2], shape (T,).
@@ -85,7 +85,7 @@ class CableComponents(NamedTuple):
     mesh: StringMesh
 
     def planes(self, ends: Array, amplitudes: Array) -> tuple[tuple[PlaneModes, Array, Array], ...]:
-        """In-plane and normal modes, each with their excitation.
+        """In-plane modes and normal modes, each with its excitation.
 
         Args:
             ends: Displacements of all platform ends in K modes, world axes, shape (m, 3, K).
@@ -107,7 +107,7 @@ class StringMesh(NamedTuple):
         taut: Indices of the cables, t of them.
         table: Rows of these cables in the table of strings, shape (t, STRING_COLUMNS).
         axes: Axes of the cables: horizontal in the plane, normal to the plane, and upward, shape (t, 3, 3).
-        omega: Highest angular frequency that the nodes resolve [rad/s].
+        omega: Highest angular frequency for which the nodes are dense enough [rad/s].
         points: Material point [m], mass [kg] and integrals of C at the nodes, shape (t, nodes, 6).
     """
 
@@ -126,7 +126,7 @@ class StringMesh(NamedTuple):
 class PlaneModes(NamedTuple):
     """Modes of the taut cables in one plane, k modes per cable.
 
-    The u unknowns of a cable are displacements multiplied by the roots of their masses.
+    The u unknowns of a cable are displacements times the root of the node's mass.
     """
 
     rest: Array  # quasi-static shape of the nodes for a displaced platform end, shape (t, u, d)
@@ -136,7 +136,7 @@ class PlaneModes(NamedTuple):
 
 
 def component_modes(strings: Strings, row: int, up_to: float) -> CableComponents:
-    """Modes of the cables of one state, accurate up to a frequency; higher modes complete the basis."""
+    """Modes of the cables of one state. They are accurate up to a frequency; higher modes complete the basis."""
     # units: up_to [Hz]
     omega = 2.0 * np.pi * up_to
     taut = np.flatnonzero(strings.taut[row])
@@ -148,7 +148,7 @@ def component_modes(strings: Strings, row: int, up_to: float) -> CableComponents
     plane, normal = np.empty((t, 2 * n, 2 * n)), np.empty((t, n, n))
     spectral_matrices(table, omega, _lobatto(), points, plane, normal, carried, mass)
     free = (np.arange(n) < counts[:, None] - 1)[..., None]  # the platform end is fixed
-    first = 0 if table[:, columns.BEHIND_X :].any() else 1  # a rigid frame end is also fixed
+    first = 0 if table[:, columns.BEHIND_X :].any() else 1  # a frame end without compliance is also fixed
     inside = _motions(plane, carried[:, :, :4].reshape(t, 2 * n, 2), np.repeat(free, 2, axis=1), 2 * first)
     aside = _motions(normal, carried[:, :, 4:], free, first)
     swings = inside.drive @ axes[:, ::2]
@@ -186,7 +186,7 @@ def _still(mass: Array, axes: Array, taut: Indices, count: int) -> Array:
 
 
 def _node_motion(components: CableComponents, ends: Array, amplitudes: Array) -> tuple[Array, Array]:
-    """Node displacements times the roots of their masses: in the planes and normal to them."""
+    """Displacements of the nodes times the root of the node's mass, in the planes and normal to the planes."""
     # shapes: ends (m, 3, K); amplitudes (T, K); returns (t, 2 nodes, K)
     plane, normal = (
         motions.rest @ end + motions.shape @ given for motions, end, given in components.planes(ends, amplitudes)
@@ -195,7 +195,7 @@ def _node_motion(components: CableComponents, ends: Array, amplitudes: Array) ->
 
 
 def cable_shapes(components: CableComponents, ends: Array, amplitudes: Array, count: int) -> Array:
-    """Displacements of all cables at equally spaced material points, from frame to platform end, (K, m, count, 3)."""
+    """Displacements of all cables at equally spaced material points, frame end first, (K, m, count, 3)."""
     mesh = components.mesh
     t, n, k = mesh.taut.size, mesh.points.shape[1], ends.shape[2]
     values = np.empty((t, count, n))

@@ -25,8 +25,8 @@ class Damping(NumberFields):
     """Damping of a vibration; none by default.
 
     Attributes:
-        loss_time: Loss time eta of the cables' stretch [s], >= 0: at angular frequency omega, EA becomes EA (1 + i
-            omega eta) (Kelvin-Voigt).
+        loss_time: Loss time eta of the cables' stretch [s], >= 0. At the angular frequency omega, EA is replaced by EA
+            (1 + i omega eta) (Kelvin-Voigt).
         air_damping: Drag force per length and velocity of a cable [N s/m^2], >= 0.
         modal_damping: Additional damping ratio of every mode, >= 0, < 1.
 
@@ -58,23 +58,23 @@ _BYTES = 400.0  # largest number of elements per cable and frequency
 def dynamic_stiffness(state: Equilibrium, frequency: ArrayLike, damping: Damping | None = None) -> Complex:
     """Dynamic stiffness of every cable at its platform end, for vibration about an equilibrium.
 
-    Exact for vibrations about the elastic catenary, in and out of its plane, from taut strings to deep sag. The frame
-    end is fixed, or elastic because of the cable on the pulley and the dead length. At frequency zero it equals the
-    cable stiffness of `stiffness`.
+    The result is exact for vibrations about the elastic catenary, in its plane and normal to it, with any sag. The
+    frame end is fixed, or elastic due to the cable on the pulley and the dead length. At frequency zero the result is
+    the cable stiffness of `stiffness`.
 
     Args:
         state: A single equilibrium; a plan or a solution of one; or a robot and a pose.
         frequency: Frequencies [Hz], >= 0, shape (F,) or a single one.
-        damping: Energy losses of the vibration; None: no losses. Its modal_damping acts as a loss factor of the whole
-            stiffness, equal to twice its value. Every mode then has this damping ratio at its own frequency.
+        damping: Energy losses of the vibration; None: no losses. A modal_damping zeta acts as the loss factor 2 zeta of
+            the whole stiffness. Every mode then has the damping ratio zeta at its own frequency.
 
     Returns:
-        Complex array of shape (F, m, 3, 3), or (m, 3, 3) [N/m], world axes; NaN for folded or slack cables,
-        which have no linear vibration.
+        Complex array [N/m], shape (F, m, 3, 3), or (m, 3, 3) for a single frequency, world axes; NaN for folded or
+        slack cables, which have no linear vibration.
 
     Raises:
         InvalidValueError: If the state is not a single Equilibrium with lengths and with exact or elastic cables; if a
-            frequency is negative, or so high that a cable would contain more than a hundred thousand waves.
+            frequency is negative, or so high that a cable would have more than a hundred thousand waves.
 
     Examples:
         >>> import numpy as np
@@ -95,7 +95,7 @@ def dynamic_stiffness(state: Equilibrium, frequency: ArrayLike, damping: Damping
     optional(damping, Damping, "damping")
     check_solved(state)
     cables = state.cables.shape[-1]
-    check_memory(f"{given.size:,} frequencies", _BYTES * given.size * cables, "Take them in parts.")
+    check_memory(f"{given.size:,} frequencies", _BYTES * given.size * cables, "Split them into parts.")
     found = moving_stiffness(strings_of(state), given.reshape(-1), damping)
     found += cable_slopes(state).blocks
     return locked(found if given.ndim else found[0])
@@ -104,7 +104,7 @@ def dynamic_stiffness(state: Equilibrium, frequency: ArrayLike, damping: Damping
 def single_state(state: Equilibrium) -> Equilibrium:
     """Check a single equilibrium and return it unchanged."""
     if state.pose.shape:
-        step = "Take the poses one by one: state[i]."
+        step = "Select a single pose: state[i]."
         raise InvalidValueError("state", f"a batch of {len(state)}", "a single state", step)
     return state
 
@@ -144,7 +144,7 @@ def moving_stiffness(strings: Strings, frequency: Array, damping: Damping | None
 
 
 def check_counts(counts: NDArray[np.int64], frequency: Array) -> None:
-    """Reject a frequency at which a cable requires too many elements or has no solution."""
+    """Reject a frequency at which a cable would need too many elements, or has no solution."""
     # shapes: counts (1, F, m, 2); frequency (F,) [Hz]
     high = np.flatnonzero((counts == collocation.TOO_MANY).any(axis=(0, 2, 3)))
     if high.size:
@@ -171,7 +171,7 @@ def in_world(found: NDArray[np.float64] | Complex, axes: Array) -> Complex:
 
 
 def waves_of(frequency: Array, damping: Damping | None) -> Complex:
-    """Frequencies and damping in the form for kernels."""
+    """Frequencies and damping as arrays for kernels."""
     # shapes: frequency (F,) [Hz]; returns (1, F, WAVE_COLUMNS)
     omega = 2.0 * np.pi * frequency
     waves = np.zeros((1, frequency.size, collocation.WAVE_COLUMNS), dtype=np.complex128)

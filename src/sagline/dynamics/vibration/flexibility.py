@@ -1,4 +1,4 @@
-"""Derivatives of the flexibility of free cables with respect to force, length and material (third order of energy)."""
+"""Derivatives of the flexibility of free cables with respect to force, length and material."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from sagline.core.arrays import Array, Flags
 from sagline.robot.equilibrium import Equilibrium
 
-_SMOOTH = 0.1  # largest u = w L/(N_A + N_B) for which twelve integration points reach rounding error
+_SMOOTH = 0.1  # largest u = w L/(N_A + N_B) at which twelve integration points are exact except for rounding
 _POINTS, _SHARES = (0.5 * np.array(values) for values in np.polynomial.legendre.leggauss(12))
 _ALONG, _ACROSS, _UP = 0, 1, 2  # axes of a cable
 
@@ -20,10 +20,10 @@ class Flexibility(NamedTuple):
 
     # with respect to the force on the platform end, symmetric in all axes [m/N^2], shape (..., m, 3, 3, 3)
     by_force: Array
-    by_length: Array  # with respect to the unstrained length, added at the frame end [1/N], shape (..., m, 3, 3)
+    by_length: Array  # with respect to the length of cable added at the frame end [1/N], shape (..., m, 3, 3)
     by_density: Array  # with respect to the linear density [m^2/(N kg)], shape (..., m, 3, 3)
     by_stiffness: Array  # with respect to the axial stiffness [m/N^2], shape (..., m, 3, 3)
-    stretch: Array  # integral of t t^T/EA ds, t the tangent: the stretch part [m/N], shape (..., m, 3, 3)
+    stretch: Array  # stretch part: integral of t t^T/EA ds with the tangent t [m/N], shape (..., m, 3, 3)
 
 
 class _CatenaryState(NamedTuple):
@@ -43,7 +43,7 @@ class _CatenaryState(NamedTuple):
 
     @property
     def slope(self) -> Array:
-        """(N_B - N_A)/(w L)."""
+        """Ratio (N_B - N_A)/(w L)."""
         return (self.a + self.b) / (self.size_a + self.size_b)
 
     @property
@@ -127,7 +127,7 @@ def _by_force(hung: _CatenaryState) -> Array:
 
 
 def _turned(hung: _CatenaryState) -> Array:
-    """Integral of h/N^3, equal to (sine_b - sine_a)/(h w), in a form without cancellation."""
+    """Integral of h/N^3, which is (sine_b - sine_a)/(h w), without cancellation."""
     cosine = (hung.h**2 + hung.a * hung.b) / hung.product
     near = hung.length / hung.product * hung.h * (1.0 / hung.size_a + 1.0 / hung.size_b) / (1.0 + cosine)
     far = (hung.b / hung.size_b - hung.a / hung.size_a) / (hung.h * hung.weight)
@@ -180,7 +180,7 @@ def _chosen(hung: _CatenaryState, even: Array, steep: Array) -> Array:
 
 
 def _plane_of(along: Array, across: Array, mixed: Array, up: Array) -> Array:
-    """Matrices (..., 3, 3) without coupling between in-plane and normal directions."""
+    """Matrices (..., 3, 3) without coupling between in-plane directions and the normal direction."""
     whole = np.zeros((*along.shape, 3, 3))
     whole[..., _ALONG, _ALONG], whole[..., _ACROSS, _ACROSS], whole[..., _UP, _UP] = along, across, up
     whole[..., _ALONG, _UP] = whole[..., _UP, _ALONG] = mixed
@@ -188,7 +188,7 @@ def _plane_of(along: Array, across: Array, mixed: Array, up: Array) -> Array:
 
 
 def _symmetric(parts: dict[tuple[int, int, int], Array]) -> Array:
-    """A tensor that is symmetric in all three axes, from its independent elements."""
+    """Tensor that is symmetric in all three axes, from its independent elements."""
     whole = np.zeros((*next(iter(parts.values())).shape, 3, 3, 3))
     for place, values in parts.items():
         for turned in permutations(place):

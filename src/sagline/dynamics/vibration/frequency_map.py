@@ -42,21 +42,21 @@ _ONE_PERCENT: Final = Damping(modal_damping=0.01)
 class FrequencyMap(Result, Saved):
     """Result of `frequency_map` at N poses.
 
-    Values are NaN unless the status is SOLVED or FOLDED. Frequencies are also NaN if no mode is below up_to.
+    Values are NaN except for the statuses SOLVED and FOLDED. Frequencies are also NaN if no mode is below up_to.
 
     Attributes:
         robot: The robot.
         pose: The poses, a batch of N.
-        up_to: Frequency below which modes are found [Hz].
+        up_to: Upper limit of the mode frequencies [Hz].
         damping: Energy losses.
         status: Codes of `VibrationStatus`, shape (N,).
         frequency: Lowest natural frequency with cable mass [Hz], shape (N,).
         massless_frequency: Lowest natural frequency of the platform with massless cables [Hz], shape (N,).
         platform_share: Platform share of the kinetic energy in the lowest mode with cable mass, shape (N,).
-        peak: Largest receptance, static or near a mode below up_to: displacement of the center of mass per force on it,
-            in the direction of largest response, as in `frequency_response` [m/N], shape (N,); infinite without
-            damping.
-        peak_frequency: Frequency of that peak [Hz], shape (N,).
+        peak: Largest receptance, static or near a mode below up_to: displacement of the center of mass per force at the
+            center of mass, in the direction of the largest response, as in `frequency_response` [m/N], shape (N,);
+            infinite without damping.
+        peak_frequency: Frequency of the peak [Hz], shape (N,).
     """
 
     robot: Robot
@@ -82,8 +82,7 @@ def frequency_map(
 ) -> FrequencyMap:
     """Lowest frequency and largest receptance of a robot at many poses, with cable mass.
 
-    Each pose is evaluated as in `vibration`: all modes below up_to are computed, and the exact count confirms their
-    number.
+    At each pose, all modes below up_to are computed as in `vibration`, and the exact count confirms their number.
 
     Args:
         robot: The robot.
@@ -98,7 +97,7 @@ def frequency_map(
 
     Raises:
         InvalidValueError: If an argument has the wrong type, up_to is not positive, or too many modes are below it.
-        SaglineError: If modes and count disagree; the message names the pose.
+        SaglineError: If the number of modes differs from the exact count; the message names the pose.
 
     Examples:
         >>> import numpy as np
@@ -153,7 +152,7 @@ def _status(model: VibrationModel, row: int) -> tuple[VibrationStatus, float]:
 def _numbers_of_pose(
     state: Equilibrium, model: VibrationModel, row: int, up_to: float, damping: Damping, lowest: float
 ) -> tuple[float, ...]:
-    """Values of one pose in the order of `FrequencyMap`; `lowest` is the lowest massless frequency [Hz]."""
+    """Values of one pose, in the order of `FrequencyMap`; lowest: lowest massless frequency [Hz]."""
     freedom = model.freedom
     rest = compliance_of(freedom, model.stiffness[row])[:3, :3]
     found = state_modes(model, row, up_to)

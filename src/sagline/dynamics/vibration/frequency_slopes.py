@@ -29,15 +29,14 @@ from sagline.statics.stiffness import modes
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class FrequencySlopes(Result):
-    """Result of `frequency_slopes`: derivatives of K frequencies, including the platform's motion to a new equilibrium.
+    """Result of `frequency_slopes`: derivatives of K frequencies, including the motion to the new equilibrium.
 
-    All other data, such as the lengths off the drums and the wrench, are constant. If a tension distribution method
-    determines the lengths for a pose, add length_sensitivity times the length changes.
+    For each derivative all other data are constant, for example lengths off the drums and wrench. If a tension
+    distribution method determines the lengths for a pose, add length_sensitivity times the length changes.
 
-    Equal frequencies do not have separate derivatives, because they split when a parameter changes. The rows of equal
-    frequencies contain the derivatives for an increasing parameter, in ascending order. For a decreasing parameter the
-    derivatives are the same values with the opposite sign. The derivative of the mean of equal frequencies is the mean
-    of the values.
+    Equal frequencies have no separate derivatives, because they split when a parameter changes. Their rows contain the
+    derivatives for an increasing parameter, in ascending order. For a decreasing parameter the values have the opposite
+    sign. The mean of equal frequencies has the mean of the values as its derivative.
 
     Attributes:
         state: The state.
@@ -51,9 +50,9 @@ class FrequencySlopes(Result):
         mass_sensitivity: Derivative with respect to the mass, including its weight, at constant inertia, shape (K,)
             [Hz/kg].
         inertia_sensitivity: Derivative with respect to the inertia, platform frame, shape (K, 3, 3) [Hz/(kg m^2)]. For
-            a symmetric change of the inertia, multiply the elements of both matrices and sum.
+            a symmetric change of the inertia, multiply both matrices element by element and sum.
         pose_sensitivity: Derivative with respect to (displacement of the center of mass, rotation vector), world axes,
-            at fixed lengths, with the wrench that holds the platform there, shape (K, 6) [Hz/m, Hz/rad].
+            at fixed lengths; the wrench changes to keep equilibrium, shape (K, 6) [Hz/m, Hz/rad].
         wrench_sensitivity: Derivative with respect to the wrench about the center of mass, world axes, shape (K, 6)
             [Hz/N, Hz/(N m)].
     """
@@ -72,12 +71,12 @@ class FrequencySlopes(Result):
 
 
 def frequency_slopes(state: Equilibrium | HasState, together: float = 1e-6) -> FrequencySlopes:
-    """Sensitivities of every natural frequency to the robot's data, its pose and the wrench; all analytic.
+    """Sensitivities of every natural frequency to the robot's data, pose and wrench, from analytic derivatives.
 
     Args:
         state: A single equilibrium, or a plan of one, for the massless frequencies of `modes`; or a vibration, for
             frequencies with cable mass. Cables are exact or weightless, without pulleys and dead lengths.
-        together: Relative difference up to which adjacent frequencies count as equal.
+        together: Largest relative difference of adjacent frequencies that count as equal.
 
     Returns:
         FrequencySlopes; NaN where a frequency is NaN.
@@ -116,7 +115,7 @@ def frequency_slopes(state: Equilibrium | HasState, together: float = 1e-6) -> F
 def _with_cable_mass(vibration: Vibration, together: float) -> FrequencySlopes:
     if vibration.status is not VibrationStatus.SOLVED:
         told = f"one whose status is {vibration.status.name}"
-        raise InvalidValueError("state", told, "a vibration that was solved", "Take the state itself, massless.")
+        raise InvalidValueError("state", told, "a vibration that was solved", "Use its state for massless frequencies.")
     rest = _rest(vibration.state)
     cables, groups = string_data(rest), list(_groups(vibration.frequency, together))
     slopes = [square_derivatives(rest, mode_group(rest, cables, vibration.frequency[group])) for group in groups]
@@ -127,7 +126,7 @@ def _rest(state: Equilibrium) -> StateSlopes:
     check_model(single_state(state))
     if state.contact is not None:
         value, allowed = "one with pulleys or dead length", "cables that start at their frame anchors"
-        raise InvalidValueError("state", value, allowed, "Take the robot without winches: robot.replace(winches=None).")
+        raise InvalidValueError("state", value, allowed, "Use the robot without winches: robot.replace(winches=None).")
     check_solved(state)
     return state_slopes(state)
 
@@ -179,7 +178,7 @@ def _result(
 
 
 def _parting(form: Array, frequency: Array) -> Array:
-    """Derivatives of a group's frequencies from those of the squared frequency, (..., g, g) to (g, ...)."""
+    """Derivatives (g, ...) of the frequencies of a group, from derivatives (..., g, g) of the squared frequency."""
     known: Flags = np.asarray(np.isfinite(form).all(axis=(-1, -2)))
     squares = np.linalg.eigvalsh(np.where(known[..., None, None], form, 0.0))
     squares = np.where(known[..., None], squares, np.nan)

@@ -1,4 +1,4 @@
-"""The robot about a state as a linear system, for control design: A, B, C, D with names and units."""
+"""Linear system of a robot about a state, for control design: A, B, C, D with names and units."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ _WRENCH_UNITS = ("N",) * 3 + ("N m",) * 3
 class Linearized(Result):
     """Result of `linearized`: dx/dt = A x + B u, y = C x + D u for deviations from a state, with massless cables.
 
-    Motions are (displacement of the center of mass, rotation vector), wrenches act on the platform about its center of
-    mass; both in world axes. n is the number of free motions, m the number of cables.
+    A motion is (displacement of the center of mass, rotation vector). A wrench acts on the platform about its center of
+    mass. Both are in world axes. n is the number of free motions, m the number of cables.
 
     Attributes:
         state: The state.
@@ -72,7 +72,7 @@ class Linearized(Result):
 
     @property
     def poles(self) -> Any:
-        """Eigenvalues of A [rad/s], complex, shape (X,): i omega of the massless modes if undamped."""
+        """Eigenvalues of A [rad/s], complex, shape (X,). Without damping they are i omega of the massless modes."""
         return locked(np.linalg.eigvals(self.A).astype(complex))
 
     def state_space(self) -> StateSpace:
@@ -88,24 +88,25 @@ class Linearized(Result):
 
 @of_equilibrium
 def linearized(state: Equilibrium, damping: Damping | None = None, inputs: Inputs = "lengths") -> Linearized:
-    """Linear model of the robot about a state, from winches and wrench to pose, tensions and lengths.
+    """Linear model of the robot about a state; inputs are winches and wrench, outputs are pose, tensions and lengths.
 
     The cables have no mass in this model, so that it is not valid above the first string frequency (see `vibration`).
-    The static gains are the compliance and the sensitivities of `stiffness`, the poles are `modes`.
+    The static gains are the compliance and the sensitivities of `stiffness`. The poles are the frequencies of `modes`.
 
     Args:
         state: A single equilibrium; a plan or a solution of one; or a robot and a pose.
-            An unstable one has growing poles.
+            An unstable equilibrium has unstable poles.
         damping: `loss_time` of the cables' stretch, to first order in it, and `modal_damping`; none by default.
-        inputs: Inputs of the winches: "lengths" off the drums, or "speeds", their rates, with lengths as states.
+        inputs: Inputs of the winches: "lengths" (off the drums), or "speeds" (rates of these lengths, with the lengths
+            as states).
 
     Returns:
         The system.
 
     Raises:
         InvalidValueError: If the state is not one of these, is a batch, or has no
-            lengths; for `air_damping`, which acts on cables with mass; for `loss_time` with "lengths" as inputs,
-            because tensions then depend on winch speeds.
+            lengths; for `air_damping`, which acts only on cables with mass; for `loss_time` with "lengths" as inputs,
+            because the tensions then depend on winch speeds.
 
     Examples:
         Final displacement of the platform after 1 mm of cable 0 is wound in:
@@ -131,7 +132,7 @@ def _check(state: Equilibrium, damping: Damping, inputs: Inputs) -> None:
     single_state(state)
     if damping.air_damping:
         value = f"{damping.air_damping:g} N s/m^2"
-        raise InvalidValueError("air_damping", value, "0 for massless cables", "See vibration, or leave it out.")
+        raise InvalidValueError("air_damping", value, "0 for massless cables", "Use vibration, or omit it.")
     if not damping.loss_time:
         return
     item, value = "loss_time", f"{damping.loss_time:g} s"
@@ -140,7 +141,7 @@ def _check(state: Equilibrium, damping: Damping, inputs: Inputs) -> None:
         raise InvalidValueError(item, value, allowed, step)
     if inputs == "lengths":
         allowed = '0 with inputs="lengths": a step of a length would cause infinite tensions'
-        raise InvalidValueError(item, value, allowed, 'Take inputs="speeds", or give modal_damping.')
+        raise InvalidValueError(item, value, allowed, 'Use inputs="speeds", or give modal_damping.')
 
 
 def _system(state: Equilibrium, damping: Damping, inputs: Inputs) -> Linearized:
@@ -196,7 +197,7 @@ def _driven_by_speeds(state: Equilibrium, damping: Damping) -> _Matrices:
 
 
 def _driven_by_lengths(found: _Matrices, size: int) -> _Matrices:
-    """System with lengths as inputs; no output depends on their rates."""
+    """System with lengths as inputs, without dependence on length rates."""
     A, B, C, D = found
     m = len(A) - size
     B, D = (np.concatenate(pair, axis=1) for pair in ((A[:size, size:], B[:size, m:]), (C[:, size:], D[:, m:])))
@@ -207,20 +208,20 @@ def _solved_slopes(state: Equilibrium) -> CableSlopes:
     slopes = cable_slopes(state)
     if np.isfinite(slopes.matrix).all():
         return slopes
-    step = "See the status of the plan; straight cables have no stiffness: take another model."
+    step = "See the status of the plan. Straight cables have no stiffness; use another model."
     raise InvalidValueError("state", "one without lengths or stiffness", "a state that was solved", step)
 
 
 def _stretch_loss(state: Equilibrium, slopes: CableSlopes, loss_time: float) -> tuple[Array, Array, Array, Array]:
-    """Stretch loss to first order: K(omega) = K + i omega eta K S K, with S the stretch part."""
+    """Stretch loss to first order: K(omega) = K + i omega eta K S K, with the stretch part S of the flexibility."""
     # matrices: damping wrench per platform velocity (6, 6) and per length rates (6, m); frame-end tension per platform
-    # velocity (m, 6) and per rate of the cable's own length (m,)
+    # velocity (m, 6) and per rate of the length of the same cable (m,)
     m = state.one_robot.cable_count
     if not loss_time:
         return np.zeros((6, 6)), np.zeros((6, m)), np.zeros((m, 6)), np.zeros(m)
     follows = loss_time * slopes.blocks @ flexibility(state, slopes.force).stretch
     per_motion = follows @ slopes.blocks  # N s/m, at the platform ends
-    per_speed = (follows @ slopes.by_length[..., None])[..., 0]  # paid-out cable is unstretched
+    per_speed = (follows @ slopes.by_length[..., None])[..., 0]  # cable that is paid out has no strain
     if not np.isfinite(per_motion).all():
         step = "Give modal_damping instead, or tighten the cable."
         raise InvalidValueError("state", "one with a folded cable", "cables that stretch, for loss_time", step)
@@ -237,7 +238,7 @@ def _stretch_loss(state: Equilibrium, slopes: CableSlopes, loss_time: float) -> 
 
 
 def _modal_drag(state: Equilibrium, ratio: float) -> Array:
-    """Drag on the platform that gives every stable massless mode the same damping ratio, shape (6, 6)."""
+    """Damping matrix of the platform with the same damping ratio for every stable massless mode, shape (6, 6)."""
     found, mass = modes(state), mass_matrix(state)
     momenta = mass @ found.shape
     drag: Array = momenta * (2.0 * ratio * 2.0 * np.pi * np.nan_to_num(found.frequency)) @ momenta.T

@@ -15,21 +15,21 @@ from sagline.statics.slopes import cable_slopes, motions_of_ends
 from sagline.statics.stiffness import Modes, modes
 from sagline.statics.strings import Strings, strings_of
 
-EQUAL: Final = 1e-6  # relative difference of shares of the energy that count as equal
+EQUAL: Final = 1e-6  # largest relative difference of energy shares that count as equal
 
 _TINY = np.finfo(float).tiny
 
 
 def end_displacements(state: Equilibrium, shape: Array) -> Array:
-    """Displacement of the platform ends in motions of the platform; shape (6, n); returns (m, 3, n)."""
+    """Displacements (m, 3, n) of the platform ends due to motions (6, n) of the platform."""
     robot = state.one_robot
     return motions_of_ends((robot.platform_anchors - robot.center_of_mass) @ state.pose.matrix.T) @ shape
 
 
 def stretch_losses(state: Equilibrium, platform: Modes, loss_time: float) -> Array:
     """Damping ratio of each massless mode due to the loss in the cables' stretch, to first order."""
-    # The ratio is half the loss factor omega eta, times the share of the mode's elastic energy in the stretch of the
-    # cables, before and behind their exit points. The rest of the energy is in sag and in the swivel motion. Shapes:
+    # The ratio is half the loss factor omega eta, times the share of the elastic energy that is in the stretch of the
+    # cables, on both sides of their exit points. The rest of the energy is in sag and in the swivel motion. Shapes:
     # loss_time [s]; returns (n,) source: docs/model.md, section 11
     omega = 2.0 * np.pi * platform.frequency
     if loss_time == 0.0:
@@ -44,7 +44,7 @@ def stretch_losses(state: Equilibrium, platform: Modes, loss_time: float) -> Arr
 
 
 def quasi_static_displacements(state: Equilibrium, ends: Array, count: int) -> Array:
-    """Quasi-static displacement of the cables for given displacements of their platform ends, to first order."""
+    """Quasi-static displacement of the cables due to displacements of their platform ends, to first order."""
     # shapes: ends (m, 3); returns (m, count, 3)
     middles = (np.arange(count - 1) + 0.5) / (count - 1)
     tangent, sag, stretch = _along(state, middles)
@@ -87,7 +87,7 @@ WITH_MASS, MASSLESS = "with cable mass", "massless"
 class ListedMode(NamedTuple):
     """One mode."""
 
-    number: int  # from 1, among the modes of its kind
+    number: int  # number of the mode within its kind, starting at 1
     kind: str  # "with cable mass" or "massless"
     frequency: float  # [Hz]
     platform_share: float  # platform share of the kinetic energy
@@ -97,21 +97,21 @@ class ListedMode(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Name for selection: "1", "massless 1"."""
+        """Name for the selection: "1", "massless 1"."""
         return f"{self.number}" if self.kind == WITH_MASS else f"{MASSLESS} {self.number}"
 
     @property
     def swings(self) -> str:
-        """Name of the part with the largest share of the kinetic energy."""
+        """Name of the platform or cable with the largest share of the kinetic energy."""
         if self.cable is None or self.platform_share >= self.cable_share:
             return "platform"
         return f"cable {self.cable}"
 
 
 def listed_modes(vibration: Vibration) -> list[ListedMode]:
-    """All modes with cable mass, then the massless ones, each in ascending order."""
+    """All modes with cable mass, then all massless modes, each in ascending order."""
     share = vibration.cable_share
-    # the first of equal cables, which differ by rounding
+    # the first one if several cables are equal except for rounding
     most = np.argmax(share >= (1.0 - EQUAL) * share.max(axis=0), axis=0) if vibration.frequency.size else ()
     swinging = [
         ListedMode(
@@ -136,8 +136,8 @@ def listed_modes(vibration: Vibration) -> list[ListedMode]:
 
 def mode_correlation(vibration: Vibration) -> Array:
     """Share of each massless mode's motion in each mode with cable mass, shape (n, K)."""
-    # A share is the squared mass-weighted product of the platform motions of both modes. The shares of a massless mode,
-    # summed over all modes including those above `up_to`, are less than 1 because of the motion of the cables
+    # A share is the squared mass-weighted product of the platform motions of both modes. The sum of the shares of a
+    # massless mode over all modes, including modes above `up_to`, is less than 1 because of the motion of the cables
     massless = modes(vibration.state).shape
     mass = np.linalg.pinv(massless @ massless.T)
     return np.asarray((massless.T @ mass @ vibration.shape) ** 2)

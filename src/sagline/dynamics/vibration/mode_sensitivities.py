@@ -27,13 +27,13 @@ class StateSlopes(NamedTuple):
 
 
 class ModeGroup(NamedTuple):
-    """The g modes of one frequency, with bilinear forms of cable parameter changes for each pair."""
+    """The g modes of one frequency, and bilinear forms of each pair of modes for changes of cable data."""
 
     motion: Array  # platform motion, unit modal mass, shape (6, g)
     square: float  # squared angular frequency [1/s^2]
     end_force: Array  # force of the cables on their platform ends, shape (m, g, 3)
     by_force: Array  # derivatives with respect to static platform-end force, integral of f^T dC f, shape (m, g, g, 3)
-    # derivatives with respect to length, linear density (including that of mu u^2) and axial stiffness
+    # derivatives with respect to length, linear density (including the derivative of mu u^2) and axial stiffness
     by_datum: Array  # shape (3, m, g, g)
 
 
@@ -61,7 +61,7 @@ def state_slopes(state: Equilibrium) -> StateSlopes:
 
 
 def square_derivatives(rest: StateSlopes, swings: ModeGroup) -> SquareDerivatives:
-    """Derivatives of a squared frequency, with the platform moving to its new equilibrium."""
+    """Derivatives of a squared frequency, including the motion of the platform to its new equilibrium."""
     robot, pose = rest.state.one_robot, _by_pose(rest, swings)
     turns = rest.state.pose.matrix.T @ swings.motion[3:]
     spins = np.einsum("ia,jb->ijab", turns, turns)
@@ -79,7 +79,7 @@ def square_derivatives(rest: StateSlopes, swings: ModeGroup) -> SquareDerivative
 
 
 def _by_pose(rest: StateSlopes, swings: ModeGroup) -> Array:
-    """Derivatives with respect to platform motions in its pattern at fixed lengths, (6, g, g)."""
+    """Derivatives with respect to free motions of the platform at fixed lengths, (6, g, g)."""
     slopes, turns = rest.slopes, swings.motion[3:]
     unit = np.eye(6)
     moved = np.cross(unit[:, None, 3:], slopes.levers)  # rotation of the levers
@@ -115,8 +115,8 @@ def _cross_matrices() -> Array:
 
 
 PHASE = 0.45 * np.pi  # largest phase of a transverse wave in an element [rad]
-HALVINGS = 40  # largest number of bisections of a cable: elements at a fold would become ever shorter
-CLOSE = 1e-5  # relative frequency difference for the numerical derivative of the equations
+HALVINGS = 40  # largest number of bisections of a cable, because elements at a fold would become shorter and shorter
+CLOSE = 1e-5  # relative step of the frequency for the numerical derivative of the equations
 _UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -155,9 +155,9 @@ def string_data(rest: StateSlopes) -> tuple[StringData, ...]:
 
 
 def mode_group(rest: StateSlopes, cables: tuple[StringData, ...], frequency: Array) -> ModeGroup:
-    """Modes of adjacent frequencies [Hz] that count as equal."""
+    """Modes of adjacent frequencies [Hz], which count as equal."""
     omega, group = 2.0 * np.pi * float(frequency.mean()), len(frequency)
-    omega *= 1.0 + _correction(rest, cables, omega, group)  # reduces the error to CLOSE times its value
+    omega *= 1.0 + _correction(rest, cables, omega, group)  # this step reduces the error by the factor CLOSE
     waves = [_waves(cable, omega) for cable in cables]
     matrix, scale = _equations(rest, waves, omega)
     vectors = scale[:, None] * np.linalg.svd(matrix)[2][-group:].T
@@ -203,7 +203,7 @@ def _equations(rest: StateSlopes, waves: list[_Waves], omega: float, scale: Arra
 
 
 def _waves(cable: StringData, omega: float) -> _Waves:
-    """Waves of a cable for unit forces on its frame end, by collocation at Gauss points of its elements."""
+    """Waves of a cable due to unit forces on its frame end, by collocation at Gauss points of its elements."""
     edges = _edges(cable, omega)
     size = np.diff(edges)
     place = edges[:-1, None] + size[:, None] * NODES  # (e, STAGES)
@@ -236,7 +236,7 @@ def _flexible(force: Array, stiffness: float) -> Array:
 
 
 def _edges(cable: StringData, omega: float) -> Array:
-    """Borders of elements, which are short relative to N/w and to a transverse wave."""
+    """Borders of the elements of a cable. Elements are short relative to N/w and to a transverse wave."""
     edges = np.array([0.0, cable.length])
     for _ in range(HALVINGS):
         size = np.diff(edges)

@@ -1,4 +1,4 @@
-"""Receptance of the platform, by component modes and exactly, and its peak."""
+"""Receptance of the platform, from component modes and exactly, and its peak."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from sagline.dynamics.vibration.dynamic_stiffness import Complex, Damping, movin
 from sagline.dynamics.vibration.robot_modes import StateModes, VibrationModel
 
 LOWEST: Final = 1.0  # [Hz], modes up to this frequency are always included
-TAKEN: Final = 1.6  # relative to the highest frequency: modes up to this limit are included
-# relative to the highest frequency: losses couple the modes up to this limit, and damp each higher mode separately
+TAKEN: Final = 1.6  # relative to the highest frequency; modes up to this limit are included
+# relative to the highest frequency; losses couple modes up to this limit, and damp each higher mode separately
 COUPLED: Final = 1.5
 BLOCK: Final = 128  # frequencies per block
 
@@ -38,7 +38,7 @@ class Receptance(NamedTuple):
         return components, stretch_stiffness(components) if self.damping.loss_time > 0.0 else None
 
     def by_modes(self, frequency: Array, held: FixedEndModes) -> tuple[Complex, Complex]:
-        """Compliance with cable mass, from the cables' modes, and compliance with massless cables."""
+        """Compliance with cable mass, from the modes of the cables, and compliance with massless cables."""
         # shapes: frequency (F,) [Hz]; returns (F, 6, 6)
         found = np.empty((2, frequency.size, 6, 6), dtype=np.complex128)
         for part in blocks(frequency.size, BLOCK):
@@ -51,7 +51,7 @@ class Receptance(NamedTuple):
         """Compliance from the exact dynamic stiffness of the cables; frequency (F,) [Hz]; returns (F, 6, 6)."""
         strings = self.model.strings
         moving = moving_stiffness(strings, frequency, self.damping)
-        moving -= 2j * self.damping.modal_damping * self.cables  # the whole stiffness already includes it
+        moving -= 2j * self.damping.modal_damping * self.cables  # the whole stiffness already includes modal damping
         moving[:, ~strings.taut[0]] = 0.0
         return self._compliance(frequency, moving)
 
@@ -65,7 +65,7 @@ class Receptance(NamedTuple):
             return np.asarray(freedom.T @ np.linalg.inv(freedom @ whole @ freedom.T) @ freedom)
 
     def _moving(self, components: CableComponents, lost: Array | None, omega: Array) -> tuple[Complex, Complex]:
-        """Dynamic part of the cables' stiffness, first with their mass, then without it, (F, m, 3, 3) each."""
+        """Dynamic part of the cables' stiffness with cable mass, and without cable mass, (F, m, 3, 3) each."""
         mesh, model = components.mesh, self.model
         density = mesh.density[:, None, None]
         square = omega**2 - 1j * omega * self.damping.air_damping / density[:, 0]  # (t, F)
@@ -86,7 +86,7 @@ class Receptance(NamedTuple):
 
 
 def _in_world(own: Complex, axes: Array) -> Complex:
-    """Matrices (t, F, d, d) in directions (t, d, 3) as (F, t, 3, 3)."""
+    """Matrices (F, t, 3, 3) in world axes, from matrices (t, F, d, d) along directions (t, d, 3)."""
     return np.asarray(np.einsum("tai,tfab,tbj->ftij", axes, own, axes, optimize=True))
 
 
@@ -100,7 +100,7 @@ def _driven_stiffness(motions: PlaneModes, square: Complex, loss: complex) -> Co
 def _driven_stiffness_with_loss(
     motions: PlaneModes, square: Complex, loss: complex, lost: Array, scaled: Complex
 ) -> tuple[Complex, Complex]:
-    """The same stiffness with stretch loss; lost: loss matrix (t, d + k, d + k); and the static loss alone."""
+    """Driven stiffness with stretch loss, and the static loss; lost: loss matrix (t, d + k, d + k)."""
     d, factor = motions.drive.shape[2], scaled[None, :, None, None]
     by_end = -square[..., None, None] * motions.drive[:, None] + factor * lost[:, None, d:, :d]
     alone = loss * motions.square[:, None] - square[..., None]
@@ -116,15 +116,15 @@ def _driven_stiffness_with_loss(
 
 ForceReceptance: TypeAlias = Callable[[Array], Complex]  # displacements per force (F, 3, 3) at frequencies (F,)
 
-# the search covers the modes with at least this response, relative to the largest response at a mode
+# the search covers modes with at least this response, relative to the largest response at a mode
 LIKELY: Final = 0.4
 REFINEMENTS: Final = 2  # number of refinements of the search
-CLOSER: Final = 5  # frequencies between two adjacent ones
+CLOSER: Final = 5  # number of new frequencies between two adjacent frequencies
 WIDTHS: Final = np.linspace(-3.0, 3.0, 7)  # search points about a mode, in units of half the peak width
 
 
 def modal_receptance(found: StateModes, rest: Array, ratio: float) -> ForceReceptance:
-    """Receptance from the modes of a robot; a common loss factor of the whole stiffness does not couple modes."""
+    """Receptance from the modes of a robot; a common loss factor of the whole stiffness does not couple the modes."""
     # shapes: rest (3, 3)
     natural = (2.0 * np.pi * found.frequency) ** 2
     products = (found.platform[:3, None] * found.platform[None, :3]).reshape(9, -1)
@@ -168,7 +168,7 @@ def peak_receptance(
 
 
 def _parabola_peak(frequency: Array, norms: Array) -> tuple[float, float]:
-    """Maximum of a peak through three values, at which the inverse square is approximated by a parabola."""
+    """Maximum of a peak through three values, with a parabola for the inverse square."""
     (before, after), flat = np.diff(frequency), norms**-2.0
     left, right = np.diff(flat) / (before, after)
     bend = (right - left) / (before + after)

@@ -1,4 +1,4 @@
-"""Frequency response of a platform on cables with mass, and its curves."""
+"""Frequency response of a platform on cables with mass, and curves of the response."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from sagline.robot.equilibrium import Equilibrium, of_equilibrium
 from sagline.statics.slopes import cable_slopes
 from sagline.statics.stiffness import modes, stiffness
 
-CHECKS: Final = 8  # frequencies at which the response is compared with the exact one
+CHECKS: Final = 8  # number of frequencies at which the response is compared with the exact response
 _BYTES: Final = 20_000.0  # bytes per frequency
 
 
@@ -29,8 +29,8 @@ _BYTES: Final = 20_000.0  # bytes per frequency
 class FrequencyResponse(Result):
     """Result of `frequency_response` at F frequencies.
 
-    Motions are (displacement of the center of mass [m], rotation vector [rad]), and wrenches are (force [N], moment [N
-    m]) about this center, in world axes. Both are complex amplitudes with the time factor exp(i omega t).
+    A motion is (displacement of the center of mass [m], rotation vector [rad]). A wrench is (force [N], moment [N m])
+    about the center of mass. Both are in world axes, as complex amplitudes with the time factor exp(i omega t).
 
     Attributes:
         state: The state, a single one.
@@ -40,8 +40,8 @@ class FrequencyResponse(Result):
             robot's motion pattern excludes.
         massless_compliance: Motion per wrench with massless cables, of the same shape.
         checked_frequency: Frequencies at which the compliance was compared with the exact one [Hz], shape (C,).
-        deviation: Norm of the difference from the exact compliance at these frequencies, relative to the norm of the
-            exact one, shape (C,).
+        deviation: Norm of the error of the compliance at these frequencies, relative to the norm of the exact
+            compliance, shape (C,).
     """
 
     state: Equilibrium
@@ -55,16 +55,16 @@ class FrequencyResponse(Result):
 
 @of_equilibrium
 def frequency_response(state: Equilibrium, frequency: ArrayLike, damping: Damping | None = None) -> FrequencyResponse:
-    """Motion of the platform for an oscillating wrench, with cable mass, and with massless cables for comparison.
+    """Motion of the platform due to a harmonic wrench, with cable mass, and with massless cables for comparison.
 
     The response is computed from the fixed-end modes of every cable. At some of the frequencies it is compared with the
-    response for the exact stiffness of the cables, and the deviation is reported.
+    response for the exact stiffness of the cables.
 
     Args:
         state: A single equilibrium; a plan or a solution of one; or a robot and a pose.
         frequency: Frequencies [Hz], >= 0, shape (F,).
-        damping: Energy losses; None: no losses, with infinite response at the natural frequencies. Its modal_damping
-            acts as a loss factor of the whole stiffness, equal to twice its value, as in `dynamic_stiffness`.
+        damping: Energy losses. None: no losses, and an infinite response at the natural frequencies. A modal_damping
+            zeta acts as the loss factor 2 zeta of the whole stiffness, as in `dynamic_stiffness`.
 
     Returns:
         FrequencyResponse.
@@ -92,7 +92,7 @@ def frequency_response(state: Equilibrium, frequency: ArrayLike, damping: Dampin
     given = checked(frequency, "frequency", "Hz", low=0.0)
     if given.ndim != 1 or not given.size:
         raise InvalidValueError("frequency", f"of shape {given.shape}", "a list of frequencies", "Give one or more.")
-    check_memory(f"{given.size:,} frequencies", _BYTES * given.size, "Take them in parts.")
+    check_memory(f"{given.size:,} frequencies", _BYTES * given.size, "Split them into parts.")
     known = optional(damping, Damping, "damping") or Damping()
     model = vibration_model(state)
     check_solved(state)
@@ -112,8 +112,8 @@ def frequency_response(state: Equilibrium, frequency: ArrayLike, damping: Dampin
 MOTIONS = ("x", "y", "z", "about x", "about y", "about z")
 UNITS = {(False, False): "m/N", (False, True): "1/N", (True, False): "1/N", (True, True): "rad/(N m)"}
 SAMPLES = 900  # number of logarithmically spaced frequencies
-NEAR = np.sinh(np.linspace(-8.0, 8.0, 33)) / np.sinh(8.0)  # relative frequencies about a peak, denser close to it
-BESIDE = 0.03  # range of these frequencies, relative to a peak's frequency
+NEAR = np.sinh(np.linspace(-8.0, 8.0, 33)) / np.sinh(8.0)  # relative frequencies about a peak, denser close to the peak
+BESIDE = 0.03  # range of these frequencies, relative to the frequency of the peak
 BELOW = 6.0  # ratio of the lowest mode frequency to the start of the curves
 
 
@@ -123,14 +123,14 @@ class ResponseCurves(NamedTuple):
     frequency: Array  # [Hz], ascending, shape (F,)
     with_mass: Array  # amplitude of motion per force, with cable mass, in `unit`, shape (F,)
     massless: Array  # the same with massless cables, shape (F,)
-    static: float  # the same for a static force
+    static: float  # the same for a static force and massless cables
     unit: str  # unit of all responses
 
 
 def response_curves(vibration: Vibration, force: str = "x", motion: str | None = None) -> ResponseCurves:
-    """Motion of the platform per force at its center of mass, for frequencies up to the limit of the known modes."""
-    # Both curves are from `frequency_response`; air damping acts only on cables with mass, so the massless curve does
-    # not include it
+    """Motion of the platform per force at its center of mass, at frequencies up to the limit of the known modes."""
+    # Both curves are from `frequency_response`. The massless curve has no air damping, which acts only on cables with
+    # mass
     state = instance(vibration, Vibration, "vibration").state
     if vibration.status is not VibrationStatus.SOLVED or not vibration.frequency.size:
         reason = vibration.status.name if vibration.status is not VibrationStatus.SOLVED else "no mode below up_to"
@@ -162,7 +162,7 @@ def _places(force: str, motion: str | None) -> tuple[int, int]:
 
 
 def _grid(natural: Array, highest: float) -> Array:
-    """Frequencies with logarithmic spacing, and additional ones close to each peak."""
+    """Frequencies with logarithmic spacing, and additional frequencies close to each peak."""
     even = np.geomspace(natural.min() / BELOW, highest, SAMPLES)
     near = (natural[:, None] * (1.0 + BESIDE * NEAR)).ravel()
     return np.unique(np.concatenate((even, near[(near > even[0]) & (near < highest)])))

@@ -1,4 +1,4 @@
-"""Modes of a robot with cable mass, by component mode synthesis, checked against the exact count."""
+"""Modes of a robot with cable mass, by component mode synthesis; an exact count checks their number."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from sagline.statics.slopes import cable_slopes, motions_of_ends
 from sagline.statics.stiffness import UNSTABLE, mass_matrix, natural_frequency
 from sagline.statics.strings import COUNTING, Strings, strings_of, undamped
 
-KEPT = 1.05  # relative to the requested frequency: fixed-end modes up to this limit are unknowns
-LEVELS = 4  # number of moment pairs that are matched for the higher modes
+KEPT = 1.05  # relative to the requested frequency; fixed-end modes up to this limit are unknowns
+LEVELS = 4  # number of matched pairs of moments (Krylov) of the higher modes
 _TINY = 1e-300
 
 
@@ -48,12 +48,12 @@ class _ReducedModel(NamedTuple):
     matrix: Array  # symmetric, shape (n + k, n + k): first the platform, then the cable modes [1/s^2]
     platform: Array  # matrix from the first unknowns to platform motions, shape (6, n)
     driven: Array  # matrix from the first unknowns to the excitation of the cable modes, shape (k, n)
-    kept: Flags  # components that are unknowns themselves, the first of the k, shape (T,)
-    beyond: Array  # remaining components from the last of the k unknowns, shape (T - kept, b)
+    kept: Flags  # components that are unknowns, the first of the k unknowns, shape (T,)
+    beyond: Array  # other components, as combinations of the last of the k unknowns, shape (T - kept, b)
     components: CableComponents  # fixed-end modes of the cables
 
     def amplitudes(self, vectors: Array) -> Array:
-        """Amplitudes of the components in addition to quasi-static motion; vectors (n + k, K); returns (T, K)."""
+        """Amplitudes (T, K) of the components in addition to quasi-static motion, from vectors (n + k, K)."""
         n = self.platform.shape[1]
         own = vectors[n:] - self.driven @ vectors[:n]
         found = np.empty((self.kept.size, vectors.shape[1]))
@@ -64,7 +64,7 @@ class _ReducedModel(NamedTuple):
 
 
 def vibration_model(state: Equilibrium) -> VibrationModel:
-    """Vibration model of one or N equilibria; arrays have a leading axis in either case."""
+    """Vibration model of one equilibrium or N equilibria; arrays have a leading axis in both cases."""
     slopes = cable_slopes(state)
     matrix = slopes.matrix.reshape(-1, 6, 6)
     levers = slopes.levers.reshape(len(matrix), -1, 3)
@@ -79,10 +79,10 @@ def vibration_model(state: Equilibrium) -> VibrationModel:
 
 def reduced_model(model: VibrationModel, row: int, up_to: float) -> _ReducedModel:
     """Eigenproblem of one state for its modes below a frequency [Hz]."""
-    # The unknowns are the cables' modes up to slightly above this frequency. A few joint motions represent the response
-    # of the higher modes to slow platform motions; they match the first moments (Krylov). Amplitudes are relative to
-    # the frame. The mass matrix is the platform mass plus the remaining quasi-static mass of the cables, and 1 for each
-    # mode.
+    # The unknowns are the modes of the cables up to slightly above this frequency. A few joint motions represent the
+    # response of the higher modes to slow platform motions; they match the first moments (Krylov). Amplitudes are
+    # relative to the frame. The mass of the platform unknowns is the platform mass plus the remaining quasi-static mass
+    # of the cables. The mass of each mode is 1.
     components = component_modes(model.strings, row, KEPT * up_to)
     freedom, ends = model.freedom, model.ends[row]
     drives = (components.participation[:, None] @ ends[components.cable])[:, 0] @ freedom.T
@@ -106,7 +106,7 @@ def reduced_model(model: VibrationModel, row: int, up_to: float) -> _ReducedMode
 
 
 def _slow_motions(square: Array, drives: Array) -> tuple[Array, Array]:
-    """A few motions that represent many modes: orthonormal columns of amplitudes, and the stiffness between them."""
+    """A few motions that represent many modes: orthonormal columns of amplitudes, and their stiffness matrix."""
     chain = [drives / square[:, None]]
     for _ in range(LEVELS - 1):
         chain.append(chain[-1] / square[:, None])
@@ -131,7 +131,7 @@ def dynamic_matrix(model: VibrationModel, row: int, moving: Array, omega: float)
 
 
 def _on_platform(of_cables: Array, ends: Array) -> Array:
-    """Matrices (m, 3, 3) of platform ends as one matrix of the platform, (6, 6)."""
+    """Sum of matrices (m, 3, 3) of the platform ends as a matrix of the platform, (6, 6)."""
     return np.asarray((np.swapaxes(ends, -1, -2) @ of_cables @ ends).sum(axis=0))
 
 
@@ -157,12 +157,12 @@ def _negatives(matrix: Array) -> int:
 
 
 MOST_MODES: Final = 2_000
-_CERTAIN: Final = 1.5  # an estimate above this multiple of MOST_MODES is beyond it in spite of its error
-_STEEP: Final = 1e-6  # smallest horizontal tension relative to the vertical force, for a vertical cable
+_CERTAIN: Final = 1.5  # an estimate above this multiple of MOST_MODES exceeds MOST_MODES in spite of its error
+_STEEP: Final = 1e-6  # horizontal tension of a vertical cable, relative to the vertical force
 _EVEN: Final = 1e-9  # range of q below which the tension of a cable counts as constant
 _POINTS: Final = 201
-SLOW: Final = 1e-2  # smallest frequency relative to up_to; a lower one may belong to a motion without stiffness
-BORDER: Final = 1e-6  # relative accuracy of a mode's frequency in the count
+SLOW: Final = 1e-2  # smallest frequency relative to up_to; a lower frequency may belong to a motion without stiffness
+BORDER: Final = 1e-6  # relative accuracy of a frequency in the count
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,7 +188,7 @@ class StateModes:
 
 
 def state_modes(model: VibrationModel, row: int, up_to: float) -> StateModes:
-    """Modes of one state below a frequency [Hz]; their number is compared with the exact count."""
+    """Modes of one state below a frequency [Hz]; the exact count checks their number."""
     check_string_count(model.strings, row, up_to, "up_to")
     count = modes_below(model, row, up_to)
     check_mode_count(count, up_to, "up_to")
@@ -208,10 +208,10 @@ def state_modes(model: VibrationModel, row: int, up_to: float) -> StateModes:
 
 
 def check_string_count(strings: Strings, row: int, frequency: float, item: str) -> None:
-    """Reject a frequency [Hz] below which the cables alone have far too many modes, before they are counted.
+    """Reject a frequency [Hz] below which the cables have far too many modes, before the exact count.
 
-    N half waves of a cable, in each of two directions, have the phase pi N: the integral of omega sqrt(rho/T) along it.
-    The tension is T_x cosh(q), with the vertical force T_x sinh(q).
+    N half waves of a cable, in each of two directions, have the phase pi N, which is the integral of omega sqrt(rho/T)
+    along the cable. The tension is T_x cosh(q) at the point with the vertical force T_x sinh(q).
     """
     table = strings.table[row, strings.taut[row]]
     level = np.maximum(table[:, columns.HORIZONTAL], _STEEP * np.abs(table[:, columns.VERTICAL]))
@@ -245,7 +245,7 @@ def cable_shares(model: VibrationModel, row: int, found: StateModes) -> Array:
 
 
 def damping_ratios(density: Array, found: StateModes, shares: Array, damping: Damping) -> Array:
-    """Damping ratio of each mode, to first order: lost power relative to that with critical damping."""
+    """Damping ratio of each mode, to first order: lost power relative to the power lost with critical damping."""
     # shapes: density (m,) [kg/m]; returns (K,)
     omega = 2.0 * np.pi * found.frequency
     lost = np.zeros(omega.size)

@@ -1,4 +1,4 @@
-"""All modes of a robot with cable mass below a frequency, and their excitation by a path."""
+"""All modes of a robot with cable mass below a frequency, and the excitation of modes by a path."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from sagline.statics.stiffness import Modes
 
 
 class VibrationStatus(IntEnum):
-    """Status of a vibration: type of the equilibrium, and type of its cables."""
+    """Status of a vibration: type of the equilibrium and of its cables."""
 
     SOLVED = 0
     UNSTABLE = 1
@@ -48,22 +48,22 @@ _TEXTS = {
     VibrationStatus.UNSTABLE: "the equilibrium is unstable along its negative_directions; simulate the motion",
     VibrationStatus.NO_LENGTHS: "the pose has no solution: see the status of the plan",
     VibrationStatus.FOLDED: "a cable is folded or slack and has no linear vibration: its index is in slack_cables; "
-    "the modes are those of the others",
+    "the modes belong to the platform and the other cables",
 }
 
 
-_NEAR: Final = 3.0  # two excitations are reported if their ratio is smaller than this factor
+_NEAR: Final = 3.0  # a second excitation is reported if the first one is less than this factor larger
 _INSTANTS: Final = 2000  # number of instants of a segment for its inertial wrench
 
 
 def _most_excited(state: Equilibrium, frequency: Array, shape: Array, path: Path) -> Array:
-    """Frequencies most excited by a path: one, or two if the second excitation is at least a third of the first."""
+    """Frequencies with the largest excitation by a path: one, or two if the second excitation is at least a third."""
     # shapes: frequency (K,) [Hz]; shape (6, K); returns (1,) or (2,) [Hz]
     segments = [segment for segment in segments_of(instance(path, Path, "path")) if segment.curve is not None]
     known = np.flatnonzero(frequency > 0.0)
     if not (segments and known.size):
         item, value = ("path", "without motion") if not segments else ("modes", "without a frequency")
-        raise InvalidValueError(item, value, "a motion, and modes that it can excite", "Take another path, or state.")
+        raise InvalidValueError(item, value, "a motion, and modes that it can excite", "Use another path or state.")
     if np.isnan(frequency).any():
         step = "Take another: its platform falls."
         raise InvalidValueError("modes", "of an unstable state", "of a stable one", step)
@@ -74,7 +74,7 @@ def _most_excited(state: Equilibrium, frequency: Array, shape: Array, path: Path
 
 
 def excitation(robot: Robot, segment: RestToRestSegment, frequency: Array, shape: Array) -> Array:
-    """Excitation of each mode by a segment, times the platform's motion in the mode."""
+    """Excitation of each mode by a segment, times the platform motion in the mode."""
     # shapes: frequency (K,) [Hz]; shape (6, K); returns (K,)
     time = np.linspace(0.0, segment.duration, _INSTANTS + 1)
     assert segment.curve is not None
@@ -90,27 +90,27 @@ def excitation(robot: Robot, segment: RestToRestSegment, frequency: Array, shape
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Vibration(Result):
-    """Result of `vibration`: all modes below a frequency, of platform and strings.
+    """Result of `vibration`: all modes of platform and cables below a frequency.
 
-    Modes have unit modal mass, so the shapes are in m/sqrt(kg); K is the number of modes.
+    Modes have unit modal mass. Their shapes are therefore in m/sqrt(kg). K is the number of modes.
 
     Attributes:
         state: The state, a single one.
-        up_to: Frequency below which all modes are found [Hz].
+        up_to: Upper limit of the mode frequencies [Hz].
         damping: Energy losses of the modes.
-        status: `VibrationStatus`: type of the equilibrium, and existence of linear vibrations.
+        status: Status: type of the equilibrium, and existence of linear vibrations.
         frequency: Natural frequencies with cable mass [Hz], ascending, shape (K,).
         shape: Motion of the platform (displacement of the center of mass, rotation vector, world axes), one mode per
             column, shape (6, K) [m/sqrt(kg), rad/(sqrt(kg) m)].
         platform_share: Platform share of the kinetic energy, shape (K,).
-        cable_share: Share of each cable in the kinetic energy, shape (m, K); with platform_share they sum to 1.
-        cable_shape: Displacement of the cables at equally spaced material points from frame to platform end, world
-            axes, shape (K, m, P, 3) [m/sqrt(kg)].
+        cable_share: Share of each cable in the kinetic energy, shape (m, K). The sum with platform_share is 1.
+        cable_shape: Displacement of the cables at equally spaced material points, frame end first, world axes, shape
+            (K, m, P, 3) [m/sqrt(kg)].
         loss: Damping ratio of each mode, to first order in the damping, shape (K,).
         massless_frequency: Natural frequencies of the platform with massless cables [Hz], as in `modes`, shape (n,).
-        count: Number of modes below up_to by the exact count, which is independent of the modes; equals K if none is
-            missing.
-        negative_directions: Unstable motions of the platform, one per column, shape (6, d); without columns at a stable
+        count: Number of modes below up_to, from the exact count, which is independent of the modes; K if all modes are
+            found.
+        negative_directions: Unstable motions of the platform, one per column, shape (6, d); d = 0 at a stable
             equilibrium.
         slack_cables: Indices of the cables without linear vibrations.
     """
@@ -132,14 +132,14 @@ class Vibration(Result):
 
     @property
     def complete(self) -> bool:
-        """True if no mode is missing: the number of modes equals the exact count."""
+        """True if the number of modes equals the exact count."""
         return self.status is VibrationStatus.SOLVED and self.count == self.frequency.size
 
     def to_shape(self, path: Path) -> Array:
-        """Frequencies most excited by a path, for a shaper: see `sagline.to_shape`.
+        """Frequencies with the largest excitation by a path, for a shaper; see `sagline.to_shape`.
 
         Args:
-            path: A path from rest to rest; preferably, it ends at the pose of the modes.
+            path: A path from rest to rest that ends, if possible, at the pose of the modes.
 
         Returns:
             Frequencies [Hz], shape (1,) or (2,), the most excited first.
@@ -158,8 +158,8 @@ POINTS: Final = 41  # number of points of a cable's shape
 def vibration(state: Equilibrium, *, up_to: float = UP_TO, damping: Damping | None = None) -> Vibration:
     """All modes of a robot with cable mass below a frequency.
 
-    In addition to the platform modes, each cable vibrates like a string about its catenary, in its plane and out of it.
-    The number of modes is compared with an independent exact count, so that none is missing.
+    The modes include the platform, and every cable as a string that vibrates about its catenary, in its plane and
+    normal to it. An independent exact count checks the number of modes.
 
     Args:
         state: A single equilibrium; a plan or a solution of one; or a robot and a pose.
@@ -167,13 +167,13 @@ def vibration(state: Equilibrium, *, up_to: float = UP_TO, damping: Damping | No
         damping: Energy losses of the vibration, for `loss`; None: no losses.
 
     Returns:
-        Vibration. Its status reports an unstable equilibrium, and folded or slack cables. Such cables do not have
-        linear vibrations, and the modes do not include them.
+        Vibration. Its status reports an unstable equilibrium, and folded or slack cables. Such cables have no linear
+        vibrations; the modes do not include them.
 
     Raises:
         InvalidValueError: If the state is not a single Equilibrium with exact or elastic cables; if up_to is not
             positive, or more than 2,000 modes are below it.
-        SaglineError: If modes and count disagree.
+        SaglineError: If the number of modes differs from the exact count.
 
     Examples:
         >>> import numpy as np
@@ -224,12 +224,12 @@ def vibration(state: Equilibrium, *, up_to: float = UP_TO, damping: Damping | No
 
 
 def to_shape(modes: Modes | Vibration, path: Path) -> Array:
-    """Frequencies most excited by a path: one, or two if the second excitation is at least a third of the first.
+    """Frequencies with the largest excitation by a path: one, or two if the second excitation is at least a third.
 
-    The excitation of a mode is measured by |phi . M d| |phi| |A(w)|/w, with phi its shape, d the direction of the
-    motion, and A the Fourier transform of the acceleration along it. The measure combines the force on the mode at its
-    own frequency with the resulting platform motion. It is plausible but not proved. It determines the frequencies for
-    a shaper, not the residual vibration.
+    The measure of the excitation is |phi . M d| |phi| |A(w)|/w. phi is the shape of the mode, d the direction of the
+    motion, and A the Fourier transform of the acceleration along d. The measure combines the force on the mode at its
+    frequency with the resulting platform motion. It is plausible, but not proved. Use it to choose the frequencies of a
+    shaper, not to estimate the residual vibration.
 
     Args:
         modes: Modes of the robot at a single state, preferably at the end of the path: `modes(plan.state[-1])` without
@@ -256,10 +256,10 @@ def to_shape(modes: Modes | Vibration, path: Path) -> Array:
     """
     given: object = modes
     if not isinstance(given, Modes | Vibration):
-        step = "Make them: modes(plan.state[-1]), or vibration(plan.state[-1])."
+        step = "Create them: modes(plan.state[-1]), or vibration(plan.state[-1])."
         raise InvalidValueError("modes", brief(given), "a Modes or a Vibration", step)
     state = modes.state
     if state.pose.shape:
         value = f"of {len(state.pose)} states"
-        raise InvalidValueError("modes", value, "of a single state", "Take those of the last: modes(plan.state[-1]).")
+        raise InvalidValueError("modes", value, "of a single state", "Use the last pose: modes(plan.state[-1]).")
     return _most_excited(state, modes.frequency, modes.shape, path)
