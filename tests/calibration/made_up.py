@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 import sagline as sl
-from sagline.calibration.findings import CrossValidation, Direction, Outlier
+from sagline.calibration.findings import Criticism, CrossValidation, Direction, Outlier
 from sagline.calibration.parameters import KINDS, Parameters
 from sagline.core.arrays import Array, locked
 
@@ -145,6 +145,7 @@ def made_up(
         "residuals": locked(residuals),
         "chi_squared_of_pose": locked(squares),
         "weights": locked(weights),
+        "criticisms": (Criticism("mass", "mass", 41.5, 1.2e-10, numbers.labels[0], 0.021, 0.6),),
         "outliers": tuple(Outlier(row, cable, "length", size, abs(size) / 5e-4) for row, cable, size in slips),
         "gauge": tuple(
             Direction(what, locked(way * 0.02), 1.0, STEP)

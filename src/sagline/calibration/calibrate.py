@@ -111,7 +111,7 @@ def calibrate(
     elif Omission.OTHER_EQUILIBRIUM in found.left_out:
         _refuse(frame_mismatch(fit_log, found.left_out[Omission.OTHER_EQUILIBRIUM], parameters.names))
     validation = cross_validate(problem, found, folds, robust=robust, progress=progress) if folds else None
-    return calibration_of(problem, found, rows, left_out, log.source, validation)
+    return calibration_of(problem, checked, found, rows, left_out, log.source, validation)
 
 
 def active_sensors(log: WinchLog) -> Sensors:

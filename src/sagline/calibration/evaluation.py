@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Final
 
 import numpy as np
 from scipy.special import chdtr, chdtrc
 
-from sagline.calibration.findings import CalibrationStatus, CrossValidation, Omission
+from sagline.calibration.criticism import considered_covariance, criticisms_of, fixed_terms
+from sagline.calibration.findings import CalibrationStatus, Criticism, CrossValidation, Omission
 from sagline.calibration.identifiability import OPEN, append_rows, gauge_of
 from sagline.calibration.least_squares import QUANTILE, exceeded_with, whitened_at
 from sagline.calibration.observations import BLOCK
 from sagline.calibration.outliers import misfitting, outliers_in
-from sagline.calibration.parameters import KINDS, Parameters, external
+from sagline.calibration.parameters import KINDS, Parameters, Unknown, external
 from sagline.calibration.problem import Fit, FitProblem, reported_lengths
 from sagline.calibration.result import Calibration
 from sagline.calibration.search import SearchResult
@@ -29,11 +31,13 @@ DOUBTFUL: Final = 1e-4
 ODD: Final = 0.1  # largest share of poses that fit badly; above it the whole result is doubtful
 ODD_WEIGHT: Final = 0.5  # a pose with a lower weight fits badly
 TOLERATED: Final = 1.1  # accepted ratio of chi squared to its expected value; no model is more exact in a large log
+HARMLESS: Final = 1.0  # standard errors: a criticism with smaller changes of all values does not make a result doubtful
 LITTLE: Final = 1e-6  # smallest component of an unobservable direction for a parameter to count as unobservable
 
 
 def calibration_of(
     problem: FitProblem,
+    unknowns: Sequence[Unknown],
     found: SearchResult,
     rows: Indices,
     left_out: Mapping[Omission, Indices],
@@ -47,20 +51,23 @@ def calibration_of(
     values = external(parameters, numbers)
     gauge = gauge_of(triangle, parameters, values, machine.robot, machine.sensors)
     covariance, rank = covariance_of(problem, triangle, machine.slopes)
+    fixed = fixed_terms(problem, unknowns, fit)
+    criticisms: tuple[Criticism, ...] = ()
+    if fixed is not None:
+        covariance = covariance + considered_covariance(fixed)
+        criticisms = criticisms_of(fixed, np.sqrt(np.diagonal(covariance)))
     whole, missed = kept & (normal.weights == 1.0), problem.missed(numbers)
     chi_squared = float(normal.squares[whole].sum() + missed @ missed)
     freedoms = int(normal.readings[whole].sum()) + int(np.isfinite(problem.prior_deviation).sum()) - rank
-    status = _status(found, chi_squared, freedoms)
     bad = misfitting(np.where(kept, normal.squares, np.nan), normal.readings)
     poses = fit.state.poses[kept]
     date, errors = datetime.now(UTC).date().isoformat(), np.sqrt(np.diagonal(covariance))
-    provenance = provenance_of(parameters, errors, status, source, date)
-    return Calibration(
-        robot=machine.robot.replace(calibration=provenance),
+    result = Calibration(
+        robot=machine.robot,
         before=problem.robot,
         sensors=machine.sensors,
         length_offset=locked(machine.offset),
-        status=status,
+        status=CalibrationStatus.FOUND,
         parameters=parameters,
         values=locked(values),
         covariance=locked(covariance),
@@ -76,23 +83,29 @@ def calibration_of(
         outliers=outliers_in(problem, fit.state, bad, rows[bad], count=int(kept.sum())),
         gauge=gauge,
         cannot_tell_apart=weak_directions(triangle, parameters, gauge),
+        criticisms=criticisms,
         cross_validation=validation,
         iterations=fit.iterations,
         model=problem.model,
         log=source,
         date=date,
     )
+    status = _status(found, result)
+    provenance = provenance_of(parameters, errors, status, source, date)
+    return replace(result, status=status, robot=machine.robot.replace(calibration=provenance))
 
 
-def _status(found: SearchResult, chi_squared: float, freedoms: int) -> CalibrationStatus:
-    """Status of a search, from the poses of full weight."""
+def _status(found: SearchResult, result: Calibration) -> CalibrationStatus:
+    """Status of a search, from the poses of full weight, from all poses without outliers, and from the criticisms."""
     kept, weights = found.kept, found.fit.normal.weights
     if not found.fit.converged:
         return CalibrationStatus.NOT_CONVERGED
     readings, reduced = found.fit.normal.readings[kept & (weights == 1.0)], bool((weights[kept] < 1.0).any())
     elsewhere = len(found.left_out.get(Omission.OTHER_EQUILIBRIUM, ()))
     odd = np.count_nonzero(kept & (weights < ODD_WEIGHT)) + elsewhere
-    doubt = _is_doubtful(chi_squared, freedoms, readings, robust=reduced)
+    doubt = _is_doubtful(result.chi_squared, result.degrees_of_freedom, readings, robust=reduced)
+    doubt = doubt or _is_doubtful(*result.chi_squared_of_all, readings[:0], robust=False)
+    doubt = doubt or any(one.deviations > HARMLESS for one in result.criticisms)
     doubt = doubt or bool(odd > ODD * (np.count_nonzero(kept) + elsewhere))
     return CalibrationStatus.DOUBTFUL if doubt else CalibrationStatus.FOUND
 
@@ -136,8 +149,7 @@ def _is_doubtful(chi_squared: float, free: int, readings: Indices, *, robust: bo
         limit = exceeded_with(1.0 - QUANTILE, readings)
         cut = float(np.sum(readings * (1.0 - chdtr(readings + 2, limit) / QUANTILE)))
     ratio = chi_squared / max(free - cut, 1.0)
-    rare = min(chdtrc(free, chi_squared + cut), chdtr(free, chi_squared + cut)) < 0.5 * DOUBTFUL
-    return bool(rare and not 1.0 / TOLERATED < ratio < TOLERATED)
+    return bool(chdtrc(free, chi_squared + cut) < DOUBTFUL and ratio > TOLERATED)
 
 
 def provenance_of(

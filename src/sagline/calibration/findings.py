@@ -81,6 +81,29 @@ class Outlier(Result):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Criticism(Result):
+    """Parameters that were not estimated, and whose estimation would reduce chi squared more than chance explains.
+
+    Attributes:
+        name: For example "load_cell_gain of all cables alike", "load_cell_gain[3]" or "center_of_mass".
+        kind: Kind of unknown, which can be added to the unknowns.
+        fall: Reduction of chi squared.
+        chance: Probability of such a reduction if the fixed values were correct.
+        moves: Label of the estimated parameter that would change most, in standard errors.
+        change: This change, in the unit of the parameter.
+        deviations: This change in standard errors, >= 0.
+    """
+
+    name: str
+    kind: str
+    fall: float
+    chance: float
+    moves: str
+    change: float
+    deviations: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class CrossValidation(Result):
     """Errors of predictions at poses that the calibration did not use.
 
@@ -124,11 +147,24 @@ class Findings(Result):
     outliers: tuple[Outlier, ...]
     gauge: tuple[Direction, ...]
     cannot_tell_apart: tuple[Direction, ...]
+    criticisms: tuple[Criticism, ...]
     cross_validation: CrossValidation | None
     iterations: int
     model: CableModel
     log: str
     date: str
+
+    @property
+    def chi_squared_of_all(self) -> tuple[float, int]:
+        """Chi squared of the readings of all poses without outliers, whatever their weights, and its expected value."""
+        rows = [outlier.row for outlier in self.outliers]
+        more = (self.weights < 1.0) & ~np.isin(self.rows, rows)
+        fewer = (self.weights == 1.0) & np.isin(self.rows, rows)
+        readings = np.count_nonzero(~np.isnan(self.residuals[:, self.robot.cable_count :]), axis=1)
+        squares = self.chi_squared_of_pose[more].sum() - self.chi_squared_of_pose[fewer].sum()
+        return float(self.chi_squared + squares), self.degrees_of_freedom + int(
+            readings[more].sum() - readings[fewer].sum()
+        )
 
     @property
     def standard_error(self) -> Array:

@@ -120,7 +120,8 @@ class Calibration(Findings, Saved):
         status: Status of the calibration.
         parameters: The parameters and their priors.
         values: Values of the parameters, in their units, (P,).
-        covariance: Covariance of the values, (P, P); infinite on the diagonal without observations and a prior.
+        covariance: Covariance of the values, (P, P); infinite on the diagonal without observations and a prior. It
+            includes the tolerances of the robot for parameters that were not estimated.
         chi_squared: Sum of squares of all residuals in standard deviations, priors included.
         degrees_of_freedom: Expected value of chi_squared: number of readings and lengths minus the estimated
             parameters.
@@ -135,6 +136,7 @@ class Calibration(Findings, Saved):
         outliers: Readings that do not fit.
         gauge: Unobservable directions; along them the values follow from the priors.
         cannot_tell_apart: Weakly identifiable directions.
+        criticisms: Parameters that were not estimated, although the readings contradict their values.
         cross_validation: Errors at omitted poses; None without cross-validation.
         iterations: Number of iterations of the least squares.
         model: Cable model.

@@ -14,6 +14,7 @@ from sagline.core.arrays import Array, Indices
 from sagline.core.numbers import SPACE, counted, n, plus_minus
 
 WIDTH: Final = 80
+CLEARLY: Final = 4.0  # standard deviations by which chi squared is clearly below its expected value
 MOST_OUTLIERS: Final = 12  # largest number of listed items; the number of further ones is given
 MOST_ROWS: Final = 8  # largest number of listed rows of the log; the number of further rows is given
 UNITS: Final = {"length": "m", "load cell": "N", "position": "m", "rotation": "rad"}
@@ -25,10 +26,12 @@ def calibration_text(found: Findings, width: int = WIDTH) -> str:
     parts = (
         _verdict(found, width),
         _rows(found, width),
+        _criticisms(found, width),
         _values(found, width),
         _directions(found.gauge, "Unobservable; the values of the robot file are kept:", width),
         _directions(found.cannot_tell_apart, "Weakly identifiable:", width),
         _outliers(found, width),
+        _held(found, width),
         _cross_validation(found, width),
     )
     return "\n".join(line for part in parts for line in part)
@@ -77,8 +80,20 @@ def chi_squared_text(found: Findings) -> str:
     freedom = found.degrees_of_freedom
     if freedom <= 0:
         return f"chi squared {n(found.chi_squared, '.4g')} without degrees of freedom: nothing confirms the values"
-    expected = f"{freedom:,}{SPACE}±{SPACE}{n((2.0 * freedom) ** 0.5, '.2g')}"
-    return f"chi squared {n(found.chi_squared, ',.0f')}, expected {expected}"
+    text = f"chi squared {_with_expected(found.chi_squared, freedom)}"
+    whole, of_all = found.chi_squared_of_all
+    if of_all != freedom:
+        less = counted(int(np.count_nonzero(found.weights < 1.0)), "pose")
+        text += f"; with {less} of less weight, without outliers, {_with_expected(whole, of_all)}"
+    if found.chi_squared < freedom - CLEARLY * (2.0 * freedom) ** 0.5:
+        text += "; the readings are better than the stated deviations"
+    return text
+
+
+def _with_expected(chi_squared: float, freedom: int) -> str:
+    """Chi squared, its expected value and the standard deviation of this value."""
+    spread = f"{freedom:,}{SPACE}±{SPACE}{n((2.0 * freedom) ** 0.5, '.2g')}"
+    return f"{n(chi_squared, ',.0f')}, expected {spread}"
 
 
 def _verdict(found: Findings, width: int) -> Iterator[str]:
@@ -109,6 +124,32 @@ def _rows(found: Findings, width: int) -> Iterator[str]:
     yield f"Rows: {len(found.rows):,} of {len(found.rows) + count:,} were used, {count:,} left out:"
     for reason, rows in left.items():
         yield from _wrapped(f"{reason.text}: {row_ranges(rows)}", width, "  ")
+
+
+def _criticisms(found: Findings, width: int) -> Iterator[str]:
+    """Lines of the fixed parameters that the readings contradict."""
+    if not found.criticisms:
+        return
+    yield "Contradicted by the readings, although not estimated:"
+    for one in found.criticisms:
+        unit = found.parameters.units[found.parameters.labels.index(one.moves)]
+        change = (
+            f"{one.moves} would change by {n(one.change, '+.2g', unit)}, {n(one.deviations, '.2g')} standard errors"
+        )
+        fall = f"chi squared would fall by {n(one.fall, ',.0f')} (probability by chance {n(one.chance, '.1g')})"
+        text = f"- {one.name}: {fall}, and {change}; add {one.kind} to the unknowns, or correct it"
+        yield from _wrapped(text, width, "  ", "    ")
+
+
+def _held(found: Findings, width: int) -> Iterator[str]:
+    """Lines with the parameters that were not estimated."""
+    fixed = [name for name in KINDS if name not in found.parameters.names]
+    known = [name for name in fixed if name in found.before.tolerances]
+    if known:
+        yield from _wrapped(f"Not estimated, errors include the tolerance: {', '.join(known)}", width)
+    exact = [name for name in fixed if name not in known]
+    if exact:
+        yield from _wrapped(f"Not estimated, taken as exact: {', '.join(exact)}", width)
 
 
 def _values(found: Findings, width: int) -> Iterator[str]:

@@ -258,6 +258,7 @@ def _record(found: Calibration) -> dict[str, Any]:
         "date": found.date,
         "chi_squared": found.chi_squared,
         "degrees_of_freedom": found.degrees_of_freedom,
+        "chi_squared_of_all": found.chi_squared_of_all,
         "iterations": found.iterations,
         "numbers": [
             {"name": label, "value": value, "standard_error": error, "before": before, "unit": unit}
@@ -273,6 +274,10 @@ def _record(found: Calibration) -> dict[str, Any]:
         "gauge": [{"name": one.name, "step": one.step} for one in found.gauge],
         "cannot_tell_apart": [
             {"name": one.name, "known": one.known, "step": one.step} for one in found.cannot_tell_apart
+        ],
+        "criticisms": [
+            {"name": one.name, "fall": one.fall, "chance": one.chance, "moves": one.moves, "change": one.change}
+            for one in found.criticisms
         ],
         "cross_validation": None
         if check is None

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from sagline.cables.models import MODELS
-from sagline.calibration.findings import CalibrationStatus, CrossValidation, Direction, Omission, Outlier
+from sagline.calibration.findings import CalibrationStatus, Criticism, CrossValidation, Direction, Omission, Outlier
 from sagline.calibration.log import Sensors
 from sagline.calibration.parameters import KINDS, Parameters
 from sagline.calibration.result import Calibration
@@ -100,6 +100,15 @@ OUTLIERS: Final = (
     Quantity("outlier_size", ("outlier",), "", "size of the deviation [m, N or rad]", "size"),
     Quantity("outlier_deviations", ("outlier",), "1", "the same in standard deviations", "deviations"),
 )
+CRITICISMS: Final = (
+    Quantity("criticism_name", ("criticism",), "", "parameters that were not estimated", "name", values=str),
+    Quantity("criticism_kind", ("criticism",), "", "their kind of unknown", "kind", values=str),
+    Quantity("criticism_fall", ("criticism",), "1", "reduction of chi_squared by their estimation", "fall", low=0.0),
+    Quantity("criticism_chance", ("criticism",), "1", "probability of this reduction by chance", "chance", low=0.0),
+    Quantity("criticism_moves", ("criticism",), "", "number that would change most", "moves", values=str),
+    Quantity("criticism_change", ("criticism",), "", "this change, in the unit of the number", "change"),
+    Quantity("criticism_deviations", ("criticism",), "1", "this change in standard errors", "deviations", low=0.0),
+)
 CROSS_VALIDATION: Final = (
     Quantity("folds", (), "", "folds of the cross-validation", values=int),
     *(
@@ -132,8 +141,9 @@ def _check_calibration(data: Dataset, robot: Robot, before: Robot, sensors: Sequ
         raise InvalidValueError("robot_before", f"of {before.cable_count} cables", f"of {m}, as robot", STEP)
     directions = [one for columns in DIRECTIONS.values() for one in columns]
     quantities = [*FOUND, *PARAMETERS, *PLACED, *sensors, *OUTLIERS, *LEFT_OUT, *directions]
-    if "folds" in data.variables:
-        quantities += CROSS_VALIDATION
+    for group in (CROSS_VALIDATION, CRITICISMS):  # the second is missing in older files
+        if group[0].name in data.variables:
+            quantities += group
     sizes = {str(name): size for name, size in data.sizes.items()}
     fixed = {"cable": m, "reading": 2 * m + 6, "kind_row": KIND_ROWS, "other_parameter": sizes.get("parameter", 0)}
     check_variables(data, quantities, sizes | fixed)
@@ -194,6 +204,7 @@ def _pack(found: Calibration) -> Dataset:
     for group, columns in DIRECTIONS.items():
         variables |= record_variables(getattr(found, group), columns, len(found.values))
     variables |= variables_of_result(found.cross_validation, CROSS_VALIDATION)
+    variables |= record_variables(found.criticisms, CRITICISMS)
     omitted = np.array([(row, reason) for reason, rows in found.left_out.items() for row in rows], dtype=np.int64)
     for one, values in zip(LEFT_OUT, omitted.reshape(-1, 2).T, strict=True):
         variables[one.name] = one.parts, values.astype(one.type), one.attributes
@@ -245,6 +256,9 @@ def _unpack(path: Path, data: Dataset) -> Calibration:
         **found | {"status": CalibrationStatus(found["status"]), "poses": Pose._adopt(**found["poses"])},
         left_out={reason: locked(rows[reasons == reason.value]) for reason in omissions},
         outliers=tuple(Outlier(**row) for row in records_of(data, OUTLIERS)),
+        criticisms=tuple(
+            Criticism(**row) for row in records_of(data, CRITICISMS if CRITICISMS[0].name in data.variables else ())
+        ),
         cross_validation=CrossValidation(**checked) if checked else None,
         **directions,
         model=choice_of(path, data.attrs, "model", MODELS),

@@ -1,0 +1,150 @@
+"""Criticism of a fit: score tests of parameters that were not estimated, and their share of the covariance.
+
+docs/model.md, section 14.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+from scipy.special import chdtrc
+
+from sagline.calibration.findings import Criticism
+from sagline.calibration.identifiability import OPEN, append_rows
+from sagline.calibration.least_squares import whitened_at
+from sagline.calibration.observations import BLOCK
+from sagline.calibration.parameters import KINDS, Unknown, parameters_of
+from sagline.calibration.problem import Fit, FitProblem, SearchState, machine_at, reported_lengths
+from sagline.core.arrays import Array, Indices
+from sagline.core.errors import InvalidValueError
+from sagline.core.progress import blocks
+from sagline.robot.robot import Robot
+from sagline.robot.winch import Winch
+
+CHANCE: Final = 0.01  # probability that a log without errors is criticized
+BY_CABLE: Final = ("load_cell_gain", "load_cell_bias")  # kinds that are also tested for each single cable
+
+
+class FixedTerms(NamedTuple):
+    """Readings of a fit as a linear problem in its P parameters and in the F fixed ones.
+
+    Attributes:
+        problem: The problem with all P + F parameters; the fixed ones follow the estimated ones.
+        slopes: Derivatives of the P values by the internal parameters, (P,).
+        solution: Step of the internal parameters by a change of the rows, (P, K).
+        fixed: Rows of the fixed parameters that no step of the others reduces, (K, F).
+        effect: Rows of the fixed parameters, (K, F).
+        misfit: Misfit that remains, (K,).
+    """
+
+    problem: FitProblem
+    slopes: Array
+    solution: Array
+    fixed: Array
+    effect: Array
+    misfit: Array
+
+    @property
+    def shifts(self) -> Array:
+        """Change of the P values by the internal fixed parameters, (P, F)."""
+        return np.asarray(-self.slopes[:, None] * (self.solution @ self.effect))
+
+
+def fixed_terms(problem: FitProblem, unknowns: Sequence[Unknown], fit: Fit) -> FixedTerms | None:
+    """Linear problem at the end of a fit with all other parameters that the readings observe; None if there is none."""
+    robot = _with_cells(problem)
+    parameters, others = problem.parameters, list(_other_kinds(problem, robot))
+    if not others:
+        return None
+    count = len(parameters.names)
+    wider = problem._replace(
+        robot=robot, parameters=parameters_of(robot, [*unknowns, *others], problem.sensors, counted=parameters.counted)
+    )
+    numbers = np.concatenate((fit.state.numbers, wider.prior[count:]))
+    state = SearchState(numbers, machine_at(wider, numbers), fit.state.lengths, fit.state.poses)
+    triangle = np.zeros((0, numbers.size + 1))
+    for part in blocks(len(state.poses), BLOCK):
+        rows = whitened_at(wider, state, reported_lengths(wider, state.machine, part), part, free_of_noise=True)
+        columns = np.concatenate((rows.matrix, rows.misfit[..., None]), axis=-1)
+        triangle = append_rows(triangle, columns * np.sqrt(fit.normal.weights[part])[:, None, None])
+    known = np.where(np.isfinite(problem.prior_deviation), 1.0 / problem.prior_deviation, 0.0)
+    priors = np.zeros((count, numbers.size + 1))
+    priors[:, :count] = np.diag(known)
+    priors[:, -1] = np.where(known > 0.0, -problem.missed(fit.state.numbers), 0.0)
+    whole, scale = np.vstack((triangle, priors)), problem.scale
+    left, sizes, right = np.linalg.svd(whole[:, :count] * scale, full_matrices=False)
+    seen = sizes > OPEN * sizes[0]
+    left, solution = left[:, seen], scale[:, None] * right[seen].T / sizes[seen] @ left[:, seen].T
+    rest = whole[:, count:] - left @ (left.T @ whole[:, count:])
+    return FixedTerms(wider, state.machine.slopes[:count], solution, rest[:, :-1], whole[:, count:-1], rest[:, -1])
+
+
+def criticisms_of(terms: FixedTerms, standard_error: Array) -> tuple[Criticism, ...]:
+    """Fixed parameters whose estimation would reduce chi squared by more than chance explains, the strongest first.
+
+    The test is the score test with the priors of the fixed parameters. A kind is tested with a value for each cable,
+    with one value for all cables, and a load cell alone. The most significant of these tests is kept.
+    """
+    count = len(terms.slopes)
+    parameters, groups = terms.problem.parameters, list(_groups(terms.problem, count))
+    deviations = terms.problem.prior_deviation[count:]
+    strongest: dict[str, Criticism] = {}
+    for kind, name, which, alike in groups:
+        columns = np.full((which.size, 1), 1.0) if alike else np.eye(which.size)
+        rows = terms.fixed[:, which] @ columns
+        prior = deviations[which][: columns.shape[1]]
+        score = rows.T @ terms.misfit
+        step = np.linalg.solve(rows.T @ rows + np.diag(1.0 / prior**2), score)
+        fall = float(score @ step)
+        chance = float(chdtrc(step.size, max(fall, 0.0)))
+        if chance > CHANCE / len(groups) or (kind in strongest and chance >= strongest[kind].chance):
+            continue
+        shift = terms.shifts[:, which] @ columns @ step
+        moved = np.divide(np.abs(shift), standard_error, out=np.zeros(count), where=standard_error > 0.0)
+        most = int(np.argmax(moved))
+        strongest[kind] = Criticism(
+            name, kind, fall, chance, parameters.labels[most], float(shift[most]), float(moved[most])
+        )
+    return tuple(sorted(strongest.values(), key=lambda one: one.chance))
+
+
+def considered_covariance(terms: FixedTerms) -> Array:
+    """Covariance of the values due to the stated tolerances of fixed parameters, (P, P) (Schmidt)."""
+    count = len(terms.slopes)
+    stated = np.flatnonzero(terms.problem.parameters.stated[count:])
+    effect = terms.shifts[:, stated] * terms.problem.prior_deviation[count:][stated]
+    return np.asarray(effect @ effect.T)
+
+
+def _with_cells(problem: FitProblem) -> Robot:
+    """Robot with winches, whose load cells have a gain and a bias."""
+    return problem.robot if problem.robot.winches is not None else problem.robot.replace(winches=Winch())
+
+
+def _other_kinds(problem: FitProblem, robot: Robot) -> Iterator[Unknown]:
+    """Kinds that were not estimated, that the robot has, and that the readings observe; one value for each cable."""
+    for name, kind in KINDS.items():
+        if name in problem.parameters.names:
+            continue
+        other = Unknown(name, shared=False if kind.each else None)
+        try:
+            parameters = parameters_of(robot, [other], problem.sensors, counted=problem.parameters.counted)
+        except InvalidValueError:
+            continue
+        if not (parameters.logarithmic & (parameters.prior <= 0.0)).any() and (parameters.prior_deviation > 0.0).all():
+            yield other
+
+
+def _groups(problem: FitProblem, first: int) -> Iterator[tuple[str, str, Indices, bool]]:
+    """Kind, name and indices of each group of fixed parameters; True if they have one value."""
+    names, cables = np.array(problem.parameters.names[first:]), problem.parameters.cables[first:]
+    for name in dict.fromkeys(names.tolist()):
+        which = np.flatnonzero(names == name)
+        yield name, name, which, False
+        if KINDS[name].each and len(KINDS[name].axes) == 1:
+            yield name, f"{name} of all cables alike", which, True
+        if name in BY_CABLE:
+            for k in which:
+                yield name, f"{name}[{cables[k]}]", np.array([k]), False
