@@ -61,7 +61,7 @@ class Covered(NamedTuple):
         unseen: Poses with a slip that are no outlier.
         misnamed: Outliers that tell of another cable than the one that slipped.
         wrong: Outliers that are none.
-        statuses: How they ended.
+        doubtful: How many did not end FOUND.
     """
 
     one: float
@@ -70,12 +70,12 @@ class Covered(NamedTuple):
     unseen: int
     misnamed: int
     wrong: int
-    statuses: frozenset[str]
+    doubtful: int
 
 
 @cache
 def covered(robots: int, slips: int = 0, *, robust: bool = True) -> Covered:
-    inside, distances, unseen, misnamed, wrong, statuses = [], [], 0, 0, 0, set()
+    inside, distances, unseen, misnamed, wrong, doubtful = [], [], 0, 0, 0, 0
     for seed in range(robots):
         rng = np.random.default_rng(seed)
         rows = [int(row) for row in rng.choice(60, slips, replace=False)]
@@ -90,10 +90,10 @@ def covered(robots: int, slips: int = 0, *, robust: bool = True) -> Covered:
         unseen += sum(row not in named for row, _ in slipped)
         misnamed += sum(named.get(row) not in (cable, None) for row, cable in slipped)
         wrong += len(named.keys() - {row for row, _ in slipped})
-        statuses.add(found.status.name)
+        doubtful += found.status is not sl.CalibrationStatus.FOUND
     deviations = np.concatenate(inside)
     shares = float(np.mean(deviations < 1.0)), float(np.mean(deviations < 2.0))
-    return Covered(*shares, float(np.mean(distances)), unseen, misnamed, wrong, frozenset(statuses))
+    return Covered(*shares, float(np.mean(distances)), unseen, misnamed, wrong, doubtful)
 
 
 @pytest.mark.parametrize(
@@ -111,7 +111,7 @@ def test_the_truth_lies_within_the_standard_errors_as_often_as_it_must(
     assert abs(found.one - 0.683) < one
     assert abs(found.two - 0.954) < two
     assert abs(found.mahalanobis - 63.0) < mahalanobis
-    assert robots > 60 or found.statuses == {"FOUND"}
+    assert found.doubtful <= 0.04 * robots
 
 
 @pytest.mark.parametrize("robots", [pytest.param(10, marks=extended), pytest.param(200, marks=pytest.mark.soak)])
@@ -175,7 +175,7 @@ def test_poses_that_fit_nowhere_put_the_rest_in_doubt_where_they_are_many() -> N
 def test_a_prior_as_wide_as_nothing_tells_nothing(deviation: float) -> None:
     """Of the anchors, of which the readings leave four directions open: what they tell is told as well as without."""
     robot = sl.load_robot("cogiro")
-    log = log_of(true_robot(robot), 40).log
+    log = log_of(true_robot(robot, {"frame_anchors": 0.05, "mass": 0.03, "length_zero": 0.03}), 40).log
     wide, none = (
         sl.calibrate(robot, log, (sl.Unknown("frame_anchors", deviation=one), "mass", "length_zero"), folds=0)
         for one in (deviation, np.inf)
@@ -256,9 +256,9 @@ def test_readings_that_are_too_few_are_counted_with_the_reason() -> None:
 
 @pytest.mark.parametrize(
     ("factor", "status"),
-    [(0.7, sl.CalibrationStatus.DOUBTFUL), (1.0, sl.CalibrationStatus.FOUND), (1.5, sl.CalibrationStatus.DOUBTFUL)],
+    [(0.7, sl.CalibrationStatus.DOUBTFUL), (1.0, sl.CalibrationStatus.FOUND), (1.5, sl.CalibrationStatus.FOUND)],
 )
-def test_chi_squared_too_large_or_too_small_is_doubtful(factor: float, status: sl.CalibrationStatus) -> None:
+def test_chi_squared_too_large_is_doubtful_and_too_small_is_not(factor: float, status: sl.CalibrationStatus) -> None:
     """Deviations of the sensors of which the log believes so many times the true ones."""
     robot = sl.load_robot("cogiro")
     log = log_of(true_robot(robot, {"mass": 0.03}, 4), 40, 4).log
@@ -266,6 +266,7 @@ def test_chi_squared_too_large_or_too_small_is_doubtful(factor: float, status: s
     found = sl.calibrate(robot, log.replace(sensors=believed), ("mass",), folds=0, robust=False)
     assert found.chi_squared / found.degrees_of_freedom == pytest.approx(factor**-2, rel=0.2)
     assert found.status is status
+    assert ("better than" in str(found)) is (factor > 1.0)
 
 
 @extended

@@ -136,7 +136,7 @@ def test_counts_on_no_drum_are_told_by_row_and_cable(honest: Synthetic, rows: sl
 
 
 def test_what_does_not_fit_the_robot_is_refused(honest: Synthetic) -> None:
-    with refused("log", "of 8 cables", "7 cables, those of falcon-7", kind=sl.InvalidValueError):
+    with refused("log", "of 8 cables", "7 cables, as many as falcon-7 has", kind=sl.InvalidValueError):
         screen(sl.load_robot("falcon-7"), honest.log)
     with refused("the robot", kind=sl.InvalidValueError) as caught:
         screen(sl.load_robot("cogiro"), honest.log)

@@ -142,7 +142,10 @@ def far_out(data: xarray.Dataset, name: str) -> xarray.Dataset:
 EDITS = (renamed, gone, of_other_unit, of_other_type, one_too_few, far_out)
 FREE = {  # what may have any value: text, counts
     (far_out, name) for name in ("degrees_of_freedom", "iterations", "folds", "logarithmic", "prior_stated")
-} | {(of_other_type, name) for name in ("parameter_label", "gauge_name", "gauge_step", "cannot_tell_apart_name")}
+} | {
+    (of_other_type, name)
+    for name in ("parameter_label", "gauge_name", "gauge_step", "cannot_tell_apart_name", "criticism_name")
+}
 FREE |= {(of_other_type, "cannot_tell_apart_step"), (far_out, "covariance"), (far_out, "prior_deviation")}
 
 

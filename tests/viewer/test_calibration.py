@@ -224,6 +224,7 @@ def test_of_a_long_log_some_poses_are_drawn_and_those_that_do_not_fit() -> None:
         poses=sl.Pose(np.resize(calibrated().poses.position, (count, 3)), np.eye(3)),
         residuals=np.resize(calibrated().residuals, (count, 22)),
         chi_squared_of_pose=np.zeros(count),
+        weights=np.ones(count),
         outliers=(replace(calibrated().outliers[0], row=1234),),
     )
     with contextmanager(shown)(lambda server: Page(server, FEATURES, calibrated().robot, found=long)) as page:

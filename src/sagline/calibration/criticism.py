@@ -85,29 +85,34 @@ def criticisms_of(terms: FixedTerms, standard_error: Array) -> tuple[Criticism, 
     """Fixed parameters whose estimation would reduce chi squared by more than chance explains, the strongest first.
 
     The test is the score test with the priors of the fixed parameters. A kind is tested with a value for each cable,
-    with one value for all cables, and a load cell alone. The most significant of these tests is kept.
+    with one value for all cables, and a load cell alone. Of these the test with the best information criterion (AIC)
+    is kept.
     """
-    count = len(terms.slopes)
-    parameters, groups = terms.problem.parameters, list(_groups(terms.problem, count))
-    deviations = terms.problem.prior_deviation[count:]
-    strongest: dict[str, Criticism] = {}
-    for kind, name, which, alike in groups:
-        columns = np.full((which.size, 1), 1.0) if alike else np.eye(which.size)
-        rows = terms.fixed[:, which] @ columns
-        prior = deviations[which][: columns.shape[1]]
-        score = rows.T @ terms.misfit
-        step = np.linalg.solve(rows.T @ rows + np.diag(1.0 / prior**2), score)
-        fall = float(score @ step)
-        chance = float(chdtrc(step.size, max(fall, 0.0)))
-        if chance > CHANCE / len(groups) or (kind in strongest and chance >= strongest[kind].chance):
-            continue
-        shift = terms.shifts[:, which] @ columns @ step
-        moved = np.divide(np.abs(shift), standard_error, out=np.zeros(count), where=standard_error > 0.0)
-        most = int(np.argmax(moved))
-        strongest[kind] = Criticism(
-            name, kind, fall, chance, parameters.labels[most], float(shift[most]), float(moved[most])
+    groups = list(_groups(terms.problem, len(terms.slopes)))
+    best: dict[str, tuple[float, Criticism]] = {}
+    for kind, name, which, common in groups:
+        criticism, worth = _score_test(
+            terms, standard_error, kind, name, which, np.ones((which.size, 1)) if common else np.eye(which.size)
         )
-    return tuple(sorted(strongest.values(), key=lambda one: one.chance))
+        if criticism.chance < CHANCE / len(groups) and (kind not in best or worth > best[kind][0]):
+            best[kind] = worth, criticism
+    return tuple(one for _, one in sorted(best.values(), key=lambda pair: -pair[0]))
+
+
+def _score_test(
+    terms: FixedTerms, standard_error: Array, kind: str, name: str, which: Indices, columns: Array
+) -> tuple[Criticism, float]:
+    """Result of the test of some fixed parameters along some directions (F, C), and minus its information criterion."""
+    count = len(terms.slopes)
+    rows, prior = terms.fixed[:, which] @ columns, terms.problem.prior_deviation[count:][which][: columns.shape[1]]
+    score = rows.T @ terms.misfit
+    step = np.linalg.solve(rows.T @ rows + np.diag(1.0 / prior**2), score)
+    fall = max(float(score @ step), 0.0)
+    shift = terms.shifts[:, which] @ columns @ step
+    moved = np.divide(np.abs(shift), standard_error, out=np.zeros(count), where=standard_error > 0.0)
+    most = int(np.argmax(moved))
+    chance, label = float(chdtrc(step.size, fall)), terms.problem.parameters.labels[most]
+    return Criticism(name, kind, fall, chance, label, float(shift[most]), float(moved[most])), fall - 2.0 * step.size
 
 
 def considered_covariance(terms: FixedTerms) -> Array:
@@ -144,7 +149,7 @@ def _groups(problem: FitProblem, first: int) -> Iterator[tuple[str, str, Indices
         which = np.flatnonzero(names == name)
         yield name, name, which, False
         if KINDS[name].each and len(KINDS[name].axes) == 1:
-            yield name, f"{name} of all cables alike", which, True
+            yield name, f"{name} common to all cables", which, True
         if name in BY_CABLE:
             for k in which:
                 yield name, f"{name}[{cables[k]}]", np.array([k]), False

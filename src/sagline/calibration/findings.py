@@ -23,8 +23,8 @@ class CalibrationStatus(Status):
     FOUND = 0, "found"
     DOUBTFUL = (
         1,
-        "found, but chi squared shows that the model or the deviations are wrong: check residuals and outliers, "
-        "and do not trust the standard errors",
+        "found, but the readings contradict the model or the deviations: check fixed parameters, residuals and "
+        "outliers, and do not trust the standard errors",
     )
     NOT_CONVERGED = (
         2,
@@ -85,7 +85,7 @@ class Criticism(Result):
     """Parameters that were not estimated, and whose estimation would reduce chi squared more than chance explains.
 
     Attributes:
-        name: For example "load_cell_gain of all cables alike", "load_cell_gain[3]" or "center_of_mass".
+        name: For example "load_cell_gain common to all cables", "load_cell_gain[3]" or "center_of_mass".
         kind: Kind of unknown, which can be added to the unknowns.
         fall: Reduction of chi squared.
         chance: Probability of such a reduction if the fixed values were correct.
@@ -156,7 +156,7 @@ class Findings(Result):
 
     @property
     def chi_squared_of_all(self) -> tuple[float, int]:
-        """Chi squared of the readings of all poses without outliers, whatever their weights, and its expected value."""
+        """Chi squared of the readings of all poses without outliers, with any weight, and its expected value."""
         rows = [outlier.row for outlier in self.outliers]
         more = (self.weights < 1.0) & ~np.isin(self.rows, rows)
         fewer = (self.weights == 1.0) & np.isin(self.rows, rows)

@@ -18,7 +18,7 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
 
-class _Kind(NamedTuple):
+class Kind(NamedTuple):
     """A kind of unknown.
 
     Attributes:
@@ -49,21 +49,21 @@ class _Kind(NamedTuple):
 _XYZ: Final = ("x", "y", "z")
 _SIX: Final = (*_XYZ, "about x", "about y", "about z")
 _ONE: Final = ("",)
-KINDS: Final[dict[str, _Kind]] = {
-    "frame_anchors": _Kind("robot", "m", kinds.FRAME, _XYZ, True, False, False, 0.05, 0.5),
-    "platform_anchors": _Kind("robot", "m", kinds.PLATFORM, _XYZ, True, False, False, 0.02, 0.2),
-    "length_zero": _Kind("winches", "m", kinds.ZERO, _ONE, True, False, False, 0.1, 1.0),
-    "drum_radius": _Kind("winches", "m", kinds.DRUM, _ONE, True, True, True, 0.02, 0.1, "counts"),
-    "linear_density": _Kind("cables", "kg/m", kinds.DENSITY, _ONE, True, True, True, 0.1, 0.5),
-    "axial_stiffness": _Kind("cables", "N", kinds.STIFFNESS, _ONE, True, True, True, 0.3, 1.0),
-    "pulley_radius": _Kind("winches", "m", kinds.RADIUS, _ONE, True, True, False, 0.002, 0.02),
-    "dead_cable": _Kind("winches", "m", kinds.DEAD, _ONE, True, False, False, 0.1, 1.0),
-    "load_cell_gain": _Kind("winches", "", kinds.GAIN, _ONE, True, False, False, 0.05, 0.2, "load cells"),
-    "load_cell_bias": _Kind("winches", "N", kinds.BIAS, _ONE, True, False, False, 20.0, 100.0, "load cells"),
-    "mass": _Kind("robot", "kg", kinds.MASS, _ONE, False, False, True, 0.05, 0.2),
-    "center_of_mass": _Kind("robot", "m", kinds.CENTER, _XYZ, False, False, False, 0.05, 0.2),
-    "measuring_frame": _Kind("system", "m", kinds.SHIFT, _SIX, False, False, False, 10.0, 10.0, "positions"),
-    "target": _Kind("system", "m", kinds.TARGET, _XYZ, False, False, False, 0.1, 1.0, "positions"),
+KINDS: Final[dict[str, Kind]] = {
+    "frame_anchors": Kind("robot", "m", kinds.FRAME, _XYZ, True, False, False, 0.05, 0.5),
+    "platform_anchors": Kind("robot", "m", kinds.PLATFORM, _XYZ, True, False, False, 0.02, 0.2),
+    "length_zero": Kind("winches", "m", kinds.ZERO, _ONE, True, False, False, 0.1, 1.0),
+    "drum_radius": Kind("winches", "m", kinds.DRUM, _ONE, True, True, True, 0.02, 0.1, "counts"),
+    "linear_density": Kind("cables", "kg/m", kinds.DENSITY, _ONE, True, True, True, 0.1, 0.5),
+    "axial_stiffness": Kind("cables", "N", kinds.STIFFNESS, _ONE, True, True, True, 0.3, 1.0),
+    "pulley_radius": Kind("winches", "m", kinds.RADIUS, _ONE, True, True, False, 0.002, 0.02),
+    "dead_cable": Kind("winches", "m", kinds.DEAD, _ONE, True, False, False, 0.1, 1.0),
+    "load_cell_gain": Kind("winches", "", kinds.GAIN, _ONE, True, False, False, 0.05, 0.2, "load cells"),
+    "load_cell_bias": Kind("winches", "N", kinds.BIAS, _ONE, True, False, False, 20.0, 100.0, "load cells"),
+    "mass": Kind("robot", "kg", kinds.MASS, _ONE, False, False, True, 0.05, 0.2),
+    "center_of_mass": Kind("robot", "m", kinds.CENTER, _XYZ, False, False, False, 0.05, 0.2),
+    "measuring_frame": Kind("system", "m", kinds.SHIFT, _SIX, False, False, False, 10.0, 10.0, "positions"),
+    "target": Kind("system", "m", kinds.TARGET, _XYZ, False, False, False, 0.1, 1.0, "positions"),
 }
 
 
@@ -200,15 +200,19 @@ def _field(robot: Robot, name: str) -> Array | None:
     return value
 
 
-def _refuse_unobserved(robot: Robot, sensors: Sensors, unknown: Unknown, kind: _Kind, counted: bool) -> None:
-    """Reject unknowns with neither observations nor a prior."""
-    there = {
+def is_observed(kind: Kind, sensors: Sensors, counted: bool) -> bool:
+    """True if there are readings of the type that a kind of unknown needs."""
+    return {
         "": True,
         "counts": counted,
         "load cells": sensors.tension_deviation is not None,
         "positions": sensors.position_deviation is not None or sensors.rotation_deviation is not None,
-    }
-    if there[kind.needs] or unknown.deviation is not None or unknown.name in robot.tolerances:
+    }[kind.needs]
+
+
+def _refuse_unobserved(robot: Robot, sensors: Sensors, unknown: Unknown, kind: Kind, counted: bool) -> None:
+    """Reject unknowns with neither observations nor a prior."""
+    if is_observed(kind, sensors, counted) or unknown.deviation is not None or unknown.name in robot.tolerances:
         return
     add = {
         "counts": "Add counts to the log, or leave it out.",
@@ -218,7 +222,7 @@ def _refuse_unobserved(robot: Robot, sensors: Sensors, unknown: Unknown, kind: _
     raise InvalidValueError(f"unknown: {unknown.name}", "observed by no reading", f"{kind.needs} in the log", add)
 
 
-def _is_shared(unknown: Unknown, kind: _Kind, own: Array, width: Array) -> bool:
+def _is_shared(unknown: Unknown, kind: Kind, own: Array, width: Array) -> bool:
     """True if the cables share one value, which requires equal values and equal deviations."""
     alike = bool((own == own[0]).all() and (width == width[0]).all())
     if unknown.shared is None:
@@ -232,7 +236,7 @@ def _is_shared(unknown: Unknown, kind: _Kind, own: Array, width: Array) -> bool:
     return unknown.shared
 
 
-def _prior_deviation(robot: Robot, unknown: Unknown, kind: _Kind, own: Array) -> tuple[Array, bool]:
+def _prior_deviation(robot: Robot, unknown: Unknown, kind: Kind, own: Array) -> tuple[Array, bool]:
     """Prior deviation in the unit of the kind, shape of `own`, and True if it was stated."""
     if unknown.deviation is not None:
         width = np.full(own.shape, unknown.deviation)

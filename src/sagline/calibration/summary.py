@@ -9,7 +9,7 @@ from typing import Final, Literal
 import numpy as np
 
 from sagline.calibration.findings import CalibrationStatus, Direction, Findings, Outlier
-from sagline.calibration.parameters import KINDS, Parameters
+from sagline.calibration.parameters import KINDS, Parameters, is_observed
 from sagline.core.arrays import Array, Indices
 from sagline.core.numbers import SPACE, counted, n, plus_minus
 
@@ -106,7 +106,7 @@ def _verdict(found: Findings, width: int) -> Iterator[str]:
         yield from _wrapped(f"Found: {what}{when}", width)
         yield from _wrapped(f"{chi_squared_text(found)}; {iterations}", width, "  ")
     elif found.status is CalibrationStatus.DOUBTFUL:
-        text = found.status.text.removeprefix("found, but ").removeprefix("chi squared shows that ")
+        text = found.status.text.removeprefix("found, but ")
         yield from _wrapped(f"DOUBTFUL: {chi_squared_text(found)}: {text}", width)
         yield from _wrapped(f"{what}{when}; {iterations}", width, "  ")
     else:
@@ -143,7 +143,8 @@ def _criticisms(found: Findings, width: int) -> Iterator[str]:
 
 def _held(found: Findings, width: int) -> Iterator[str]:
     """Lines with the parameters that were not estimated."""
-    fixed = [name for name in KINDS if name not in found.parameters.names]
+    observed = [name for name, kind in KINDS.items() if is_observed(kind, found.sensors, found.parameters.counted)]
+    fixed = [name for name in observed if name not in found.parameters.names]
     known = [name for name in fixed if name in found.before.tolerances]
     if known:
         yield from _wrapped(f"Not estimated, errors include the tolerance: {', '.join(known)}", width)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -142,16 +142,23 @@ def _check_calibration(data: Dataset, robot: Robot, before: Robot, sensors: Sequ
     directions = [one for columns in DIRECTIONS.values() for one in columns]
     quantities = [*FOUND, *PARAMETERS, *PLACED, *sensors, *OUTLIERS, *LEFT_OUT, *directions]
     for group in (CROSS_VALIDATION, CRITICISMS):  # the second is missing in older files
-        if group[0].name in data.variables:
+        if any(one.name in data.variables for one in group):
             quantities += group
     sizes = {str(name): size for name, size in data.sizes.items()}
     fixed = {"cable": m, "reading": 2 * m + 6, "kind_row": KIND_ROWS, "other_parameter": sizes.get("parameter", 0)}
     check_variables(data, quantities, sizes | fixed)
     ranges = {"parameter_cable": (-1, m), "parameter_place": (-1, sizes["parameter"]), "outlier_cable": (-1, m)}
     check_indices(data, ranges | dict.fromkeys(("row", "outlier_row", "left_out_row"), (0, sys.maxsize)))
-    for name, words in (("parameter_name", KINDS), ("parameter_unit", UNITS), ("outlier_quantity", OUTLYING)):
+    words: dict[str, Iterable[str]] = {
+        "parameter_name": KINDS,
+        "parameter_unit": UNITS,
+        "outlier_quantity": OUTLYING,
+        "criticism_kind": KINDS,
+        "criticism_moves": data.variables["parameter_label"].values.tolist(),
+    }
+    for name in words.keys() & set(data.variables):
         for word in data.variables[name].values:
-            choice(str(word), name, words)
+            choice(str(word), name, words[name])
     choice(str(data.attrs["read"]), "read", READ)
     for name in ("log", "date"):
         text(data.attrs[name], name)
