@@ -90,6 +90,7 @@ FIGURES = {  # function of `sl.plot` -> a call that draws
     "polygon": "polygon(shape, chosen)",
     "response": "response(swings)",
     "robot": "robot(robot, pose)",
+    "simulation": "simulation(broken)",
     "slice": 'slice(space, "z", at=2.0)',
     "small_multiples": "small_multiples(proof.plan)",
     "states": "states(done)",

@@ -37,7 +37,7 @@ SHOWN: Final = {
     "identify": told("identify cable.csv"),
     "forward": told("forward cogiro lengths.csv"),
     "tension": drawn("tension article-mixed --pose 1,0.5,2.5"),
-    "vibrate": drawn("vibrate cogiro --pose 0,0,2 --up-to 8 --force z"),
+    "vibrate": drawn("vibrate cogiro --pose 0,0,2 --up-to 8 --axis z"),
     "simulate": drawn("simulate cogiro --break 3@0.5s --loss-time 0.001"),
     "workspace": drawn("workspace article-suspended"),
     "sweep": told("sweep own_sweep.yaml --workers 1"),

@@ -1025,6 +1025,7 @@ def _figures(given: _Given) -> dict[str, Call]:
             },
         ),
         "energy": (sl.plot.energy, {"simulation": ("one", made.simulation(20))}),
+        "simulation": (sl.plot.simulation, {"simulation": ("one", made.simulation(20))}),
         "save": (sl.plot.save, {"drawing": ("one", flat), "file": ("file", str(given.folder / "figure.svg"))}),
     }
     return {f"plot.{name}": Call(draw(function), _all(**arguments)) for name, (function, arguments) in table.items()}

@@ -42,6 +42,7 @@ LINES = {
     "share": ["share", "cogiro"],
 }
 
+DRAWING = ("track", "tension", "vibrate", "simulate", "workspace", "design")  # commands that draw
 WITH = {  # lines of options that have an effect only with, or without, something else
     "workspace --scene": [*LINES["workspace"], "--clearance", "3 cm"],
     "workspace --budget": [*LINES["workspace"], "--prove", "0..1, 0..1, 1..2 m"],
@@ -49,12 +50,16 @@ WITH = {  # lines of options that have an effect only with, or without, somethin
     "view --beside": [*LINES["view"], "run.nc"],
     "calibrate --seed": ["calibrate", "winches_robot.yaml", "--plan", "8"],
     "calibrate --plan": ["calibrate", "winches_robot.yaml"],
-    "convert --at": [*LINES["convert"], "--format", "mjcf"],
+    "calibrate --style": [*LINES["calibrate"], "--plot", "fit.png"],
+    "convert --at": [*LINES["convert"], "--kind", "mjcf"],
     "convert --linear-density": [*LINES["convert"], "--axial-stiffness", "50 kN"],
     "convert --axial-stiffness": [*LINES["convert"], "--linear-density", "20 g/m"],
     "simulate --shaper": ["simulate", "cogiro", "short.yaml", "--after", "0.1", "--no-figures"],
     "sweep --scheduler": ["sweep", "own_sweep.yaml"],
-    "vibrate --force": ["vibrate", "cogiro", "--up-to", "4"],
+    "vibrate --axis": ["vibrate", "cogiro", "--up-to", "4"],
+    "robots --out": [*LINES["robots"], "--csv"],
+    "identify --out": [*LINES["identify"], "--csv"],
+    **{f"{name} {option}": LINES[name][:-1] for name in DRAWING for option in ("--style", "--format")},
 }
 
 

@@ -90,7 +90,6 @@ def test_what_straight_tendons_cost_is_told(name: str, said: str, tmp_path: Path
         ("x.txt", "mjcf", ".xml"),
         ("x.txt", "robot", ".yaml"),
         ("x.xml", "robot", ".yaml"),
-        ("x", "robot", ".yaml"),
     ],
 )
 def test_the_ending_is_that_of_the_format(tmp_path: Path, name: str, form: str, ending: str) -> None:

@@ -228,9 +228,6 @@ FIRST_TIER = """
 2 calibrate winches_robot.yaml --plan 5 --out poses.nc
 2 calibrate winches_robot.yaml --plan 5 --tension-deviation '5 mm'
 2 calibrate winches_robot.yaml --plan 5 --seed -1
-2 calibrate winches_robot.yaml winches.csv --out found.csv
-2 calibrate winches_robot.yaml winches.csv --out found
-2 calibrate winches_robot.yaml winches.csv --out folder.nc
 2 calibrate winches_robot.yaml winches.csv --out winches_robot.yaml
 2 calibrate winches_robot.yaml winches.csv --plot found.nc
 2 calibrate winches_robot.yaml winches.csv --unknowns length_zeros
@@ -298,7 +295,6 @@ FIRST_TIER = """
 2 view twin.mcap --no-browser
 2 share cogiro
 2 share cogiro --out cogiro.pdf
-2 share cogiro --out nowhere/page.html
 2 share missing.nc
 2 share cut.mcap
 2 twin nobody
@@ -391,7 +387,6 @@ def folder(files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path
         if file.is_file():
             os.link(file, tmp_path / file.name)
     (tmp_path / "folder").mkdir()
-    (tmp_path / "folder.nc").mkdir()
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "80")
     return tmp_path

@@ -57,7 +57,7 @@ def test_every_frequency_says_what_it_is_and_hidden_modes_are_counted(folder: Fi
     state = sl.inverse(sl.load_robot("cogiro"), sl.Pose([0, 0, 2], np.eye(3))).state
     modes = sl.vibration(state, up_to=12.0)
     text = " ".join(result.stdout.split())
-    assert re.search(rf"\b{modes.count} modes .* 12 Hz: ", text)
+    assert re.search(rf"\b{modes.count} modes .* 12 Hz, ", text)
     assert f" {sl.modes(state).frequency[-1]:.3f} Hz" in text
     rows = [line.split() for line in result.stdout.splitlines() if line.strip()[:1].isdigit() and "mode" not in line]
     assert [float(row[1]) for row in rows[:3]] == modes.frequency[:3].round(3).tolist()
@@ -112,7 +112,7 @@ def test_a_break_is_what_the_library_says_and_its_file_is_read_again(folder: Fil
     np.testing.assert_array_equal(read.largest_tension, own.largest_tension)
     cable = int(own.largest_tension.argmax())
     assert f" {event.tension_after:,.1f} N, cable {cable} " in text
-    assert "tension_max" not in text
+    assert "above tension_max" not in text
     before, after = f"{event.tension_before:,.1f} N", f"{event.tension_after:,.1f} N"
     assert re.search(rf"\b0\.200 s: .*\bcable 3, {before}\b.*\b{after}", text)
     assert (folder / "sim-energy.png").exists()

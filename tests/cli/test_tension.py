@@ -78,7 +78,7 @@ def test_large_forces_have_a_prefix_and_ordinary_spaces(folder: FilePath) -> Non
 def test_the_polygon_is_that_of_the_load(folder: FilePath, monkeypatch: pytest.MonkeyPatch) -> None:
     drawn: list[sl.TensionPolygon] = []
     monkeypatch.setattr("sagline.plot.polygon", lambda shape, points: drawn.append(shape))
-    monkeypatch.setattr("sagline.cli.output.Output.draw", lambda *_: None)
+    monkeypatch.setattr("sagline.cli.output.Output.draw", lambda _, make: make())
     assert sagline("article-mixed", "--wrench", "0,0,-100").exit_code == 0
     robot = sl.load_robot("article-mixed")
     assert robot.test_box is not None

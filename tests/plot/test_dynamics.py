@@ -1,6 +1,7 @@
 """Figures of vibrations and simulations hold the numbers they claim to show."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from matplotlib.collections import LineCollection, QuadMesh
 from matplotlib.figure import Figure
 from PIL import Image
+from scipy.spatial.transform import Rotation
 from syrupy.assertion import SnapshotAssertion
 
 import sagline as sl
@@ -248,3 +250,30 @@ def test_a_film_lasts_ten_seconds_and_is_a_gif(tmp_path: Path) -> None:
         plot.film(found, 99, tmp_path / "mode.gif")
     with refused(kind=sl.FileError, file=tmp_path / "mode.mp4", next_step="Name it .gif."):
         plot.film(found, 1, tmp_path / "mode.mp4")
+
+
+def test_a_simulation_shows_tensions_and_the_motion_from_the_first_pose() -> None:
+    swinging = made.simulation()
+    above, middle, below = plot.simulation(swinging).axes
+    drawn = [line.get_ydata() for line in above.get_lines() if str(line.get_label()).startswith("cable ")]
+    np.testing.assert_array_equal(drawn, swinging.tensions.T)
+    away = swinging.pose.position - swinging.pose.position[0]
+    moved = np.array([line.get_ydata() for line in middle.get_lines()[:3]])
+    np.testing.assert_allclose(moved, away.T, atol=1e-15)
+    assert [text.get_text() for text in above.texts] == ["break, cable 3"]
+    assert (above.get_ylabel(), middle.get_ylabel()) == ("tension [N]", "displacement [m]")
+    assert (below.get_ylabel(), below.get_xlabel()) == ("rotation [°]", "time [s]")
+
+
+def test_a_simulation_shows_rotations_about_the_axes_and_the_limit() -> None:
+    whole = made.simulation()
+    turned = Rotation.from_rotvec(np.outer(np.radians(np.linspace(0.0, 10.0, len(whole.time))), (0.0, 1.0, 0.0)))
+    pose = sl.Pose(whole.pose.position, turned)
+    highest = float(whole.tensions.max())
+    for limit, count in ((1.5 * highest, 1), (3.0 * highest, 0)):
+        robot = whole.robot.replace(tension_max=limit)
+        above, _, below = plot.simulation(replace(whole, robot=robot, pose=pose)).axes
+        x, y, z = (np.asarray(line.get_ydata()) for line in below.get_lines()[:3])
+        np.testing.assert_allclose(y, np.linspace(0.0, 10.0, len(whole.time)), atol=1e-9)
+        np.testing.assert_allclose([x, z], 0.0, atol=1e-9)
+        assert sum(line.get_label() == "tension_max" for line in above.get_lines()) == count

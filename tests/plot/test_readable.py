@@ -19,7 +19,7 @@ from tests.tiers import extended
 
 EXAMPLES = (
     "drawing", "energy", "error", "errors", "frequencies", "frequency_map", "lengths", "overview", "path", "polygon",
-    "response", "robot", "slice", "small_multiples", "tensions", "velocity", "workspace",
+    "response", "robot", "simulation", "slice", "small_multiples", "tensions", "velocity", "workspace",
 )  # fmt: skip
 COMMANDS = {
     "track cogiro own_path.yaml": 4,
@@ -28,7 +28,7 @@ COMMANDS = {
     "tension cogiro": 1,
     "vibrate cogiro": 1,
     "vibrate cogiro --map 3x3x2 --up-to 2": 2,
-    "simulate cogiro --break 3@1s": 1,
+    "simulate cogiro --break 3@1s": 2,
     "workspace cogiro --cells 12": 2,
     "workspace own_planar.yaml --cells 12": 1,
     "design winches_robot.yaml design.yaml --evaluations 40": 1,

@@ -43,7 +43,7 @@ COMMANDS: Final = (
     ),
     "track own_robot.yaml own_samples.csv --no-figures --json --payload 5kg",
     "lengths run/cogiro-catenary.nc --out lengths_out.csv",
-    "forward cogiro lengths.csv --json --out forward.nc",
+    "forward cogiro lengths.csv --json --out poses.csv",
     "forward cogiro lengths.csv --json --model elastic",
     "tension cogiro --pose 0,0,2 --json --no-figures",
     "tension falcon-7 --pose 0,0,0.5 --json --no-figures",

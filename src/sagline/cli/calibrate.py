@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
 
@@ -10,20 +10,26 @@ from rich.text import Text
 
 from sagline.cli.ending import OUTSIDE
 from sagline.cli.options import (
+    STYLE,
+    FigureStyle,
     JsonOption,
     ModelName,
     ModelOption,
     RobotArgument,
+    SeedOption,
+    TableOption,
     argument,
     flag,
     only_with,
     only_without,
     option,
+    out_option,
     quantity_option,
 )
+from sagline.cli.output import csv_text, is_file
 from sagline.cli.terminal import show_json, show_note, show_pieces, show_text, working
 from sagline.core.errors import FileError, InvalidValueError, printable
-from sagline.files.writing import check_files, create_folder, write_text
+from sagline.files.writing import check_files, create_folder, file_stem, write_text
 
 if TYPE_CHECKING:
     from sagline.cables.model import CableModel
@@ -33,6 +39,7 @@ if TYPE_CHECKING:
 
 ROBOTS: Final = (".yaml", ".yml")
 WHOLE: Final = ".nc"
+TABLE: Final = ".csv"
 FIGURES: Final = (".png", ".svg", ".pdf")
 
 
@@ -44,6 +51,7 @@ class _Request(NamedTuple):
     deviations: dict[str, Any]
     files: tuple[Path, ...]
     plot: Path | None
+    style: FigureStyle
 
     def check_files(self, suffixes: tuple[str, ...]) -> None:
         """Reject files with other suffixes, the robot's own file, and files that cannot be written."""
@@ -72,12 +80,7 @@ def calibrate(
     ] = None,
     out: Annotated[
         list[Path] | None,
-        option(
-            "FILE",
-            "The calibrated robot, .yaml, or the whole result, .nc. The option can be repeated. With --plan: the "
-            "poses, .yaml.",
-            "--out",
-        ),
+        out_option("none"),
     ] = None,
     unknowns: Annotated[
         str | None,
@@ -98,15 +101,18 @@ def calibrate(
         Path | None, option("FILE", "Figure of the fit: .png, .svg or .pdf."), only_without("--plan")
     ] = None,
     plan: Annotated[int | None, option("NUMBER", "Choose this number of poses to measure, instead of a LOG.")] = None,
-    seed: Annotated[int, option("NUMBER", "Seed of the candidate poses of --plan."), only_with("--plan")] = 0,
+    seed: Annotated[SeedOption, only_with("--plan")] = 0,
+    style: Annotated[FigureStyle, STYLE, only_with("--plot")] = FigureStyle.PLAIN,
+    write_table: Annotated[TableOption, only_without("--plan")] = False,
     as_json: JsonOption = False,
 ) -> int:
     """Estimate anchors, zeros and cables of a robot from its own readings.
 
     LOG has the readings of encoders, load cells and, if there is one, a measuring system at some poses. The result is
-    the parameters with their standard errors, the unobserved combinations, and the outliers. --plan chooses poses and
-    tensions before the measurement and predicts the errors. Exit code 1 if the fit did not converge, or contradicts the
-    model or the deviations.
+    the parameters with their standard errors, the unobserved combinations, and the outliers. --out can be repeated: the
+    calibrated robot, .yaml; the whole result, .nc; or a folder for both. --plan chooses poses and tensions before the
+    measurement and predicts the errors; then --out is their file, .yaml. Exit code 1 if the fit did not converge, or
+    contradicts the model or the deviations.
 
     For example:
 
@@ -124,10 +130,21 @@ def calibrate(
         "rotation_deviation": rotation_deviation,
     }
     known = {name: value for name, value in deviations.items() if value is not None}
-    request = _Request(robot, names, known, tuple(out or ()), plot)
+    names_of_files = ("poses.yaml",) if plan is not None else ("calibrated.yaml", "calibration.nc")
+    files = _files(robot, out or (), names_of_files)
+    if write_table:
+        files += _files(robot, [files[0].parent if files else Path("output")], ("calibration.csv",))
+    request = _Request(robot, names, known, files, plot, style)
     if plan is not None:
         return _plan_poses(request, plan, seed, as_json=as_json)
     return _fit(request, log, model.build(), folds, robust=robust, as_json=as_json)
+
+
+def _files(robot: str, out: Iterable[Path], names: Iterable[str]) -> tuple[Path, ...]:
+    """The files of `--out`; a folder means files with these names in it, after the name of the robot."""
+    stem = file_stem(Path(robot).stem)
+    folders = {place: [place / f"{stem}-{name}" for name in names] for place in out if not is_file(place)}
+    return tuple(file for place in out for file in folders.get(place, [place]))
 
 
 def _fit(request: _Request, log: Path | None, model: CableModel, folds: int, *, robust: bool, as_json: bool) -> int:
@@ -144,7 +161,7 @@ def _fit(request: _Request, log: Path | None, model: CableModel, folds: int, *, 
         raise FileError(
             log, "is not a CSV file of readings", "Give the readings of encoders and load cells, winches.csv."
         )
-    request.check_files((*ROBOTS, WHOLE))
+    request.check_files((*ROBOTS, WHOLE, TABLE))
     robot, readings = load_robot(request.robot), _log(log, request.deviations)
     with working(f"{robot.name}: calibrating from {len(readings):,} rows") as line:
         found = calibrate(
@@ -210,6 +227,8 @@ def _written(found: Calibration, request: _Request, line: Any) -> list[Path]:
         create_folder(file.parent)
         if file.suffix.lower() == WHOLE:
             found.save(file)
+        elif file.suffix.lower() == TABLE:
+            write_text(file, csv_text(_rows(found)))
         elif found.status is not CalibrationStatus.NOT_CONVERGED:
             write_text(file, dump_robot(found.robot))
         else:
@@ -220,7 +239,9 @@ def _written(found: Calibration, request: _Request, line: Any) -> list[Path]:
 
         line.stage("drawing")
         create_folder(request.plot.parent)
-        plot.save(plot.calibration(found), request.plot)
+        with request.style.active():
+            figure = plot.calibration(found)
+        plot.save(figure, request.plot)
         files.append(request.plot)
     return files
 
@@ -249,8 +270,15 @@ def _tell_offset(found: Calibration, files: list[Path]) -> None:
         show_note("Note: ", f"{robots[0]} {text}; {kept}.", style="bold")
 
 
+def _rows(found: Calibration) -> Iterator[Sequence[object]]:
+    """Names of the columns, then the parameters with their standard errors and prior values."""
+    numbers = found.parameters
+    yield "name", "value", "standard error", "before", "unit"
+    yield from zip(numbers.labels, found.values, found.standard_error, numbers.prior, numbers.units, strict=True)
+
+
 def _record(found: Calibration) -> dict[str, Any]:
-    numbers, check = found.parameters, found.cross_validation
+    check = found.cross_validation
     return {
         "robot": found.robot.name,
         "status": found.status.name,
@@ -261,10 +289,8 @@ def _record(found: Calibration) -> dict[str, Any]:
         "chi_squared_of_all": found.chi_squared_of_all,
         "iterations": found.iterations,
         "numbers": [
-            {"name": label, "value": value, "standard_error": error, "before": before, "unit": unit}
-            for label, value, error, before, unit in zip(
-                numbers.labels, found.values, found.standard_error, numbers.prior, numbers.units, strict=True
-            )
+            dict(zip(("name", "value", "standard_error", "before", "unit"), row, strict=True))
+            for row in list(_rows(found))[1:]
         ],
         "rows": len(found.rows),
         "left_out": {reason.name: rows for reason, rows in found.left_out.items()},

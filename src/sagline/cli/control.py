@@ -5,10 +5,9 @@ from __future__ import annotations
 import gc
 import sys
 from contextlib import ExitStack, closing
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from sagline.cli.options import ModbusOption, PriorityOption, RobotArgument, flag, option
+from sagline.cli.options import LogOption, ModbusOption, PriorityOption, RobotArgument, flag, option
 
 if TYPE_CHECKING:
     from sagline.control.link import Link
@@ -23,7 +22,7 @@ def control(
     ],
     modbus: ModbusOption = False,
     shadow: Annotated[bool, flag("Read and log only; nothing is sent.", "--shadow")] = False,
-    log: Annotated[Path | None, option("FILE", "Write the log to an MCAP file, run.mcap.")] = None,
+    log: LogOption = None,
     priority: PriorityOption = None,
 ) -> int:
     """Control a machine: connect, home, follow paths, until quit.

@@ -16,10 +16,11 @@ from sagline.cli.options import (
     option,
     quantity_option,
 )
+from sagline.cli.output import file_of
 from sagline.cli.terminal import show_data, show_note
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.core.numbers import n
-from sagline.files.writing import write_text
+from sagline.files.writing import create_folder, write_text
 
 if TYPE_CHECKING:
     from sagline.cables.cable import Cable
@@ -47,7 +48,7 @@ def convert(
     ],
     out: FileOption = None,
     form: Annotated[
-        _Format, option("FORMAT", "robot: a robot file in YAML; mjcf: a MuJoCo model with straight cables.", "--format")
+        _Format, option("KIND", "robot: a robot file in YAML; mjcf: a MuJoCo model with straight cables.", "--kind")
     ] = _Format.ROBOT,
     linear_density: Annotated[
         float | None,
@@ -74,22 +75,23 @@ def convert(
         sagline convert robot.wcrfx --out robot.yaml
         sagline convert robot.wcrfx --out my_robot.yaml \
             --linear-density "20 g/m" --axial-stiffness "50 kN"
-        sagline convert cogiro --format mjcf --out cogiro.xml
+        sagline convert cogiro --kind mjcf --out cogiro.xml
     """
     from sagline.core.arrays import FARTHEST
     from sagline.files.pose_text import decimal_numbers
     from sagline.files.robot_file import dump_robot
 
+    out = out if out is None else file_of(out, f"{Path(source).stem}{ENDINGS[form][0]}")
     if out is not None and Path(source).exists() and out.resolve() == Path(source).resolve():
         raise FileError(out, "is the file to convert", "Name another file with --out.")
     if out is not None and out.suffix.lower() not in ENDINGS[form]:
         kind = "a robot file" if form is _Format.ROBOT else "a MuJoCo model"
         raise FileError(
-            out, f"is not a valid name for {kind}", f"Let it end in {ENDINGS[form][0]}, or choose another --format."
+            out, f"is not a valid name for {kind}", f"Let it end in {ENDINGS[form][0]}, or choose another --kind."
         )
     if at is not None and form is _Format.ROBOT:
         raise InvalidValueError(
-            "--at", "given for a robot file", "--format mjcf", "A robot file has no pose: leave it out."
+            "--at", "given for a robot file", "--kind mjcf", "A robot file has no pose: leave it out."
         )
     place = None if at is None else decimal_numbers(at, "--at", "m", FARTHEST)
     imported = _read(source, _material(linear_density, axial_stiffness), cable_set)
@@ -101,6 +103,7 @@ def convert(
     if out is None:
         show_data(text)
     else:
+        create_folder(out.parent)
         write_text(out, text)
     _report(imported, out)
 

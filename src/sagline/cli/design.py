@@ -5,9 +5,20 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
-from sagline.cli.options import JsonOption, RobotArgument, argument, figures_flag, option
+from sagline.cli.options import (
+    USUAL_FORMATS,
+    FiguresOption,
+    FigureStyle,
+    FormatsOption,
+    JsonOption,
+    OutOption,
+    RobotArgument,
+    StyleOption,
+    argument,
+    option,
+)
 from sagline.cli.output import Output, TextTable, number_text, show_table
-from sagline.cli.terminal import show_note, show_text, working
+from sagline.cli.terminal import show_note, working
 from sagline.files.writing import create_folder
 
 if TYPE_CHECKING:
@@ -20,13 +31,13 @@ MOST_ROWS: Final = 12  # largest number of printed rows; front.csv has all rows
 def design(
     robot: RobotArgument,
     file: Annotated[Path, argument("DESIGN", "Design variables with their bounds, and goals, design.yaml.")],
-    out: Annotated[Path, option("DIR", "Folder for the results; a search in it is continued.", "--out")] = Path(
-        "front"
-    ),
+    out: OutOption = Path("front"),
     evaluations: Annotated[
         str | None, option("NUMBER", "Number of candidate robots. Default: that of the file.")
     ] = None,
-    figures: Annotated[bool, figures_flag("Draw the candidates and the best robots, as PNG and SVG.")] = True,
+    figures: FiguresOption = True,
+    formats: FormatsOption = USUAL_FORMATS,
+    style: StyleOption = FigureStyle.PLAIN,
     as_json: JsonOption = False,
 ) -> None:
     r"""Search for a better robot. A file has the design variables (anchors, cables, limits) and the goals.
@@ -50,7 +61,7 @@ def design(
     first, request = load_robot(robot), load_design(file)
     if evaluations is not None:
         request["evaluations"] = whole_of(evaluations, "--evaluations", 1, MOST_EVALUATIONS)
-    output = Output(out, [FRONT], [FIGURE] * figures)
+    output = Output(out, "", [FRONT], [FIGURE] * figures, formats, style)
     rated = [0]
     with working(f"{first.name}: evaluating robots") as line:
 
@@ -69,13 +80,8 @@ def design(
             from sagline import plot
 
             line.stage("drawing")
-            output.draw(plot.front(front))
-
-    def tell() -> None:
-        show_table(_table(front))
-        show_text(front.text)
-
-    output.report(lambda: _record(front), tell, as_json=as_json)
+            output.draw(lambda: plot.front(front))
+    output.report(lambda: _record(front), front.text, lambda: show_table(_table(front)), as_json=as_json)
 
 
 def _table(front: Front) -> TextTable:

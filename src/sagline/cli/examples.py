@@ -6,9 +6,8 @@ import shutil
 from importlib.resources import files
 from pathlib import Path
 from shlex import quote
-from typing import Annotated
 
-from sagline.cli.options import flag, option
+from sagline.cli.options import ForceOption, OutOption
 from sagline.cli.terminal import show_text
 from sagline.core.errors import FileError
 from sagline.files.writing import atomic_file, check_folder, create_folder
@@ -17,10 +16,8 @@ KINDS = (".py", ".yaml", ".csv", ".wcrfx")
 
 
 def examples(
-    folder: Annotated[Path, option("DIR", "Folder for the files; it is created if missing.", "--out")] = Path(
-        "sagline-examples"
-    ),
-    force: Annotated[bool, flag("Replace files that exist.", "--force")] = False,
+    folder: OutOption = Path("sagline-examples"),
+    force: ForceOption = False,
 ) -> None:
     """Write the files for the commands of the documentation: a robot, a path, lengths, measurements, scripts.
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import numpy as np
 
-from sagline.cli.options import JsonOption, OutOption, SeedOption, argument, flag, option
+from sagline.cli.options import JsonOption, OutOption, SeedOption, TrueOption, argument, flag
 from sagline.cli.output import TextTable, number_text, show_table
 from sagline.cli.terminal import show_json, show_note, show_text, working
 from sagline.core.errors import InvalidValueError, nearest
@@ -28,14 +28,8 @@ def experiment(
     waits: Annotated[
         bool, flag("Without real time and network: half a minute instead of 14 minutes.", "--in-process")
     ] = False,
-    true: Annotated[
-        str | None,
-        option(
-            "ROBOT",
-            "File of the real robot if it differs. The controller uses article-prototype.",
-        ),
-    ] = None,
-    seed: SeedOption = "1",
+    true: TrueOption = None,
+    seed: SeedOption = 1,
     folder: OutOption = Path("output"),
     as_json: JsonOption = False,
 ) -> None:
@@ -52,15 +46,12 @@ def experiment(
     """
     from sagline.article.experiment import PROTOTYPE, in_process
     from sagline.article.experiment_page import NAMES, experiment_chapter, write_experiment
-    from sagline.cli.values import whole_of
     from sagline.files.robot_file import load_robot
     from sagline.files.writing import plain
-    from sagline.twin.machine import MOST_SEED
 
     if name not in KNOWN:
         near = nearest(name, KNOWN)
         raise InvalidValueError("experiment", repr(name), ", ".join(KNOWN), f"Did you mean {near or KNOWN[0]}?")
-    noise = whole_of(seed, "--seed", 0, MOST_SEED)
     nominal = load_robot(PROTOTYPE)
     real = nominal if true is None else load_robot(true)
     if real.cable_count != nominal.cable_count:
@@ -73,9 +64,7 @@ def experiment(
         def tell(share: float) -> None:
             line.progress(round(PARTS * share), PARTS)
 
-        result = (
-            in_process(real, nominal, seed=noise, tell=tell) if waits else apart_over_s7(real, nominal, noise, tell)
-        )
+        result = in_process(real, nominal, seed=seed, tell=tell) if waits else apart_over_s7(real, nominal, seed, tell)
     place = write_experiment(result, folder, how)
     if as_json:
         show_json({finding.key: plain(finding.numbers) for finding in experiment_chapter(result, how).findings})
@@ -118,6 +107,8 @@ def _tell(result: Experiment) -> None:
         [str(point), place, number_text(1e3 * theirs, ".1f"), number_text(1e3 * ours, ".3f")]
         for point, place, (theirs, ours) in zip((*table.points, "mean"), (*places, ""), distances, strict=True)
     ]
-    show_table(TextTable(["point", "desired x, y, z [m]", "article [mm]", "ours [mm]"], rows))
+    verdict = f"Mean distance of the points {n(1e3 * np.mean(result.distance), '.3f', 'mm')}"
+    verdict += f"; {n(1e3 * np.mean(table.distance), '.1f', 'mm')} in the article."
+    show_table(TextTable(["point", "desired x, y, z [m]", "article [mm]", "ours [mm]"], rows), verdict)
     took = n(result.duration / 60.0, ".1f", "min")
     show_text(f"It took {took}; the fastest winch had {n(1e3 * result.winch_speed, '.0f', 'mm/s')}.")

@@ -6,25 +6,25 @@ from pathlib import Path
 from typing import Annotated
 
 from sagline.cli.options import (
+    OutOption,
     RobotArgument,
     Tension,
     TensionVariable,
     VariableOption,
     choice_option,
     flag,
-    option,
 )
+from sagline.cli.output import file_of
 from sagline.cli.terminal import show_note, show_text
+from sagline.files.writing import create_folder
 
 
 def export_c(
     robot: RobotArgument,
-    out: Annotated[
-        Path, option("FILE", "The source, sagline.c; header and SCL file are written to the same folder.", "--out")
-    ] = Path("sagline.c"),
+    out: OutOption = Path("sagline.c"),
     tension: Annotated[
         list[Tension] | None,
-        choice_option("METHOD", "Tension distribution method, repeated for several", Tension),
+        choice_option("METHOD", "Tension distribution method", Tension),
     ] = None,
     variable: VariableOption = TensionVariable.CHORD,
     forward: Annotated[bool, flag("Write the forward kinematics too.", "--forward")] = False,
@@ -35,7 +35,8 @@ def export_c(
     """Write C99 for the kinematics of a robot on a microcontroller, and SCL for a cable's length on a PLC.
 
     The source has the same kernels as sagline: tensions and lengths of a pose, and on request the pose of given
-    lengths, over pulleys too. It needs no heap, and every call returns a status.
+    lengths, over pulleys too. It needs no heap, and every call returns a status. Header and SCL file are written beside
+    the source. --tension can be repeated.
 
     For example:
 
@@ -48,7 +49,9 @@ def export_c(
 
     loaded = load_robot(robot)
     methods = [each.build(variable) for each in tension or [Tension.CLOSEST]]
-    source, header, scl = export_c(loaded, out, tension=methods, forward=forward, single_precision=single_precision)
+    target = file_of(out, "sagline.c")
+    create_folder(target.parent)
+    source, header, scl = export_c(loaded, target, tension=methods, forward=forward, single_precision=single_precision)
     precision = "single" if single_precision else "double"
     show_note(f"{loaded.name}: ", f"{loaded.cable_count} cables, {loaded.motion_pattern}, {precision} precision")
     show_text(f"{source}: C99; cc -std=c99 -O2 -ffp-contract=off -c {source.name}", whole=True)
@@ -58,7 +61,7 @@ def export_c(
 
 def export_scl(
     robot: RobotArgument,
-    out: Annotated[Path, option("FILE", "The source file.", "--out")] = Path("plc.scl"),
+    out: OutOption = Path("plc.scl"),
 ) -> None:
     """Write SCL source for the PLCs of a robot, for TIA Portal: data blocks, limits, and the program of a group.
 
@@ -74,6 +77,8 @@ def export_scl(
     from sagline.files.robot_file import load_robot
 
     loaded = load_robot(robot)
-    path = export_scl(loaded, out)
+    target = file_of(out, "plc.scl")
+    create_folder(target.parent)
+    path = export_scl(loaded, target)
     groups = len(groups_of(loaded.cable_count))
     show_text(f"{path}: SCL for the {groups} PLCs of {loaded.name}, not compiled yet", whole=True)

@@ -15,13 +15,13 @@ from sagline.cli.options import (
     OutOption,
     PayloadOption,
     RobotArgument,
+    TableOption,
     WrenchOption,
     argument,
     flag,
 )
-from sagline.cli.output import Output, TextTable, csv_text, number_text, show_table
+from sagline.cli.output import Output, TextTable, number_text, show_table
 from sagline.cli.terminal import show_json, show_note, show_text, working
-from sagline.files.writing import write_text
 
 if TYPE_CHECKING:
     from sagline.files.measurements import LengthSamples
@@ -43,6 +43,7 @@ def forward(
     wrench: WrenchOption = None,
     payload: PayloadOption = None,
     folder: OutOption = Path("output"),
+    write_table: TableOption = True,
     as_json: JsonOption = False,
 ) -> int:
     """Find the poses of the platform from measured cable lengths.
@@ -62,22 +63,26 @@ def forward(
 
     robot = robot_with_payload(name, payload)
     lengths = _counted(file, robot) if counts else _measured(file, robot)
-    table = f"{file_stem(robot.name, 'poses')}.csv"
-    output = Output(folder, [table])
+    table = "-poses.csv"
+    output = Output(folder, file_stem(robot.name), [table] * write_table)
     with working(f"{robot.name}: finding {len(lengths.unstrained_length):,} poses") as line:
         first = solve(robot, lengths.unstrained_length[0], model=model.build(), wrench=wrench)
         start = first.pose if np.isfinite(first.pose.position).all() else None
         found = solve(robot, lengths.unstrained_length, start, model.build(), wrench, progress=line.progress)
     rows = _rows(lengths, found)
-    write_text(output.file(table), csv_text(rows))
+    if write_table:
+        output.table(table, rows)
     lost = [k for k, status in enumerate(found.status) if status not in (ForwardStatus.SOLVED, ForwardStatus.FITTED)]
     if as_json:
         header = [str(cell).split(" ")[0] for cell in rows[0]]
-        show_json({"poses": [dict(zip(header, row, strict=True)) for row in rows[1:]], "file": output.files[0]})
+        file_of_poses = output.files[0] if output.files else None
+        show_json({"poses": [dict(zip(header, row, strict=True)) for row in rows[1:]], "file": file_of_poses})
     else:
-        show_table(_grid(rows))
-        if len(rows) - 1 > SHOWN:
-            show_text(f"The first {SHOWN} of {len(rows) - 1:,} samples; the file has all of them.")
+        count = len(rows) - 1
+        many = f"All {count:,}" if not lost else f"{count - len(lost):,} of {count:,}"
+        show_table(_grid(rows), f"{many} samples have a pose in stable equilibrium.")
+        if count > SHOWN:
+            show_text(f"The first {SHOWN} of {count:,} samples; the CSV file has all of them.")
         output.show()
     if not lost:
         return 0

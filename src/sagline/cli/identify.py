@@ -8,8 +8,17 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import numpy as np
 
-from sagline.cli.options import JsonOption, argument, choice_option, flag, quantity_option
-from sagline.cli.output import TextTable, number_text, show_table
+from sagline.cli.options import (
+    JsonOption,
+    OutOption,
+    TableOption,
+    argument,
+    choice_option,
+    flag,
+    only_with,
+    quantity_option,
+)
+from sagline.cli.output import Output, TextTable, number_text, show_table
 from sagline.cli.terminal import show_json, show_note, show_text, working
 from sagline.core.numbers import n
 
@@ -28,6 +37,7 @@ class _TensionPlace(StrEnum):
 
 
 STEPS = 25  # number of samples along each axis of the working range
+TABLE = "-cable.csv"
 TOLERANCE = 5e-3  # position tolerance [m]; the article has 6 mm
 
 
@@ -45,6 +55,8 @@ def identify(
     offset: Annotated[
         bool, flag("Estimate the zero of the lengths as another unknown.", "--offset/--no-offset")
     ] = False,
+    folder: Annotated[OutOption, only_with("--csv")] = Path("output"),
+    write_table: TableOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Estimate linear density and axial stiffness of a measured cable, and its empirical model.
@@ -59,6 +71,7 @@ def identify(
     from sagline.article.identify_cable import UNITS, identify_cable
     from sagline.files.measurements import load_measurements
 
+    output = Output(folder, file.stem, [TABLE] * write_table)
     data = load_measurements(file)
     with working(f"{file.name}: identifying"):
         cable = identify_cable(
@@ -69,26 +82,28 @@ def identify(
             unknowns=["linear_density", "axial_stiffness", *["length_offset"] * offset],
         )
         model = _model(cable, data)
-    if as_json:
-        show_json(_record(cable, model))
-        return
     rows = [
-        [name, number_text(value, ".5g"), number_text(error, ".2g"), UNITS[name]]
+        (name, float(value), float(error), UNITS[name])
         for name, value, error in zip(cable.names, cable.values, cable.standard_error, strict=True)
     ]
     for name, estimate, unit in (("k_h", model.k_h, "m/s²"), ("k_p", model.k_p, "m²/s⁴")):
-        rows.append(
-            [name, number_text(estimate.value, ".5g"), number_text(estimate.high - estimate.value, ".2g"), unit]
-        )
-    heads = ["", "value", "standard error", "unit"]
-    show_table(TextTable(heads, rows, f"{len(data.span)} measurements", left=frozenset({0, 3})))
-    show_text(
-        f"chi-squared per degree of freedom: {number_text(cable.chi_squared, '.3g')} (about 1 if the errors are right)"
+        rows.append((name, estimate.value, estimate.high - estimate.value, unit))
+    if write_table:
+        output.table(TABLE, [("name", "value", "standard error", "unit"), *rows])
+    if as_json:
+        show_json(_record(cable, model))
+        return
+    texts = [[name, number_text(value, ".5g"), number_text(error, ".2g"), unit] for name, value, error, unit in rows]
+    verdict = f"chi-squared per degree of freedom: {number_text(cable.chi_squared, '.3g')}"
+    grid = TextTable(
+        ["", "value", "standard error", "unit"], texts, f"{len(data.span)} measurements", left=frozenset({0, 3})
     )
+    show_table(grid, f"{verdict} (about 1 if the errors are right)")
     show_text(
         f"The empirical model with k_h, k_p has position errors below {n(1e3 * TOLERANCE, 'g', 'mm')} in the "
         f"measured range if T_x is above {n(model.tension_min(TOLERANCE), '.3g', 'N')}."
     )
+    output.show()
     for warning in cable.warnings:
         show_note("Warning: ", warning, style="bold yellow")
 

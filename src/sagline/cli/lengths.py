@@ -11,10 +11,10 @@ import numpy as np
 
 from sagline.cli.ending import OUTSIDE
 from sagline.cli.options import FileOption, argument, option
-from sagline.cli.output import csv_text
+from sagline.cli.output import csv_text, file_of
 from sagline.cli.terminal import show_data, show_note, working
 from sagline.core.errors import FileError
-from sagline.files.writing import write_text
+from sagline.files.writing import create_folder, write_text
 
 if TYPE_CHECKING:
     from sagline.core.arrays import Array
@@ -43,6 +43,7 @@ def lengths(
 
         sagline lengths output/cogiro-catenary.nc --out lengths.csv
     """
+    out = out if out is None else file_of(out, f"{file.stem}-lengths.csv")
     plan = _plan_of(file, out)
     return write_rows(plan, "L{} [m]", np.atleast_2d(plan.unstrained_length).tolist(), out)
 
@@ -71,6 +72,7 @@ def encoder(
     """
     from sagline.kinematics.winches import encoder_counts, winch_rates
 
+    out = out if out is None else file_of(out, f"{file.stem}-counts.csv")
     plan = _plan_of(file, out)
     counts = np.atleast_2d(encoder_counts(plan, winding.value))
     whole = [[int(count) if count == count else count for count in row] for row in counts.tolist()]
@@ -102,6 +104,7 @@ def write_rows(plan: Plan, name: str, rows: Sequence[Sequence[float]], out: Path
     if out is None:
         show_data(text)
     else:
+        create_folder(out.parent)
         write_text(out, text)
     if kept.all():
         return 0
@@ -125,8 +128,8 @@ def _plan_of(file: Path, out: Path | None) -> Plan:
     return plan
 
 
-def plan_text(plan: Plan) -> str:
-    """A whole plan as CSV: time, pose, lengths, tensions and status of each sample; empty cells for NaN."""
+def plan_rows(plan: Plan) -> list[list[object]]:
+    """A whole plan as a table: time, pose, lengths, tensions and status of each sample; empty cells for NaN."""
     from sagline.kinematics.status import PoseStatus
 
     pose, lengths, tensions = plan.state.pose, plan.unstrained_length, plan.chord_tension
@@ -140,4 +143,4 @@ def plan_text(plan: Plan) -> str:
     numbers = np.column_stack([np.atleast_1d(column) for column in columns.values()]).tolist()
     words = [PoseStatus(int(code)).name for code in np.atleast_1d(plan.status)]
     body = ([*("" if x != x else x for x in row), word] for row, word in zip(numbers, words, strict=True))
-    return csv_text([[*columns, "status"], *body])
+    return [[*columns, "status"], *body]

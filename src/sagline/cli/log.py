@@ -37,7 +37,9 @@ def log(
             "--to",
         ),
     ] = None,
-    plan: Annotated[str | None, option("NUMBER", "Only the cycles of this plan, from 0. Default: all.")] = None,
+    plan: Annotated[
+        str | None, option("NUMBER", "Only the cycles of this plan, from 0. Default: all.", "--plan-number")
+    ] = None,
     as_json: JsonOption = False,
 ) -> int:
     """Print the contents of a log of the controller: states, largest errors, late cycles, events.
@@ -51,7 +53,7 @@ def log(
     from sagline.cli.values import whole_of
     from sagline.files.execution_file import load_execution, save
 
-    which = None if plan is None else whole_of(plan, "--plan", 0, MOST_PLANS)
+    which = None if plan is None else whole_of(plan, "--plan-number", 0, MOST_PLANS)
     if to is not None:
         check_file(to)
     with working(f"reading {file.name}"):

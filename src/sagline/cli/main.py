@@ -33,6 +33,12 @@ GROUPS = {  # the commands in the order of the help
 }
 NAMES = tuple(chain.from_iterable(GROUPS.values()))
 MODULES = {"encoder": "lengths", "show": "robots", "export-c": "export", "export-scl": "export"}  # or their names
+FORMER = {  # former names of options, which remain valid, by command
+    "convert": {"--format": "--kind"},
+    "log": {"--plan": "--plan-number"},
+    "vibrate": {"--force": "--axis"},
+    "workspace": {"--wrench": "--loads"},
+}
 DEBUG = "--debug"
 HYPHEN = "\N{NON-BREAKING HYPHEN}"
 MOST_NAMES = 6  # largest number of files listed after an error
@@ -77,6 +83,8 @@ class _Command(TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse the arguments; an empty text is an error, because as a path it would mean the current folder."""
+        former = FORMER.get(self.name or "", {})
+        args = [former.get(name, name) + sign + value for name, sign, value in (arg.partition("=") for arg in args)]
         if not ctx.resilient_parsing:  # resilient parsing is used for completion in the shell
             given, _, _ = self.make_parser(ctx).parse_args(args=list(args))
             parameter: Any  # typer has its own class of parameters

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import typer
 
-from sagline.cli.options import argument, flag, option
+from sagline.cli.options import ForceOption, argument, flag, option
 from sagline.cli.terminal import show_note, show_text, working
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.core.numbers import n
@@ -53,7 +53,7 @@ def new(
     mass: Annotated[str | None, option("MASS", 'Mass of the platform with its load, "30 kg".')] = None,
     rope: Annotated[str | None, option("ROPE", f"Rope of the cables: {ROPE_NAMES}.")] = None,
     diameter: Annotated[str | None, option("LENGTH", 'Diameter of the rope, "4 mm".')] = None,
-    force: Annotated[bool, flag("Replace the file if it exists.", "--force")] = False,
+    force: ForceOption = False,
     look: Annotated[bool, flag("Show it in the browser afterwards.", "--view")] = False,
 ) -> int:
     r"""Make a robot file of your own: the command asks for missing options, checks the robot and describes it.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -15,6 +16,10 @@ from sagline.core.errors import InvalidValueError
 if TYPE_CHECKING:
     from sagline.cables.model import CableModel
     from sagline.tension.method import TensionMethod
+
+
+FORMATS = ("png", "svg", "pdf")  # formats of figures
+USUAL_FORMATS = "png,svg"
 
 
 class ModelName(StrEnum):
@@ -61,6 +66,27 @@ class Tension(StrEnum):
         from sagline.tension.methods import METHODS
 
         return METHODS[self.value.title().replace("-", "")](variable.value)
+
+
+class FigureStyle(StrEnum):
+    """Styles of figures, by journal and width."""
+
+    PLAIN = "plain"
+    IEEE = "ieee"
+    IEEE_WIDE = "ieee-wide"
+    MDPI = "mdpi"
+    MDPI_WIDE = "mdpi-wide"
+    SLIDES = "slides"
+    SLIDES_WIDE = "slides-wide"
+
+    def active(self) -> AbstractContextManager[object]:
+        """Context in which new figures have this style."""
+        if self is FigureStyle.PLAIN:
+            return nullcontext()
+        from sagline.plot import style
+
+        name, _, wide = self.value.partition("-")
+        return style(name, 2 if wide else 1)
 
 
 def robot_completions(incomplete: str) -> list[str]:
@@ -111,9 +137,10 @@ def flag(text: str, *names: str) -> Any:
     return typer.Option(*names, help=text)
 
 
-def figures_flag(text: str) -> Any:
-    """`--figures/--no-figures`."""
-    return flag(text, "--figures/--no-figures")
+def out_option(default: str | bool = True) -> Any:
+    """`--out`; text for the default value if it is None."""
+    text = "Folder for the files, or the main file if the name has its suffix."
+    return typer.Option("--out", metavar="DIR|FILE", help=text, show_default=default)
 
 
 @dataclass(frozen=True)
@@ -155,9 +182,21 @@ def _unchanged(value: Any) -> Any:
 RobotArgument = Annotated[
     str, argument("ROBOT", "A preset (see sagline robots) or a robot file, robot.yaml.", robot_completions)
 ]
-OutOption = Annotated[Path, option("DIR", "Folder for the files; it is created if missing.", "--out")]
-FileOption = Annotated[Path | None, option("FILE", "File to write. Default: stdout.", "--out")]
+OutOption = Annotated[Path, out_option()]
+FileOption = Annotated[Path | None, out_option("stdout")]
 JsonOption = Annotated[bool, flag("Print the numbers as JSON and nothing else on stdout.", "--json")]
+TableOption = Annotated[bool, flag("Write the whole table as a CSV file.", "--csv/--no-csv")]
+FiguresOption = Annotated[bool, flag("Draw figures.", "--figures/--no-figures")]
+STYLE = choice_option("STYLE", "Style of the figures", FigureStyle)
+StyleOption = Annotated[FigureStyle, STYLE, only_with("--figures")]
+FormatsOption = Annotated[
+    Any,
+    converted_option(
+        "FORMATS", f"Formats of the figures, with commas between: {', '.join(FORMATS)}.", "formats_of", "--format"
+    ),
+    only_with("--figures"),
+]
+ForceOption = Annotated[bool, flag("Replace files that exist.", "--force")]
 ModelOption = Annotated[ModelName, choice_option("MODEL", "Cable model", ModelName)]
 VariableOption = Annotated[
     TensionVariable, choice_option("VARIABLE", "Tension that the method distributes", TensionVariable)
@@ -190,7 +229,7 @@ PoseOption = Annotated[
 ]
 TensionOption = Annotated[Tension, choice_option("METHOD", "Tension distribution method", Tension)]
 LossTimeOption = Annotated[
-    float, quantity_option("TIME", "Loss time [s] of the cables' stretch: EA (1 + i omega TIME).", "s", low=0.0)
+    float | None, quantity_option("TIME", "Loss time [s] of the cables' stretch: EA (1 + i omega TIME).", "s", low=0.0)
 ]
 AirDampingOption = Annotated[
     float,
@@ -200,4 +239,10 @@ ModbusOption = Annotated[bool, flag("Use Modbus TCP instead of S7.", "--modbus")
 PriorityOption = Annotated[
     int | None, option("NUMBER", "Schedule in real time (SCHED_FIFO of Linux) with this priority, 1 to 99.")
 ]
-SeedOption = Annotated[str, option("NUMBER", "Seed of the load cells' noise.")]
+SeedOption = Annotated[
+    int, converted_option("NUMBER", "Seed of the random numbers.", "whole_of", least=0, most=2**63 - 1)
+]
+HostOption = Annotated[str, option("ADDRESS", "Address to listen on; 0.0.0.0 and :: mean all addresses.")]
+PortOption = Annotated[int, converted_option("NUMBER", "Port to listen on; 0 selects a free port.", "port_of")]
+TrueOption = Annotated[str | None, option("ROBOT", "File of the real robot if it differs from the nominal one.")]
+LogOption = Annotated[Path | None, option("FILE", "Write a log to this MCAP file, run.mcap.")]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from io import StringIO
@@ -18,15 +19,16 @@ from rich.measure import Measurement
 from rich.table import Table
 from rich.text import Text
 
+from sagline.cli.options import FigureStyle
 from sagline.cli.terminal import FREE, show_json, show_pieces, show_text
-from sagline.core.errors import printable
-from sagline.files.writing import check_files, create_folder
+from sagline.core.errors import FileError, printable
+from sagline.files.writing import check_files, check_folder, create_folder, write_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-SUFFIXES = ("png", "svg")  # formats of a figure
+ENDING = re.compile(r"\.[a-z]{1,5}", re.IGNORECASE)  # ending of a file, by which --out is a file and not a folder
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,8 +95,10 @@ class TextTable:
         return table
 
 
-def show_table(grid: TextTable) -> None:
-    """Print a table as part of the result."""
+def show_table(grid: TextTable, verdict: str = "") -> None:
+    """Print a table as part of the result, below a verdict."""
+    if verdict:
+        show_text(verdict, style="bold")
     show_pieces(grid.pieces)
 
 
@@ -120,41 +124,96 @@ def csv_text(rows: Iterable[Sequence[object]]) -> str:
     return text.getvalue()
 
 
+def is_file(out: Path) -> bool:
+    """True if `--out` is a file and not a folder: it ends like a file, and is not a folder that exists."""
+    return ENDING.fullmatch(out.suffix) is not None and not out.is_dir()
+
+
+def file_of(out: Path, name: str) -> Path:
+    """The file of `--out`, with its usual name if `--out` is a folder; nothing is created."""
+    if is_file(out):
+        return out
+    check_folder(out)
+    return out / name
+
+
 class Output:
-    """The files that a command writes into a folder; the command fails before any work if one cannot be written."""
+    """The files that a command writes; the command fails before any work if one cannot be written."""
 
-    def __init__(self, folder: Path, names: Iterable[str], figures: Sequence[str] = ()) -> None:
-        """Check that all files can be written; figures are names without suffix, and each is written as PNG and SVG."""
-        self.folder, self.files = folder, list[Path]()
-        self._figures = list(figures)
-        if every := [*names, *(f"{name}.{suffix}" for name in figures for suffix in SUFFIXES)]:
-            check_files(folder, every)
+    def __init__(
+        self,
+        out: Path,
+        stem: str,
+        parts: Iterable[str],
+        figures: Sequence[str] = (),
+        formats: Sequence[str] = (),
+        style: FigureStyle = FigureStyle.PLAIN,
+    ) -> None:
+        """Check that all files can be written.
 
-    def file(self, name: str) -> Path:
+        Args:
+            out: A folder; or the first file by its name, whose beginning the other files get instead of the stem.
+            stem: Beginning of all names; "" if `out` must be a folder.
+            parts: Rest of each name, with its suffix.
+            figures: Rest of the name of each figure, without suffix.
+            formats: Suffixes of the figures.
+            style: Style of the figures.
+        """
+        whole = [*parts, *(f"{figure}.{suffix}" for figure in figures for suffix in formats)]
+        self.folder, self.files, self._stem = out, list[Path](), stem
+        self._main: dict[str, str] = {}  # name of the first file, if `out` is a file
+        self._figures, self._formats, self._style = list(figures), formats, style
+        if is_file(out):
+            suffix = Path(f"_{whole[0]}").suffix if stem and whole else ""
+            if out.suffix.lower() != suffix:
+                step = f"Name a folder{f', or a file that ends in {suffix}' if suffix else ''}."
+                raise FileError(out, "is not a valid name for the files of this command", step)
+            self.folder, self._stem, self._main = out.parent, out.stem, {whole[0]: out.name}
+        if whole:
+            check_files(self.folder, map(self._name, whole))
+
+    def _name(self, part: str) -> str:
+        """Name of a file."""
+        return self._main.get(part, f"{self._stem}{part}")
+
+    def file(self, part: str) -> Path:
         """Path of a file that is about to be written; the folder is created if missing."""
         create_folder(self.folder)
-        self.files.append(self.folder / name)
+        self.files.append(self.folder / self._name(part))
         return self.files[-1]
 
-    def draw(self, *figures: Figure | Axes) -> None:
-        """Save figures under the checked names, in their order."""
+    @property
+    def draws(self) -> bool:
+        """True if figures are wanted."""
+        return bool(self._figures)
+
+    def table(self, part: str, rows: Iterable[Sequence[object]]) -> None:
+        """Write a table as CSV."""
+        write_text(self.file(part), csv_text(rows))
+
+    def draw(self, *figures: Callable[[], Figure | Axes]) -> None:
+        """Make figures in the chosen style, and save them under the checked names, in their order."""
         from sagline.plot import save
 
-        for figure in figures:
-            name = self._figures.pop(0)
-            for suffix in SUFFIXES:
+        for make in figures:
+            with self._style.active():
+                figure, name = make(), self._figures.pop(0)
+            for suffix in self._formats:
                 save(figure, self.file(f"{name}.{suffix}"))
 
-    def report(self, record: Callable[[], Mapping[str, object]], tell: Callable[[], None], *, as_json: bool) -> None:
-        """Print a record and the files as JSON, or the text of `tell` and the files."""
+    def report(
+        self, record: Callable[[], Mapping[str, object]], verdict: str, tell: Callable[[], None], *, as_json: bool
+    ) -> None:
+        """Print a record and the files as JSON, or the verdict, the text of `tell` and the files."""
         if as_json:
             show_json({**record(), "files": self.files})
         else:
+            show_text(verdict, style="bold")
             tell()
             self.show()
 
     def show(self) -> None:
-        """Print the folder and the names of the files in it; the two formats of a figure share one name."""
+        """Print the folder and the names of the files in it; the formats of a figure share one name."""
         if not self.files:
             return
         suffixes: dict[str, list[str]] = {}

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
-from sagline.cli.options import JsonOption, RobotArgument
-from sagline.cli.output import TextTable, show_table
+from sagline.cli.options import JsonOption, OutOption, RobotArgument, TableOption, only_with
+from sagline.cli.output import Output, TextTable, show_table
 from sagline.cli.terminal import show_json, show_text
+from sagline.core.numbers import n
 
 if TYPE_CHECKING:
     from sagline.core.arrays import Array
@@ -39,12 +41,24 @@ MATERIAL = ("linear_density", "axial_stiffness", "diameter", "expansion")  # fie
 PER_CABLE = (*MATERIAL, "tension_min", "tension_max")
 
 
-def robots(as_json: JsonOption = False) -> None:
+def robots(
+    folder: Annotated[OutOption, only_with("--csv")] = Path("output"),
+    write_table: TableOption = False,
+    as_json: JsonOption = False,
+) -> None:
     """List the preset robots."""
     from sagline.files.robot_file import load_robot
     from sagline.robot.catalogue import robot_names
 
+    output = Output(folder, "robots", [".csv"] * write_table)
     robots = [load_robot(name) for name in robot_names()]
+    if write_table:
+        sizes = [f"{what} {axis} [m]" for what in ("frame", "platform") for axis in "xyz"]
+        rows = [
+            [each.name, each.cable_count, each.motion_pattern, each.mass, *_frame(each), *_platform(each), each.source]
+            for each in robots
+        ]
+        output.table(".csv", [["robot", "cables", "motion", "mass [kg]", *sizes, "source"], *rows])
     if as_json:
         show_json([_short(robot) for robot in robots])
         return
@@ -54,7 +68,7 @@ def robots(as_json: JsonOption = False) -> None:
         for robot in robots
         for frame, platform in [(_frame(robot), _platform(robot))]
     ]
-    show_table(TextTable(heads, rows, left=frozenset({0, 2, 4, 5})))
+    show_table(TextTable(heads, rows, left=frozenset({0, 2, 4, 5})), f"{len(robots)} preset robots.")
     show_text(
         "Frame: length × width × height over the floor. Without a size in the source: size of the box of the anchors."
     )
@@ -62,6 +76,7 @@ def robots(as_json: JsonOption = False) -> None:
     for robot in robots:
         show_text(robot.name, style="bold")
         show_text(robot.source, indent=4)
+    output.show()
 
 
 def show(name: RobotArgument, as_json: JsonOption = False) -> None:
@@ -78,7 +93,8 @@ def show(name: RobotArgument, as_json: JsonOption = False) -> None:
     if as_json:
         show_json(_record(robot))
         return
-    show_table(_values(robot))
+    assumed = f"; {len(robot.assumed)} values are assumed" if robot.assumed else ""
+    show_table(_values(robot), f"{robot.name}: {robot.cable_count} cables, {n(robot.mass, '.4g', 'kg')}{assumed}.")
     if robot.winches is not None:
         show_table(_winches(robot, robot.winches))
     show_table(_anchors(robot))

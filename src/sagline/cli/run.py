@@ -2,12 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sagline.cli.options import JsonOption, OutOption
+from sagline.cli.lengths import plan_rows
+from sagline.cli.options import (
+    USUAL_FORMATS,
+    FiguresOption,
+    FigureStyle,
+    FormatsOption,
+    JsonOption,
+    OutOption,
+    StyleOption,
+    TableOption,
+)
 from sagline.cli.output import Output
-from sagline.cli.terminal import show_text, working
+from sagline.cli.terminal import working
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,7 +33,14 @@ HULLS = ("hull-suspended", "hull-mixed")  # workspaces with sag, the article's f
 CELLS = 20  # cells along the longest edge of the frame; half a second per robot, error of volumes 0.2 %
 
 
-def run(folder: OutOption = Path("output"), as_json: JsonOption = False) -> int:
+def run(
+    folder: OutOption = Path("output"),
+    figures: FiguresOption = True,
+    formats: FormatsOption = USUAL_FORMATS,
+    style: StyleOption = FigureStyle.PLAIN,
+    table: TableOption = False,
+    as_json: JsonOption = False,
+) -> int:
     """Run the article's test: both simulated robots, its empirical model and the exact one, figures 18 to 22.
 
     The tension distribution is the least norm of the horizontal tensions T_x, as in the article's figures.
@@ -39,8 +58,10 @@ def run(folder: OutOption = Path("output"), as_json: JsonOption = False) -> int:
     # their minimum, and curves that return to their start. This is the minimum norm of T_x.
     tension = MinimumNorm("horizontal")
     robots = [load_robot(name) for name in ROBOTS]
-    plans = [f"{run_name(robot, model)}.nc" for robot in robots for model in models]
-    output = Output(folder, [*plans, *(f"{name}.glb" for name in HULLS)], [*FIGURES, *HULLS])
+    plans = [run_name(robot, model) for robot in robots for model in models]
+    files = [f"{name}.{kind}" for name in plans for kind in ("nc", *["csv"] * table)]
+    drawn = [*FIGURES, *HULLS] if figures else []
+    output = Output(folder, "", [*files, *(f"{name}.glb" for name in HULLS)], drawn, formats, style)
     path, runs = article_path(), []
     with working("planning and confirming the article's path") as line:
         for robot in robots:
@@ -48,34 +69,34 @@ def run(folder: OutOption = Path("output"), as_json: JsonOption = False) -> int:
     with working("workspaces of both robots") as line:
         spaces = [workspace(robot, cells=CELLS, progress=line.progress) for robot in robots]
     with working("writing runs, hulls and figures"):
-        from sagline import plot
-
         for name, run in zip(plans, runs, strict=True):
-            run.plan.save(output.file(name))
-        empirical = (run for run in runs if isinstance(run.plan.state.cables.model, Empirical))
-        output.draw(*_figures(*empirical), *(plot.workspace(space) for space in spaces))
+            run.plan.save(output.file(f"{name}.nc"))
+            if table:
+                output.table(f"{name}.csv", plan_rows(run.plan))
+        if figures:
+            from sagline import plot
+
+            empirical = (run for run in runs if isinstance(run.plan.state.cables.model, Empirical))
+            output.draw(*_figures(*empirical), *(partial(plot.workspace, space) for space in spaces))
         for name, space in zip(HULLS, spaces, strict=True):
             space.surface.export(output.file(f"{name}.glb"))
-    if not as_json:
-        show_text(
-            f"The article's path, {len(path):,} poses in {path.duration:g} s; least norm of the horizontal tensions."
-        )
-        for space in spaces:
-            name, mass = space.robot.name, space.robot.mass
-            show_text(f"The workspace of {name} in its frame is {amount_of(space)}, level, with its {mass:g} kg.")
-    return tell(runs, output, as_json=as_json)
+    notes = [f"The article's path, {len(path):,} poses in {path.duration:g} s; least norm of the horizontal tensions."]
+    for space in spaces:
+        name, mass = space.robot.name, space.robot.mass
+        notes.append(f"The workspace of {name} in its frame is {amount_of(space)}, level, with its {mass:g} kg.")
+    return tell(runs, output, notes, as_json=as_json)
 
 
-def _figures(suspended: ConfirmedRun, mixed: ConfirmedRun) -> tuple[Figure | Axes, ...]:
+def _figures(suspended: ConfirmedRun, mixed: ConfirmedRun) -> tuple[Callable[[], Figure | Axes], ...]:
     """The article's figures 18 to 22, with its own cable model, in the order of FIGURES."""
     from sagline import plot
 
     path = suspended.plan.path
     assert path is not None
     return (
-        plot.path(path),
-        plot.velocity(path),
-        plot.overview(suspended.plan),
-        plot.overview(mixed.plan),
-        plot.errors(suspended.confirmation, mixed.confirmation),
+        lambda: plot.path(path),
+        lambda: plot.velocity(path),
+        lambda: plot.overview(suspended.plan),
+        lambda: plot.overview(mixed.plan),
+        lambda: plot.errors(suspended.confirmation, mixed.confirmation),
     )

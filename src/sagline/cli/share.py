@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
-from sagline.cli.options import argument, option, robot_completions
+from sagline.cli.options import argument, out_option, robot_completions
+from sagline.cli.output import file_of, is_file
 from sagline.cli.terminal import show_text, working
 from sagline.core.errors import FileError, InvalidValueError
-from sagline.files.writing import check_file, write_text
+from sagline.files.writing import check_file, create_folder, write_text
 
 if TYPE_CHECKING:
     from sagline.robot.robot import Robot
@@ -28,9 +29,7 @@ def share(
             robot_completions,
         ),
     ],
-    out: Annotated[
-        Path | None, option("FILE.html", "File to write. Default: run.html or ROBOT.html here.", "--out")
-    ] = None,
+    out: Annotated[Path | None, out_option("run.html or ROBOT.html here")] = None,
 ) -> None:
     """Make one HTML page of a robot or a run that needs no server and no network: for a phone, a mail, a lecture.
 
@@ -52,14 +51,15 @@ def share(
 
     check_module()
     source = Path(what)
-    if out is not None and out.suffix.lower() not in ENDINGS:
+    if out is not None and is_file(out) and out.suffix.lower() not in ENDINGS:
         raise FileError(out, "is not a valid name for a page", "Let it end in .html.")
     with working(f"reading {source.name}"):
         found = _found(source)
     robot = found if isinstance(found, Robot) else found.robot
     stem = file_stem(robot.name) if source.suffix == "" else source.stem
-    target = _free(Path(f"{stem}.html")) if out is None else check_file(out)
+    target = _free(Path(f"{stem}.html")) if out is None else check_file(file_of(out, f"{stem}.html"))
     text = robot_page(found) if isinstance(found, Robot) else course_page(found, source.stem)
+    create_folder(target.parent)
     write_text(target, text)
     size = len(text.encode())
     amount = f"{size / 1e3:,.0f} kB" if size < 1e6 else f"{size / 1e6:.1f} MB"

@@ -7,27 +7,38 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+import numpy as np
+
 from sagline.cli.options import (
+    USUAL_FORMATS,
     AirDampingOption,
+    FiguresOption,
+    FigureStyle,
+    FormatsOption,
     JsonOption,
     LossTimeOption,
+    OutOption,
     PayloadOption,
+    PoseOption,
     RobotArgument,
+    StyleOption,
+    TableOption,
     Tension,
     TensionOption,
     TensionVariable,
     WrenchOption,
     argument,
     choice_option,
-    figures_flag,
     only_with,
+    only_without,
     option,
     quantity_option,
 )
 from sagline.cli.output import Output, TextTable, number_text, show_table
+from sagline.cli.tension import reason
 from sagline.cli.terminal import show_note, show_text, working
 from sagline.cli.track import check_unit
-from sagline.core.errors import FileError, InvalidValueError
+from sagline.core.errors import InvalidValueError
 
 if TYPE_CHECKING:
     from sagline.cli.progress import ProgressLine
@@ -37,6 +48,7 @@ if TYPE_CHECKING:
     from sagline.motion.path import Path as MotionPath
     from sagline.present.summaries import Summary
     from sagline.robot.equilibrium import Equilibrium
+    from sagline.robot.pose import Pose
     from sagline.robot.robot import Robot
     from sagline.tension.method import TensionMethod
 
@@ -76,30 +88,35 @@ _StepOption = Annotated[
     float | None,
     quantity_option("TIME", "Time step of the integrator [s]. Default: chosen for the robot.", "s", above=0.0),
 ]
-_OutOption = Annotated[Path | None, option("FILE", "File to write. Default: ROBOT-simulation.nc in output.", "--out")]
 
 
 def simulate(
     name: RobotArgument,
     path: _PathOption = None,
+    pose: Annotated[PoseOption, only_without("PATH")] = None,
     shaper: _ShaperOption = _ShaperKind.NONE,
     cable_mass: Annotated[_CableMass, choice_option("KIND", "Model of the cable mass", _CableMass)] = _CableMass.NONE,
     breaks: _BreaksOption = None,
     after: Annotated[float, quantity_option("TIME", "Simulated time after the end of the path [s].", "s", low=0.0)] = 3,
     step: _StepOption = None,
     tension: TensionOption = Tension.CLOSEST,
-    loss_time: LossTimeOption = 0,
+    loss_time: LossTimeOption = None,
     air_damping: AirDampingOption = 0,
     wrench: WrenchOption = None,
     payload: PayloadOption = None,
-    out: _OutOption = None,
-    figures: Annotated[bool, figures_flag("Draw the energy balance, as PNG and SVG.")] = True,
+    folder: OutOption = Path("output"),
+    figures: FiguresOption = True,
+    formats: FormatsOption = USUAL_FORMATS,
+    style: StyleOption = FigureStyle.PLAIN,
+    write_table: TableOption = False,
     as_json: JsonOption = False,
 ) -> int:
     """Simulate a robot along a path in time: vibration, input shapers and breaking cables.
 
     Lengths are planned as `sagline track` plans them. The result is the largest tension, the residual vibration at the
-    end, the energy balance and the events. Play the file with `sagline view ROBOT FILE`.
+    end, the energy balance and the events. Figures show tensions and motion, and the energy balance. Without
+    --loss-time, a loss time of 1 ms is assumed if a cable breaks, as in the viewer, and none otherwise. Play the file
+    with `sagline view ROBOT FILE`.
 
     For example:
 
@@ -107,6 +124,8 @@ def simulate(
         sagline simulate cogiro --break 3@0.5s --loss-time 0.001 --out sim.nc
     """
     from sagline.cli.values import robot_with_payload
+    from sagline.dynamics.simulation.initial_conditions import initial_conditions
+    from sagline.dynamics.simulation.simulate import NODES, losses_after_break
     from sagline.dynamics.simulation.simulate import simulate as integrate
     from sagline.dynamics.vibration.dynamic_stiffness import Damping
     from sagline.files.path_file import load_path
@@ -115,32 +134,36 @@ def simulate(
 
     robot = robot_with_payload(name, payload)
     events = tuple(_break(text, robot) for text in breaks or ())
-    damping = Damping(loss_time, air_damping)
-    file = Path("output") / f"{file_stem(robot.name, 'simulation')}.nc" if out is None else out
-    if file.suffix != ".nc":
-        raise FileError(file, "does not end in .nc", "Name a NetCDF file: --out sim.nc.")
-    drawing = f"{file.stem}-energy"
-    output = Output(file.parent, [file.name], [drawing] * figures)
+    damping = Damping(loss_time or 0.0, air_damping)
+    stem, parts = file_stem(robot.name, "simulation"), [".nc", *[".csv"] * write_table]
+    output = Output(folder, stem, parts, ["-motion", "-energy"] if figures else [], formats, style)
     way = None if path is None else load_path(path)
     if path is not None and way is not None:
         check_unit(path, way, robot)
     method = tension.build(TensionVariable.CHORD)
     with working(f"{robot.name}: simulating") as line:
-        start = _start(robot, way, method, shaper, cable_mass, wrench, line)
+        start = _start(robot, way, pose, method, shaper, cable_mass, wrench, line)
         end = after if way is None else _duration(start) + after
         line.stage(f"{robot.name}: simulating {end:g} s, {cable_mass_text(cable_mass.value)}")
         kind: Any = cable_mass.value
+        if events and loss_time is None:
+            given = initial_conditions(start, None, None, end)
+            assumed = losses_after_break(given, NODES if cable_mass is _CableMass.LUMPED else 0)
+            damping = Damping(assumed.loss_time, air_damping)
         simulation = integrate(start, duration=end, step=step, cable_mass=kind, events=events, damping=damping)
-        simulation.save(output.file(file.name))
+        simulation.save(output.file(".nc"))
+        if write_table:
+            output.table(".csv", _rows(simulation))
         if figures:
             from sagline import plot
 
             line.stage("drawing")
-            output.draw(plot.energy(simulation))
+            output.draw(lambda: plot.simulation(simulation), lambda: plot.energy(simulation))
     summary = summary_of(simulation)
     assert summary is not None
     output.report(
         lambda: {"robot": robot.name, **summary.json, "events": [_record(event) for event in simulation.events]},
+        _verdict(simulation, summary),
         lambda: _tell(simulation, summary),
         as_json=as_json,
     )
@@ -163,6 +186,7 @@ def _break(text: str, robot: Robot) -> Break:
 def _start(
     robot: Robot,
     way: MotionPath | None,
+    pose: Pose | None,
     method: TensionMethod,
     shaper: _ShaperKind,
     cable_mass: _CableMass,
@@ -177,10 +201,12 @@ def _start(
     from sagline.statics.stiffness import modes
 
     if way is None:
-        plan = inverse(robot, middle_pose(robot), tension=method, wrench=load)
+        place = middle_pose(robot) if pose is None else pose
+        plan = inverse(robot, place, tension=method, wrench=load)
         if not plan.feasible:
+            text, _, why = reason(robot, place, plan).partition(". ")
             raise InvalidValueError(
-                "robot", "infeasible in the middle of its test box", "a feasible pose", "Give a path."
+                "--pose", f"infeasible ({why or text})", "a feasible pose", "Change it, or the load."
             )
         return plan.state
     if shaper is not _ShaperKind.NONE:
@@ -198,6 +224,23 @@ def _start(
 def _duration(start: Plan | Equilibrium) -> float:
     path = getattr(start, "path", None)
     return 0.0 if path is None else float(path.time[-1] - path.time[0])
+
+
+def _verdict(simulation: Simulation, summary: Summary) -> str:
+    """Largest tension, and the cables whose limit it exceeds."""
+    rows = {row.key: row for row in summary.rows}
+    above = rows["cables_above_tension_max"]
+    limits = f"above tension_max: {above.text}" if above.value else "all cables stay below tension_max"
+    return f"{simulation.robot.name}: tensions up to {rows['tension_max_n'].text}; {limits}."
+
+
+def _rows(simulation: Simulation) -> list[list[object]]:
+    """Names of the columns, then time, pose and tensions of each sample."""
+    columns = {"time [s]": simulation.time}
+    columns |= {f"{axis} [m]": simulation.pose.position[:, k] for k, axis in enumerate("xyz")}
+    columns |= {f"q{axis}": simulation.pose.quaternion[:, k] for k, axis in enumerate("xyzw")}
+    columns |= {f"T{k} [N]": column for k, column in enumerate(simulation.tensions.T)}
+    return [[*columns], *np.column_stack([*columns.values()]).tolist()]
 
 
 def _tell(simulation: Simulation, summary: Summary) -> None:

@@ -13,7 +13,7 @@ from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary
 from sagline.cli.ending import OUTSIDE
 from sagline.cli.output import Output, TextTable, number_text, show_table
-from sagline.cli.terminal import show_note
+from sagline.cli.terminal import show_note, show_text
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.files.writing import file_stem
@@ -121,12 +121,26 @@ def _gap_text(gap: Gap, plan: Plan) -> str:
     return f"{when}: {short}; limits of {cables}"
 
 
-def tell(runs: Sequence[ConfirmedRun], output: Output, *, as_json: bool) -> int:
-    """Print the summary and the infeasible parts of the paths; returns the exit code."""
-    output.report(
-        lambda: {"runs": [_record(run) for run in runs]}, lambda: show_table(_summary_grid(runs)), as_json=as_json
-    )
+def tell(runs: Sequence[ConfirmedRun], output: Output, notes: Sequence[str] = (), *, as_json: bool) -> int:
+    """Print the summary, notes and the infeasible parts of the paths; returns the exit code."""
+
+    def show() -> None:
+        show_table(_summary_grid(runs))
+        for note in notes:
+            show_text(note)
+
+    output.report(lambda: {"runs": [_record(run) for run in runs]}, _verdict(runs), show, as_json=as_json)
     return max((_complaints(run) for run in runs), default=0)
+
+
+def _verdict(runs: Sequence[ConfirmedRun]) -> str:
+    """Number of feasible, stable poses of all runs."""
+    poses = sum(run.plan.status.size for run in runs)
+    held = sum(int(np.sum(run.plan.feasible)) - run.lost for run in runs)
+    of = "" if len(runs) == 1 else f" of {len(runs)} runs"
+    if held == poses:
+        return f"All {poses:,} poses{of} are feasible and stable."
+    return f"{held:,} of {poses:,} poses{of} are feasible and stable."
 
 
 def _summary_grid(runs: Sequence[ConfirmedRun]) -> TextTable:

@@ -8,12 +8,7 @@ from shlex import quote
 from typing import TYPE_CHECKING, Annotated
 
 from sagline.cli.ending import OUTSIDE
-from sagline.cli.options import (
-    JsonOption,
-    argument,
-    only_without,
-    option,
-)
+from sagline.cli.options import JsonOption, argument, only_without, option, out_option
 from sagline.cli.output import TextTable, number_text, show_table
 from sagline.cli.terminal import show_json, show_note, show_text, working
 from sagline.core.errors import SaglineError
@@ -34,12 +29,7 @@ ENDS = {
 
 def sweep(
     file: Annotated[Path, argument("SWEEP.yaml", "Robots, poses, wrenches and quantities.")],
-    out: Annotated[
-        Path | None,
-        option(
-            "DIR", "Folder of the sweep; an unfinished sweep in it is continued. Default: SWEEP in output.", "--out"
-        ),
-    ] = None,
+    out: Annotated[Path | None, out_option("SWEEP in output")] = None,
     workers: Annotated[
         str | None,
         option("COUNT", "Processes on this machine. Default: one per processor."),
@@ -53,8 +43,8 @@ def sweep(
 ) -> int:
     """Compute tensions, lengths or shortfalls of every robot at every pose under every wrench.
 
-    Each task writes its chunk to the disk, and DIR/done has the progress. The same command continues a stopped sweep.
-    Read the numbers with sl.sweep.load("DIR"), or as Zarr. Exit code 1 if requests have no verdict.
+    Each task writes its chunk to the disk, and DIR/done has the progress. The same command continues a sweep that was
+    stopped. Read the numbers with sl.sweep.load("DIR"), or as Zarr. Exit code 1 if requests have no verdict.
 
     For example:
 
@@ -119,7 +109,8 @@ def _show(found: Sweep) -> None:
         for name, count in counts.items()
         if count
     ]
-    show_table(TextTable(["requests", "number", "[%]", ""], rows, str(found.request)))
+    verdict = f"{counts['feasible']:,} of {total:,} requests are feasible."
+    show_table(TextTable(["requests", "number", "[%]", ""], rows, str(found.request)), verdict)
     show_text(f"{counted(found.tasks, 'task')}, {found.seconds:,.1f} s of work; variables: {', '.join(found.names)}")
     show_text(f"In {found.folder.resolve()}: read with sl.sweep.load({str(found.folder)!r})", whole=True)
 

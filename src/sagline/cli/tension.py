@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from sagline.cli.ending import OUTSIDE
 from sagline.cli.options import (
+    USUAL_FORMATS,
+    FiguresOption,
+    FigureStyle,
+    FormatsOption,
     JsonOption,
     ModelName,
     ModelOption,
@@ -16,10 +20,11 @@ from sagline.cli.options import (
     PayloadOption,
     PoseOption,
     RobotArgument,
+    StyleOption,
+    TableOption,
     TensionVariable,
     VariableOption,
     WrenchOption,
-    figures_flag,
 )
 from sagline.cli.output import Output, TextTable, show_table
 from sagline.cli.terminal import show_note, show_text
@@ -44,7 +49,10 @@ def tension(
     wrench: WrenchOption = None,
     payload: PayloadOption = None,
     folder: OutOption = Path("output"),
-    figures: Annotated[bool, figures_flag("Draw the tension polygon, as PNG and SVG.")] = True,
+    figures: FiguresOption = True,
+    formats: FormatsOption = USUAL_FORMATS,
+    style: StyleOption = FigureStyle.PLAIN,
+    table: TableOption = False,
     as_json: JsonOption = False,
 ) -> int:
     """Compare nine tension distribution methods at one pose, and draw their tensions in the tension polygon.
@@ -67,7 +75,8 @@ def tension(
     robot = robot_with_payload(name, payload)
     place = middle_pose(robot) if pose is None else pose
     drawn = figures and robot.cable_count == robot.degrees_of_freedom + 2
-    output = Output(folder, (), [file_stem(robot.name, "tension")] * drawn)
+    parts = ["-tensions.csv"] * table
+    output = Output(folder, file_stem(robot.name), parts, ["-tension"] * drawn, formats, style)
     least = inverse(
         robot, place, model.build(), MinimumNorm(variable.value), wrench
     )  # raises an error if no method applies
@@ -88,7 +97,9 @@ def tension(
         from sagline import plot
 
         points = {title: plan.chord_tension for title, plan in plans.items() if plan is not None}
-        output.draw(plot.polygon(shape, points))
+        output.draw(lambda: plot.polygon(shape, points))
+    for part in parts:
+        output.table(part, _rows(robot, plans))
     tensions = {title: _record(plan) for title, plan in plans.items()}
 
     def tell() -> None:
@@ -97,7 +108,9 @@ def tension(
             f"Capacity margin, the additional force in any direction that the cables can balance: {n(margin, unit='N')}"
         )
 
-    output.report(lambda: {"capacity_margin": margin, "tensions": tensions}, tell, as_json=as_json)
+    count = sum(plan is not None and plan.feasible for plan in plans.values())
+    verdict = f"{robot.name}: {count} of {len(plans)} methods have tensions within the limits."
+    output.report(lambda: {"capacity_margin": margin, "tensions": tensions}, verdict, tell, as_json=as_json)
     return 0
 
 
@@ -134,6 +147,13 @@ def _record(plan: Plan | None) -> Any:
     if plan is None:
         return None
     return {"status": PoseStatus(int(plan.status)).name, "chord_tension": list(map(float, plan.chord_tension))}
+
+
+def _rows(robot: Robot, plans: dict[str, Plan | None]) -> list[list[object]]:
+    """Status and tensions of each method that is defined for the robot."""
+    known = {title: _record(plan) for title, plan in plans.items() if plan is not None}
+    head = ["method", "status", *(f"T{k} [N]" for k in range(robot.cable_count))]
+    return [head, *([title, each["status"], *each["chord_tension"]] for title, each in known.items())]
 
 
 def _grid(robot: Robot, plans: dict[str, Plan | None]) -> TextTable:

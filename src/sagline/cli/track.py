@@ -2,32 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
-from sagline.cli.lengths import plan_text
+from sagline.cli.lengths import plan_rows
 from sagline.cli.options import (
+    USUAL_FORMATS,
+    FiguresOption,
+    FigureStyle,
+    FormatsOption,
     JsonOption,
     ModelName,
     ModelOption,
     OutOption,
     PayloadOption,
     RobotArgument,
+    StyleOption,
+    TableOption,
     Tension,
     TensionOption,
     TensionVariable,
     VariableOption,
     WrenchOption,
     argument,
-    figures_flag,
-    flag,
 )
 from sagline.cli.output import Output
 from sagline.cli.terminal import working
 from sagline.core.errors import FileError
-from sagline.files.writing import write_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -52,16 +56,17 @@ def track(
     wrench: WrenchOption = None,
     payload: PayloadOption = None,
     folder: OutOption = Path("output"),
-    figures: Annotated[bool, figures_flag("Draw figures, as PNG and SVG.")] = True,
-    table: Annotated[
-        bool, flag("Write the plan as DIR/ROBOT-MODEL.csv too: poses, lengths, tensions.", "--csv")
-    ] = False,
+    figures: FiguresOption = True,
+    formats: FormatsOption = USUAL_FORMATS,
+    style: StyleOption = FigureStyle.PLAIN,
+    table: TableOption = False,
     as_json: JsonOption = False,
 ) -> int:
     """Plan the cable lengths of a robot along a path, and confirm them with exact catenaries.
 
     The lengths of the chosen model are given to exact catenaries; the position error is the distance of the resulting
-    equilibrium from the planned pose. The plan is written to DIR/ROBOT-MODEL.nc.
+    equilibrium from the planned pose. The plan is written to DIR/ROBOT-MODEL.nc, with --csv
+    also poses, lengths and tensions as a table.
 
     For example:
 
@@ -80,15 +85,15 @@ def track(
         check_unit(path, way, machine)
     cable = model.build()
     name = run_name(machine, cable)
-    drawn = [f"{name}-{figure}" for figure in FIGURES if figures]
-    output = Output(folder, [f"{name}.nc", *[f"{name}.csv"] * table], drawn)
+    drawn = [f"-{figure}" for figure in FIGURES if figures]
+    output = Output(folder, name, [".nc", *[".csv"] * table], drawn, formats, style)
     method = tension.build(variable)
     with working(f"{machine.name}: planning and confirming {len(way):,} poses") as line:
         run = run_along(machine, way, cable, method, line, wrench)
     with working("writing"):
-        run.plan.save(output.file(f"{name}.nc"))
+        run.plan.save(output.file(".nc"))
         if table:
-            write_text(output.file(f"{name}.csv"), plan_text(run.plan))
+            output.table(".csv", plan_rows(run.plan))
         if figures:
             output.draw(*_figures(run))
     return tell([run], output, as_json=as_json)
@@ -106,10 +111,15 @@ def check_unit(file: Path, way: MotionPath, robot: Robot) -> None:
         raise FileError(file, reason, "If these are millimeters, write the unit: x [mm] in CSV, 1500 mm in YAML.")
 
 
-def _figures(run: ConfirmedRun) -> tuple[Figure | Axes, ...]:
+def _figures(run: ConfirmedRun) -> tuple[Callable[[], Figure | Axes], ...]:
     """Figures in the order of FIGURES."""
     from sagline import plot
 
     way = run.plan.path
     assert way is not None
-    return plot.path(way), plot.velocity(way), plot.overview(run.plan), plot.error(run.confirmation)
+    return (
+        lambda: plot.path(way),
+        lambda: plot.velocity(way),
+        lambda: plot.overview(run.plan),
+        lambda: plot.error(run.confirmation),
+    )

@@ -6,11 +6,20 @@ import gc
 import re
 from collections.abc import Sequence
 from contextlib import ExitStack, closing
-from pathlib import Path
 from socket import gethostname
 from typing import TYPE_CHECKING, Annotated, Final
 
-from sagline.cli.options import ModbusOption, PriorityOption, RobotArgument, SeedOption, converted_option, option
+from sagline.cli.options import (
+    HostOption,
+    LogOption,
+    ModbusOption,
+    PortOption,
+    PriorityOption,
+    RobotArgument,
+    SeedOption,
+    TrueOption,
+    option,
+)
 from sagline.cli.terminal import show_note, show_text
 
 if TYPE_CHECKING:
@@ -35,20 +44,11 @@ STATUS: Final = {  # the first applicable text, by the names of `GroupStatus`
 
 def twin(
     name: RobotArgument,
-    true: Annotated[str | None, option("ROBOT", "File of the real robot if it differs. The PLCs use ROBOT.")] = None,
-    port: Annotated[
-        int,
-        converted_option(
-            "NUMBER",
-            "Port of the first group; the next ports are for the other groups. 0 selects free ports.",
-            "port_of",
-        ),
-    ] = 11021,
-    host: Annotated[
-        str, option("ADDRESS", "Address to listen on; 0.0.0.0 and :: mean all addresses of this machine.")
-    ] = "127.0.0.1",
+    true: TrueOption = None,
+    port: PortOption = 11021,
+    host: HostOption = "127.0.0.1",
     modbus: ModbusOption = False,
-    seed: SeedOption = "0",
+    seed: SeedOption = 0,
     faults: Annotated[
         list[str] | None,
         option(
@@ -58,12 +58,13 @@ def twin(
             "--fault",
         ),
     ] = None,
-    log: Annotated[Path | None, option("FILE.mcap", "Write the true pose of the platform, until Ctrl-C.")] = None,
+    log: LogOption = None,
     priority: PriorityOption = None,
 ) -> int:
     """Simulate plant, drives and PLCs of a robot in real time, until Ctrl-C.
 
-    Each group of two winches has a PLC, a server with the data blocks of the real one. The first lines show the command
+    Each group of two winches has a PLC, a server with the data blocks of the real one, on consecutive ports from --port
+    on. The PLCs use ROBOT. The log has the true pose of the platform. The first lines show the command
     that connects a controller; the next lines show the states of the PLCs. Exit code 130 after Ctrl-C.
 
     For example:
@@ -73,20 +74,18 @@ def twin(
         sagline twin article-prototype --true worn.yaml --log twin.mcap
         sagline twin article-prototype --modbus --port 5020
     """
-    from sagline.cli.values import whole_of
     from sagline.control.real_time import set_priority
     from sagline.files.robot_file import load_robot
-    from sagline.twin.machine import MOST_SEED, Machine
+    from sagline.twin.machine import Machine
     from sagline.twin.server import SCAN, Server, check_first_port
 
     robot = load_robot(name)
     check_first_port(port, robot)
     real = robot if true is None else load_robot(true)
-    noise = whole_of(seed, "--seed", 0, MOST_SEED)
     if priority is not None:
         set_priority(priority)
     with ExitStack() as stack:
-        machine = Machine(real, nominal=robot, seed=noise, period=SCAN, faults=tuple(faults or ()))
+        machine = Machine(real, nominal=robot, seed=seed, period=SCAN, faults=tuple(faults or ()))
         server = stack.enter_context(closing(Server(machine, host=host, port=port, modbus=modbus)))
         watch = TwinMonitor(machine)
         if log is not None:

@@ -28,7 +28,7 @@ _SIGN: Final = re.compile(r"\s*(?:±|\+/-|\+-)\s*")
 _SPAN: Final = re.compile(r"(.*?)(?:\.\.|\bto\b)(.*)", re.DOTALL)
 _UNIT: Final = re.compile(r"(?!e[-+]?[0-9])[a-zµ].*", re.IGNORECASE | re.DOTALL)  # not an exponent
 _POINTS: Final = re.compile(r"([0-9]{1,4})\s*[x×]\s*([0-9]{1,4})\s*[x×]\s*([0-9]{1,4})")
-_STEP: Final = "Give forces, moments and accelerations with units: --wrench '±100 N, ±20 N m'."
+_STEP: Final = "Give forces, moments and accelerations with units: --loads '±100 N, ±20 N m'."
 _LONGEST: Final = 200  # largest number of characters of a set of loads or a box
 
 
@@ -58,6 +58,16 @@ def ratio(text: str, item: str) -> float:
     return quantity(number, item, "", low=0.0) / (100.0 if percent else 1.0)
 
 
+def formats_of(text: str, item: str) -> tuple[str, ...]:
+    """Formats of figures from "png, pdf"."""
+    from sagline.cli.options import FORMATS
+
+    found = tuple(dict.fromkeys(part.strip().lower() for part in text.split(",")))
+    if not set(found) <= set(FORMATS):
+        raise InvalidValueError(item, repr(text), ", ".join(FORMATS), f"Give one or several: {item} png,pdf.")
+    return found
+
+
 def middle_pose(robot: Robot) -> Pose:
     """Level pose in the middle of a robot's test box; InvalidValueError if it has none."""
     if robot.test_box is None:
@@ -83,7 +93,7 @@ def wrenches_of(text: str, item: str) -> WrenchSet:
     if len(text) > _LONGEST or not _SIGN.match(text):
         if "±" in text or len(text) > _LONGEST:
             raise InvalidValueError(item, repr(text), "each with ±, or none", _STEP)
-        return WrenchPolytope([cast(Any, wrench_of_text(text, item))])
+        return WrenchPolytope([cast(Any, wrench_of_text(text, item, _STEP))])
     found: dict[str, list[float]] = {kind: [] for kind in _KINDS}
     for part in text.split(","):
         kind, size = _load_of(part, item)

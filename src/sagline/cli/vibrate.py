@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,27 +12,35 @@ import numpy as np
 
 from sagline.cli.ending import OUTSIDE
 from sagline.cli.options import (
+    USUAL_FORMATS,
     AirDampingOption,
+    FiguresOption,
+    FigureStyle,
+    FormatsOption,
     JsonOption,
     LossTimeOption,
     OutOption,
     PayloadOption,
     PoseOption,
     RobotArgument,
+    StyleOption,
+    TableOption,
+    Tension,
+    TensionOption,
+    TensionVariable,
     WrenchOption,
     choice_option,
     converted_option,
-    figures_flag,
     only_with,
     only_without,
     option,
     quantity_option,
 )
-from sagline.cli.output import Output, TextTable, csv_text, number_text, show_table
+from sagline.cli.output import Output, TextTable, number_text, show_table
 from sagline.cli.tension import reason
 from sagline.cli.terminal import show_note, show_text, working
 from sagline.core.errors import InvalidValueError
-from sagline.files.writing import write_text
+from sagline.core.numbers import counted
 
 if TYPE_CHECKING:
     from sagline.dynamics.vibration.dynamic_stiffness import Damping
@@ -41,6 +50,7 @@ if TYPE_CHECKING:
     from sagline.robot.equilibrium import Equilibrium
     from sagline.robot.pose import Pose
     from sagline.robot.robot import Robot
+    from sagline.tension.method import TensionMethod
 
 
 class _Direction(StrEnum):
@@ -58,6 +68,7 @@ LEAST_SHARE = 0.05  # smallest share of the platform in a printed mode; the file
 COLUMNS = ("mode", "kind", "frequency_hz", "platform_share", "cable", "cable_share", "damping_ratio")
 LOWEST = 3  # number of lowest modes that are always printed
 FIGURES = ("frequency", "peak")  # figures of a map
+TABLE, MAP = "-modes.csv", "-vibration-map.nc"
 
 
 _PointsOption = Annotated[
@@ -75,7 +86,7 @@ _DampingOption = Annotated[
         "RATIO", "Damping ratio of every mode, 0.01 or '1 %', in addition to that of the cables.", "ratio"
     ),
 ]
-_ForceOption = Annotated[
+_AxisOption = Annotated[
     _Direction,
     choice_option("AXIS", "Force of the response figure", _Direction),
     only_with("--figures"),
@@ -89,16 +100,20 @@ def vibrate(
     points: _PointsOption = None,
     up_to: Annotated[float, quantity_option("HZ", "All modes below this frequency are found.", "Hz", above=0.0)] = 20,
     damping: _DampingOption = 0.01,
-    loss_time: LossTimeOption = 0,
+    loss_time: LossTimeOption = None,
     air_damping: AirDampingOption = 0,
-    force: _ForceOption = _Direction.X,
+    axis: _AxisOption = _Direction.X,
     film: Annotated[
         int | None, option("MODE", "Write a film of this mode, ten seconds, as GIF."), only_without("--map")
     ] = None,
+    tension: TensionOption = Tension.CLOSEST,
     wrench: Annotated[WrenchOption, only_without("--map")] = None,
     payload: PayloadOption = None,
     folder: OutOption = Path("output"),
-    figures: Annotated[bool, figures_flag("Draw the response, as PNG and SVG.")] = True,
+    figures: FiguresOption = True,
+    formats: FormatsOption = USUAL_FORMATS,
+    style: StyleOption = FigureStyle.PLAIN,
+    write_table: Annotated[TableOption, only_without("--map")] = True,
     as_json: JsonOption = False,
 ) -> int:
     """Find all natural frequencies of a pose: those of the platform and those of the cables as strings.
@@ -120,16 +135,18 @@ def vibrate(
     from sagline.files.writing import file_stem
     from sagline.kinematics.inverse import inverse
 
-    losses = Damping(loss_time, air_damping, damping)
+    losses, method = Damping(loss_time or 0.0, air_damping, damping), tension.build(TensionVariable.CHORD)
     robot = robot_with_payload(name, payload)
     if points is not None:
-        return _vibrate_in_box(robot, points, up_to, losses, folder, figures=figures, as_json=as_json)
-    table, drawing = (file_stem(robot.name, what) for what in ("modes", "response"))
-    reel = f"{file_stem(robot.name, f'mode-{film}')}.gif"
-    output = Output(folder, [f"{table}.csv", *[reel] * (film is not None)], [drawing] * figures)
+        drawn = [f"-vibration-map-{figure}" for figure in FIGURES if figures]
+        output = Output(folder, file_stem(robot.name), [MAP], drawn, formats, style)
+        return _vibrate_in_box(robot, points, up_to, losses, method, output, as_json=as_json)
+    reel = f"-mode-{film}.gif"
+    parts = [*[TABLE] * write_table, *[reel] * (film is not None)]
+    output = Output(folder, file_stem(robot.name), parts, ["-response"] * figures, formats, style)
     place = middle_pose(robot) if pose is None else pose
     with working(f"{robot.name}: modes up to {up_to:g} Hz") as line:
-        plan = inverse(robot, place, wrench=wrench)
+        plan = inverse(robot, place, tension=method, wrench=wrench)
         if not plan.feasible:
             show_note("No modes: ", reason(robot, place, plan), style="bold red")
             return OUTSIDE
@@ -139,19 +156,24 @@ def vibrate(
             return OUTSIDE
         modes = listed_modes(found)
         _check_film(film, modes)
-        rows = [["" if value is None else value for value in _numbers(mode)] for mode in modes]
-        header = [column.replace("_hz", " [Hz]") for column in COLUMNS]
-        write_text(output.file(f"{table}.csv"), csv_text([header, *rows]))
+        if write_table:
+            rows = [["" if value is None else value for value in _numbers(mode)] for mode in modes]
+            output.table(TABLE, [[column.replace("_hz", " [Hz]") for column in COLUMNS], *rows])
         if figures and found.status is VibrationStatus.SOLVED and found.frequency.size:
             from sagline import plot
 
             line.stage("drawing the response")
-            output.draw(plot.response(found, force.value))
+            output.draw(lambda: plot.response(found, axis.value))
         if film is not None:
             from sagline import plot
 
             plot.film(found, film, output.file(reel), progress=line.stage(f"filming mode {film}"))
-    output.report(lambda: _record(found, modes), lambda: _tell(found, modes, plan.state), as_json=as_json)
+    output.report(
+        lambda: _record(found, modes),
+        _verdict(found, modes),
+        lambda: _tell(found, modes, plan.state),
+        as_json=as_json,
+    )
     if found.status is VibrationStatus.FOLDED:
         slack = ", ".join(map(str, found.slack_cables))
         show_note(f"Cables {slack}: ", found.status.text, style="bold")
@@ -164,6 +186,16 @@ def _check_film(film: int | None, modes: list[ListedMode]) -> None:
     count = sum(mode.kind == WITH_MASS for mode in modes)
     if film is not None and not 1 <= film <= count:
         raise InvalidValueError("--film", film, f"1 to {count}, modes with cable mass", "Raise --up-to for more.")
+
+
+def _verdict(found: Vibration, modes: list[ListedMode]) -> str:
+    """Number of modes with cable mass, and the lowest one."""
+    from sagline.dynamics.vibration.mode_list import WITH_MASS
+
+    frequency = [mode.frequency for mode in modes if mode.kind == WITH_MASS]
+    lowest = f", the lowest at {min(frequency):.3f} Hz" if frequency else ""
+    proof = "the list is complete by the exact count" if found.complete else "some may be missing"
+    return f"{counted(len(frequency), 'mode')} with cable mass below {found.up_to:g} Hz{lowest}; {proof}."
 
 
 def _tell(found: Vibration, modes: list[ListedMode], state: Equilibrium) -> None:
@@ -184,10 +216,8 @@ def _tell(found: Vibration, modes: list[ListedMode], state: Equilibrium) -> None
         mode for k, mode in enumerate(swinging) if k < LOWEST or mode.platform_share >= LEAST_SHARE or k in beside
     ]
     if not swinging:
-        proof = "by the exact count" if found.complete else "not proved by the exact count"
         lowest = number_text(min(beyond, default=np.nan), ".3f")
-        below = f"No mode with cable mass is below {found.up_to:g} Hz, {proof}"
-        show_text(f"{below}; the lowest massless one is at {lowest} Hz. Raise --up-to.")
+        show_text(f"The lowest massless mode is at {lowest} Hz. Raise --up-to.")
         return
     rows = [
         [
@@ -212,16 +242,12 @@ def _tell(found: Vibration, modes: list[ListedMode], state: Equilibrium) -> None
     ]
     x, y, z = state.pose.position
     show_table(TextTable(heads, rows, f"{state.one_robot.name} at {x:g}, {y:g}, {z:g} m", left=frozenset()))
-    proof = "the list is complete by the exact count" if found.complete else "some may be missing"
-    hidden = len(swinging) - len(chosen)
-    text = f"{len(swinging)} modes with cable mass below {found.up_to:g} Hz: {proof}."
-    if hidden:
-        text += f" Not shown: {hidden} modes of the cables alone (platform below {100.0 * LEAST_SHARE:.0f} %)."
-    show_text(text)
+    if hidden := len(swinging) - len(chosen):
+        show_text(f"Not shown: {hidden} modes of the cables alone (platform below {100.0 * LEAST_SHARE:.0f} %).")
     if beyond:
         higher = ", ".join(number_text(frequency, ".3f") for frequency in beyond)
         show_text(f"Massless modes above this frequency: {higher} Hz")
-    elif swinging:
+    else:
         show_text("Each massless frequency is in the row of the mode with most of its motion.")
 
 
@@ -243,32 +269,36 @@ def _record(found: Vibration, modes: list[ListedMode]) -> dict[str, Any]:
 
 
 def _vibrate_in_box(
-    robot: Robot, points: Sequence[int], limit: float, damping: Damping, folder: Path, *, figures: bool, as_json: bool
+    robot: Robot,
+    points: Sequence[int],
+    limit: float,
+    damping: Damping,
+    method: TensionMethod,
+    output: Output,
+    *,
+    as_json: bool,
 ) -> int:
     """Compute, write and draw the map over the test box; returns the exit code."""
     from sagline.dynamics.vibration.frequency_map import frequency_map
-    from sagline.files.writing import file_stem
 
     poses = _grid(robot, points)
-    name = file_stem(robot.name, "vibration-map")
-    output = Output(folder, [f"{name}.nc"], [f"{name}-{figure}" for figure in FIGURES if figures])
     what = f"{robot.name}: modes at {len(poses):,} poses"
     with working(what) as line:
-        found = frequency_map(robot, poses, up_to=limit, damping=damping, progress=line.progress)
-        found.save(output.file(f"{name}.nc"))
-        if figures:
+        found = frequency_map(robot, poses, up_to=limit, damping=damping, tension=method, progress=line.progress)
+        found.save(output.file(MAP))
+        if output.draws:
             from sagline import plot
 
             line.stage("drawing")
-            output.draw(*(plot.frequency_map(found, figure) for figure in FIGURES))
+            output.draw(*(partial(plot.frequency_map, found, figure) for figure in FIGURES))
     known = np.isfinite(found.frequency)
 
     def tell() -> None:
         if known.any():
             show_table(_table_of_map(found))
-        show_text(f"{int(known.sum()):,} of {known.size:,} poses have modes below {limit:g} Hz.")
 
-    output.report(lambda: _record_of_map(found), tell, as_json=as_json)
+    verdict = f"{int(known.sum()):,} of {known.size:,} poses have modes below {limit:g} Hz."
+    output.report(lambda: _record_of_map(found), verdict, tell, as_json=as_json)
     if known.any():
         return 0
     show_note("No modes: ", "no feasible pose of the box has a mode below --up-to; raise it", style="bold red")

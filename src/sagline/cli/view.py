@@ -11,7 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from sagline.cli.options import (
+    HostOption,
     PayloadOption,
+    PortOption,
     PoseOption,
     WrenchOption,
     argument,
@@ -58,10 +60,6 @@ _BesideOption = Annotated[
 _TruthOption = Annotated[
     Path | None, option("TWIN.mcap", "With a log: the log of the twin, with the true pose of the platform.")
 ]
-_HostOption = Annotated[
-    str,
-    option("ADDRESS", "Address to listen on; 0.0.0.0 means all addresses of this machine, so that others can look."),
-]
 _AllowHostOption = Annotated[
     list[str] | None,
     option("NAME", "Further name of this machine, or of a proxy, in the address of a browser. It can be repeated."),
@@ -80,8 +78,8 @@ def view(
     ] = None,
     wrench: WrenchOption = None,
     payload: PayloadOption = None,
-    host: _HostOption = "127.0.0.1",
-    port: Annotated[int, converted_option("NUMBER", "Port to listen on; 0 selects a free port.", "port_of")] = 8080,
+    host: HostOption = "127.0.0.1",
+    port: PortOption = 8080,
     token: Annotated[
         bool, flag("Answer only requests with the token of the printed address.", "--token/--no-token")
     ] = True,

@@ -10,14 +10,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from sagline.cli.ending import OUTSIDE
 from sagline.cli.options import (
+    USUAL_FORMATS,
+    FiguresOption,
+    FigureStyle,
+    FormatsOption,
     JsonOption,
     ModelName,
     ModelOption,
     OutOption,
     PayloadOption,
     RobotArgument,
+    StyleOption,
+    TableOption,
     converted_option,
-    figures_flag,
     flag,
     only_with,
     option,
@@ -133,7 +138,7 @@ _BudgetOption = Annotated[
 
 def workspace(
     name: RobotArgument,
-    wrench: LoadsOption = None,
+    loads: LoadsOption = None,
     payload: PayloadOption = None,
     tilt: _TiltOption = 0,
     box: _BoxOption = None,
@@ -153,7 +158,10 @@ def workspace(
     ] = HullName.EXACT,
     model: ModelOption = ModelName.CATENARY,
     folder: OutOption = Path("output"),
-    figures: Annotated[bool, figures_flag("Draw the hull and a slice, as PNG and SVG.")] = True,
+    figures: FiguresOption = True,
+    formats: FormatsOption = USUAL_FORMATS,
+    style: StyleOption = FigureStyle.PLAIN,
+    table: TableOption = False,
     as_json: JsonOption = False,
 ) -> int:
     """Find the workspace of a robot: its volume with an error bar, and the limits at its boundary.
@@ -165,7 +173,7 @@ def workspace(
     For example:
 
         sagline workspace article-suspended
-        sagline workspace cogiro --wrench "±100 N, ±20 N m" --tilt 10deg
+        sagline workspace cogiro --loads "±100 N, ±20 N m" --tilt 10deg
         sagline workspace article-suspended --prove "-2..2, -1..1, 1..3 m"
         sagline workspace ipanema-1 --max-sag "5 cm" --box "-1..1, -1..1, 0..2 m"
     """
@@ -189,14 +197,14 @@ def workspace(
         raise InvalidValueError("--tilt", f"{tilt:g} rad", "0 to 180deg", step)
     robot = robot_with_payload(name, payload)
     criteria = _criteria(name, limits, scene, in_frame=in_frame)
-    space_file, mesh = f"{file_stem(robot.name, 'workspace')}.nc", f"{file_stem(robot.name, 'hull')}.glb"
-    drawn = [file_stem(robot.name, what) for what in ("workspace", "slice") if figures]
-    output = Output(folder, [space_file, mesh], drawn)
+    space_file, mesh, limits_file = "-workspace.nc", "-hull.glb", "-limits.csv"
+    parts, drawn = [space_file, mesh, *[limits_file] * table], ["-workspace", "-slice"] if figures else []
+    output = Output(folder, file_stem(robot.name), parts, drawn, formats, style)
     with working(f"{robot.name}: workspace") as line:
         space = workspace(
             robot,
             box,
-            wrench,
+            loads,
             orientations=Tilts(tilt),
             criteria=criteria,
             model=cable,
@@ -208,7 +216,7 @@ def workspace(
         if to_prove is not None:
             claim = PoseBox(to_prove.low, to_prove.high, tilt)
             stage = line.stage(f"{robot.name}: proof")
-            proof = prove(robot, claim, wrench, budget=budget, model=cable, progress=stage)
+            proof = prove(robot, claim, loads, budget=budget, model=cable, progress=stage)
         space.save(output.file(space_file))
         if space.nearest is None:
             space.surface.export(output.file(mesh))
@@ -216,10 +224,14 @@ def workspace(
                 from sagline import plot
 
                 line.stage("drawing")
-                output.draw(plot.workspace(space))
+                output.draw(lambda: plot.workspace(space))
                 if space.unit == "m³":  # for a plane, the first figure is the slice
-                    output.draw(plot.slice(space))
-    output.report(lambda: _record(space, proof), lambda: _tell(space, proof), as_json=as_json)
+                    output.draw(lambda: plot.slice(space))
+        if table:
+            rows = [[limit.criterion, "" if limit.cable < 0 else limit.cable, limit.share] for limit in space.limits]
+            output.table(limits_file, [["criterion", "cable", "share"], *rows])
+    verdict = str(space).partition("\n")[0]
+    output.report(lambda: _record(space, proof), verdict, lambda: _tell(space, proof), as_json=as_json)
     if space.nearest is not None:
         show_note("Empty workspace: ", space.nearest.reason, style="bold red")
     proved = proof is None or proof.verdict is ProofVerdict.PROVED_INSIDE

@@ -24,6 +24,7 @@ from .plan import velocity as velocity
 from .polygon import polygon as polygon
 from .robot import robot as robot
 from .sheet import save as save
+from .simulation import simulation as simulation
 from .style import style as style
 from .workspace import slice as slice
 from .workspace import workspace as workspace

@@ -36,6 +36,8 @@ from sagline.robot.robot import Robot
 Integrator = Literal["splitting", "runge-kutta"]  # in the order of the kernel's codes
 CableMass = Literal["none", "lumped", "modal"]
 RECORD: Final = 0.01  # s
+NODES: Final = 20  # elements of a cable with mass
+LOSS_TIME: Final = 1e-3  # loss time that is assumed after a break [s]
 MOST_STEPS: Final = 10**8  # some minutes
 
 
@@ -46,7 +48,7 @@ def simulate(
     duration: float | None = None,
     step: float | None = None,
     cable_mass: CableMass = "none",
-    nodes: int = 20,
+    nodes: int = NODES,
     integrator: Integrator | None = None,
     winches: Winches = "ideal",
     winding: Winding = "constant",
@@ -144,6 +146,13 @@ def simulate(
         damping=damping,
         record=record,
     ).finish()
+
+
+def losses_after_break(given: InitialConditions, elements: int = 0) -> Damping:
+    """Energy losses of the cables that are assumed after a break, where none are known."""
+    if elements:  # the damping of waves in stiff cables does not require smaller steps than the waves
+        return Damping(loss_time=min(LOSS_TIME, 2.0 / wave_frequency(given, elements)))
+    return Damping(loss_time=LOSS_TIME)
 
 
 def started_run(

@@ -9,11 +9,9 @@ import numpy as np
 import viser
 
 from sagline.core.numbers import n
-from sagline.dynamics.simulation.chain_plant import wave_frequency
 from sagline.dynamics.simulation.initial_conditions import initial_conditions
 from sagline.dynamics.simulation.results import Break, Simulation
-from sagline.dynamics.simulation.simulate import started_run
-from sagline.dynamics.vibration.dynamic_stiffness import Damping
+from sagline.dynamics.simulation.simulate import losses_after_break, started_run
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.viewer import shapes
@@ -26,7 +24,6 @@ from sagline.viewer.readout import definitions, refused, sentence, verdict_box
 from sagline.viewer.robot_scene import Nodes
 from sagline.viewer.tension_scale import force_unit
 
-LOSSES: Final = Damping(loss_time=1e-3)
 PARTS: Final = (0.03, 0.1, 0.3, 0.7, 1.5, 2.8, 4.2)  # ends of the parts [s]; the first part is short and shown soon
 DURATION: Final = PARTS[-1]
 ELEMENTS: Final = 10  # elements of a cable with mass; twice as many take four times as long
@@ -44,9 +41,7 @@ def simulate_cut(state: Equilibrium, cable: int, cable_mass: str) -> Iterator[Si
     """Simulation of the break of a cable with constant other lengths; each part continues the previous one."""
     given = initial_conditions(state, None, None, DURATION)
     elements = ELEMENTS if cable_mass == "lumped" else 0
-    losses = LOSSES
-    if elements:  # the damping of waves in stiff cables does not require smaller steps than the waves
-        losses = Damping(loss_time=min(LOSSES.loss_time, 2.0 / wave_frequency(given, elements)))
+    losses = losses_after_break(given, elements)
     run = started_run(given, elements, events=(Break(cable=cable, time=0.0),), damping=losses)
     for part in PARTS:
         yield run.until(part)
