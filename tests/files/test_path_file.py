@@ -347,5 +347,5 @@ def test_waypoints_of_other_habits(tmp_path: FilePath, text: str, parts: tuple[s
 
 
 def test_a_rate_too_small_for_a_sample_between_is_refused(tmp_path: FilePath) -> None:
-    with refused(value="1 s, in which there is no sample", kind=FileError):
+    with refused(value="1 s, without a sample inside", kind=FileError):
         load_path(write(tmp_path, "tour.yaml", "rate: 1e-40\n" + HEAD + TWO))

@@ -78,7 +78,8 @@ class Cable:
             youngs_modulus: Young's modulus E of the whole rope [Pa], > 0; the modulus of its fibers or wires is larger.
             section_area: Section area A to which E refers [m^2], > 0; for a rope usually only the area of its fibers or
                 metal.
-            diameter: Diameter of the rope [m], > 0; None if not known. The section area does not follow from it.
+            diameter: Diameter of the rope [m], > 0; None if unknown. The section area cannot be computed from the
+                diameter.
             expansion: Coefficient of thermal expansion [1/K], or None.
 
         Returns:
@@ -125,7 +126,7 @@ class Cable:
         return evolve(self, **changes)
 
     def known(self) -> dict[str, Array]:
-        """The fields that are known, by their names.
+        """Known fields, by name.
 
         Returns:
             linear_density, axial_stiffness, and diameter and expansion unless they are None.

@@ -192,7 +192,7 @@ class CableModel:
         )
 
     def profile(self, cable: Cable, state: CableState, points: int = 50) -> Array:
-        """Points of a cable in its own vertical plane, according to this model.
+        """Points of a cable in its vertical plane, according to this model.
 
         Args:
             cable: Material.
@@ -310,7 +310,7 @@ class CableState(Result):
         return out.reshape(self.shape)
 
     def points(self, count: int) -> Array:
-        """Points along the cable in its own vertical plane.
+        """Points along the cable in its vertical plane.
 
         Args:
             count: Number of points at equal steps of unstrained length, >= 2.

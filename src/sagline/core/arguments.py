@@ -123,7 +123,7 @@ def word_of(name: str) -> str:
 
 
 def named(value: str | T, kind: type[T], kinds: Mapping[str, type[T]], item: str) -> T:
-    """An object of a type unchanged; a name in words, for example "minimum-norm", gives one with default options."""
+    """An object of a type, unchanged; for a name such as "minimum-norm", an object with default options."""
     if not isinstance(value, str):
         return instance(value, kind, item)
     words = {word_of(name): kind for name, kind in kinds.items()}

@@ -124,7 +124,7 @@ def broadcast_shape(item: str, *shapes: tuple[int, ...]) -> tuple[int, ...]:
         return np.broadcast_shapes(*shapes)
     except ValueError:
         listed = " and ".join(str(shape) for shape in dict.fromkeys(shapes))
-        step = "Give one value for each, or one for all."
+        step = "Give one value for each, or one value for all."
         raise InvalidValueError(item, f"not of one shape, but {listed}", "shapes that broadcast", step) from None
 
 
@@ -156,7 +156,7 @@ def _refuse_masked_or_with_unit(value: Any, item: str, unit: str) -> None:
 
 
 def _from_other_kind(given: NDArray[Any], item: str) -> Array:
-    """Convert long doubles and Python number objects; refuse values that are not real numbers."""
+    """Convert long doubles and number objects of Python; refuse values that are not real numbers."""
     if given.dtype.kind in "fO" and (given.dtype.kind == "f" or all(_is_real(entry) for entry in given.flat)):
         with np.errstate(over="ignore"):  # an overflow gives infinity, which is refused
             return np.array(given, dtype=np.float64, order="C")

@@ -12,7 +12,7 @@ _WORD: Final = 60  # number of leading characters of the given text that are com
 LONGEST: Final = 299  # largest number of characters of a terminal line; longer messages are shortened
 HEAD: Final = "Error: "  # prefix of a message
 MOST: Final = LONGEST - len(HEAD)  # largest number of characters of a message
-LEAST: Final = 30  # smallest number of characters that are kept of each part
+LEAST: Final = 30  # smallest number of characters of each part in a shortened message
 
 
 class SaglineError(Exception):
@@ -49,7 +49,7 @@ class InvalidValueError(SaglineError, ValueError):
 
 
 class CableGeometryError(InvalidValueError):
-    """Positions of the two ends of a cable that are impossible for a cable."""
+    """Impossible positions of the two ends of a cable."""
 
 
 class NoSuchEntryError(InvalidValueError, IndexError):
@@ -88,7 +88,7 @@ class FileError(SaglineError):
 
         Args:
             path: The file.
-            error: The error of a value in it.
+            error: The error of a value in the file.
 
         Returns:
             The error, to be raised.

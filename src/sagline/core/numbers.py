@@ -14,7 +14,7 @@ LONGEST_PLAIN = 1e7  # larger numbers without a prefix are written with a power 
 SPACE = "\N{NO-BREAK SPACE}"
 TIGHT = ("", "°")  # units written without a space before them
 
-# first unit of a product, with its prefix; a power of a unit gets no prefix, which would be hard to read
+# first unit of a product, with its prefix; powers of a unit get no prefix, because it would be hard to read
 _scaled = re.compile(r"([fpnµmkMG]?)(rad|Pa|m|g|s|N|J|W)(?![\w²³⁴⁻^])")
 _superscript = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 

@@ -72,7 +72,7 @@ class ByFields:
     __slots__ = ()
 
     def __reduce__(self) -> tuple[Any, tuple[type[ByFields], dict[str, Any]]]:
-        """Pickle by fields, so that the arrays of the loaded object are locked too."""
+        """Pickle by fields, which locks the arrays of the loaded object."""
         return _again, (type(self), {field.name: getattr(self, field.name) for field in fields(self)})  # type: ignore[arg-type]
 
 
@@ -82,7 +82,7 @@ class Result(ByFields, Shown):
     __slots__ = ()
 
     def __repr__(self) -> str:
-        """First line of the text of a class that has its own text; otherwise the summary."""
+        """First line of the text from `__str__` if the class defines it; otherwise the summary."""
         if type(self).__str__ is object.__str__:
             return super().__repr__()
         return f"<{type(self).__name__}: {str(self).splitlines()[0]}>"

@@ -61,7 +61,7 @@ class ClearanceRows:
         platform: Box | Mesh | None = None,
         from_anchor: float | None = None,
     ) -> None:
-        """Prepare the measurement; the arguments are those of `clearance`, checked."""
+        """Prepare the measurement with the checked arguments of `clearance`."""
         self._precision = precision
         self._radius = cable_radius
         self._from_anchor = 0.0 if from_anchor is None else from_anchor
@@ -256,7 +256,7 @@ def clearance(
     """Least distances between sagging cables, platform and obstacles.
 
     Cables have the shape of their model, such as a catenary, and begin at the exit point of their pulley. The distances
-    are accurate to about 1e-12 m (with meshes 1e-7 m). A proof shows that other points are at most closer by the
+    are accurate to about 1e-12 m (with meshes 1e-7 m). It is proved that other points are closer by at most the
     precision.
 
     Args:
@@ -276,7 +276,7 @@ def clearance(
         Clearances.
 
     Raises:
-        InvalidValueError: If an argument is of the wrong kind, or a mesh is 100 times as large as the robot.
+        InvalidValueError: If an argument has the wrong type, or a mesh is 100 times larger than the robot.
         SaglineError: If an obstacle is a mesh and python-fcl is missing.
 
     Examples:
@@ -307,7 +307,7 @@ def clearance(
 
 
 def check_obstacles(given: Any, robot: Robot) -> tuple[Obstacle, ...]:
-    """Checked obstacles as a tuple; a mesh 100 times as large as the robot is rejected."""
+    """Checked obstacles as a tuple; rejects a mesh that is 100 times larger than the robot."""
     found = obstacles_of(given, "obstacles")
     for one in found:
         if isinstance(one, Mesh):

@@ -1,4 +1,4 @@
-"""Least distances from meshes with python-fcl; for cables by branch and bound on the chords of their pieces.
+"""Least distances from meshes, with python-fcl. Distances of cables: branch and bound on the chords of pieces.
 
 fcl computes the distance between triangles, and between triangles and a segment, with full precision. The bulge of a
 cable piece is an upper bound of its distance from its chord. A box is twelve triangles and a sphere is a segment of
@@ -39,7 +39,7 @@ class _Solid(NamedTuple):
 
     Attributes:
         geometry: Geometry of the body.
-        radius: Radius that is subtracted from distances [m].
+        radius: Radius to subtract from distances [m].
         mesh: Triangles of the body; None for rods and balls.
         inner: A point inside the body [m].
         place: Rotation and position of a body at rest.

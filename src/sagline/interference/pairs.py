@@ -113,7 +113,7 @@ class Pairs(NamedTuple):
         by_kernel: Numbers of the pairs that kernels measure, shape (P, 2).
         with_mesh: Numbers of the pairs with at least one mesh, shape (Q, 2).
         names: Names of all pairs, in the order of their numbers.
-        left_out: Pairs that are not measured, with the reason.
+        left_out: Omitted pairs, with the reasons.
     """
 
     parts: tuple[_CablePart, ...]

@@ -1,7 +1,6 @@
 """Decorators of kernels, and the back end that runs them: compiled C, numba, or plain Python.
 
-`SAGLINE_BACKEND` selects the back end. If it is not set, the first available back end is used. Results differ only by
-rounding.
+`SAGLINE_BACKEND` selects the back end; the default is the first available one. Results differ only by rounding.
 """
 
 from __future__ import annotations
@@ -31,8 +30,7 @@ def backend() -> str:
         "c" for the compiled library, "numba" for compilation at the first use, "python" for plain Python.
 
     Raises:
-        InvalidValueError: If the environment variable SAGLINE_BACKEND has another value, or names a back end that is
-            not available.
+        InvalidValueError: If the environment variable SAGLINE_BACKEND has another value, or its back end is missing.
 
     Examples:
         >>> import sagline as sl

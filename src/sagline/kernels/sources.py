@@ -67,7 +67,7 @@ def sources_of(module: str, sources: Path) -> frozenset[Path]:
 
 @cache
 def _imported(source: str) -> frozenset[str]:
-    """Names that a file imports from the kernels: modules, and names in modules (which do not belong to a file)."""
+    """Names that a file imports from the kernels: modules and names in modules."""
     names = set()
     for match in IMPORT.finditer(source):
         package = match[1]

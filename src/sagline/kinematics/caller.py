@@ -1,6 +1,6 @@
 """Fast copies between the arrays of a control loop and work arrays, with checks that take tens of nanoseconds.
 
-A memoryview accepts only an array of its own type and size, and this check is faster than a numpy copy.
+A memoryview accepts only an array of equal type and size. This check is faster than a numpy copy.
 """
 
 from __future__ import annotations

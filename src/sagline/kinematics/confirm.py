@@ -55,7 +55,7 @@ class Confirmation(Result):
     def rotation_error(self) -> Array:
         """Angle between equilibrium orientation and planned orientation [rad], shape () or (N,)."""
         planned, real = self.plan.state.pose.quaternion, self.pose.quaternion
-        # Sine and cosine of half the angle give a precise angle even if it is very small. The cosine alone would not.
+        # Sine and cosine of half the angle give a precise angle, even if the angle is very small.
         sine = 0.5 * np.linalg.norm(real - planned, axis=-1) * np.linalg.norm(real + planned, axis=-1)
         cosine = np.abs(np.einsum("...i,...i->...", real, planned))
         return locked(np.asarray(2.0 * np.arctan2(sine, cosine)))

@@ -294,7 +294,7 @@ def checked_lengths(robot: Robots, lengths: ArrayLike) -> Array:
 
 
 def dead_only(lengths: Array, dead: Array) -> InvalidValueError:
-    """Error for a length that is not longer than the dead length.
+    """Error for a length that does not exceed the dead length.
 
     lengths: unstrained lengths [m], shape (m,) or (N, m); dead: dead length [m], of the same shape; at least one length
     does not exceed it. Returns the error, to be raised. It names the cable and, in a batch, the sample.

@@ -187,7 +187,7 @@ class Plan(Result, Saved):
             return ()
         return (
             f"{count} of {self.status.size} poses are at the border of feasibility: their tensions "
-            f"balance the platform, but {type(self.tension).__name__} did not select them; widen the limits there",
+            f"balance the platform, but {type(self.tension).__name__} did not select them; widen the limits",
         )
 
     def _below_validity(self) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""The polygon of feasible tensions of one pose."""
+"""Polygon of feasible tensions of one pose."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from sagline.tension.method import Options, Variable, check_sharing, kernel_opti
 from sagline.tension.methods import Centroid, MinimumNorm
 from sagline.tension.polygon import Side, TensionPolygon
 
-MERGED = 1e-10  # corners with a smaller distance, relative to the largest tension, are merged
+MERGED = 1e-10  # largest distance of corners that are merged, relative to the largest tension
 
 _CATENARY = Catenary()
 
@@ -43,7 +43,7 @@ def tension_polygon(
         pose: One pose.
         model: Cable model.
         wrench: External plus inertial wrench about the center of mass, world axes [N, N m], shape (6,); None for zero.
-        variable: The tension variable of the polygon: "chord", "horizontal" (the article's) or "frame_end".
+        variable: The tension variable of the polygon: "chord", "horizontal" (as in the article) or "frame_end".
 
     Returns:
         The polygon, without vertices if the pose is not feasible.
@@ -67,7 +67,7 @@ def tension_polygon(
     plan = inverse(robot, pose, model, MinimumNorm(variable), wrench, stability=False)
     if plan.status not in (PoseStatus.SOLVED, PoseStatus.INFEASIBLE):
         raise InvalidValueError(
-            "pose", "one without a balance", "one that `inverse` can solve", PoseStatus(int(plan.status)).text
+            "pose", "one without a balance", "a pose that `inverse` can solve", PoseStatus(int(plan.status)).text
         )
     options = kernel_options(robot, model, MinimumNorm(variable))
     return polygon_at(robot, pose, options, plan.state.wrench, plan.chord_tension, _pulls(plan), bool(plan.feasible))
@@ -76,7 +76,7 @@ def tension_polygon(
 def polygon_at(
     robot: Robot, pose: Pose, options: Options, wrench: Array, tension: Array, pulls: Array, feasible: bool
 ) -> TensionPolygon:
-    """The polygon around chord tensions [N] that balance the platform, (m,), at given sag forces [N], (m,)."""
+    """Polygon from chord tensions (m,) [N] that balance the platform, and their sag forces (m,) [N]."""
     m, r = robot.cable_count, robot.cable_count - robot.degrees_of_freedom
     scale, offset = np.empty(m), np.empty(m)
     limits = np.empty((bounds.STRIP_ROWS, m))
@@ -107,7 +107,7 @@ def polygon_at(
 
 
 def _pulls(plan: Plan) -> Array:
-    """Sag forces T_z - tau sin phi of the cables [N], in the form for kernels."""
+    """Sag forces T_z - tau sin phi of the cables [N], for kernels."""
     return plan.state.pull
 
 
@@ -133,7 +133,7 @@ def _sides_of(
 
 
 def _limit_at(end: float, row: Array, origin: Array, low: Array, high: Array) -> Side | None:
-    """The limit at an end of an interval."""
+    """Limit at an end of an interval."""
     if not np.isfinite(end):
         return None
     there = origin + row * end
@@ -143,7 +143,7 @@ def _limit_at(end: float, row: Array, origin: Array, low: Array, high: Array) ->
 
 
 def _tensions(vertices: Array, null: Array, origin: Array) -> Array:
-    """Tensions at the vertices; at infinite vertices, cables unaffected by the null space keep their tensions."""
+    """Tensions at the vertices; at infinite vertices, finite for cables that the null space does not affect."""
     with np.errstate(invalid="ignore"):
         steps = vertices[:, :, None] * null
     moved = np.where(null == 0.0, 0.0, steps)

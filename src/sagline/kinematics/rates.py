@@ -261,8 +261,8 @@ def length_rate(state: Equilibrium, path: Path, tension: TensionMethod, feasible
 
     Geometry and tensions both change: L(t) = L(pose(t), tau(t)). Most methods depend only on the pose. They are solved
     again shortly before and after each sample, at poses extrapolated by the path's twist, twist rate and jerk.
-    `Closest` depends on its previous tensions. Its rates are the smallest rates of the tensions that keep the balance,
-    with cables held at the limits that they would cross. With pulleys, `Closest` is solved again for two steps after
+    `Closest` depends on its previous tensions. Its rates are the smallest rates of the tensions that keep the balance.
+    Cables that would cross a limit are held at the limit. With pulleys, `Closest` is solved again for two steps after
     each sample.
 
     state: robot, poses, wrench and cables along the path; path: the path; if it has no jerk, a spline through its

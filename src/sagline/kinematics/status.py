@@ -26,8 +26,8 @@ class PoseStatus(Status):
     NOT_CONVERGED = codes.POSE_NOT_CONVERGED, "the tensions did not converge; please report this robot and pose"
     NO_CHORD = (
         codes.POSE_NO_CHORD,
-        "both ends of a cable coincide, or its platform end is inside its pulley or below it, nearer to the swivel "
-        "axis than the pulley's diameter; move the platform away from the anchor",
+        "both ends of a cable coincide, or its platform end is inside or below its pulley, closer to the swivel axis "
+        "than the diameter of the pulley; move the platform away from the anchor",
     )
     NOT_COVERED = (
         codes.POSE_NOT_COVERED,

@@ -171,8 +171,8 @@ def _check_sampled(grid: Array, ends: Array, times: Array, moves: Flags) -> None
         k = int(unseen[0])
         raise InvalidValueError(
             f"the time from waypoints[{k}] to waypoints[{k + 1}]",
-            f"{times[k]:.4g} s, in which there is no sample",
-            "more than the time from one sample to the next",
+            f"{times[k]:.4g} s, without a sample inside",
+            "more than the time between two samples",
             "Check the units of durations, limits and rate; or give a higher rate.",
         )
 

@@ -31,7 +31,8 @@ def path_from_samples(time: ArrayLike, pose: PoseLike) -> Path:
         Path with the given times and poses; its jerk is None, because a cubic spline does not define it.
 
     Raises:
-        InvalidValueError: If the times do not increase, there are fewer than two, or the number of poses differs.
+        InvalidValueError: If the times do not increase, the number of times is below two, or the number of poses
+            differs.
 
     Examples:
         >>> import numpy as np

@@ -78,7 +78,7 @@ def robot_at(robot: Robots, pose: int) -> Robot:
 
 
 def cables_of(robot: Robots) -> Cable:
-    """Material of the cables, (m,), or (N, m) for several robots; with an optional field only if all robots have it."""
+    """Material of the cables, (m,), or (N, m) for several robots; optional fields only if all robots have them."""
     if isinstance(robot, Robot):
         return robot.cables
     materials = [one.cables.known() for one in robot]

@@ -96,7 +96,7 @@ class Design:
         Args:
             name: Name of the robot.
             frame: Edges of the frame [m], shape (3,).
-            platform: Edges of the platform [m], shape (3,), smaller than those of the frame.
+            platform: Edges of the platform [m], shape (3,), smaller than the edges of the frame.
             mass: Mass of the platform with its payload [kg].
             rope: Name in the catalogue of ropes.
             diameter: Diameter of the rope [m], 0.3 mm to 80 mm.

@@ -290,7 +290,7 @@ def drum_lever(robot: Robot, length: Array) -> Array:
     """Cable length per radian of drum rotation [m], at given lengths off the drums.
 
     length: unstrained lengths off the drums [m], (m,) or (N, m). Returns the lever of the layer at these lengths;
-        without drum data, drum_radius plus half the cable diameter; same shape as the lengths.
+        without drum data, drum_radius plus half the cable diameter. The shape is the shape of the lengths.
     """
     winch = robot.winches
     if winch is None or winch.drum_radius is None:

@@ -170,7 +170,7 @@ class Equilibrium(Result):
 
 
 class HasState(Protocol):
-    """A result about an equilibrium: a plan, a forward solution, a vibration."""
+    """A result with an equilibrium, such as a plan, a forward solution or a vibration."""
 
     @property
     def state(self) -> Equilibrium:
@@ -178,7 +178,7 @@ class HasState(Protocol):
 
 
 class OfEquilibrium(Protocol[_P, _R_co]):
-    """A function of an equilibrium, that of a result, or that of a robot at a pose."""
+    """A function of an equilibrium, with the equilibrium, a result, or a robot and a pose as first arguments."""
 
     @overload
     def __call__(self, state: Equilibrium | HasState, *args: _P.args, **options: _P.kwargs) -> _R_co: ...
@@ -187,7 +187,7 @@ class OfEquilibrium(Protocol[_P, _R_co]):
 
 
 def equilibrium_of(start: Any, pose: PoseLike | None = None, item: str = "state") -> Equilibrium:
-    """An equilibrium unchanged; that of a result, such as a plan; or that of a robot at a pose, or at several."""
+    """The given equilibrium, the equilibrium of a result such as a plan, or the equilibrium of a robot at its poses."""
     if isinstance(start, Robot) and pose is not None:
         found: Equilibrium = import_module(_INVERSE).equilibrium_at(start, pose)
         return found
@@ -196,7 +196,7 @@ def equilibrium_of(start: Any, pose: PoseLike | None = None, item: str = "state"
 
 
 def of_equilibrium(function: Callable[Concatenate[Equilibrium, _P], _R_co]) -> OfEquilibrium[_P, _R_co]:
-    """Let a function of an equilibrium take a result with one, or a robot and a pose, in its place."""
+    """Let a function of an equilibrium also accept a result, or a robot and a pose."""
 
     @wraps(function)
     def call(*given: Any, **options: Any) -> _R_co:

@@ -29,8 +29,7 @@ def unit(vectors: Array) -> Array:
     """Normalize vectors along the last axis.
 
     If the length of a vector differs from 1 only by rounding errors, the vector is returned unchanged. Files, pickles
-    and copies normalize again, and repeated normalization must not change values. Zero vectors give NaN; check lengths
-    first.
+    and copies normalize again, which must not change values. Zero vectors give NaN; check lengths first.
 
     vectors: shape (..., k). Returns array of the same shape; the given array itself if all lengths are 1.
     """
@@ -221,7 +220,7 @@ class Pose:
     def transform(self, points: ArrayLike) -> Array:
         """Transform points from the platform frame to the world.
 
-        Every pose transforms every point. If each pose has its own points, transform them pose by pose:
+        Every pose transforms every point. If the points depend on the pose, transform them pose by pose:
         `pose[i].transform(points[i])`.
 
         Args:

@@ -1,4 +1,4 @@
-"""Checks of poses against the motion pattern of a robot: poses must not differ by a rotation that is not free."""
+"""Checks of poses against the motion pattern of a robot: poses may differ only by free motions."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ class Robot(Shown):
             with length 1; None for the other patterns.
         tension_min: Lower tension limits [N], >= 0, one for all or one per cable, shape (m,).
         tension_max: Upper tension limits [N], may be infinite, one for all or one per cable, shape (m,).
-        tension_limits_of: The tension that is limited, "chord" or "frame_end".
+        tension_limits_of: Tension to which the limits apply, "chord" or "frame_end".
         platform_size: Edges of the platform, for drawing [m], shape (3,), or None.
         frame_size: Edges of the frame, for drawing [m], shape (3,), or None.
         test_box: Box of poses, or None; almost all of its poses are wrench-feasible.

@@ -244,8 +244,7 @@ def _guided_spans(
 def _span(model: CableModel, cable: Cable, step: Array, tension: Array, gravity: float) -> CableState:
     """Catenaries over steps (K, 3) with given tension at the upper ("platform") ends; NaN if there is no solution.
 
-    The upper tension has a minimum over the chord tension and increases above it. No catenary has a smaller upper
-    tension.
+    The upper tension has a minimum over the chord tension, and increases above it. No catenary has a smaller one.
     """
     level, rise = np.hypot(step[:, 0], step[:, 1]), step[:, 2]
     weight = 0.0 if model.weightless else cable.linear_density * gravity

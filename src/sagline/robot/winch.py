@@ -27,11 +27,9 @@ _AXES: Final = {"swivel_axis": 1, "guides": 2}  # number of array axes of a fiel
 class Winch:
     """One winch with its pulley, or the winches of all cables. All given fields have one shape, () or (m,).
 
-    None means that a value is unknown. A function that needs an unknown value raises an error with the name of the
-    field.
+    None means that a value is unknown. A function that needs an unknown value raises an error that names the field.
 
-    A cable ends at its platform anchor. Cables that run over a pulley at the platform back to the frame are not
-    modeled.
+    A cable ends at its platform anchor. Cables that run over a platform pulley back to the frame are not modeled.
 
     Attributes:
         pulley_radius: Radius of the pulley at the frame, to the centerline of the cable [m], 0 to 10; 0 for an eyelet.
@@ -257,7 +255,7 @@ class Winch:
         return evolve(self, dead_cable=length, dead_rise=rise)
 
     def known(self) -> dict[str, Array]:
-        """The fields that are known, by their names, in order.
+        """Known fields, by name, in order.
 
         Returns:
             The fields that are not None.

@@ -29,7 +29,7 @@ class WinchDrive:
         rated_speed: Speed of the motor's shaft at rated torque [rad/s].
         speed_limit: Largest speed of the motor's shaft [rad/s].
         source: The data sheet.
-        assumed: Assumptions, and data that are not used.
+        assumed: Assumptions, and unused data.
     """
 
     name: str
@@ -47,7 +47,7 @@ class WinchDrive:
 
         Args:
             drum_radius: Radius of the drum to the surface under the cable [m].
-            drum_inertia: Moment of inertia of the drum about its own axis [kg m^2], >= 0.
+            drum_inertia: Moment of inertia of the drum about its axis [kg m^2], >= 0.
             fields: Other fields of `Winch`, position_gain for instance.
 
         Returns:
@@ -110,7 +110,7 @@ _DIRECT_SOURCE: Final = (
     "Yaskawa, Sigma II user's manual, 8.1.4, SGMSH servomotors, ratings and specifications for standard servomotors, "
     "200 V, page 8-15"
 )
-_DIRECT_ASSUMED: Final = "the motor alone: no gear, no brake"
+_DIRECT_ASSUMED: Final = "only the motor: no gear, no brake"
 # model: rated and peak torque [N m], inertia [1e-4 kg m^2]
 _DIRECT: Final = {
     "10aa": (3.18, 9.54, 1.74),

@@ -136,8 +136,8 @@ def structure_matrix(robot: Robot | Sequence[Robot], pose: PoseLike) -> Array:
 def article_balance(robot: Robot, pose: PoseLike, k_h: float = 4.845) -> ArticleBalance:
     """Matrix H and vector b of the article, for the horizontal tensions t_x; for comparison with `structure_matrix`.
 
-    The equations of the article are used with the levers b_i = B_i - P from the center of mass, with the corrected sign
-    of b_pi (erratum 1), and with gravity once (erratum 2). H and b are infinite directly under an anchor (erratum 8).
+    The levers in the equations of the article are b_i = B_i - P from the center of mass. The sign of b_pi is corrected
+    (erratum 1), and gravity is counted once (erratum 2). H and b are infinite directly under an anchor (erratum 8).
 
     Args:
         robot: The robot.

@@ -92,7 +92,7 @@ def on_platform(forces: Array, levers: Array) -> Array:
 
 
 def motions_of_ends(levers: Array) -> Array:
-    """Matrices from a platform motion (..., 6) [m, rad] to the displacements of the platform ends, (..., m, 3, 6)."""
+    """Matrices (..., m, 3, 6): displacements of the platform ends per platform motion (..., 6) [m, rad]."""
     motion = np.eye(6)
     ends = np.swapaxes(motion[:, :3] + np.cross(motion[:, 3:], levers[..., None, :]), -1, -2)
     return np.ascontiguousarray(ends)
@@ -137,7 +137,7 @@ def tension_slopes(state: Equilibrium, slopes: CableSlopes) -> TensionSlopes:
 
 
 def _at_anchors(state: Equilibrium, slopes: CableSlopes, forces: Array) -> Array:
-    """Derivatives of the tension without pulleys, from the change of the force on each platform end, (..., m, 7, 3)."""
+    """Derivatives of the tension without pulleys, from force changes (..., m, 7, 3) at the platform ends."""
     cables = state.cables
     at_frame, forces = slopes.force.copy(), forces.copy()
     at_frame[..., 2] -= cables.cable_weight

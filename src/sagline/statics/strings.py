@@ -28,7 +28,7 @@ class Strings(NamedTuple):
     """String data of the cables of N states."""
 
     table: Array  # columns as in `sagline.kernels.dynamics.string`, shape (N, m, STRING_COLUMNS)
-    axes: Array  # axes of each cable in the world: horizontal in its plane, normal to it, upward, shape (N, m, 3, 3)
+    axes: Array  # world axes of each cable: horizontal in its plane, normal to the plane, upward, shape (N, m, 3, 3)
     taut: Flags  # True for cables with linear vibrations: neither folded nor slack, shape (N, m)
 
 
@@ -78,7 +78,7 @@ def strings_below(strings: Strings, frequency: Array) -> Indices:
 
 
 def undamped(frequency: Array) -> Array:
-    """Undamped frequencies in the form for kernels.
+    """Waves of undamped frequencies, for kernels.
 
     Shapes: frequency (N, F) [Hz]; returns (N, F, WAVE_COLUMNS).
     """

@@ -197,8 +197,7 @@ class AnalyticCenter(TensionMethod):
     The tensions are smooth wherever the feasible set has an interior, because limits never become active. Near the
     border of the workspace, the set shrinks to a point, and the tensions converge to this point. The method supports
     any number of redundant cables. The result is the same in every variable. Choose this method for controllers that
-    require differentiable tensions. If the feasible set is unbounded, it has no center, and the pose gets the status
-    UNBOUNDED.
+    require differentiable tensions. An unbounded feasible set has no center; the pose gets the status UNBOUNDED.
 
     Source:
         Di Paola, Goldsztejn, Zoso & Caro 2023, "Analytic center based tension distribution for cable-driven

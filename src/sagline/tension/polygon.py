@@ -42,8 +42,9 @@ class TensionPolygon(Result):
         bounded: True if every side is a limit.
         basis: Orthonormal basis of the null space, shape (r, m).
         origin: The minimum-norm tensions that balance the wrench, without limits [N], shape (m,).
-        scale: Factor in: tension variable = scale * chord tension + offset, shape (m,). It is 1 for the chord tension,
-            cos phi for the horizontal tension, and the derivative by the chord tension for the frame-end tension.
+        scale: Factor in: tension variable = scale * chord tension + offset, shape (m,). It is 1 for the chord tension
+            and cos phi for the horizontal tension. For the frame-end tension it is the derivative with respect to the
+            chord tension.
         offset: Offset in this equation [N], shape (m,); zero except for the frame-end tension.
     """
 

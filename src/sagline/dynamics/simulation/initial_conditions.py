@@ -234,7 +234,7 @@ def _from_equilibrium(state: Equilibrium, table: Any) -> InitialConditions:
         raise InvalidValueError("start", item, "a single equilibrium, or a plan", "Give a single one: state[0].")
     robot, length = state.one_robot, state.unstrained_length
     if np.isnan(length).any():
-        step = "Give a pose that is feasible."
+        step = "Give a feasible pose."
         raise InvalidValueError("start", "a state without lengths", "one with a solution", step)
     tension, end = TimeTable.constant(np.nan_to_num(drum_tension(state))), 0.0
     lengths = TimeTable.constant(length)
@@ -265,7 +265,7 @@ def _check_robot(robot: Robot, model: CableModel) -> None:
 
 
 def check_set_points(robot: Robot, lengths: TimeTable) -> None:
-    """Reject lengths [m] that are not longer than the dead length."""
+    """Reject lengths [m] that do not exceed the dead length."""
     checked(lengths.value, "unstrained_length", "m")
     least, dead = lengths.value.min(axis=0), dead_cable(robot)
     if (short := least <= dead).any():

@@ -58,7 +58,7 @@ class Records:
 
 
 class Plant:
-    """State of a robot during a simulation, mutable, in its own memory.
+    """Mutable state of a robot during a simulation.
 
     In this class the platform axes are the principal axes of the platform, with the origin at the center of mass.
 
@@ -109,7 +109,7 @@ class Plant:
 
     def remember_winding(self, longest: float) -> None:
         """Set up drums that store the strain of wound-in cable, up to a given length off the drum [m] plus MARGIN."""
-        # cable deeper on the drum has the winding tension; after it is paid out, it is wound in again at that tension
+        # cable deeper on the drum has the winding tension, also if it is paid out and wound in again
         self.layers = np.tile(self.data[d.WINDING_STRAIN][:, None], (1, int((longest + MARGIN) / BIN) + 1))
 
     def arguments(
@@ -207,5 +207,5 @@ def _principal_axes(robot: Robot, pose: Pose) -> tuple[Array, Array]:
 
 def energy_error(step: float, time: float, cable: int) -> InvalidValueError:
     """Error for a run with energy drift; step and time [s]."""
-    value = f"{step:g} s, with which the energy grows or fades without a cause: at {time:.6g} s mostly in cable {cable}"
+    value = f"{step:g} s, which changes the energy without a cause: at {time:.6g} s, mostly in cable {cable}"
     return InvalidValueError("step", value, "a step that conserves the energy", f"Give step={0.2 * step:.3g}.")

@@ -160,8 +160,7 @@ class EnergyBalance(Result):
             nodes.
         removed: Energy of broken cables and dropped loads since the start, minus the energy of picked-up loads. Heights
             count as in `potential`, so that the value can have either sign.
-        error: Numerical energy error of the integrator: change of the sum kinetic + potential - supplied + lost +
-            removed.
+        error: Energy error of the integrator: change of the sum kinetic + potential - supplied + lost + removed.
     """
 
     kinetic: Array

@@ -176,7 +176,7 @@ class SimulationRun:
         return self.until(math.inf)
 
     def until(self, time: float) -> Simulation:
-        """Continue to a time [s] and return the simulation up to it."""
+        """Continue to a time [s], and return the simulation up to this time."""
         ahead = (time - float(self.plant.audit[d.BEGIN])) / self.step
         records = math.ceil(min(ahead, self.steps) / self.every - 1e-9)
         last = max(min(records * self.every, self.steps), int(self.plant.counters[k.STEPS]))

@@ -153,7 +153,7 @@ class SpeedProfile:
 
     @property
     def motion(self) -> Array:
-        """Following acceleration and squared speed at each position, shape (K, 2)."""
+        """Acceleration after each position, and squared speed at the position, shape (K, 2)."""
         rate = self.acceleration
         return np.stack((np.append(rate, rate[-1]), self.square), axis=1)
 

@@ -66,7 +66,7 @@ def dynamic_stiffness(state: Equilibrium, frequency: ArrayLike, damping: Damping
         state: A single equilibrium; a plan or a solution of one; or a robot and a pose.
         frequency: Frequencies [Hz], >= 0, shape (F,) or a single one.
         damping: Energy losses of the vibration; None: no losses. A modal_damping zeta acts as the loss factor 2 zeta of
-            the whole stiffness. Every mode then has the damping ratio zeta at its own frequency.
+            the whole stiffness. Every mode then has the damping ratio zeta.
 
     Returns:
         Complex array [N/m], shape (F, m, 3, 3), or (m, 3, 3) for a single frequency, world axes; NaN for folded or
@@ -156,7 +156,7 @@ def check_counts(counts: NDArray[np.int64], frequency: Array) -> None:
 
 
 def in_world(found: NDArray[np.float64] | Complex, axes: Array) -> Complex:
-    """Cable stiffness in its plane and normal to it, converted to world axes."""
+    """Cable stiffness in the plane and normal to the plane, converted to world axes."""
     # shapes: found (F, m, FOUND); axes (m, 3, 3); returns (F, m, 3, 3)
     xx, xz, zz, yy = np.moveaxis(found, -1, 0)[..., None, None]
     level, normal, up = np.moveaxis(axes, 1, 0)

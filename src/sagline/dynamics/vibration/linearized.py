@@ -96,7 +96,7 @@ def linearized(state: Equilibrium, damping: Damping | None = None, inputs: Input
     Args:
         state: A single equilibrium; a plan or a solution of one; or a robot and a pose.
             An unstable equilibrium has unstable poles.
-        damping: `loss_time` of the cables' stretch, to first order in it, and `modal_damping`; none by default.
+        damping: `loss_time` of the cables' stretch (to first order) and `modal_damping`; by default no damping.
         inputs: Inputs of the winches: "lengths" (off the drums), or "speeds" (rates of these lengths, with the lengths
             as states).
 
@@ -223,7 +223,7 @@ def _stretch_loss(state: Equilibrium, slopes: CableSlopes, loss_time: float) -> 
     per_motion = follows @ slopes.blocks  # N s/m, at the platform ends
     per_speed = (follows @ slopes.by_length[..., None])[..., 0]  # cable that is paid out has no strain
     if not np.isfinite(per_motion).all():
-        step = "Give modal_damping instead, or tighten the cable."
+        step = "Use modal_damping, or tighten the cable."
         raise InvalidValueError("state", "one with a folded cable", "cables that stretch, for loss_time", step)
     forces = np.swapaxes(per_motion @ motions_of_ends(slopes.levers), -1, -2)
     by_motion = np.stack([on_platform(forces[:, k], slopes.levers).sum(axis=-1) for k in range(6)], axis=-1)

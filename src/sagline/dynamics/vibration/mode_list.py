@@ -60,7 +60,7 @@ def quasi_static_displacements(state: Equilibrium, ends: Array, count: int) -> A
 
 
 def _behind(strings: Strings) -> Array:
-    """Direction of flexibility at the exit point of each cable, due to its routing [sqrt(m/N)], world axes, (m, 3)."""
+    """Root compliance of each exit point due to the routing, in its direction, world axes, (m, 3) [sqrt(m/N)]."""
     table, axes = strings.table[0], strings.axes[0]
     return np.asarray(table[:, columns.BEHIND_X, None] * axes[:, 0] + table[:, columns.BEHIND_Z, None] * axes[:, 2])
 

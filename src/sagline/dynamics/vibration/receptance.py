@@ -86,7 +86,7 @@ class Receptance(NamedTuple):
 
 
 def _in_world(own: Complex, axes: Array) -> Complex:
-    """Matrices (F, t, 3, 3) in world axes, from matrices (t, F, d, d) along directions (t, d, 3)."""
+    """Matrices (F, t, 3, 3) in world axes, converted from matrices (t, F, d, d) along directions (t, d, 3)."""
     return np.asarray(np.einsum("tai,tfab,tbj->ftij", axes, own, axes, optimize=True))
 
 

@@ -128,7 +128,7 @@ class ResponseCurves(NamedTuple):
 
 
 def response_curves(vibration: Vibration, force: str = "x", motion: str | None = None) -> ResponseCurves:
-    """Motion of the platform per force at its center of mass, at frequencies up to the limit of the known modes."""
+    """Motion of the platform per force at its center of mass, for frequencies up to the limit of the modes."""
     # Both curves are from `frequency_response`. The massless curve has no air damping, which acts only on cables with
     # mass
     state = instance(vibration, Vibration, "vibration").state

@@ -142,7 +142,7 @@ class Vibration(Result):
             path: A path from rest to rest that ends, if possible, at the pose of the modes.
 
         Returns:
-            Frequencies [Hz], shape (1,) or (2,), the most excited first.
+            Frequencies [Hz], shape (1,) or (2,), in order of decreasing excitation.
 
         Raises:
             InvalidValueError: In the cases listed for `sagline.to_shape`.
@@ -237,7 +237,7 @@ def to_shape(modes: Modes | Vibration, path: Path) -> Array:
         path: A path from rest to rest; for each mode, the segment with the largest excitation counts.
 
     Returns:
-        Frequencies [Hz], shape (1,) or (2,), the most excited first.
+        Frequencies [Hz], shape (1,) or (2,), in order of decreasing excitation.
 
     Raises:
         InvalidValueError: If the modes are of several states, no mode has a frequency, or the path is in motion at an

@@ -1,8 +1,8 @@
 """Linear programs in few unknowns, over bounds: the dual simplex method.
 
-The method visits points that are optimal for their active sides. It ends when a point satisfies all bounds. It also
-ends when a side contradicts the active sides, which proves infeasibility. If only the limits change, the sides of the
-last solution are still optimal, and the search starts from them.
+The method visits points that are optimal for their active sides. It ends at a point that satisfies all bounds, or if a
+side contradicts the active sides, which proves infeasibility. If only the limits change, the sides of the last solution
+are still optimal, and the search starts from them.
 """
 
 from __future__ import annotations

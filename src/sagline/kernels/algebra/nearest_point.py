@@ -1,8 +1,8 @@
 """Point nearest to a target that satisfies all bounds, for any number of unknowns: a dual active-set method.
 
 The method starts from the target. It adds violated sides one by one, and drops sides with a negative multiplier, until
-all sides are satisfied; docs/model.md, section 5. The first active sides are those of a similar problem, which usually
-are the solution.
+all sides are satisfied; docs/model.md, section 5. The search starts with the active sides of a similar problem, which
+are usually also active in the solution.
 
 Source:
     Goldfarb & Idnani 1983, "A numerically stable dual method for solving strictly convex quadratic programs", with

@@ -21,7 +21,7 @@ from sagline.kernels.jit import formula, glue, kernel
 LOOSEST = 5.0  # largest X = wD/(2 tau), of a cable fifteen times as long as its chord, almost without tension
 # Largest strain; the cable is then twice as long as without tension. Applies if the robot has no upper limit.
 LARGEST_STRAIN = 1.0
-SMALLEST = 1e-100  # smallest chord tension of a catenary without weight [N]; the equations divide by it
+SMALLEST = 1e-100  # smallest chord tension of a catenary without weight [N]; the equations divide by the tension
 SECTIONS = 80  # steps of the search for the smallest admissible tension of a slack cable
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 PRECISION = 1e-14  # relative
@@ -76,12 +76,12 @@ def cable_without_tension(cables: Cables) -> int:
 def fill_admissible_tensions(
     model: Model, limits: TensionLimits, low: float, high: float, cables: Cables, i: int
 ) -> None:
-    """Fill the smallest and largest admissible chord tension of a cable; the smallest is larger if there is none.
+    """Fill the smallest and largest admissible chord tension of a cable; smallest > largest if none is admissible.
 
     low, high: limits of the robot [N]; the upper one may be infinite.
     """
     half_weight = cables.half_weight[i]
-    # a slack cable over a pulley has a free span that is longer than the tangent by up to the diameter
+    # the free span of a slack cable over a pulley can be longer than the tangent by one diameter
     floor = least_of_sag(model, half_weight + cables.density[i] * model.gravity * cables.radius[i])
     if limits.quantity == codes.LIMITS_OF_FRAME_END and sags(model, half_weight):
         chord, material, pulley = chord_of(cables, i), material_of(cables, i), pulley_of(cables, i)

@@ -192,8 +192,7 @@ def _catenary_sag(
 ) -> float:
     """Largest drop below the chord [m]; on a vertical chord, the drop below its lower end."""
     slope = rise / span if span > 0.0 else 0.0
-    # length from the frame end to the point with a tangent parallel to the chord; to the turning point of a vertical
-    # cable
+    # length between the frame end and the point whose tangent is parallel to the chord (the turning point if vertical)
     part = length - (vertical - horizontal * slope) / weight
     part = min(max(part, 0.0), length)
     x, z = catenary_end(horizontal, vertical - weight * (length - part), part, weight, stiffness)
@@ -240,8 +239,7 @@ def closures(
 ) -> None:
     """Error of each cable in the equations of its model [m].
 
-    For a catenary, the distance between its computed end and the platform end; for other models, the error of the
-    length.
+    For a catenary, the distance between computed end and platform end; for other models, the error of the length.
     """
     model = model_of(terms)
     for i in range(residual_out.shape[0]):

@@ -31,12 +31,12 @@ STEPS = 80
 # it.
 SMALL_NEWTON_STEP = 1e-9
 SMALL_HALLEY_STEP = 1e-6
-SPLIT = 134217729.0  # 2^27 + 1: halves of a mantissa
+SPLIT = 134217729.0  # 2^27 + 1, which splits a mantissa into halves
 
 
 @kernel
 def slack_series(horizontal: float, vertical_a: float, vertical: float, tension_a: float, tension_b: float) -> float:
-    """The ratio atanh(u)/u of P1 for u = (T_zB - T_zA)/(T_A + T_B), accurate also close to 1; infinite for a fold."""
+    """Ratio atanh(u)/u of P1 for u = (T_zB - T_zA)/(T_A + T_B) in any range; infinite for a fold (u = 1)."""
     total = tension_a + tension_b
     u = (vertical - vertical_a) / total
     # T_A + T_B times (1 - u), from sums of positive terms instead of a subtraction

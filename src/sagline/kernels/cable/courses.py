@@ -21,8 +21,7 @@ def cable_courses(
 ) -> None:
     """Points of exact cables from their frame anchors over their pulleys to their platform ends.
 
-    A cable without a tension is drawn along its chord. A cable without a chord is drawn from its anchor to its platform
-    end.
+    A cable without a tension is drawn along its chord. A cable without a chord is drawn as a line between its ends.
 
     Args:
         cables: Row of the cable_table, (m, CABLE_COLUMNS).

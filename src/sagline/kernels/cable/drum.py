@@ -1,6 +1,6 @@
-"""Cable on a drum: number of turns as a function of the length off the drum, and the strain at which it was wound.
+"""Cable on a drum: number of turns as a function of the length off the drum, and strain from the winding.
 
-Turns count from the drum's first groove, where the cable is fastened, and increase with the cable on the drum.
+Turns are counted from the first groove of the drum, where the cable is fastened. They increase while cable is wound in.
 Layer k lies in the grooves between the turns of layer k - 1, and advances in the opposite direction. docs/model.md,
 section 10.
 """
@@ -19,7 +19,7 @@ DRUM_COLUMNS = 7
 DEEP_LENGTH, DEEP_PATH, DEEP_STRAIN, TOP_STRAIN = range(4)
 MEMORY_ROWS = 4
 STEPS = 60  # limit of Newton steps; a convex function of one variable needs two or three
-SETTLED = 1e-8  # size of the last step, in turns or relative to all turns; the next step would be the square of it
+SETTLED = 1e-8  # size of the last step, in turns or relative to all turns; the next step would be its square
 
 
 @formula

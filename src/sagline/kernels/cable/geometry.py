@@ -93,7 +93,7 @@ def cable_geometry(cables: Array, body: Array, pose: Array, rotation: Array, geo
 
 @entry
 def cable_geometries(robots: Array, bodies: Array, poses: Array, rotation: Array, geometries: Array) -> None:
-    """Fill the geometry rows of N poses, (N, GEOMETRY_ROWS, m); tables and poses as in `sagline.kernels.tables`.
+    """Fill the geometry rows of N poses, (N, GEOMETRY_ROWS, m); for tables and poses see `sagline.kernels.tables`.
 
     rotation: Work array, (3, 3).
     """

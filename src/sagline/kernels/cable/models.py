@@ -1,8 +1,8 @@
 """The switch between cable models, and the shallow cable: length from tension, and tension from length.
 
 The shallow cable is a straight line of tension tau plus a vertical force b on its platform end; docs/model.md, section
-3. One pair of equations serves the parabolic model (b = wD/2, k = g^2/24, stretched by tau) and the article's empirical
-one (b = k_h rho D, k = k_p, stretched by |T|):
+3. The same equations are used for the parabolic model (b = wD/2, k = g^2/24, stretching tension tau) and the empirical
+model (b = k_h rho D, k = k_p, stretching tension |T|):
 
     T = tau (cos phi, sin phi) + (0, b)
     L = D (1 + k (rho D cos phi / tau)^2) / (1 + stretching tension/EA)
@@ -42,8 +42,8 @@ def shallow_tension(
 ) -> tuple[float, bool]:
     """Chord tension of a shallow cable from its length, and True if it was found.
 
-    The first Newton steps use the cubic of the parabolic model and start from above. The other steps use the model's
-    own length and stay within a bracket. A cable without sag that is longer than its chord has the tension 0.
+    The first Newton steps use the cubic of the parabolic model and start from above. The other steps use the length of
+    the cable model and stay within a bracket. A cable without sag that is longer than its chord has the tension 0.
     """
     p = (length - chord) / length * stiffness
     q = stiffness * chord * sag / length

@@ -235,7 +235,7 @@ def _length_behind_by(
 def end_by(
     pulley: Pulley, material: Material, weight: float, force: Force, free: float, change: Change, by_weight: EndMotion
 ) -> EndMotion:
-    """Motion of the platform end at a fixed force on it due to a change of a cable's data; docs/model.md, section 10.
+    """Motion of the platform end due to a change of cable data, at a fixed force on the end; docs/model.md, section 10.
 
     by_weight: motion per change of w at a fixed free length [m^2/N].
     """

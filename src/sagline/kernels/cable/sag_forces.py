@@ -1,8 +1,9 @@
 """Sag forces T_z - tau sin phi of the cables of one pose as curves over their chord tensions.
 
 If the platform end of a cable is below its frame end, its sag force is not monotone in the tension. The sag force falls
-while the sag is deep, rises while the sag becomes shallow, and falls again because of the stretch. Its extreme values
-on a range of tensions are at the two ends or at one of up to two extrema; docs/model.md, section 5.
+while the sag is deep, rises while the sag becomes shallow, and falls again because of the stretch. On a range of
+tensions, its largest and smallest values are at an end of the range or at one of at most two extrema; docs/model.md,
+section 5.
 """
 
 from __future__ import annotations
@@ -77,7 +78,7 @@ def sag_forces_at(curves: Curves, tau: Array, sag_force: Array) -> None:
 
 @kernel
 def slopes_at(curves: Curves, tau: Array, slope: Array, bend: Array) -> None:
-    """Fill slopes (m,) and curvatures (m,) [1/N] of the sag forces by the chord tensions, from central differences."""
+    """Fill slopes (m,) and curvatures (m,) [1/N] of the sag forces over the tensions, from central differences."""
     cables = curves.cables
     if curves.model.code != codes.CATENARY:
         for i in range(tau.size):
@@ -127,7 +128,7 @@ def sag_force_range(curves: Curves, i: int, section: Section) -> tuple[float, fl
 
 @kernel
 def most_along(curves: Curves, i: int, section: Section, along: float, hanging: float) -> float:
-    """Upper bound of along tau - b sag_force(tau) on a section [N]; exact if an end of the section is optimal.
+    """Upper bound of along * tau - b * sag_force(tau) on a section [N]; exact if an end of the section is optimal.
 
     The value at one end and the range of the sag force limit the distance to a better tension. The section is shortened
     to this distance. This step is repeated.
@@ -161,11 +162,11 @@ STEPS = 30
 PEAK_STEPS = 40
 PEAK_PRECISION = 1e-3  # relative error of the tension at which the sag force rises fastest
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
-# Start of the search, as a factor of the first-order extrema. These are at X = |sin phi|/cos^2 phi and at the tension
-# sqrt(EA wD |sin phi|/6). In 200,000 random cables with X <= 1 and e <= 0.01, the exact extrema were at 0.28 to 1.03
-# times this X and at 0.58 to 1.0 times this tension.
+# Start of the search, as a factor of the first-order extrema. The first-order extrema are at X = |sin phi|/cos^2 phi
+# and at the tension sqrt(EA wD |sin phi|/6). In 200,000 random cables with X <= 1 and e <= 0.01, the exact extrema were
+# at 0.28 to 1.03 times this X and at 0.58 to 1.0 times this tension.
 START_OF_LEAST, START_OF_MOST = 1.25, 0.9
-# Limit for the growth of the sag force at its first-order peak, as a share of the sum of its terms. The growth changes
+# Limit for the growth of the sag force at its first-order peak, relative to the sum of its terms. The growth changes
 # by a smaller share between this peak and the exact peak in all random cables of the tests. Below minus this limit the
 # growth is negative everywhere; otherwise golden sections search the exact peak.
 FALLS_FOR_SURE = 0.3

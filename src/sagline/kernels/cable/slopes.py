@@ -1,4 +1,4 @@
-"""Derivatives of the force on a cable's platform end with respect to L, rho and EA, in the plane, with fixed ends."""
+"""In-plane derivatives of the force on a platform end with respect to L, rho and EA, with both ends fixed."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class _ForceSlopes(NamedTuple):
 
 
 class _MachineSlopes(NamedTuple):
-    """Derivatives of the force on the platform end by R and the dead length [N/m]."""
+    """Derivatives of the force on the platform end with respect to R and dead length [N/m]."""
 
     by_radius: PlaneVector
     by_dead: PlaneVector
@@ -96,7 +96,7 @@ def force_by_length(
 def _shallow_force_slopes(
     model: Model, span: float, rise: float, material: Material, length: float, tension: float
 ) -> _ForceSlopes:
-    """Force slopes (by L, rho and EA) of a shallow cable."""
+    """Derivatives of the force of a shallow cable with respect to L, rho and EA."""
     slopes = shallow_slopes(model, span, rise, material, length, tension)
     chord = math.hypot(span, rise)
     cosine = span / chord
@@ -113,7 +113,7 @@ def _shallow_force_slopes(
 def force_slopes(
     model: Model, span: float, rise: float, material: Material, length: float, force: Force, plane: PlaneStiffness
 ) -> _ForceSlopes:
-    """Force slopes (by L, rho and EA) of a cable of any model except the straight one."""
+    """Derivatives of the force with respect to L, rho and EA, for any cable model except the straight one."""
     horizontal, vertical, tension = force
     stiffness = material.stiffness
     weight = material.density * model.gravity
@@ -137,7 +137,7 @@ def force_slopes(
 def slopes_over(
     model: Model, material: Material, pulley: Pulley, free: float, force: Force, plane: PlaneStiffness
 ) -> tuple[_ForceSlopes, _MachineSlopes]:
-    """Force slopes by L, rho, EA, R and dead length of a cable with or without a pulley, shallow or exact.
+    """Derivatives of the force with respect to L, rho, EA, R and dead length, for shallow and exact cables.
 
     free: unstrained length of the free span [m].
     """

@@ -31,7 +31,7 @@ SAME_EXIT = 1e-9  # largest change of the exit direction that counts as converge
 LIMIT_STEPS = 30
 LIMIT_PRECISION = 1e-13  # relative
 LIMIT_MISS = 1e-6  # relative; larger than the remaining error of a slack cable after all passes
-SECANT = 1e-6  # relative step below which a secant slope is dominated by rounding
+SECANT = 1e-6  # smallest relative step of a secant; the slope of a shorter one is mostly rounding
 TAUT = 1.25  # chord tension in units of wD/2, larger than the one with the least frame-end tension
 
 
@@ -161,8 +161,7 @@ def frame_end_tension(model: Model, chord: Chord, material: Material, pulley: Pu
 def chord_tension_at_frame_end(model: Model, chord: Chord, material: Material, pulley: Pulley, tension: float) -> float:
     """Chord tension at which the tension at the frame end has a given value, on the taut side.
 
-    If the frame-end tension never has this value, the result is the chord tension, if any, at which the frame-end
-    tension of a parabola is least.
+    If the frame-end tension is always larger, the result is the chord tension with its least value for a parabola.
     """
     loosest = 0.5 * material.density * model.gravity * chord.length * chord.sine
     return taut_at_frame_end(model, chord, material, pulley, tension, max(loosest, 0.0))
@@ -217,7 +216,7 @@ def hold_cable(model: Model, chord: Chord, material: Material, pulley: Pulley, t
     length, sag_force, _status = solve_cable_state(model, chord, material, pulley, tau)
     horizontal, vertical = tau * chord.cosine, tau * chord.sine + sag_force - weight * length
     tension = math.sqrt(horizontal * horizontal + vertical * vertical)
-    # cables of the shallow models leave along their chord, and have the chord tension behind it
+    # with the shallow models, a cable leaves along its chord; its tension behind the chord is the chord tension
     sine, cosine, there = chord.cosine, pulley.entry * chord.sine, tau
     if model.code == codes.CATENARY:
         there = tension

@@ -23,7 +23,7 @@ from sagline.kernels.jit import formula, kernel
 
 
 class _ShallowSlopes(NamedTuple):
-    """Derivatives of tau of a shallow cable by x_B, z_B [N/m], L [N/m], rho [N m/kg] and EA [1]."""
+    """Derivatives of tau of a shallow cable with respect to x_B, z_B [N/m], L [N/m], rho [N m/kg] and EA [1]."""
 
     by_x: float
     by_z: float
@@ -106,7 +106,7 @@ def _elastic_stiffness(span: float, rise: float, length: float, tension: float, 
 def shallow_slopes(
     model: Model, span: float, rise: float, material: Material, length: float, tension: float
 ) -> _ShallowSlopes:
-    """Derivatives of tau of a shallow cable by its chord and its own data.
+    """Derivatives of tau of a shallow cable with respect to chord and cable data.
 
     They follow from L (1 + s/EA) = D (1 + S/tau^2) with S = k (rho x_B)^2 and s = |T| (empirical) or tau (parabolic).
     """
@@ -234,8 +234,7 @@ def energy_of_cables(model: Model, cables: Array, rows: Array, behind: bool | No
     """Energy [J] of all cables of a pose, and the sum of the magnitudes of its terms.
 
     cables: rows of the cable_table, (m, CABLE_COLUMNS); rows: as in `sagline.kernels.cable.geometry`, (CABLE_ROWS, m),
-    after `cable_forces`; behind: `Model.behind` as a separate argument; None excludes the code of pulleys from
-    compilation.
+    after `cable_forces`; behind: `Model.behind` as a separate argument; None excludes code of pulleys.
     """
     x = g.SPAN if behind is None else g.FREE_SPAN
     z = g.RISE if behind is None else g.FREE_RISE

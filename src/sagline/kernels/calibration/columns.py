@@ -1,4 +1,4 @@
-"""Derivatives of the readings of one pose by every unknown: direct effects, and effects of platform motion."""
+"""Derivatives of the readings of one pose: direct effect of every unknown, and effect of the platform motion."""
 
 from __future__ import annotations
 
@@ -166,7 +166,7 @@ def _add_wrench_change(slopes: Slopes, at: int, scale: float, force: Triple, mom
 def _add_force_change(
     slopes: Slopes, space: CalibrationArrays, i: int, at: int, scale: float, force: Triple, direct: float
 ) -> None:
-    """Add to a column the effects of a change of the force of one cable, on the wrench and on its own reading."""
+    """Add to a column the effects of a change of one cable force, on the wrench and on the reading of this cable."""
     _add_wrench_change(slopes, at, scale, force, cross(_lever_of(space.rows, i), force))
     slopes.work[i, at] += scale * direct
 
@@ -286,7 +286,7 @@ def _free_displacement(free: Array, vector: Triple) -> Triple:
 def _fill_center(
     cables: Array, sensing: Sensing, sought: Unknowns, free: Array, axis: int, space: CalibrationArrays, slopes: Slopes
 ) -> None:
-    """Add to the columns the effect of a shift of the center of mass, to which the platform's motion refers.
+    """Add to the columns the effect of a shift of the center of mass, the reference point of platform motion.
 
     Only the part along free motions counts, because a planar platform stays in its plane.
     """

@@ -53,7 +53,7 @@ def frame_end_slopes(model: Model, cables: Array, rows: Array, i: int) -> _Frame
     share = 1.0 / strained
     grown = (1.0 + end / stiffness) / end * share
     lifted = weight * pulley.radius * entry * cosine * share  # derivative with respect to the wrap angle
-    turned_x, turned_z = cosine / leaving, -entry * sine / leaving  # derivative of the wrap angle by the force at P
+    turned_x, turned_z = cosine / leaving, -entry * sine / leaving  # derivative of psi with respect to the force at P
     rise = rows[g.FREE_RISE, i]
     return _FrameEndSlopes(
         leaving,

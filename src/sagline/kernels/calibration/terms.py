@@ -66,7 +66,7 @@ class Linearization(NamedTuple):
 class Slopes(NamedTuple):
     """Derivatives with respect to the P unknowns at one pose."""
 
-    work: Array  # slopes of the readings, (R, P); at first those with a fixed platform
+    work: Array  # slopes of the readings, (R, P); at first with a fixed platform
     wrench: Array  # slopes of the wrench on the fixed platform about its center of mass, (6, P)
 
 

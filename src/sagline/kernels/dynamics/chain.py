@@ -2,7 +2,7 @@
 
 docs/model.md, section 11. Node 0 is the platform end, and the last node is the frame end. Nodes are therefore added and
 removed at the end of the arrays. All elements have the same unstrained length, except the element at the frame, which
-has the remaining length. Each element adds half of its mass to each of its two nodes. The mass at node 0 belongs to the
+has the remaining length. Each element adds half of its mass to each of its two nodes. Mass at node 0 is part of the
 platform.
 """
 
@@ -36,7 +36,7 @@ BEHIND, RUN = 8, 9  # cable between drum and exit point: unstrained length, and 
 WIND = 10  # force of the wind per length and square of the speed [N s^2/m^3]
 SMOOTH = 11  # share of a new value in the filtered mean tension that detects a slack cable
 GRAVITY = 12  # [m/s^2]
-REST, RATE = 13, 14  # unstrained length of the element at the frame [m], and rate of the cable that is let out [m/s]
+REST, RATE = 13, 14  # unstrained length of the element at the frame [m], and rate of cable paid out [m/s]
 STEP = 15  # time step of the damping forces [s]
 CHAIN_COLUMNS = 16
 
@@ -144,7 +144,7 @@ def _add_damping(place: Array, speed: Array, count: int, row: Array, pulls: Arra
         factor = pulls[size + j + 1] if k > 0 else 0.0
         force = pulls[2 * size + j] - factor * force
         x, y, z, distance = _element_direction(place, j)
-        # the velocity of the frame node is that of the entering cable and includes the change of the rest length
+        # the frame node has the velocity of the entering cable, which includes the change of the rest length
         opening = _opening_speed(speed, j, x, y, z)
         length = row[REST] + row[BEHIND] if j == count else row[ELEMENT]
         elastic = pulls[j]
@@ -155,7 +155,7 @@ def _add_damping(place: Array, speed: Array, count: int, row: Array, pulls: Arra
 
 @formula
 def fill_frame_node_velocity(place: Array, speed: Array, count: int, row: Array) -> None:
-    """Fill the velocity of the frame node: that of the entering cable, L' (1 + strain) along the cable."""
+    """Fill the velocity of the frame node: L' (1 + strain) along the cable, as the entering cable."""
     for c in range(3):
         speed[c, count + 1] = row[RATE] * (place[c, count] - place[c, count + 1]) / row[REST]
 
@@ -286,7 +286,7 @@ def mean_tension(pulls: Array, count: int, row: Array) -> float:
 
 @kernel
 def insert_node(place: Array, speed: Array, count: int, row: Array) -> None:
-    """Insert a node on the element at the frame, one element length from its end; count grows by one, rest shrinks.
+    """Insert a node in the element at the frame, one element length from its inner end; updates count and rest.
 
     Tension, mass and momentum, including the half element at the frame, do not change. Without cable behind the exit
     point, position and velocity are linear along the element, and the center of mass does not change.
@@ -306,7 +306,7 @@ def insert_node(place: Array, speed: Array, count: int, row: Array) -> None:
 
 @kernel
 def merge_nodes(place: Array, speed: Array, count: int, row: Array) -> None:
-    """Merge the element at the frame with its neighbor and remove the node between them; count shrinks, rest grows.
+    """Merge the element at the frame with its neighbor, and remove the node between them; updates count and rest.
 
     The next node takes its momentum. The momentum of the half element at the frame, at the velocity of the entering
     cable, is subtracted.

@@ -32,7 +32,7 @@ STAGES = 8
 
 
 def _gauss() -> tuple[Array, Array, Array]:
-    """Nodes on [0, 1], weights and integrals from 0 to the nodes of Gauss collocation."""
+    """Gauss collocation on [0, 1]: nodes, weights, and integrals from 0 to the nodes."""
     nodes, weights = np.polynomial.legendre.leggauss(STAGES)
     basis = [np.polynomial.legendre.Legendre.basis(k) for k in range(STAGES)]
     values = np.array([one(nodes) for one in basis])
@@ -55,7 +55,7 @@ class Wave(NamedTuple):
 
 @glue
 def fill_flexibility(string: String, wave: Wave, start: float, size: float, normal: bool, c: Numbers) -> None:
-    """Fill C at the stages of an element, (STAGES, 3): xx, xz, zz; normal to the plane only the first is used."""
+    """Fill C at the stages of an element, (STAGES, 3): xx, xz, zz. For motion normal to the plane, only xx is used."""
     for k in range(STAGES):
         vertical = vertical_at(string, start + NODES[k] * size)
         square = string.horizontal * string.horizontal + vertical * vertical
@@ -82,7 +82,7 @@ def fill_integral(c: Numbers, size: float, d: int, phi: Numbers) -> None:
 
 @glue
 def _fill_stages(c: Numbers, mu: Any, size: float, d: int, system: Numbers) -> None:
-    """Fill the equations of u at the stages, (STAGES d, STAGES d), then the right sides for u and f at 0."""
+    """Fill the matrix (STAGES d, STAGES d) of the equations of u at the stages, and right sides for u and f at 0."""
     scale = size * size * mu
     n = STAGES * d
     for i in range(STAGES):
@@ -132,7 +132,7 @@ def _solve_in_place(system: Numbers, n: int, columns: int) -> None:
 
 @glue
 def transfer(c: Numbers, mu: Any, size: float, d: int, system: Numbers, phi: Numbers) -> None:
-    """Fill the transfer matrix (2 d, 2 d) of an element: from (u, f) at its start to (u, f) at its end."""
+    """Fill the transfer matrix (2 d, 2 d) of an element, which gives (u, f) at its end from (u, f) at its start."""
     n = STAGES * d
     _fill_stages(c, mu, size, d, system)
     _solve_in_place(system, n, n + 2 * d)
@@ -167,7 +167,7 @@ SINGULAR, TOO_MANY = -1, -2  # returned instead of a count
 
 @glue
 def _transfer_stiffness(phi: Numbers, d: int, k: Numbers, moved: Numbers) -> None:
-    """Fill an element's end displacement and force, (d, d) each, for unit displacements of its start, where f = k u."""
+    """Fill end displacements and forces of an element, (d, d), for unit displacements u and f = k u at its start."""
     for a in range(d):
         for b in range(d):
             end, force = phi[a, b], phi[d + a, b]
@@ -228,7 +228,7 @@ def _negative_pivots(phi: Numbers, d: int, clear: float, moved: Numbers) -> int:
 
 @glue
 def _negative_spring_pivots(phi: Numbers, d: int, give: Numbers) -> int:
-    """Number of negative eigenvalues of the pivot 1/give + k00 at a start that is flexible in one direction."""
+    """Number of negative eigenvalues of the pivot 1/give + k00, for a start that is flexible in one direction."""
     if d == 1:
         return int(1.0 + (give[0, 0] * phi[0, 0] / phi[0, 1]).real < 0.0)
     determinant = phi[0, 2] * phi[1, 3] - phi[0, 3] * phi[1, 2]

@@ -20,7 +20,7 @@ BIN = 0.005  # length of cable on the drum with one common strain [m]
 def wind_in(layer: Array, place: float, step: float, strain: float, stiffness: float) -> float:
     """Wind cable of a given strain onto a drum; returns the energy [J] lost when the strain is averaged within a bin.
 
-    The cable in a bin has one strain, which preserves its strained and its unstrained length.
+    The cable in a bin has one strain. Its strained length and its unstrained length are preserved.
 
     layer: strain in each bin of the cable on the drum, (B,), the last bin without end; place: length let out before
         [m]; step: length to wind in [m], > 0; stiffness: EA [N].
@@ -74,7 +74,7 @@ NO, YES, NEW = 0.0, 1.0, 2.0
 
 # rows of the state of the drives of m cables, (DRIVE_ROWS, m)
 RATE = 0  # dL/dt of the unstrained length [m/s]
-WOUND, SPEED = 1, 2  # length s that is let out [m], and its rate [m/s]
+WOUND, SPEED = 1, 2  # length s paid out [m], and its rate [m/s]
 FORCE, INTEGRAL = 3, 4  # force of the motor at the cable, outward; integral part of its controller [N]
 AT_FRAME, WHOLE, AT_DRUM = 5, 6, 7  # frame-end tension including damping; H and drum tension without damping [N]
 STRETCHING = 8  # damping part of H [N]
@@ -100,7 +100,7 @@ DATA_ROWS = 12
 # sums over a run [J]
 SUPPLIED, LOST, ON_DRUMS, GIVEN_POWER, LOST_POWER = 0, 1, 2, 3, 4
 START, START_POTENTIAL, BEGIN = 5, 6, 7  # energy at the start and its potential part [J]; time of step 0 [s]
-MOVED = 8  # largest sum so far of kinetic energy, change of potential energy, supplied and lost energy
+MOVED = 8  # largest sum, until now, of kinetic energy, change of potential energy, supplied and lost energy
 AUDIT_SIZE = 9
 
 LOOP_PERIOD = 1e-3  # [s]

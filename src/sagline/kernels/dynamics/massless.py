@@ -104,7 +104,7 @@ def cable_gravity(run: MasslessRun) -> float:
 
 @kernel
 def add_wind_on_cables(cables: Array, drag: Array, rows: Array, wind: Array, given: Array) -> None:
-    """Add half of the wind's force on every cable, which acts across its chord, to a wrench (6,)."""
+    """Add half of the wind force on every cable, which is normal to its chord, to a wrench (6,)."""
     for i in range(cables.shape[0]):
         x = rows[g.AZIMUTH_X, i] * rows[g.COSINE, i]
         y = rows[g.AZIMUTH_Y, i] * rows[g.COSINE, i]

@@ -27,7 +27,7 @@ from sagline.kernels.jit import entry, formula, kernel
 LARGEST_DEGREE = 48
 LEAST_DEGREE = 6
 HALF_WAVE = 1.5  # polynomial degrees per half wavelength
-ALWAYS = 7.0  # degrees in addition to those for the waves
+ALWAYS = 7.0  # polynomial degrees in addition to the degrees for the waves
 MOST_PHASE = math.pi * (LARGEST_DEGREE - ALWAYS) / HALF_WAVE
 
 Rule = tuple[Array, Array, Array, Array]
@@ -38,8 +38,8 @@ class Lobatto(NamedTuple):
 
     nodes: Array  # (p, i)
     weights: Array  # (p, i)
-    slopes: Array  # derivative at node q of the polynomial that is 1 at node i, (p, q, i)
-    integrals: Array  # integral of this polynomial from -1 to node q, (p, q, i)
+    slopes: Array  # derivative at node q of the Lagrange polynomial of node i, (p, q, i)
+    integrals: Array  # integral of the Lagrange polynomial of node i from -1 to node q, (p, q, i)
 
 
 class _Element(NamedTuple):
@@ -174,7 +174,7 @@ def node_counts(strings: Array, omega: float, counts: Indices) -> None:
 
 @formula
 def _fill_rest_shapes(points: Array, count: int, carried: Array, still: Array) -> None:
-    """Fill static shapes times root masses, (nodes, 5): xx, xz, zx, zz, yy; and the mass in this motion, (4,)."""
+    """Fill static shapes xx, xz, zx, zz, yy times roots of masses, (nodes, 5), and the mass in this motion, (4,)."""
     end = points[count - 1]
     determinant = end[2] * end[4] - end[3] * end[3]
     for k in range(4):
@@ -196,7 +196,7 @@ def _fill_rest_shapes(points: Array, count: int, carried: Array, still: Array) -
 
 @formula
 def _constrain_unknown(matrix: Array, unknown: int, stiffness: float) -> None:
-    """Fix an unknown: decouple it, and set its own stiffness."""
+    """Fix an unknown: decouple it, and set its diagonal stiffness."""
     for j in range(matrix.shape[0]):
         matrix[unknown, j] = matrix[j, unknown] = 0.0
     matrix[unknown, unknown] = stiffness

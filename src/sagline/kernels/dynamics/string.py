@@ -18,7 +18,7 @@ LENGTH = 2  # unstrained length of the free span [m]
 WEIGHT = 3  # weight per length [N/m]
 STIFFNESS = 4  # EA [N]
 DENSITY = 5  # [kg/m]
-# compliance [m/N] of the cable behind the frame end: in the plane (x, z)^T (x, z), and normal to the plane
+# compliance [m/N] of the cable behind the frame end: (x, z)^T (x, z) in the plane, one value normal to it
 BEHIND_X, BEHIND_Z, BEHIND_Y = 6, 7, 8  # the first two in [sqrt(m/N)]
 STRING_COLUMNS = 9
 

@@ -1,6 +1,6 @@
 """Steps to an equilibrium: Newton's method from a nearby pose, energy descent with a trust region from a distant pose.
 
-docs/model.md, section 6. From almost any start, the descent ends in a stable equilibrium. Steps are in the problem's
+docs/model.md, section 6. From almost any start, the descent ends in a stable equilibrium. Steps have the problem's
 units.
 """
 
@@ -74,7 +74,7 @@ POLISH_STEPS = 30
 SHORTENINGS = 10
 NEAR_STEPS = 6
 NEAR = 3e-3  # length of a full Newton step below which Newton's method replaces the descent
-PREDICTED = 0.03  # the longest first-order step that is tried
+PREDICTED = 0.03  # longest first-order step
 SHRINKING = 0.3  # largest ratio of a Newton step to the previous one
 FRESH = 1e-4  # largest distance from its pose at which a factored stiffness is reused
 BALANCED = 1e-9  # relative to the sum of tensions and weight; a smaller unbalance counts as zero
@@ -183,8 +183,7 @@ def _newton_steps(
     """One Newton step on the wrench balance, shortened until the unbalance is below best; requires the stiffness.
 
     Returns the new unbalance and the length of the step. If no step is better, the length is 0 and the pose is
-    unchanged. If the unbalance is below good, only the full step is tried, because a worse full step is then due to
-    rounding.
+    unchanged. If the unbalance is below good, only the full step is tried; a worse full step is then due to rounding.
     """
     model, cables, body, wrench, free = problem.model, problem.cables, problem.body, problem.wrench, problem.free
     step, trial, part = space.step, space.trial, space.part
@@ -217,7 +216,7 @@ def _newton_steps(
 
 @glue
 def polish(problem: PoseProblem, pose: Array, space: ForwardArrays, good: float) -> int:
-    """Newton steps on the wrench balance as long as it improves, to full precision; returns the number of steps.
+    """Newton steps on the wrench balance until it no longer improves; returns the number of steps.
 
     good: an unbalance below this counts as zero. The work arrays belong to the pose before and after the steps. The
     stiffness may belong to a pose that differs by rounding errors.
@@ -250,8 +249,7 @@ def descend(problem: PoseProblem, pose: Array, space: ForwardArrays, known: floa
     known: the sum of tensions from `unbalance` at the pose; 0 unless space belongs to the pose and matrix is its
         stiffness.
 
-    Returns the number of tried steps, and the sum of tensions at the pose, or 0 if the last tried pose is not the
-    result.
+    Returns the number of tried steps, and the sum of tensions at the pose (0 if the last tried pose is not the result).
     """
     model, cables, body, wrench, free = problem.model, problem.cables, problem.body, problem.wrench, problem.free
     trial, motion, rotation, rows, gradient = space.trial, space.motion, space.rotation, space.rows, space.gradient

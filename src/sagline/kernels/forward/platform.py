@@ -1,8 +1,7 @@
-"""The platform on cables of given lengths: wrench at a pose, and derivatives of the wrench by motions.
+"""The platform on cables of given lengths: wrench at a pose, and derivatives of the wrench due to motions.
 
 A motion consists of the displacement of the center of mass and a rotation vector in world axes, which rotates the
-present orientation from the left. The unbalance is minus the total wrench on the platform. It is the gradient of the
-energy.
+present orientation from the left. The unbalance is minus the total wrench on the platform: the gradient of the energy.
 """
 
 from __future__ import annotations
@@ -108,8 +107,7 @@ def _add_row(target: Array, share: float, row: Six) -> None:
 def platform_stiffness(model: Model, cables: Array, rows: Array, stiffness: Array) -> None:
     """Fill the derivative (6, 6) of the unbalance after `unbalance`: the sum of elastic, sag and geometric stiffness.
 
-    The skew part of the derivative is half the moment of the cable forces. It is zero in an equilibrium without a given
-    moment.
+    Its skew part is half the moment of the cable forces. This part is zero in equilibrium without a given moment.
     """
     stiffnesses_in_plane(model, cables, rows, model.behind)
     for j in range(6):

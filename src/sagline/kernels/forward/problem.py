@@ -100,7 +100,7 @@ def new_forward_arrays(memory: Memory, rows: Array, factor: Array) -> tuple[Forw
 
 @glue
 def new_motions(memory: Memory, n: int) -> tuple[Array, Array, Array, Array]:
-    """Free motions (n, 6) in the units of steps, and in the units for comparing stiffnesses; and two pose rows."""
+    """Arrays: free motions (n, 6) in units of steps and in units of stiffness comparisons, and two pose rows."""
     free, memory = block(memory, n, 6)
     arcs, memory = block(memory, n, 6)
     poses, memory = block(memory, 2, tables.POSE_COLUMNS)

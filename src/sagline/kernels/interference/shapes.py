@@ -49,7 +49,7 @@ def point(row: Array, share: float) -> tuple[float, float, float]:
 
 @kernel
 def slopes(row: Array, share: float) -> tuple[float, float, float, float]:
-    """First and second derivatives of (x, z) in the cable's plane by the share of its length [m].
+    """First and second derivatives of (x, z) in the cable's plane with respect to the share of its length [m].
 
     With t the tension and T the force, the derivatives with respect to the unstrained length are r' = T (1/t + 1/EA)
     and r'' = (-T_x T_z w/t^3, w T_x^2/t^3 + w/EA).
@@ -112,7 +112,7 @@ STEPS = 12  # Newton on a slope of at most six straight parts
 
 @kernel
 def between_segments(one: Array, other: Array) -> tuple[float, float, float, float]:
-    """Squared distance of segments (x0, y0, z0, x1, y1, z1), a lower bound of it, [m^2], and the nearest shares."""
+    """Squared distance [m^2] of segments (x0, y0, z0, x1, y1, z1), its lower bound, and the nearest shares."""
     ax, ay, az = one[3] - one[0], one[4] - one[1], one[5] - one[2]
     bx, by, bz = other[3] - other[0], other[4] - other[1], other[5] - other[2]
     rx, ry, rz = one[0] - other[0], one[1] - other[1], one[2] - other[2]
@@ -157,7 +157,7 @@ def outside(coordinate: float, half: float) -> float:
 
 @kernel
 def to_box(segment: Array, box: Array) -> tuple[float, float, float]:
-    """Squared distance of a segment from a box, a lower bound of it, [m^2], and the share of the nearest point."""
+    """Squared distance [m^2] between a segment and a box, its lower bound, and the share of the nearest point."""
     px, py, pz = in_box_axes(box, segment[0] - box[PLACE], segment[1] - box[PLACE + 1], segment[2] - box[PLACE + 2])
     dx, dy, dz = in_box_axes(box, segment[3] - segment[0], segment[4] - segment[1], segment[5] - segment[2])
     hx, hy, hz = box[HALF], box[HALF + 1], box[HALF + 2]
@@ -195,7 +195,7 @@ def to_box(segment: Array, box: Array) -> tuple[float, float, float]:
 
 @kernel
 def nearest_in_box(box: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """The point of a box that is nearest to a point [m]."""
+    """Point of a box nearest to a given point [m]."""
     px, py, pz = in_box_axes(box, x - box[PLACE], y - box[PLACE + 1], z - box[PLACE + 2])
     ex, ey, ez = outside(px, box[HALF]), outside(py, box[HALF + 1]), outside(pz, box[HALF + 2])
     return (

@@ -250,7 +250,7 @@ def polygon_of_pose(
         robot_terms: As in `inverse_poses`, of one robot.
         pose: Row (POSE_COLUMNS,).
         wrench: External plus inertial wrench about the center of mass, (6,).
-        carried: Chord tensions and sag forces of the cables, (m,) each; NaN selects sag forces of first order.
+        carried: Chord tensions and sag forces of the cables, (m,) each; for NaN, first-order sag forces are used.
         memory: `memory_for` the number of cables.
         polygon: Filled: scale and offset of the variable, (m,) each; minimum norm and limits, (3, m); null space (r,
             m); for r = 2 corners and labels as in `feasible_polygon`; for r = 1 the ends of the interval, corners[0, 0]

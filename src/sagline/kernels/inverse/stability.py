@@ -1,4 +1,4 @@
-"""Proof that the equilibrium of a solved pose is stable, from values of its solution; docs/model.md, section 6.
+"""Proof of the stability of a solved pose, from values of its solution; docs/model.md, section 6.
 
 The stiffness of a platform end is positive definite. Let u be the unit vector along the chord and c the compliance
 along u. The stiffness is then at least u u^T/c. With any right inverse A of the structure matrix J, the inverse of J

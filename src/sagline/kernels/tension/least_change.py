@@ -64,7 +64,7 @@ class _Tangents(NamedTuple):
     inverse: Array  # transposed pseudo-inverse of the hard rows, (h, m)
     soft: Array  # soft rows along the null space of the hard rows, (k, d)
     normal: Array  # normal matrix of `soft` and of the weights of change, later its factor, (d, d)
-    rows: Array  # derivatives of the tensions by the unknowns, (d, m)
+    rows: Array  # derivatives of the tensions with respect to the unknowns, (d, m)
     bounds: Array  # optimal tensions without limits, and the limits, (3, m)
     unknowns: Array  # right side, a target of zeros, and the point, (3, d)
     held: ActiveSet  # active limits of the last point

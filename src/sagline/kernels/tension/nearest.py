@@ -31,7 +31,7 @@ class Distribution(NamedTuple):
 class ReferencePoint(NamedTuple):
     """Reference point of a nearest-point method, in coordinates of the null space."""
 
-    previous: Array  # reference tensions in the distribution's variable (m,), NaN if there are none
+    previous: Array  # reference tensions in the distribution's variable (m,), NaN without a reference
     reference: Array  # lambda_ref, (r,)
     held: ActiveSet  # active limits of the last projection
     point: Array  # result of the last projection, (r,)

@@ -83,7 +83,7 @@ def share_lowest_sum(bounds: Array, null: Array, near: ReferencePoint, basis: Ba
 def share_lowest_maximum(
     bounds: Array, offset: Array, null: Array, near: ReferencePoint, basis: Basis, memory: Memory
 ) -> int:
-    """Fill the point (r,) of `near` with the least largest tension; if not unique, the one nearest to the reference.
+    """Fill the point (r,) of `near` that minimizes the largest tension (if not unique, nearest to the reference).
 
     The program's last unknown is the largest tension.
     """
@@ -101,7 +101,7 @@ def share_lowest_maximum(
         rows[r, m + i] = 1.0
         for row in range(STRIP_ROWS):
             wide[row, i] = bounds[row, i]
-        # the largest tension minus that of cable i is >= 0
+        # largest tension minus tension of cable i >= 0
         wide[START, m + i], wide[LOW, m + i], wide[HIGH, m + i] = -bounds[START, i] - offset[i], 0.0, math.inf
     for k in range(r):
         cost[k] = 0.0
@@ -138,7 +138,7 @@ def share_by_norm(
 ) -> int:
     """Fill the point (r,) of `near` whose tensions have the least p-norm.
 
-    known: True if the point is the result of the previous iteration, (1,); the search then starts from it.
+    known: True if the point is the result of the previous iteration, (1,); the search then starts at this point.
     """
     point = near.point
     slack = TOLERANCE * largest_bound(bounds)

@@ -33,7 +33,7 @@ PARALLEL = 1e-12
 
 @kernel
 def _limit_lines(bounds: Array, null: Array, lines: Array) -> None:
-    """Fill the limits 2i and 2i + 1 as rows gx, gy, offset of gx x + gy y + offset >= 0, (2m, 3)."""
+    """Fill rows (gx, gy, offset), (2m, 3): limits 2i and 2i + 1 are gx x + gy y + offset >= 0."""
     for i in range(null.shape[1]):
         lines[2 * i, 0] = null[0, i]
         lines[2 * i, 1] = null[1, i]

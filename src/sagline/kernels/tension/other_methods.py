@@ -92,7 +92,7 @@ def _hold_violated(bounds: Array, null: Array, slack: float, memory: Memory, ten
 
 @glue
 def _puncture(bounds: Array, tension: Array) -> None:
-    """Move the tensions toward the minimum norm, START, as far as the limits allow."""
+    """Move the tensions toward the minimum norm (START) until a limit is reached."""
     m = tension.size
     share = 0.0  # 0 at the minimum norm, 1 at the given tensions
     for i in range(m):

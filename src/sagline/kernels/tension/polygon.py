@@ -1,8 +1,8 @@
 """The polygon of feasible tensions in the null space of two redundant cables; docs/model.md, section 5.
 
 The limits of cable i are the bound low_i <= t0_i + N_i . lambda <= high_i. A polygon is stored as its corners,
-counter-clockwise, each with the label of the side that starts at the corner. The label is 2i for the lower limit of
-cable i and 2i + 1 for its upper limit. The sides of the box that replaces infinity have labels from 2m on.
+counter-clockwise. Each corner has the label of the side that starts at it. The label is 2i for the lower limit of cable
+i and 2i + 1 for its upper limit. The sides of the box that replaces infinity have labels from 2m on.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ def _cut_polygon(
 
     The corners change in place. The border of a half-plane crosses the border of a convex polygon at most twice.
     """
-    leaving = -1  # last corner inside before the first outside
-    entering = -1  # first corner inside after the last outside
+    leaving = -1  # last corner inside, before the first corner outside
+    entering = -1  # first corner inside, after the last corner outside
     kept = 0
     before = x * corners[count - 1, 0] + y * corners[count - 1, 1] - side >= -slack
     for k in range(count):
@@ -164,9 +164,9 @@ def feasible_polygon(bounds: Array, null: Array, corners: Array, labels: Indices
 
 @kernel
 def polygon_again(bounds: Array, null: Array, corners: Array, labels: Indices, count: int) -> bool:
-    """Fill the corners of a polygon with known sides; False if the sides are no longer those of the feasible polygon.
+    """Fill the corners of a polygon with known sides; False if the feasible polygon has other sides.
 
-    They are still its sides if they follow each other in this order, and if no limit cuts off a corner.
+    The known sides are still correct if they follow each other in this order, and if no limit cuts off a corner.
     """
     m = null.shape[1]
     slack = TOLERANCE * largest_bound(bounds)
@@ -202,7 +202,7 @@ def polygon_again(bounds: Array, null: Array, corners: Array, labels: Indices, c
 
 @formula
 def nearest_on_side(ax: float, ay: float, bx: float, by: float, x: float, y: float) -> tuple[float, float]:
-    """The point of the side from a to b that is nearest to a given point."""
+    """Point nearest to a given point, on the side between the corners a and b."""
     ex = bx - ax
     ey = by - ay
     square = ex * ex + ey * ey
@@ -234,7 +234,7 @@ class WorkArrays(NamedTuple):
 
     corners: Array  # corners of the feasible polygon, (2m + SPARE_CORNERS, 2)
     labels: Indices  # labels of its sides, (2m + SPARE_CORNERS,)
-    known: Indices  # number of corners of the last polygon, (1,); 0 if there is none
+    known: Indices  # number of corners of the last polygon, (1,); 0 without a polygon
     basis: Basis  # basis of the linear program of the last iteration
     rest: Memory  # memory whose content is not kept
 

@@ -302,7 +302,7 @@ def _measure_direction(place: CablesInBox, box: PoseRange, direction: Array, tur
                 vz += direction[3] * rx + direction[4] * ry
             slope = place.slopes[motion]
             change = vx * place.full[0, i] + vy * place.full[1, i] + vz * place.full[2, i]
-            # derivative of the unit vector only
+            # only the derivative of the unit vector
             change += x * slope[i] + y * slope[m + i] + z * slope[2 * m + i]
             if motion < 3:
                 half = box.half[motion]
@@ -338,7 +338,7 @@ def _most_of_run(slope: float, rate: float, most: float, width: float) -> float:
 
 @kernel
 def _most_of_cable(place: CablesInBox, curves: Curves, ranges: Ranges, tau: float, i: int, rows: Array) -> float:
-    """Upper bound, over a box, of the gain of the contribution of a cable along y if its tension differs from tau."""
+    """Upper bound over a box: gain of a cable's contribution along y if its tension differs from tau."""
     low, high = ranges.lowest[i], ranges.highest[i]
     bend, spread, hanging = rows[BENT, i], rows[SPREAD, i], rows[HANGING, i]
     weight = abs(hanging)

@@ -251,7 +251,7 @@ def tighten(freedom: Array, place: CablesInBox, curves: Curves, upward: float, r
 
 @kernel
 def spread_of_slopes(place: CablesInBox, box: PoseRange, centered: Centered, ranges: Ranges, slopes: Array) -> None:
-    """Fill the derivatives of the wrench of centered tensions and sag forces by each motion, (MOTIONS, 6)."""
+    """Fill the derivatives of the wrench of tensions and sag forces with respect to each motion, (MOTIONS, 6)."""
     m = place.way.size
     for motion in range(MOTIONS):
         for a in range(6):

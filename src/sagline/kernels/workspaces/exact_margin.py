@@ -129,8 +129,7 @@ def _write_value(margin: Array, exact: float, error: float) -> None:
 def _margin_in_facet(platform: Platform, facet: LimitingFacet, curves: Curves, load: Array, memory: Memory) -> float:
     """Margin on the exact curves, from the tensions at which the load meets the facet; NaN outside the facet.
 
-    The tensions follow from the secants. Within narrow bounds, their errors have only a second-order effect on the
-    margin.
+    The tensions follow from the secants. Within narrow bounds, their errors have a second-order effect on the margin.
     """
     columns, y, bands = facet.columns, facet.direction, facet.bands
     n, m = platform.freedom.shape[0], columns.shape[1]
@@ -207,8 +206,7 @@ def _largest_multiple(
 ) -> float:
     """Largest multiple of a load that the cables supply in addition to a demand; infinite or NaN if not found.
 
-    A reflection turns the load to the first component, which is the only soft one. The search starts beyond the upper
-    bound.
+    A reflection turns the load to the first component, the only soft one. The search starts beyond the upper bound.
     """
     n, m = demand.matrix.shape
     rows, rest = block(memory, 2 * n + 4, m)

@@ -34,7 +34,7 @@ class CablesInBox(NamedTuple):
     full: Array  # structure matrix, (6, m)
     matrix: Array  # its components along the rows, (n, m)
     lever: Array  # levers from center of mass to platform end, world axes [m], (3, m)
-    slopes: Array  # derivatives of the structure matrix by each motion of the platform, (MOTIONS, 6 * m)
+    slopes: Array  # derivatives of the structure matrix with respect to each motion, (MOTIONS, 6 * m)
     way: Array  # largest displacement of a platform end [m], (m,)
     turned: Array  # largest change of a unit vector, (m,)
     bent: Array  # largest deviation of a unit vector from the linear prediction, (m,)
@@ -108,7 +108,7 @@ def set_cables_in_box(
 
 @kernel
 def _set_slopes(geometry: Array, rotation: Array, center: Array, box: PoseRange, place: CablesInBox) -> None:
-    """Fill the derivatives of the structure matrix by the motions."""
+    """Fill the derivatives of the structure matrix with respect to the motions."""
     m = place.way.size
     for motion in range(MOTIONS if box.turn > 0.0 else 3):
         slopes = place.slopes[motion].reshape((6, m))

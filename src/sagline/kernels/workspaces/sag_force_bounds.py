@@ -1,8 +1,8 @@
 """Bounds of the sag forces within the chord tension limits, and of their changes with tension and platform end.
 
 The sag force of an inextensible cable is tau X (L/D) + tau sin phi (X coth X - 1) with X = wD/(2 tau). This module
-bounds its slopes in closed form. Stretch decreases the slopes with respect to position. Because of stretch, the sag
-force falls faster with the tension, by at most wD/(2 EA); docs/model.md, section 13.
+bounds its slopes in closed form. Stretch decreases the slopes with respect to position. Stretch changes the slope over
+the tension by at most -wD/(2 EA); docs/model.md, section 13.
 """
 
 from __future__ import annotations
@@ -60,9 +60,9 @@ def fill_bands(curves: Curves, bands: Array, memory: Memory) -> bool:
 def _from_secant(cables: Cables, i: int, low: float, high: float) -> tuple[float, float]:
     """Lower and upper bound, <= 0 and >= 0, of a sag force minus its secant between two chord tensions [N].
 
-    The sag force of an inextensible cable is a sum of convex functions of the tension, except for the term
-    wD/2 sin phi (X/3 - ...) of a cable below its frame end, which is concave. The secant of 1/tau is above 1/tau by at
-    most (1/sqrt(low) - 1/sqrt(high))^2. Two million random cables with X <= 10 and e <= 10 confirmed the bounds.
+    The sag force of an inextensible cable is a sum of convex functions of the tension. Only the term wD/2 sin phi (X/3
+    - ...) is concave if the platform end is below the frame end. The secant of 1/tau is above 1/tau by at most
+    (1/sqrt(low) - 1/sqrt(high))^2. Two million random cables with X <= 10 and e <= 10 confirmed the bounds.
     """
     half_weight = cables.half_weight[i]
     if half_weight == 0.0:
@@ -83,13 +83,13 @@ SMALL = 1e-3  # X below which series are used
 
 @formula
 def _sinh_ratio(x: float) -> float:
-    """Upper bound of sinh(x)/x, equal to it except for small x."""
+    """Upper bound of sinh(x)/x; exact except for small x."""
     return math.sinh(x) / x if x > SMALL else 1.0 + x * x / 3.0
 
 
 @formula
 def _slack_rate(x: float) -> float:
-    """Upper bound of x cosh x - sinh x, equal to it except for small x."""
+    """Upper bound of x cosh x - sinh x; exact except for small x."""
     return x * math.cosh(x) - math.sinh(x) if x > 0.1 else 0.34 * x * x * x
 
 

@@ -1,4 +1,4 @@
-"""Signed margin of a pose for a set of loads; a negative value is the distance by which the set exceeds the limit.
+"""Signed margin of a pose for a set of loads; negative if the set is not within the available wrench set.
 
 The margin is the least signed distance between the set and the facets of the available wrench set; docs/model.md,
 section 13. The sag forces depend on the tensions, which vary within their limits. The least favorable sag forces give a
