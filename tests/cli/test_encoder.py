@@ -114,7 +114,7 @@ def test_what_is_too_much_for_the_winches_is_told() -> None:
         ("C0,C1,C2\n", 1, "no rows", "at least one"),
         ("C0 [mm],C1,C2\n1,2,3\n", 1, "C0 is [mm]", "none"),
         ("C0,C1,C2\n1,x,3\n", 2, "C1 is x", "a number"),
-        ("time,C0,C1,C2\n1,1,2,3\n1,1,2,3\n", 3, "time is 1 s", "a time later than in the row before"),
+        ("time,C0,C1,C2\n1,1,2,3\n1,1,2,3\n", 3, "time is 1 s", "a time after the time of the previous row"),
     ],
 )
 def test_a_wrong_file_of_counts_is_named_with_its_line(text: str, line: int, named: str, allowed: str) -> None:

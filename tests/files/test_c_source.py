@@ -262,7 +262,7 @@ def test_what_is_not_covered_is_refused(tmp_path: Path) -> None:
     robot = sl.load_robot(PROTOTYPE)
     changes: list[tuple[dict[str, Any], dict[str, Any], str, str | None]] = [
         ({"tension_max": np.inf}, {"tension": sl.ClosedForm()}, "article-prototype: tension_max[0]", None),
-        ({}, {"tension": []}, "tension", "Give one, Closest() for instance."),
+        ({}, {"tension": []}, "tension", "Give a method, for example Closest()."),
         ({"cables": sl.Cable(0.09, 1e39)}, {"single_precision": True}, "table", "Export it in double precision."),
     ]
     for change, asked, item, step in changes:

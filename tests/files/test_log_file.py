@@ -130,7 +130,7 @@ COMMANDED = "length_0,x_commanded,y_commanded,z_commanded"
             ROWS,
             (
                 "tension_deviation",
-                "does not say the tension_deviation of what it holds",
+                "does not give the tension_deviation of a sensor with readings",
                 None,
                 (
                     "Write a comment above the columns, for instance '# tension_deviation: "
@@ -138,10 +138,10 @@ COMMANDED = "length_0,x_commanded,y_commanded,z_commanded"
                 ),
             ),
         ),
-        ("length_0,z\n3,1\n", ("position_deviation", "does not say the position_deviation of what it holds")),
+        ("length_0,z\n3,1\n", ("position_deviation", "does not give the position_deviation of a sensor with readings")),
         (
             "length_0,alpha,beta,gamma\n3,1,0,0\n",
-            ("rotation_deviation", "does not say the rotation_deviation of what it holds"),
+            ("rotation_deviation", "does not give the rotation_deviation of a sensor with readings"),
         ),
         ("# length_deviation: 1\n", ("columns",)),
         ("load_cell_0\n1\n", ("line 1", "neither columns count_0, ... nor length_0, ...", "one of the two")),

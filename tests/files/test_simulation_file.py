@@ -180,8 +180,8 @@ def edited(data: xr.Dataset, name: str, index: Any, value: Any) -> xr.Dataset:
         ("event_cable", 1, 8, ("event_cable[1]", "8", "-1 for 'pick up'")),
         ("event_cable", 0, -2, ("event_cable[0]", "-2", "0 to 7 for 'break'")),
         ("event_time", 0, np.nan, ("event_time[0]", "nan", "finite, at every pose")),
-        ("event_kind", 0, "", ("event_kind[0]", None, "a word that prints")),
-        ("event_kind", 0, "\x1b[31m", ("event_kind[0]", None, "a word that prints")),
+        ("event_kind", 0, "", ("event_kind[0]", None, "printable characters")),
+        ("event_kind", 0, "\x1b[31m", ("event_kind[0]", None, "printable characters")),
         ("axis", 0, "q", ("axis", None, "x, y, z")),
     ],
 )

@@ -1,7 +1,7 @@
-"""C99 of a robot's inverse and forward kinematics, for microcontrollers: the kernels of this package, translated.
+"""C99 source of a robot's inverse and forward kinematics for microcontrollers, from translated kernels of this package.
 
-`tools/translate/portable.py` writes the translated kernels, in parts, when the package is built. The source of a robot
-contains the parts that it needs, its data, and functions to call.
+`tools/translate/portable.py` translates the kernels in parts when the package is built. The source of a robot contains
+the necessary parts, the data of the robot, and functions to call.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from sagline.tension.methods import Closest, method_of
 
 KERNELS: Final = "c/kernels.json"
 BAD_INPUT: Final = 9
-FORWARD_STATUS: Final = 10  # added to the codes of the forward kernel
+FORWARD_STATUS: Final = 10  # number that is added to the status codes of the forward kernel
 COMMENT: Final = re.compile(r"/\*.*?\*/", re.DOTALL)
 _CLOSEST = Closest()
 
@@ -54,16 +54,17 @@ def export_c(
 ) -> tuple[Path, Path, Path]:
     """Write C99 for a robot's kinematics on a microcontroller, and SCL of one function for a PLC.
 
-    NAME.c has the kernels of `inverse` and, on request, of `forward`, translated, with the data of the robot. It has no
-    heap and no recursion, its loops are bounded, and each function returns a status. NAME.h declares the functions and
-    states their bounds. NAME.scl is P3 of "The model" in SCL for a Siemens PLC; it has not been compiled yet.
+    NAME.c contains the translated kernels of `inverse` and, on request, of `forward`, and the data of the robot. The
+    source has no heap and no recursion, all loops are bounded, and each function returns a status. NAME.h declares the
+    functions and states their bounds. NAME.scl is the function P3 of "The model" in SCL for a Siemens PLC; it has not
+    been compiled yet.
 
     Args:
         robot: The robot; its winches may have pulleys and dead lengths, but no guides.
         file: Path of the source, sagline.c; the other files are in the same folder. Existing files are replaced.
-        tension: Tension distribution method, or several of them, of which each call selects one.
-        forward: If true, the source has the forward kinematics too.
-        single_precision: If true, numbers are `float`, for controllers whose hardware has single precision only.
+        tension: Tension distribution method, or several methods; each call then selects one of them.
+        forward: True to include the forward kinematics.
+        single_precision: True for numbers of type `float`, for controllers with hardware for single precision only.
 
     Returns:
         Paths of the source, the header and the SCL text.
@@ -83,7 +84,7 @@ def export_c(
     real = np.float32 if flag(single_precision, "single_precision") else np.float64
     methods = tuple(tension) if isinstance(tension, list | tuple) else (tension,)
     if not methods:
-        raise InvalidValueError("tension", "empty", "a method or several", "Give one, Closest() for instance.")
+        raise InvalidValueError("tension", "empty", "a method or several", "Give a method, for example Closest().")
     chosen = [method_of(method) for method in methods]
     path = checked_name(file_path(file), ".c", "C source", "sagline")
     source, header = source_of(without_guides(robot, "export_c", "inverse"), chosen, forward, real, path.stem)
@@ -129,18 +130,18 @@ def _kernels() -> dict[str, Any]:
         found: dict[str, Any] = json.loads(place.read_text(encoding="utf-8"))
     except FileNotFoundError:
         step = "Build the package: python -m tools.build, in the folder of the source code."
-        raise FileError(Path(str(place)), "is missing: the package was not built", step) from None
+        raise FileError(Path(str(place)), "is missing, because the package was not built", step) from None
     return found
 
 
 def _evaluated(bounds: dict[str, list[tuple[int, int, int]]], robot: Robot) -> dict[str, int]:
-    """Bounds of a kernel for a robot, from polynomials in its degrees of freedom and redundant cables."""
+    """Bounds of a kernel for a robot, from polynomials in the degrees of freedom and the number of redundant cables."""
     n, r = robot.degrees_of_freedom, robot.cable_count - robot.degrees_of_freedom
     return {name: sum(value * n**i * r**j for i, j, value in terms) for name, terms in bounds.items()}
 
 
 def _reached(parts: list[tuple[list[str], str]], asked: Sequence[str]) -> str:
-    """The parts that some entries need, in their order."""
+    """The parts that some entries need, in the order of the source."""
     owner = {name: index for index, (names, _) in enumerate(parts) for name in names}
     waiting, reached = [owner[name] for name in asked], {index for index, (names, _) in enumerate(parts) if not names}
     while waiting:
@@ -155,7 +156,7 @@ def _reached(parts: list[tuple[list[str], str]], asked: Sequence[str]) -> str:
 def _words(
     robot: Robot, methods: Sequence[TensionMethod], options: Sequence[Options], real: type[np.floating], stem: str
 ) -> dict[str, str]:
-    """Words of the robot's functions: data and sizes."""
+    """Replacements in the text of the robot's functions: data and sizes."""
     freedom, m, n = robot.freedom, robot.cable_count, robot.degrees_of_freedom
     turning = freedom[:, 3:].any(axis=1) if robot.motion_pattern in ROTATING else np.zeros(n, dtype=bool)
     rows = tables.RESULT_ROWS if has_routing(robot) else tables.BARE_ROWS
@@ -189,7 +190,7 @@ def _words(
 
 
 def _method_names(methods: Sequence[TensionMethod]) -> list[str]:
-    """Name in C of each method: that of its class, with a number if it is repeated."""
+    """Name in C of each method: name of its class, with a number if the class is repeated."""
     found: list[str] = []
     for method in methods:
         name = "SAGLINE" + re.sub(r"(?=[A-Z])", "_", type(method).__name__).upper()
@@ -206,7 +207,7 @@ def _rule(options: Options, real: type[np.floating]) -> str:
 
 
 def _statuses() -> str:
-    """Members of the list of statuses in C, with their meaning."""
+    """Members of the enumeration of statuses in C, with their meanings."""
     rows = [(status.name, int(status), status.text) for status in PoseStatus if int(status) < BAD_INPUT]
     rows.append(("BAD_INPUT", BAD_INPUT, "a number is not finite, a length too short, a quaternion not of length 1"))
     forward = [(f"FORWARD_{each.name}", FORWARD_STATUS + int(each), each.text) for each in ForwardStatus]
@@ -215,7 +216,7 @@ def _statuses() -> str:
 
 
 def _constant(values: Array, name: str, real: type[np.floating]) -> str:
-    """A constant in C, or a list in braces; each is read back as the same number."""
+    """A constant in C, or a list in braces; C reads each text as exactly the same number."""
     if values.ndim:
         separator = ", " if values.ndim == 1 else ",\n    "
         return f"{{{separator.join(_constant(value, name, real).strip('{}') for value in values)}}}"

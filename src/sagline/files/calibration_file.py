@@ -39,7 +39,7 @@ from sagline.robot.robot import Robot
 if TYPE_CHECKING:
     from xarray import Dataset
 
-READ: Final = ("lengths", "counts")  # quantity that is read from the winches; the index is Parameters.counted
+READ: Final = ("lengths", "counts")  # quantity that the winches report; the index is Parameters.counted
 UNITS = ("m", "kg/m", "N", "kg", "rad", "1")
 OUTLYING = ("length", "load cell", "position", "rotation")
 P: Final = ("parameter",)
@@ -78,7 +78,7 @@ FOUND: Final = (
     Quantity("chi_squared_of_pose", N, "1", "share of each pose in chi_squared", low=0.0),
     Quantity("weight", N, "1", "less than 1 for a pose that does not fit the rest", "weights", low=0.0),
 )
-SENSORS: Final = {  # name in the file -> attribute, unit; one number, or one per cable or axis
+SENSORS: Final = {  # name in the file: attribute and unit; the value is one number, or one per cable or axis
     "length_deviation": ("cable", "m"),
     "tension_deviation": ("cable", "N"),
     "position_deviation": ("axis", "m"),
@@ -135,7 +135,7 @@ DIRECTIONS: Final = {  # unobservable or weakly observable directions in paramet
 
 
 def _check_calibration(data: Dataset, robot: Robot, before: Robot, sensors: Sequence[Quantity]) -> None:
-    """Refuse a data set that is not a calibration; its two robots and the quantities of its sensors are arguments."""
+    """Refuse a data set that is not a calibration; arguments: the two robots and the quantities of the sensors."""
     m = robot.cable_count
     if before.cable_count != m:
         raise InvalidValueError("robot_before", f"of {before.cable_count} cables", f"of {m}, as robot", STEP)
@@ -169,7 +169,7 @@ def _check_calibration(data: Dataset, robot: Robot, before: Robot, sensors: Sequ
 
 
 def load_calibration(file: os.PathLike[str] | str) -> Calibration:
-    """Read a calibration written by its `save` or by `sagline calibrate`; all numbers are equal to the last bit.
+    """Read a calibration from a file of `Calibration.save` or `sagline calibrate`; all numbers are restored exactly.
 
     Args:
         file: The NetCDF file.
@@ -242,7 +242,7 @@ def _unpack(path: Path, data: Dataset) -> Calibration:
     """Calibration of a data set; the path is used in messages."""
     robot = parse_robot(str(data.attrs["robot"]), f"{path}, robot")
     before = parse_robot(str(data.attrs["robot_before"]), f"{path}, robot_before")
-    measured = ["length_deviation", *(name for name in SENSORS if name in data.variables)]  # the first is always there
+    measured = ["length_deviation", *(name for name in SENSORS if name in data.variables)]  # the first always exists
     sensors = [_sensor(name, data.variables[name].ndim) for name in dict.fromkeys(measured)]
     _check_calibration(data, robot, before, sensors)
     found, numbers, placed = (fields_of(data, each) for each in (FOUND, PARAMETERS, (*PLACED, *sensors)))
@@ -278,7 +278,7 @@ FORMAT: Final = Format(
     kind=Calibration,
     name="calibration",
     made="calibration of sagline",
-    give="Give the .nc file that sagline calibrate wrote, or a calibration's save.",
+    give="Give a .nc file of sagline calibrate, or of Calibration.save.",
     again="Save the calibration again, or get the original file.",
     key="sagline_calibration_format",
     version=1,

@@ -1,4 +1,4 @@
-"""Files of calibration poses: a path that rests at each pose, with the tensions and lengths at rest."""
+"""Files of calibration poses: a path with a stop at each pose, and the tensions and lengths at each stop."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ HEAD: Final = """\
 """
 SPEED: Final = 0.2  # largest speed between two poses [m/s]
 ANGULAR_SPEED: Final = 0.1  # largest angular speed between two poses [rad/s]
-DWELL: Final = 2.0  # shortest time between two poses, and between two sets of tensions at one pose [s]
+DWELL: Final = 2.0  # shortest time between two poses, or between two sets of tensions at one pose [s]
 RATE: Final = 10.0  # sample rate of the path [1/s]
-_PEAK: Final = 15.0 / 8.0  # ratio of the peak speed of a quintic to its mean speed
+_PEAK: Final = 15.0 / 8.0  # ratio of peak speed to mean speed of a quintic
 _DECIMALS: Final = {"position": 4, "quaternion": 6, "frame_end_tension": 1, "unstrained_length": 5, "counts": 0}
-_DIGITS: Final = 4  # significant digits of an expected error; further digits have no meaning
+_DIGITS: Final = 4  # significant digits of an expected error
 
 
 def save(plan: CalibrationPoses, file: os.PathLike[str] | str) -> None:
@@ -56,7 +56,7 @@ def save(plan: CalibrationPoses, file: os.PathLike[str] | str) -> None:
 
 
 def _durations(poses: Pose) -> list[float]:
-    """Duration of each motion [s], at least DWELL, and slow enough for any machine."""
+    """Duration of each motion [s], at least DWELL, and long enough for any machine."""
     way = np.linalg.norm(np.diff(poses.position, axis=0), axis=1)
     turn = (poses.rotation[1:] * poses.rotation[:-1].inv()).magnitude()
     times = np.maximum(_PEAK * np.maximum(way / SPEED, turn / ANGULAR_SPEED), DWELL)
@@ -87,5 +87,5 @@ def _round(row: Array, decimals: int) -> list[Any]:
 
 
 def _plain(error: float) -> float | None:
-    """Error rounded to few digits; None if it is not known."""
+    """Error rounded to few digits; None for an unknown error."""
     return float(f"{error:.{_DIGITS}g}") if np.isfinite(error) else None

@@ -1,4 +1,4 @@
-"""Robots of CASPR, the cable-robot platform for MATLAB: one XML file of bodies and one of cables."""
+"""Robots of CASPR, a MATLAB program for cable robots: one XML file of bodies, and one XML file of cables."""
 
 from __future__ import annotations
 
@@ -48,16 +48,17 @@ _JOINTS: Final[dict[str, tuple[MotionPattern, _Vector | None]]] = {
 
 
 def load_caspr(source: str | os.PathLike[str], cables: Cable | None = None, cable_set: str | None = None) -> Imported:
-    """Read a robot of CASPR that has one platform.
+    """Read a CASPR robot with one platform.
 
-    Cables in CASPR have no weight, and its ideal cables do not stretch. Without the argument `cables`, missing values
-    are those of a 4 mm steel rope; the robot's `assumed` lists them. Pulleys that swivel about a vertical axis are
-    read.
+    Cables in CASPR have no weight, and ideal cables do not stretch. Without the argument `cables`, missing values are
+    replaced by values of a 4 mm steel rope; the robot's `assumed` lists these values. Only pulleys with a vertical
+    swivel axis are read.
 
     Args:
-        source: The robot's folder, or its file of bodies or of cables; the other is searched for in the same folder.
-        cables: The cables' material; None takes the values of the file and assumes the missing ones.
-        cable_set: Name of the set of cables; None takes the file's default.
+        source: The robot's folder, or its file of bodies or of cables; the other file is then searched in the same
+            folder.
+        cables: The cables' material; None for the values of the file, with assumed values where they are missing.
+        cable_set: Name of the set of cables; None for the default of the file.
 
     Returns:
         Imported: the robot, and the lost data.
@@ -118,7 +119,7 @@ def _files(source: Path) -> tuple[Path, Path]:
         if len(files) != 1:
             names = ", ".join(file.name for file in files) or "none"
             reason = f"goes with {len(files)} CASPR files of {kind} ({names}); allowed: 1"
-            raise FileError(source, reason, "Name the file itself.", item=f"CASPR files of {kind}")
+            raise FileError(source, reason, "Give the file, not the folder.", item=f"CASPR files of {kind}")
     return found["bodies"][0], found["cables"][0]
 
 
@@ -132,11 +133,11 @@ def _platform(root: Element) -> tuple[dict[str, Any], list[str]]:
     """Fields of the robot from the file of bodies, and the lost data of this file."""
     links = root.findall(".//link_rigid")
     if len(links) != 1:
-        raise InvalidValueError("number of <link_rigid>", len(links), "1", "sagline moves a single platform.")
+        raise InvalidValueError("number of <link_rigid>", len(links), "1", "sagline supports a single platform.")
     link = links[0]
     joint = only_child(link, "joint", "link_rigid").get("type", "")
     if joint not in _JOINTS:
-        raise InvalidValueError("joint type", repr(joint), ", ".join(_JOINTS), "sagline's platform moves freely.")
+        raise InvalidValueError("joint type", repr(joint), ", ".join(_JOINTS), "sagline supports only free platforms.")
     physical = only_child(link, "physical", "link_rigid")
     mass = number_of_text(physical.findtext("mass"), "mass", "kg")
     center = numbers_of_text(physical.findtext("com_location"), 3, "com_location", "m")
@@ -148,7 +149,7 @@ def _platform(root: Element) -> tuple[dict[str, Any], list[str]]:
 
 
 def _inertia(element: Element, mass: float, center: Array) -> Array:
-    """Inertia about the center of mass; CASPR gives it about this point or about the joint (the platform's origin)."""
+    """Inertia about the center of mass; CASPR gives it about this center, or about the joint (platform origin)."""
     xx, yy, zz, xy, xz, yz = (
         number_of_text(element.findtext(key), key, "kg m^2") for key in ("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
     )
@@ -166,7 +167,7 @@ def _lost_of_link(root: Element, link: Element) -> list[str]:
     location = link.findtext("parent/location", "0 0 0")
     if numbers_of_text(location, 3, "parent: location", "m").any():
         lost.append(
-            f"The joint's place in the base ({location.strip()} m): add it to CASPR's joint position to get the "
+            f"The joint's position in the base ({location.strip()} m): add it to CASPR's joint position to get the "
             "position of sagline's platform."
         )
     end = link.findtext("physical/end_location", "0 0 0")
@@ -209,7 +210,7 @@ def _row(element: Element, item: str, center: Array, lost: list[str]) -> tuple[A
     """Values of a cable in the order of `_COLUMNS`; the axial stiffness is None if the file does not give it."""
     ends = list(only_child(element, "attachments", item))
     if len(ends) != 2:
-        raise InvalidValueError(f"{item}: number of attachments", len(ends), "2", "sagline's cables are not routed.")
+        raise InvalidValueError(f"{item}: number of attachments", len(ends), "2", "sagline has no routed cables.")
     points: dict[str, Array] = {}
     pulley = 0.0, _Z
     for end in ends:
@@ -226,14 +227,14 @@ def _row(element: Element, item: str, center: Array, lost: list[str]) -> tuple[A
         number_of_text(element.findtext(f"properties/{key}"), f"{item}: {key}", "N")
         for key in ("force_min", "force_max")
     )
-    # CASPR divides K by the cable's length, so K is an axial stiffness in N
+    # K is an axial stiffness in N, because CASPR divides it by the cable's length
     stiffness = element.findtext("properties/K") if element.tag == "cable_linear_spring" else None
     known = None if stiffness is None else number_of_text(stiffness, f"{item}: K", "N")
     return points["0"], points["1"], low, high, known, *pulley
 
 
 def _pulley(end: Element, link: str, item: str, lost: list[str]) -> tuple[float, _Vector]:
-    """Pulley radius and swivel axis at a cable end; the axis is the direction in which the cable enters the pulley."""
+    """Pulley radius and swivel axis at a cable end; along the swivel axis, the cable enters the pulley."""
     if end.tag != "attachment_base_pulley" or link != "0":
         unlike = f"of a kind unknown here, <{end.tag}>"
     elif end.find("pulley_radius") is None or end.find("cable_entry_vector") is None:

@@ -50,7 +50,7 @@ def export_scl(robot: Robot, file: str | os.PathLike[str]) -> Path:
 
     Args:
         robot: The robot used for planning; its winches need drum_radius and counts_per_turn.
-        file: Path of the output, plc.scl for instance. A file that exists is replaced.
+        file: Path of the output, for example plc.scl. An existing file is replaced.
 
     Returns:
         The path.
@@ -110,7 +110,7 @@ def _words(robot: Robot) -> dict[str, str]:
 
 
 def _block(block: Block) -> str:
-    """Text of a data block; its rows keep their order, as in TIA Portal without optimized access."""
+    """Text of a data block; the rows are in the order of the block, for access without optimization in TIA Portal."""
     start = [f"   magic := 16#{block.magic:08X};"]
     if any(field.name == "version" for field in block.fields):
         start.append(f"   version := {LAYOUT};")
@@ -134,13 +134,13 @@ def _row(name: str, values: list[float]) -> str:
 
 
 def _scl_number(value: float) -> str:
-    """A number in SCL syntax, which does not have infinite numbers."""
+    """A number in SCL syntax; a large number replaces an infinite one."""
     text = repr(min(value, 1e300)).upper()
     return text if "." in text else text.replace("E", ".0E")
 
 
 def checked_name(file: str | os.PathLike[str], ending: str, what: str, usual: str) -> Path:
-    """Path of a source file; FileError if its suffix is wrong."""
+    """Path of a source file; raises FileError if the suffix is wrong."""
     path = file_path(file)
     if path.suffix != ending:
         raise FileError(
@@ -150,7 +150,7 @@ def checked_name(file: str | os.PathLike[str], ending: str, what: str, usual: st
 
 
 def filled(source: str, words: dict[str, str]) -> str:
-    """Text of a file of this package, with each @word@ replaced in the given order."""
+    """Text of a file of this package; each @word@ is replaced, in the given order."""
     text = files("sagline.files").joinpath(source).read_text(encoding="utf-8")
     for word, value in words.items():
         text = text.replace(f"@{word}@", value)
@@ -158,6 +158,6 @@ def filled(source: str, words: dict[str, str]) -> str:
 
 
 def origin(robot: Robot) -> dict[str, str]:
-    """Words for the robot's name and the version of sagline; the name is ASCII and cannot end a comment."""
+    """Replacements for the robot's name and the version of sagline; the name becomes ASCII and cannot end a comment."""
     name = "".join(x if x.isascii() and (x.isalnum() or x in " -_.,()") else "_" for x in robot.name)
     return {"name": name, "version": version("sagline")}

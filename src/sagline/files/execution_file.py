@@ -1,4 +1,4 @@
-"""Executions read from logs in MCAP, and written to MCAP or to NetCDF with the plan inside."""
+"""Executions: reading from logs in MCAP, and writing to MCAP or NetCDF with the plan inside."""
 
 from __future__ import annotations
 
@@ -36,16 +36,17 @@ PLAN_GROUP: Final = "plan"
 
 
 def load_execution(file: os.PathLike[str] | str, plan: int | None = None) -> Execution:
-    """Read an execution from a log in MCAP, which may contain a whole session or end early (killed process).
+    """Read an execution from a log in MCAP. The log may contain a whole session, or may end early (killed process).
 
-    Numbers written by `save` of an execution are read back to the last bit.
+    Numbers of a file of `Execution.save` are restored exactly.
 
     Args:
         file: The log.
-        plan: Index of the plan, from 0; -1 is the last. None: all cycles, with the plan if the log has only one.
+        plan: Index of the plan, from 0; -1 is the last plan. None: all cycles, with the plan if the log has only one
+            plan.
 
     Returns:
-        The execution; its status is UNKNOWN if its end is not in the log.
+        The execution; its status is UNKNOWN if the log does not contain the end.
 
     Raises:
         FileError: If the file is missing, not a log, of a newer format, damaged or cut off before its first cycle, or
@@ -76,7 +77,7 @@ def execution_of_log(log: RecordedLog, plan: int | None = None) -> Execution:
     number = (0 if count == 1 else None) if chosen is None else chosen % count
     blocks = [block for block in log.blocks if plan is None or block.get("plan") == number]
     if log.truth and not log.blocks:
-        step = "Give it as: sagline view ROBOT RUN.mcap --truth FILE."
+        step = "Give this file as: sagline view ROBOT RUN.mcap --truth FILE."
         raise FileError(log.path, "is the log of a twin with true poses, not an execution", step)
     if log.robot is None or not blocks:
         raise FileError(log.path, "has no cycle", "It contains no data, or it was cut off at its start.")
@@ -169,7 +170,7 @@ def save(execution: Execution, file: os.PathLike[str] | str) -> None:
 
 
 def save_execution(execution: Execution, file: os.PathLike[str] | str) -> None:
-    """Write an execution to a log in MCAP atomically, with plan and robot inside and all numbers unrounded."""
+    """Write an execution to a log in MCAP atomically, with plan, robot and all numbers without rounding."""
     done, target = instance(execution, Execution, "execution"), file_path(file)
     check_packages()
     with atomic_file(target) as partial_file, FileIO(partial_file, "wb") as stream:
@@ -194,7 +195,7 @@ def save_dataset(execution: Execution, file: os.PathLike[str] | str) -> None:
 
 
 def _plain(value: Any) -> Any:
-    """A number or a text unchanged; the name of a state."""
+    """A number or a text without change; the name of a state."""
     return value.name if isinstance(value, State) else str(value) if isinstance(value, str) else value
 
 
@@ -202,7 +203,7 @@ FORMAT: Final = Format(
     kind=Execution,
     name="execution",
     made="execution of sagline log",
-    give="Give the .nc file that sagline log wrote.",
+    give="Give a .nc file of sagline log.",
     again="Write it again with sagline log.",
     key="sagline_execution_format",
     version=1,

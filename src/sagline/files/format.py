@@ -1,4 +1,4 @@
-"""NetCDF formats of results, found by the type of the result."""
+"""NetCDF formats of results, selected by the type of the result."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Format(Content, Generic[T]):
 
     kind: type[T]  # type of the result
     pack: Callable[[T], Dataset]  # data set of a result
-    # result of a data set; takes the path for messages. None for results that are only written
+    # result from a data set and a path for messages; None for results that are only written
     unpack: Callable[[Path, Dataset], T] | None = None
 
     def save(self, result: T, file: os.PathLike[str] | str) -> None:
@@ -56,11 +56,11 @@ MODULES: Final = {
 
 
 def module_of(result: object) -> Any:
-    """The module that writes results of this type or of one of its base classes; KeyError if there is none."""
+    """The module that writes results of this type or of one of its base classes; raises KeyError if there is none."""
     names = [kind.__name__ for kind in type(result).__mro__]
     return import_module(f"sagline.files.{MODULES[next((name for name in names if name in MODULES), names[0])]}")
 
 
 def save(result: object, file: os.PathLike[str] | str) -> None:
-    """Write a result to a file of the format of its type atomically."""
+    """Write a result to a file atomically, in the format of the result's type."""
     module_of(result).save(result, file)

@@ -32,7 +32,7 @@ DEVIATIONS: Final = {
 }
 _KEYS: Final = (*DEVIATIONS, "frame", "target")
 _COMMENT = re.compile(r"\s*#\s*([A-Za-z_ ]+?)\s*:(.*)")
-_NEAR: Final = 0.7  # similarity above which a word counts as a misspelt key; "name" and "frame" are less similar
+_NEAR: Final = 0.7  # smallest similarity of a misspelt key; "name" and "frame" are less similar
 XYZ: Final = ("x", "y", "z")
 COMMANDED: Final = "_commanded"
 _MOST: Final = 1000  # largest number of cables
@@ -53,7 +53,7 @@ class _Sensors(YamlEntry):
 
 
 def sensors_of_comments(text: str, path: Path) -> tuple[Sensors, str]:
-    """Sensors read from the comments above the columns of a log, and the rest of the text."""
+    """Sensors from the comments above the columns of a log, and the rest of the text."""
     lines = text.split("\n")
     count = next((k for k, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")), len(lines))
     said = [_key_line(line.rstrip("\r")) for line in lines[:count]]
@@ -68,7 +68,7 @@ def sensors_of_comments(text: str, path: Path) -> tuple[Sensors, str]:
 
 
 def _key_line(line: str) -> str:
-    """A comment with a sensor key, or a similar word, as a line of YAML; an empty line for any other comment."""
+    """Line of YAML from a comment with a sensor key, or with a similar word; an empty line from any other comment."""
     found = _COMMENT.fullmatch(line)
     if found is None:
         return ""
@@ -91,7 +91,7 @@ def _sensors(entry: _Sensors) -> Sensors:
 
 
 def _comments_of_sensors(sensors: Sensors) -> Iterator[str]:
-    """Comments that `sensors_of_comments` reads as the same sensors."""
+    """Comments for sensors; `sensors_of_comments` restores the same sensors."""
     for name, unit in DEVIATIONS.items():
         value: Array | None = getattr(sensors, name)
         if value is not None:
@@ -152,7 +152,7 @@ def _fields(table: CsvTable, cables: int) -> dict[str, Any]:
 
 
 def _stack_columns(table: CsvTable, names: Iterable[str], *, all_of_them: bool = True) -> Array | None:
-    """Columns side by side, with NaN for missing columns; None if all columns are missing."""
+    """Matrix of some columns, with NaN for missing columns; None if all columns are missing."""
     names = list(names)
     found = [name for name in names if name in table.columns]
     if not found:
@@ -164,7 +164,7 @@ def _stack_columns(table: CsvTable, names: Iterable[str], *, all_of_them: bool =
 
 
 def _rotation(table: CsvTable, suffix: str) -> Array | None:
-    """Rotations as unit quaternions; rows of NaN without a rotation."""
+    """Rotations as unit quaternions; a row of NaN where the rotation is not measured."""
     angles = _stack_columns(table, [name + suffix for name in EULER])
     quaternion = _stack_columns(table, [name + suffix for name in QUATERNION])
     if angles is not None and quaternion is not None:
@@ -202,7 +202,7 @@ def _commanded(table: CsvTable) -> Pose | None:
 
 
 def _log_columns(log: WinchLog) -> Iterator[tuple[str, Array]]:
-    """Name with unit and values, shape (N,), of each column of a log."""
+    """Name with unit, and values (N,), of each column of a log."""
     m = log.readings.shape[1]
     if log.time is not None:
         yield "time [s]", log.time
@@ -242,11 +242,11 @@ def load_log(file: os.PathLike[str] | str, sensors: Sensors | None = None) -> Wi
       commanded pose; without a rotation the platform is level.
     - `time`: time of the row.
 
-    Units are in brackets; the defaults are s, m, N and rad. A cell is blank if the value was not measured; times and
+    Units are in brackets; the defaults are s, m, N and rad. A cell is blank if the value was not measured. Times and
     commanded poses must not be blank. Comments above the header give the standard deviations of the sensors (one
-    number, or one per cable or axis) and the pose of the measuring system: `# frame: {position: [1, 0, 0.5], euler:
-    {alpha: 90 deg}}` and `# target: [0, 0, 0.1]`, with the meaning of the fields of `Sensors`. Quaternions have length
-    1 within 1e-3 (rounding of printed decimals), and are normalized.
+    number, or one per cable or axis). They also give the pose of the measuring system, `# frame: {position: [1, 0,
+    0.5], euler: {alpha: 90 deg}}`, and the target, `# target: [0, 0, 0.1]`. The keys are fields of `Sensors`.
+    Quaternions have length 1 within 1e-3 (rounding of printed decimals), and are normalized.
 
     Args:
         file: The file.
@@ -277,7 +277,7 @@ def load_log(file: os.PathLike[str] | str, sensors: Sensors | None = None) -> Wi
         if fields[name] is not None and getattr(given, f"{key}_deviation") is None:
             wish = f"# {key}_deviation: {USUAL[key]}"
             step = f"Write a comment above the columns, for instance '{wish}', or give sensors (--{key}-deviation)."
-            reason = f"does not say the {key}_deviation of what it holds"
+            reason = f"does not give the {key}_deviation of a sensor with readings"
             raise FileError(path, reason, step, item=f"{key}_deviation")
     try:
         return WinchLog(**fields, sensors=given, source=str(path))
@@ -288,12 +288,12 @@ def load_log(file: os.PathLike[str] | str, sensors: Sensors | None = None) -> Wi
 
 
 def save(log: WinchLog, file: os.PathLike[str] | str) -> None:
-    """Write a log to a CSV file atomically; `load_log` reads equal numbers, to the last bit."""
+    """Write a log to a CSV file atomically; `load_log` restores all numbers exactly."""
     write_text(file_path(file), dump_log(log))
 
 
 def dump_log(log: WinchLog) -> str:
-    """A log as CSV text, in SI units, with the sensors in comments."""
+    """CSV text of a log, in SI units, with the sensors in comments."""
     columns = dict(_log_columns(instance(log, WinchLog, "log")))
     lines = [*_comments_of_sensors(log.sensors), ",".join(columns)]
     rows = np.column_stack(list(columns.values())).tolist()

@@ -1,4 +1,4 @@
-"""Contents of a log in MCAP: quantities of a cycle, topics with their schemas, attachments, and drawn scenes."""
+"""Contents of a log in MCAP: quantities of a cycle, topics with their schemas, attachments, and scenes."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 ROWS: Final = "time"
 GROUP, CABLE, AXIS, TURN = ("group",), ("cable",), ("axis",), ("quaternion_part",)
 WORLD, PLATFORM = "world", "platform"
-FINE, COARSE = 2.0**20, 2.0**10  # [1/m], rounding of drawn coordinates, after which most of their bytes are zero
+FINE, COARSE = 2.0**20, 2.0**10  # [1/m], rounding of drawn coordinates, so that most of their bytes are zero
 POINTS: Final = 7  # number of points per cable
 _THICKNESS: Final = 3.0  # line width [px]
 _STEEL, _BLUE, _CABLE = (0.47, 0.5, 0.54), (0.23, 0.53, 0.79), (0.55, 0.36, 0.17)  # color: red, green, blue, 0 to 1
@@ -81,9 +81,9 @@ CYCLES: Final = (
 )
 EVERY: Final = (TIME, *CYCLES)
 SMALL: Final = frozenset({"estimate", "mode"})  # integers that are stored in one byte
-# Decimals of the quantities that are recorded while the machine runs. They are finer than the resolution of the
-# sensors: an encoder step is 72 nm, and the noise of a load cell is 1 N. Integer counts are not rounded. With all
-# digits of the noise, a log of 14 minutes would be twice as large.
+# Decimals of the quantities that are recorded while the machine runs. This rounding is finer than the resolution of the
+# sensors: an encoder step is 72 nm, and the noise of a load cell is 1 N. Counts are not rounded. With all digits of the
+# noise, a log of 14 minutes would be twice as large.
 DECIMALS: Final = {
     "time": 6, "late": 6, "clock": 6, "age": 5, "plc_time": 5, "position": 7, "quaternion": 8, "length": 7,
     "set_length": 8, "correction": 8, "rate": 5, "set_rate": 7, "torque": 3, "tension": 2, "filtered": 2,
@@ -100,12 +100,12 @@ EVENTS: Final = {  # variables of events
 
 
 def columns_of(execution: Execution) -> dict[str, NDArray[Any]]:
-    """Columns of N cycles, by the name of the quantity; their first axis is N."""
+    """Columns of N cycles, by the name of the quantity; the first axis has length N."""
     return {quantity.name: quantity.of(execution) for quantity in EVERY}
 
 
 NANO: Final = 1e9  # ticks of the log's clock per second [1/s]
-FORMAT: Final = 1  # raised whenever an older sagline could misread a log
+FORMAT: Final = 1  # incremented whenever an older sagline could misread a log
 SOURCE: Final = f"sagline {version('sagline')}"
 CYCLE, RECORD, EVENT, TF, SCENE, TRUTH = "/cycle", "/record", "/event", "/tf", "/scene", "/truth"
 HEAD: Final = "sagline.json"  # attachment: format, period, robot
@@ -118,7 +118,7 @@ PER_METER: Final = 1e3  # [mm/m]
 
 
 class _CycleField(NamedTuple):
-    """A quantity of `/cycle`, rounded for human readers; `/record` has all digits."""
+    """A quantity of `/cycle`, rounded for human readers; the topic `/record` contains all digits."""
 
     digits: int  # number of decimals
     unit: str
@@ -149,7 +149,7 @@ def _number(shown: _CycleField) -> dict[str, Any]:
 
 
 _TEXT: Final = {"type": "string"}
-# Foxglove reads no schema with two types for a value. A list with a missing number is therefore written as objects.
+# Foxglove reads no schema with two types for a value. Lists with missing numbers are therefore lists of objects.
 PARTIAL: Final = "partial"
 _PARTIAL: Final = {
     "type": "array",
@@ -207,7 +207,7 @@ def cycle_texts(columns: dict[str, NDArray[Any]]) -> Iterator[bytes]:
 
 
 def event_message(event: Event) -> bytes:
-    """Message of an event, without loss."""
+    """Message of an event, with all its data."""
     return _text({**event._asdict(), "kind": event.kind.value, "state": event.state.name})
 
 
@@ -222,12 +222,12 @@ def event_of(text: bytes) -> Event:
 
 
 def truth_text(time: float, position: Any, quaternion: Any) -> bytes:
-    """Message of the true pose of the platform, without loss."""
+    """Message of the true pose of the platform, with all digits."""
     return _text({"time": time, "position": position.tolist(), "quaternion": quaternion.tolist()})
 
 
 def _json_values(values: NDArray[Any]) -> list[Any]:
-    """Values in JSON: None for numbers that are not finite, and for rows without finite numbers."""
+    """Values for JSON: None for numbers that are not finite, and for rows without finite numbers."""
     known = np.isfinite(values)
     if known.all():
         return list(values.tolist())
@@ -240,7 +240,7 @@ def _text(said: dict[str, Any]) -> bytes:
 
 
 def transform(stamp: int, position: Array, quaternion: Array) -> FrameTransform:
-    """Pose of the platform at a time [ns] as a message of Foxglove; position [m], quaternion scalar last."""
+    """Pose of the platform at a time [ns], as a message of Foxglove; position [m], quaternion scalar last."""
     from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 
     found = FrameTransform(parent_frame_id=WORLD, child_frame_id=PLATFORM)
@@ -272,7 +272,7 @@ class Scene:
         return scene
 
     def _cables(self, ends: Array, tension: Array) -> Array:
-        """Points along the cables (m, POINTS, 3): parabolas, visually identical to the cables."""
+        """Points along the cables (m, POINTS, 3), on parabolas that look the same as the cables."""
         robot, share = self._robot, np.linspace(0.0, 1.0, POINTS)[:, None]
         start = robot.frame_anchors[:, None]
         run = ends[:, None] - start
@@ -299,7 +299,7 @@ def _lines(entity: SceneEntity, stamp: int, name: str, frame: str, color: tuple[
 
 
 def _corners(points: Array) -> Array:
-    """Lines between pairs of points, (e, 2, 3); a pair has a line if no third point is closer to both of its points."""
+    """Lines between pairs of points, (e, 2, 3). A pair has a line if no third point is closer to both points."""
     distance = np.linalg.norm(points[:, None] - points[None], axis=2)
     near = [
         (i, j)

@@ -1,4 +1,4 @@
-"""Reading of logs in MCAP: whole, cut off by a killed process, or still growing."""
+"""Reading of logs in MCAP: complete logs, logs cut off by a killed process, and logs that still grow."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ from sagline.robot.robot import Robot
 
 MAGIC: Final = bytes((137, 77, 67, 65, 80, 48, 13, 10))
 AGAIN: Final = "Get the original file."
-_HEAD: Final = 9  # bytes of a record before its content: type and length
+_HEAD: Final = 9  # number of bytes of a record before its content: type and length
 _CHUNK, _ATTACHMENT, _DATA_END = 0x06, 0x09, 0x0F
 _NEEDED: Final = {quantity.name for quantity in EVERY} | {"plan", "zero", "epoch"}  # columns required in every chunk
-_INFLATION: Final = 100  # largest ratio of a chunk to its compressed bytes, of which it has 1.5 to 10 times as many
-_SMALL: Final = 1 << 16  # bytes of a chunk that are always allowed
-_LARGEST: Final = 1 << 24  # bytes of the packed cycles of a chunk; a sagline log has about a hundredth of it
+_INFLATION: Final = 100  # largest ratio of a chunk to its compressed bytes; usual ratios are 1.5 to 10
+_SMALL: Final = 1 << 16  # a chunk of this size [bytes] is always allowed
+_LARGEST: Final = 1 << 24  # largest size of the packed cycles of a chunk [bytes]; a usual size is a hundredth of it
 _SCHEMA, _CHANNEL, _MESSAGE = 0x03, 0x04, 0x05
 _MESSAGE_HEAD: Final = struct.Struct("<HIQQ")  # channel, sequence number, two times
 _PLAN_NAME, _END_NAME = (re.compile(name.replace(".", r"\.").format(r"(\d+|none)")) for name in (PLAN, END))
@@ -64,8 +64,8 @@ class RecordedLog:
     robot: Robot | None = None  # the robot; None until it has been read
     period: float = 0.0  # period of a cycle [s]
     plans: list[bytes] = field(default_factory=list)  # the plans, packed
-    endings: dict[int, Ending] = field(default_factory=dict)  # end of each plan, by its index; -1: no plan
-    blocks: list[dict[str, NDArray[Any]]] = field(default_factory=list)  # columns of cycles, chunk by chunk
+    endings: dict[int, Ending] = field(default_factory=dict)  # end of each plan, by the index of the plan; -1: no plan
+    blocks: list[dict[str, NDArray[Any]]] = field(default_factory=list)  # columns of cycles, for each chunk
     events: list[Event] = field(default_factory=list)  # events in order
     truth: list[Truth] = field(default_factory=list)  # true poses of the platform, in the log of a twin
     epoch: int = 0  # zero of the log's clock [ns]
@@ -96,7 +96,7 @@ class LogReader:
                 self._take(code, record)
         except (FileError, MemoryError):
             raise
-        except Exception as error:  # the libraries have no error class for a damaged file, so any error is caught
+        except Exception as error:  # any error is caught, because the libraries have no common error for a damaged file
             raise self._damaged() from error
         torn = self._offset - before < len(data) and not self.log.complete
         if torn and data.endswith(MAGIC) and len(data) > len(MAGIC):
@@ -109,8 +109,8 @@ class LogReader:
             status = path.stat()
             check_regular(path, status.st_mode)
             if status.st_size < self._offset:
-                raise FileError(path, "has become shorter while it was read", "Read it again; it was started again.")
-            check_memory(f"{path.name}", 2.0 * (status.st_size - self._offset), "Take a shorter log.")
+                raise FileError(path, "has become shorter while it was read", "Read it again; it was restarted.")
+            check_memory(f"{path.name}", 2.0 * (status.st_size - self._offset), "Give a shorter log.")
             with path.open("rb") as file:
                 file.seek(self._offset)
                 return file.read(status.st_size - self._offset)
@@ -124,13 +124,13 @@ class LogReader:
     def _check_kind(self, data: bytes) -> None:
         if data[: len(MAGIC)] == MAGIC:
             return
-        if MAGIC.startswith(data):  # the file is empty, or has only the first few bytes
+        if MAGIC.startswith(data):  # the file has at most the first few bytes
             raise FileError(self.log.path, "is empty", "It contains no data, or it was cut off at its start.")
-        step = "Give the .mcap file that was recorded, or that an execution's save wrote."
+        step = "Give a recorded .mcap file, or one of Execution.save."
         raise FileError(self.log.path, "is not a log in MCAP", step)
 
     def _records(self, data: bytes) -> Iterator[tuple[int, bytes]]:
-        """Complete records; the next call reads an incomplete record."""
+        """Complete records; an incomplete last record is left for the next call."""
         place = 0 if self._offset else len(MAGIC)
         start = self._offset
         if not start:
@@ -168,7 +168,7 @@ class LogReader:
             self._take_chunk(_content_of(found))
 
     def _take_chunk(self, data: bytes) -> None:
-        """Take the channels and messages of a chunk."""
+        """Store the channels and messages of a chunk."""
         from mcap.data_stream import ReadDataStream
         from mcap.records import Channel
 
@@ -177,7 +177,7 @@ class LogReader:
             code, first = data[place], place + _HEAD
             place = first + int.from_bytes(data[place + 1 : first], "little")
             if code not in (_SCHEMA, _CHANNEL, _MESSAGE) or place > len(data):
-                raise ValueError("a chunk with a record that none has")
+                raise ValueError("a chunk with an unknown record")
             if code == _CHANNEL:
                 channel = Channel.read(ReadDataStream(BytesIO(data[first:place])))
                 self._topics[channel.id] = channel.topic
@@ -225,15 +225,15 @@ class LogReader:
 
 
 def _content_of(chunk: Any) -> bytes:
-    """Uncompressed records of a chunk; ValueError if they are more than its own size allows."""
+    """Uncompressed records of a chunk; raises ValueError if they are larger than the compressed size allows."""
     from lz4.frame import LZ4FrameDecompressor
     from zstandard import ZstdDecompressor, get_frame_parameters
 
     data, said = chunk.data, chunk.uncompressed_size
     if said > _INFLATION * len(data) + _SMALL:
-        raise ValueError("a chunk that says to be larger than its bytes allow")
+        raise ValueError("a chunk with a stated size that its bytes do not allow")
     if chunk.compression == "zstd":
-        if get_frame_parameters(data).content_size != said:  # the libraries reserve as much before they decompress
+        if get_frame_parameters(data).content_size != said:  # the libraries allocate this size first
             raise ValueError("a chunk with two sizes")
         data = ZstdDecompressor().decompress(data, allow_extra_data=False)
     elif chunk.compression == "lz4":
@@ -246,7 +246,7 @@ def _content_of(chunk: Any) -> bytes:
 
 
 def read_log(file: os.PathLike[str] | str) -> RecordedLog:
-    """Content of a log, also of a log that was cut off."""
+    """Content of a complete log, or of a log that was cut off."""
     reader = LogReader(file)
     reader.more()
     log = reader.log
@@ -258,7 +258,7 @@ def read_log(file: os.PathLike[str] | str) -> RecordedLog:
 
 
 def has_begun(file: os.PathLike[str] | str) -> bool:
-    """True if a log written by another process can be read; False while the file or its first bytes are missing."""
+    """True if a log of another process can be read; False as long as the file or its first bytes are missing."""
     try:
         path = file_path(file)
         check_regular(path, path.stat().st_mode)

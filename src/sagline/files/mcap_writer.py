@@ -38,15 +38,15 @@ from sagline.kinematics.plan import Plan
 from sagline.robot.robot import Robot
 
 PACKAGES: Final = ("mcap", "mcap_protobuf", "foxglove_schemas_protobuf", "zstandard")
-_UNLIMITED: Final = 1 << 40  # [bytes], so large that no chunk ends because of its size
+_UNLIMITED: Final = 1 << 40  # [bytes], so large that the size never ends a chunk
 CHUNK: Final = 0.9  # time between chunks [s]; a killed process loses less than one second
-BLOCK: Final = 100  # largest number of cycles per chunk, because cycles are faster on a lockstep clock
-ROOM: Final = 4096  # capacity of the queue, 41 s of cycles
+BLOCK: Final = 100  # largest number of cycles per chunk; in lockstep, cycles are faster than in real time
+ROOM: Final = 4096  # capacity of the queue: cycles of 41 s
 PATIENCE: Final = 0.1  # time between two checks that the writer thread is alive [s]
 
 
 class _Unbuffered:
-    """Unbuffered output, because the library's own writer would buffer."""
+    """Unbuffered output; it replaces the buffered writer of the library."""
 
     def __init__(self, file: RawIOBase) -> None:
         self._file = file
@@ -69,12 +69,12 @@ class _Unbuffered:
 
 
 class McapFile:
-    """The writer of one log; only one thread at a time may use it."""
+    """The writer of one log, for use by one thread at a time."""
 
     def __init__(self, file: RawIOBase, robot: Robot, period: float, epoch: int = 0) -> None:
         """Begin a log."""
-        # file: output, opened unbuffered, closed by the caller period: period of a cycle [s] epoch: offset from the
-        # given times to times of the log [ns]
+        # file: output, opened without buffer, closed by the caller; period: period of a cycle [s]; epoch: offset from
+        # the given times to times of the log [ns]
         import xarray  # noqa: F401 — loaded here, before the machine moves
         from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
         from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
@@ -111,7 +111,7 @@ class McapFile:
         self._attach(name, mcap_layout.JSON, json.dumps({"status": status, "reason": reason}).encode())
 
     def block(self, columns: Mapping[str, NDArray[Any]], plan: int, zero: Array, rest: Callable[[], Any] = int) -> None:
-        """Write cycles of a plan (`NONE`: no plan) and the homing offset [m]; `rest` is called between messages."""
+        """Write cycles of a plan (`NONE`: no plan) and the homing offset [m]; rest: called between messages."""
         stamps = [self.stamp(value) for value in columns["time"].tolist()]
         kept = {**columns, "plan": np.array(plan), "zero": zero, "epoch": np.array(self.epoch)}
         for stamp, text in zip(stamps, mcap_layout.cycle_texts(kept), strict=True):
@@ -158,7 +158,7 @@ class McapFile:
     def _known(
         columns: Mapping[str, NDArray[Any]], stamps: list[int], share: int
     ) -> list[tuple[int, dict[str, Array]]]:
-        """Stamp, pose and tensions of every `share`-th cycle with an estimate of the pose."""
+        """Time stamp, pose and tensions of every `share`-th cycle that has an estimate of the pose."""
         names = ("position", "quaternion", "tension")
         known = np.flatnonzero(np.isfinite(columns["position"]).all(axis=1))
         return [(stamps[k], {name: columns[name][k] for name in names}) for k in known[::share].tolist()]
@@ -172,11 +172,11 @@ def check_packages() -> None:
 
 
 class Recorder:
-    """A log written by a separate thread while a controller or a twin runs.
+    """A log that a separate thread writes while a controller or a twin runs.
 
     Data are put into a queue, so that the caller never waits for a disk. If the queue or the disk is full, recording
-    stops permanently, `stopped` gives the reason, and the data already in the file remain. Numbers are rounded to the
-    decimals of `DECIMALS`.
+    stops permanently. The attribute `stopped` then gives the reason, and the data in the file remain. Numbers are
+    rounded to the decimals of `DECIMALS`.
     """
 
     def __init__(
@@ -192,12 +192,12 @@ class Recorder:
         """Open the file and start the thread.
 
         Args:
-            file: The file, "run.mcap" for instance; an existing regular file is replaced; any other target is refused.
+            file: The file, for example "run.mcap". An existing regular file is replaced; any other target is refused.
             robot: The robot used by the controller.
             period: Period of a cycle [s].
             group_count: Number of groups G; None: two winches per group.
-            epoch: Offset from times of the link's clock to those of the log [ns]; None: the log starts at the
-                present time of day.
+            epoch: Offset from times of the link's clock to times of the log [ns]; None: the log starts at the present
+                time of day.
             stream: Output instead of the file, unbuffered.
         """
         self.file = check_file(file_path(file))
@@ -237,7 +237,7 @@ class Recorder:
         self._put(partial(self._add, cycle))
 
     def event(self, event: Event) -> None:
-        """Record an event; an event before the first cycle waits until the start time of the log is known."""
+        """Record an event; an event before the first cycle is written after the start time of the log is known."""
         if self._epoch is None:
             self._early.append(event)
         else:
@@ -261,7 +261,7 @@ class Recorder:
         self._why = self._why or "it is closed"
 
     def __enter__(self) -> Recorder:
-        """Record inside the block and close at its end."""
+        """Record inside the block; the log is closed at the end of the block."""
         return self
 
     def __exit__(self, *failure: object) -> None:
@@ -277,7 +277,7 @@ class Recorder:
             self._why = f"{self.file}: {ROOM} entries wait to be written, and the queue is full; the disk is too slow"
 
     def _date(self, time_of_link: float) -> None:
-        """Set the start time of the log; from now on, times of the log are times of day."""
+        """Set the start time of the log, so that times of the log are times of day."""
         if self._epoch is None:
             self._epoch = self._mcap.epoch = time.time_ns() - round(time_of_link * mcap_layout.NANO)
             for event in self._early:
@@ -291,7 +291,7 @@ class Recorder:
                 self._mcap.finish()
         except OSError as error:
             self._why = f"{self.file}: cannot be written ({_reason(error)})"
-        except Exception as error:  # after any error the control loop continues and the operator gets a message
+        except Exception as error:  # any error, because the control loop must continue; the operator receives a message
             self._why = f"{self.file}: {type(error).__name__}: {error}; a mistake in sagline"
 
     def _write(self) -> None:
@@ -305,7 +305,7 @@ class Recorder:
                 if task is None:
                     break
                 task()
-            late = time.monotonic() >= due and self._queue.empty()  # otherwise the queued data go into the same chunk
+            late = time.monotonic() >= due and self._queue.empty()  # otherwise queued data are added to the chunk
             if late or len(self._tape) >= BLOCK:
                 self._close_block()
                 self._mcap.close_chunk()

@@ -13,8 +13,8 @@ from sagline.core.arrays import Array, locked
 from sagline.files.reading import read_text
 from sagline.files.table import TABLE_LIMIT, CsvTable
 
-# for each kind of column: name of the other kind, and the next step if the file has that kind
-_OTHERS: Final = {"L": ("C", "these are counts: add --counts"), "C": ("L", "these are lengths: leave out --counts")}
+# for each kind of column: name of the other kind, and the next step if the file has the other kind
+_OTHERS: Final = {"L": ("C", "these are counts: add --counts"), "C": ("L", "these are lengths: omit --counts")}
 UNITS = {"span": "m", "rise": "m", "length": "m", "tension": "N"}
 
 
@@ -34,8 +34,8 @@ class CountSamples(NamedTuple):
 
 def load_lengths(file: os.PathLike[str] | str, cable_count: int, size: float = np.inf) -> LengthSamples:
     """Read a CSV file with one column per cable, L0, L1, ..., and optionally the time."""
-    # Units are in brackets, `time [s],L0 [mm],L1 [mm]`; the defaults are s and m cable_count: number of cables m of the
-    # robot size: largest extent of the robot [m]; lengths more than a hundred times larger must have another unit
+    # Units are in brackets, `time [s],L0 [mm],L1 [mm]`; the defaults are s and m. cable_count: number of cables m of
+    # the robot; size: largest extent of the robot [m]; lengths that are a hundred times larger must have another unit
     table, names = _read(file, "L", "m", cable_count)
     for name in names:
         table.refuse(table.columns[name] <= 0.0, name, table.columns[name], "m", "> 0 m")
@@ -45,12 +45,12 @@ def load_lengths(file: os.PathLike[str] | str, cable_count: int, size: float = n
 
 def load_counts(file: os.PathLike[str] | str, cable_count: int) -> CountSamples:
     """Read a CSV file with one column per encoder, C0, C1, ..., and optionally the time."""
-    # returns times [s] (None if the file has no times) and counts
+    # The result has times [s] (None if the file has no times) and counts
     return CountSamples(*_samples(*_read(file, "C", "", cable_count)))
 
 
 def _read(file: os.PathLike[str] | str, letter: str, unit: str, cable_count: int) -> tuple[CsvTable, list[str]]:
-    """A table with one column per cable, and the names of these columns."""
+    """Table with one column per cable, and names of these columns."""
     path = Path(file)
     names = _columns(letter, cable_count)
     other, hint = _OTHERS[letter]
@@ -70,7 +70,7 @@ def _samples(table: CsvTable, names: list[str]) -> tuple[Array | None, Array]:
     time = table.columns.get("time")
     if time is not None:
         late = np.diff(time, prepend=-np.inf) <= 0.0
-        table.refuse(late, "time", time, "s", "a time later than in the row before")
+        table.refuse(late, "time", time, "s", "a time after the time of the previous row")
     return time, locked(np.stack([table.columns[name] for name in names], axis=-1))
 
 

@@ -26,7 +26,7 @@ CHECKED: Final = 20_000  # largest number of triangles for which self-intersecti
 _MEANT: Final = "Check that it is the file you mean."
 _CORNER_ZERO: Final = re.compile(rb"^[ \t]*f[ \t](?:.*[ \t])?[+-]?0+(?=[/\s]|\Z)", re.MULTILINE)
 KINDS: Final = (".stl", ".ply", ".obj", ".glb")
-_CONTACTS: Final = 40  # contacts per triangle; most are with its own neighbors
+_CONTACTS: Final = 40  # number of contacts per triangle; most contacts are with neighbors
 _UPRIGHT: Final = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])  # from z up to y up, as in glTF
 ENDINGS: Final = (".stl", ".glb", ".ply", ".vtk", ".vtu")
 _VTK: Final = (".vtk", ".vtu")
@@ -36,18 +36,18 @@ def load_mesh(file: str | os.PathLike[str], unit: str = "m", name: str | None = 
     """Read a solid from a file: an obstacle around a robot, or a platform.
 
     Args:
-        file: STL, PLY, OBJ or GLB, at most 200 MB and a million triangles. z points up; a GLB has y up by its
-            standard and is rotated to z up.
-        unit: Unit of its coordinates, "mm" for instance; these formats do not state it.
+        file: STL, PLY, OBJ or GLB, at most 200 MB and a million triangles. z points up; a GLB has y up by its standard,
+            and is rotated.
+        unit: Unit of the coordinates, for example "mm"; files of these formats do not contain the unit.
         name: Name; None: the name of the file.
 
     Returns:
         Mesh, in meters.
 
     Raises:
-        FileError: If the file cannot be read, or the surface is not closed, or crosses itself (checked for
-            up to 20,000 triangles); the message gives its extent.
-        SaglineError: If trimesh or python-fcl is missing; the message says how to install it.
+        FileError: If the file cannot be read, or the surface is not closed or crosses itself (checked for up to 20,000
+            triangles). The message gives the extent of the mesh.
+        SaglineError: If trimesh or python-fcl is missing; the message contains the command that installs it.
 
     Examples:
         >>> import sagline as sl
@@ -57,12 +57,12 @@ def load_mesh(file: str | os.PathLike[str], unit: str = "m", name: str | None = 
     factor = meters(unit, "unit")
     called = path.stem[:100] if name is None else name
     if path.suffix.lower() not in KINDS:
-        raise FileError(path, f"is not a mesh file; allowed: {', '.join(KINDS)}", "Save it as one of these.")
+        raise FileError(path, f"is not a mesh file; allowed: {', '.join(KINDS)}", "Save it in one of these formats.")
     data = read_bytes(path, LIMIT)
     vertices, faces = _triangles(path, data, factor)
     if len(faces) > MOST:
         raise FileError(
-            path, f"has {len(faces):,} triangles; allowed: {MOST:,}", "Simplify it in the program that made it."
+            path, f"has {len(faces):,} triangles; allowed: {MOST:,}", "Simplify the mesh in the program that made it."
         )
     try:
         mesh = Mesh(vertices, faces, called)
@@ -71,7 +71,7 @@ def load_mesh(file: str | os.PathLike[str], unit: str = "m", name: str | None = 
     if len(faces) <= CHECKED and (crossing := first_crossing(mesh)) is not None:
         where = ", ".join(f"{value:.4g}" for value in crossing)
         reason = f"crosses itself at ({where}) m, {extent_text(mesh.vertices)}; allowed: a simple surface"
-        raise FileError(path, reason, "Unite its parts in the program that made it, or load them one by one.")
+        raise FileError(path, reason, "Unite the parts in the program that made them, or load the parts one by one.")
     return mesh
 
 
@@ -82,12 +82,12 @@ def meters(unit: str, item: str) -> float:
     except InvalidValueError:
         factor = 0.0
     if not isinstance(factor, float) or not factor > 0.0:
-        raise InvalidValueError(item, brief(unit), "a unit of length: m, mm, cm, inch", "Name the file's unit.")
+        raise InvalidValueError(item, brief(unit), "a unit of length: m, mm, cm, inch", "Give the unit of the file.")
     return factor
 
 
 def _triangles(path: Path, data: bytes, unit: float) -> tuple[Array, Indices]:
-    """Distinct vertices [m] and non-degenerate triangles of a file with coordinates in a unit [m]."""
+    """Distinct vertices [m] and non-degenerate triangles of a file; unit: length of the unit of coordinates [m]."""
     try:
         import trimesh
     except ImportError:
@@ -97,14 +97,14 @@ def _triangles(path: Path, data: bytes, unit: float) -> tuple[Array, Indices]:
         line = data.count(b"\n", 0, zero.end()) + 1
         raise FileError(path, f"has a face with corner 0 in line {line}; allowed: from 1, or from -1 back", _MEANT)
     try:
-        with np.errstate(all="ignore"):  # coordinates that are not numbers are refused below
+        with np.errstate(all="ignore"):  # later code refuses coordinates that are not numbers
             read: Any = trimesh.load(BytesIO(data), file_type=kind, force="mesh", process=False, skip_materials=True)
             _check_vertices(path, np.asarray(read.vertices, dtype=np.float64) * unit)
             read.merge_vertices(merge_tex=True, merge_norm=True)
         vertices, faces = unit * np.array(read.vertices, dtype=np.float64), np.array(read.faces, dtype=np.int64)
     except SaglineError:
         raise
-    except Exception as error:  # the readers of the formats raise many kinds of errors for a wrong file
+    except Exception as error:  # any error, because the readers raise many kinds of errors for a wrong file
         reason = " ".join(str(error).split())[:80] or type(error).__name__
         raise FileError(path, f"cannot be read as {kind.upper()} ({reason})", _MEANT) from None
     if not len(faces):
@@ -114,7 +114,7 @@ def _triangles(path: Path, data: bytes, unit: float) -> tuple[Array, Indices]:
 
 
 def _check_vertices(path: Path, vertices: Array) -> None:
-    """Refuse vertices [m] that are not numbers or far beyond all machines."""
+    """Refuse vertices [m] that are not numbers, or too far away for any machine."""
     if not np.isfinite(vertices).all():
         raise FileError(path, "contains coordinates that are not numbers", _MEANT)
     try:
@@ -124,7 +124,7 @@ def _check_vertices(path: Path, vertices: Array) -> None:
 
 
 def first_crossing(mesh: Mesh) -> Array | None:
-    """Point [m] at which a surface crosses itself, except at common edges and corners; None if there is none."""
+    """Point [m] at which a surface crosses itself, except at common edges and corners; None without a crossing."""
     from sagline.interference.meshed import package
 
     fcl = package()
@@ -149,15 +149,15 @@ def _without_common_vertex(faces: Indices, pairs: Indices) -> NDArray[np.bool_]:
 
 def save(surface: Surface, file: Path | str, colors: ArrayLike | None = None) -> None:
     """Write a surface to a file atomically, in meters."""
-    # file: the suffix selects the format: .stl, .glb (y up, as this format requires), .ply, .vtk or .vtu (meshio or
-    # PyVista writes the last three). An existing file is replaced
-    # colors: red, green, blue of each vertex, 0 to 255, shape (V, 3); only GLB and PLY store them
+    # file: the suffix selects the format: .stl, .glb (y up, as this format requires), .ply, .vtk or .vtu (the last two
+    # need meshio or PyVista). An existing file is replaced colors: red, green, blue of each vertex, 0 to 255, shape (V,
+    # 3); only GLB and PLY store them
     target = file_path(file)
     ending = target.suffix.lower()
     if ending not in ENDINGS:
-        raise FileError(target, "has an ending without a format for surfaces", f"Use {', '.join(ENDINGS)}.")
+        raise FileError(target, "has a suffix that is not a format for surfaces", f"Use {', '.join(ENDINGS)}.")
     if not len(surface.faces):
-        raise InvalidValueError("surface", "empty", "a surface with triangles", "Look for the set elsewhere.")
+        raise InvalidValueError("surface", "empty", "a surface with triangles", "Search the set in another box.")
     tints = None if colors is None else _check_colors(colors, len(surface.vertices))
     check_file(target)
     content = None if ending in _VTK else _by_trimesh(surface, ending[1:], tints)
@@ -185,7 +185,7 @@ def _by_trimesh(surface: Surface, kind: str, colors: NDArray[np.uint8] | None) -
     except ModuleNotFoundError:
         raise FileError.not_installed("trimesh", "Surfaces need it", "workspace") from None
     vertices, faces = surface.vertices, surface.faces
-    if kind == "stl":  # STL has no vertex list: readers merge corners that are equal in single precision
+    if kind == "stl":  # STL has no list of vertices, so readers merge corners that are equal in single precision
         vertices, faces = _in_single_precision(vertices, faces)
     if kind == "glb":
         vertices = np.stack([vertices[:, 0], vertices[:, 2], -vertices[:, 1]], axis=1)
@@ -195,7 +195,7 @@ def _by_trimesh(surface: Surface, kind: str, colors: NDArray[np.uint8] | None) -
 
 
 def _in_single_precision(vertices: Array, faces: Indices) -> tuple[Array, Indices]:
-    """Rounded vertices with equal ones merged, and triangles without those that rounding makes degenerate."""
+    """Rounded vertices without duplicates, and triangles that are not degenerate after the rounding."""
     rounded, place = np.unique(np.round(vertices, 7).astype(np.float32), axis=0, return_inverse=True)
     faces = place.reshape(-1)[faces]
     return rounded.astype(np.float64), faces[(faces != faces[:, [1, 2, 0]]).all(axis=1)]
@@ -206,7 +206,7 @@ def _vtk_package(file: Path) -> str:
         if find_spec(name) is not None:
             return name
     step = "Install one (pip install meshio), or write .stl, .glb or .ply."
-    raise FileError(file, "needs meshio or PyVista, neither of which is installed", step)
+    raise FileError(file, "needs meshio or PyVista, and both are missing", step)
 
 
 def _by_meshio(surface: Surface, file: Path, kind: str) -> None:

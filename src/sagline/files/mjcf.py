@@ -1,11 +1,11 @@
 """MJCF, the model format of MuJoCo: straight elastic cables as spatial tendons, pulleys as cylinders.
 
-The cylinders do not swivel. Let the platform end of a cable move by a small u in its vertical plane, perpendicular to
-the chord, and by v out of this plane. Over a swiveling pulley the cable then lengthens by u^2/(2 l) + v^2 cos phi/(2
-s), where l is its free length and s the distance of the end from the swivel axis. On a fixed cylinder the cable unrolls
-to a straight line and lengthens by v^2/(2 a), where a is the length from its first point to its end. The tendon
-therefore starts at the point with a = s/cos phi, which is R tan(psi/2) before it leaves the cylinder. Force and
-stiffness are then those of a swiveling pulley.
+The cylinders do not swivel. The platform end of a cable moves by a small distance u in the vertical plane of the cable,
+perpendicular to the chord, and by v out of this plane. Over a swiveling pulley, the cable becomes longer by u^2/(2 l) +
+v^2 cos phi/(2 s); l is the free length, and s is the distance of the end from the swivel axis. On a fixed cylinder, the
+cable unrolls to a straight line and becomes longer by v^2/(2 a); a is the length from the first point to the end. The
+tendon therefore starts at the point with a = s/cos phi. This point is R tan(psi/2) before the point at which the tendon
+leaves the cylinder. Force and stiffness are then equal to those with a swiveling pulley.
 """
 
 from __future__ import annotations
@@ -32,27 +32,27 @@ from sagline.robot.robot import Robot
 from sagline.statics.tables import refuse_missing_chords, touching_angle
 
 NOTE = (
-    "The pulleys are cylinders in the direction of the initial pose, and they do not swivel: forces and stiffness are "
-    "those of the robot at this pose; elsewhere lengths are right only in the planes of the pulleys, with an error "
-    "that grows with the cube of the distance. The stiffness of a tendon includes the cable outside it (dead length, "
-    "and a part of the wrap), and its springlength excludes it. "
+    "A pulley is a cylinder in the direction of the pulley at the initial pose, and does not swivel. Forces and "
+    "stiffness agree with the robot at the initial pose. At other poses, lengths are exact only in the planes of the "
+    "pulleys; their error grows with the cube of the distance from the initial pose. Dead length and a part of the "
+    "wrap are outside of the tendon: its stiffness includes them, and its springlength excludes them. "
     "The model has no friction on the pulleys and no drums. "
 )
-_OFF = 0.05  # smallest distance of a tendon's start from its cylinder, in radii; a closer one would not wrap
+_OFF = 0.05  # smallest distance of a tendon's start from its cylinder, in radii; a closer tendon would not wrap
 _WIDTH = 0.2  # ratio of the drawn width of a pulley to its radius
 _BESIDE = 2.0  # distance of the side point from the pulley center in radii, on the side of the cable
 _LONGEST = 1e3  # largest length of a tendon before its cylinder, in pulley radii
 _NOTE = (
-    " Written by sagline. Every cable is a straight spring that pulls and never pushes, of the given unstrained length "
-    "and axial stiffness. Its sag, its weight and the tension limits are not in this model. The damping is not the "
-    "robot's: it lets the platform come to rest, and acts on slack cables too. "
+    " Written by sagline. Every cable is a straight spring that pulls and never pushes, with the given unstrained "
+    "length and axial stiffness. The model has no sag, no weight of cables and no tension limits. The damping is not "
+    "that of the robot: it brings the platform to rest, and also acts on slack cables. "
 )
 _RADIUS = 0.002  # ratio of the radius of drawn cable ends to the size of the robot
 _DRAWN = {"contype": "0", "conaffinity": "0"}  # geometry without contacts
 _THINNEST = 0.02  # ratio of the shortest to the longest edge of a box for display
 _STEPS = 20.0  # time steps per period of the fastest motion
 _LONGEST_STEP = 0.002  # default time step of MuJoCo [s]
-_DOWN = Context(prec=2, rounding=ROUND_DOWN)  # the time step is rounded down to two digits
+_DOWN = Context(prec=2, rounding=ROUND_DOWN)  # rounds the time step down to two digits
 _STRETCH_DAMPING = 4.0  # critical damping at half the frequency bound, which is about the highest frequency
 _SWING_DAMPING = 0.4  # a fifth of critical damping
 _ROUNDING = 1e-12
@@ -63,7 +63,7 @@ class _Lead(NamedTuple):
     """First points of the tendons, and points beside the pulleys, in the world [m], (m, 3)."""
 
     start: Array
-    side: Array  # points beside the pulleys, on the side of the cable
+    side: Array  # a point beside each pulley, on the side of the cable
     missing: Array  # cable off the drum minus tendon length [m], (m,); negative if the tendon is longer
 
 
@@ -73,7 +73,7 @@ def _lead_of(robot: Robot, pose: Pose) -> _Lead:
     wrap = touching_angle(robot, pose)
     if np.isnan(wrap).any():
         refuse_missing_chords(robot, pose)
-    before = np.minimum(np.tan(0.5 * wrap), _LONGEST)  # from the start of the tendon to the exit point, in pulley radii
+    before = np.minimum(np.tan(0.5 * wrap), _LONGEST)  # from the start of the tendon to the exit point, in radii
     off = np.maximum(np.minimum(_OFF, 0.5 * before), before - wrap)
     first = np.maximum(wrap - before + off, 0.0)
     sine, cosine = np.sin(first), np.cos(first)
@@ -102,7 +102,7 @@ def _add_pulleys(world: Element, robot: Robot, pose: Pose, lead: _Lead) -> None:
 
 
 def _add(parent: Element, tag: str, **attributes: str | ArrayLike) -> Element:
-    """Add an element; numbers in its attributes are written to their last bit."""
+    """Add an element; numbers in its attributes are written with all digits."""
     texts = {
         name: value if isinstance(value, str) else " ".join(map(repr, np.ravel(value).tolist()))
         for name, value in attributes.items()
@@ -113,25 +113,25 @@ def _add(parent: Element, tag: str, **attributes: str | ArrayLike) -> Element:
 def dump_mjcf(robot: Robot, pose: PoseLike, unstrained_length: ArrayLike | None = None) -> str:
     """Text of a MuJoCo model of the robot, with the platform at a pose.
 
-    A cable of unstrained length L becomes a spatial tendon with the stiffness EA/L, which is slack if it is shorter
-    than L (the model `Elastic`). A pulley is a cylinder that does not swivel. Forces, lengths and stiffness agree with
-    the robot at the given pose, and comments in the file state the deviations at other poses. The time step is short
-    enough for the fastest vibration of the platform on its cables at any pose. Damping brings the platform to rest. The
-    damping of a cable is proportional to its stiffness. The platform's joints also have damping if the cables do not
-    resist all motions.
+    A cable of unstrained length L becomes a spatial tendon with the stiffness EA/L; the tendon is slack if it is
+    shorter than L (the model `Elastic`). A pulley becomes a cylinder that does not swivel. Forces, lengths and
+    stiffness agree with the robot at the given pose, and comments in the file state the deviations at other poses. The
+    time step is short enough for the fastest vibration of the platform on its cables at any pose. Damping brings the
+    platform to rest. The damping of a cable is proportional to its stiffness. The platform's joints also have damping
+    if the cables do not resist all motions.
 
     Args:
         robot: The robot.
-        pose: A single pose, where the platform starts.
-        unstrained_length: Unstrained length L off the drum [m], >= 1e-6, shape (m,). None: the
-            lengths with which straight elastic cables hold the platform at rest at this pose.
+        pose: Initial pose of the platform, a single pose.
+        unstrained_length: Unstrained length L off the drum [m], >= 1e-6, shape (m,). None: lengths of straight elastic
+            cables that hold the platform at rest at this pose.
 
     Returns:
         The XML text.
 
     Raises:
-        InvalidValueError: If the pose is a batch, a length is below 1e-6 m or no longer than the dead length, or no
-            tensions within the robot's limits hold the platform there.
+        InvalidValueError: If the pose is a batch, a length is below 1e-6 m or at most the dead length, or no tensions
+            within the robot's limits hold the platform at the pose.
         CableGeometryError: If a platform end is inside its pulley.
 
     Examples:
@@ -152,7 +152,7 @@ def dump_mjcf(robot: Robot, pose: PoseLike, unstrained_length: ArrayLike | None 
     root.append(Comment(_NOTE + NOTE if over_pulley.any() else _NOTE))
     _add(root, "compiler", angle="radian", inertiafromgeom="false")
     step = f"{_DOWN.create_decimal_from_float(time_step):g}"
-    # implicitfast integrates damping implicitly, so that damping does not limit the time step
+    # implicitfast integrates damping implicitly, so that damping has no effect on the largest time step
     _add(root, "option", gravity=(0.0, 0.0, -robot.gravity), timestep=step, integrator="implicitfast")
     radius = _RADIUS * _add_view(root, robot)
     world = _add(root, "worldbody")
@@ -181,9 +181,9 @@ def dump_mjcf(robot: Robot, pose: PoseLike, unstrained_length: ArrayLike | None 
 
 def _step_and_damping(robot: Robot, pose: Pose, stiffness: Array) -> tuple[float, float, float]:
     """Time step [s], damping of a cable over its stiffness [s], and damping of each joint [N s/m, N m s/rad]."""
-    # The joint damping is zero if the cables resist every motion. At every pose, the squared angular frequency is at
-    # most the sum over the cables of stiffness times the largest mobility of the platform end. Forces that rotate with
-    # the platform increase it; the large number of steps per period is a margin for them.
+    # The joint damping is zero if the cables resist every motion. At every pose, the squared angular frequency has a
+    # bound: the sum over the cables of stiffness times the largest mobility of the platform end. Forces that rotate
+    # with the platform increase the frequency; the large number of steps per period is a margin for these forces.
     levers = (robot.platform_anchors - robot.center_of_mass) @ pose.matrix.T
     along, about = robot.freedom[:, :3], robot.freedom[:, 3:]
     moved = along + np.cross(about, levers[:, None])  # displacement of the end of cable i in free motion j, (m, n, 3)
@@ -197,7 +197,7 @@ def _step_and_damping(robot: Robot, pose: Pose, stiffness: Array) -> tuple[float
     directions = cables / np.where(distance > 0.0, distance, 1.0)[:, None]
     stretch = np.einsum("ik,ijk->ij", directions, moved)
     slowest = eigh((stretch.T * stiffness) @ stretch, masses, eigvals_only=True)[0]
-    swing = robot.gravity / max(distance.max(), _SHORTEST)  # squared; pendulum of the longest cable
+    swing = robot.gravity / max(distance.max(), _SHORTEST)  # squared frequency of a pendulum with the longest cable
     drag = _SWING_DAMPING * robot.mass * np.sqrt(swing) if slowest < swing else 0.0
     return step, _STRETCH_DAMPING / fastest, float(drag)
 
@@ -230,7 +230,7 @@ def _check_lengths(robot: Robot, lengths: ArrayLike) -> Array:
 
 
 def _add_view(root: Element, robot: Robot) -> float:
-    """Add center and extent of the frame for MuJoCo's camera; returns the size of the robot [m]."""
+    """Add the center and the extent of the frame for MuJoCo's camera; returns the size of the robot [m]."""
     low, high = robot.frame_anchors.min(axis=0), robot.frame_anchors.max(axis=0)
     size = float(np.linalg.norm(high - low)) + float(np.linalg.norm(np.ptp(robot.platform_anchors, axis=0)))
     _add(root, "statistic", center=0.5 * (low + high), extent=size)
@@ -253,12 +253,12 @@ def _add_platform(world: Element, robot: Robot, pose: Pose, radius: float, drag:
 
 
 def _inertia(robot: Robot, pose: Pose) -> Array:
-    """The robot's inertia; if MuJoCo would refuse it, an inertia with the same effect on the free motions."""
+    """The robot's inertia, or, if MuJoCo would refuse it, an inertia with the same effect on the free motions."""
     least, middle, most = np.linalg.eigvalsh(robot.inertia)
-    missing = most - (least + middle) + _ROUNDING * most  # largest moment minus the two others; zero for a body
+    missing = most - (least + middle) + _ROUNDING * most  # zero or less for a body, except for rounding
     if least > 0.0 and missing <= 0.0:
         return robot.inertia
-    if robot.motion_pattern == "3R3T":  # a flat plate (rounding error), or an impossible inertia, which MuJoCo reports
+    if robot.motion_pattern == "3R3T":  # a flat plate, or an impossible inertia, which MuJoCo reports
         return robot.inertia + missing * np.eye(3) if missing < 2.0 * _ROUNDING * most else robot.inertia
     axes = robot.freedom[:, 3:] @ pose.matrix  # rotation axis of planar motion in the platform's axes
     moment = np.einsum("ij,jk,ik->", axes, robot.inertia, axes)
@@ -266,7 +266,7 @@ def _inertia(robot: Robot, pose: Pose) -> Array:
 
 
 def _add_joints(body: Element, robot: Robot, pose: Pose, drag: float) -> None:
-    """A free joint, or one slide or hinge for each free motion; their axes are in the body's own frame."""
+    """A free joint, or one slide or hinge for each free motion, with axes in the frame of the body."""
     damping = {"damping": drag} if drag > 0.0 else {}
     if robot.motion_pattern == "3R3T":
         _add(body, "joint", name="pose", type="free", **damping)

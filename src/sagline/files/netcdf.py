@@ -1,8 +1,8 @@
 """NetCDF files: atomic writing with a digest at the end, and reading of undamaged files only.
 
-An HDF5 file contains its own length, and HDF5 ignores later bytes. The digest is therefore appended at the end of the
-file. It is checked before anything else is read, because reading a damaged file may take any amount of memory and time.
-A file without a digest is not read.
+An HDF5 file contains its own length, and HDF5 ignores additional bytes. The digest is therefore appended to the file.
+It is checked before anything else is read, because reading a damaged file may take any amount of memory and time. A
+file without a digest is not read.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 OTHERS: Final = {
     "sagline_format": ("a plan", "Read it with load_plan, or look at it: sagline view ROBOT FILE."),
     "sagline_simulation_format": ("a simulation", "Read it with load_simulation, or play it: sagline view ROBOT FILE."),
-    "sagline_execution_format": ("an execution", "Open it with xarray.open_dataset; its plan is its group 'plan'."),
+    "sagline_execution_format": ("an execution", "Open it with xarray.open_dataset; the plan is the group 'plan'."),
     "sagline_workspace_format": ("a workspace", "Read it with load_workspace."),
     "sagline_calibration_format": ("a calibration", "Read it with load_calibration."),
     "sagline_frequency_map_format": ("a frequency map", "Open it with xarray.open_dataset."),
@@ -42,8 +42,8 @@ _KINDS: Final = {
     **dict.fromkeys((".xml", ".wcrfx"), "an XML file"),
     **{f".{kind}": f"a {kind.upper()} file" for kind in ("csv", "json", "png", "svg")},
 }
-INFLATION = 1000  # largest ratio of memory to file size; real files have smaller ratios
-HEADERS: Final = 1 << 18  # [bytes], more than all names and attributes, except for long texts such as the robot
+INFLATION = 1000  # largest ratio of memory to file size; files of sagline have smaller ratios
+HEADERS: Final = 1 << 18  # [bytes], larger than all names and attributes, except for long texts such as the robot
 _HEAD, _TAIL = b"\nsagline sha256 ", b"\n"
 _LENGTH = len(_HEAD) + sha256().digest_size * 2 + len(_TAIL)
 _BLOCK = 1 << 20  # bytes per read
@@ -68,7 +68,7 @@ def _digest_is_right(file: Path) -> bool | None:
 
 
 def _line(handle: BinaryIO, size: int) -> bytes:
-    """Digest line of the next `size` bytes of a file; moves the file position to their end."""
+    """Digest line of the next `size` bytes of a file; the file position is then after these bytes."""
     found = sha256()
     while size > 0 and (block := handle.read(min(_BLOCK, size))):
         found.update(block)
@@ -85,15 +85,15 @@ class Content:
     give: str  # next step for the user: "Give the .nc file that sagline track wrote."
     again: str  # next step for a damaged file
     key: str  # attribute that holds the version of the format
-    version: int  # newest version of the format; raised whenever an older sagline could misread the file
+    version: int  # newest version of the format; incremented whenever an older sagline could misread the file
 
     def format_of(self, path: Path, attributes: Mapping[str, Any]) -> int:
-        """Format version of a file; FileError if the file has other content or a newer version."""
+        """Format version of a file; raises FileError if the file has other content or a newer version."""
         found = attributes.get(self.key)
         if found is None:
             raise FileError(path, *self._instead(attributes))
         if not isinstance(found, int | np.integer) or found < 1:
-            step = "Write it again; it was edited, or damaged."
+            step = "Write the file again, because it was edited or damaged."
             raise FileError(path, f"has the unknown format {found!r}", step, item=self.key)
         if found > self.version:
             raise FileError(
@@ -120,7 +120,7 @@ class Content:
 def labeled_dataset(
     variables: Mapping[str, Any], attributes: Mapping[str, Any], coordinates: Mapping[str, Any] | None = None
 ) -> Dataset:
-    """Make a data set whose dimensions have labels but no indexes; the reader builds the indexes it needs."""
+    """Make a data set without indexes for the labels of its dimensions; the reader makes the necessary indexes."""
     from xarray import Coordinates, Dataset
 
     parts = {dimension for dimensions, *_ in variables.values() for dimension in dimensions} & PARTS.keys()
@@ -129,12 +129,12 @@ def labeled_dataset(
 
 
 def index_coordinate(dimension: str, count: int) -> tuple[str, Any, dict[str, str]]:
-    """Coordinate that counts cables or the like from 0."""
+    """Coordinate with the numbers of cables, or similar items, from 0."""
     return dimension, np.arange(count), {"long_name": f"{dimension}, counted from 0"}
 
 
 def write_dataset(data: Dataset, file: Path, groups: Mapping[str, Dataset] | None = None) -> None:
-    """Write a data set; a digest over all values and attributes follows the NetCDF data."""
+    """Write a data set, and after it a digest over all values and attributes."""
     parts: list[tuple[str | None, Dataset]] = [(None, data), *(groups or {}).items()]
     texts = [value for _, part in parts for value in part.attrs.values() if isinstance(value, str)]
     size = sum(part.nbytes + HEADERS for _, part in parts) + sum(len(text.encode()) for text in texts)
@@ -144,17 +144,17 @@ def write_dataset(data: Dataset, file: Path, groups: Mapping[str, Dataset] | Non
                 # _FillValue None: numbers are stored unchanged, and NaN does not mean "missing"
                 encoding = {str(name): {"_FillValue": None} for name in part.variables}
                 mode: Literal["w", "a"] = "w" if group is None else "a"
-                # absolute path: xarray expands ~ to the home folder
+                # absolute path, because xarray expands ~ to the home folder
                 part.to_netcdf(partial.absolute(), mode, group=group, engine="h5netcdf", encoding=encoding)
-        except RuntimeError as error:  # h5py raises it on a full disk
+        except RuntimeError as error:  # h5py raises this error on a full disk
             raise OSError(str(error)) from error
         seal(partial)
 
 
 def read_dataset(path: Path, content: Content) -> Dataset:
-    """Data set of an undamaged file, whose digest is checked before reading."""
+    """Data set of an undamaged file; the digest is checked before reading."""
     try:
-        check_regular(path, path.stat().st_mode)  # opening a pipe would wait for its writer
+        check_regular(path, path.stat().st_mode)  # a pipe is not opened, because this would wait for its writer
         right = _digest_is_right(path)
     except FileNotFoundError:
         raise FileError(path, "does not exist", "Check its name.") from None
@@ -169,7 +169,7 @@ def read_dataset(path: Path, content: Content) -> Dataset:
 
 @contextmanager
 def file_errors(path: Path) -> Iterator[None]:
-    """Turn errors about values of a file into a FileError that names the file."""
+    """Convert errors about values of a file to a FileError with the name of the file."""
     try:
         yield
     except KeyError as error:
@@ -177,14 +177,14 @@ def file_errors(path: Path) -> Iterator[None]:
         raise FileError(path, f"has no {error.args[0]}", step, item=str(error.args[0])) from None
     except InvalidValueError as error:
         raise FileError.of(path, error) from None
-    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:  # parts do not fit together
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:  # parts that do not agree
         step = "Write it again; it is incomplete or was edited."
         (text,) = shortened((f"{type(error).__name__}: {error}",), 120)
-        raise FileError(path, f"has parts that do not fit together ({text})", step) from error
+        raise FileError(path, f"has parts that do not agree ({text})", step) from error
 
 
 def is_of(path: Path, content: Content) -> bool:
-    """True if the attributes of an undamaged file name this content; nothing else is checked."""
+    """True if a file has the attributes of this content; nothing else is checked."""
     from h5py import File
 
     try:
@@ -212,22 +212,22 @@ def _load(path: Path, content: Content) -> Dataset:
                 raise ValueError(f"{size} bytes for {data.nbytes:.2g} bytes of data")
             return data.load()
     except Exception as error:  # h5py, h5netcdf and xarray have no common error class for a damaged file
-        raise FileError(path, "is not a NetCDF file of sagline, but ends in its digest", content.again) from error
+        raise FileError(path, "is not a NetCDF file of sagline, but ends with a digest", content.again) from error
 
 
 def _cause(path: Path, content: Content) -> tuple[str, str]:
-    """Reason why a file cannot be read, and the next step; the messages of the libraries are too technical."""
+    """Reason why a file cannot be read, and the next step, in place of the technical messages of the libraries."""
     with path.open("rb") as file:
         begin = file.read(len(_BEGIN))
     if begin == _BEGIN:
-        reason = f"was cut off or edited, or is not a {content.made}: it does not end in a digest"
+        reason = f"was cut off or edited, or is not a {content.made}: it does not end with a digest"
         return reason, content.again
     kind = _KINDS.get(path.suffix.lower(), "empty" if not begin else "another kind of file")
     return f"is {kind}, not a {content.made}", content.give
 
 
 def attributes_with_units(source: Any, units: Mapping[str, str | None]) -> dict[str, Any]:
-    """Numeric attributes of an object, each followed by its unit unless the unit is None."""
+    """Numeric attributes of an object, each with its unit in the next attribute, except for a unit of None."""
     found: dict[str, Any] = {}
     for name, unit in units.items():
         found |= {name: float(getattr(source, name)), **({} if unit is None else {f"{name}_units": unit})}
@@ -235,7 +235,7 @@ def attributes_with_units(source: Any, units: Mapping[str, str | None]) -> dict[
 
 
 def choice_attributes(key: str, choice: Any, choices: Mapping[str, type[Any]]) -> dict[str, Any]:
-    """Name and set options of a model, method or similar object, as attributes."""
+    """Attributes with the type and the options of a model, method or similar object."""
     if choices.get(type(choice).__name__) is not type(choice):
         raise InvalidValueError(key, type(choice).__name__, ", ".join(choices), "Only these can be read back.")
     options = {f"{key}_{field.name}": getattr(choice, field.name) for field in fields(choice)}
@@ -245,7 +245,7 @@ def choice_attributes(key: str, choice: Any, choices: Mapping[str, type[Any]]) -
 def choice_of(
     path: Path, attributes: Mapping[str, Any], key: str, choices: Mapping[str, type[Choice]], **known: Any
 ) -> Choice:
-    """Object read from attributes written by `choice_attributes`; FileError if its kind or an option is unknown."""
+    """Object from attributes of `choice_attributes`; raises FileError if its type or an option is unknown."""
     name = attributes[key]
     if name not in choices:
         refused = InvalidValueError(key, repr(name), ", ".join(choices), "Read it with a newer sagline.")
@@ -255,7 +255,7 @@ def choice_of(
     try:
         options = {option: _plain(value) for option, value in given.items() if value is not None}
         found: Choice = choice(**{**options, **known})
-    except TypeError as error:  # a text in place of a number
+    except TypeError as error:  # for example a text in place of a number
         raise FileError(path, f"{key}: {error}", "Write it again; it was edited.") from None
     return found
 
@@ -265,7 +265,7 @@ def _plain(value: Any) -> Any:
 
 
 def robot_of(path: Path, data: Dataset, item: str = "robot") -> Robot:
-    """Robot of a data set; FileError if it is not a robot, or has another number of cables."""
+    """Robot of a data set; raises FileError for an invalid robot, or another number of cables."""
     robot = parse_robot(str(data.attrs["robot"]), f"{path}, {item}")
     if data.sizes["cable"] != robot.cable_count:
         reason = f"has {data.sizes['cable']} cables, its robot {robot.cable_count}"

@@ -1,9 +1,10 @@
 """Lossless compression of columns of numbers, and of data sets inside other files.
 
-Measured and planned values are smooth in time. A column is converted to integers. These are scaled decimals if all
-values have few decimals, otherwise the bits of the floats, whose order is that of the numbers. Differences of order 0
-to 5 of the integers are stored; the order with the fewest bits is chosen. The upper bytes of these differences are
-nearly all zero. Bytes of equal weight are stored together, so that zstandard compresses them strongly.
+Measured and planned values are smooth in time. A column is converted to integers. If all values have few decimals, the
+integers are scaled decimals. Otherwise they are the bits of the floats, in a form with the same order as the numbers.
+Differences of order 0 to 5 of the integers are stored; the order with the fewest bits is chosen. The upper bytes of
+these differences are nearly all zero. Bytes of equal weight are stored together, so that zstandard compresses them
+strongly.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ MOST_ORDER: Final = 5
 LEVEL: Final = 9  # level of zstandard; higher levels take much longer and save little
 TYPES: Final = ("float64", "int64", "int8", "bool")
 _EXACT: Final = 2.0**53  # all integers below this are exact floats
-_GAPS: Final = np.iinfo(np.int64).min + np.arange(3)  # codes of NaN, infinite and -infinite among decimals
+_GAPS: Final = np.iinfo(np.int64).min + np.arange(3)  # codes of NaN, infinity and -infinity in a column of decimals
 _GAP_VALUES: Final = np.array([np.nan, np.inf, -np.inf])
 
 
@@ -38,13 +39,13 @@ class _Column:
     type: str  # type of the values
     shape: tuple[int, ...]  # shape of the column
     decimals: int  # largest number of decimals; -1 for integers or bits of floats
-    order: int  # order of the differences
+    order: int  # order of the stored differences
 
 
 def round_decimals(values: NDArray[np.float64], decimals: int) -> NDArray[np.float64]:
-    """Numbers rounded to `decimals`, each the float nearest to the decimal; no -0.0."""
+    """Numbers rounded to `decimals`: each is the float nearest to the decimal, and never -0.0."""
     scale = 10.0**decimals
-    whole = np.abs(values) < _EXACT / scale  # larger floats have no such decimals
+    whole = np.abs(values) < _EXACT / scale  # larger floats do not have so many decimals
     return np.asarray(np.where(whole, np.rint(np.where(whole, values, 0.0) * scale) / scale, values) + 0.0)  # no -0.0
 
 
@@ -53,10 +54,10 @@ def pack(
     decimals: Mapping[str, int] | None = None,
     rest: Callable[[], Any] = int,
 ) -> bytes:
-    """Pack columns, first axis first, without loss."""
+    """Pack columns without loss; the first axis is packed as the time."""
     # columns: floats, integers or flags of any shape; the first axis is time
-    # decimals: expected number of decimals by column; a column with more decimals is stored bit by bit
-    # rest: called between two columns, so that other threads can run
+    # decimals: expected number of decimals of each column; a column with more decimals is stored as bits
+    # rest: function to call between two columns, so that other threads can run
     from zstandard import compress
 
     known = decimals or {}
@@ -72,7 +73,7 @@ def pack(
 
 
 def unpack(data: bytes, most: int = 1 << 62) -> dict[str, NDArray[Any]]:
-    """Columns packed by `pack`, equal to the last bit; at most so many bytes."""
+    """Columns from data of `pack`, exactly restored; most: largest size of the columns [bytes]."""
     from zstandard import ZstdDecompressor, ZstdError, get_frame_parameters
 
     try:
@@ -87,7 +88,7 @@ def unpack(data: bytes, most: int = 1 << 62) -> dict[str, NDArray[Any]]:
         start = 4 + int.from_bytes(plain[:4], "little")
         heads = json.loads(plain[4:start])
         columns = [_Column(name, kind, tuple(shape), *rest) for name, kind, shape, *rest in heads]
-    except (ZstdError, TypeError, ValueError) as error:  # ValueError is raised by JSON too
+    except (ZstdError, TypeError, ValueError) as error:  # JSON also raises ValueError
         raise ValueError(f"no packed columns ({error})") from None
     found: dict[str, NDArray[Any]] = {}
     for column in columns:
@@ -102,7 +103,7 @@ def unpack(data: bytes, most: int = 1 << 62) -> dict[str, NDArray[Any]]:
 
 
 def _count(column: _Column) -> int:
-    """Number of values of a column; ValueError if `pack` never writes such a head."""
+    """Number of values of a column; raises ValueError for a head that `pack` never writes."""
     sizes = all(0 <= size < 1 << 40 for size in column.shape)
     if not (
         column.type in TYPES and sizes and column.order in range(MOST_ORDER + 1) and column.decimals in range(-1, 16)
@@ -112,7 +113,7 @@ def _count(column: _Column) -> int:
 
 
 def _whole(values: NDArray[Any], decimals: int) -> tuple[NDArray[np.int64], int]:
-    """Values as integers, and the number of decimals they are scaled by; -1 for integers or for bits of floats."""
+    """Values as integers, and the number of decimals of their scale; -1 for integers, and for bits of floats."""
     if values.dtype.name not in TYPES:
         raise TypeError(f"columns of {values.dtype} are not packed")
     if values.dtype != np.float64:
@@ -121,7 +122,7 @@ def _whole(values: NDArray[Any], decimals: int) -> tuple[NDArray[np.int64], int]
     if decimals < 0:
         return bits, -1
     gaps = ~np.isfinite(values)
-    with np.errstate(over="ignore"):  # infinite values are stored bit by bit
+    with np.errstate(over="ignore"):  # infinite values are stored as bits
         scaled = np.rint(np.where(gaps, 0.0, values) * 10.0**decimals)
     if not (np.abs(scaled) < _EXACT).all():
         return bits, -1
@@ -134,14 +135,14 @@ def _whole(values: NDArray[Any], decimals: int) -> tuple[NDArray[np.int64], int]
 
 
 def _decimal(whole: NDArray[np.int64], decimals: int) -> NDArray[np.float64]:
-    values = np.asarray(whole / 10.0**decimals)  # the float nearest to the decimal, as both operands are exact
+    values = np.asarray(whole / 10.0**decimals)  # the float nearest to the decimal, because both operands are exact
     for gap, value in zip(_GAPS, _GAP_VALUES, strict=True):
         values[whole == gap] = value
     return values
 
 
 def _smallest(whole: NDArray[np.int64]) -> tuple[int, NDArray[np.uint64]]:
-    """Order whose differences need the fewest bits, and these differences with the sign in the lowest bit."""
+    """Order of the differences with the fewest bits, and these differences, with the sign in the lowest bit."""
     best: tuple[float, int, NDArray[np.uint64]] | None = None
     for order in range(MOST_ORDER + 1):
         small = ((whole << 1) ^ (whole >> 63)).view(np.uint64)
@@ -154,7 +155,7 @@ def _smallest(whole: NDArray[np.int64]) -> tuple[int, NDArray[np.uint64]]:
 
 
 def _planes(small: NDArray[np.uint64]) -> bytes:
-    """Bytes grouped by weight, column by column."""
+    """Bytes of each column, grouped by weight."""
     courses = np.ascontiguousarray(small.T).view(np.uint8)
     return courses.reshape(-1, 8).T.tobytes()
 

@@ -25,7 +25,7 @@ PLACE = ("time", "x", "y", "z")
 EULER = ("alpha", "beta", "gamma")
 QUATERNION = ("qx", "qy", "qz", "qw")
 UNITS = dict(zip(PLACE + EULER + QUATERNION, ("s", "m", "m", "m", "rad", "rad", "rad", "", "", "", ""), strict=True))
-_LEAST_STEP = 1e-12  # shortest time step for which differences of positions give a velocity [s]
+_LEAST_STEP = 1e-12  # shortest time step [s]; differences over a shorter step do not give a velocity
 TIMING_UNITS = {
     "rate": "1/s",
     "durations": "s",
@@ -43,13 +43,14 @@ def _path_from_table(path: FilePath, text: str) -> Path:
     _check_columns(table)
     time, *place = (table.columns[name] for name in PLACE)
     late = np.diff(time, prepend=-np.inf) < _LEAST_STEP
-    table.refuse(late, "time", time, "s", "a time later than in the row before")
+    table.refuse(late, "time", time, "s", "a time after the time of the previous row")
     if time.size < 2:
         step = "Add the samples of the path."
         raise FileError.of(path, InvalidValueError("number of samples", time.size, "at least two", step))
     for name in PLACE[1:]:
         values = table.columns[name]
-        table.refuse(np.abs(values) > FARTHEST, name, values, "m", f"up to {FARTHEST:g} m; millimeters are {name} [mm]")
+        allowed = f"up to {FARTHEST:g} m; if it is in mm, name the column {name} [mm]"
+        table.refuse(np.abs(values) > FARTHEST, name, values, "m", allowed)
     position = np.stack(place, axis=-1)
     if "alpha" in table.columns:
         return path_from_samples(time, Pose.from_euler(position, *(table.columns[name] for name in EULER)))
@@ -63,7 +64,7 @@ def _path_from_table(path: FilePath, text: str) -> Path:
 
 
 def _check_columns(table: CsvTable) -> None:
-    """Refuse a table without a position, or with an incomplete or a double orientation."""
+    """Refuse a table without a position, with an incomplete orientation, or with two forms of orientation."""
     orientation = table.columns.keys() & set(EULER + QUATERNION)
     wanted = PLACE + next((way for way in (EULER, QUATERNION) if orientation & set(way)), ())
     table.check_columns(wanted, f"; found: {', '.join(table.columns)}")
@@ -78,7 +79,7 @@ def _check_columns(table: CsvTable) -> None:
 def load_path(file: str | os.PathLike[str]) -> Path:
     """Read a path from a file of waypoints (.yaml, .yml) or of sampled poses (.csv).
 
-    A YAML file moves from rest to rest between its waypoints (see `quintic_path`); a quantity is a number in SI
+    The path of a YAML file is from rest to rest between waypoints (see `quintic_path`). A quantity is a number in SI
     (lengths in m, angles in rad) or a text with its unit:
 
         rate: 100                             # samples per second, 100 if left out
@@ -90,13 +91,13 @@ def load_path(file: str | os.PathLike[str]) -> Path:
           - {position: [2 m, 1500 mm, 1.5], euler: {alpha: 20 deg}}        # alpha about z, beta about y, gamma about x
           - {position: [2, 1, 1.5], quaternion: [0, 0, 0.6, 0.8]}          # x, y, z, w
 
-    Calibration poses written by their `save` have this format, with the tensions and lengths of each waypoint.
+    Files of `CalibrationPoses.save` have this format, with the tensions and lengths of each waypoint.
 
-    A CSV file has one row for each sample, below a header `time,x,y,z`, followed by `alpha,beta,gamma`, by
-    `qx,qy,qz,qw`, or by nothing for a constant orientation. Units are in brackets, `time [s],x [mm],...,alpha [deg]`;
-    the defaults are s, m and rad. Velocity and acceleration are those of a spline (see `path_from_samples`).
+    A CSV file has a header and one row for each sample. The header is `time,x,y,z`, then `alpha,beta,gamma` or
+    `qx,qy,qz,qw`, or nothing for a constant orientation. Units are in brackets, `time [s],x [mm],...,alpha [deg]`; the
+    defaults are s, m and rad. A spline through the samples gives velocity and acceleration (see `path_from_samples`).
 
-    Quaternions in either file have length 1 within 1e-3 (rounding of printed decimals), and are normalized.
+    Quaternions in both kinds of files have length 1 within 1e-3 (rounding of printed decimals), and are normalized.
 
     Args:
         file: The file; its suffix selects the format.
@@ -126,7 +127,7 @@ def load_path(file: str | os.PathLike[str]) -> Path:
 
 
 class _Waypoint(PoseEntry):
-    """A pose, and the tensions and lengths that `CalibrationPoses.save` adds; a path does not use these."""
+    """A pose, and the tensions and lengths of `CalibrationPoses.save`; a path does not use tensions and lengths."""
 
     frame_end_tension: Any = None
     unstrained_length: Any = None

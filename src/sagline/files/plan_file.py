@@ -1,4 +1,4 @@
-"""Plans in NetCDF: every quantity with its unit, and the robot, the model and the version inside."""
+"""Plans in NetCDF: every quantity with its unit, and the robot, the model and the version."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ QUANTITIES = (
     ),
 )
 
-# variables of a plan with pulleys or drums behind the frame anchors
+# variables of a plan with pulleys or drums
 MACHINE = (
     Quantity("free_length", CABLE, "m", "unstrained length of the free cable", known=SOLVED, low=0.0),
     Quantity(
@@ -189,13 +189,13 @@ def _check_plan(data: Dataset, cables: int) -> None:
 def save_plan(plan: Plan, file: os.PathLike[str] | str) -> None:
     """Write a plan to a NetCDF file atomically.
 
-    Dimensions are pose (absent for a single pose) and cable; a path's times are a coordinate of pose. Infeasible
-    poses are included, with their status, shortfall, blocking cables and proof, and NaN lengths and forces. A digest
-    over all values and attributes follows the NetCDF data and detects changes.
+    The dimensions are pose (absent for a single pose) and cable. The times of a path are a coordinate of pose.
+    Infeasible poses are included, with status, shortfall, blocking cables and proof; their lengths and forces are NaN.
+    A digest over all values and attributes follows the NetCDF data and detects changes.
 
     Args:
         plan: The plan, of one robot.
-        file: The file, "run.nc" for instance; an existing regular file is replaced, any other target is refused.
+        file: The file, for example "run.nc". An existing regular file is replaced; any other target is refused.
 
     Raises:
         InvalidValueError: If the plan has several robots (one per pose), a cable model or a tension method that is not
@@ -214,7 +214,7 @@ def save_plan(plan: Plan, file: os.PathLike[str] | str) -> None:
 
 
 def load_plan(file: os.PathLike[str] | str) -> Plan:
-    """Read a plan written by `save_plan`; all numbers are equal to the last bit.
+    """Read a plan from a file of `save_plan`; all numbers are restored exactly.
 
     Args:
         file: The NetCDF file.
@@ -261,7 +261,7 @@ def _attributes(plan: Plan) -> dict[str, Any]:
 
 
 def plan_of_dataset(path: FilePath, data: Dataset, item: str = "robot") -> Plan:
-    """Plan of a data set made by `plan_dataset`; path and item are used in messages."""
+    """Plan from a data set of `plan_dataset`; path and item are used in messages."""
     robot = robot_of(path, data, item)
     _check_plan(data, robot.cable_count)
     behind = MACHINE[0].name in data.variables

@@ -13,7 +13,7 @@ from sagline.files.quantity import in_si, plain_number
 from sagline.files.yaml_text import YamlEntry
 from sagline.robot.pose import Pose
 
-STRONGEST: Final = 1e12  # N and N m: larger than on any machine, far below overflow
+STRONGEST: Final = 1e12  # [N, N m], larger than on any machine, far below overflow
 QUATERNION_TOLERANCE: Final = 1e-3  # largest deviation of a quaternion's length from 1, for three decimals
 POSE_STEP: Final = "Give meters, and degrees about z, y and x: --pose 1,0,1.5 or --pose 1,0,1.5,10,0,0."
 WRENCH_STEP: Final = (
@@ -27,7 +27,7 @@ def decimal_numbers(parts: Sequence[str], item: str, unit: str, largest: float) 
     found = []
     for part in parts:
         number = plain_number(part)
-        if number is None or not abs(number) <= largest:  # also true for NaN
+        if number is None or not abs(number) <= largest:  # True also for NaN
             raise InvalidValueError(item, repr(part), f"decimal numbers up to {largest:g} {unit}", f"Correct {item}.")
         found.append(number)
     return found
@@ -40,12 +40,12 @@ def pose_of_text(text: str, item: str = "--pose", step: str = POSE_STEP) -> Pose
 
 
 def wrench_of_text(text: str | None, item: str = "--wrench", step: str = WRENCH_STEP) -> Array | None:
-    """A wrench from "fx,fy,fz" in N, or "fx,fy,fz,mx,my,mz" with moments in N m; None for None."""
+    """A wrench from "fx,fy,fz" in N, or "fx,fy,fz,mx,my,mz" with moments in N m; None if the text is None."""
     return None if text is None else np.array(_three_or_six(text, item, "N or N m", STRONGEST, step))
 
 
 def _three_or_six(text: str, item: str, unit: str, largest: float, step: str) -> list[float]:
-    """Six numbers from three or six numbers between commas; three numbers are followed by three zeros."""
+    """Six numbers from a text with three or six numbers between commas; three zeros are added to three numbers."""
     parts = text.split(",", maxsplit=6)
     if len(parts) not in (3, 6):
         raise InvalidValueError(item, repr(text), "three or six numbers", step)
@@ -68,7 +68,7 @@ class PoseEntry(YamlEntry):
 
 
 def pose_of_entry(entry: PoseEntry, item: str) -> Pose:
-    """Pose of an entry of a file; InvalidValueError if it is not a pose, or too far away for any machine."""
+    """Pose of an entry of a file; raises InvalidValueError if it is wrong, or too far away for any machine."""
     position = si_numbers(entry.position, 3, "m", f"{item}.position")
     if (far := float(np.abs(position).max())) > FARTHEST:
         raise InvalidValueError(f"{item}.position", f"{far:g} m away", f"up to {FARTHEST:g} m", UNITS_STEP)
@@ -90,7 +90,7 @@ def pose_of_entry(entry: PoseEntry, item: str) -> Pose:
 
 
 def si_numbers(value: Any, count: int, unit: str, item: str) -> Array:
-    """Numbers in SI, shape (count,), from a value of a file."""
+    """Numbers in SI, shape (count,), from a value in a file."""
     numbers = checked(in_si(value, unit, item), item, unit)
     if numbers.shape != (count,):
         raise InvalidValueError(item, f"of shape {numbers.shape}", f"a list of {count} numbers", f"Correct {item}.")

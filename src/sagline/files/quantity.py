@@ -1,4 +1,4 @@
-"""Numbers in files: plain in SI, or as text with a unit."""
+"""Numbers in files: plain numbers in SI, or texts with a unit."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ REACH: Final = f"numbers up to {LARGEST:g}"
 _LONGEST: Final = 60  # largest number of characters of a number with its unit; a float64 needs 24
 
 _DECIMAL = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
-_WORD = r"[-+]?\.?(?:inf|Inf|INF)|\.?(?:nan|NaN|NAN)"  # infinite numbers and NaN in YAML and Python
-_FACTOR = r"[A-Za-zµμΩÅ°_]+(?:[ \t]?(?:\^|\*\*)[ \t]?[-+]?[0-9]|[²³])?"  # no parentheses, as pint fails on some
+_WORD = r"[-+]?\.?(?:inf|Inf|INF)|\.?(?:nan|NaN|NAN)"  # words for infinite numbers and NaN in YAML and Python
+_FACTOR = r"[A-Za-zµμΩÅ°_]+(?:[ \t]?(?:\^|\*\*)[ \t]?[-+]?[0-9]|[²³])?"  # no parentheses, because pint fails for some
 _UNIT = rf"{_FACTOR}(?:(?:[ \t]?[*/·][ \t]?|[ \t]){_FACTOR}){{0,5}}"
 _BLANKS = re.compile("[ \t\r\n\u00a0\u202f]+")  # the last two are no-break spaces, used before units
-_TORQUE = re.compile(r"\b([cmkM]?N)m\b(?![ \t]?(?:\^|\*\*))")  # Nm means N m; Nm^2 and Nms are ambiguous
+_TORQUE = re.compile(r"\b([cmkM]?N)m\b(?![ \t]?(?:\^|\*\*))")  # Nm is read as N m; Nm^2 and Nms are ambiguous
 _PLAIN = re.compile(rf"[ \t]*(?:({_DECIMAL})|{_WORD})[ \t]*")
 _WITH_UNIT = re.compile(rf"[ \t]*({_DECIMAL})([ \t]+1[ \t]?/[ \t]?{_UNIT}|[ \t]*{_UNIT})[ \t]*")
 
 
 def plain_number(text: str) -> float | None:
-    """A decimal number in the digits 0 to 9, with optional point, sign and exponent; or inf, or nan.
+    """Number from a decimal text: digits 0 to 9, with optional point, sign and exponent; or inf, or nan.
 
     Other notations of YAML, Python or C are not accepted, for example 1:30, 0x10, 1_000 and digits of other alphabets.
 
     Returns:
-        The number; None if the text is not a number. Only the word inf is infinite, and 1e999 becomes the largest
-        float64.
+        The number; None if the text is not a number. Only the word inf gives an infinite number; 1e999 gives the
+        largest float64.
 
     Examples:
         >>> from sagline.files.quantity import plain_number
@@ -53,12 +53,12 @@ def plain_number(text: str) -> float | None:
 
 
 def within_reach(number: float) -> bool:
-    """True if a number is finite, and products of a few such numbers do not overflow."""
+    """True if a number is finite and so small that products of a few such numbers do not overflow."""
     return abs(number) <= LARGEST
 
 
 def in_si(value: object, unit: str, item: str) -> Nested:
-    """A quantity, or nested lists of quantities, as numbers in an SI unit."""
+    """Numbers in an SI unit, from a quantity or from nested lists of quantities."""
     if isinstance(value, list | tuple):
         return [in_si(element, unit, f"{item}[{i}]") for i, element in enumerate(value)]
     number = _from_text(value, unit) if isinstance(value, str) else _from_number(value)
@@ -89,29 +89,29 @@ def _from_text(text: str, unit: str) -> float | None:
 
 
 def _limit(number: float) -> float:
-    """Number limited to the range of float64; only the word inf is infinite, not a number that is too large."""
+    """Number limited to the range of float64, so that a number that is too large does not become infinite."""
     return max(-float_info.max, min(number, float_info.max))
 
 
 @lru_cache(maxsize=1000)
 def _factor(given: str, wanted: str) -> float | None:
-    """Factor from a unit to the wanted one; None if it does not convert."""
+    """Factor from a unit to the required unit; None if the units do not agree."""
     from pint.errors import PintError
 
     units = _registry()
     try:
         texts = (_TORQUE.sub(r"(\1*m)", given), wanted)
         one, wish = (units.Quantity(1.0, units.parse_units(text)) for text in texts)
-        # in pint angles are dimensionless, so 5 Hz would convert to 5 rad/s; the root units differ
+        # root units are compared, because pint would convert 5 Hz to 5 rad/s: angles are dimensionless in pint
         same = one.to_root_units().units == wish.to_root_units().units
         return float(one.to(wish.units).magnitude) if same else None
     except (PintError, ValueError, TypeError, AttributeError, SyntaxError, ArithmeticError):
-        return None  # pint raises errors without a common base class
+        return None  # any error, because pint's errors have no common base class
 
 
 @cache
 def _registry() -> UnitRegistry[Any]:
-    # slow to build, as slow as a run of `sagline track`, and therefore built once, and only if a file has units
+    # built once, and only if a file has units, because this takes as long as a run of `sagline track`
     from pint import UnitRegistry
 
     return UnitRegistry(autoconvert_offset_to_baseunit=False)

@@ -1,4 +1,4 @@
-"""Robot files: YAML with units in, YAML in SI out, and the scene around the robot."""
+"""Robot files: reading of YAML with units, writing of YAML in SI, and the scene around the robot."""
 
 from __future__ import annotations
 
@@ -46,12 +46,12 @@ def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
             # origin and standard errors of estimated values, written by `calibrate`
         scene: [{name: pole, capsule: [[1, 0, 0], [1, 0, 3]], radius: 5 cm}]      # obstacles: `load_scene`
 
-    A file may be based on a preset (`base: cogiro` in addition to its own name). It then contains only the values that
-    differ. All other values, and the notes on assumed values, are those of the preset.
+    A file may be based on a preset (`base: cogiro` in addition to its own name). It then contains only values that are
+    different. All other values, and the notes on assumed values, come from the preset.
 
     Args:
-        name_or_path: One of `robot_names()`, or the path of a file. An argument is a path if it is a path
-            object, ends in .yaml or .yml, contains a folder or names an existing file.
+        name_or_path: One of `robot_names()`, or the path of a file. A text is a path if it ends with .yaml or .yml,
+            contains a folder, or is the name of an existing file.
 
     Returns:
         The robot, checked.
@@ -73,7 +73,7 @@ def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
 
 
 def parse_robot(text: str, origin: Path | str) -> Robot:
-    """A robot from the text of a robot file."""
+    """Robot from the text of a robot file."""
     entry = _robot_entry(text, origin)
     try:
         return entry.robot()
@@ -82,18 +82,18 @@ def parse_robot(text: str, origin: Path | str) -> Robot:
 
 
 def _robot_entry(text: str, origin: Path | str) -> RobotEntry:
-    """Entry of a robot file with known keys of the right type; values are not checked."""
+    """Schema entry of a robot file: keys and types are checked, values are not checked."""
     return validate(_on_base(parse_mapping(text, origin), origin), RobotEntry, origin)
 
 
 def dump_robot(robot: Robot) -> str:
-    """A robot as the text of a robot file, in SI.
+    """Text of a robot file for a robot, in SI.
 
     Args:
         robot: The robot.
 
     Returns:
-        YAML text; `load_robot` reads an equal robot from a file with this text, to the last bit.
+        YAML text; `load_robot` restores exactly the same robot from a file with this text.
 
     Examples:
         >>> import sagline as sl
@@ -124,12 +124,12 @@ def dump_robot(robot: Robot) -> str:
 
 
 def _deviations(found: Mapping[str, Array]) -> dict[str, Any]:
-    """Standard deviations; one number for a field if all its values are equal."""
+    """Standard deviations; a single number for a field with equal values."""
     return {name: (one.flat[0].item() if (one == one.flat[0]).all() else one.tolist()) for name, one in found.items()}
 
 
 def _on_base(data: dict[Any, Any], origin: Path | str) -> dict[Any, Any]:
-    """Keys of a file merged over those of its base preset, if it names one."""
+    """Keys of a file, with the missing keys of its base preset, if the file has one."""
     if "base" not in data:
         return data
     name = data.pop("base")
@@ -138,14 +138,14 @@ def _on_base(data: dict[Any, Any], origin: Path | str) -> dict[Any, Any]:
         step = f"Did you mean {near}?" if near else "Name one of them, or leave base out."
         raise FileError.of(origin, InvalidValueError("base", brief(name), ", ".join(robot_names()), step))
     base = _on_base(parse_mapping(preset_text(name), f"preset {name}"), origin)
-    del base["name"]  # the file needs its own name: equal names would overwrite each other's files
+    del base["name"]  # the file needs its own name, because equal names would overwrite each other's files
     assumed = {field: why for field, why in base.get("assumed", {}).items() if field not in data}
     own = data.get("assumed", {})
     return {**base, **data, "assumed": {**assumed, **own} if isinstance(own, dict) else own}
 
 
 def _winches(winches: Winch) -> dict[str, Any]:
-    """Keys of winches that differ from those of a winch with pulleys only."""
+    """Keys of winches with values that differ from a winch with pulleys only."""
     plain = Winch().per_cable(len(winches.pulley_radius)).known()
     data = {
         key: field.tolist()
@@ -177,14 +177,14 @@ def load_scene(file: str | os.PathLike[str]) -> tuple[Obstacle, ...]:
           - {name: lamp, sphere: [0, 0, 2.8], radius: 20 cm}
           - {name: hall, mesh: hall.stl, unit: mm, position: [0, 0, -1], turned: 90 deg}
 
-    `turned` is a rotation about z; `mesh` is a file in the folder of the robot file, read by `load_mesh`. The scene is
-    part of the file only. A `Robot` does not have a scene, and `dump_robot` does not write one.
+    `turned` is a rotation about z; `mesh` is a file in the folder of the robot file, read by `load_mesh`. Only the file
+    contains the scene. A `Robot` has no scene, and `dump_robot` does not write one.
 
     Args:
         file: The robot file.
 
     Returns:
-        Boxes, capsules, spheres and meshes in the order of the file; empty if it has no scene.
+        Boxes, capsules, spheres and meshes in the order of the file; empty if the file has no scene.
 
     Raises:
         FileError: If the file or a mesh cannot be read, or a value is wrong; the message names the key.

@@ -1,4 +1,4 @@
-"""Keys and units of robot files. Ranges and shapes are checked by the robot itself."""
+"""Keys and units of robot files. The constructor of the robot checks ranges and shapes."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from sagline.robot.winch import Winch
 if TYPE_CHECKING:
     from sagline.interference.obstacles import Box, Capsule, Sphere
 
-_KINDS: Final = {  # kinds of obstacles, and the further keys allowed for each
+_KINDS: Final = {  # kinds of obstacles, and further keys that are allowed for each kind
     "box": ("center", "turned"),
     "capsule": ("radius",),
     "sphere": ("radius",),
@@ -58,11 +58,11 @@ _UNITS: Final = {
     **{f"cables.{name}": unit for name, unit in units(Cable).items()},
     **{f"winches.{name}": unit for name, unit in units(Winch).items()},
 }  # every other key of inertia is in kg m^2
-SWIVEL_AXES: Final = {"up": [0.0, 0.0, 1.0], "down": [0.0, 0.0, -1.0]}  # words for vertical axes
+SWIVEL_AXES: Final = {"up": [0.0, 0.0, 1.0], "down": [0.0, 0.0, -1.0]}  # words for vertical directions
 
 
 class ObstacleEntry(YamlEntry):
-    """Obstacle around the robot; `_KINDS` lists the keys that may be combined."""
+    """Obstacle around the robot; `_KINDS` lists the allowed combinations of keys."""
 
     name: str
     box: Any = None  # edges of a box
@@ -76,7 +76,7 @@ class ObstacleEntry(YamlEntry):
     turned: Any = 0.0  # angle of a box or mesh about z
 
     def _kind(self, item: str) -> str:
-        """Kind of the obstacle; InvalidValueError if its keys cannot be combined."""
+        """Kind of the obstacle; raises InvalidValueError for a combination of keys that is not allowed."""
         label(self.name, f"{item}.name")
         given = self.model_fields_set - {"name"}
         found = [kind for kind in _KINDS if kind in given]
@@ -92,7 +92,7 @@ class ObstacleEntry(YamlEntry):
         return kind
 
     def solid(self, item: str) -> Box | Capsule | Sphere | None:
-        """Box, capsule or sphere of the entry; None for a mesh (its values are checked, not its file)."""
+        """Box, capsule or sphere of the entry; None for a mesh (the values are checked, but not the file)."""
         from sagline.files.mesh_file import meters  # imported here because most robot files have no scene
         from sagline.interference.obstacles import Box, Capsule, Sphere
 
@@ -130,7 +130,7 @@ class _RobotPart(YamlEntry):
         return in_si(getattr(self, key), _UNITS.get(item, "kg*m^2"), item)
 
     def only_way(self, item: str, ways: tuple[tuple[str, ...], ...], beside: tuple[str, ...]) -> tuple[str, ...]:
-        """The set of all given keys except those in `beside`; an error if it is not one of the sets in `ways`."""
+        """Set of all given keys except the keys in `beside`; raises an error if `ways` does not contain this set."""
         found = self.model_fields_set.difference(beside)
         for way in ways:
             if found == set(way):
@@ -144,13 +144,13 @@ class _RobotPart(YamlEntry):
 
 
 def _with_keys(names: Iterable[str]) -> Any:
-    """A mapping in a robot file with keys of these names, all of them optional."""
+    """A mapping in a robot file with optional keys of these names."""
     keys: dict[str, Any] = dict.fromkeys(names, (Any, None))
     return create_model("_Keys", __base__=_RobotPart, **keys)
 
 
 class _Cables(_RobotPart):
-    """Material of the cables; each value is one number for all cables, or a list."""
+    """Material of the cables; each value is a number for all cables, or a list."""
 
     linear_density: Any
     axial_stiffness: Any = None
@@ -161,7 +161,7 @@ class _Cables(_RobotPart):
     expansion: Any = None
 
     def cable(self) -> Cable:
-        """The cables; their stiffness is computed from the given keys, from the diameter if no other key gives it."""
+        """The cables; the given keys determine the stiffness, and without other keys the diameter gives the section."""
         ways = (("axial_stiffness",), *(("youngs_modulus", key) for key in ("section_area", "radius", "diameter")))
         beside = ["linear_density", "expansion"]
         if self.model_fields_set & {"axial_stiffness", "section_area"}:
@@ -210,14 +210,14 @@ def _vectors(value: object) -> object:
 
 
 class _Inertia(_RobotPart):
-    """Inertia about the center of mass: a matrix, its diagonal, its elements, or a solid body with the robot's mass."""
+    """Inertia about the center of mass: a matrix, its diagonal, its elements, or a solid body of the robot's mass."""
 
     matrix: Any = None
     diagonal: Any = None
     Ixx: Any = None
     Iyy: Any = None
     Izz: Any = None
-    Ixy: Any = 0.0  # element of the matrix (negative product of inertia), like the next two
+    Ixy: Any = 0.0  # element of the matrix, as the next two: the negative product of inertia
     Ixz: Any = 0.0
     Iyz: Any = 0.0
     box: Any = None
@@ -227,7 +227,7 @@ class _Inertia(_RobotPart):
     @model_validator(mode="before")
     @classmethod
     def _accept_list(cls, data: object) -> object:
-        """A list of lists is the matrix, a list of numbers its diagonal."""
+        """Matrix from a list of lists, or its diagonal from a list of numbers."""
         if not isinstance(data, list):
             return data
         return {"matrix" if any(isinstance(row, list) for row in data) else "diagonal": data}
@@ -262,10 +262,10 @@ class _TestBox(_RobotPart):
 
 
 class _Deviations(_with_keys(UNCERTAIN)):  # type: ignore[misc]
-    """Standard deviations of a robot's values; one number per field, one per axis, or one per value."""
+    """Standard deviations of a robot's values: for each field one number, one per axis, or one per value."""
 
     def of(self, robot: Robot, within: str) -> dict[str, Any]:
-        """Standard deviations in SI; percentages refer to the robot's values."""
+        """Standard deviations in SI; a percentage is relative to the robot's value."""
         found = {}
         for key in (key for key in _Deviations.model_fields if key in self.model_fields_set):
             item, value = within + key, getattr(self, key)
@@ -294,7 +294,7 @@ def _share(value: Any, item: str) -> Any:
 
 
 class _Calibration(_RobotPart):
-    """Calibration from which some of the values come."""
+    """Calibration that has determined some of the values."""
 
     log: str
     date: str
@@ -307,7 +307,7 @@ class _Calibration(_RobotPart):
 
 
 class RobotEntry(_RobotPart):
-    """A whole robot file. Keys are the fields of `Robot`; missing values are its defaults."""
+    """A whole robot file. The keys are the fields of `Robot`; missing values are the defaults of `Robot`."""
 
     name: str
     frame_anchors: Any
@@ -331,7 +331,7 @@ class RobotEntry(_RobotPart):
     notes: str = ""
     tolerances: _Deviations | None = None
     calibration: _Calibration | None = None
-    scene: list[ObstacleEntry] = Field(default_factory=list)  # not part of the robot: see sagline.files.robot_file
+    scene: list[ObstacleEntry] = Field(default_factory=list)  # not a field of Robot; see sagline.files.robot_file
 
     def robot(self) -> Robot:
         """The robot the file describes."""
@@ -350,7 +350,7 @@ class RobotEntry(_RobotPart):
         return self._with_tolerances(Robot(**fields))
 
     def _with_tolerances(self, robot: Robot) -> Robot:
-        """The robot with the tolerances of its values, which may be given in percent."""
+        """The robot with tolerances, which the file may give in percent."""
         about: dict[str, Any] = {}
         if self.tolerances is not None:
             about["tolerances"] = self.tolerances.of(robot, "tolerances.")

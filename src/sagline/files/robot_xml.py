@@ -1,4 +1,4 @@
-"""XML robot files of other tools: safe reading, checked numbers, and the record of lost data."""
+"""XML robot files of other programs: safe reading, checked numbers, and a record of lost data."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ from sagline.files.reading import error_at_line, read_bytes
 from sagline.robot.robot import Robot
 from sagline.robot.winch import UPRIGHT
 
-Column: TypeAlias = Sequence[float | None]  # one number per cable, None if missing in the file
+Column: TypeAlias = Sequence[float | None]  # one number per cable; None if the number is missing in the file
 _LIMIT: Final = 4.0  # largest size of a file [MB]; the largest file of CASPR has 0.1 MB
 _ENCODING = re.compile(r"utf-?8|utf-?16|us-ascii|ascii|latin-?1|iso-8859-1?[0-9]|(windows-|cp)125[0-8]", re.IGNORECASE)
 
 _DECLARED = re.compile(rb"""\s*<\?xml[^>]*?encoding\s*=\s*["']([A-Za-z0-9._-]+)""")
 _CUT_OFF: Final = (3, 4, 5, 6, 20)  # error codes of expat: no element; incomplete token, character or section
-# Material if a file gives none: a 4 mm steel rope, as assumed for the preset cogiro.
+# Material for a file without material: a 4 mm steel rope, as in the preset cogiro.
 _STEEL_ROPE: Final = {"linear density": 0.065, "axial stiffness": 700e3}  # [kg/m], [N]
 
 
 def read_xml(path: Path) -> Element:
     """The root element of an XML file."""
-    # files that declare entities are refused, because an entity can grow without bound or refer to another file; a
-    # document type is skipped, and the file that it refers to is never opened
+    # Files that declare entities are refused, because an entity can grow without bound or refer to another file. A
+    # document type is skipped; its file is never opened
     data = read_bytes(path, _LIMIT)
     builder, parser = TreeBuilder(), expat.ParserCreate()
     parser.StartElementHandler = builder.start
@@ -44,7 +44,7 @@ def read_xml(path: Path) -> Element:
     parser.XmlDeclHandler = _check_encoding
     try:
         parser.Parse(data, True)
-    except (expat.ExpatError, LookupError, ValueError) as error:  # the last two are for an encoding that does not fit
+    except (expat.ExpatError, LookupError, ValueError) as error:  # the last two errors are for a wrong encoding
         raise error_at_line(path, *_cause(error, data)) from None
     except _RefusedError as error:
         raise FileError(path, *error.args) from None
@@ -68,11 +68,11 @@ def number_of_text(text: str | None, item: str, unit: str) -> float:
 
 
 def only_child(parent: Element, tag: str, item: str) -> Element:
-    """The element of this tag inside another."""
+    """The element with this tag inside another element."""
     found = parent.findall(tag)
     if len(found) != 1:
         raise InvalidValueError(
-            f"{item}: number of <{tag}>", len(found), "1", f"Check that the file is whole, then correct {item}."
+            f"{item}: number of <{tag}>", len(found), "1", f"Check that the file is complete, then correct {item}."
         )
     return found[0]
 
@@ -89,12 +89,12 @@ def cables_of_file(
 
 
 def vertical_axis(sideways: float, up: float) -> tuple[float, float, float] | None:
-    """Swivel axis (up or down) from the horizontal and vertical parts of a direction; None if it is not vertical."""
+    """Swivel axis (up or down) from the horizontal and vertical parts of a direction; None if it is inclined."""
     return None if not up or sideways > UPRIGHT * abs(up) else (0.0, 0.0, float(np.sign(up)))
 
 
 def _cause(error: Exception, data: bytes) -> tuple[str, str]:
-    """Reason why expat does not accept the bytes, and the next step."""
+    """Reason why the XML parser expat refuses the bytes, and the next step."""
     if not data.strip():
         return "is empty", "Write it again; it may have been cut off."
     declared = _DECLARED.match(data)
@@ -112,7 +112,7 @@ def _cause(error: Exception, data: bytes) -> tuple[str, str]:
 
 
 def _decodes(data: bytes, encoding: str) -> bool:
-    """True if bytes that begin with one-byte letters are text in this encoding."""
+    """True if bytes are text in an encoding with one byte per ASCII letter."""
     try:
         return not encoding.lower().startswith(("utf-16", "utf16")) and bool(data.decode(encoding))
     except (LookupError, UnicodeError):
@@ -124,7 +124,7 @@ class _RefusedError(Exception):
 
 
 def _refuse_entity(name: str, *_: object) -> NoReturn:
-    raise _RefusedError(f"declares the entity {name}", "Write its text out; entities are not read.")
+    raise _RefusedError(f"declares the entity {name}", "Replace the entity by its text; entities are not read.")
 
 
 def _check_encoding(version: str, encoding: str | None, standalone: int) -> None:
@@ -134,7 +134,7 @@ def _check_encoding(version: str, encoding: str | None, standalone: int) -> None
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Imported:
-    """A robot read from a file of another tool, and the lost data.
+    """A robot from a file of another program, and the lost data.
 
     Attributes:
         robot: The robot; `robot.assumed` lists the fields that the file does not give, with the reason, and
@@ -147,5 +147,5 @@ class Imported:
 
 
 def with_losses(robot: Robot, lost: tuple[str, ...]) -> Imported:
-    """Robot and its lost data; they are added to its notes, so that its file contains them."""
+    """Robot and its lost data; the data are added to the notes of the robot, so that its file contains them."""
     return Imported(robot.replace(notes=" ".join(("Not taken over:", *lost))) if lost else robot, lost)

@@ -1,4 +1,4 @@
-"""Simulations in NetCDF: every quantity with its unit, the energy balance, the events, and the robot inside."""
+"""Simulations in NetCDF: every quantity with its unit, the energy balance, the events, and the robot."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
 TIME: Final = Quantity("time", (), "s", "time")
-# variables of every sample; a broken cable has neither length nor nodes
+# variables of every sample; a broken cable has no length and no nodes
 SAMPLES: Final = (
     Quantity("position", ("axis",), "m", "position of the platform origin in the world", "pose.position"),
     Quantity(
@@ -74,14 +74,14 @@ WINCHES: Final = ("ideal", "robot", LAGGING)
 # numeric attributes and their units
 LAG: Final = {"bandwidth": "Hz", "damping_ratio": "1"}
 LOSSES: Final = {"loss_time": "s", "air_damping": "N s/m^2", "modal_damping": "1"}
-# events of a cable or winch, of the platform, and of both
+# events of a cable or winch, events of the platform, and all events
 OF_CABLES: Final = ("break", "stall", "saturate", "slack")
 OF_PLATFORM: Final = ("drop", "pick up")
 OF_EITHER: Final = ("brake",)
 
 
 ROWS: Final = "time"
-ROUNDING: Final = 1e-12  # tolerance, as a share of the largest energy
+ROUNDING: Final = 1e-12  # tolerance, relative to the largest energy
 
 
 def _check_simulation(data: Dataset, cables: int) -> None:
@@ -155,7 +155,7 @@ def _check_events(data: Dataset, time: Array, cables: int) -> Array:
 
 
 def _check_gaps(name: str, values: Array, gone: Any) -> None:
-    """Refuse values of broken cables and missing values of intact ones; gone: flags, shape (samples, cables)."""
+    """Refuse values of broken cables and missing values of intact cables; gone: flags, shape (samples, cables)."""
     missing = np.isnan(values)
     gone = gone.reshape(gone.shape + (1,) * (values.ndim - 2))
     for index in np.argwhere(missing != gone)[:1].tolist():
@@ -165,7 +165,7 @@ def _check_gaps(name: str, values: Array, gone: Any) -> None:
 
 
 def _check_balance(data: Dataset) -> None:
-    """Refuse an energy error that is not the sum of the other energies."""
+    """Refuse an energy error that contradicts the other energies."""
     names = ("kinetic_energy", "potential_energy", "energy_supplied", "energy_lost", "energy_removed", "energy_error")
     kinetic, potential, supplied, lost, removed, error = (data.variables[name].values for name in names)
     total = kinetic + potential - supplied + lost + removed
@@ -176,7 +176,7 @@ def _check_balance(data: Dataset) -> None:
 
 
 def load_simulation(file: os.PathLike[str] | str) -> Simulation:
-    """Read a simulation written by its `save`; all numbers are equal to the last bit.
+    """Read a simulation from a file of `Simulation.save`; all numbers are restored exactly.
 
     Args:
         file: The NetCDF file.
@@ -255,7 +255,7 @@ FORMAT: Final = Format(
     kind=Simulation,
     name="simulation",
     made="simulation of sagline",
-    give="Give the .nc file that a simulation's save wrote.",
+    give="Give a .nc file of Simulation.save.",
     again="Save the simulation again, or get the original file.",
     key="sagline_simulation_format",
     version=1,

@@ -21,12 +21,12 @@ from sagline.core.errors import FileError, InvalidValueError, nearest
 from sagline.files.quantity import LARGEST, REACH, in_si, plain_number
 
 TABLE_LIMIT: Final = 64.0  # largest size [MB], about half a million rows
-_TOO_LONG: Final = 100.0  # ratio to the size of the object above which a length must be in mm
+_TOO_LONG: Final = 100.0  # ratio to the size of the object; a larger length must be in mm
 _NONE: Final[Mapping[str, str]] = MappingProxyType({})
 _COLUMN = re.compile(r"\s*(\w+)\s*(?:\[(.*)\])?\s*")  # name, or name [unit]
 _PLAIN_ROW = re.compile(
     r"(?:[-+.0-9eE \t]*,|nan,)*"
-)  # texts of these characters only are plain numbers for `float`, which is much faster
+)  # a text of these characters only is converted by `float`, which is much faster
 _DECIMAL_COMMA = re.compile(r"\s*[-+]?[0-9]+,[0-9]+\s*")
 
 
@@ -38,7 +38,7 @@ class CsvTable:
     columns: dict[str, Array]  # name and numbers of each column, shape (rows,)
     lines: array[int]  # line number of each row in the file, from 1
     header: int  # line number of the header
-    plain: frozenset[str]  # columns without a unit in the header; they are in SI
+    plain: frozenset[str]  # names of columns without a unit in the header; the values are in SI
 
     @classmethod
     def read(
@@ -49,13 +49,13 @@ class CsvTable:
         strangers: Mapping[str, str] = _NONE,
         gaps: Collection[str] = (),
     ) -> CsvTable:
-        """Read a CSV text whose first row names its columns, `name` or `name [unit]`."""
+        """Read a CSV text; the first row contains the names of the columns, `name` or `name [unit]`."""
         reader = csv.reader(io.StringIO(text), strict=True)
         found: dict[str, float | None] = {}
         numbers, lines, header = array("d"), array("q"), 0
         try:
             for row in reader:
-                if not "".join(row).strip():  # a blank line, or the bare commas of a spreadsheet
+                if not "".join(row).strip():  # a blank line, or a line of a spreadsheet with commas only
                     continue
                 if not found:
                     found, header = _factors(path, reader.line_num, row, units, strangers), reader.line_num
@@ -69,7 +69,7 @@ class CsvTable:
             raise FileError(path, reason, step, item="columns")
         values = np.array(numbers).reshape(len(lines), len(found))
         factors = [1.0 if factor is None else factor for factor in found.values()]
-        with np.errstate(over="ignore"):  # too large values are reported below
+        with np.errstate(over="ignore"):  # values that are too large are reported later
             columns = {name: values[:, k] * factor for k, (name, factor) in enumerate(zip(found, factors, strict=True))}
         plain = frozenset(name for name, factor in found.items() if factor is None)
         table = cls(path, columns, lines, header, plain)
@@ -80,24 +80,24 @@ class CsvTable:
         return table
 
     def check_columns(self, names: Iterable[str], hint: str) -> None:
-        """Refuse a table that lacks one of the columns; the hint is the end of the message."""
+        """Refuse a table without one of the columns; hint: end of the message."""
         if missing := [name for name in names if name not in self.columns]:
             raise line_error(self.path, self.header, f"missing column {', '.join(missing)}{hint}")
 
     def check_rows(self) -> None:
         """Refuse a table without rows."""
         if not self.lines:
-            raise line_error(self.path, self.header, "no rows below the columns' names; allowed: at least one")
+            raise line_error(self.path, self.header, "no rows below the names of the columns; allowed: at least one")
 
     def refuse(self, wrong: NDArray[np.bool_], item: str, values: Array, unit: str, allowed: str) -> None:
-        """Refuse the first row that is wrong; the message gives line, value, unit, and allowed values."""
+        """Refuse a table with a wrong row; the message gives line, value, unit and allowed values of the first one."""
         if wrong.any():
             k = int(np.argmax(wrong))
             value = f"{values[k]:.12g} {unit}".rstrip()
             raise line_error(self.path, self.lines[k], f"{item} is {value}; allowed: {allowed}")
 
     def refuse_millimeters(self, name: str, size: Array | float, whole: str) -> None:
-        """Refuse lengths without a unit that exceed a hundred times the size [m] of the object, shape () or (rows,)."""
+        """Refuse lengths without a unit above a hundred times the size of the object [m], shape () or (rows,)."""
         if name in self.plain:
             far = self.columns[name] > _TOO_LONG * size
             allowed = f"lengths like {whole}; if these are millimeters, call the column {name} [mm]"
@@ -107,7 +107,7 @@ class CsvTable:
 def _factors(
     path: FilePath, line: int, header: list[str], units: Mapping[str, str], strangers: Mapping[str, str]
 ) -> dict[str, float | None]:
-    """Factor to SI of each column, by its name; None if no unit is given."""
+    """Factor to SI of each column, by the name of the column; None without a unit."""
     if len(header) == 1 and (other := next((mark for mark in ";\t" if mark in header[0]), None)):
         shown = {";": "semicolons", "\t": "tabs"}[other]
         raise line_error(
@@ -132,7 +132,7 @@ def _factors(
 def _factor(path: FilePath, line: int, name: str, unit: str, wanted: str) -> float:
     try:
         if unit.strip():
-            return cast(float, in_si(f"1 {unit.strip()}", wanted, name))  # one text gives one number
+            return cast(float, in_si(f"1 {unit.strip()}", wanted, name))  # equal texts give equal numbers
     except InvalidValueError:
         pass
     allowed = f"a unit that converts to {wanted}" if wanted else "none"
@@ -148,7 +148,7 @@ def _numbers(path: FilePath, line: int, row: list[str], names: tuple[str, ...], 
     if gaps:
         row = [cell if name not in gaps or cell.strip() else "nan" for name, cell in zip(names, row, strict=True)]
     if _PLAIN_ROW.fullmatch(",".join(row) + ","):
-        with contextlib.suppress(ValueError):  # on an error, the slow code below finds the cell
+        with contextlib.suppress(ValueError):  # after an error, the slower code finds the cell
             return [float(cell) for cell in row]
     numbers = [plain_number(cell) for cell in row]
     if None in numbers:
@@ -159,7 +159,7 @@ def _numbers(path: FilePath, line: int, row: list[str], names: tuple[str, ...], 
 
 
 def line_error(path: FilePath, line: int, reason: str) -> FileError:
-    """An error that names the line."""
+    """FileError with the number of the line."""
     found = FileError(path, f"line {line}: {reason}", f"Correct line {line}.", item=f"line {line}")
     found.value, _, found.allowed = reason.partition("; allowed: ")
     return found

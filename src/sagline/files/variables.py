@@ -1,4 +1,4 @@
-"""Variables of NetCDF files: declaration of a quantity, and checks of its shape, type, unit, codes, signs and gaps."""
+"""Variables of NetCDF files: declaration of a quantity, and checks of shape, type, unit, codes, signs and NaN."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from sagline.core.errors import InvalidValueError, printable
 if TYPE_CHECKING:
     from xarray import Dataset, Variable
 
-STEP = "Write the file again; it was edited, or damaged."
+STEP = "Write the file again, because it was edited or damaged."
 NEWER = "Read it with a newer sagline."
 NONE: Final = -1  # missing index or code
 # labels along the dimensions other than rows and cable
@@ -30,7 +30,7 @@ PARTS = {
 
 
 class Known(Enum):
-    """Poses at which a quantity has values; it is NaN at all others."""
+    """Poses at which a quantity has values; the quantity is NaN at all other poses."""
 
     EVERYWHERE = "at every pose"
     SOLVED = "at the solved poses alone"
@@ -44,21 +44,21 @@ class Quantity(NamedTuple):
     """One variable of a file, and the range of its values."""
 
     name: str  # name in the file
-    parts: tuple[str, ...]  # dimensions after those of the rows: poses, or samples in time
+    parts: tuple[str, ...]  # dimensions after the dimensions of the rows (poses, or samples in time)
     unit: str  # unit in the file; "" for a plain number
     long_name: str  # description
-    source: str = ""  # dotted attribute of the result with the values; "" if the attribute is called `name`
-    # poses at which it has values; an integer of a record with values SOMEWHERE is `NONE` at all others
+    source: str = ""  # attribute of the result, with dots for nested attributes; "" if the attribute is `name`
+    # poses with values; in records, an integer with values SOMEWHERE is `NONE` at all other places
     known: Known = EVERYWHERE
     low: float = -np.inf  # lowest value
     infinite: bool = False  # True if values may be infinite
-    codes: type[IntEnum] | None = None  # status type of the codes it holds, if any
+    codes: type[IntEnum] | None = None  # status type, if the values are codes
     # type of values that are not codes: float, int, bool or str
     values: type[float | int | bool | str] = float
 
     @property
     def place(self) -> str:
-        """Dotted attribute of the result with the values."""
+        """Attribute of the result with the values, with dots for nested attributes."""
         return self.source or self.name
 
     @property
@@ -67,14 +67,14 @@ class Quantity(NamedTuple):
         return np.dtype(np.int8 if self.codes is not None else object if self.values is str else self.values)
 
     def of(self, result: Any) -> Any:
-        """Values of a result; None if it does not have them, such as the proof of a plan without one."""
+        """Values of a result; None if the result has no values, for example a plan without a proof."""
         for name in self.place.split("."):
             result = None if result is None else getattr(result, name)
         return result
 
     @property
     def attributes(self) -> dict[str, Any]:
-        """Attributes of the variable; status codes are explained as in the CF conventions."""
+        """Attributes of the variable; the meanings of status codes follow the CF conventions."""
         found: dict[str, Any] = {"long_name": self.long_name}
         if self.unit:
             found["units"] = self.unit
@@ -85,7 +85,7 @@ class Quantity(NamedTuple):
 
 
 def variables_of_result(result: Any, quantities: Iterable[Quantity], rows: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Dimensions, values and attributes of each quantity that a result has, by name."""
+    """Dimensions, values and attributes by name, for each quantity of a result."""
     found: dict[str, Any] = {}
     for one in quantities:
         if (values := one.of(result)) is not None:
@@ -94,7 +94,7 @@ def variables_of_result(result: Any, quantities: Iterable[Quantity], rows: tuple
 
 
 def record_variables(records: Sequence[Any], quantities: Iterable[Quantity], width: int = 0) -> dict[str, Any]:
-    """Variables with one row per record; lists have a second dimension with this width; None is stored as `NONE`."""
+    """Variables with one row per record. Lists have a second dimension of this width. None is stored as `NONE`."""
     found: dict[str, Any] = {}
     for one in quantities:
         values = [NONE if (value := one.of(record)) is None else value for record in records]
@@ -109,7 +109,7 @@ def values_of(data: Dataset, name: str) -> Any:
 
 
 def fields_of(data: Dataset, quantities: Iterable[Quantity]) -> dict[str, Any]:
-    """Values of the quantities in a data set, by attribute of the result; a part of the result is a nested mapping."""
+    """Values of the quantities of a data set, by attribute of the result; nested attributes give nested mappings."""
     found: dict[str, Any] = {}
     for one in quantities:
         if one.name in data.variables:
@@ -122,7 +122,7 @@ def fields_of(data: Dataset, quantities: Iterable[Quantity]) -> dict[str, Any]:
 
 
 def records_of(data: Dataset, quantities: Iterable[Quantity]) -> list[dict[str, Any]]:
-    """Records written by `record_variables`, by attribute; integers with values SOMEWHERE may be None."""
+    """Records from variables of `record_variables`, by attribute; integers with values SOMEWHERE may be None."""
     columns: dict[str, list[Any]] = {}
     for one in quantities:
         values = data[one.name].values
@@ -140,11 +140,11 @@ def check_variables(
     rows: Iterable[str] = (),
     solved: Flags | None = None,
 ) -> None:
-    """Refuse a data set whose labels or variables are not as declared."""
+    """Refuse a data set with labels or variables that contradict the declarations."""
     # data: the data set
     # quantities: declared quantities, in the order of the checks
-    # sizes: number of entries along each dimension that has no labels
-    # rows: dimensions before those of the declaration
+    # sizes: number of entries along each dimension without labels
+    # rows: dimensions before the dimensions of the declaration
     # solved: rows with a solution; None: all
     for name, labels in PARTS.items():
         if name in data.variables and list(data.variables[name].values) != list(labels):
@@ -162,7 +162,7 @@ def check_variables(
 
 
 def check_indices(data: Dataset, ranges: Mapping[str, tuple[int, int]]) -> None:
-    """Refuse indices out of range; each range includes its first and excludes its second number."""
+    """Refuse indices out of range; a range includes its first number and excludes its second number."""
     for name, (low, high) in ranges.items():
         values = data.variables[name].values
         wrong = (values < low) | (values >= high)
@@ -175,7 +175,7 @@ def _check_form(quantity: Quantity, variable: Variable, wanted: Mapping[str, int
     found = dict(zip(map(str, variable.dims), variable.shape, strict=True))
     if list(found.items()) != list(wanted.items()):
         raise InvalidValueError(f"{quantity.name}: shape", _shape(found), _shape(wanted), STEP)
-    # texts have several types; each text is checked later
+    # the type of texts may differ, so each text is checked later
     if quantity.values is not str and variable.dtype.newbyteorder("=") != quantity.type:
         raise InvalidValueError(f"{quantity.name}: type", variable.dtype, str(quantity.type), STEP)
     unit = variable.attrs.get("units", "")
@@ -188,7 +188,7 @@ def _shape(sizes: Mapping[str, int]) -> str:
 
 
 def _check_codes(quantity: Quantity, variable: Variable) -> None:
-    """Refuse codes that are unknown, or that had another meaning when the file was written."""
+    """Refuse codes that are unknown, or have another meaning in the file."""
     assert quantity.codes is not None
     ours = {code.value: code.name.lower() for code in quantity.codes}
     values = np.atleast_1d(variable.attrs.get("flag_values", ())).tolist()
@@ -204,7 +204,7 @@ def _check_codes(quantity: Quantity, variable: Variable) -> None:
 def _check_texts(quantity: Quantity, variable: Variable) -> None:
     for index, value in np.ndenumerate(variable.values):
         if not isinstance(value, str) or not value or value != printable(value):
-            raise InvalidValueError(f"{quantity.name}{list(index)}", repr(value), "a word that prints", STEP)
+            raise InvalidValueError(f"{quantity.name}{list(index)}", repr(value), "printable characters", STEP)
 
 
 def _check_numbers(quantity: Quantity, values: np.ndarray[Any, Any], solved: Flags) -> None:

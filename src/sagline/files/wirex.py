@@ -1,4 +1,4 @@
-"""Robots of WireX and WireCenter: one XML file, `.wcrfx`, of geometry, platform, cables and winches."""
+"""Robots of WireX and WireCenter: one XML file, `.wcrfx`, with geometry, platform, cables and winches."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ from sagline.robot.robot import Robot
 from sagline.robot.winch import Winch
 
 _AXES: Final = ("x", "y", "z")
-_FLATTEST: Final = 0.1  # smallest ratio of edges of the assumed box; anchors may lie in a plane, unlike a body
+_FLATTEST: Final = 0.1  # smallest ratio of edges of the assumed box, because the anchors may be in a plane
 _VERSIONS: Final = ("0.31", "0.32")
-_INFINITE: Final = re.compile(r"\+?(inf|infinity|1\.#inf0*)", re.IGNORECASE)  # Windows prints 1.#INF
+_INFINITE: Final = re.compile(r"\+?(inf|infinity|1\.#inf0*)", re.IGNORECASE)  # Windows writes 1.#INF
 
 
 def load_wirex(source: str | os.PathLike[str], cables: Cable | None = None) -> Imported:
@@ -39,12 +39,13 @@ def load_wirex(source: str | os.PathLike[str], cables: Cable | None = None) -> I
 
     WireX does not require material, inertia or limits. Missing values are assumed and listed in the robot's `assumed`.
     Missing moments of inertia are set to the largest given moment, missing products of inertia to zero. If no inertia
-    is given, the platform is a box around its anchors. Pulleys that swivel about a vertical axis are read. Of a winch,
-    the largest force, the drum and the inertia of the motor are read.
+    is given, the platform is a box around its anchors. Only pulleys with a vertical swivel axis are read. The data of a
+    winch that are read are the largest force, the drum and the inertia of the motor.
 
     Args:
         source: The `.wcrfx` file.
-        cables: The cables' material; None takes that of the file, or a 4 mm steel rope if the file has none.
+        cables: The cables' material; None for the material of the file, or a 4 mm steel rope if the file has no
+            material.
 
     Returns:
         Imported: the robot, and the lost data.
@@ -85,10 +86,10 @@ def _robot(root: Element, name: str, cables: Cable | None) -> Imported:
     robot = only_child(root, "robot", "models")
     chains = robot.findall("geometry/chain")
     if not chains:
-        raise InvalidValueError("number of <chain>", 0, ">= 1", "Check that the file is whole.")
+        raise InvalidValueError("number of <chain>", 0, ">= 1", "Check that the file is complete.")
     platforms = robot.findall("platform")
     if len(platforms) > 1:
-        raise InvalidValueError("number of <platform>", len(platforms), "1", "sagline moves a single platform.")
+        raise InvalidValueError("number of <platform>", len(platforms), "1", "sagline supports a single platform.")
     materials = [_material(root, chain, k) for k, chain in enumerate(chains)]
     platform = platforms[0] if platforms else Element("platform")
     assumed: dict[str, str] = {}
@@ -117,7 +118,7 @@ def _robot(root: Element, name: str, cables: Cable | None) -> Imported:
 
 
 def _optional(element: Element | None, key: str, item: str, unit: str) -> float | None:
-    """Number in an attribute; None if it is missing, empty, or infinite (some programs write this for unknown)."""
+    """Number in an attribute; None if it is missing, empty, or infinite, which some programs write for unknown."""
     text = "" if element is None else element.get(key, "").strip()
     if not text or _INFINITE.fullmatch(text):
         return None
@@ -135,7 +136,7 @@ def _point(chain: Element, tag: str, k: int) -> list[float]:
 
 
 def _material(root: Element, chain: Element, k: int) -> Element:
-    """The <cable> of a chain by its cable_id, from 1; the first one without an id; an empty one if none exists."""
+    """The <cable> with the cable_id of a chain, from 1; the first one without an id; empty if none exists."""
     known = root.findall("cable")
     text = chain.get("cable_id", "1")
     if not known:
@@ -155,14 +156,14 @@ def _cables(materials: list[Element], assumed: dict[str, str]) -> Cable:
         radius = _optional(element, "radius", item, "m")
         if radius is not None and radius < 0.0:
             raise InvalidValueError(f"{item}: radius", f"{radius:g} m", ">= 0 m", "Correct it in the file.")
-        density.append(_optional(element, "weight", item, "kg/m") or None)  # zero means unknown
+        density.append(_optional(element, "weight", item, "kg/m") or None)  # zero in a file means unknown
         stiffness.append((modulus or 0.0) * np.pi * (radius or 0.0) ** 2 or None)
         diameter.append(2.0 * (radius or 0.0))
     return cables_of_file(density, stiffness, "WireX", assumed, diameter if all(diameter) else None)
 
 
 def _winches(root: Element, chains: list[Element]) -> tuple[Winch | None, tuple[str, ...]]:
-    """Pulleys and drums, and their lost data."""
+    """Pulleys and drums, and the lost data about them."""
     lost, radii, axes = [], [], []
     for k, chain in enumerate(chains):
         item = f"chain {k + 1}: base"
@@ -188,11 +189,11 @@ def _winches(root: Element, chains: list[Element]) -> tuple[Winch | None, tuple[
 
 
 def _axis(base: Element, item: str) -> tuple[float, float, float] | None:
-    """Direction in which the cable enters its pulley: z axis of the matrix a11 to a33; default up; None if tilted."""
+    """Direction in which the cable enters its pulley: z axis of the matrix a11 to a33; default up; None if inclined."""
     if base.get("a33") is None:
         return (0.0, 0.0, 1.0)
     upright = _required(base, "a33", item, "")
-    # in a rotation with a vertical z axis, last row and last column are zero off the diagonal
+    # for a vertical z axis, the last row and the last column are zero off the diagonal
     sideways = max(abs(_optional(base, key, item, "") or 0.0) for key in ("a13", "a23", "a31", "a32"))
     return vertical_axis(sideways, upright)
 
@@ -213,7 +214,7 @@ def _drive(winch: Element) -> dict[str, float]:
 def _pattern(robot: Element, assumed: dict[str, str]) -> MotionPattern:
     given = robot.get("motionpattern") or "3R3T"
     if given not in get_args(MotionPattern):
-        step = "sagline has no other; correct it in the file."
+        step = "sagline has no other pattern; correct it in the file."
         raise InvalidValueError("motionpattern", repr(given), ", ".join(MOTION_PATTERNS), step)
     if given in PLANAR:
         assumed["plane_normal"] = "z: the file names no plane; the x-y plane is assumed"
@@ -221,7 +222,7 @@ def _pattern(robot: Element, assumed: dict[str, str]) -> MotionPattern:
 
 
 def _limits(root: Element, materials: list[Element], assumed: dict[str, str]) -> tuple[list[float], list[float]]:
-    """Lower limit from the cable, and upper limit from the winch, otherwise from the cable's breaking load."""
+    """Lower tension limit from the cable; upper limit from the winch, or otherwise from the cable's breaking load."""
     low = [_optional(element, "minimum_load", "cable", "N") for element in materials]
     break_at = [_optional(element, "breaking_load", "cable", "N") or None for element in materials]
     winch = _optional(root.find("winch/cable"), "f_max", "winch: cable", "N") or None
@@ -243,7 +244,7 @@ def _center(platform: Element, assumed: dict[str, str]) -> list[float]:
 
 
 def _inertia(platform: Element, mass: float, size: Array, assumed: dict[str, str]) -> Array:
-    """Symmetric matrix; one of two mirrored elements may be missing; if both are missing, a value is assumed."""
+    """Symmetric matrix. One of two symmetric elements may be missing; if both are missing, a value is assumed."""
     matrix = np.full((3, 3), np.nan)
     tensor = platform.find("inertiatensor")
     for (i, row), (j, column) in product(enumerate(_AXES), repeat=2):
@@ -256,7 +257,7 @@ def _inertia(platform: Element, mass: float, size: Array, assumed: dict[str, str
     why = ["taken about the center of mass; the WireX format does not say about which point"]
     missing = [(i, j) for i, j in combinations_with_replacement(range(3), 2) if np.isnan(matrix[i, j])]
     products = [pair for pair in missing if pair[0] != pair[1]]
-    if len(products) not in (0, 3):  # one or two given products: the others are missing
+    if len(products) not in (0, 3):  # if one or two products are given, the others are errors
         key = "I" + "".join(_AXES[k] for k in products[0])
         raise InvalidValueError(f"inertiatensor: {key}", "missing", "a number in kg m^2", f"Add {key} to the file.")
     if missing:

@@ -1,4 +1,4 @@
-"""Workspaces in NetCDF: surface, grid, limiting criteria, loads, obstacles, and the robot inside."""
+"""Workspaces in NetCDF: surface, grid, limiting criteria, loads, obstacles, and the robot."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def _check_workspace(data: Dataset, cables: int) -> None:
 
 
 def _criteria_attributes(criteria: Sequence[Criterion]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Attributes of criteria, and variables of the obstacles among them; InvalidValueError for foreign kinds."""
+    """Attributes of criteria, and variables of their obstacles; raises InvalidValueError for unknown criteria."""
     attributes: dict[str, Any] = {}
     variables: dict[str, Any] = {}
     for k, one in enumerate(criteria):
@@ -122,7 +122,7 @@ def _criteria_attributes(criteria: Sequence[Criterion]) -> tuple[dict[str, Any],
 
 
 def _criteria_of(path: Path, data: Dataset) -> tuple[Criterion, ...]:
-    """Criteria written by `_criteria_attributes`, in order; the path is used in messages."""
+    """Criteria from attributes of `_criteria_attributes`, in their order; the path is used in messages."""
     found: list[Criterion] = []
     while (key := f"criterion_{len(found)}") in data.attrs:
         known: dict[str, Any] = {}
@@ -136,7 +136,7 @@ def _criteria_of(path: Path, data: Dataset) -> tuple[Criterion, ...]:
 
 
 def _obstacle(key: str, obstacle: Any) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Obstacle: texts and numbers as attributes, arrays as variables with separate dimensions."""
+    """Attributes and variables of an obstacle; texts and numbers are attributes, arrays are variables."""
     attributes: dict[str, Any] = {key: type(obstacle).__name__}
     variables: dict[str, Any] = {}
     for field in fields(type(obstacle)):
@@ -159,7 +159,7 @@ def _obstacle_of(data: Dataset, key: str) -> Any:
 
 
 def load_workspace(file: os.PathLike[str] | str) -> Workspace:
-    """Read a workspace written by its `save`; all numbers are equal to the last bit.
+    """Read a workspace from a file of `Workspace.save`; all numbers are restored exactly.
 
     Args:
         file: The NetCDF file.
@@ -213,7 +213,7 @@ def _attributes(space: Workspace) -> dict[str, Any]:
 def _unpack(path: FilePath, data: Dataset) -> Workspace:
     """Workspace of a data set; the path is used in messages."""
     robot = parse_robot(str(data.attrs["robot"]), f"{path}, robot")
-    if "component_separate" not in data.variables:  # of an older sagline, without proofs
+    if "component_separate" not in data.variables:  # a file of an older sagline, without proofs
         data = data.assign(component_separate=("component", np.zeros(data.sizes["component"], dtype=np.bool_)))
     _check_workspace(data, robot.cable_count)
 
@@ -270,7 +270,7 @@ FORMAT: Final = Format(
     kind=Workspace,
     name="workspace",
     made="workspace of sagline",
-    give="Give the .nc file that sagline workspace wrote, or a workspace's save.",
+    give="Give a .nc file of sagline workspace, or of Workspace.save.",
     again="Save the workspace again, or get the original file.",
     key="sagline_workspace_format",
     version=1,

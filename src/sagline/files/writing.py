@@ -1,8 +1,8 @@
 """Atomic file writing, names of files, and JSON text.
 
-A file is written next to its target and then renamed in one step, so that it is complete or absent. Folders, devices,
-pipes, sockets and links are refused as targets. Links among the parent folders are followed. A file that is replaced
-keeps its permissions; its other hard links keep the old content.
+A file is written next to its target and then renamed in one step, so that the target is never incomplete. Folders,
+devices, pipes, sockets and links are refused as targets. Links among the parent folders are followed. The permissions
+of a replaced file are kept; other hard links to it keep the old content.
 """
 
 from __future__ import annotations
@@ -28,21 +28,21 @@ import numpy as np
 from sagline.core.errors import FileError, is_seen
 from sagline.files.reading import check_regular
 
-LONGEST = 120  # [bytes]; with added words and suffix, a name stays below the common limit of 255
+LONGEST = 120  # [bytes], so that a name with suffix is below the common limit of 255
 UNNAMED = "robot"
 LOCK = "lock"  # locked while the folder is in use; the system releases the lock at the end of the process
 TRIES = 100
 _finished: ContextVar[list[Path] | None] = ContextVar("finished", default=None)
-_OTHERS = re.compile(r"[^\n -~]+")  # all except printable ASCII and line feed; json escapes control characters
+_OTHERS = re.compile(r"[^\n -~]+")  # not printable ASCII, not line feed; json escapes control characters
 PREFIX, SUFFIX = ".sagline-", ".part"
 _DEVICES = re.compile(r"(con|prn|aux|nul|com[\d¹²³]|lpt[\d¹²³])(\..*)?", re.IGNORECASE)  # reserved names on Windows
 
 
 def file_stem(name: str, *words: str) -> str:
-    """A name for files of a robot, without a suffix, which is never a path, empty, hidden, too long or a device.
+    """Name for files of a robot, without a suffix. It is never a path, empty, hidden, too long, or a device.
 
     Letters and digits of all scripts, dots, hyphens and underscores are kept; spaces become hyphens. If the name has
-    other characters or is too long, eight digits of its digest are added, so that two robots do not share files.
+    other characters or is too long, eight digits of its digest are added, so that two robots never have the same files.
 
     Examples:
         >>> from sagline.files.writing import file_stem
@@ -64,7 +64,7 @@ def file_stem(name: str, *words: str) -> str:
 
 @contextmanager
 def staging(folder: Path) -> Iterator[Path]:
-    """New temporary folder inside a folder, removed when the block ends."""
+    """New temporary folder inside a folder; it is removed when the block ends."""
     # Folders left by killed processes are removed first
     for left in folder.glob(f"{PREFIX}*{SUFFIX}"):
         _remove_if_left(left)
@@ -77,7 +77,7 @@ def staging(folder: Path) -> Iterator[Path]:
 
 
 def _new_place(folder: Path) -> tuple[Path, int]:
-    """New folder and its lock; another folder is made if a process has removed this one as abandoned."""
+    """New folder and its lock; another folder is made if a process has removed the first one as abandoned."""
     for _ in range(TRIES):
         place = Path(tempfile.mkdtemp(prefix=PREFIX, suffix=SUFFIX, dir=folder))
         try:
@@ -109,7 +109,7 @@ def _open_lock(place: Path) -> int:
 
 
 def try_lock(lock: int, *, if_unknown: bool) -> bool:
-    """True if the lock of an open file could be taken; `if_unknown` on systems without locks."""
+    """True if an open file could be locked; `if_unknown` on systems without locks."""
     if sys.platform == "win32":
         return if_unknown
     import fcntl
@@ -135,7 +135,7 @@ def atomic_file(file: os.PathLike[str] | str, size: int = 0) -> Iterator[Path]:
 
 @contextmanager
 def atomic_files(folder: os.PathLike[str] | str, names: Sequence[str], size: int = 0) -> Iterator[tuple[Path, ...]]:
-    """Temporary files that together replace files of one folder when the block ends without an error."""
+    """Temporary files that replace files of a folder, all together, when the block ends without an error."""
     targets = [check_file(Path(folder) / name) for name in names]
     try:
         with staging(Path(folder)) as place:
@@ -147,7 +147,7 @@ def atomic_files(folder: os.PathLike[str] | str, names: Sequence[str], size: int
             for part, target in zip(parts, targets, strict=True):
                 _finish(part, target)
             old, new = [str(part) for part in parts], [str(target) for target in targets]
-            list(map(os.replace, old, new))  # runs in C, so Ctrl-C cannot interrupt it between two names
+            list(map(os.replace, old, new))  # this runs in C, so that Ctrl-C cannot interrupt it between two names
     except OSError as error:
         target = _target_of(error, targets)
         raise FileError(target, f"cannot be written ({_reason(error)})", _next_step(target)) from error
@@ -172,7 +172,7 @@ def write_text(file: os.PathLike[str] | str, text: str) -> None:
 
 @contextmanager
 def finished_files() -> Iterator[list[Path]]:
-    """List of the files completed inside the block, in order."""
+    """List of the files that are completed inside the block, in order."""
     files: list[Path] = []
     token = _finished.set(files)
     try:
@@ -182,7 +182,7 @@ def finished_files() -> Iterator[list[Path]]:
 
 
 def check_file(file: os.PathLike[str] | str) -> Path:
-    """Refuse a path to which no file can be written, without changing it."""
+    """Refuse a path to which no file can be written; nothing is changed."""
     target = Path(file)
     try:
         mode = target.lstat().st_mode
@@ -200,14 +200,14 @@ def check_file(file: os.PathLike[str] | str) -> Path:
 
 
 def check_files(folder: os.PathLike[str] | str, names: Iterable[str]) -> None:
-    """Refuse files that cannot be written to a folder, without changing anything."""
+    """Refuse files that cannot be written to a folder; nothing is changed."""
     check_folder(folder)
     for name in names:
         check_file(Path(folder) / name)
 
 
 def check_folder(folder: os.PathLike[str] | str) -> None:
-    """Refuse a folder to which no files can be written, without creating it."""
+    """Refuse a folder to which no files can be written; it is not created."""
     path = Path(folder).absolute()
     nearest = next(place for place in (path, *path.parents) if os.path.lexists(place))
     if not nearest.is_dir():
@@ -219,12 +219,12 @@ def check_folder(folder: os.PathLike[str] | str) -> None:
             os.lstat(nearest / part)
         except FileNotFoundError:
             pass
-        except (OSError, ValueError) as error:  # a name that is too long, or holds a zero byte
+        except (OSError, ValueError) as error:  # a name that is too long, or contains a zero byte
             raise FileError(path, f"cannot be created ({_reason(error)})", "Name another folder.") from None
 
 
 def create_folder(folder: os.PathLike[str] | str, *, parents: bool = True) -> Path:
-    """The folder, created if missing; its parent folders too, or an error if they are missing."""
+    """The folder, created if missing. Missing parent folders are created if `parents`, or otherwise an error."""
     path = Path(folder)
     try:
         path.mkdir(parents=parents, exist_ok=True)
@@ -243,7 +243,7 @@ def _check_space(file: Path, size: int) -> None:
 
 
 def _finish(part: Path, target: Path) -> None:
-    """Give a file the permissions of the replaced file, and flush it to the disk."""
+    """Set the permissions of the replaced file, and flush the new file to the disk."""
     if target.is_file():
         shutil.copymode(target, part)
     with part.open("rb+") as handle:
@@ -251,13 +251,13 @@ def _finish(part: Path, target: Path) -> None:
 
 
 def _target_of(error: OSError, targets: Sequence[Path]) -> Path:
-    """The target that an error refers to, found by the name of its temporary file; the first one if unknown."""
+    """Target of an error, from the name of its temporary file; the first target if unknown."""
     name = Path(str(error.filename)).name.removesuffix(SUFFIX)
     return targets[int(name)] if name.isdecimal() and int(name) < len(targets) else targets[0]
 
 
 def _reason(error: Exception) -> str:
-    reason: str = getattr(error, "strerror", None) or str(error)  # HDF5 raises a text without an error number
+    reason: str = getattr(error, "strerror", None) or str(error)  # errors of HDF5 have a text without an error number
     return next(iter(reason.splitlines()), type(error).__name__)
 
 
@@ -268,7 +268,7 @@ def _next_step(target: Path) -> str:
 
 
 def plain(what: Any) -> Any:
-    """Data converted for JSON: arrays as lists, keys and paths as texts, None for numbers that are not finite."""
+    """Data for JSON: lists from arrays, texts from keys and paths, None from numbers that are not finite."""
     match what:
         case dict():
             return {str(key): plain(value) for key, value in what.items()}
@@ -285,6 +285,6 @@ def plain(what: Any) -> Any:
 
 
 def json_text(what: Any) -> str:
-    """One JSON document of data that `plain` accepts; control characters are escaped for safety in a terminal."""
+    """JSON document from data that `plain` accepts; control characters are escaped for safety in a terminal."""
     text = json.dumps(plain(what), indent=2, ensure_ascii=False, allow_nan=False)
     return _OTHERS.sub(lambda found: "".join(c if is_seen(c) else json.dumps(c)[1:-1] for c in found[0]), text)

@@ -31,7 +31,7 @@ _WORDS: Final = {
 
 
 class YamlEntry(BaseModel):
-    """A mapping in a file: only the declared keys are allowed, and types are not converted."""
+    """A mapping in a file; only the declared keys are allowed, and types are not converted."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
 
@@ -40,7 +40,7 @@ Schema = TypeVar("Schema", bound=YamlEntry)
 
 
 def validate(data: Mapping[Any, Any], schema: type[Schema], origin: Path | str) -> Schema:
-    """Entry of a schema from a mapping; FileError for an unknown or missing key, or a value of the wrong type."""
+    """Entry of a schema from a mapping; raises FileError for an unknown or missing key, or a wrong type."""
     try:
         return schema.model_validate(data)
     except ValidationError as error:
@@ -54,7 +54,7 @@ def validate(data: Mapping[Any, Any], schema: type[Schema], origin: Path | str) 
 
 
 def _explain(mistake: ErrorDetails, schema: type[YamlEntry]) -> tuple[str, str, str, str]:
-    """The key, its value, the allowed values and the next step."""
+    """Key, value, allowed values and next step of an error."""
     where = mistake["loc"]
     key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in where).removeprefix(".")
     found = reprlib.repr(mistake["input"])
@@ -68,7 +68,7 @@ def _explain(mistake: ErrorDetails, schema: type[YamlEntry]) -> tuple[str, str, 
             return key, "an unknown key", ", ".join(known), next_step
         case "model_type":
             known = list(_at(schema, where).model_fields)
-            return key, found, f"keys {', '.join(known)}", "Give it as keys."
+            return key, found, f"keys {', '.join(known)}", "Give a mapping with keys."
         case "string_type":
             return key, found, "text", f'Put it in quotes: {key}: "..."'
         case _:
@@ -77,7 +77,7 @@ def _explain(mistake: ErrorDetails, schema: type[YamlEntry]) -> tuple[str, str, 
 
 
 def _at(schema: type[YamlEntry], where: tuple[int | str, ...]) -> type[YamlEntry]:
-    """The schema of a mapping inside the file; list indices in the path are ignored."""
+    """Schema of a mapping inside the file; list indices in the path are ignored."""
     for part in (part for part in where if isinstance(part, str)):
         kind = schema.model_fields[part].annotation
         schema = next(k for k in (kind, *get_args(kind)) if isinstance(k, type) and issubclass(k, YamlEntry))
@@ -86,14 +86,14 @@ def _at(schema: type[YamlEntry], where: tuple[int | str, ...]) -> type[YamlEntry
 
 def parse_mapping(text: str, origin: Path | str) -> dict[Any, Any]:
     """Mapping at the top level of a YAML text; duplicate keys are refused."""
-    # Only plain decimal numbers, true, false and null are converted. All else remains text: yes is not true, 1:30 is
-    # not 90, and dates and tags do not exist. Aliases are allowed if their expansion is not too large.
+    # Only plain decimal numbers, true, false and null are converted. Everything else remains text: yes is not true,
+    # 1:30 is not 90, and there are no dates and no tags. Aliases are allowed if their expansion is not too large.
     try:
         data = yaml.load(text, Loader=_PlainLoader)
     except yaml.MarkedYAMLError as error:
         raise error_at_line(origin, *_cause(error, text)) from None
-    except (yaml.YAMLError, RecursionError, ValueError, OverflowError) as error:  # the last two are for \UFFFFFFFF
-        reason = f"is not YAML as read here ({_reason(error, text)})"
+    except (yaml.YAMLError, RecursionError, ValueError, OverflowError) as error:  # the last two for \UFFFFFFFF
+        reason = f"is not YAML in the form that sagline reads ({_reason(error, text)})"
         raise error_at_line(origin, reason, "Check that this is the file you mean.") from None
     if data is None:
         raise FileError(origin, "is empty", "Write it again; it may have been cut off.")
@@ -103,7 +103,7 @@ def parse_mapping(text: str, origin: Path | str) -> dict[Any, Any]:
 
 
 def dump_mapping(data: Mapping[str, Any]) -> str:
-    """Mapping as YAML text that `parse_mapping` reads back unchanged; texts that look like numbers are quoted.
+    """YAML text of a mapping, which `parse_mapping` restores; texts that look like numbers are in quotes.
 
     Examples:
         >>> from sagline.files.yaml_text import dump_mapping
@@ -116,20 +116,20 @@ def dump_mapping(data: Mapping[str, Any]) -> str:
 
 
 def _cause(error: yaml.MarkedYAMLError, text: str) -> tuple[str, str]:
-    """Reason why a text is not YAML, and the next step; the message of PyYAML is used if it is clear."""
+    """Reason why a text is not YAML, and the next step; a clear message of PyYAML is used."""
     mark, problem = error.problem_mark or error.context_mark, str(error.problem or error.context)
     index, place = (len(text), "") if mark is None else (mark.index, f"line {mark.line + 1}: ")
     if isinstance(error, yaml.scanner.ScannerError | yaml.parser.ParserError):
         line = text.splitlines()[mark.line] if mark is not None and mark.line < len(text.splitlines()) else ""
         if "\t" in line[: len(line) - len(line.lstrip())] or text[index : index + 1] == "\t":
-            return f"is not YAML ({place}a tab is used instead of blanks)", "Indent by blanks, not by tabs."
+            return f"is not YAML ({place}a tab is used instead of blanks)", "Indent with blanks, not with tabs."
         if not text[index:].strip():
             return f"is not complete YAML ({place}{problem})", "Correct its end; it may have been cut off."
         return f"is not YAML ({place}{problem})", "Correct this line, or the indentation and the quotes before it."
     if tag := re.search(r"constructor for the tag '(?:tag:yaml\.org,2002:)?(.*)'", problem):
         return f"{place}the tag {tag[1]} precedes a value; tags are not allowed", "Write the value without it."
     if "unhashable" in problem:
-        return f"{place}a key is a list or a mapping; allowed: a word", "Give it a word as its key."
+        return f"{place}a key is a list or a mapping; allowed: a word", "Give a word as the key."
     if "another document" in problem:
         return f"{place}a second document begins, at ---; allowed: one", "Keep one of them."
     step = "Remove one of the two." if "given twice" in problem else "Correct this line."
@@ -171,7 +171,7 @@ class _PlainLoader(yaml.SafeLoader):
         return _tag_of(kind, value, implicit)
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
-        # PyYAML silently keeps the last of two equal keys, so they are checked here; it refuses a wrong !!map itself
+        # equal keys are checked here, because PyYAML silently keeps the last one; it refuses a wrong !!map itself
         keys = [key for key, _ in node.value] if node.id == "mapping" else []
         seen = set()
         for key in (key for key in keys if isinstance(key, yaml.ScalarNode)):
@@ -183,13 +183,13 @@ class _PlainLoader(yaml.SafeLoader):
     def construct_number(self, node: yaml.ScalarNode) -> object:
         text = self.construct_scalar(node)
         number = plain_number(text)
-        if number is None:  # the code that uses the text reports the error
+        if number is None:  # later code that uses the text reports the error
             return text
         return int(text) if text.lstrip("+-").isdecimal() else number
 
 
 class _PlainDumper(yaml.SafeDumper):
-    """Quotes texts that one of the two readers (`_PlainLoader` or PyYAML) would not read as text."""
+    """Writer with quotes around texts that one of two readers (`_PlainLoader`, PyYAML) would not read as text."""
 
     def resolve(self, kind: type[yaml.Node], value: str | None, implicit: Any) -> str:
         ours = _tag_of(kind, value, implicit)
@@ -197,8 +197,8 @@ class _PlainDumper(yaml.SafeDumper):
 
 
 def _tag_of(kind: type[yaml.Node], value: str | None, implicit: Any) -> str:
-    """The tag of a value without an explicit tag."""
-    if kind is yaml.ScalarNode and value is not None and implicit[0]:  # neither quotes nor a tag
+    """Tag of a value without an explicit tag."""
+    if kind is yaml.ScalarNode and value is not None and implicit[0]:  # a value without quotes and without a tag
         if value in _WORDS:
             return _WORDS[value]
         if plain_number(value) is None:
@@ -208,7 +208,7 @@ def _tag_of(kind: type[yaml.Node], value: str | None, implicit: Any) -> str:
 
 
 def _extent(node: yaml.Node, known: dict[int, tuple[int, int] | None]) -> tuple[int, int]:
-    """Number of values and of levels of a node with all aliases expanded; `known` caches them."""
+    """Numbers of values and of levels of a node with all aliases expanded; known: cache of these numbers."""
     if id(node) in known:
         found = known[id(node)]
         if found is None:
