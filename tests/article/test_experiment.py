@@ -107,7 +107,7 @@ def courses_are_those_of_the_plan_without_the_stops(whole: Experiment) -> None:
 def test_a_cable_that_breaks_ends_it_with_the_place_and_the_reason() -> None:
     twin = sl.twin.Machine(ROBOT, start=level_poses(HOME), faults=[f"cable 2 breaks at {STOP + 4.0:g} s"])
     watch = StopObserver(lambda: twin.reading.position)
-    with refused("the experiment, on its way to P1", kind=RefusedError) as caught:
+    with refused("the experiment, on the way to P1", kind=RefusedError) as caught:
         experiment(Controller(ROBOT, twin.link(), record=watch, seed=1), watch)
     assert len(str(caught.value)) < 300
 

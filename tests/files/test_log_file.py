@@ -155,7 +155,7 @@ COMMANDED = "length_0,x_commanded,y_commanded,z_commanded"
         ("count_0,load_cell_1\n1,1\n", ("line 1", "unknown column 'load_cell_1' (did you mean load_cell_0?)")),
         ("count_0,load_cel_0\n1,1\n", ("line 1", "unknown column 'load_cel_0' (did you mean load_cell_0?)")),
         ("count_0;count_1\n1;2\n", ("line 1", "the columns are separated by semicolons")),
-        ("count_0\n", ("line 1", "no rows below the columns' names")),
+        ("count_0\n", ("line 1", "no rows below the names of the columns")),
         ("count_0,count_1\n# time: 5\n1,2\n", ("line 2", "a comment", "comments above the names of the columns")),
         ("# a word\n\ncount_0 [mm]\n1\n", ("line 3", "the unit of count_0 is [mm]", "none")),
         ("length_0 [N]\n1\n", ("line 1", "the unit of length_0 is [N]")),

@@ -295,7 +295,10 @@ def test_another_suffix_is_refused(tmp_path: FilePath) -> None:
         ("time,x,y,z\n0,0x10,2,3\n", ("line 2", "x is 0x10", "a number")),
         ("time,x,y,z\n0,1e308,2,3\n", ("line 2", "x is 1e+308 m", "numbers up to 1e+50 m")),
         ("time,x,y,z\n0,1e999,2,3\n", ("line 2", "x is inf m", "a finite number")),
-        ("time,x,y,z\n0,1,2,3\n1e-15,1,2,3\n", ("line 3", "time is 1e-15 s", "a time after the time of the previous row")),
+        (
+            "time,x,y,z\n0,1,2,3\n1e-15,1,2,3\n",
+            ("line 3", "time is 1e-15 s", "a time after the time of the previous row"),
+        ),
         (
             "position,x,y,z\n",
             ("line 1", "unknown column 'position'", "time, x, y, z, alpha, beta, gamma, qx, qy, qz, qw"),

@@ -1,4 +1,4 @@
-"""The article's studies, computed again: one module per study, with pure functions of numbers."""
+"""The studies of the article, computed again: each study is a module with pure functions of numbers."""
 
 from sagline.core.surface import group
 

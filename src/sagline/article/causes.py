@@ -1,4 +1,4 @@
-"""Possible causes of the errors of Table 2, one at a time and together, and the limits of ten poses."""
+"""Possible causes of the errors of Table 2, single causes and combinations, and the limits of ten poses."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ COUNTS = ("one parameter", "two parameters", "three parameters")
 SHOWN = 8  # rows of the table with two and with three parameters
 FEW = 6e-3  # largest remaining error of a good explanation [m]
 PRINTING = 1e-3 / np.sqrt(12.0)  # scatter of positions that are printed in whole millimeters [m]
-NOTHING = 0.95  # a model with a larger remaining error, as a share of the measured one, explains nothing
-ALIKE = 0.2  # a smaller slope over height, as a share of the measured one, counts as zero
-AS_MEASURED = 0.15  # relative difference below which a slope counts as equal to the measured one
+NOTHING = 0.95  # a model explains nothing if its remaining error, relative to the measured error, is larger
+ALIKE = 0.2  # a slope over height counts as zero if it is smaller, relative to the measured slope
+AS_MEASURED = 0.15  # a slope counts as equal to the measured slope if the relative difference is smaller
 LOWEST, HIGHEST = "P8", "P7"
 
 
@@ -65,7 +65,7 @@ def best_explanations(study: TenPoses, draw: Drawings) -> Finding:
 
 
 def limits_of_ten_points(study: TenPoses) -> Finding:
-    """Limits of ten points: parameters that they cannot separate."""
+    """Limits of ten points: parameters that the points cannot separate."""
     few = [found for found in study.explanations[1] if found.rms < FEW]
     named = all(found.names & {PULLEY, ANCHORS} for found in few)
     zeros = 1e3 * study.single_zero
@@ -146,7 +146,7 @@ def _values(found: Explanation) -> str:
 
 
 def _told(found: Explanation, name: str) -> str:
-    """A value with its standard uncertainty, or with a mark if it is at a limit."""
+    """A value with its standard uncertainty, or with a mark for a value at a limit."""
     k = [parameter.name for parameter in found.parameters].index(name)
     value, unit = found.values[k], found.parameters[k].unit
     if found.at_limit[k]:
@@ -161,7 +161,7 @@ def _ratio(found: Explanation, name: str) -> float:
 
 
 def single_causes(study: TenPoses) -> Finding:
-    """Each class of parameters alone: an example, its best value, the remaining error, and the reason."""
+    """Each class of parameters alone: an example, the best value, the remaining error, and the reason for the error."""
     ranked = study.explanations[0]
     alone = {found.parameters[0].name: found for found in ranked}
     slopes = {name: _slope(study, found) for name, found in alone.items()}
@@ -198,7 +198,7 @@ def single_causes(study: TenPoses) -> Finding:
 def _table_of_classes(study: TenPoses, alone: dict[str, Explanation], slopes: dict[str, float]) -> Table:
     trends = {trend.parameter.name: trend for trend in study.trends}
     return Table(
-        "One imperfection at a time; best value: the value within the plausible range that fits Table 2 best",
+        "Single imperfections; best value: the value within the plausible range that fits Table 2 best",
         (
             "off",
             "for example",

@@ -1,4 +1,4 @@
-"""Chapters: figures 6 and 7, and the dependence of the constants on the sampled tensions."""
+"""Chapters about figures 6 and 7, and about the dependence of the constants on the sampled tensions."""
 
 from __future__ import annotations
 

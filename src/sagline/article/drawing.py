@@ -1,4 +1,4 @@
-"""Small drawings of the article's page, readable on a phone: curves, curves with fits, maps of errors."""
+"""Small drawings for the page about the article, readable on a phone: curves, curves with fits, maps of errors."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ if TYPE_CHECKING:
     from matplotlib.path import Path
 
 WIDTH, HEIGHT = 4.6, 3.1  # size on a desktop screen [in]; on a phone it is four fifths of this
-LEFT, RIGHT, BELOW, ABOVE = 0.16, 0.975, 0.5, 0.12  # margins as shares of the width, then in [in]
+LEFT, RIGHT, BELOW, ABOVE = 0.16, 0.975, 0.5, 0.12  # margins: the first ones relative to the width, the others in [in]
 POINT = 1.0 / 72.0  # [in]
-APART = 40.0  # smallest distance of the numbers of two lines [pt]
+APART = 40.0  # smallest distance between the numbers of two lines [pt]
 NAME_SIZE = TICK - 0.5  # text size of legends [pt]
 SHADES = "viridis"
 MOST_POINTS = 400  # largest number of points of a curve over time, to limit the size of the page
@@ -41,14 +41,14 @@ MAP_LEFT, MAP_RIGHT = 0.13, 0.9  # margins with space for a color bar
 
 
 class Drawings:
-    """Converter from figures to drawings of one page, with identifiers that are unique in the page."""
+    """Converter from figures to the drawings of a page, with identifiers that are unique in the page."""
 
     def __init__(self, page: str) -> None:
-        """Prepare drawings whose identifiers begin with the name of their part of the page."""
+        """Prepare drawings; their identifiers begin with the name of this part of the page."""
         self._names = (f"{page}-{k}-" for k in count(1))
 
     def panel(self, figure: Sheet, caption: str) -> Panel:
-        """The figure as a drawing inside the page; the caption is the text for screen readers."""
+        """Drawing of a figure for the page; the caption is the text for screen readers."""
         svg = svg_text(figure, 200, **{"svg.hashsalt": "sagline", "svg.fonttype": "path"})
         svg = _size.sub("", _remarks.sub("", svg).strip(), count=2)  # the page sets the size
         return Panel(unique_names(svg.replace("<svg ", '<svg role="img" ', 1), next(self._names)), caption)
@@ -64,7 +64,7 @@ def axes(x: str, y: str, height: float = HEIGHT) -> tuple[Sheet, Axes]:
 
 
 def legend_above(ax: Axes, title: str = "") -> None:
-    """Legend above the axes in as many columns as fit; the height of the figure grows by that of the legend."""
+    """Legend above the axes in as many columns as fit; the figure becomes higher by the height of the legend."""
     figure = cast(Sheet, ax.get_figure(root=True))
     handles, labels = ax.get_legend_handles_labels()
     widest = max(TextPath((0.0, 0.0), label, size=NAME_SIZE).get_extents().width for label in labels)
@@ -94,7 +94,7 @@ def legend_above(ax: Axes, title: str = "") -> None:
 
 
 def _grow(figure: Sheet, more: float) -> None:
-    """Add height above the axes [in]; they keep their size."""
+    """Add height above the axes [in]; the size of the axes does not change."""
     before, place = figure.get_figheight(), figure.subplotpars
     after = before + more
     figure.set_figheight(after)
@@ -103,8 +103,8 @@ def _grow(figure: Sheet, more: float) -> None:
 
 def logarithmic_with_floor(ax: Axes, floor: float, told: str) -> None:
     """A logarithmic vertical axis that ends at a floor."""
-    # Curves below the floor are covered by a shaded strip with a text; they are not clipped to the floor. If no curve
-    # is below the floor, the axis is an ordinary one.
+    # A shaded strip with a text covers curves below the floor; these curves are not clipped. If no curve is below the
+    # floor, the axis is an ordinary logarithmic axis.
     ax.set_yscale("log")
     values = np.concatenate([np.asarray(line.get_ydata(), dtype=np.float64) for line in ax.get_lines()])
     seen = values[np.isfinite(values)]
@@ -160,7 +160,7 @@ def with_fit(ax: Axes, x: Array, y: Array, fine: Array, fit: Array) -> None:
 def error_panels(
     names: Sequence[str], position: Array, series: Sequence[tuple[str, Array, float, str]], caption: str, draw: Drawings
 ) -> list[Panel]:
-    """Errors as circle areas at positions (N, 3), seen along y and along x; series: label, errors, scale and color."""
+    """Errors as areas of circles at positions (N, 3), seen along y and along x; series: label, errors, scale, color."""
     panels = []
     for column, name in ((0, "x"), (1, "y")):
         figure, ax = axes(f"${name}$ [m]", "$z$ [m]")
@@ -195,7 +195,7 @@ class Courses(NamedTuple):
     def panels(
         self, labels: tuple[str, str, str], one: int, captions: tuple[str, str], draw: Drawings
     ) -> tuple[Panel, Panel]:
-        """Draw one curve alone, and all curves, with labels of both axes and of the legend."""
+        """Draw a single curve and all curves, with labels of both axes and of the legend."""
         figure, ax = axes(*labels[:2])
         with_fit(ax, self.x, self.rows[one], self.fine, self.fits[one])
         second, bx = axes(*labels[:2])
@@ -214,7 +214,7 @@ def map_axes(x: str, y: str) -> tuple[Sheet, Axes]:
 def draw_errors(
     ax: Axes, x: Array, y: Array, error: Array, edges: Array, ticks: tuple[float, ...], lines: tuple[float, ...]
 ) -> None:
-    """Fill a map between round values of the error and draw contour lines of some values."""
+    """Fill a map between round values of the error, and draw contour lines of some values."""
     # Signed errors are interpolated through zero, so that bands around zero keep their true width. Values below the
     # first edge are gray, as shown in the color bar.
     colors = matplotlib.colormaps["magma_r"](np.linspace(0.04, 0.92, len(edges)))
@@ -236,7 +236,7 @@ def draw_errors(
 
 
 def _number_lines(ax: Axes, drawn: ContourSet) -> None:
-    """Numbers near the middle of the lines, apart from one another, with a halo for a dark background."""
+    """Numbers near the middle of the lines, apart from each other, with a halo on a dark background."""
     places: list[tuple[float, float]] = []
     for path in drawn.get_paths():
         apart = (place for place in _places(ax, path) if all(np.hypot(*np.subtract(place, p)) > APART for p in places))
@@ -254,7 +254,7 @@ def _number_lines(ax: Axes, drawn: ContourSet) -> None:
 
 
 def _places(ax: Axes, path: Path) -> Iterator[tuple[float, float]]:
-    """Points on the longest piece of a line, from its middle outward, apart from the axes [pt]."""
+    """Points on the longest piece of a line [pt], from the middle outward, not close to the axes."""
     figure: Any = ax.get_figure(root=True)
     inside = ax.bbox.padded(-0.5 * APART * figure.dpi / 72.0)
     polygons = map(np.asarray, path.to_polygons(closed_only=False))

@@ -1,4 +1,4 @@
-"""The eleven errata of the article, each shown by a computation: 1 to 4 platform, 5 to 9 cable, 10 and 11 misprints."""
+"""The eleven errata of the article, each with a computation: 1 to 4 platform, 5 to 9 cable, 10 and 11 misprints."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.present.page import Chapter, Finding, Table
 
-POSE = (2.0, 1.0, 1.5)  # a pose of the simulated robots outside their planes of symmetry [m]
+POSE = (2.0, 1.0, 1.5)  # position of the simulated robots outside of their planes of symmetry [m]
 PATH_RATE = 5.0  # samples per second, sufficient because the errors change slowly
 TAUT = 1e4  # [N], so large that only the leading terms matter
 
 
 LONG = 15.0  # the simulated frame [m]
-TAUTER = 20.0  # factor on the sampled tensions, so that only the leading terms matter
+TAUTER = 20.0  # factor of the sampled tensions, so that only the leading terms matter
 NEARLY = 1e-6  # angle from vertical or level [rad]
 TURN = (0.3, 0.2, 0.1)  # [rad], about z, y, x
 
-# label, value, unit, and for differences the size of the terms, which shows rounding errors
+# label, value, unit; for a difference also the size of its terms, to show rounding errors
 Number: TypeAlias = tuple[str, float, str] | tuple[str, float, str, float]
 
 
@@ -40,7 +40,7 @@ def _erratum(number: int, numbers: Sequence[Number]) -> Finding:
 
 
 def sign_of_intercept() -> Finding:
-    """Erratum 1: the intercept of pi at the platform end is +wD/2; the printed sign causes errors of centimeters."""
+    """Erratum 1: the intercept of pi at the platform end is +wD/2; the printed sign gives errors of centimeters."""
     cable, chord = sl.load_robot(ROBOTS[0]).cables, 10.0
     angle = 0.754  # the article's angle [rad]
     state = sl.Catenary().from_tension(cable, chord * np.cos(angle), chord * np.sin(angle), TAUT, GRAVITY)
@@ -60,7 +60,7 @@ def sign_of_intercept() -> Finding:
 
 
 def gravity_twice() -> Finding:
-    """Erratum 2: gravity is in (5) and again in (6) and (51)."""
+    """Erratum 2: gravity is counted in (5), and again in (6) and (51)."""
     robot = sl.load_robot(ROBOTS[0])
     weight = robot.mass * robot.gravity
     numbers: list[Number] = [("weight of the platform", weight, "N")]
@@ -74,7 +74,7 @@ def gravity_twice() -> Finding:
 
 
 def euler_rates() -> Finding:
-    """Erratum 3: (5) with Euler-angle rates, and its term M W x', compared with Newton-Euler."""
+    """Erratum 3: Euler-angle rates in (5), and the term M W x' of (5), compared with the Newton-Euler equations."""
     robot = sl.load_robot(ROBOTS[0])
     angles, rates, curvatures = np.array([0.4, 0.3, -0.2]), np.array([0.5, -0.6, 0.4]), np.array([0.3, 0.2, -0.5])
     still, velocity = np.zeros(3), np.array([1.0, 0.0, 0.0])
@@ -131,7 +131,7 @@ def _lifted(force: float) -> float:
     balance = sl.article_balance(robot, pose)
     wanted = np.array([0.0, 0.0, force, 0.0, 0.0, 0.0])
     tension = balance.h.T @ np.linalg.solve(balance.h @ balance.h.T, wanted - balance.b)
-    cables_alone = sl.article_balance(robot.replace(gravity=0.0), pose)  # vector b without the platform's weight
+    cables_alone = sl.article_balance(robot.replace(gravity=0.0), pose)  # the vector b without the platform's weight
     return float((balance.h @ tension + cables_alone.b)[2])
 
 
@@ -151,7 +151,7 @@ def _angular(angles: Array, rates: Array, curvatures: Array) -> tuple[Array, Arr
 
 
 def _reversed(angles: Array) -> Array:
-    """(alpha, beta, gamma) about z, y, x as a vector along x, y, z, the most favorable interpretation."""
+    """Vector along x, y, z from angles about z, y, x: the most favorable interpretation of (5)."""
     return angles[::-1]
 
 
@@ -160,7 +160,7 @@ def _largest(vector: Array) -> float:
 
 
 def stretch_by_end_tension() -> Finding:
-    """Erratum 5: the elongation of (36) follows from the tension at B, not from the mean tension."""
+    """Erratum 5: (36) computes the elongation from the tension at B instead of the mean tension."""
     cable = simulated_cable()
     end = End.at_angle(LONG)
     study = stretch_study(cable, end, np.array([500.0]))
@@ -197,7 +197,7 @@ def sag_constant() -> Finding:
 
 
 def sign_in_bound() -> Finding:
-    """Erratum 7: the bound (54) on T_x of a suspended cable."""
+    """Erratum 7: the lower bound (54) for T_x of a suspended cable."""
     from scipy.optimize import brentq
 
     cable, chord = simulated_cable(), 10.0
@@ -219,7 +219,7 @@ def sign_in_bound() -> Finding:
 
 
 def vertical_and_level() -> Finding:
-    """Erratum 8: poses below an anchor, and poses with a level cable, are excluded."""
+    """Erratum 8: the equations exclude poses below an anchor, and poses with a level cable."""
     robot = sl.load_robot(ROBOTS[0])
     under = robot.frame_anchors[0] - robot.platform_anchors[0] - [0.0, 0.0, 2.0]
     cable, chord = simulated_cable(), 10.0
@@ -242,7 +242,7 @@ def vertical_and_level() -> Finding:
 
 
 def error_formula() -> Finding:
-    """Erratum 9: (56) sums B_i - P; Table 2 has distances."""
+    """Erratum 9: (56) is a sum of B_i - P, but Table 2 has distances."""
     table, robot = table2(), sl.load_robot("article-prototype")
     sums = np.array([(robot.platform_anchors + actual - desired).sum(axis=0) for desired, actual in _pairs()])
     literal = np.linalg.norm(sums, axis=1)
@@ -264,7 +264,7 @@ def error_formula() -> Finding:
 
 
 def table_number() -> Finding:
-    """Erratum 10: the robots' parameters are in Table 1."""
+    """Erratum 10: the parameters of the robots are in Table 1, not in Table 2."""
     suspended, mixed = (sl.load_robot(name) for name in ROBOTS)
     same = (
         np.array_equal(suspended.cables.linear_density, mixed.cables.linear_density)
@@ -285,7 +285,7 @@ def table_number() -> Finding:
 
 
 def printed_formulas() -> Finding:
-    """Erratum 11: (31) and (8)."""
+    """Erratum 11: misprints in (31) and (8)."""
     slope, intercept = np.tan(0.754), 5.0
     horizontal = np.linspace(-100.0, 100.0, 2_000_001)
     least = float(np.hypot(horizontal, slope * horizontal + intercept).min())
@@ -326,5 +326,5 @@ DEMONSTRATIONS = (
 
 
 def errata_chapter() -> Chapter:
-    """Each erratum with its demonstration, in the order of docs/errata.md."""
+    """All errata with their demonstrations, in the order of docs/errata.md."""
     return chapter("errata", [demonstrate() for demonstrate in DEMONSTRATIONS])

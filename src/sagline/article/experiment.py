@@ -1,8 +1,8 @@
-"""Repetition of the experiment of ten points: home, the ten poses of Table 2, home, with controller and machine.
+"""Repetition of the article's experiment with controller and machine: home, the ten poses of Table 2, home.
 
-In the article the prototype moves from point to point "with low speed", and stops at each point while its position is
-measured; this takes about 14 minutes. Speed and stops are assumed so that the duration is equal. The machine is a twin,
-so that its true position is known.
+In the article, the prototype moves from point to point "with low speed", and stops at each point for the measurement of
+its position. The experiment takes about 14 minutes. Speed and stops are assumed, so that the duration is the same. The
+machine is a twin, because the true position is then known.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from sagline.core.status import Status
 
 PROTOTYPE: Final = "article-prototype"
 SPEED: Final = 0.06  # largest speed of the platform [m/s]; the fastest winch then has 61 mm/s
-STOP: Final = 14.0  # time at each point, including home twice [s]; the total is 13.9 minutes
-LOOK: Final = 1.0  # time at the end of a stop [s]; measured values are means over this time
+STOP: Final = 14.0  # duration of a stop at each point, and at home before and after [s]; the total is 13.9 minutes
+LOOK: Final = 1.0  # duration at the end of a stop [s]; measured values are means over this duration
 BIAS: Final = 2.0  # [N], 0.1 % of the range of a 2 kN load cell
-NEXT: Final = "Correct that, and start again."
-EVERY: Final = 10  # number of cycles between two points of a drawn curve
+NEXT: Final = "Correct the cause, and start again."
+EVERY: Final = 10  # number of cycles between two points of a curve in a figure
 
 Where = Callable[[], Array]  # the true position of the platform's origin [m], shape (3,)
 Tell = Callable[[float], None]  # completed share of the experiment
@@ -42,7 +42,7 @@ class StopObserver:
 
     def __init__(self, where: Where, tell: Tell | None = None) -> None:
         """No observations yet."""
-        self.stopped = ""  # it is never stopped
+        self.stopped = ""  # this recorder never stops
         self.farthest = self.misjudged = 0.0
         self.courses: list[Array] = []
         self.cycles = self.acted = self.stood = 0
@@ -53,14 +53,14 @@ class StopObserver:
         self._before: Array | None = None
 
     def begins(self, plan: sl.Plan) -> None:
-        """Take the plan of a motion; the first cycle still belongs to the previous stop."""
+        """Receive the plan of a motion; the first cycle still belongs to the previous stop."""
         self._plan, self._begun = plan, False
 
     def ends(self, status: Status, reason: str) -> None:
-        """Ignore the end: the caller of the controller handles it."""
+        """Ignore the end of the plan, because the caller of the controller handles it."""
 
     def event(self, event: control.Event) -> None:
-        """Ignore events: the controller keeps them."""
+        """Ignore events, because the controller stores them."""
 
     def cycle(self, cycle: control.Recorded) -> None:
         """Observe a cycle."""
@@ -109,20 +109,20 @@ class Experiment:
     estimated: Array  # positions estimated from the encoders at the stops [m], shape (10, 3)
     tension: Array  # measured tensions at the stops, means over a second [N], shape (10, m)
     planned_tension: Array  # planned tensions at the stops [N], shape (10, m)
-    # part of the tension error that lengths can correct without moving the platform: largest of a cable [N], (10,)
+    # largest tension error of a cable that changes of length can correct without moving the platform [N], shape (10,)
     null_error: Array
     correction: Array  # correction of the lengths by the tension loop at the stops [m], shape (10, m)
     back: Array  # final minus initial position of the platform at home [m], shape (3,)
     time: Array  # time of motion, without the stops [s], shape (K,)
     cells: Array  # measured tensions [N], shape (K, m)
     planned: Array  # planned tensions [N], shape (K, m)
-    lengths: Array  # lengths minus those at home [m], shape (K, m)
+    lengths: Array  # lengths minus lengths at home [m], shape (K, m)
     stops: Array  # times of the ten stops, in the scale of `time` [s], shape (10,)
     duration: float  # duration from home to home, including stops [s]
     winch_speed: float  # largest speed of a winch [m/s]
     farthest: float  # largest distance of the true position from the set point in motion [m]
     misjudged: float  # largest distance of the true position from the estimate [m]
-    acting: float  # share of the cycles at stops in which the tension loop changed the lengths
+    acting: float  # share of the cycles at stops with a change of the lengths by the tension loop
     events: tuple[control.Event, ...]  # events of the controller
 
     @property
@@ -137,7 +137,7 @@ class Experiment:
 
 
 def pair(robot: sl.Robot, errors: Errors) -> tuple[sl.Robot, sl.Robot]:
-    """Robot with errors, and the robot as planned, both with the data that a twin needs."""
+    """Robot with errors, and planned robot, both with the data that a twin needs."""
     true, nominal = robot_with_errors(robot, errors), robot
     assert true.winches is not None
     assert robot.winches is not None
@@ -154,7 +154,7 @@ def pair(robot: sl.Robot, errors: Errors) -> tuple[sl.Robot, sl.Robot]:
 
 
 def with_cells(robot: sl.Robot) -> sl.Robot:
-    """Robot with alternating load cell offsets of +2 N and -2 N, unless it has its own offsets."""
+    """Robot with load cell offsets of +2 N and -2 N in turn, if the robot has no offsets."""
     winches = robot.winches
     if winches is None or winches.load_cell_bias.any():
         return robot
@@ -170,7 +170,7 @@ def in_process(
     loop: control.TensionSettings | None = None,
     tell: Tell | None = None,
 ) -> Experiment:
-    """Experiment on a twin in this process, whose clock waits for the controller."""
+    """Experiment on a twin in this process, in lockstep."""
     planned = sl.load_robot(PROTOTYPE) if nominal is None else nominal
     real = with_cells(planned if true is None else true)
     twin = sl.twin.Machine(real, nominal=planned, start=level_poses(HOME), seed=seed)
@@ -179,7 +179,7 @@ def in_process(
 
 
 def experiment(controller: control.Controller, watch: StopObserver) -> Experiment:
-    """Run the experiment; RefusedError if it cannot be connected or homed, or ends early."""
+    """Run the experiment; raises RefusedError if connecting or homing fails, or the experiment ends early."""
     legs = _legs(controller.period)
     controller.connect()
     controller.home(level_poses(HOME))
@@ -200,15 +200,15 @@ def experiment(controller: control.Controller, watch: StopObserver) -> Experimen
 
 
 def _executed(controller: control.Controller, leg: sl.Path, name: str) -> control.Execution:
-    """Execution of a motion; RefusedError if it did not reach the end."""
+    """Execution of a motion; raises RefusedError if the motion does not reach its end."""
     try:
         done = controller.execute(leg)
-    except control.RefusedError as error:  # a fault during planning, which takes some time
+    except control.RefusedError as error:  # for a fault during planning, which takes some time
         raise (
-            error if controller.state is control.State.IDLE else _ended(controller, f"before its way to {name}")
+            error if controller.state is control.State.IDLE else _ended(controller, f"before the motion to {name}")
         ) from None
     if done.status is not control.ExecutionStatus.DONE:
-        raise control.RefusedError(f"the experiment, on its way to {name}", done.reason.rstrip("."), NEXT)
+        raise control.RefusedError(f"the experiment, on the way to {name}", done.reason.rstrip("."), NEXT)
     return done
 
 
@@ -221,7 +221,7 @@ def _stand(controller: control.Controller, name: str) -> None:
 
 
 def _ended(controller: control.Controller, where: str) -> control.RefusedError:
-    """Error of an experiment that was ended by a fault."""
+    """Error for an experiment that a fault has ended."""
     faults = [event.text for event in controller.events if event.kind is control.EventKind.FAULT]
     reason = faults[-1] if faults else controller.events[-1].text
     return control.RefusedError(f"the experiment, {where}", reason.rstrip("."), NEXT)
@@ -273,7 +273,7 @@ def _legs(period: float) -> list[sl.Path]:
 
 
 def duration() -> float:
-    """Duration of the experiment, stops included [s]; there is a stop at home before and after."""
+    """Duration of the experiment [s], including all stops and the stops at home before and after."""
     path = sl.quintic_path(points(), speed=SPEED, rate=10.0)
     return float(path.time[-1] - path.time[0]) + STOP * len(points())
 

@@ -1,4 +1,4 @@
-"""Page of an experiment: Table 2 and figures 25 to 27, compared with those of the article."""
+"""Page of an experiment: Table 2 and figures 25 to 27, compared with the article."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ NOTATION = (
     "An error is the true position minus the desired position. "
     "The true position of a twin is known; the true position of a prototype must be measured."
 )
-JERK = 2.0  # duration of the jerk in the article [s]
-AREA = 600.0  # circle area of the largest error of a figure [pt^2]
+JERK = 2.0  # duration of the jerk phase in the article [s]
+AREA = 600.0  # area of the circle of the largest error in a figure [pt^2]
 
 
 def write_experiment(result: Experiment, folder: Path | str, how: str) -> Path:
-    """Write a self-contained HTML page, and its numbers as JSON."""
+    """Write a self-contained HTML page, and a JSON file with its numbers."""
     chapter = experiment_chapter(result, how)
     lead = (
         "Gia Luan & Truong Thinh, Appl. Sci. 2020, 10(15), 5318, section 7: home, ten points, home, with a stop at "
@@ -67,8 +67,8 @@ def _stops(result: Experiment) -> Finding:
         },
         data=(
             table_of(
-                "The ten points; null-space error: part of the load cells' error in the null space of the structure "
-                "matrix, largest of a cable",
+                "The ten points; null-space error: largest tension error of a cable in the null space of the structure "
+                "matrix",
                 ("point", [*table.points, "mean"], ""),
                 ("desired x, y, z [m]", [*(_joined(place, ".2f") for place in table.desired), ""], ""),
                 ("article: error x, y, z [mm]", [*(_joined(1e3 * error, ".0f") for error in table.error), ""], ""),

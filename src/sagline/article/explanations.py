@@ -1,4 +1,4 @@
-"""Least-squares fits of parameter errors to measured positions, with their information criterion."""
+"""Least-squares fits of parameter errors to measured positions, with an information criterion for each fit."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ import sagline as sl
 from sagline.article.machine import Errors, Parameter
 from sagline.core.arrays import Array, Flags
 
-STEP = 0.01  # step of the difference quotients, as a share of a plausible error
+STEP = 0.01  # step of the difference quotients, relative to a plausible error
 ITERATIONS = 20
-CONVERGED = 1e-5  # change of the platform position in the last step [m]; positions are printed in millimeters
-NEAR = 1e-3  # a value closer to its limit than this share of a plausible error counts as at the limit
+CONVERGED = 1e-5  # largest change of the platform position in the last step [m]; printed positions are in millimeters
+NEAR = 1e-3  # a value is at its limit if its distance, relative to a plausible error, is smaller
 
 Model: TypeAlias = tuple[Parameter, ...]
-ErrorOf: TypeAlias = Callable[[Sequence[Errors]], Array]  # actual minus desired positions [m], (K, N, 3), of K machines
+ErrorOf: TypeAlias = Callable[[Sequence[Errors]], Array]  # actual minus desired positions of K machines [m], (K, N, 3)
 
 
 class Explanation(NamedTuple):
     """Best fit to the measured positions by errors of some parameters, within their plausible limits."""
 
     parameters: Model  # the parameters, k of them
-    values: Array  # errors of the parameters, each in its unit, shape (k,)
-    deviation: Array  # standard deviations of the errors, each in its unit, shape (k,); NaN at a limit
-    at_limit: Flags  # True for errors at their plausible limit, shape (k,)
+    values: Array  # errors of the parameters in their units, shape (k,)
+    deviation: Array  # standard deviations of the errors in their units, shape (k,); NaN at a limit
+    at_limit: Flags  # True for errors at a plausible limit, shape (k,)
     predicted: Array  # actual minus desired position with these errors [m], shape (N, 3)
     rms: float  # root mean square of measured minus predicted position, over all coordinates [m]
     worst: float  # largest distance of measured and predicted position [m]
@@ -45,14 +45,14 @@ class Explanation(NamedTuple):
 
 
 class _Tangent(NamedTuple):
-    """First-order model of the positions about given errors of a model's parameters."""
+    """First-order model of the positions, at given errors of a model's parameters."""
 
     error: Array  # actual minus desired position, shape (3 N,) [m]
     slopes: Array  # derivatives with respect to each parameter, shape (3 N, k) [m per unit of the parameter]
 
 
 def explanations(error_of: ErrorOf, measured: Array, models: Sequence[Model]) -> tuple[Explanation, ...]:
-    """Fit models to measured positions: least squares within plausible limits by Gauss-Newton, all models together."""
+    """Fit models to measured positions by Gauss-Newton steps within plausible limits, all models together."""
     values, slopes = _start(error_of, measured, models)
     steps = [np.zeros(len(model)) for model in models]
     moving = list(range(len(models)))
@@ -62,7 +62,7 @@ def explanations(error_of: ErrorOf, measured: Array, models: Sequence[Model]) ->
         for i, one in zip(moving, near, strict=True):
             right = measured.ravel() - one.error + one.slopes @ values[i]
             step = _bounded_least_squares(models[i], one.slopes, right) - values[i]
-            if step @ steps[i] < 0.0:  # the step reverses its direction, because it oscillates about the solution
+            if step @ steps[i] < 0.0:  # a step against the previous one, because the steps oscillate about the solution
                 step *= 0.5
             values[i], steps[i], slopes[i] = values[i] + step, step, one.slopes
             if np.abs(one.slopes @ step).max() > CONVERGED:
@@ -76,19 +76,19 @@ def explanations(error_of: ErrorOf, measured: Array, models: Sequence[Model]) ->
             f"the fit of {names}",
             f"still moving after {ITERATIONS} steps",
             "fits that converge",
-            "Leave this model out.",
+            "Omit this model.",
         )
     found = error_of([_errors(*of) for of in zip(models, values, strict=True)])
     return tuple(_explanation(*of, measured) for of in zip(models, values, slopes, found, strict=True))
 
 
 def subsets(parameters: Sequence[Parameter], most: int) -> list[Model]:
-    """All models with one parameter, with two, and so on."""
+    """All models with one parameter, with two parameters, and so on."""
     return [model for count in range(1, most + 1) for model in combinations(parameters, count)]
 
 
 def tangents(error_of: ErrorOf, models: Sequence[Model], values: Sequence[Array]) -> list[_Tangent]:
-    """First-order model of each model about its values; each finite difference steps away from the upper limit."""
+    """First-order model of each model at its values; finite differences use steps away from the upper limits."""
     points, steps = [], []
     for model, x in zip(models, values, strict=True):
         high = limits(model)[1]
@@ -104,13 +104,13 @@ def tangents(error_of: ErrorOf, models: Sequence[Model], values: Sequence[Array]
 
 
 def limits(model: Model) -> tuple[Array, Array]:
-    """Lower and upper limits of the plausible errors of a model's parameters, each in its unit, shape (k,)."""
+    """Lower and upper limits of the plausible errors of a model's parameters in their units, shape (k,)."""
     high = np.array([parameter.plausible for parameter in model])
     return np.where([parameter.positive for parameter in model], 0.0, -high), high
 
 
 def _bounded_least_squares(model: Model, slopes: Array, right: Array) -> Array:
-    """Least squares within the limits; each unknown is scaled by its upper limit."""
+    """Least-squares solution within the limits; the unknowns are scaled by their upper limits."""
     from scipy.optimize import lsq_linear
 
     low, high = limits(model)
@@ -132,7 +132,7 @@ def _errors(model: Model, values: Array) -> Errors:
 
 
 def _start(error_of: ErrorOf, measured: Array, models: Sequence[Model]) -> tuple[list[Array], list[Array]]:
-    """Initial values of every model, and its first-order model, from the derivatives at zero common to all models."""
+    """Initial values and first-order model of every model, from derivatives at zero errors that all models use."""
     alone: list[Model] = [(parameter,) for parameter in dict.fromkeys(p for model in models for p in model)]
     near = {
         model[0]: one for model, one in zip(alone, tangents(error_of, alone, [np.zeros(1)] * len(alone)), strict=True)
@@ -173,7 +173,7 @@ def _deviation(slopes: Array, free: Flags, rest: Array) -> Array:
 
 
 def _left_out(model: Model, values: Array, slopes: Array, rest: Array) -> float:
-    """Cross-validation: rms residual of each pose, predicted by the fit to all other poses, linearized [m]."""
+    """Cross-validation: rms residual of all poses [m]; a linear fit to all other poses predicts each pose."""
     right, pose = rest.ravel() + slopes @ values, np.arange(rest.size) // rest.shape[1]
     left = [
         right[pose == k] - slopes[pose == k] @ _bounded_least_squares(model, slopes[pose != k], right[pose != k])

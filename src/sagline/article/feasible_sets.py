@@ -22,7 +22,7 @@ TOLERANCES = (0.01, 0.001, 0.0001)  # [m]
 TENSIONS = np.linspace(10.0, 500.0, 200)  # [N]
 PSI_TENSIONS = np.array([30.0, 60.0, 120.0, 200.0, 300.0, 400.0])  # [N]
 SHOWN = 2  # index of the length whose set psi is drawn alone
-LOW_PART = 50.0  # the article ignores the curve below this tension [N]
+LOW_PART = 50.0  # lower end of the curve [N], as in the article
 
 
 class End(NamedTuple):
@@ -44,7 +44,7 @@ class End(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _FeasibleSets:
-    """The sets psi for some lengths, the curve Psi over all lengths, and the line pi through its projection."""
+    """The sets psi for some lengths, the curve Psi over all lengths, and the line pi through the projection of Psi."""
 
     cable: sl.Cable  # material
     end: End  # desired position B_d
@@ -58,7 +58,7 @@ class _FeasibleSets:
 
     @property
     def tangent(self) -> float:
-        """Tan phi, the article's slope of pi (26)."""
+        """Tan phi, the slope of pi in the article (26)."""
         return self.end.rise / self.end.span
 
     @property
@@ -71,9 +71,9 @@ def feasible_sets(
     cable: sl.Cable, end: End, tolerance: float, tensions: Array, psi_tensions: Array, points: int = 80
 ) -> _FeasibleSets:
     """Exact sets psi and curve Psi of the article."""
-    # At a given L, the map from T to B is one to one. The outline of psi is therefore the image, under the inverse map,
-    # of the outline of the tolerance |dx| + |dz| = epsilon_max around B_d. A search is not necessary. Source: Gia Luan
-    # & Truong Thinh 2020, (20), (21), figures 3 to 5, statements 1 and 2
+    # At a given L, the map from T to B is one to one. The inverse map of the outline of the tolerance, |dx| + |dz| =
+    # epsilon_max around B_d, is therefore the outline of psi. A search is not necessary. Source: Gia Luan & Truong
+    # Thinh 2020, (20), (21), figures 3 to 5, statements 1 and 2
     if points % 4:
         raise sl.InvalidValueError("points", points, "a multiple of 4", "The outline has four edges.")
     model, stretch = sl.Catenary(), end.chord / end.span
@@ -102,7 +102,7 @@ def _diamond(points: int) -> Array:
 
 
 def feasible_chapter() -> Chapter:
-    """Tensions for which the cable ends at a point, with and without a tolerance."""
+    """Chapter about the tensions for which the cable ends at a point, with and without a tolerance."""
     end = End.at_angle(CHORD)
     studies = [feasible_sets(simulated_cable(), end, e, TENSIONS, PSI_TENSIONS) for e in TOLERANCES]
     draw = Drawings("feasible")

@@ -1,4 +1,4 @@
-"""Chapter: the article's identification for another cable."""
+"""Chapter about the article's identification for another cable."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LINES = (1e-3, 5e-3, 1e-2)  # contour lines of the map [m]
 SAMPLES, LENGTH_ERROR, TENSION_ERROR, SEED = 60, 1e-3, 1.0, 2020  # scatter of the synthetic measurements [m], [N]
 BOTH = ("linear_density", "axial_stiffness")
 UNITS = {"linear_density": "kg/m", "axial_stiffness": "N", "length_offset": "m"}
-CASES = (  # lowest and highest chord tension [N], unknowns
+CASES = (  # lowest and highest chord tension [N], and the unknowns
     ("loose and taut", 30.0, 600.0, BOTH),
     ("taut only", 300.0, 600.0, BOTH),
     ("loose only", 15.0, 40.0, BOTH),
@@ -32,7 +32,7 @@ CASES = (  # lowest and highest chord tension [N], unknowns
 
 
 def identify_chapter() -> Chapter:
-    """Apply identify_empirical to the simulation's cable, and identify_cable to synthetic measurements of it."""
+    """Chapter with identify_empirical for the simulation's cable, and identify_cable for synthetic measurements."""
     fit = identify_empirical(simulated_cable(), SPANS, RISES, TENSIONS)
     draw = Drawings("identify")
     return chapter("identify", (_constants(fit, draw), _limits(fit, draw), _measured()))
@@ -143,7 +143,7 @@ def _measured() -> Finding:
 
 
 def _made_up_fit(cable: sl.Cable, lowest: float, highest: float, unknowns: tuple[str, ...]) -> CableFit:
-    """Identify a known cable from measurements with seeded scatter, over a range of chord tensions [N]."""
+    """Identify a known cable from measurements with random scatter, over a range of chord tensions [N]."""
     random = np.random.default_rng(SEED)
     span, rise = random.uniform(2.0, 12.0, SAMPLES), random.uniform(-4.0, 2.0, SAMPLES)
     tension: Array = random.uniform(lowest, highest, SAMPLES)

@@ -21,14 +21,14 @@ from sagline.core.results import Result
 from sagline.kernels.cable.batch import batch_end
 
 CONFIDENCE = 0.95
-POINT_BYTES = 400.0  # memory of each combination of span, rise and tension during the fit
+POINT_BYTES = 400.0  # memory for a combination of span, rise and tension during the fit
 
 
 class Estimate(NamedTuple):
     """A fitted constant and its confidence interval.
 
-    The interval is that of least squares. The residuals are not noise but the model error within the working range.
-    The interval therefore shows the variation of the constant within the range, not the accuracy of the fit.
+    The interval is computed as for least squares. The residuals are not noise, but errors of the model within the
+    working range. The interval therefore shows how the constant varies within the range, not the accuracy of the fit.
     """
 
     value: float  # value of the constant
@@ -41,13 +41,14 @@ class EmpiricalFit(Result):
     """An empirical model for one cable and working range, and its errors.
 
     The axes of the maps are s spans, r rises and t tensions, in ascending order. The position error is |dx| + |dz|,
-    (20) of the article: the distance from B_d to the end of the exact cable with the force and length of the model.
+    (20) of the article. It is the distance between B_d and the end of an exact cable with the force and the length of
+    the model.
 
     Attributes:
         model: The model to use.
         k_h: Intercept constant of the model [m/s^2].
         k_p: Sag constant of the model [m^2/s^4].
-        cable: Material, a single one.
+        cable: Material of a single cable.
         gravity: Gravitational acceleration [m/s^2].
         spans: Sampled spans [m], shape (s,).
         rises: Sampled rises [m], shape (r,).
@@ -72,23 +73,23 @@ class EmpiricalFit(Result):
     cable_weight: Array
 
     def tension_min(self, tolerance: float) -> float:
-        """T_x,min of the article [N]: for this and larger T_x, the position errors of all sampled cables are allowed.
+        """T_x,min of the article [N]: at this T_x and above, all sampled cables have allowed position errors.
 
         Args:
             tolerance: Allowed position error [m], > 0.
 
         Returns:
-            The lowest such tension; NaN if even the highest sampled one is not enough.
+            The lowest such tension; NaN if the highest sampled tension is too low.
         """
         worst = self.position_error.max(axis=(0, 1))
         return _first_of_good_tail(self.tensions, worst <= _tolerance(tolerance))
 
     def weight_max(self, tolerance: float, tension: float | None = None) -> float:
-        """w_max of the article [N]: up to this weight w L, the position errors of all sampled cables are allowed.
+        """w_max of the article [N]: up to this weight w L, all sampled cables have allowed position errors.
 
         Args:
             tolerance: Allowed position error [m], > 0.
-            tension: Lower limit of the considered T_x [N]; None for all.
+            tension: Smallest T_x that is included [N]; None for all.
 
         Returns:
             The largest such sampled weight; NaN if even the lightest cable is too heavy.
@@ -105,13 +106,14 @@ def identify_empirical(
 ) -> EmpiricalFit:
     """Find the constants of the empirical model for a cable and its working range.
 
-    Both constants enter their equations linearly, so that one least-squares step each is sufficient: first k_h from T_z
-    with given slope tan phi, then k_p from L by (48) with this k_h.
+    Both equations are linear in their constants, so that one least-squares step for each constant is sufficient. The
+    first step determines k_h from T_z with the slope tan phi. The second step determines k_p from L by (48) with this
+    k_h.
 
     Args:
-        cable: Material, a single one of positive density.
+        cable: Material of a single cable with positive density.
         spans: Horizontal distances of the ends [m], shape (s,), > 0.
-        rises: Heights of the platform end above the frame end [m], shape (r,); below it they are negative.
+        rises: Heights of the platform end above the frame end [m], shape (r,); negative for a lower platform end.
         tensions: T_x [N], shape (t,), > 0.
         gravity: Gravitational acceleration [m/s^2], > 0.
 
@@ -177,8 +179,8 @@ def identify_empirical(
 
 
 def end_position_error(state: CableState) -> Array:
-    """Position error (20) of the article, |dx| + |dz| [m]: distance from B_d to the ends of exact cables."""
-    # state: of any model, shape (...); returns shape (...)
+    """Position error (20) of the article, |dx| + |dz| [m]: distance between B_d and the ends of exact cables."""
+    # state: states of any model, shape (...); returns errors of the same shape
     shape = state.shape
     horizontal, vertical, length, weight, stiffness = (
         kernel_input(operand, shape).reshape(-1)
@@ -213,7 +215,7 @@ def _tolerance(tolerance: float) -> float:
 
 
 def _first_of_good_tail(values: Array, good: Flags) -> float:
-    """First value from which on all values are good; NaN if the last one is not good."""
+    """First value for which this value and all later values are good; NaN if the last value is not good."""
     bad = np.flatnonzero(~good)
     first = int(bad[-1]) + 1 if bad.size else 0
     return float(values[first]) if first < values.size else float("nan")

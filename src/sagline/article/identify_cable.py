@@ -19,10 +19,10 @@ from sagline.core.results import Result
 
 TensionAt = Literal["frame_end", "platform_end", "chord"]
 UNITS = {"linear_density": "kg/m", "axial_stiffness": "N", "length_offset": "m"}
-TOO_LOOSE = 0.5  # relative standard error above which a value is not determined
-TOO_CLOSE = 0.95  # correlation above which two values cannot be separated
+TOO_LOOSE = 0.5  # a value is not determined if its relative standard error is larger
+TOO_CLOSE = 0.95  # two values cannot be separated if their correlation is larger
 ITERATIONS = 30  # iterations to compute the chord tension from the tension at an end
-WEIGHTINGS = 3  # iterations of the weights, which depend slightly on the solution
+WEIGHTINGS = 3  # iterations of the weights, because they depend slightly on the solution
 _ADVICE = {
     "linear_density": "measure at lower tensions or longer spans, to increase the sag",
     "axial_stiffness": "measure at higher tensions, to increase the stretch",
@@ -31,17 +31,17 @@ _ADVICE = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CableFit(Result):
-    """A cable found from measurements.
+    """A cable that was identified from measurements.
 
     Attributes:
         cable: The identified cable.
-        names: Unknowns, in the order of the arrays below: "linear_density" [kg/m], "axial_stiffness" [N],
-            "length_offset" [m], positive if the measured lengths are too long.
+        names: Unknowns, in the order of the following arrays: "linear_density" [kg/m], "axial_stiffness" [N],
+            "length_offset" [m]. The offset is positive if the measured lengths are too long.
         values: Estimates, shape (k,).
         covariance: Covariance of the values, shape (k, k), from the given measurement errors.
         residuals: Measured minus predicted length [m], shape (n,).
-        chi_squared: Sum of squares of the residuals in units of their standard errors, per degree of freedom;
-            about 1 if the cable model and the measurement errors are correct, much larger otherwise.
+        chi_squared: Sum of squares of the residuals in standard errors, divided by the degrees of freedom. The value is
+            about 1 if the cable model and the measurement errors are correct, and much larger otherwise.
     """
 
     cable: Cable
@@ -65,7 +65,7 @@ class CableFit(Result):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Values that the data do not determine or cannot separate; empty if all are determined."""
+        """Texts about values that the data do not determine or cannot separate; empty if there are none."""
         found = []
         for name, value, error in zip(self.names, self.values, self.standard_error, strict=True):
             if name != "length_offset" and error > TOO_LOOSE * value:
@@ -98,8 +98,8 @@ def identify_cable(
 ) -> CableFit:
     """Find a cable's density and stiffness from measured lengths and tensions by weighted least squares.
 
-    The exact cable predicts each length from the measured tension. Each residual is divided by its standard error, the
-    combined error of length and tension.
+    The exact cable predicts each length from the measured tension. Each residual is divided by its standard error,
+    which combines the errors of length and tension.
 
     Args:
         span: Horizontal distance of the ends [m], shape (n,), > 0.
@@ -109,7 +109,7 @@ def identify_cable(
         length_error: Standard error of a length [m], > 0.
         tension_error: Standard error of a tension [N], > 0.
         tension_at: Place of the measurement: "frame_end" (a load cell at the winch), "platform_end" or "chord".
-        unknowns: Unknowns: any of "linear_density", "axial_stiffness", "length_offset".
+        unknowns: One or several of "linear_density", "axial_stiffness", "length_offset".
         start: Initial values, and values of known parameters; None for 0.1 kg/m and 100 kN.
         gravity: Gravitational acceleration [m/s^2], > 0.
 
@@ -168,12 +168,12 @@ class _Measured:
             )
 
     def predicted(self, cable: Cable, tension: Array) -> Array:
-        """Lengths of exact cables with the given tension at the place of measurement [m]."""
+        """Lengths of exact cables [m] with the given tension at the place of the measurement."""
         chord = np.hypot(self.span, self.rise)
         half = 0.5 * cable.linear_density * self.gravity * chord
         side = {"frame_end": 1.0, "platform_end": -1.0, "chord": 0.0}[self.tension_at]
         across = half * self.span / chord if side else 0.0
-        floor = 1e-3 * tension  # lower bound, because half the cable's weight can exceed the measured tension
+        floor = 1e-3 * tension  # at least this, because half the weight of the cable can exceed the measured tension
         tau = np.maximum(side * half * self.rise / chord + np.sqrt(np.maximum(tension**2 - across**2, 0.0)), floor)
         state = Catenary().from_tension(cable, self.span, self.rise, tau, self.gravity)
         for _ in range(ITERATIONS if side else 0):
@@ -210,7 +210,7 @@ def _fit(data: _Measured, names: tuple[str, ...], known: Cable, length_error: fl
         higher, lower = (data.predicted(cable, f * data.tension) for f in (1.0 + 1e-4, 1.0 - 1e-4))
         slope = (higher - lower) / (2e-4 * data.tension)
         spread = np.hypot(length_error, slope * tension_error)
-    # the covariance with the weights of the last iteration
+    # covariance with the weights of the last iteration
     jacobian = found.jac
     covariance = np.linalg.pinv(jacobian.T @ jacobian, rcond=1e-14)
     values = np.array([offset if name == "length_offset" else float(getattr(cable, name)) for name in names])
@@ -228,7 +228,7 @@ def _fit(data: _Measured, names: tuple[str, ...], known: Cable, length_error: fl
 
 
 def _bounds(names: tuple[str, ...]) -> tuple[list[float], list[float]]:
-    """Bounds that are wider than for any rope: 1 mg/m to 1 t/m, 1 N to 1 PN."""
+    """Bounds that every rope satisfies: 1 mg/m to 1 t/m, 1 N to 1 PN."""
     low = {"linear_density": np.log(1e-6), "axial_stiffness": 0.0, "length_offset": -np.inf}
     high = {"linear_density": np.log(1e3), "axial_stiffness": np.log(1e15), "length_offset": np.inf}
     return [low[name] for name in names], [high[name] for name in names]
@@ -245,8 +245,8 @@ def _checked_start(start: Cable | None) -> Cable:
 def _checked_unknowns(unknowns: Sequence[str]) -> tuple[str, ...]:
     if not isinstance(unknowns, list | tuple) or not unknowns:
         allowed = f"one to three of {', '.join(UNITS)}"
-        raise InvalidValueError("unknowns", brief(unknowns), allowed, "Name what to find, in a list.")
+        raise InvalidValueError("unknowns", brief(unknowns), allowed, "Give a list of unknowns.")
     names = tuple(choice(name, "unknowns", UNITS) for name in unknowns)
     if len(set(names)) != len(names):
-        raise InvalidValueError("unknowns", brief(names), "each of them once", "Leave out what is named twice.")
+        raise InvalidValueError("unknowns", brief(names), "each of them once", "Give each name once.")
     return names

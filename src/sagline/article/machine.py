@@ -1,4 +1,4 @@
-"""A robot with errors of its parameters, and the resulting equilibria of the platform."""
+"""Robots with parameter errors, and the resulting equilibria of the platform."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ MODULUS, DENSITY, LOAD = "Young's modulus E", "linear density ρ", "load"
 ANCHORS, DRUM, ZERO = "anchor height", "drum radius", "zero of the lengths"
 PULLEY, DEAD = "pulley radius", "dead cable"
 WIDTH, HEIGHT = "platform anchors, outward", "platform anchors, up and down"
-Errors: TypeAlias = Mapping[str, float]  # errors of parameters by name, each in its unit; missing ones are zero
+Errors: TypeAlias = Mapping[str, float]  # errors of parameters in their units, by name; a missing error is zero
 
 
 class Parameter(NamedTuple):
-    """Parameter of the prototype that may deviate from Table 1, equally for all cables."""
+    """Parameter of the prototype that may differ from Table 1, by the same error for all cables."""
 
     name: str
-    unit: str  # unit of its error
-    typical: float  # typical error, in that unit
-    plausible: float  # largest plausible error, in that unit; assumed, not given in the article
-    positive: bool = False  # True if it can only be larger than planned
+    unit: str  # unit of the error
+    typical: float  # typical error, in this unit
+    plausible: float  # largest plausible error, in this unit; assumed, because the article does not give it
+    positive: bool = False  # True if the error can only be positive
 
 
 PARAMETERS = (
@@ -46,7 +46,7 @@ def robot_with_errors(robot: sl.Robot, errors: Errors) -> sl.Robot:
     """Robot with errors of some parameters: anchors, cables, routing and load."""
     off = {parameter.name: 0.0 for parameter in PARAMETERS} | dict(errors)
     cables, winches, outward = robot.cables, robot.winches, np.sign(robot.platform_anchors)
-    changes: dict[str, Any] = {}  # unchanged parts are reused, because a fit creates a thousand robots
+    changes: dict[str, Any] = {}  # parts without errors are reused, because a fit makes a thousand robots
     if off[MODULUS] or off[DENSITY]:
         changes["cables"] = cables.replace(
             axial_stiffness=cables.axial_stiffness * (1.0 + 0.01 * off[MODULUS]),
@@ -66,15 +66,15 @@ def robot_with_errors(robot: sl.Robot, errors: Errors) -> sl.Robot:
 
 
 def wound_lengths(plan: sl.Plan, home: sl.Plan, errors: Errors) -> Array:
-    """Lengths that the winches wind if planned lengths are commanded."""
+    """Actual lengths from the winches for commanded lengths."""
     from_home = plan.unstrained_length - home.unstrained_length
     return plan.unstrained_length + 0.01 * errors.get(DRUM, 0.0) * from_home + 1e-3 * errors.get(ZERO, 0.0)
 
 
 def rest_positions(robot: sl.Robot, plan: sl.Plan, home: sl.Plan, errors: Sequence[Errors]) -> Array:
-    """Equilibria of robots with errors; the winches wind the lengths that are planned for the robot without errors."""
-    # Encoders are set with the platform at rest in its home pose with planned lengths, so additional lengths of pulleys
-    # and dead length at home are not counted
+    """Equilibria of robots with errors at the lengths that are planned for the robot without errors."""
+    # Encoders are set to the planned lengths with the platform at rest in its home pose, so that additional lengths on
+    # pulleys and dead lengths at home have no effect
     robots = [robot_with_errors(robot, one) for one in errors]
     off_drum = np.stack([wound_lengths(plan, home, one) for one in errors]) + _not_counted(robots, home)[:, None]
     count, poses, m = off_drum.shape
@@ -86,7 +86,7 @@ def rest_positions(robot: sl.Robot, plan: sl.Plan, home: sl.Plan, errors: Sequen
             "the changed robot",
             f"not held in a stable equilibrium at pose {index % poses}",
             "smaller changes",
-            "Change it by less.",
+            "Change the robot by less.",
         )
     return found.pose.position.reshape(count, poses, 3)
 

@@ -1,4 +1,4 @@
-"""Errors of the five cable models, and the range in which each is sufficient."""
+"""Errors of the five cable models, and the range in which each model is sufficient."""
 
 from __future__ import annotations
 
@@ -30,27 +30,27 @@ MODELS: tuple[sl.CableModel, ...] = (
     sl.Empirical(),
     sl.Parabolic(),
     sl.Catenary(),
-)  # from coarse to exact
+)  # in the order from coarse to exact
 CHORDS = np.geomspace(1.0, 30.0, 41)  # [m]
 TENSIONS = np.geomspace(5.0, 2000.0, 61)  # [N]
 TOLERANCE = 1e-3  # [m]
-FLOOR = 1e-9  # errors below a nanometer are not drawn [m]
+FLOOR = 1e-9  # smallest drawn error [m]
 EDGES, LINES = 10.0 ** np.arange(-9.0, 1.0), (1e-4, 1e-3, 1e-2)  # filled contours and contour lines of the maps [m]
 TICKS = (1e-9, 1e-6, 1e-3, 1.0)  # [m]
 FINE_CHORDS, FINE_TENSIONS = np.geomspace(1.0, 30.0, 140), np.geomspace(5.0, 2000.0, 180)  # abscissae of the maps
 FINE_DENSITIES = np.geomspace(0.01, 1.0, 140)  # [kg/m]
-FINE_ANGLES = np.radians(np.linspace(-85.0, 0.0, 140))  # suspended: the platform end is below the frame end
+FINE_ANGLES = np.radians(np.linspace(-85.0, 0.0, 140))  # a suspended cable, with the platform end below the frame end
 REFERENCE = {"chord": 10.0, "angle": float(np.radians(-30.0)), "density": 0.067, "tension": 100.0}
 USES = ((3.0, 300.0), (10.0, 300.0), (10.0, 50.0), (10.0, 15.0), (25.0, 100.0))  # chord [m], tension [N] of the table
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _ModelErrors:
-    """Errors of the five models relative to the exact one, for every combination of four quantities of a cable.
+    """Errors of the five models relative to the exact model, for all combinations of four quantities of a cable.
 
-    All models have the same horizontal tension. The length error is therefore the error of the length that a winch
-    winds. The position error, |dx| + |dz| of (20), is the distance from the desired position to the end of an exact
-    cable with the force and length of the model.
+    All models have the same horizontal tension. The length error is therefore the error of the length at a winch. The
+    position error, |dx| + |dz| of (20), is the distance between the desired position and the end of an exact cable with
+    the force and length of the model.
     """
 
     models: tuple[sl.CableModel, ...]  # the models, shape (5,)
@@ -95,7 +95,7 @@ def model_errors(
 
 
 def models_chapter() -> Chapter:
-    """Chapter for the choice of a controller's cable model."""
+    """Chapter about the choice of a cable model for a controller."""
     cable = simulated_cable()
     draw = Drawings("models")
     return chapter(
@@ -111,7 +111,7 @@ def _name(model: object) -> str:
 
 
 def _study(**varied: Array) -> _ModelErrors:
-    """Errors for varied given quantities; all other quantities have their reference values."""
+    """Errors over the given quantities; all other quantities have their reference values."""
     at = (varied.get(name, np.array([REFERENCE[name]])) for name in ("chord", "angle", "density", "tension"))
     return model_errors(float(simulated_cable().axial_stiffness), *at)
 
@@ -158,12 +158,12 @@ def _sufficient(draw: Drawings) -> Finding:
 
 
 def _choice(label: str, heights: Array, errors: Array, caption: str, draw: Drawings) -> Panel:
-    """Map of the coarsest sufficient model; borders are at the allowed length error, with its sign."""
+    """Map of the coarsest sufficient model; the borders are at the positive or negative allowed length error."""
     names = [_name(model) for model in MODELS]
     colors = matplotlib.colormaps["viridis_r"](0.9 * np.arange(len(names)) / (len(names) - 1))
     figure, ax = map_axes("chord tension [N]", label)
     ax.add_patch(Rectangle((0.0, 0.0), 1.0, 1.0, transform=ax.transAxes, color=colors[-1], zorder=0.5))
-    for error, color in zip(errors[-2::-1], colors[-2::-1], strict=True):  # coarser models are drawn over better models
+    for error, color in zip(errors[-2::-1], colors[-2::-1], strict=True):  # coarser models over better ones
         band = ax.contourf(FINE_TENSIONS, heights, error, levels=[-TOLERANCE, TOLERANCE], colors=[color])
         band.set_rasterized(True)
     if heights is FINE_CHORDS:

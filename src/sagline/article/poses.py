@@ -1,4 +1,4 @@
-"""Chapter: Table 2 and figures 25 to 27."""
+"""Chapter about Table 2 and figures 25 to 27."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from sagline.core.numbers import n
 from sagline.plot.sheet import BLUE, COLORS
 from sagline.present.page import Chapter, Finding, Table, table_of
 
-AREA = 2e4  # circle area per meter of error [pt^2/m]
+AREA = 2e4  # area of a circle per meter of error [pt^2/m]
 
 
 def poses_chapter() -> Chapter:
-    """The ten poses of the prototype, and possible causes of the errors."""
+    """Chapter about the ten poses of the prototype, and possible causes of the errors."""
     study = ten_poses()
     draw = Drawings("poses")
     return chapter(
@@ -159,7 +159,7 @@ def _trends(study: TenPoses, draw: Drawings) -> Finding:
 
 
 def _typical(parameter: Parameter) -> str:
-    """A parameter with its typical error."""
+    """Text of a parameter with its typical error."""
     return f"{parameter.name} {n(parameter.typical, '+g', parameter.unit)}"
 
 

@@ -17,26 +17,26 @@ PUBLISHED_K_H = 4.845  # [m/s^2], magnitude; Gia Luan & Truong Thinh 2020, secti
 PUBLISHED_K_P = 4.385  # [m^2/s^4], section 5.2.4
 SHALLOW_K_H = GRAVITY / 2.0
 SHALLOW_K_P = GRAVITY**2 / 24.0
-LOWEST, HIGHEST = (20.0, 400.0), (500.0, 200_000.0)  # search intervals of the tension range of the article [N]
+LOWEST, HIGHEST = (20.0, 400.0), (500.0, 200_000.0)  # search intervals for both ends of the range of tensions [N]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InterceptStudy:
-    """Intercepts b_pi of the forces on one end of the cable, and the regressions of the article."""
+    """Intercepts b_pi for the forces on one end of the cable, and the regressions of the article."""
 
     sampling: Sampling  # the cables, a angles, c chords, r densities
     slope: Array  # a_pi of the fitted lines, shape (a, c, r)
     intercept: Array  # b_pi of the fitted lines [N], shape (a, c, r)
     r_squared: Array  # quality of the fit of the lines, shape (a, c, r)
-    h_b: Array  # factor of D in b_pi = h_b D [N/m], shape (a, r)
-    k_h_of_angle: Array  # factor of rho in h_b = k_h rho, one per angle [m/s^2], shape (a,)
-    k_h: float  # factor of rho in h_b = k_h rho over all angles [m/s^2]
+    h_b: Array  # h_b in b_pi = h_b D [N/m], shape (a, r)
+    k_h_of_angle: Array  # k_h in h_b = k_h rho, for each angle [m/s^2], shape (a,)
+    k_h: float  # k_h in h_b = k_h rho, for all angles together [m/s^2]
 
 
 def intercept_studies(sampling: Sampling) -> tuple[InterceptStudy, InterceptStudy]:
-    """The article's regressions (21), (27), (28) at the platform end and at the frame end."""
-    # both lines give the vertical force on the cable; at the frame end it is smaller by the cable's weight, so that the
-    # intercept is negative there; source: Gia Luan & Truong Thinh 2020, section 4.2, figures 6 and 7; erratum 1 in
+    """The regressions (21), (27), (28) of the article, at the platform end and at the frame end."""
+    # Both lines are vertical forces on the cable. The force at the frame end is smaller by the cable's weight, so that
+    # its intercept is negative. Source: Gia Luan & Truong Thinh 2020, section 4.2, figures 6 and 7; erratum 1 in
     # docs/errata.md
     state = sampling.hang()
     frame_end = state.vertical_force - state.cable_weight
@@ -60,21 +60,21 @@ def _study(sampling: Sampling, vertical: Array) -> InterceptStudy:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StretchStudy:
-    """The adjusting length d = L - D of one cable over its tension."""
+    """Adjusting length d = L - D of a cable, as a function of the tension."""
 
     cable: sl.Cable  # material
-    end: End  # desired position of its platform end
+    end: End  # desired position of the platform end
     tensions: Array  # T_x [N], shape (t,)
-    magnitude: Array  # |T| on the platform end of the unstretchable cable [N], shape (t,)
+    magnitude: Array  # |T| at the platform end of the cable without stretch [N], shape (t,)
     unstretchable: Array  # adjusting length d of a cable that does not stretch [m], shape (t,)
     stretchable: Array  # adjusting length d_e of the elastic cable [m], shape (t,)
-    relieved: Array  # d_e plus the article's elongation |T| L/EA of (36) [m], shape (t,)
-    relieved_exactly: Array  # d_e plus the true elongation, of the mean force along the cable [m], shape (t,)
+    relieved: Array  # d_e plus the elongation |T| L/EA of the article (36) [m], shape (t,)
+    relieved_exactly: Array  # d_e plus the true elongation by the mean force along the cable [m], shape (t,)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SagStudy:
-    """The article's chain of regressions from d to k_p, for cables that do not stretch."""
+    """The sequence of regressions of the article from d to k_p, for cables without stretch."""
 
     sampling: Sampling  # the cables, a angles, c chords, r densities, t tensions
     adjusting_length: Array  # adjusting lengths d [m], shape (a, c, r, t)
@@ -121,10 +121,10 @@ def density_shape(density: Array) -> Array:
 
 
 def stretch_study(cable: sl.Cable, end: End, tensions: Array) -> StretchStudy:
-    """Subtract the elongation from a cable's adjusting length: by (36) and (38), and with the true elongation."""
-    # The elongation under the force at the platform end, |T| L/EA, is too large by half the cable's weight along the
-    # chord, w L^2 sin(phi)/(2 EA) (erratum 5)
-    # source: Gia Luan & Truong Thinh 2020, (33) to (38), figures 8 and 9
+    """Adjusting lengths of a cable without its elongation: by (36) and (38), and with the true elongation."""
+    # The elongation by the force at the platform end, |T| L/EA, is too large by w L^2 sin(phi)/(2 EA), because half of
+    # the cable's weight acts along the chord (erratum 5) source: Gia Luan & Truong Thinh 2020, (33) to (38), figures 8
+    # and 9
     model, chord_tension = sl.Catenary(), tensions * end.chord / end.span
     stiff = model.from_tension(cable.replace(axial_stiffness=UNSTRETCHABLE), *end, chord_tension, GRAVITY)
     soft = model.from_tension(cable, *end, chord_tension, GRAVITY)
@@ -143,7 +143,7 @@ def stretch_study(cable: sl.Cable, end: End, tensions: Array) -> StretchStudy:
 
 
 def sag_study(sampling: Sampling) -> SagStudy:
-    """The article's regressions (41), (43), (44), (45), one after the other."""
+    """The regressions (41), (43), (44), (45) of the article, one after the other."""
     # source: Gia Luan & Truong Thinh 2020, section 5.2, figures 10 to 15
     excess = sampling.hang().adjusting_length
     a_d = fit_factor(length_shape(sampling.tensions), excess)
@@ -160,7 +160,7 @@ def sag_study(sampling: Sampling) -> SagStudy:
 
 
 class Constants(NamedTuple):
-    """Constants by the regressions for one range of tensions."""
+    """Constants from the regressions for one range of tensions."""
 
     lowest: float  # lowest sampled T_x [N]
     highest: float  # highest sampled T_x [N]
@@ -171,25 +171,25 @@ class Constants(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ConstantsStudy:
-    """The constants over the range of tensions."""
+    """The constants for different ranges of tensions."""
 
-    sampling: Sampling  # the cables; only their tensions change
-    over_lowest: tuple[Constants, ...]  # ranges from each lowest tension to the highest one of the article
+    sampling: Sampling  # the cables; only the tensions differ
+    over_lowest: tuple[Constants, ...]  # ranges from each lowest tension to the highest tension of the article
     over_highest: tuple[Constants, ...]  # ranges from the lowest tension of the article to each highest one
-    # ranges with both ends of the article's range multiplied by 1, 2, 4, and so on, up to the limit of taut cables
+    # the article's range times 1, 2, 4, and so on, up to the limit of taut cables
     scaled: tuple[Constants, ...]
-    published: Constants  # the range that gives the published |k_h| (at the frame end) and k_p
+    published: Constants  # the range with the published |k_h| (at the frame end) and k_p as results
 
 
 def constants(sampling: Sampling) -> Constants:
-    """Both constants by the article's regressions."""
+    """Both constants, from the article's regressions."""
     platform, frame = intercept_studies(sampling)
     tensions = sampling.tensions
     return Constants(float(tensions.min()), float(tensions.max()), platform.k_h, frame.k_h, sag_study(sampling).k_p)
 
 
 def constants_study(sampling: Sampling, lowest: Array, highest: Array, factors: Array) -> ConstantsStudy:
-    """The constants for many ranges of tensions, and the range of the published ones."""
+    """The constants for many ranges of tensions, and the range that gives the published constants."""
     found = published_range(sampling)
     return ConstantsStudy(
         sampling=sampling,
@@ -202,7 +202,7 @@ def constants_study(sampling: Sampling, lowest: Array, highest: Array, factors: 
 
 @cache
 def published_sampling() -> Sampling:
-    """Assumed sampling of the article, with the range of tensions that gives its constants."""
+    """Assumed sampling of the article, with the range of tensions that gives the published constants."""
     sampling = article_sampling()
     found = published_range(sampling)
     return sampling.between(found.lowest, found.highest)
@@ -210,8 +210,8 @@ def published_sampling() -> Sampling:
 
 def published_range(sampling: Sampling) -> Constants:
     """The range of tensions that gives both published constants: k_h = -4.845 at the frame end and k_p = 4.385."""
-    # the two ends of the range determine the two constants: k_p falls with the lower end, and |k_h| rises with the
-    # upper one
+    # The two ends of the range determine the two constants: k_p decreases with the lower end, and |k_h| increases with
+    # the upper end
     from scipy.optimize import brentq
 
     def best_lowest(highest: float) -> float:
@@ -227,7 +227,7 @@ def published_range(sampling: Sampling) -> Constants:
 
     try:
         highest = float(np.exp(brentq(missing, *np.log(HIGHEST), xtol=1e-8)))
-    except ValueError:  # no change of sign between the ends of the search
+    except ValueError:  # there is no change of sign between the ends of the search
         raise sl.InvalidValueError(
             "the sampled cables",
             "such that no range of tensions gives the published constants",

@@ -21,7 +21,7 @@ from sagline.files.writing import check_files, plain
 from sagline.plot.sheet import BLUE, VERMILLION
 from sagline.present.page import Chapter, Panel, page, write_page
 
-NAMES = ("article.html", "article.json")  # both files are written, or none
+NAMES = ("article.html", "article.json")  # either both files are written or none
 TITLE = "The article, reproduced"
 LEAD = (
     "Gia Luan & Truong Thinh, “Empirical Quasi-Static and Inverse Kinematics of Cable-Driven Parallel Manipulators "
@@ -36,8 +36,8 @@ NOTATION = (
 Progress = Callable[[int, int, str], None]
 _numbers = re.compile(r"(\d+)(?:-(\d+))?")
 REDONE = "3-15, 17-22 and 25-27; the others are drawings and photographs without data"
-KEY = "five-models"  # key of the finding whose numbers the drawing shows
-FIRST, LAST = 1e-3, 1e4  # ends of the axis [mm]; smaller values are written at its edge
+KEY = "five-models"  # key of the finding with the numbers of the drawing
+FIRST, LAST = 1e-3, 1e4  # ends of the axis [mm]; smaller values are written at the edge of the drawing
 ROBOTS = (("suspended", BLUE, -0.16), ("mixed", VERMILLION, 0.16))
 
 
@@ -52,7 +52,7 @@ class ArticleReport:
 
 
 def write_article(folder: Path | str, parts: Sequence[str] = (), progress: Progress | None = None) -> ArticleReport:
-    """Repeat the article's studies and write a self-contained HTML page and a JSON file of its numbers."""
+    """Repeat the studies of the article, and write a self-contained HTML page and a JSON file with its numbers."""
     wanted = selection(parts)
     check_files(folder, NAMES)
     chapters = []
@@ -74,8 +74,8 @@ class ReportPart(NamedTuple):
     key: str  # name of the chapter
     figures: tuple[int, ...]  # figures of the article in the chapter
     tables: tuple[int, ...]  # tables of the article in the chapter
-    module: str  # module that builds it, loaded on demand
-    function: str  # the function that builds it
+    module: str  # module that builds the chapter, loaded on demand
+    function: str  # function that builds the chapter
 
     def build(self) -> Chapter:
         """Build the chapter."""
@@ -101,13 +101,13 @@ PARTS = (
 class _Selection:
     """Requested chapters, figures and tables."""
 
-    whole: frozenset[str]  # keys of chapters requested completely
+    whole: frozenset[str]  # keys of completely requested chapters
     figures: frozenset[int]  # numbers of requested figures
     tables: frozenset[int]  # numbers of requested tables
 
     @property
     def parts(self) -> tuple[ReportPart, ...]:
-        """The chapters that have something to build."""
+        """The chapters with requested findings."""
         return tuple(
             p for p in PARTS if p.key in self.whole or self.figures & {*p.figures} or self.tables & {*p.tables}
         )
@@ -121,7 +121,7 @@ class _Selection:
 
 
 def selection(words: Sequence[str]) -> _Selection:
-    """Selected chapters, figures and tables; without words, all of them."""
+    """Chapters, figures and tables that the words select; everything without words."""
     if not words:
         return _Selection(frozenset(part.key for part in PARTS), frozenset(), frozenset())
     whole: set[str] = set()
@@ -139,7 +139,7 @@ def selection(words: Sequence[str]) -> _Selection:
         else:
             raise _unknown(word)
     if open_word:
-        raise sl.InvalidValueError(open_word, "without numbers", f"{open_word} 6-9", "Give the numbers after it.")
+        raise sl.InvalidValueError(open_word, "without numbers", f"{open_word} 6-9", "Give numbers after this word.")
     return _Selection(frozenset(whole), frozenset(wanted["figures"]), frozenset(wanted["tables"]))
 
 
@@ -148,19 +148,19 @@ def _checked_range(kind: str, word: str, first: int, last: int) -> set[int]:
     numbers = set(range(first, last + 1)) if last < 100 else set()
     if not numbers & known:
         allowed = REDONE if kind == "figures" else "2; Table 1 is in the presets"
-        raise sl.InvalidValueError(f"{kind} {word}", "not repeated here", allowed, "Ask for one of these.")
+        raise sl.InvalidValueError(f"{kind} {word}", "not repeated here", allowed, "Give one of these.")
     return numbers & known
 
 
 def _unknown(word: str) -> sl.InvalidValueError:
     keys = [part.key for part in PARTS]
     near = get_close_matches(word.lower(), [*keys, "figures", "tables"], n=1)
-    step = f"Did you mean {near[0]}?" if near else "Or give nothing, for everything."
+    step = f"Did you mean {near[0]}?" if near else "Give no word for everything."
     return sl.InvalidValueError("part", repr(word), f"{', '.join(keys)}, figures N-M, table 2", step)
 
 
 def _picture(chapters: Sequence[Chapter]) -> Panel | None:
-    """The largest position error of each model for both robots; None if the report does not have them."""
+    """Drawing of the largest position errors of each model for both robots; None if the report has no such errors."""
     numbers = next((f.numbers for c in chapters for f in c.findings if f.key == KEY), None)
     if numbers is None:
         return None
@@ -174,7 +174,7 @@ def _picture(chapters: Sequence[Chapter]) -> Panel | None:
         for k, error in enumerate(errors):
             text = n(error, ".2g", "mm", size=1e3 * numbers["longest_length_m"])
             place, away = (max(error, FIRST), k + shift), -7.0 if FIRST < error < 1e3 * ERROR_BAND else 7.0
-            side = "left" if away > 0.0 else "right"  # key of the line of the article
+            side = "left" if away > 0.0 else "right"  # key of the line for the article
             ax.annotate(text, place, (away, 0.0), textcoords="offset points", fontsize=NAME_SIZE, va="center", ha=side)
     ax.set_xscale("log")
     ax.set_xlim(FIRST, LAST)

@@ -1,4 +1,4 @@
-"""Chapter: figures 8 to 15."""
+"""Chapter about figures 8 to 15."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ from sagline.present.page import Chapter, Finding
 
 CHORD = 10.0  # [m]
 TENSIONS = np.linspace(10.0, 500.0, 150)  # [N]
-MIDDLE, DENSE = 2, -1  # index of the article's angle, and index of the heaviest density
+MIDDLE, DENSE = 2, -1  # indices of the article's angle and of the largest density
 PICKED = (1, 3, 5, 7)  # indices of drawn chords
 DRAWN = (1, 3, 5, 7, 9)  # indices of drawn densities
 
 
 def sag_chapter() -> Chapter:
-    """Chapter from the adjusting length to k_p."""
+    """Chapter about the regressions from the adjusting length to k_p."""
     end = End.at_angle(CHORD)
     stretch, sag = stretch_study(simulated_cable(), end, TENSIONS), sag_study(published_sampling())
     draw = Drawings("sag")
@@ -176,10 +176,10 @@ def _named(values: Iterable[float], form: str) -> list[str]:
 
 
 def _middle_and_dense(study: SagStudy) -> str:
-    """Angle and density of the drawn cables, for a caption."""
+    """Text of the angle and density of the drawn cables, for a caption."""
     return f"at φ = {n(ANGLE, unit='rad')}, ρ = {n(study.sampling.densities[DENSE], unit='kg/m')}"
 
 
 def _away(fit: Array, values: Array) -> float:
-    """Largest distance of a fit divided by the largest value, along the fitted axis (the second to last)."""
+    """Largest distance from a fit divided by the largest value, along the fitted axis (the second to last axis)."""
     return float((np.abs(fit - values).max(axis=-2) / values.max(axis=-2)).max())

@@ -1,4 +1,4 @@
-"""Cables sampled in the article's empirical study, and its least-squares fits."""
+"""Sampled cables of the article's empirical study, and the least-squares fits of this study."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from sagline.core.fields import given, rule
 
 GRAVITY = 9.81  # [m/s^2], in all of the article's studies
 ANGLE = 0.754  # angle of the article's figure 10 [rad]
-UNSTRETCHABLE = 1e20  # [N], so stiff that strains are below the rounding error of a length
+UNSTRETCHABLE = 1e20  # [N], so stiff that the strain is below the rounding error
 
 
 class FittedLine(NamedTuple):
@@ -21,7 +21,7 @@ class FittedLine(NamedTuple):
 
     slope: Array  # slope, shape (...)
     intercept: Array  # intercept, shape (...)
-    r_squared: Array  # share of the variance of y that the line explains, shape (...)
+    r_squared: Array  # coefficient of determination: share of the variance of y that the line explains, shape (...)
     deviation: Array  # largest distance of a sample from the line, in the unit of y, shape (...)
 
 
@@ -39,8 +39,7 @@ def fit_line(x: Array, y: Array) -> FittedLine:
 
 def fit_factor(shape: Array, y: Array, axis: int = -1) -> Array:
     """Least-squares factor a in y = a * shape, along one axis."""
-    # all regressions of the article except for the line have this form, with the shape 1/T_x^2, D^3, cos^4(phi), rho^2,
-    # D or rho
+    # all other regressions of the article have this form; the shape is 1/T_x^2, D^3, cos^4(phi), rho^2, D or rho
     shape, y = np.broadcast_arrays(shape, y)
     factor: Array = np.sum(shape * y, axis=axis) / np.sum(shape**2, axis=axis)
     return factor
@@ -51,7 +50,7 @@ _POSITIVE = {"shape": (None,), "above": 0.0}
 
 @attrs.frozen(eq=False)
 class Sampling:
-    """Every combination of four quantities of a cable whose platform end is above its frame end."""
+    """Every combination of four quantities of a cable; the platform end is above the frame end."""
 
     # angle phi of the chord (the article's beta), between 0 and pi/2
     angles: Array = attrs.field(converter=given, metadata=rule("rad", shape=(None,)))
@@ -75,16 +74,15 @@ class Sampling:
         return sl.Catenary().from_tension(cable, chord * cosine, chord * np.sin(angle), tension / cosine, GRAVITY)
 
     def between(self, lowest: float, highest: float) -> Sampling:
-        """This sampling with an equal number of tensions, evenly spaced between two limits."""
+        """The same sampling, with its tensions evenly spaced between two limits."""
         tensions = np.linspace(lowest, highest, self.tensions.size)
         return Sampling(self.angles, self.chords, self.densities, tensions, self.axial_stiffness)
 
 
 def article_sampling() -> Sampling:
-    """Assumed samples; the article only gives phi = 0.754 rad and rho in (0, 2)."""
-    # Chords from 2 to 16 m, as in the frames of its Table 1; five angles around its 0.754 rad; ten densities; sixty
-    # tensions from 100 N to 10 kN, evenly spaced
-    # source: Gia Luan & Truong Thinh 2020, figures 6 to 15
+    """Assumed samples; the article gives only phi = 0.754 rad and rho in (0, 2)."""
+    # Chords from 2 to 16 m, as in the frames of the article's Table 1; five angles around 0.754 rad; ten densities;
+    # sixty tensions from 100 N to 10 kN, evenly spaced source: Gia Luan & Truong Thinh 2020, figures 6 to 15
     return Sampling(
         angles=[0.25, 0.5, ANGLE, 1.0, 1.25],
         chords=np.linspace(2.0, 16.0, 8),

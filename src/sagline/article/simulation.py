@@ -13,14 +13,15 @@ from sagline.article.models import MODELS
 from sagline.core.arrays import Array
 
 ROBOTS = ("article-suspended", "article-mixed")  # the article's first and second configuration
-# The article describes (55), closest to the previous tensions. Its figures, however, show unneeded cables near their
-# minimum, and curves that return to their initial values. This is the minimum norm of its variable T_x.
+# The article describes (55): the tensions closest to the previous ones. In its figures, however, unneeded cables are
+# near their minimum, and curves return to their initial values. This agrees with the minimum norm of the article's
+# variable T_x.
 METHOD = sl.MinimumNorm("horizontal")
 ERROR_BAND = 6e-3  # [m], the article's "(-6, 6) mm"
 
 
 class Figures(NamedTuple):
-    """A run in numbers, over its feasible poses."""
+    """Numbers of a run, over the feasible poses."""
 
     error_max: float  # largest distance of the platform from the planned position [m]
     error_mean: float  # mean distance [m]
@@ -28,10 +29,9 @@ class Figures(NamedTuple):
     tension_min: float  # smallest T_x [N]
     tension_max: float  # largest T_x [N]
     vertical_max: float  # largest |T_z| [N]
-    step_max: float  # largest change of T_x from one sample to the next [N]
+    step_max: float  # largest change of T_x between two samples [N]
     slope_max: float  # largest |dT_x/dt| [N/s]
-    # largest change of dT_x/dt from one step to the next [N/s]; at a corner of a curve it does not become zero with
-    # smaller steps
+    # largest change of dT_x/dt between two steps [N/s]; at a corner of a curve, it remains with smaller steps
     slope_jump: float
     length_min: float  # smallest L [m]
     length_max: float  # largest L [m]
@@ -58,13 +58,13 @@ class PathStudy:
     mixed: tuple[sl.Confirmation, ...]
 
     def of(self, kind: type[sl.CableModel]) -> tuple[sl.Confirmation, sl.Confirmation]:
-        """Both robots' runs with one model."""
+        """Runs of both robots with one model."""
         k = [type(model) for model in self.models].index(kind)
         return self.suspended[k], self.mixed[k]
 
     @property
     def tension_ratio(self) -> float:
-        """Ratio of the highest T_x of the mixed robot to that of the suspended one, with the empirical model."""
+        """Ratio of the highest T_x of the mixed robot to that of the suspended robot, with the empirical model."""
         suspended, mixed = (figures(run) for run in self.of(sl.Empirical))
         return mixed.tension_max / suspended.tension_max
 
@@ -76,15 +76,15 @@ class LowTension:
     tension_min: Array  # lower limit of the chord tension [N], shape (k,)
     suspended: Array  # largest error along one axis of the first configuration [m], shape (k,)
     mixed: Array  # largest error along one axis of the second configuration [m], shape (k,)
-    suspended_bound: Figures  # first configuration with the bound (54) as the lower limit, T_adj = 0
+    suspended_bound: Figures  # first configuration with the bound (54), for T_adj = 0, as the lower limit
     mixed_bound: Figures  # second configuration with this bound
 
 
 def path_study(rate: float = 100.0, models: Sequence[sl.CableModel] = MODELS) -> PathStudy:
-    """Plan both robots along the article's path and apply the lengths to exact cables.
+    """Plan both robots along the article's path, and apply the lengths to exact cables.
 
-    The plan is the article's "simple controller", which computes lengths from tensions. The resulting pose of the
-    platform is the equilibrium on exact cables with the same inertial forces.
+    The plan is the "simple controller" of the article, which computes lengths from tensions. The resulting pose of the
+    platform is the equilibrium on exact cables, with the same inertial forces.
 
     Source:
         Gia Luan & Truong Thinh 2020, section 7.1, figures 17 to 22.
@@ -108,7 +108,7 @@ def low_tension_study(limits: Array, rate: float = 10.0) -> LowTension:
 
 
 def figures(run: sl.Confirmation) -> Figures:
-    """A run in numbers."""
+    """Numbers of a run."""
     plan, good = run.plan, np.atleast_1d(run.plan.feasible & run.held)
     if not good.any():
         return Figures(*(float("nan"),) * 13, float(np.mean(plan.feasible)), 0.0)

@@ -1,4 +1,4 @@
-"""Chapter: figures 17 to 22."""
+"""Chapter about figures 17 to 22."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ LIMITS = np.array(
     [15.0, 17.0, 18.0, 18.5, 19.0, 19.5, 20.0, 22.5, 25.0, 30.0, 40.0, 50.0]
 )  # lower limits of the chord tension [N]
 CORNER = (5.0, 3.5, 1.5)  # corner of the path [m]
-FLOOR = 1e-9  # distances below a nanometer are not drawn [m]
-NEAR = 1.05  # tensions below this multiple of the lower limit count as near the minimum
+FLOOR = 1e-9  # smallest drawn distance [m]
+NEAR = 1.05  # tensions are near the minimum if they are below this multiple of the lower limit
 
 
 def simulation_chapter() -> Chapter:
-    """Both robots along the path."""
+    """Chapter about both robots along the path."""
     study, low = path_study(), low_tension_study(LIMITS)
     draw = Drawings("simulation")
     return chapter(

@@ -50,12 +50,12 @@ class TenPoses:
     model_error: Array  # error of the empirical model at the ten poses [m], shape (10, 3)
     height_line: FittedLine  # least-squares line of the measured vertical error over the height of the pose
     trends: tuple[Trend, ...]  # effects of single parameters
-    # all explanations by one, by two and by three parameters, each group sorted by the remaining error
+    # all explanations by one, two and three parameters; each group is sorted by the remaining error
     explanations: tuple[tuple[Explanation, ...], ...]
-    # part of the effect of a pulley radius on the positions that an offset of the lengths and an anchor height together
-    # can reproduce: length of the projection divided by the length of the whole vector
+    # an offset of the lengths together with an anchor height can reproduce this part of the effect of a pulley radius
+    # on the positions: length of the projected vector divided by the length of the vector
     imitated: float
-    single_zero: Array  # standard deviation of each length offset, with one offset per cable [m], shape (m,)
+    single_zero: Array  # standard deviations of the length offsets of all cables [m], shape (m,)
     dead_meter: Array  # predicted actual minus desired position with 1 m of dead length [m], shape (10, 3)
     measured_rms: float  # root mean square of the measured errors, over all coordinates [m]
 
@@ -64,14 +64,14 @@ class TenPoses:
         return self.explanations[count - 1][0]
 
     def explanation(self, *names: str) -> Explanation:
-        """The explanation by the parameters of these names."""
+        """The explanation by the parameters with these names."""
         return next(found for found in self.explanations[len(names) - 1] if found.names == set(names))
 
 
 def ten_poses(most: int = 3) -> TenPoses:
-    """Plan the prototype at the ten poses, and search for causes of its measured errors."""
-    # Every model with up to three of the parameters is fitted with the exact machine, within plausible limits.
-    # Positions are printed in whole millimeters, so that no fit can be better than 0.3 mm.
+    """Plan the prototype at the ten poses, and search for causes of the measured errors."""
+    # Every model with up to three parameters is fitted with the exact machine, within plausible limits. No fit can be
+    # better than 0.3 mm, because the printed positions are in whole millimeters.
     table, robot = table2(), sl.load_robot("article-prototype")
     plan, home = _planned(robot, table.desired), _planned(robot, np.array([HOME]))
 
@@ -117,7 +117,7 @@ def _trend(parameter: Parameter, error: Array, table: Table2) -> Trend:
 
 
 def _limits(robot: sl.Robot, error_of: ErrorOf, plan: sl.Plan, found: Explanation) -> tuple[float, Array]:
-    """Limits of ten poses near the best explanation by two parameters: `imitated` and `single_zero`."""
+    """Limits of ten poses near the best explanation by two parameters: values of `imitated` and `single_zero`."""
     at = dict(zip((p.name for p in found.parameters), found.values, strict=True))
     three = tuple(p for p in PARAMETERS if p.name in (PULLEY, ZERO, ANCHORS))
     slopes = tangents(error_of, [three], [np.array([at.get(p.name, 0.0) for p in three])])[0].slopes

@@ -1,4 +1,4 @@
-"""Chapter: the article's future work, the boundary of the workspace with sag and without."""
+"""Chapter about the future work of the article: boundary of the workspace with and without sag."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from sagline.workspaces.region import Plane, slice_of
 
 CELLS = 24  # cells along the longest edge of the frame
 HEIGHT = 3.0  # half the height of the frame [m]
-POINTS = 121  # points along each side of a slice
+POINTS = 121  # number of points along each side of a slice
 
 
 class _Workspaces(NamedTuple):
-    """One robot's workspace with sag and without."""
+    """Workspace of a robot with and without sag."""
 
-    exact: sl.Workspace  # workspace on exact catenaries
-    straight: sl.Workspace  # workspace on straight cables without weight
+    exact: sl.Workspace  # workspace with exact catenaries
+    straight: sl.Workspace  # workspace with straight cables without weight
 
 
 def workspace_chapter() -> Chapter:
-    """Volume and boundary of both simulated robots."""
+    """Chapter about volume and boundary of the workspaces of both simulated robots."""
     pairs = {name: _pair(name) for name in ROBOTS}
     draw = Drawings("workspace")
     return chapter("workspace", (_volumes(pairs), _boundaries(pairs, draw)))
@@ -87,7 +87,7 @@ def _boundaries(pairs: dict[str, _Workspaces], draw: Drawings) -> Finding:
 
 
 def _panel(pair: _Workspaces, normal: int, at: float, draw: Drawings) -> Panel:
-    """Both boundaries in a plane."""
+    """Drawing of both boundaries in a plane."""
     plane, box = Plane(normal, at), pair.exact.box
     first, second = plane.axes
     figure, ax = axes(PLACE[first], PLACE[second])
@@ -102,7 +102,7 @@ def _panel(pair: _Workspaces, normal: int, at: float, draw: Drawings) -> Panel:
 
 
 def _farthest(pair: _Workspaces) -> float:
-    """Largest distance of both boundaries along rays from the middle of the frame [m]."""
+    """Largest distance between both boundaries along rays from the middle of the frame [m]."""
     middle = np.array([0.0, 0.0, HEIGHT])
     ways = np.vstack((np.eye(3), -np.eye(3)))
     reach = np.linspace(0.0, float(np.max(pair.exact.box.high - pair.exact.box.low)), 2001)
@@ -110,7 +110,7 @@ def _farthest(pair: _Workspaces) -> float:
     ends = []
     for space in pair:
         level = space.levels()(places.reshape(-1, 3)).reshape(reach.size, len(ways))
-        first = (level < 0.0).argmax(axis=0)  # distance beyond the boundary
+        first = (level < 0.0).argmax(axis=0)  # distance that is beyond the boundary
         row = np.arange(len(ways))
         inner, outer = level[first - 1, row], level[first, row]
         end = reach[first - 1] + (reach[first] - reach[first - 1]) * inner / (inner - outer)

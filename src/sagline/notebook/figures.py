@@ -1,4 +1,4 @@
-"""Small figures of notebooks, which are drawn in at most a second for results of any size."""
+"""Small figures for notebooks; drawing takes at most a second for results of any size."""
 
 from __future__ import annotations
 
@@ -52,8 +52,8 @@ MOST_CABLES: Final = 16
 LEVELS: Final = 4  # number of drawn slices of a workspace
 
 LARGEST: Final = 200_000  # largest size of a figure [bytes]
-MOST_MARKS: Final = 1500  # largest number of points drawn as vectors; more points become one picture in the figure
-DOTS: Final = 110  # dots per inch of this picture
+MOST_MARKS: Final = 1500  # largest number of points that are drawn as vectors; more points are drawn as a bitmap
+DOTS: Final = 110  # dots per inch of the bitmap
 FONT: Final = "'DejaVu Sans', Verdana, sans-serif"
 _remarks = re.compile(r"<metadata>.*?</metadata>|<!--.*?-->|<defs>\s*<style.*?</style>\s*</defs>", flags=re.DOTALL)
 _gray = re.compile(r"\b(fill|stroke): #([0-9a-f]{2})\2\2(?![0-9a-f])")
@@ -61,7 +61,7 @@ _family = re.compile(r"font-family: 'DejaVu Sans'(?:, 'DejaVu Sans')?;? ?")
 
 
 def drawing_of(thing: object, description: str) -> str:
-    """The figure in the style and colors of the notebook as HTML; "" if there is none."""
+    """HTML of the figure in the style and colors of the notebook; "" without a figure."""
     with Using(STYLE):
         figure = figure_of(thing)
         return "" if figure is None else _html(figure, description)
@@ -69,7 +69,7 @@ def drawing_of(thing: object, description: str) -> str:
 
 @singledispatch
 def figure_of(thing: object) -> Figure | None:
-    """A small figure of an object; None for an object without one."""
+    """A small figure of an object; None for an object without a figure."""
     return None
 
 
@@ -115,7 +115,7 @@ def _(path: Path) -> Figure | None:
 
 @figure_of.register
 def _(space: Workspace) -> Figure | None:
-    """Boundary at some heights, from above; for a flat workspace, in its own plane."""
+    """Boundary at some heights, seen from above; a flat workspace is drawn in its own plane."""
     sides = [k for k, axis in enumerate(space.axes) if axis.size > 1]
     if space.volume <= 0.0 or len(sides) < 2:
         return None
@@ -143,7 +143,7 @@ def _(found: Calibration) -> Figure | None:
 def _time_lines(
     clock: Array, axis: str, values: Array, label: str, gaps: Flags, names: tuple[str, ...] | None = None
 ) -> Figure:
-    """Lines over time, with as many samples as are visible."""
+    """Lines over time, with at most as many samples as are visible."""
     figure = sheet(3.2)
     ax = figure.add_subplot()
     chosen = _chosen(values)
@@ -161,7 +161,7 @@ def _time_lines(
 
 
 def _chosen(values: Array) -> Indices:
-    """Evenly spaced samples (N, c), with the largest and smallest of each column."""
+    """Evenly spaced samples (N, c), and the samples with the largest and the smallest value of each column."""
     count = len(values)
     if count <= MOST_SAMPLES:
         return np.arange(count, dtype=np.int64)
@@ -178,7 +178,7 @@ def _whole(ax: object) -> Figure | None:
 
 
 def _html(figure: Figure, description: str) -> str:
-    """The figure as SVG, or as PNG if that is smaller; "" if both are too large."""
+    """The figure as SVG, or as PNG if the PNG is smaller; "" if both are too large."""
     lines = [line for ax in figure.findobj(lambda each: hasattr(each, "get_lines")) for line in ax.get_lines()]  # type: ignore[attr-defined]
     if sum(len(line.get_xdata()) for line in lines if line.get_marker() not in ("None", None)) > MOST_MARKS:
         for line in lines:
@@ -199,7 +199,7 @@ def _ink(gray: re.Match[str]) -> str:
 
 
 def _themed(svg: str, description: str) -> str:
-    """A drawing in the colors of the page: black becomes the text color, gray the text color with less opacity.
+    """Drawing in the colors of the page: black becomes the text color, gray becomes a transparent text color.
 
     Its identifiers become unique, so that one page can contain several drawings.
     """

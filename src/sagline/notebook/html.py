@@ -26,8 +26,8 @@ def html_of(thing: object) -> str | None:
 
 
 def _figure_of(thing: object, description: str) -> str:
-    """The figure; "" if there is none, or it cannot be drawn."""
-    with suppress(Exception):  # the summary is shown without it; Matplotlib may be missing
+    """HTML of the figure; "" without a figure, or if it cannot be drawn."""
+    with suppress(Exception):  # for example without Matplotlib; the summary is then shown alone
         from sagline.notebook.figures import drawing_of
 
         return drawing_of(thing, description)

@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 from sagline.core.numbers import n
 from sagline.files.writing import atomic_files, create_folder, json_text
 
-SENTENCE = 40  # smallest number of characters in a table cell with text
-NARROW = 3  # largest number of columns of a table beside the text
+SENTENCE = 40  # a table cell counts as text if it has at least this number of characters
+NARROW = 3  # largest number of columns of a table that is placed beside the text
 _subscript = re.compile(r"(?<=[A-Za-zα-ωΑ-Ω])_([A-Za-zα-ω0-9]{1,3}(?:,min)?)(?![A-Za-zα-ω0-9_])")
 
 
@@ -49,7 +49,7 @@ class Table(NamedTuple):
     Attributes:
         caption: Content of the table.
         head: Column heads with units.
-        rows: The cells; the first of each row names it.
+        rows: The cells; the first cell of a row is the name of the row.
     """
 
     caption: str
@@ -58,7 +58,7 @@ class Table(NamedTuple):
 
 
 def table_of(caption: str, *columns: tuple[str, Iterable[Any], str]) -> Table:
-    """Table from columns, each with its head, its values and their format for `n`; texts are unchanged."""
+    """Table from columns; a column is a head, its values, and their format for `n`; texts are not formatted."""
     cells = [[each if isinstance(each, str) else n(each, form) for each in values] for _, values, form in columns]
     return Table(caption, [head for head, _, _ in columns], list(zip(*cells, strict=True)))
 
@@ -72,7 +72,7 @@ class Finding:
         figures: Numbers of the article's figures that the finding repeats.
         tables: Numbers of the article's tables that the finding repeats.
         title: A few words.
-        statement: Statement of the article, with figure or equation; empty if there is none.
+        statement: Statement of the article, with figure or equation; empty without a statement.
         measured: The computed result.
         verdict: Verdict on the statement.
         panels: Drawings.
@@ -99,7 +99,7 @@ class Chapter:
     Attributes:
         key: Name of the chapter.
         title: Heading of the chapter.
-        lead: Topic of the chapter.
+        lead: Introduction of the chapter.
         findings: Findings of the chapter.
     """
 
@@ -109,7 +109,7 @@ class Chapter:
     findings: tuple[Finding, ...]
 
 
-MANY = {  # verdicts on more than one finding
+MANY = {  # texts of verdicts in the plural
     Verdict.HOLDS: "hold",
     Verdict.HOLDS_WITHIN: "hold within limits",
     Verdict.FAILS: "do not hold",
@@ -137,7 +137,7 @@ def page(
     *,
     summary: bool = True,
 ) -> str:
-    """The whole page: the result on one screen, then every finding."""
+    """The whole page: a summary on one screen, then all findings."""
     style = files("sagline.present").joinpath("page.css").read_text(encoding="utf-8")
     before = f"{_result(chapters, picture)}\n{_contents(chapters)}\n" if summary else ""
     body = "\n".join(_chapter(number, chapter) for number, chapter in enumerate(chapters, start=1))
@@ -153,7 +153,7 @@ def page(
 
 
 def write_page(folder: Path | str, names: tuple[str, str], text: str, numbers: dict[str, Any]) -> tuple[Path, Path]:
-    """Write a page and its numbers as JSON into a folder, which is created if missing: both files or neither.
+    """Write a page, and its numbers as JSON, to a folder, which is created if missing; both files or none are written.
 
     Raises:
         FileError: If the folder cannot be written.
@@ -194,7 +194,7 @@ def _counted(verdict: Verdict, count: int) -> str:
 
 
 def _contents(chapters: Sequence[Chapter]) -> str:
-    """Every finding with its verdict, one line each."""
+    """List of all findings with their verdicts, one per line."""
     parts = []
     for number, chapter in enumerate(chapters, start=1):
         lines = "".join(
@@ -216,7 +216,7 @@ def _chapter(number: int, chapter: Chapter) -> str:
 
 
 def _finding(finding: Finding) -> str:
-    """Heading, statement, result, drawings and tables; one drawing or a narrow table is next to the text."""
+    """HTML of a finding; a single drawing or a narrow table is beside the text."""
     said = f'<div class="said"><h4>The article</h4><p>{_text(finding.statement)}</p></div>' if finding.statement else ""
     paragraphs = "".join(f"<p>{_text(part)}</p>" for part in finding.measured.split("\n\n"))
     pair = f'<div class="pair">{said}<div class="found"><h4>Computed</h4>{paragraphs}</div></div>'
@@ -250,7 +250,7 @@ def _headline(finding: Finding) -> str:
 
 
 def _text(text: str) -> str:
-    """Text with typeset subscripts: T_x, b_π, ε_max."""
+    """HTML of a text with subscripts, as in T_x, b_π, ε_max."""
     return _subscript.sub(r"<sub>\1</sub>", escape(text))
 
 
@@ -259,7 +259,7 @@ def _badge(finding: Finding) -> str:
 
 
 def _cell(text: str) -> str:
-    """A number on one line, or a sentence that may wrap."""
+    """Table cell: a number does not wrap, a sentence may wrap."""
     return f'<td class="words">{_text(text)}</td>' if len(text) > SENTENCE else f"<td>{_text(text)}</td>"
 
 

@@ -1,4 +1,4 @@
-"""A summary of each result type: title, verdict, rows with values, and further lines; as text and as JSON."""
+"""Summaries of results: title, verdict, rows with values, and further lines, as text and as JSON."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ MOST_LINES: Final = 12  # largest number of lines of the text of a result
 WIDTH: Final = 80  # largest number of columns of its lines
 MOST_GAPS = 5  # largest number of listed items
 MOST_MODES = 8
-LAST = 1.0  # time at the end of a simulation for the residual vibration [s]
+LAST = 1.0  # duration at the end of a simulation for the residual vibration [s]
 
 
 class Row(NamedTuple):
@@ -49,7 +49,7 @@ class Row(NamedTuple):
         key: Name in JSON, with the unit.
         label: Label for readers.
         value: Value in JSON.
-        text: Text of the value for readers, with the unit; "" for values for programs only.
+        text: Text of the value with the unit, for readers; "" for a value that is only for programs.
     """
 
     key: str
@@ -82,7 +82,7 @@ class Summary(NamedTuple):
 
     @property
     def json(self) -> dict[str, Any]:
-        """The values by their keys."""
+        """The values, by key."""
         return {row.key: row.value for row in self.rows}
 
 
@@ -157,7 +157,7 @@ def _(robot: Robot) -> Summary:
 
 
 def middle_plan(robot: Robot) -> Plan | None:
-    """Plan of the middle of a robot's test box; None without a box."""
+    """Plan at the middle of a robot's test box; None without a test box."""
     box = robot.test_box
     if box is None or robot.cable_count < robot.degrees_of_freedom:
         return None
@@ -261,7 +261,7 @@ def _(simulation: Simulation) -> Summary:
 
 
 def _largest_tensions(simulation: Simulation) -> Array:
-    """Largest tension of each cable at any step of a simulation [N], shape (m,)."""
+    """Largest tension of each cable over all steps of a simulation [N], shape (m,)."""
     if simulation.largest_tension is not None:
         return simulation.largest_tension
     largest: Array = np.nanmax(simulation.tensions, axis=0)
@@ -269,7 +269,7 @@ def _largest_tensions(simulation: Simulation) -> Array:
 
 
 def cable_mass_text(cable_mass: str) -> str:
-    """Model of the cable mass in words."""
+    """Text of the model of the cable mass."""
     return "massless" if cable_mass == "none" else f"with cable mass ({cable_mass})"
 
 

@@ -1,4 +1,4 @@
-"""Kernels in a page: their arguments, laid out in the memory of a WebAssembly module, for page/kernels.js."""
+"""Calls of kernels in a page: layout of the arguments in the memory of a WebAssembly module, for page/kernels.js."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from sagline.core.errors import FileError
 
-Call = tuple[str, tuple[Any, ...]]  # name of the entry in C without its prefix, arguments as in Python
+Call = tuple[str, tuple[Any, ...]]  # name of the entry in C without prefix, and arguments as in Python
 AnyArray = NDArray[Any]
 
 MODULE: Final = files("sagline.share").joinpath("page").joinpath("kernels.wasm")
@@ -22,10 +22,10 @@ _ALIGNED: Final = 16  # bytes
 
 
 def check_module() -> None:
-    """FileError with the command that makes the WebAssembly module if it is missing."""
+    """FileError for a missing WebAssembly module, with the command that makes it."""
     if not MODULE.is_file():
         step = "Run python -m tools.build in the source checkout, or install a wheel of sagline."
-        raise FileError(str(MODULE), "is missing: shared pages compute with it", step)
+        raise FileError(str(MODULE), "is missing, but shared pages need it", step)
 
 
 def module_text() -> str:
@@ -35,12 +35,12 @@ def module_text() -> str:
 
 
 def described_calls(calls: Mapping[str, Call], names: Mapping[str, AnyArray]) -> dict[str, Any]:
-    """Description of calls: where each array is, what the write-protected ones contain, and all arguments in C.
+    """Description of calls: addresses of all arrays, contents of write-protected arrays, and arguments in C.
 
-    calls: by the name of a function in the page; names: arrays for the page to read or write, or views of them, which
-    are contiguous. Arrays that are not write-protected begin as zeros.
+    calls: by the name of the function in the page. names: arrays, or contiguous views, that the page reads or writes.
+    Arrays without write protection begin with zeros.
     """
-    places: dict[int, int] = {}  # of the owners of memory, by their identity
+    places: dict[int, int] = {}  # addresses of the arrays that own memory, by identity
     filled: dict[int, str] = {}
     size = 0
     leaves = {name: list(_leaves(arguments)) for name, (_, arguments) in calls.items()}
@@ -74,7 +74,7 @@ def described_calls(calls: Mapping[str, Call], names: Mapping[str, AnyArray]) ->
 
 
 def _leaves(value: Any) -> Iterator[Any]:
-    """Arrays and numbers of nested tuples, in order; None is not an argument in C."""
+    """Arrays and numbers of nested tuples, in order; None is omitted, because it is not an argument in C."""
     if isinstance(value, tuple):
         for each in value:
             yield from _leaves(each)

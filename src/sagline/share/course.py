@@ -1,4 +1,4 @@
-"""Samples that a shared page plays: poses, tensions and lengths over time, with a verdict for each."""
+"""Samples for playback in a shared page: poses, tensions and lengths over time, and a verdict for each sample."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from sagline.statics.tables import chord_geometry
 if TYPE_CHECKING:
     from sagline.viewer.session import PlayedLog
 
-MOST_RATE: Final = 100.0  # samples per second; twice this rate or more is thinned out, as screens show 60
+MOST_RATE: Final = 100.0  # samples per second; samples are omitted from twice this rate on, because screens show 60
 
 
 class _SampleVerdict(NamedTuple):
     """Verdict on a sample."""
 
-    good: bool | None  # None: not known
+    good: bool | None  # None if unknown
     words: str
 
 
@@ -42,11 +42,11 @@ class SharedMotion:
     kind: str  # "run", "simulation" or "log"
     time: Array  # times from 0 [s], shape (N,)
     position: Array  # position of the platform's origin [m], shape (N, 3); NaN if it is not known
-    quaternion: Array  # its rotation, scalar last, shape (N, 4)
-    tension: Array  # for numbers and colors [N], shape (N, m)
-    quantity: str  # name of this tension in words
+    quaternion: Array  # rotation of the platform, scalar last, shape (N, 4)
+    tension: Array  # tension for numbers and colors [N], shape (N, m)
+    quantity: str  # description of this tension
     chord_tension: Array  # chord tensions of the drawn catenaries [N], shape (N, m); NaN for a straight line
-    length: Array  # unstrained, off the drum [m], shape (N, m)
+    length: Array  # unstrained length off the drum [m], shape (N, m)
     verdict: NDArray[np.intp]  # indices of `verdicts`, shape (N,)
     verdicts: tuple[_SampleVerdict, ...]
     notes: tuple[str, ...] = ()
@@ -58,7 +58,7 @@ class SharedMotion:
         return Pose.from_quaternion(self.position[index], self.quaternion[index])
 
     def thinned(self) -> SharedMotion:
-        """Every n-th sample and the last one, if the rate exceeds that of screens, and a note on this."""
+        """Every n-th sample and the last one, if there are more than screens show, and a note about this."""
         count, duration = len(self.time), float(self.time[-1])
         every = int((count - 1) / (MOST_RATE * duration)) if duration > 0.0 else 1
         if every <= 1:
@@ -73,7 +73,7 @@ class SharedMotion:
 
 
 def of_plan(plan: Plan) -> SharedMotion:
-    """A plan of N poses, one second each without times."""
+    """Samples of a plan of N poses; poses without times have intervals of one second."""
     count = len(plan.state.pose)
     time = np.arange(count, dtype=np.float64) if plan.path is None else plan.path.time
     verdicts = [_SampleVerdict(True, "Feasible")]
@@ -106,7 +106,7 @@ def _why(gap: Gap) -> str:
 
 
 def of_simulation(simulation: Simulation) -> SharedMotion:
-    """A simulation; cables with mass are drawn as massless catenaries of the same lengths."""
+    """Samples of a simulation; cables with mass are drawn as massless catenaries of the same lengths."""
     robot, time = simulation.robot, simulation.time
     broken = np.zeros_like(simulation.tensions, dtype=bool)
     verdicts = [_SampleVerdict(None, "Simulated")]
@@ -128,7 +128,7 @@ def of_simulation(simulation: Simulation) -> SharedMotion:
 
 
 def chord_tension(robot: Robot, pose: Pose, length: Array) -> Array:
-    """Chord tensions of massless cables of these lengths off the drum, (N, m); NaN for NaN or too short lengths.
+    """Chord tensions (N, m) of massless cables with these lengths off the drum; NaN for NaN, and for too short lengths.
 
     Cables leave their pulleys along the chord.
     """
@@ -143,7 +143,7 @@ def chord_tension(robot: Robot, pose: Pose, length: Array) -> Array:
 
 
 def of_session(session: PlayedLog) -> SharedMotion:
-    """A log of the controller: planned poses of the platform, or estimated ones without a plan."""
+    """Samples of a log of the controller, at planned poses, or without a plan at estimated poses."""
     from sagline.viewer.session import WRONG
 
     planned = np.isfinite(session.planned).all(axis=1, keepdims=True)
@@ -154,7 +154,7 @@ def of_session(session: PlayedLog) -> SharedMotion:
     states = [State(int(code)) for code in codes]
     verdicts = tuple(_SampleVerdict(False if state in WRONG else None, f"Controller: {state.name}") for state in states)
     unknown = ~np.isfinite(position).all(axis=1)
-    if unknown.any():  # no earlier pose is known
+    if unknown.any():  # without an earlier pose
         somewhere = session.pose_at(int(np.argmax(unknown)))
         position[unknown], quaternion[unknown] = somewhere.position, somewhere.quaternion
     drawn = chord_tension(session.robot, Pose.from_quaternion(position, quaternion), session.length)

@@ -30,7 +30,7 @@ from sagline.viewer import shapes
 from sagline.viewer.tension_scale import ForceUnit, TensionScale
 
 DIGITS: Final = 12  # significant digits of the numbers in a page
-FINEST: Final = 1e-5  # resolution of its solids, as a share of the robot's size
+FINEST: Final = 1e-5  # resolution of the solids, relative to the robot's size
 WIDE: Final = 640.0  # px
 EDGE: Final = 12.0  # px, margin
 _RIGHT: Final = np.array([0.9, 0.436, 0.0])
@@ -39,7 +39,7 @@ _EDGES: Final = [(a, b) for a in range(8) for b in range(a) if (a ^ b) in (1, 2,
 
 
 def drawing_data(robot: Robot) -> dict[str, Any]:
-    """Kernel that draws the cables of a run, for page/robot.js, with the data of the robot."""
+    """Kernel for the drawing of the cables of a run, for page/robot.js, with the data of the robot."""
     pose, tension = np.zeros((1, tables.POSE_COLUMNS)), np.zeros(robot.cable_count)
     arguments = _draw_arguments(robot, robot_terms(robot), pose[0], tension)
     return _described(robot, {"draw": ("cable_courses", arguments)}, pose, arguments)
@@ -93,7 +93,7 @@ def model_data(robot: Robot) -> dict[str, Any]:
 def _described(
     robot: Robot, calls: dict[str, Call], pose: Array, draw: tuple[Any, ...], arrays: dict[str, AnyArray] | None = None
 ) -> dict[str, Any]:
-    """Calls and arrays, those of the drawing too, and the anchors and pulley radii that are drawn [m]."""
+    """Calls and arrays, including the drawing, and the drawn anchors and pulley radii [m]."""
     drawn = {"pose": pose, "drawn": draw[3], "points": draw[-1]}
     return {
         "kernels": described_calls(calls, drawn | (arrays or {})),
@@ -110,14 +110,14 @@ def solids_data(robot: Robot) -> dict[str, Any]:
     meshes = {name: _triangles(each, size) for name, each in drawn.items() if len(each.faces)}
     least, most = body.vertices.min(axis=0), body.vertices.max(axis=0)
     middle, grip = 0.5 * (least + most), 0.5 * float(np.linalg.norm(most - least))
-    there = np.vstack((low, high, home_pose(robot).transform(body.vertices)))  # a platform may extend beyond its frame
+    there = np.vstack((low, high, home_pose(robot).transform(body.vertices)))  # a platform may be larger than the frame
     seen = [json_numbers(there.min(axis=0)), json_numbers(there.max(axis=0))]
     box = {"low": json_numbers(low), "high": json_numbers(high), "seen": seen}
     return {**box, "middle": json_numbers(middle), "grip": json_numbers(grip), **meshes}
 
 
 def colors(robot: Robot) -> dict[str, Any]:
-    """Colors of tensions with their numbers."""
+    """Color scale of tensions, with numbers."""
     scale, unit = TensionScale.of(robot), ForceUnit.up_to(float(_highest(robot)))
     shares = np.linspace(0.0, 1.0, 24)
     steps = scale.low * (scale.high / scale.low) ** shares
@@ -148,12 +148,12 @@ def _highest(robot: Robot) -> float:
 
 
 def _triangles(solid: shapes.Solid, size: float) -> tuple[dict[str, object], str]:
-    """Corners of all triangles, encoded."""
+    """Encoded corners of all triangles."""
     return encode_columns([PackedColumn("corners", solid.vertices[solid.faces].reshape(-1, 3), FINEST * size)])
 
 
 def courses_at(robot: Robot, pose: Pose, tension: Array) -> Array:
-    """Points of exact cables at chord tensions (m,), straight where NaN, (m, points_per_cable, 3)."""
+    """Points (m, points_per_cable, 3) of exact cables at chord tensions (m,); straight lines for NaN."""
     arguments = _draw_arguments(robot, robot_terms(robot), pose_rows(pose)[0], tension)
     cable_courses(*arguments)
     points: Array = arguments[-1]
@@ -161,7 +161,7 @@ def courses_at(robot: Robot, pose: Pose, tension: Array) -> Array:
 
 
 def _draw_arguments(robot: Robot, terms: tuple[Array, Array, Array], pose: Array, tension: Array) -> tuple[Any, ...]:
-    """Arguments of `cable_courses`, the points last; pose: a pose row."""
+    """Arguments of `cable_courses`; the points are the last argument; pose: a pose row."""
     m, points = robot.cable_count, shapes.points_per_cable(robot)
     work = np.empty((3, 3)), np.empty((GEOMETRY_ROWS, m)), np.empty((m, points, 3))
     return terms[2][0], terms[1][0], pose, tension, points - shapes.POINTS, *work
@@ -191,7 +191,7 @@ def robot_drawing(robot: Robot, pose: Pose, tension: Array) -> str:
 
 
 def _seen(points: Array) -> Array:
-    """Projection to the right and down, shape (..., 2)."""
+    """Projected coordinates to the right and down, shape (..., 2)."""
     return np.stack((points @ _RIGHT, -(points @ _UP)), axis=-1)
 
 

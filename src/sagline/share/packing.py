@@ -1,4 +1,4 @@
-"""Encoding of samples in a page, for page/states.js: whole numbers, differences in time, deflate."""
+"""Encoding of samples in a page, for page/states.js: as whole numbers, differences in time, and deflate."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sagline.core.arrays import Array
 
 Codes = NDArray[np.int64]
 
-_ORDERS: Final = (0, 1, 2, 3)  # orders of differences; the order with the smallest values is used
+_ORDERS: Final = (0, 1, 2, 3)  # possible orders of differences; the order with the smallest data is used
 _LEVEL: Final = 9
 
 
@@ -22,13 +22,13 @@ class PackedColumn(NamedTuple):
     """A quantity over time in a page."""
 
     name: str
-    values: Array  # shape (N,) or (N, k); NaN if there is none
+    values: Array  # shape (N,) or (N, k); NaN for a missing value
     step: float  # resolution, in the unit of the values, or relative to the value
-    scale: Literal["linear", "relative"] = "linear"  # "linear", or "relative" of values above zero
+    scale: Literal["linear", "relative"] = "linear"  # "linear", or "relative" for values above zero
 
 
 def encode_columns(channels: Sequence[PackedColumn]) -> tuple[dict[str, object], str]:
-    """Description of columns, and their encoded values."""
+    """Description and encoded values of columns."""
     described, planes = [], []
     for channel in channels:
         values = channel.values.reshape(len(channel.values), -1)
@@ -44,7 +44,7 @@ def encode_columns(channels: Sequence[PackedColumn]) -> tuple[dict[str, object],
 
 
 def _codes(channel: PackedColumn, values: Array) -> tuple[Codes, int | None]:
-    """The nearest whole numbers of steps, and the code of a missing value; None if there are no missing values."""
+    """Nearest whole numbers of steps, and the code of a missing value, or None if no value is missing."""
     known = np.isfinite(values)
     if channel.scale == "relative":
         known &= values > 0.0
@@ -59,7 +59,7 @@ def _codes(channel: PackedColumn, values: Array) -> tuple[Codes, int | None]:
 
 
 def _least(column: Codes) -> tuple[int, int, Codes]:
-    """Order of the smallest differences, their size in bytes, and the differences with the sign in the lowest bit."""
+    """Order with the smallest differences, their size [bytes], and the differences, with the sign in the lowest bit."""
     found = []
     for order in _ORDERS:
         rest = column

@@ -28,9 +28,9 @@ SCRIPTS: Final = (  # in the order of their dependencies
     "renderer.js", "camera.js", "scene.js", "panel.js",
     "pointers.js", "player.js", "share.js",
 )  # fmt: skip
-MADE: Final = '<meta name="generator" content="sagline'  # mark of our pages
-POSITION, TURN, LENGTH, TENSION, TIME = 1e-5, 1e-6, 1e-5, 1e-4, 1e-6  # resolutions: m, -, m, relative, s
-WOUND: Final = 0.002  # largest change of a length by the slider, as a share of the robot's size
+MADE: Final = '<meta name="generator" content="sagline'  # mark of pages of sagline
+POSITION, TURN, LENGTH, TENSION, TIME = 1e-5, 1e-6, 1e-5, 1e-4, 1e-6  # resolutions [m, -, m, relative, s]
+WOUND: Final = 0.002  # largest change of a length with the slider, relative to the robot's size
 SPEEDS: Final = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)
 RING: Final = '<div class="ring" data-part="ring" aria-hidden="true"></div>'
 HOME: Final = '<button type="button" class="home" data-part="home">Home</button>'
@@ -38,7 +38,7 @@ AROUND: Final = "Drag, or press the arrow keys, to look around; pinch, scroll or
 
 
 def robot_page(robot: Robot) -> str:
-    """Page of a robot whose platform can be dragged; its scripts compute the tensions."""
+    """Page of a robot with a platform that can be dragged; scripts of the page compute the tensions."""
     at = home_pose(robot)
     plan = inverse(robot, at)
     facts = {**_facts(robot, model_data(robot)), "home": {"position": json_numbers(at.position)}}
@@ -62,7 +62,7 @@ def robot_page(robot: Robot) -> str:
 
 
 def course_page(course: SharedMotion, title: str) -> str:
-    """Page that plays a run."""
+    """Page for the playback of a run."""
     robot, kept = course.robot, course.thinned()
     first = kept.pose_at(0)
     header, text = encode_columns(
@@ -135,7 +135,7 @@ def _about(robot: Robot) -> str:
 def _sliders(robot: Robot) -> str:
     """Sliders of the free translations, and of the rotation about the vertical."""
     (low, high), at, freedom = bounds(robot), home_pose(robot).position, robot.freedom
-    free = np.linalg.norm(freedom.T @ freedom, axis=1) > 1.0 - 1e-9  # axes of free motion only, no combinations
+    free = np.linalg.norm(freedom.T @ freedom, axis=1) > 1.0 - 1e-9  # only motions along single axes
     found = [
         _slider(f"<i>{name}</i>", axis, min(low[axis], at[axis]), max(high[axis], at[axis]), 1e-3)
         for axis, name in enumerate("xyz")
@@ -147,13 +147,13 @@ def _sliders(robot: Robot) -> str:
 
 
 def _guides(robot: Robot) -> tuple[str, ...]:
-    """Note on guides, between which the kernels have no catenaries."""
+    """Note on guides; the kernels have no catenaries between them."""
     given = robot.winches is not None and robot.winches.guides is not None
     return ("Cables between guides count as straight.",) * given
 
 
 def _winch(robot: Robot) -> str:
-    """Choice of a cable, and a slider of the change of its length [mm]."""
+    """Choice of a cable, and a slider for the change of its length [mm]."""
     names = "".join(f'<option value="{i}">{i}</option>' for i in range(robot.cable_count))
     most = 1e3 * round_below(WOUND * size_of(robot))
     return (
@@ -196,6 +196,6 @@ def _table(robot: Robot, tension: Array, length: Array) -> str:
 def _precision() -> str:
     """Largest rounding errors of the values in a page, in words."""
     return (
-        f"Kept to {0.5e6 * POSITION:g} µm of positions and lengths, {0.5e6 * TURN:g} µrad of rotations, "
+        f"Rounded to {0.5e6 * POSITION:g} µm of positions and lengths, {0.5e6 * TURN:g} µrad of rotations, "
         f"{50.0 * TENSION:g} % of tensions. The catenaries are computed in this page."
     )
