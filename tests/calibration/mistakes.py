@@ -124,6 +124,16 @@ def kilonewtons(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> 
     return Mistake(log.replace(load_cells=1e-3 * _cells(log)), ("load cells seem to be in kN",))
 
 
+def customary_units(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> Mistake:
+    """Load cells or reported lengths in units that differ from those of SI by less than a factor of fifty."""
+    units = {"kgf": 9.80665, "lbf": 4.4482216} | ({} if log.counts is not None else {"ft": 0.3048, "in": 0.0254})
+    unit = str(rng.choice(list(units)))
+    if unit in ("kgf", "lbf"):
+        return Mistake(log.replace(load_cells=_cells(log) / units[unit]), (f"load cells seem to have the unit {unit}",))
+    changed = log.replace(unstrained_length=log.readings / units[unit])
+    return Mistake(changed, (f"lengths seem to have the unit {unit}",))
+
+
 Maker = Callable[[sl.WinchLog, sl.Robot, np.random.Generator], Mistake]
 MISTAKES: Final[tuple[Maker, ...]] = (
     swapped_encoders,
@@ -137,4 +147,5 @@ MISTAKES: Final[tuple[Maker, ...]] = (
     commanded_in_millimeters,
     deviations_in_millimeters,
     kilonewtons,
+    customary_units,
 )

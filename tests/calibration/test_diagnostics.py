@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from tests.calibration.mistakes import (
     MISTAKES,
     Maker,
     commanded_in_millimeters,
+    customary_units,
     deviations_in_millimeters,
     far_zero,
     kilonewtons,
@@ -28,6 +30,7 @@ from tests.calibration.synthetic import USUAL, log_of, true_robot, usual_sensors
 from tests.refusal import refused
 from tests.tiers import extended, wide
 
+EXAMPLES = Path(__file__).parents[2] / "examples"
 SENSORS = usual_sensors(position_deviation=1e-3)
 ROBOTS = (
     with_drums(),
@@ -93,6 +96,7 @@ def told_wrongly(makers: tuple[Maker, ...], seeds: range) -> list[str]:
 def test_the_units_of_readings_are_told() -> None:
     units = (millimeters, positions_in_millimeters, commanded_in_millimeters, deviations_in_millimeters, kilonewtons)
     assert told_wrongly((*units, far_zero), range(4)) == []
+    assert told_wrongly((customary_units,), range(2)) == []
 
 
 @pytest.mark.parametrize("make", wide(MISTAKES[:5]), ids=lambda make: make.__name__)
@@ -150,3 +154,12 @@ def test_what_is_none_is_refused() -> None:
             diagnose_log(robot, given, model)
     with refused("log", "of 8 cables", kind=sl.InvalidValueError):
         diagnose_log(sl.load_robot("falcon-7"), log)
+
+
+def test_exchanged_load_cells_that_leave_poses_without_equilibrium_are_a_refusal() -> None:
+    robot, log = sl.load_robot(EXAMPLES / "winches_robot.yaml"), sl.load_log(EXAMPLES / "winches.csv")
+    assert log.load_cells is not None
+    cells = log.load_cells[:, [2, 1, 0, 3, 4, 5, 6, 7]]
+    with refused("log", kind=sl.InvalidValueError) as caught:
+        sl.calibrate(robot, log.replace(load_cells=cells), folds=0)
+    assert "cables 0 and 2" in caught.value.value

@@ -9,7 +9,14 @@ import numpy as np
 
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary, model_of
-from sagline.calibration.diagnostics import GOOD, diagnose_log, fits_without_measured_poses, frame_mismatch, wrong_units
+from sagline.calibration.diagnostics import (
+    GOOD,
+    STRANGE,
+    diagnose_log,
+    fits_without_measured_poses,
+    frame_mismatch,
+    wrong_units,
+)
 from sagline.calibration.evaluation import calibration_of
 from sagline.calibration.findings import Omission
 from sagline.calibration.least_squares import misfit
@@ -106,7 +113,8 @@ def calibrate(
     except InvalidValueError:
         _refuse_mistakes(robot, log, fit_log, parameters, model)
         raise
-    if not found.fit.converged or misfit(found.fit.normal) > GOOD:
+    departure = float(np.abs(problem.missed(found.fit.state.numbers)).max())
+    if not found.fit.converged or misfit(found.fit.normal) > GOOD or departure > STRANGE:
         _refuse_mistakes(robot, log, fit_log, parameters, model)
     elif Omission.OTHER_EQUILIBRIUM in found.left_out:
         _refuse(frame_mismatch(fit_log, found.left_out[Omission.OTHER_EQUILIBRIUM], parameters.names))

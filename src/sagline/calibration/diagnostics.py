@@ -10,7 +10,7 @@ import numpy as np
 
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary, model_of
-from sagline.calibration.hypotheses import Hypothesis, Trial
+from sagline.calibration.hypotheses import CELL_UNITS, LENGTH_UNITS, Hypothesis, Trial
 from sagline.calibration.log import WinchLog, load_cells_of
 from sagline.calibration.screening import screen
 from sagline.core.arguments import instance
@@ -24,6 +24,7 @@ POOR: Final = 50.0  # a larger limit than GOOD; it applies if a correction reduc
 # largest mean square of the departures from the priors, in prior deviations. If the anchors are wrong by 0.25 m, a fit
 # with swapped cables may agree with the readings by chance
 NEAR: Final = 0.25
+STRANGE: Final = 6.0  # prior deviations: a value that departs by more suggests a mistake in the log, although it fits
 # smallest ratio of the robot's size to the deviation of lengths or positions; below it, they are not informative
 ROUGH: Final = 10.0
 FAR: Final = 0.25  # smallest reported error of a zero, relative to the length; tape measures have smaller errors
@@ -37,8 +38,9 @@ def diagnose_log(robot: Robot, log: WinchLog, model: CableModel | str = _CATENAR
     The first check compares the readings with their expected sizes. It detects lengths and positions in mm, and load
     cells in kN. Then a robot similar to the given one is fitted to about 24 rows. If no such robot fits, corrections of
     single mistakes are tested: columns of two cables exchanged (encoders, load cells or both), an encoder that counts
-    backward, zeros with large errors, or load cells up to five rows early or late. The first correction that gives a
-    fit is reported. Zeros with large errors, and lengths with the wrong sign, are found only with commanded poses.
+    backward, zeros with large errors, load cells up to five rows early or late, or units (kgf, lbf, ft, in). The first
+    correction that gives a fit is reported. Zeros with large errors, and lengths with the wrong sign, are found only
+    with commanded poses.
     """
     instance(robot, Robot, "robot")
     instance(log, WinchLog, "log")
@@ -142,6 +144,8 @@ def _single_mistake(trial: Trial) -> Iterator[str]:
     if whole.quality <= GOOD:
         if far.any():
             yield _zero_text(whole.zeros, far)
+        elif whole.departure > NEAR:
+            yield from _other_unit(trial, whole.departure)
         return
     enough = max(GOOD, min(POOR, 0.01 * whole.quality))
     for changes, steps in ((_length_changes(trial), 0), (_load_cell_changes(trial), 1)):
@@ -157,9 +161,20 @@ def _single_mistake(trial: Trial) -> Iterator[str]:
             return
 
 
+def _other_unit(trial: Trial, departure: float) -> Iterator[str]:
+    """Sentence about a unit with which a robot near the given one fits as well; departure: without the change."""
+    for unit in CELL_UNITS:
+        found = trial.result(Hypothesis(cell_unit=unit))
+        if unit and found.quality <= GOOD and found.departure < min(NEAR, 0.5 * departure):
+            yield _change_text(Hypothesis(cell_unit=unit), trial.log)
+            return
+
+
 def _length_changes(trial: Trial) -> Iterator[Hypothesis]:
     """Possible mistakes in lengths or counts; some of them include an exchange of the load cells of the same cables."""
     m = trial.robot.cable_count
+    if trial.log.counts is None:
+        yield from (Hypothesis(length_unit=unit) for unit in LENGTH_UNITS if unit)
     for two in combinations(range(m), 2):
         yield Hypothesis(lengths=two)
         if trial.log.load_cells is not None:
@@ -178,6 +193,7 @@ def _load_cell_changes(trial: Trial) -> Iterator[Hypothesis]:
     """Possible mistakes in the load cells alone."""
     if trial.log.load_cells is None:
         return
+    yield from (Hypothesis(cell_unit=unit) for unit in CELL_UNITS if unit)
     for two in combinations(range(trial.robot.cable_count), 2):
         yield Hypothesis(cells=two)
     for late in range(1, SHIFTS + 1):
@@ -210,6 +226,13 @@ def _zero_text(zeros: Array, far: Flags) -> str:
 
 def _change_text(change: Hypothesis, log: WinchLog) -> str:
     kind = "count" if log.counts is not None else "length"
+    for unit, factor, what, column in (
+        (change.cell_unit, CELL_UNITS[change.cell_unit], "load cells", "load_cell_0"),
+        (change.length_unit, LENGTH_UNITS[change.length_unit], "lengths", "length_0"),
+    ):
+        if unit:
+            text = f"{what} seem to have the unit {unit}: multiply them by {factor:.6g}"
+            return f"{text}, or write their unit, {column} [{unit}]"
     if change.lengths is not None:
         i, j = change.lengths
         what, columns = ("encoders of ", f"{kind}_{i} and {kind}_{j}")

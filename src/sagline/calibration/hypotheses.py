@@ -22,7 +22,6 @@ from sagline.calibration.problem import (
     start_of,
 )
 from sagline.core.arrays import Array, Indices
-from sagline.core.errors import InvalidValueError
 from sagline.robot.drum import drums_of
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
@@ -45,6 +44,10 @@ _WIDE: Final = {
 }
 
 
+CELL_UNITS: Final = {"": 1.0, "kgf": 9.80665, "lbf": 4.4482216152605}  # [N]
+LENGTH_UNITS: Final = {"": 1.0, "ft": 0.3048, "in": 0.0254}  # [m]
+
+
 class Hypothesis(NamedTuple):
     """A change of the readings.
 
@@ -54,6 +57,8 @@ class Hypothesis(NamedTuple):
         flipped: A cable whose encoder counts backward, or None.
         moved: Cables with zeros that are computed from the commanded poses.
         late: Number of rows by which the load cells lag behind the encoders.
+        cell_unit: Unit of the load cells in `CELL_UNITS`; "" for newtons.
+        length_unit: Unit of the lengths in `LENGTH_UNITS`; "" for meters.
     """
 
     lengths: tuple[int, int] | None = None
@@ -61,6 +66,8 @@ class Hypothesis(NamedTuple):
     flipped: int | None = None
     moved: tuple[int, ...] = ()
     late: int = 0
+    cell_unit: str = ""
+    length_unit: str = ""
 
 
 class _TrialResult(NamedTuple):
@@ -101,7 +108,7 @@ class Trial:
         problem, poses, moved = self._problem(change, MOST_ROWS)
         try:
             state, normal = _fitted(problem, start_of(problem, poses))
-        except (InvalidValueError, np.linalg.LinAlgError):  # the search diverges with such readings
+        except (ValueError, np.linalg.LinAlgError):  # the search diverges with such readings
             return _TrialResult(np.inf, np.inf, moved)
         quality = float(np.median(normal.squares / np.maximum(normal.readings, 1)))
         off = state.numbers - problem.prior
@@ -120,7 +127,7 @@ class Trial:
                 state, normal = evaluate_step(problem, state, step, kept)
                 kept = kept & np.isfinite(normal.squares)
                 step, gain = best_step(problem, state, normal)
-        except (InvalidValueError, np.linalg.LinAlgError):
+        except (ValueError, np.linalg.LinAlgError):
             return np.inf
         there = int(np.count_nonzero(kept))
         return float(normal.squares[kept].sum() - gain) / there if 2 * there > len(kept) else np.inf
@@ -142,9 +149,10 @@ class Trial:
         rows = self.rows[(self.rows + late >= 0) & (self.rows + late < len(log))]
         rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(most, len(rows))).round().astype(np.int64))]
         given = readings_table(log.rows(rows))
-        read = _swap_columns(log.readings[rows], change.lengths)
+        read = LENGTH_UNITS[change.length_unit] * _swap_columns(log.readings[rows], change.lengths)
         if log.load_cells is not None:
-            given = given._replace(cells=_swap_columns(log.load_cells[rows + late], change.cells))
+            cells = CELL_UNITS[change.cell_unit] * log.load_cells[rows + late]
+            given = given._replace(cells=_swap_columns(cells, change.cells))
         counted, winches = log.counts is not None, self.robot.winches
         if (cable := change.flipped) is not None:
             zero = winches.count_zero[cable] if counted and winches is not None else read[:, cable].max()
@@ -165,7 +173,7 @@ class Trial:
 
     def _poses(self, problem: FitProblem, change: Hypothesis, most: int) -> Pose | None:
         """Poses by forward kinematics of the lengths; None if a pose is not solved."""
-        key = change._replace(cells=None), most
+        key = change._replace(cells=None, cell_unit=""), most
         if key not in self.found:
             rows = start_of(problem, None).poses
             if not np.isfinite(rows).all():

@@ -74,7 +74,7 @@ def search_from_priors(
             improbable = _improbable(fit, kept)
         elsewhere = _other_equilibrium(problem, fit.state, improbable)
         if robust:
-            elsewhere &= ~_single_cable_outliers(problem, fit.state, elsewhere)
+            elsewhere &= ~_single_cable_outliers(problem, fit.state, elsewhere & np.isfinite(fit.normal.squares))
         if elsewhere.any():
             left_out[Omission.OTHER_EQUILIBRIUM] = locked(np.flatnonzero(elsewhere))
             kept &= ~elsewhere
