@@ -106,5 +106,5 @@ MODELS: dict[str, type[CableModel]] = {
 
 
 def model_of(value: CableModel | str, item: str = "model") -> CableModel:
-    """A cable model unchanged, or one by its name on the command line: "elastic"."""
+    """A cable model, unchanged, or the cable model with a name such as "elastic"."""
     return named(value, CableModel, MODELS, item)

@@ -166,7 +166,7 @@ def whole_number(value: Any, item: str, low: int, high: int = sys.maxsize) -> in
     """Check a whole number.
 
     value: integer of Python or numpy, not a Boolean; high: largest allowed number, by default the largest size of a
-        Python container.
+    Python container.
     """
     number = integer(value)
     if number is not None and low <= number <= high:

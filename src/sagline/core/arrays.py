@@ -47,9 +47,9 @@ def checked(
     """Locked float64 copy of a caller's value; raises an error that names the problem.
 
     unit: unit of the value, for the message; "" if dimensionless; shape: required trailing axes, with None for any
-        length; leading axes are arbitrary; None (default) accepts every shape; above: strict lower limit of every
-        value; missing: True if NaN is allowed. Returns a float64 array, C-contiguous, write-locked, that owns its
-        memory. An array with all these properties, such as a result of sagline, is returned without a copy.
+    length; leading axes are arbitrary; None (default) accepts every shape; above: strict lower limit of every value;
+    missing: True if NaN is allowed. Returns a float64 array, C-contiguous, write-locked, that owns its memory. An array
+    with all these properties, such as a result of sagline, is returned without a copy.
     """
     array = value if _is_immutable(value) else numbers(value, item, unit)
     if shape is not None:

@@ -121,7 +121,7 @@ def printable(text: str, kept: str = "") -> str:
     r"""Text for a terminal, without characters that move the cursor, hide a letter or cannot be encoded.
 
     text: any text; kept: characters that remain unchanged, for instance line ends. Returns the text with control
-        characters, line ends, lone surrogates and all other invisible characters as Python escape sequences.
+    characters, line ends, lone surrogates and all other invisible characters as Python escape sequences.
 
     Examples:
         >>> from sagline.core.errors import printable

@@ -22,7 +22,7 @@ def check_memory(item: str, size: float, next_step: str) -> None:
     """Refuse an allocation that does not fit into memory.
 
     item: purpose of the memory, for the message, such as "a path of 2e+08 samples"; size: peak memory [bytes], not
-        checked below 64 MB.
+    checked below 64 MB.
     """
     if size > UNASKED and size > (free := free_memory()):
         # the two numbers must differ in the message

@@ -33,10 +33,10 @@ def n(
     1000, or a power of ten if no such prefix exists. The minus sign is U+2212. The space before a unit does not break.
 
     value: the number, in the unit; "–" if not finite; form: format of the digits, as in `format`; not used with an
-        uncertainty; unit: its unit, such as "mm", "kg/m", "%"; "" if dimensionless; uncertainty: standard uncertainty
-        in the unit, or None; its two digits follow the value in parentheses: 43.98(10) is 43.98 ± 0.10; size: size of
-        the operands if the value is a difference, in the unit; a value up to `ROUNDING` times the size is written as "0
-        (rounding)".
+    uncertainty; unit: its unit, such as "mm", "kg/m", "%"; "" if dimensionless; uncertainty: standard uncertainty in
+    the unit, or None; its two digits follow the value in parentheses: 43.98(10) is 43.98 ± 0.10; size: size of the
+    operands if the value is a difference, in the unit; a value up to `ROUNDING` times the size is written as "0
+    (rounding)".
 
     Source:
         ISO 80000-1:2022, 7.2 (prefixes); JCGM 100:2008, 7.2.2 (uncertainty in parentheses).

@@ -49,7 +49,7 @@ def digest_of_kernels() -> str:
 
 
 def is_whole(content: bytes) -> bool:
-    """True if a file of machine code begins with the digest of the rest."""
+    """True if a file of machine code begins with the digest of its other content."""
     return hashlib.sha256(content[DIGEST:]).digest() == content[:DIGEST]
 
 

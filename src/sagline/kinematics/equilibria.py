@@ -147,7 +147,7 @@ def _distinct(found: ForwardRows, length: float) -> tuple[Indices, Indices]:
 
 
 def _distance(row: Array, other: Array, length: float) -> float:
-    """Distance of two pose rows: the larger of relative displacement and angle."""
+    """Distance of two pose rows: maximum of relative displacement and angle."""
     shift = float(np.linalg.norm(row[:3] - other[:3])) / length
     sign = np.copysign(1.0, row[3:] @ other[3:])
     return max(shift, 2.0 * float(np.linalg.norm(row[3:] - sign * other[3:])))

@@ -58,8 +58,8 @@ def fit_measurements(
     sum ((T_A - reading)/sigma_T)^2. The platform is in equilibrium at L_true.
 
     found: equilibria at the measured lengths (N samples), where the search starts; replaced in place; loads: external
-        plus inertial wrenches (1 or N, 6). Returns the covariances of (displacement of the center of mass, rotation
-        vector), (N, 6, 6); NaN without a solution.
+    plus inertial wrenches (1 or N, 6). Returns the covariances of (displacement of the center of mass, rotation
+    vector), (N, 6, 6); NaN without a solution.
     """
     if model.code == codes.STRAIGHT:
         raise InvalidValueError("model", "Straight()", "a model with forces", "Use Catenary() with measured tensions.")

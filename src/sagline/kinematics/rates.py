@@ -48,7 +48,7 @@ class _Instants(NamedTuple):
 
 
 def _instants(robot: Robots, path: Path, wrench: Array) -> _Instants:
-    """Poses and wrenches one step before and after each sample of a path; the step depends on its speed.
+    """Poses and wrenches one step before and after each sample of a path; the step depends on the speed.
 
     path: the path; if it has no jerk, a spline through its accelerations gives it; wrench: external plus inertial
     wrench at the samples (N, 6); the external part is interpolated by a spline.
@@ -103,7 +103,7 @@ class _PlacedCables(NamedTuple):
     cables: CableState  # their state, fields of shape (N, m)
     pull: Array  # T_z - tau sin phi [N], shape (N, m)
     structure: Array  # structure matrix J, shape (N, n, m)
-    hanging: Array  # structure matrix for vertical forces at the platform ends, shape (N, n, m)
+    hanging: Array  # wrench of unit vertical forces at the platform ends, shape (N, n, m)
 
 
 def _cables_at(state: Equilibrium, pose: Pose, chord_tension: Array) -> _PlacedCables:
@@ -169,7 +169,7 @@ def _held_limit_rates(
 class _RateConditions(NamedTuple):
     """Conditions on the rates x of the chord tensions."""
 
-    structure: Array  # structure matrix J; rates of the tension variable combine its rows, shape (N, n, m)
+    structure: Array  # structure matrix J, shape (N, n, m)
     matrix: Array  # balance condition: matrix x = right, shape (N, n, m)
     right: Array  # right side of this condition, shape (N, n)
     scale: Array  # the rate of the tension variable, scale x + drift, is minimized; shape (N, m)

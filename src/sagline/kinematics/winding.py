@@ -29,7 +29,7 @@ def checked_winding(winding: ArrayLike, shape: tuple[int, ...], cables: int) -> 
     """Winding directions, one per cable.
 
     winding: directions +1, -1 and 0; shape: () for a single pose, (N,) for N poses. Returns an array of shape (m,) or
-        (N, m).
+    (N, m).
     """
     array = checked(winding, "winding", "")
     shapes = [(cables,)] + [(*shape, cables)] * bool(shape)

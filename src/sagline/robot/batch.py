@@ -186,8 +186,8 @@ def points_on_pulleys(robot: Robots, pose: Pose, angle: Array) -> Array:
     """Points on the pulleys, measured along the cables from the entry points.
 
     pose: one pose, or a batch of N, which defines the swivel angles of the pulleys; angle: angle on the pulley from the
-        frame anchor [rad], shape (..., m); the wrap angle gives the exit point. Returns points in the world [m], shape
-        (..., m, 3); frame anchors for cables without a pulley.
+    frame anchor [rad], shape (..., m); the wrap angle gives the exit point. Returns points in the world [m], shape
+    (..., m, 3); frame anchors for cables without a pulley.
     """
     radius, entry = pulleys_of(robot)
     away = outward(robot, pose) * (radius * (1.0 - np.cos(angle)))[..., None]

@@ -138,7 +138,7 @@ def drums_of(robot: Robot) -> Drums:
     """The drums of a robot.
 
     robot: the robot. Its winches need drum_radius and groove_pitch. Its cables need a diameter. Several layers also
-        need drum_width and cable_length. A moving exit also needs cable_length.
+    need drum_width and cable_length. A moving exit also needs cable_length.
     """
     winches, diameter = robot.winches, robot.cables.diameter
     names = ["drum_radius", "groove_pitch"]
@@ -216,8 +216,8 @@ def drum_tension(state: Equilibrium) -> Array:
     Along an exact cable without friction, T + T^2/(2 EA) - w z is constant (z is the height). With the other models,
     the cable between pulley and drum has no weight, and its tension is the chord tension.
 
-    Returns tensions [N], shape (m,) or (N, m). A slack cable that leaves a drum downward has a negative tension. The
-    tension is NaN if it would compress the cable to a negative length.
+    Returns tensions [N], shape (m,) or (N, m). The tension of a slack cable that leaves a drum downward is negative.
+    The tension is NaN if it would compress the cable to a negative length.
 
     Source:
         docs/model.md, section 10.
@@ -242,7 +242,7 @@ def warmth(robot: Robot, temperature: Any) -> Array | float:
     """Factor of thermal expansion of the cables.
 
     temperature: difference from the reference temperature [K], one number or one per cable. Returns 1 + expansion *
-        temperature, shape (m,) or a number.
+    temperature, shape (m,) or a number.
     """
     difference = checked(temperature, "temperature", "K")
     if difference.shape not in ((), (robot.cable_count,)):
@@ -290,7 +290,7 @@ def drum_lever(robot: Robot, length: Array) -> Array:
     """Cable length per radian of drum rotation [m], at given lengths off the drums.
 
     length: unstrained lengths off the drums [m], (m,) or (N, m). Returns the lever of the layer at these lengths;
-        without drum data, drum_radius plus half the cable diameter. The shape is the shape of the lengths.
+    without drum data, drum_radius plus half the cable diameter. The shape is the shape of the lengths.
     """
     winch = robot.winches
     if winch is None or winch.drum_radius is None:

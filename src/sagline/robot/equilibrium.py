@@ -32,7 +32,7 @@ from sagline.robot.robot import Robot
 
 _P = ParamSpec("_P")
 _R_co = TypeVar("_R_co", covariant=True)
-# inverse kinematics builds on this module; it is imported by name when a robot and a pose are the start
+# imported by name if a robot and a pose are given, because inverse kinematics imports this module
 _INVERSE: Final = "sagline.kinematics.inverse"
 
 

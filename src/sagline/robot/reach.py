@@ -25,7 +25,7 @@ def check_reach(robot: Robot, pose: Pose, item: str) -> None:
     normal of its plane, and remains in one of the parallel planes.
 
     robot: the robot, or the first of several with a common pattern; pose: a batch, or one pose. A single pose and NaN
-        are always accepted.
+    are always accepted.
     """
     pattern, normal = robot.motion_pattern, robot.plane_normal
     if pattern == "3R3T" or len(pose.shape) == 0 or len(pose) == 0:
@@ -58,10 +58,10 @@ def check_plane(robot: Robot, pose: Pose, item: str) -> None:
 
 
 def forbidden_turn(robot: Robot, pose: Pose, other: Array) -> Array:
-    """Rotation of each pose from a given orientation, without the part that the motion pattern allows.
+    """Rotation from a given orientation to each pose, minus the part that the motion pattern allows.
 
     pose: one pose or a batch of N; other: the orientation, a unit quaternion, shape (4,). Returns sin(angle/2) times
-        the axis, shape (N, 3); zeros if all motions are free.
+    the axis, shape (N, 3); zeros if all motions are free.
     """
     own = np.atleast_2d(pose.quaternion)
     if robot.motion_pattern == "3R3T":
@@ -86,7 +86,7 @@ def out_of_plane(robot: Robot, pose: Pose) -> Array:
     """Distance between the platform ends of a planar robot and the plane of its frame ends.
 
     pose: one pose or a batch of N. Returns the signed distance [m], shape (N,); zeros if the robot is not planar, or if
-        its frame ends or its platform ends are not in one plane.
+    its frame ends or its platform ends are not in one plane.
     """
     away = np.zeros(len(np.atleast_2d(pose.position)))
     if robot.plane_normal is None:

@@ -81,8 +81,8 @@ def with_routing(state: Equilibrium, winding: Array | None) -> Equilibrium:
     """Equilibrium with the lengths of the actual routing between exit points and drums.
 
     state: equilibrium with the routing of the kernels; winding: +1 winding in, -1 paying out, 0 at rest, shape (m,) or
-        (N, m); None: no friction. Returns the equilibrium with corrected wrapped and dead lengths, NaN if a cable is
-        too slack for a catenary between guides. Without guides and friction, returns the given equilibrium.
+    (N, m); None: no friction. Returns the equilibrium with corrected wrapped and dead lengths, NaN if a cable is too
+    slack for a catenary between guides. Without guides and friction, returns the given equilibrium.
     """
     if state.contact is None or (winding is None and not differs(state.robot, None)):
         return state

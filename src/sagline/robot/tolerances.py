@@ -56,8 +56,8 @@ def deviations(
     """Standard deviations of the quantities of a robot, each in the shape of its field.
 
     given: deviations for some names of `UNCERTAIN`: one number for the whole field, three numbers (x, y, z) for a
-        quantity with three components, or an array of the shape of the field; infinite if unknown; low: the smallest
-        allowed deviation. Returns the same names in the same order.
+    quantity with three components, or an array of the shape of the field; infinite if unknown; low: the smallest
+    allowed deviation. Returns the same names in the same order.
     """
     if not isinstance(given, Mapping):
         allowed = "names of fields and standard deviations"
@@ -91,7 +91,7 @@ def of_share(share: ArrayLike, value: Array | None, item: str) -> Array:
     """Standard deviation of a quantity from a relative deviation.
 
     share: the relative deviation, shape () or the shape of the quantity; value: value of the quantity, or None if
-        unknown. Returns the deviation in the unit and the shape of the quantity.
+    unknown. Returns the deviation in the unit and the shape of the quantity.
     """
     if value is None:
         raise InvalidValueError(item, "in percent", "a field that is given", f"Give {item} in its unit, or the field.")

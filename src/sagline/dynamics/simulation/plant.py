@@ -24,7 +24,7 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.tables import cable_table
 
-MARGIN: Final = 5.0  # [m], cable beyond the required length for which a drum stores the strain
+MARGIN: Final = 5.0  # length beyond the required one for which a drum stores strains [m]
 BROKEN: Final = 1e-12  # share of the stiffness and weight of a cable that remains after it is cut
 NOTES: Final = 1000  # number of recorded unscheduled events after which a run pauses to store them
 

@@ -151,7 +151,7 @@ class Simulator:
         self._read()
 
     def _set_up_course(self, given: InitialConditions, m: int) -> None:
-        """Prepare the lengths between the last and the next set points, and the expected tensions of drums."""
+        """Prepare the time table between the last and the next set points."""
         drums = self._kind == d.DRUMS
         stretch = 1.0 + self._plant.data[d.WINDING_STRAIN] if drums else np.ones(m)
         lengths = np.repeat(given.lengths.value, 2, axis=0)

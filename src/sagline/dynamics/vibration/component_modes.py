@@ -69,7 +69,8 @@ class CableComponents(NamedTuple):
     Attributes:
         square: Squared angular frequencies [1/s^2], shape (T,).
         cable: Cable index of each mode, shape (T,).
-        participation: Participation P of an acceleration of the platform end, world axes, shape (T, 3) [sqrt(kg)].
+        participation: Participation factors P: modal force per acceleration of the platform end, world axes, shape (T,
+            3) [sqrt(kg)].
         still: M_0, mass of every cable for quasi-static motion of its platform end, world axes, shape (m, 3, 3) [kg].
         plane: The modes in the cables' planes, grouped by cable.
         normal: The modes normal to the planes.
@@ -165,7 +166,7 @@ def component_modes(strings: Strings, row: int, up_to: float) -> CableComponents
 
 
 def _motions(matrix: Array, rest: Array, free: Flags, first: int) -> PlaneModes:
-    """Fixed-end modes in one plane; unknowns fixed in all cables are excluded."""
+    """Fixed-end modes in one plane, without the unknowns that are fixed in all cables."""
     last = matrix.shape[1] - (2 if rest.shape[2] == 2 else 1)
     square, own = np.linalg.eigh(matrix[:, first:last, first:last])
     shape = np.zeros((*matrix.shape[:2], last - first))

@@ -110,7 +110,7 @@ def _lever_form(turns: Array, levers: Array, force: Array) -> Array:
 
 
 def _cross_matrices() -> Array:
-    """Matrices of the cross products of each axis with a vector, (3, 3, 3)."""
+    """Matrices (3, 3, 3) of the cross product of each axis with a vector."""
     return np.swapaxes(np.cross(np.eye(3)[:, None], np.eye(3)), -1, -2)
 
 

@@ -157,7 +157,7 @@ def _negatives(matrix: Array) -> int:
 
 
 MOST_MODES: Final = 2_000
-_CERTAIN: Final = 1.5  # an estimate above this multiple of MOST_MODES exceeds MOST_MODES in spite of its error
+_CERTAIN: Final = 1.5  # estimate relative to MOST_MODES that is certainly too large, in spite of its error
 _STEEP: Final = 1e-6  # horizontal tension of a vertical cable, relative to the vertical force
 _EVEN: Final = 1e-9  # range of q below which the tension of a cable counts as constant
 _POINTS: Final = 201

@@ -36,7 +36,7 @@ class TensionLimits(NamedTuple):
 
 @formula
 def sags(model: Model, half_weight: float) -> bool:
-    """True if a cable sags, so that its length grows without bound as its tension decreases; half_weight: wD/2 [N]."""
+    """True if a cable sags (its length is infinite at zero tension); half_weight: wD/2 [N]."""
     return half_weight > 0.0 and model.code != codes.STRAIGHT and model.code != codes.ELASTIC
 
 

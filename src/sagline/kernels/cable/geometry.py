@@ -111,8 +111,8 @@ PARAMETER, KAPPA, EXCESS, FIRST, SECOND = LENGTH + 5, LENGTH + 6, LENGTH + 7, LE
 XX, XZ, ZX, ZZ = LENGTH + 10, LENGTH + 11, LENGTH + 12, LENGTH + 13  # in-plane stiffness [N/m]
 SOFT = LENGTH + 14  # EA of the cable that `cable_forces` solves [N]
 # Rows of cables over pulleys. The ASKED rows contain span, rise and length [m] of an equivalent cable without a pulley.
-# The OFF rows contain corrections [m] of these values, which make the forces of both cables equal. The next pose starts
-# with these corrections.
+# The OFF rows contain corrections [m] of span, rise and length, which make the forces of both cables equal. The next
+# pose starts with these corrections.
 ASKED_SPAN, ASKED_RISE, ASKED_LENGTH = LENGTH + 15, LENGTH + 16, LENGTH + 17
 OFF_X, OFF_Z, OFF_LENGTH = LENGTH + 18, LENGTH + 19, LENGTH + 20
 FREE_SPAN, FREE_RISE, FREE_LENGTH = LENGTH + 21, LENGTH + 22, LENGTH + 23  # of the free span [m]

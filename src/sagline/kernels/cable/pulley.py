@@ -113,7 +113,7 @@ def exit_after(
     """Sine and cosine of the wrap angle after one Newton step.
 
     force: T_x and T_zA of a cable that leaves at the angle before the step. If this angle grows by d, the free span
-        loses the length R d/E_A, and T_zA grows by the weight of this length.
+    loses the length R d/E_A, and T_zA grows by the weight of this length.
     """
     horizontal, vertical_a = force
     tension = math.sqrt(horizontal * horizontal + vertical_a * vertical_a)

@@ -270,7 +270,7 @@ def _find_extremum(curves: Curves, rising: bool, work: Array, tensions: Array, s
     slope. Each later step uses the slope between the last two points.
 
     rising: True if the sag forces rise at A and fall at B, False for the opposite; tensions: (m,), NaN for cables to
-        skip, filled; sag forces: (m,), filled.
+    skip, filled; sag forces: (m,), filled.
     """
     m = tensions.size
     for step in range(STEPS):

@@ -16,7 +16,7 @@ from sagline.kernels.jit import formula, kernel
 
 @formula
 def wind_across(wind: Array, along: float, x: float, y: float, z: float, drag: float) -> tuple[float, float, float]:
-    """Force of a wind on a line, normal to the line [N].
+    """Force [N] of the wind on a line; it is normal to the line.
 
     wind: velocity of the air [m/s], (3,); along: its component along the line (x, y, z), divided by the line's length;
     drag: force per square of the speed normal to the line [N s^2/m^2].
@@ -155,7 +155,7 @@ def _add_damping(place: Array, speed: Array, count: int, row: Array, pulls: Arra
 
 @formula
 def fill_frame_node_velocity(place: Array, speed: Array, count: int, row: Array) -> None:
-    """Fill the velocity of the frame node: L' (1 + strain) along the cable, as the entering cable."""
+    """Fill the velocity of the frame node: L' (1 + strain) along the cable."""
     for c in range(3):
         speed[c, count + 1] = row[RATE] * (place[c, count] - place[c, count + 1]) / row[REST]
 
@@ -182,7 +182,7 @@ def drift_nodes(place: Array, speed: Array, count: int, row: Array, before: floa
     """Move the nodes for h [s]; the node next to the frame keeps its momentum while its mass changes.
 
     place: of the nodes [m]; speed: of the nodes [m/s]; before: unstrained length of the element at the frame before the
-        motion [m] (row: after it); h: time [s].
+    motion [m] (row: after it); h: time [s].
     """
     old, new = row[ELEMENT] + before, row[ELEMENT] + row[REST]
     middle = 0.5 * (old + new)

@@ -1,7 +1,7 @@
 """Motion of the platform on cables with mass: chains instead of exact catenaries, one force evaluation per step.
 
-The integrator is the symplectic splitting of `sagline.kernels.dynamics.motion`, whose kicks and drifts also include the
-nodes of the chains. Winches, time tables and audit are the same. docs/model.md, section 11.
+The integrator is the symplectic splitting of `sagline.kernels.dynamics.motion`. Its kicks and drifts also move the
+nodes of the chains. Winches, time tables and audit are as in that module. docs/model.md, section 11.
 """
 
 from __future__ import annotations
@@ -196,9 +196,9 @@ def run_chains(
     Args:
         rules: See `Rules`; `stride` is the number of steps per control period of drums.
         numbers: See `Numbers`.
-        body: Rows of the cable_table, with anchors in the platform's principal axes relative to its center of mass,
-            which includes the chains' mass at node 0; inertia; a projection (6, 6) onto the free motions; and the
-            reference point of the given wrench in these axes, (3,).
+        body: Rows of the cable_table, with platform anchors in principal axes relative to the center of mass (including
+            the mass of the chains at node 0); row of inertia; projection (6, 6) onto the free motions; and reference
+            point of the given wrench in these axes, (3,).
         data: Data of the drives, (DATA_ROWS, m).
         courses: Time tables of lengths, wrenches and wind velocity, as in `motion.run_massless`.
         kept: As in `motion.run_massless`, with one more counter. The work array has ROOM numbers plus two for each

@@ -23,7 +23,7 @@ def wind_in(layer: Array, place: float, step: float, strain: float, stiffness: f
     The cable in a bin has one strain. Its strained length and its unstrained length are preserved.
 
     layer: strain in each bin of the cable on the drum, (B,), the last bin without end; place: length let out before
-        [m]; step: length to wind in [m], > 0; stiffness: EA [N].
+    [m]; step: length to wind in [m], > 0; stiffness: EA [N].
     """
     lost = 0.0
     first, last = _bin_of(layer, place - step), _bin_of(layer, place)
@@ -46,7 +46,7 @@ def pay_out(layer: Array, place: float, step: float, stiffness: float) -> tuple[
     """Mean strain of the cable that a drum lets out, and the energy [J] lost by averaging.
 
     layer: strain in each bin of the cable on the drum, (B,), the last bin without end; place: length let out before
-        [m]; step: length to let out [m], > 0; stiffness: EA [N].
+    [m]; step: length to let out [m], > 0; stiffness: EA [N].
     """
     first, last = _bin_of(layer, place), _bin_of(layer, place + step)
     if first == last:

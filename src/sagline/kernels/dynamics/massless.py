@@ -166,15 +166,15 @@ def damp_cables(
 ) -> float:
     """Fill the damping wrench (6,) of the cables; returns the power lost.
 
-    The strain rate is the same along a whole cable, including the part behind the free span. The let-out cable
-    lengthens the span by its strained length. The rate of the chord minus the rate of this length stretches the cable
-    or changes its sag. Only the stretching part causes damping, with EA/L as factor. This part is the elastic
+    The strain rate is the same along a whole cable, including the part behind the free span. Cable that is paid out
+    lengthens the span by its strained length. The chord rate minus the rate of this length stretches the cable or
+    changes its sag. Only the stretch causes damping, with the factor EA/L. The share of the stretch is the elastic
     compliance divided by the total compliance: 1 for a taut cable, 0 for a slack cable. For the damping of the air, the
     cable moves like its chord.
 
     losses: loss_time [s], and air damping [N s/m^2]; weight_of: gravity if the cables have weight, else 0 [m/s^2];
     turning: velocity of the center of mass, and angular velocity, (6,); now: state of the drives, filled with the
-        damping parts of the tensions; wrench: filled.
+    damping parts of the tensions; wrench: filled.
     """
     lost = 0.0
     for k in range(6):

@@ -211,8 +211,8 @@ def run_massless(
         model: See `ModelTerms`.
         rules: See `Rules`; `stride` is the number of steps per control period of drums.
         numbers: See `Numbers`.
-        robot: Rows of the cable_table, with anchors in the platform's principal axes relative to its center of mass;
-            body with its center at zero; inertia; and free motions (n, 6).
+        robot: Rows of the cable_table, with platform anchors in principal axes relative to the center of mass; row of
+            the body_table with the center of mass at zero; row of inertia; free motions (n, 6).
         data: Data of the drives, (DATA_ROWS, m).
         courses: Time tables of lengths, wrenches and wind velocity. Lengths (K, m) are unstrained. For drums the table
             has lengths s along the path of winding, then expected tensions, (K, 2 m).

@@ -30,7 +30,7 @@ def interpolate_table(course: CubicTable, at: int, now: float, shift: float, val
     """Fill values and rates (n,) of a table at a time; returns the interval of this time, searched from `at` forward.
 
     shift: small time offset. At an instant of the table, a negative shift selects the interval before the instant, a
-        positive shift the interval after it.
+    positive shift the interval after it.
     """
     times, last, moment = course.time, course.time.shape[0] - 1, now + shift
     while at < last - 1 and moment >= times[at + 1]:

@@ -100,8 +100,8 @@ def _find_pose(
 ) -> tuple[int, float]:
     """Fill the equilibrium by the first reliable method; returns the number of steps and the sum of tensions.
 
-    On return, space contains unbalance, stiffness and its factor at the pose. A first number NaN means that the factor
-    does not exist. exact: model with an energy, whose equilibrium is the start for the problem's own model.
+    On return, space contains unbalance, stiffness and its factor at the pose. If the first number of the factor is NaN,
+    the factor does not exist. exact: model with an energy; its equilibrium is the start for the model of the problem.
     """
     model, cables, body, wrench, free = problem.model, problem.cables, problem.body, problem.wrench, problem.free
     steps, size, known = 0, 0.0, 0.0

@@ -247,7 +247,7 @@ def descend(problem: PoseProblem, pose: Array, space: ForwardArrays, known: floa
     """Decrease the energy until a full Newton step is short. A start in balance does not move, even if it is unstable.
 
     known: the sum of tensions from `unbalance` at the pose; 0 unless space belongs to the pose and matrix is its
-        stiffness.
+    stiffness.
 
     Returns the number of tried steps, and the sum of tensions at the pose (0 if the last tried pose is not the result).
     """

@@ -22,7 +22,7 @@ def square_between(one: Array, other: Array, s: float, t: float) -> float:
 
 @kernel
 def _newton_step(one: Array, other: Array, s: float, t: float) -> tuple[float, float, float]:
-    """Squared distance at two shares, and the shares after a Newton step, within both ranges."""
+    """Squared distance at two shares, and the shares (within their ranges) after a Newton step."""
     ax, ay, az = point(one, s)
     bx, by, bz = point(other, t)
     rx, ry, rz = ax - bx, ay - by, az - bz
@@ -84,7 +84,7 @@ def nearest_of_curves(one: Array, other: Array, s: float, t: float) -> tuple[flo
 
 @kernel
 def _box_step(curve: Array, box: Array, s: float) -> tuple[float, float]:
-    """Squared distance of a cable's point from a box [m^2], and the share after a Newton step, within the range."""
+    """Squared distance of a cable point from a box [m^2], and the share (within its range) after a Newton step."""
     x, y, z = point(curve, s)
     px, py, pz = in_box_axes(box, x - box[PLACE], y - box[PLACE + 1], z - box[PLACE + 2])
     ex, ey, ez = outside(px, box[HALF]), outside(py, box[HALF + 1]), outside(pz, box[HALF + 2])

@@ -107,7 +107,7 @@ def bulge(row: Array, first: float, last: float, chord2: float) -> float:
     return min(by_curvature, by_length)
 
 
-STEPS = 12  # Newton on a slope of at most six straight parts
+STEPS = 12  # Newton steps; the slope has at most six straight parts
 
 
 @kernel

@@ -219,7 +219,7 @@ def _write_proof(demand: Demand, change: TensionChange, lever: float, farkas: Ar
 
 @glue
 def _block_cables(cables: Cables, demand: Demand, change: TensionChange, blocking: Flags) -> None:
-    """Fill which cables (m,) are at a limit that opposes the least change."""
+    """Fill blocking (m,): True for cables at a limit that opposes the least change."""
     largest = 0.0
     for i in range(blocking.size):
         largest = max(largest, abs(component_along(demand.matrix, change.direction, i)))

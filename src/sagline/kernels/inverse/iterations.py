@@ -57,8 +57,8 @@ def distribute_and_solve_cables(
     """Distribute the tensions and solve the cables until their sag forces converge; returns the pose's status.
 
     cables: the cables from `set_pose`, with tensions, ratios and sag forces to be filled; work: work arrays for
-        frame-end tensions and for methods that are not projections, or None to exclude both from compilation; statuses:
-        filled with the status of each cable, (m,).
+    frame-end tensions and for methods that are not projections, or None to exclude both from compilation; statuses:
+    filled with the status of each cable, (m,).
     """
     near.held.labels[0] = 0
     if work is not None:

@@ -216,9 +216,9 @@ def decide_feasibility(
     """Feasibility of a demand with tensions within the cables' limits.
 
     nodes: largest number of examined ranges; change: start of the search, filled with the tensions of least residual,
-        this residual and its direction. Returns POSE_SOLVED, POSE_INFEASIBLE, POSE_BORDERLINE, or POSE_NOT_CONVERGED
-        after an arithmetic failure; the lower and upper bound of the shortfall [N]; and True if the one direction
-        proves infeasibility over the whole first range.
+    this residual and its direction. Returns POSE_SOLVED, POSE_INFEASIBLE, POSE_BORDERLINE, or POSE_NOT_CONVERGED after
+    an arithmetic failure; the lower and upper bound of the shortfall [N]; and True if the one direction proves
+    infeasibility over the whole first range.
     """
     n, m = demand.matrix.shape
     tops, rest = vector(memory, m)  # largest contribution of each cable along a direction [N]

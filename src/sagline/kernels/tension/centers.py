@@ -67,7 +67,7 @@ def deepest_point(bounds: Array, null: Array, work: WorkArrays, point: Array) ->
     """Fill the point (r,) whose tensions are farthest from their nearest limits; returns the pose's status."""
     r, m = null.shape
     rows, memory = block(work.rest, r + 1, 2 * m)
-    halves, memory = block(memory, STRIP_ROWS, 2 * m)  # one bound per side; the depth, an unknown, narrows the bound
+    halves, memory = block(memory, STRIP_ROWS, 2 * m)  # one bound per limit, narrowed by the depth, which is an unknown
     vectors, memory = block(memory, 2, r + 1)
     cost, found = vectors[0], vectors[1]
     for i in range(m):

@@ -283,8 +283,8 @@ def least_change(curves: Curves, demand: Demand, ranges: Array, change: TensionC
     """Change tensions within their ranges until the residual of the demand is least; returns its length [N].
 
     ranges: least and largest tensions, rows 0 and 1; change: start of the search, filled with the result. The result is
-        the length of the soft residual [N]. It is infinite if hard rows and ranges contradict each other on the
-        tangents, and NaN if the hard rows are linearly dependent.
+    the length of the soft residual [N]. It is infinite if hard rows and ranges contradict each other on the tangents,
+    and NaN if the hard rows are linearly dependent.
     """
     n, m = demand.matrix.shape
     soft = demand.soft

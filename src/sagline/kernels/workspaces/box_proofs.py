@@ -258,8 +258,8 @@ def _measure_direction(place: CablesInBox, box: PoseRange, direction: Array, tur
     """Fill the contributions per newton of tension and of sag force along a direction, and their changes in a box.
 
     direction: y at the middle, (6,); turning: slopes of y with each motion, (MOTIONS, 6); rows: filled for tensions,
-        then for sag forces, with the value at the middle, the largest linear change (SPREAD), and the largest deviation
-        from the linear change (BENT).
+    then for sag forces, with the value at the middle, the largest linear change (SPREAD), and the largest deviation
+    from the linear change (BENT).
     """
     m = place.way.size
     motions = MOTIONS if box.turn > 0.0 else 3

@@ -39,7 +39,7 @@ VALUE, BELOW, ABOVE = 0, 1, 2  # rows of a margin (3,) [N]
 
 
 class LimitingFacet(NamedTuple):
-    """The limiting facet of a pose whose margin has no certain sign."""
+    """The limiting facet of a pose if the bounds of the margin do not decide its sign."""
 
     direction: Array  # unit normal y, (6,)
     columns: Array  # wrench of the secants per newton of chord tension, (6, m)
@@ -61,7 +61,7 @@ def settle_margin(
     margin: Array,
     memory: Memory,
 ) -> int:
-    """Replace a margin (3,) without certain sign by its value on the exact curves; returns the status of the margin.
+    """Replace a margin (3,) by its value on the exact curves; returns the status of the margin.
 
     platform: with the least favorable wrench of the set.
     """
