@@ -16,6 +16,7 @@ from sagline.kinematics.forward import forward
 from sagline.kinematics.inverse import inverse
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
 from sagline.statics.stiffness import stiffness
 
 FORCES: Final = 24  # trials per iteration, which narrows the bounds of a limit by a factor of about 23
@@ -31,11 +32,14 @@ class Push(NamedTuple):
     force: Array  # force in world axes [N], shape (3,)
     at: Array  # point at which it acts, platform frame [m], shape (3,)
 
+    def load(self, robot: Robot, pose: Pose) -> Array:
+        """Wrench of the force at a pose [N, N m], shape (6,)."""
+        lever = pose.matrix @ (self.at - robot.center_of_mass)
+        return np.concatenate((self.force, np.cross(lever, self.force)))
+
     def wrench(self, state: Equilibrium, factor: Array | float = 1.0) -> Array:
         """Wrench on the platform at an equilibrium, with the force multiplied by factors, shape (..., 6)."""
-        lever = state.pose.matrix @ (self.at - state.one_robot.center_of_mass)
-        own = np.concatenate((self.force, np.cross(lever, self.force)))
-        return np.asarray(state.wrench + np.multiply.outer(factor, own))
+        return np.asarray(state.wrench + np.multiply.outer(factor, self.load(state.one_robot, state.pose)))
 
 
 class Reserve(NamedTuple):

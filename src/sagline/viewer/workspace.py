@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 from sagline.cables.model import CableModel
 from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.core.numbers import counted, n
+from sagline.robot.inertia import without_cables
 from sagline.robot.robot import Robot
 from sagline.tension.methods import MinimumNorm
 from sagline.viewer.readout import color_key, html_block
@@ -22,7 +23,7 @@ from sagline.viewer.slices import MarginScale
 from sagline.viewer.tension_scale import ForceUnit, cable_color
 from sagline.workspaces.boundary import Outline, outline
 from sagline.workspaces.criteria import LeastMargin
-from sagline.workspaces.levels import Levels
+from sagline.workspaces.levels import Details, Levels
 from sagline.workspaces.nearest import nearest_to
 from sagline.workspaces.orientations import Orientations
 from sagline.workspaces.region import Find, Region, region_of
@@ -70,13 +71,30 @@ SMALL: Final = 0.25  # smallest share of its box; a smaller region is computed a
 LEAST: Final = 0.005  # smallest share of the boundary that is written
 
 
+class _NumberedLevels(Levels):
+    """Levels of the cables that are not broken; limiting cables have their numbers in the whole robot."""
+
+    numbers: Indices  # number of each remaining cable, then -1 for no cable
+
+    def details(self, positions: Array) -> Details:
+        """Details with the numbers of the whole robot."""
+        found = super().details(positions)
+        return found._replace(cable=self.numbers[found.cable])
+
+
 class WorkspaceQuery(NamedTuple):
-    """Robot, orientation, cable model and loads of a workspace."""
+    """Robot, orientation, cable model, loads and broken cables of a workspace."""
 
     robot: Robot  # robot with the changes of the settings
     quaternion: Array  # orientation of the platform, shape (4,)
     model: CableModel
     wrenches: WrenchSet
+    broken: tuple[int, ...] = ()  # numbers of the broken cables
+
+    @property
+    def without(self) -> str:
+        """Text of the broken cables; "" if all cables hold the platform."""
+        return f", without cable {', '.join(map(str, self.broken))}" if self.broken else ""
 
     @property
     def orientations(self) -> Orientations:
@@ -85,8 +103,11 @@ class WorkspaceQuery(NamedTuple):
 
     def levels(self) -> Levels:
         """Levels, whose change of sign is the boundary."""
-        margin = (LeastMargin(),)
-        return Levels(self.robot, self.wrenches, self.orientations, margin, self.model, MinimumNorm(), None, None)
+        robot = without_cables(self.robot, *self.broken) if self.broken else self.robot
+        margin, way = (LeastMargin(),), MinimumNorm()
+        levels = _NumberedLevels(robot, self.wrenches, self.orientations, margin, self.model, way, None, None)
+        levels.numbers = np.append(np.delete(np.arange(self.robot.cable_count), self.broken), -1)
+        return levels
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -171,7 +192,7 @@ def _cells_of(size: Array) -> tuple[int, int, int]:
 def _hull_text(found: Outline, query: WorkspaceQuery, region: Region) -> str:
     """HTML of the size of a region, the limiting cables, and the faces of the box that it reaches."""
     parts = f" in {counted(found.parts, 'part')} on this grid" if found.parts > 1 else ""
-    text = f"<b>Region</b> {n(found.volume, '.3g', region.unit)}{parts}, {escape(str(query.wrenches))}"
+    text = f"<b>Region</b> {n(found.volume, '.3g', region.unit)}{parts}, {escape(str(query.wrenches))}{query.without}"
     key = color_key(
         (cable_color(k), f"{f'cable {k}' if k >= 0 else 'no cable'}, {n(100.0 * share, '.0f')} %")
         for k, share in found.shares.items()
@@ -188,8 +209,10 @@ def _empty_text(found: Outline, query: WorkspaceQuery, region: Region, rough: bo
     """HTML for an empty region, with the best position; for a rough search, with the remark that it continues."""
     if rough:
         return "<b>Region</b> none found on the coarse grid"
-    reason = nearest_to(query.levels(), found.grid, region.box.low, region.box.high).reason
-    return f"<b>Region</b> empty, {escape(str(query.wrenches))}<br>{escape(reason)}"
+    empty = f"<b>Region</b> empty, {escape(str(query.wrenches))}{query.without}"
+    if query.broken:  # the reason would give the numbers of the remaining cables
+        return empty
+    return f"{empty}<br>{escape(nearest_to(query.levels(), found.grid, region.box.low, region.box.high).reason)}"
 
 
 def _majority(cables: Indices) -> Indices:
@@ -310,9 +333,9 @@ def _levels_at(find: Find, places: Array) -> tuple[Array, Indices]:
     return found.level.reshape(places.shape[:2]), found.cable.reshape(places.shape[:2])
 
 
-def travel_text(found: FreeTravel, unit: ForceUnit) -> str:
+def travel_text(found: FreeTravel, unit: ForceUnit, without: str = "") -> str:
     """HTML: margin, nearest boundary with its limit, and a table of all directions."""
-    head = f"<b>Margin</b> {unit.written(found.margin)}<br>"
+    head = f"<b>Margin</b> {unit.written(found.margin)}{without}<br>"
     crossed = [k for k in range(len(found.which)) if found.crossed[k]]
     if crossed:
         nearest = min(crossed, key=lambda k: float(found.distance[k]))

@@ -137,7 +137,7 @@ class PushFeature(Feature):
         self._force.value = 0.0
 
     def _respond(self, view: View) -> None:
-        push, state = self._typed(), view.state
+        push, state = self.push, view.state
         if push is None:
             self._show_none("")
         elif state is None:
@@ -151,7 +151,8 @@ class PushFeature(Feature):
             self._show_text(response_text(response, drawn_for))
             self.response = response
 
-    def _typed(self) -> Push | None:
+    @property
+    def push(self) -> Push | None:
         """The force in the fields; None if it is zero."""
         size = self._unit.newtons * float(_numbers(self._force.value, 1, "force", "a number >= 0")[0])
         if size == 0.0:

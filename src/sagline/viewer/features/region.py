@@ -7,13 +7,15 @@ from typing import Any, Final
 
 import numpy as np
 
-from sagline.cables.model import CableModel
+from sagline.cables.models import Catenary
 from sagline.core.arrays import Array, locked
 from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.viewer.feature import BackgroundTask, Feature, View
+from sagline.viewer.features.push import PushFeature
 from sagline.viewer.page import Page
+from sagline.viewer.player import InMotion
 from sagline.viewer.readout import html_block, refused, sentence
 from sagline.viewer.robot_scene import INFEASIBLE, PLATFORM, REST, Nodes
 from sagline.viewer.slices import MarginScale, Picture, picture_of
@@ -70,7 +72,7 @@ class RegionFeature(Feature):
 
     def __init__(self, page: Page) -> None:
         """Build the tab."""
-        self._server, self._size, self._nodes = page.server, page.size, Nodes(page.server.scene)
+        self._page, self._server, self._size, self._nodes = page, page.server, page.size, Nodes(page.server.scene)
         self._task = BackgroundTask(page.later)
         self._key: Hashable = None  # key of the workspace
         self._query: WorkspaceQuery | None = None
@@ -115,6 +117,11 @@ class RegionFeature(Feature):
         return self._task.busy
 
     @property
+    def _without(self) -> str:
+        """Text of the broken cables."""
+        return "" if self._query is None else self._query.without
+
+    @property
     def _anything(self) -> bool:
         """True if the user has chosen a drawing."""
         return bool(self._region_box.value or self._slice_box.value or self._travel_box.value)
@@ -139,9 +146,9 @@ class RegionFeature(Feature):
         if not self._anything:
             self._clear()
             return
-        robot, pose, model, wrench = view.snapshot.robot, view.snapshot.pose, view.settings.model, view.wrench
+        robot, pose = view.snapshot.robot, view.snapshot.pose
         try:
-            levels, region = self._prepare(robot, pose, model, wrench)
+            levels, region = self._prepare(self._query_of(view))
             self._follow_hull()
             self._place = pose.position
             self._follow_wall()
@@ -170,16 +177,27 @@ class RegionFeature(Feature):
     def _refuse(self, message: str) -> None:
         self._hull_html.content, self._margin_html.content = refused(message), ""
 
-    def _prepare(self, robot: Robot, pose: Pose, model: CableModel, wrench: Array | None) -> tuple[Levels, Region]:
-        """Levels and region, created again if their inputs have changed."""
-        loads = _load(self._force, "N"), _load(self._moment, "N m")
-        key = (id(robot), pose.quaternion.tobytes(), type(model), loads, None if wrench is None else wrench.tobytes())
+    def _query_of(self, view: View) -> WorkspaceQuery:
+        """Robot, model, loads and broken cables of a view, with the push of the user."""
+        snapshot, model, wrench = view.snapshot, view.settings.model, view.wrench
+        broken: tuple[int, ...] = ()
+        if isinstance(snapshot, InMotion):  # its cables are exact
+            model, broken = Catenary(), tuple(sorted(snapshot.broken))
+        elif snapshot.plan is not None:
+            model, wrench = snapshot.plan.state.cables.model, snapshot.plan.state.wrench
+        push = self._page.feature(PushFeature).push if view.played is None else None
+        center = np.zeros(6) if wrench is None else np.array(wrench)
+        center += 0.0 if push is None else push.load(snapshot.robot, snapshot.pose)
+        loads = WrenchBox(_load(self._force, "N"), _load(self._moment, "N m"), center)
+        return WorkspaceQuery(snapshot.robot, locked(np.array(snapshot.pose.quaternion)), model, loads, broken)
+
+    def _prepare(self, query: WorkspaceQuery) -> tuple[Levels, Region]:
+        """Levels and region, created again if the query has changed."""
+        robot, loads = query.robot, (query.wrenches.center.tobytes(), query.wrenches.segments.tobytes())
+        key = (id(robot), query.quaternion.tobytes(), type(query.model), *loads, query.broken)
         if key != self._key or self._levels is None or self._region is None:
-            quaternion = locked(np.array(pose.quaternion))
-            self._query = WorkspaceQuery(
-                robot, quaternion, model, WrenchBox(*loads, center=wrench)
-            )  # keeps the robot alive, so that its id remains unique
-            self._region, self._levels = region_of(robot, None, CELLS), self._query.levels()
+            self._query = query  # keeps the robot alive, so that its id remains unique
+            self._region, self._levels = region_of(robot, None, CELLS), query.levels()
             self._key = key
         if self._scale_key != key and self._scaled:
             self._scale_key, self._scale = key, _scale_of(self._levels, self._region)
@@ -248,6 +266,7 @@ class RegionFeature(Feature):
         if self._region_box.value and self._levels is not None:
             here = self._levels.details(self._place[None])
             text = margin_text(float(here.margin[0]), int(here.cable[0]), force_unit(self._levels.robot))
+            text += self._without
             if self._result is not None and (hull := self._result[2]) is not None:
                 patches = near_patches(hull, self._place, REACH * self._size)
             self._margin_html.content = html_block(f"<b>Here</b> {text}")
@@ -301,7 +320,7 @@ class RegionFeature(Feature):
         which = free_directions(robot, region.flat)
         travel = free_travel(levels.details, pose.position, which, region.low, region.high)
         self._draw_travel(travel)
-        self._travel_html.content = travel_text(travel, force_unit(robot))
+        self._travel_html.content = travel_text(travel, force_unit(robot), self._without)
 
     def _draw_travel(self, travel: FreeTravel) -> None:
         """Draw an arrow in each direction, with its length if it ends at the boundary."""
