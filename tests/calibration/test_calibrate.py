@@ -36,7 +36,7 @@ ALL = {  # of 63 numbers: what an honest drawing may be off
     "center_of_mass": 0.02,
 }
 SLIP = 0.02  # m
-NO_POSE = ("without a pose at which this robot can give such readings", "one at least")
+NO_POSE = ("without a pose that explains the readings", "one at least")
 
 
 def unknowns(errors: dict[str, float]) -> list[sl.Unknown]:

@@ -154,7 +154,7 @@ def pair(robot: sl.Robot, errors: Errors) -> tuple[sl.Robot, sl.Robot]:
 
 
 def with_cells(robot: sl.Robot) -> sl.Robot:
-    """Robot with load cell offsets of +2 N and -2 N in turn, if the robot has no offsets."""
+    """Robot with alternating load cell offsets of +2 N and -2 N, if the robot has no offsets."""
     winches = robot.winches
     if winches is None or winches.load_cell_bias.any():
         return robot

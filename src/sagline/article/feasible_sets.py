@@ -21,7 +21,7 @@ CHORD = 10.0  # [m]
 TOLERANCES = (0.01, 0.001, 0.0001)  # [m]
 TENSIONS = np.linspace(10.0, 500.0, 200)  # [N]
 PSI_TENSIONS = np.array([30.0, 60.0, 120.0, 200.0, 300.0, 400.0])  # [N]
-SHOWN = 2  # index of the length whose set psi is drawn alone
+SHOWN = 2  # index of the length for which the set psi is drawn alone
 LOW_PART = 50.0  # lower end of the curve [N], as in the article
 
 

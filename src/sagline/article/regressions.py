@@ -175,7 +175,7 @@ class ConstantsStudy:
 
     sampling: Sampling  # the cables; only the tensions differ
     over_lowest: tuple[Constants, ...]  # ranges from each lowest tension to the highest tension of the article
-    over_highest: tuple[Constants, ...]  # ranges from the lowest tension of the article to each highest one
+    over_highest: tuple[Constants, ...]  # ranges from the lowest tension of the article to each highest tension
     # the article's range times 1, 2, 4, and so on, up to the limit of taut cables
     scaled: tuple[Constants, ...]
     published: Constants  # the range with the published |k_h| (at the frame end) and k_p as results

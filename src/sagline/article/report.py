@@ -160,7 +160,7 @@ def _unknown(word: str) -> sl.InvalidValueError:
 
 
 def _picture(chapters: Sequence[Chapter]) -> Panel | None:
-    """Drawing of the largest position errors of each model for both robots; None if the report has no such errors."""
+    """Drawing of the largest position errors of each model for both robots; None without position errors."""
     numbers = next((f.numbers for c in chapters for f in c.findings if f.key == KEY), None)
     if numbers is None:
         return None

@@ -13,8 +13,8 @@ from sagline.article.models import MODELS
 from sagline.core.arrays import Array
 
 ROBOTS = ("article-suspended", "article-mixed")  # the article's first and second configuration
-# The article describes (55): the tensions closest to the previous ones. In its figures, however, unneeded cables are
-# near their minimum, and curves return to their initial values. This agrees with the minimum norm of the article's
+# The article describes (55), the tensions closest to the previous tensions. In its figures, however, unneeded cables
+# are near their minimum, and curves return to their initial values. This agrees with the minimum norm of the article's
 # variable T_x.
 METHOD = sl.MinimumNorm("horizontal")
 ERROR_BAND = 6e-3  # [m], the article's "(-6, 6) mm"

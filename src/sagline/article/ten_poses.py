@@ -52,8 +52,8 @@ class TenPoses:
     trends: tuple[Trend, ...]  # effects of single parameters
     # all explanations by one, two and three parameters; each group is sorted by the remaining error
     explanations: tuple[tuple[Explanation, ...], ...]
-    # an offset of the lengths together with an anchor height can reproduce this part of the effect of a pulley radius
-    # on the positions: length of the projected vector divided by the length of the vector
+    # part of the effect of a pulley radius on the positions that an offset of the lengths and an anchor height can
+    # reproduce together, as a ratio of the lengths of vectors
     imitated: float
     single_zero: Array  # standard deviations of the length offsets of all cables [m], shape (m,)
     dead_meter: Array  # predicted actual minus desired position with 1 m of dead length [m], shape (10, 3)

@@ -57,11 +57,11 @@ def calibrate(
 
     Args:
         robot: The robot before the calibration. Its values are the initial values and the priors. The standard
-            deviation of a prior is that of `Unknown(name, deviation=...)`, the robot's tolerance, or a typical value of
-            the kind, in this order.
+            deviation of a prior is the first available value of these: `Unknown(name, deviation=...)`, the robot's
+            tolerance, a typical value of the kind.
         log: Readings at poses at rest.
         unknowns: Parameters to estimate: names of `KINDS` in `sagline.calibration.parameters`, or `Unknown`s.
-        model: Cable model: the exact or the weightless one.
+        model: Cable model, exact or without weight.
         robust: True to reduce the weight of poses that do not fit the other poses.
         folds: Number of parts of the poses for the cross-validation, at most one per pose; each part takes the time of
             one calibration. 0 for no cross-validation.

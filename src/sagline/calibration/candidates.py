@@ -23,7 +23,7 @@ MOST_SETS: Final = 5  # number of sets of tensions at one pose
 ROUNDS: Final = 6  # largest number of attempts to draw poses; a large part of a box may be infeasible
 KEPT: Final = 0.02  # margin at both tension limits, as a share of their range; actual tensions differ from commands
 GROUP: Final = 20  # number of poses per solution; their sets of tensions are near the same corners
-UNLIMITED: Final = 3.0  # upper limit in place of an infinite one, relative to the largest minimum-norm tension
+UNLIMITED: Final = 3.0  # replacement of an infinite upper limit, relative to the largest minimum-norm tension
 SAME: Final = 1e-6  # smallest distance of two sets of tensions, as a share of the largest tension
 
 
@@ -82,7 +82,7 @@ def _concatenated(parts: list[CandidatePoses]) -> CandidatePoses:
 
 
 def _random_poses(robot: Robot, box: PoseBox, count: int, rng: np.random.Generator) -> Pose:
-    """Random poses of a box; from the second one on, every other pose is nearer to the borders."""
+    """Random poses of a box; the second pose, the fourth pose and so on are nearer to the borders."""
     share, part = rng.uniform(size=(count, 3)), rng.uniform(size=count)
     share[1::2] = 0.5 - 0.5 * np.cos(np.pi * share[1::2])
     part[1::2] **= 0.25
@@ -205,7 +205,7 @@ def _nearest_neighbor_tour(apart: Array) -> Indices:
 
 
 def _reverse_segments(order: Indices, apart: Array, floor: float) -> bool:
-    """Reverse every segment whose reversal shortens the tour, in place; True if any segment was reversed."""
+    """Reverse every segment if this shortens the tour, in place; True if a segment was reversed."""
     changed = False
     for i in range(len(order) - 2):
         before, first, lasts, after = order[i], order[i + 1], order[i + 1 : -1], order[i + 2 :]

@@ -1,4 +1,4 @@
-"""Criticism of a fit: score tests of parameters that were not estimated, and their share of the covariance.
+"""Criticism of a fit: score tests of fixed parameters (not estimated), and their share of the covariance.
 
 docs/model.md, section 14.
 """
@@ -23,20 +23,20 @@ from sagline.core.progress import blocks
 from sagline.robot.robot import Robot
 from sagline.robot.winch import Winch
 
-CHANCE: Final = 0.01  # probability that a log without errors is criticized
-BY_CABLE: Final = ("load_cell_gain", "load_cell_bias")  # kinds that are also tested for each single cable
+CHANCE: Final = 0.01  # probability that a log without errors fails a test
+BY_CABLE: Final = ("load_cell_gain", "load_cell_bias")  # kinds that are also tested for single cables
 
 
 class FixedTerms(NamedTuple):
-    """Readings of a fit as a linear problem in its P parameters and in the F fixed ones.
+    """Readings of a fit as a linear problem in P estimated parameters and F fixed parameters.
 
     Attributes:
-        problem: The problem with all P + F parameters; the fixed ones follow the estimated ones.
+        problem: The problem with all P + F parameters; the fixed parameters are the last F.
         slopes: Derivatives of the P values by the internal parameters, (P,).
         solution: Step of the internal parameters by a change of the rows, (P, K).
-        fixed: Rows of the fixed parameters that no step of the others reduces, (K, F).
-        effect: Rows of the fixed parameters, (K, F).
-        misfit: Misfit that remains, (K,).
+        fixed: Part of `effect` that no step of the estimated parameters can reproduce, (K, F).
+        effect: Derivatives of the rows by the fixed parameters, (K, F).
+        misfit: Remaining misfit, (K,).
     """
 
     problem: FitProblem
@@ -53,7 +53,7 @@ class FixedTerms(NamedTuple):
 
 
 def fixed_terms(problem: FitProblem, unknowns: Sequence[Unknown], fit: Fit) -> FixedTerms | None:
-    """Linear problem at the end of a fit with all other parameters that the readings observe; None if there is none."""
+    """Linear problem at the end of a fit, with all observable parameters as fixed ones; None if there are none."""
     robot = _with_cells(problem)
     parameters, others = problem.parameters, list(_other_kinds(problem, robot))
     if not others:
@@ -82,11 +82,11 @@ def fixed_terms(problem: FitProblem, unknowns: Sequence[Unknown], fit: Fit) -> F
 
 
 def criticisms_of(terms: FixedTerms, standard_error: Array) -> tuple[Criticism, ...]:
-    """Fixed parameters whose estimation would reduce chi squared by more than chance explains, the strongest first.
+    """Fixed parameters that the readings contradict: their estimation would reduce chi squared more than by chance.
 
     The test is the score test with the priors of the fixed parameters. A kind is tested with a value for each cable,
-    with one value for all cables, and a load cell alone. Of these the test with the best information criterion (AIC)
-    is kept.
+    and with a common value. Kinds of load cells are also tested for single cables. The test with the best information
+    criterion (AIC) is kept. The largest reduction comes first.
     """
     groups = list(_groups(terms.problem, len(terms.slopes)))
     best: dict[str, tuple[float, Criticism]] = {}
@@ -102,7 +102,7 @@ def criticisms_of(terms: FixedTerms, standard_error: Array) -> tuple[Criticism, 
 def _score_test(
     terms: FixedTerms, standard_error: Array, kind: str, name: str, which: Indices, columns: Array
 ) -> tuple[Criticism, float]:
-    """Result of the test of some fixed parameters along some directions (F, C), and minus its information criterion."""
+    """Result of the test of fixed parameters along directions (F, C), and minus its information criterion."""
     count = len(terms.slopes)
     rows, prior = terms.fixed[:, which] @ columns, terms.problem.prior_deviation[count:][which][: columns.shape[1]]
     score = rows.T @ terms.misfit
@@ -124,12 +124,12 @@ def considered_covariance(terms: FixedTerms) -> Array:
 
 
 def _with_cells(problem: FitProblem) -> Robot:
-    """Robot with winches, whose load cells have a gain and a bias."""
+    """Robot with winches, because tests need gains and biases of load cells."""
     return problem.robot if problem.robot.winches is not None else problem.robot.replace(winches=Winch())
 
 
 def _other_kinds(problem: FitProblem, robot: Robot) -> Iterator[Unknown]:
-    """Kinds that were not estimated, that the robot has, and that the readings observe; one value for each cable."""
+    """Kinds that were not estimated, although the robot has them and the readings observe them; one value per cable."""
     for name, kind in KINDS.items():
         if name in problem.parameters.names:
             continue

@@ -36,11 +36,11 @@ def diagnose_log(robot: Robot, log: WinchLog, model: CableModel | str = _CATENAR
     """Likely mistakes in a log, as sentences with the next step; empty for a consistent log.
 
     The first check compares the readings with their expected sizes. It detects lengths and positions in mm, and load
-    cells in kN. Then a robot similar to the given one is fitted to about 24 rows. If no such robot fits, corrections of
-    single mistakes are tested: columns of two cables exchanged (encoders, load cells or both), an encoder that counts
-    backward, zeros with large errors, load cells up to five rows early or late, or units (kgf, lbf, ft, in). The first
-    correction that gives a fit is reported. Zeros with large errors, and lengths with the wrong sign, are found only
-    with commanded poses.
+    cells in kN. Then a robot similar to the given robot is fitted to about 24 rows. If no such robot fits, corrections
+    of single mistakes are tested: columns of two cables exchanged (encoders, load cells or both), an encoder that
+    counts backward, zeros with large errors, load cells up to five rows early or late, or units (kgf, lbf, ft, in). The
+    first correction that gives a fit is reported. Zeros with large errors, and lengths with the wrong sign, are found
+    only with commanded poses.
     """
     instance(robot, Robot, "robot")
     instance(log, WinchLog, "log")
@@ -98,7 +98,7 @@ def wrong_units(robot: Robot, log: WinchLog) -> Iterator[str]:
 
 
 def fits_without_measured_poses(robot: Robot, log: WinchLog, model: CableModel) -> bool:
-    """True if a robot similar to this one fits lengths and load cells alone."""
+    """True if a robot similar to this robot fits lengths and load cells, without the measured poses."""
     if log.load_cells is None or (log.position is None and log.rotation is None):
         return False
     own = log.replace(position=None, rotation=None)
@@ -138,7 +138,7 @@ def _spread(position: Array) -> float:
 
 
 def _single_mistake(trial: Trial) -> Iterator[str]:
-    """Sentence about the single mistake whose correction gives a fit."""
+    """Sentence about a single mistake; its correction gives a fit."""
     whole = trial.result(Hypothesis())
     far = _far(trial, whole.zeros)
     if whole.quality <= GOOD:
@@ -190,7 +190,7 @@ def _length_changes(trial: Trial) -> Iterator[Hypothesis]:
 
 
 def _load_cell_changes(trial: Trial) -> Iterator[Hypothesis]:
-    """Possible mistakes in the load cells alone."""
+    """Possible mistakes in the load cells only."""
     if trial.log.load_cells is None:
         return
     yield from (Hypothesis(cell_unit=unit) for unit in CELL_UNITS if unit)

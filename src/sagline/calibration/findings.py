@@ -82,7 +82,7 @@ class Outlier(Result):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Criticism(Result):
-    """Parameters that were not estimated, and whose estimation would reduce chi squared more than chance explains.
+    """Fixed parameters that the readings contradict: their estimation would reduce chi squared more than by chance.
 
     Attributes:
         name: For example "load_cell_gain common to all cables", "load_cell_gain[3]" or "center_of_mass".

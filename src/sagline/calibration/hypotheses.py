@@ -52,9 +52,9 @@ class Hypothesis(NamedTuple):
     """A change of the readings.
 
     Attributes:
-        lengths: Two cables whose lengths or counts are exchanged, or None.
-        cells: Two cables whose load cells are exchanged, or None.
-        flipped: A cable whose encoder counts backward, or None.
+        lengths: Two cables with exchanged lengths or counts, or None.
+        cells: Two cables with exchanged load cells, or None.
+        flipped: A cable with an encoder that counts backward, or None.
         moved: Cables with zeros that are computed from the commanded poses.
         late: Number of rows by which the load cells lag behind the encoders.
         cell_unit: Unit of the load cells in `CELL_UNITS`; "" for newtons.

@@ -19,7 +19,7 @@ from sagline.robot.robot import Robot
 FEW: Final = 8  # largest number of readings per parameter for exchanges; with more, they reduce errors by less than 1 %
 OPEN: Final = 1e-12  # a direction with a smaller singular value, relative to the largest, is unobservable
 ROUNDING: Final = 1e-6  # a parameter with a smaller share of the square of a direction does not belong to the direction
-CONDITION: Final = 1e-13  # smallest prior relative to the information of all candidates; rounding hides smaller ones
+CONDITION: Final = 1e-13  # smallest prior relative to the information of all candidates; rounding hides a smaller prior
 _WORTH: Final = 1e-9  # smallest increase of the log det by an exchange; smaller ones are rounding
 
 
@@ -96,8 +96,8 @@ class Choice(NamedTuple):
 def choose_informative(rows: Array, known: Array, count: int) -> Choice:
     """D-optimal choice of `count` candidates: a greedy choice, and for few candidates an improvement by exchanges.
 
-    The increase of log det by the greedy choice is at least 1 - 1/e of the largest possible one, because log det is
-    submodular (Nemhauser, Wolsey & Fisher 1978). The exchanges follow Fedorov 1972.
+    The increase of log det by the greedy choice is at least 1 - 1/e of the largest possible increase, because log det
+    is submodular (Nemhauser, Wolsey & Fisher 1978). The exchanges follow Fedorov 1972.
     """
     found = Information(rows, known)
     for _ in range(count):
@@ -115,7 +115,7 @@ def choose_informative(rows: Array, known: Array, count: int) -> Choice:
 
 
 def _exchange(found: Information) -> None:
-    """Replace each chosen candidate once by the best one that is not chosen."""
+    """Replace each chosen candidate once by the best candidate that is not chosen."""
     for candidate in tuple(found.chosen):
         found.leave(candidate)
         gains = found.gains()

@@ -64,8 +64,8 @@ def whitened_at(
 ) -> WhitenedRows:
     """Whitened readings of some poses at a state, with their slopes; reported: lengths [m], (n, m).
 
-    If `direction` (P,) is given, only the slopes along it are computed. With `free_of_noise`, the slopes are those at
-    the true lengths. At the reported lengths, the scale of all lengths would seem observable, because it also scales
+    If `direction` (P,) is given, only the slopes along it are computed. With `free_of_noise`, the slopes are computed
+    at the true lengths. At the reported lengths, the scale of all lengths would seem observable, because it also scales
     the noise.
     """
     log, parameters, machine = problem.log, problem.parameters, state.machine
@@ -292,7 +292,7 @@ def _significant_eigenpairs(matrix: Array) -> tuple[Array, Array]:
 
 
 def exceeded_with(probability: Any, freedoms: Any) -> Array:
-    """Value that chi squared exceeds with a probability, exact for small ones; at least one degree of freedom."""
+    """Value that chi squared exceeds with a (small) probability, for at least one degree of freedom."""
     return np.asarray(chdtri(np.maximum(freedoms, 1), probability))
 
 

@@ -29,7 +29,7 @@ def _default_if_none(sensors: Sensors | None) -> Sensors:
 
 
 class _Replaceable(Result):
-    """Base of input types whose fields can be replaced; pickled through the constructor."""
+    """Base of input types with fields that can be replaced; pickled through the constructor."""
 
     __slots__ = ()
 
@@ -62,7 +62,7 @@ class Sensors(_Replaceable):
             if rotations are not measured.
         frame: Pose of the measuring system in the world; None for the axes of the world. A point with measured
             coordinates p has the world coordinates frame.position + frame.matrix p.
-        target: The point of the platform whose position is measured, platform frame [m], shape (3,).
+        target: The measured point of the platform, in the platform frame [m], shape (3,).
 
     Raises:
         InvalidValueError: If a deviation is not positive, or a value is of the wrong kind or shape.
@@ -130,12 +130,12 @@ class WinchLog(_Replaceable, Saved):
         rotation: Rotation of the platform in these axes as unit quaternions, scalar last, shape (N, 4), rows of NaN if
             not measured; or None.
         time: Time of each row [s], shape (N,), in any order; or None.
-        commanded: Commanded poses, near the actual ones, N of them; or None.
+        commanded: N commanded poses, near the actual poses; or None.
         sensors: Standard deviations of all readings; None for `Sensors()`, which only has length deviations.
         source: Origin of the readings.
 
     Raises:
-        InvalidValueError: If both or neither of counts and lengths are given, a field is of the wrong kind, shape or
+        InvalidValueError: If counts and lengths are both given or both missing, a field is of the wrong kind, shape or
             range, or the sensors lack the standard deviation of a reading.
 
     Examples:

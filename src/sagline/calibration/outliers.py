@@ -1,4 +1,4 @@
-"""Outliers: poses that do not fit the other poses, and the wrong length, load cell or measured pose at such a pose."""
+"""Outliers: poses that do not fit the other poses, and the wrong length, load cell or measured pose at these poses."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def _fit_suspects(case: _Case, taken: Sequence[_Suspect], iterations: int) -> _S
 
 
 def _squares(case: _Case, counts: Flags) -> float:
-    """Sum of squares of all terms except those of the suspects."""
+    """Sum of squares of all terms except the terms of the suspects."""
     return float(np.sum((case.misses()[0] / case.deviation)[counts] ** 2))
 
 

@@ -136,8 +136,8 @@ _NOTHING: Final = {"load_cell_gain": "1", "load_cell_bias": "0 N", "dead_cable":
 def parameters_of(robot: Robot, unknowns: Sequence[str | Unknown], sensors: Sensors, *, counted: bool) -> Parameters:
     """Parameters of the unknowns, in the order of the unknowns; parameters of one unknown are sorted by cable and axis.
 
-    Raises an error for a repeated unknown, for a value that the robot lacks, and for an unknown with neither a reading
-    nor a stated prior.
+    Raises an error for a repeated unknown, for a value that the robot lacks, and for an unknown without a reading and
+    without a stated prior.
     """
     m = robot.cable_count
     where = np.full((kinds.KIND_ROWS, m), -1, dtype=np.int64)
@@ -254,7 +254,7 @@ def _prior_deviation(robot: Robot, unknown: Unknown, kind: Kind, own: Array) -> 
 
 
 def internal(parameters: Parameters, values: Array) -> Array:
-    """Internal parameters (P,) of values: logarithms for the logarithmic ones."""
+    """Internal parameters (P,) of values: the logarithms where `logarithmic` is True."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(parameters.logarithmic, np.log(values), values)
 

@@ -94,7 +94,7 @@ class CalibrationPoses(Result, Saved):
 
 
 def poses_text(plan: CalibrationPoses, width: int = WIDTH) -> str:
-    """Expected errors of calibration poses and of random ones, in lines of at most `width` columns."""
+    """Expected errors of calibration poses and of random poses, in lines of at most `width` columns."""
     return "\n".join((*_head(plan, width), *_errors(plan, width), *_advice(plan, width))).replace(SPACE, " ")
 
 
@@ -139,7 +139,7 @@ def _head(plan: CalibrationPoses, width: int) -> Iterator[str]:
 
 
 def _first_of_each(position: Array) -> Array:
-    """Flags of the poses whose position differs from the previous one."""
+    """Flags of the poses with another position than the previous pose."""
     return np.asarray(np.concatenate(([True], (np.diff(position, axis=0) != 0.0).any(axis=1))))
 
 

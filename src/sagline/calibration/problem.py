@@ -213,7 +213,7 @@ def held_lengths(problem: FitProblem, machine: MachineTerms, poses: Array, repor
 
 
 def _poses(problem: FitProblem, machine: MachineTerms, reported: Array, commanded: Pose | None) -> Array:
-    """Initial pose rows: measured or else commanded poses, or else forward kinematics of the reported lengths."""
+    """Initial pose rows: measured poses; otherwise commanded poses; otherwise poses from the reported lengths."""
     if commanded is not None:
         poses = np.array(pose_rows(commanded))
         poses = np.broadcast_to(poses, (len(reported), poses.shape[1])).copy()
@@ -238,7 +238,8 @@ def _poses(problem: FitProblem, machine: MachineTerms, reported: Array, commande
 def _aligned(problem: FitProblem, numbers: Array, poses: Array) -> Array:
     """Parameters after alignment of the measuring system to the poses, if it is unknown and has enough readings.
 
-    Its rotation is the mean of platform rotations relative to measured ones, or it aligns the measured points.
+    The rotation of the measuring system is the mean rotation from measured to platform rotations, or from measured to
+    platform points.
     """
     where = problem.parameters.where[kinds.SHIFT : kinds.TURN + 3, 0]
     if where[0] < 0:

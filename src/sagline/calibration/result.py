@@ -134,7 +134,7 @@ class Calibration(Findings, Saved):
         chi_squared_of_pose: Chi squared of each pose, (N,).
         weights: Weights of the poses, (N,); less than 1 for a pose that does not fit the others.
         outliers: Readings that do not fit.
-        gauge: Unobservable directions; along them the values follow from the priors.
+        gauge: Unobservable directions; the priors determine the values along these directions.
         cannot_tell_apart: Weakly identifiable directions.
         criticisms: Parameters that were not estimated, although the readings contradict their values.
         cross_validation: Errors at omitted poses; None without cross-validation.

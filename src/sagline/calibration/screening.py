@@ -93,7 +93,7 @@ def _incomplete(log: WinchLog) -> Flags:
 
 
 def _repeated(log: WinchLog) -> Flags:
-    """Flags of rows whose readings equal those of an earlier row, bit by bit."""
+    """Flags of rows with exactly the readings of an earlier row."""
     read = [v for v in (log.readings, log.load_cells, log.position, log.rotation) if v is not None]
     bits: list[NDArray[np.uint64]] = [np.ascontiguousarray(v + 0.0).view(np.uint64) for v in read]  # -0.0 to 0.0
     digest = np.zeros(len(log), dtype=np.uint64)

@@ -80,9 +80,7 @@ def search_from_priors(
             kept &= ~elsewhere
             if not kept.any():
                 step = "Check that the log is of this robot, check lengths and load cells, or give better anchors."
-                raise InvalidValueError(
-                    "log", "without a pose at which this robot can give such readings", "one at least", step
-                )
+                raise InvalidValueError("log", "without a pose that explains the readings", "one at least", step)
             current = evaluate_step(problem, fit.state, None, kept)
             fit = solve(problem, current, kept, robust=robust, progress=progress)
     return SearchResult(fit, kept, left_out)

@@ -15,7 +15,7 @@ from sagline.core.numbers import SPACE, counted, n, plus_minus
 
 WIDTH: Final = 80
 CLEARLY: Final = 4.0  # standard deviations by which chi squared is clearly below its expected value
-MOST_OUTLIERS: Final = 12  # largest number of listed items; the number of further ones is given
+MOST_OUTLIERS: Final = 12  # largest number of listed items; the number of further items is given
 MOST_ROWS: Final = 8  # largest number of listed rows of the log; the number of further rows is given
 UNITS: Final = {"length": "m", "load cell": "N", "position": "m", "rotation": "rad"}
 ANCHORS: Final[tuple[Anchors, ...]] = ("frame_anchors", "platform_anchors")

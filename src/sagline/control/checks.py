@@ -191,8 +191,8 @@ def _check_steps(time: Array, length: Array, rate: Array) -> None:
 
     If the rate within a step h is between the rates at both ends, the step of the length differs from h times the mean
     rate by at most h/2 times the difference of the rates. The largest difference among the adjacent steps is used. A
-    deviation above the allowed jump of an encoder is never accepted. The times are those of the path, because it may
-    end before a tick.
+    deviation above the allowed jump of an encoder is never accepted. The times of the path are used, because the path
+    may end before a tick.
     """
     h = np.diff(time)[:, None]
     off = np.abs(np.diff(length, axis=0) - 0.5 * h * (rate[1:] + rate[:-1]))

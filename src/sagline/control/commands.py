@@ -61,7 +61,7 @@ class Sender:
         self.command = None
 
     def stand_at(self, sample: Sample | None, tension: Array | None = None) -> None:
-        """Set the lengths at rest to those of a sample, and the tensions to the given or measured ones [N], (m,)."""
+        """Set the lengths at rest from a sample, and the tensions to given or measured values [N], (m,)."""
         if sample is not None:
             self.length, self.tension = sample.length, sample.filtered if tension is None else tension
 

@@ -86,7 +86,7 @@ class _Run:
         first_event: Number of events before the motion.
         table: Table of the cycles.
         recording: True if cycles are added to the table.
-        announced: True if the recorder has received the plan but not yet its end.
+        announced: True if the recorder has received the plan, and has not received its end.
     """
 
     def __init__(self) -> None:

@@ -154,7 +154,7 @@ class Controller(Preparation):
             angular_speed: Largest angular speed of the platform [rad/s], > 0.
 
         Raises:
-            RefusedError: If the pose of the platform is unknown, or already the requested one.
+            RefusedError: If the pose of the platform is unknown, or is already the requested pose.
         """
         limits = number(speed, "speed", "m/s", above=0.0), number(angular_speed, "angular_speed", "rad/s", above=0.0)
         here = self._here()
@@ -198,7 +198,7 @@ class Controller(Preparation):
             by: Change of length [m], positive if cable is paid out.
 
         Raises:
-            RefusedError: If the robot is neither idle nor in homing, or a tension would leave its limits.
+            RefusedError: If the robot is not idle and not in homing, or a tension would leave its limits.
         """
         c = self._context
         chosen, far = checked_winch(c.robot, winch, by)

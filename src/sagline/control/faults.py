@@ -28,7 +28,7 @@ from sagline.robot.robot import Robot
 
 LARGEST_CORRECTION: Final = TensionSettings().largest  # largest correction of the tension loop [m]
 
-# in the order of evaluation; a lost or dead cell must be found before its cable counts as slack
+# in the order of evaluation, because a lost or dead cell must be found before its cable counts as slack
 FAULTS: Final[tuple[type[Fault], ...]] = (
     EmergencyStop,
     OwnerLost,

@@ -25,7 +25,7 @@ _FREE: Final = "Stop other programs on this computer."
 
 
 class _Old(Fault):
-    """Group whose newest sample is too many cycles old."""
+    """Group with a newest sample that is too many cycles old."""
 
     cycles: int
     step: str
@@ -126,7 +126,7 @@ class GroupActs(Fault):
         self._reported: Flags = np.zeros(int(seen.group_of.max()) + 1, dtype=bool)
 
     def found(self, cycle: Cycle) -> str | None:
-        """New groups, and the reason of the first one."""
+        """Groups that have newly stopped, and the reason of the first group."""
         seen, sample = self.seen, cycle.sample
         if not (seen.faulted or seen.tripped or seen.bits & _LOCKED):
             return None

@@ -132,8 +132,8 @@ class Sample(NamedTuple):
         state: Codes of `WinchState`, shape (m,).
         winch_fault: Fault codes of the drives, 0 for none, shape (m,).
         discarded: Number of invalid blocks of each group so far, shape (G,).
-        reasons: Reason of the last invalid block of each group, None before the first one; empty if the link gives no
-            reasons.
+        reasons: Reason of the last invalid block of each group, None without an invalid block; empty if the link gives
+            no reasons.
     """
 
     time: float
@@ -173,8 +173,8 @@ class Missing(NamedTuple):
 class Link(Protocol):
     """Connection to a machine.
 
-    A sample is never older than the previous one. Incomplete, foreign, repeated and out-of-order blocks are discarded,
-    and the age of their group increases.
+    A sample is never older than the previous sample. Incomplete, foreign, repeated and out-of-order blocks are
+    discarded, and the age of their group increases.
     """
 
     @property

@@ -179,7 +179,7 @@ class Preparation(Monitor):
             self._context.garbage.go_on()
 
     def _result_of(self, work: Callable[[], T]) -> T:
-        """Result of long work; in real time, cycles continue during the work, because the PLCs would hold otherwise."""
+        """Result of long work; in real time, cycles continue during the work, because otherwise the PLCs would hold."""
         if self._context.pace is None or self.state is State.OFF:
             return work()
         result = result_in_thread(work)

@@ -68,7 +68,7 @@ class TensionLoop:
 
         Args:
             cable_count: Number of cables m.
-            settings: Settings of the loop; the defaults are those of the docs.
+            settings: Settings of the loop.
             period: Period of a cycle [s], > 0.
 
         Raises:

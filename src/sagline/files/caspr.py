@@ -64,8 +64,8 @@ def load_caspr(source: str | os.PathLike[str], cables: Cable | None = None, cabl
         Imported: the robot, and the lost data.
 
     Raises:
-        FileError: If a file cannot be read, one of the two is not found, or they do not describe a robot with one
-            platform and straight, unrouted cables.
+        FileError: If a file cannot be read or is missing, or if the files do not describe a robot with one platform and
+            straight cables that are not routed.
 
     Examples:
         >>> import sagline as sl

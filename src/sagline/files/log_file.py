@@ -250,7 +250,7 @@ def load_log(file: os.PathLike[str] | str, sensors: Sensors | None = None) -> Wi
 
     Args:
         file: The file.
-        sensors: Sensors that replace those in the file.
+        sensors: Sensors that replace the sensors in the file.
 
     Returns:
         The log; its source is the name of the file.

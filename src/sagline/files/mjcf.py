@@ -5,7 +5,7 @@ perpendicular to the chord, and by v out of this plane. Over a swiveling pulley,
 v^2 cos phi/(2 s); l is the free length, and s is the distance of the end from the swivel axis. On a fixed cylinder, the
 cable unrolls to a straight line and becomes longer by v^2/(2 a); a is the length from the first point to the end. The
 tendon therefore starts at the point with a = s/cos phi. This point is R tan(psi/2) before the point at which the tendon
-leaves the cylinder. Force and stiffness are then equal to those with a swiveling pulley.
+leaves the cylinder. Force and stiffness are then the same as with a swiveling pulley.
 """
 
 from __future__ import annotations

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
 MOST_ORDER: Final = 5
-LEVEL: Final = 9  # level of zstandard; higher levels take much longer and save little
+LEVEL: Final = 9  # compression level of zstandard; higher levels take much longer, with little effect
 TYPES: Final = ("float64", "int64", "int8", "bool")
 _EXACT: Final = 2.0**53  # all integers below this are exact floats
 _GAPS: Final = np.iinfo(np.int64).min + np.arange(3)  # codes of NaN, infinity and -infinity in a column of decimals

@@ -111,7 +111,7 @@ def _factor(given: str, wanted: str) -> float | None:
 
 @cache
 def _registry() -> UnitRegistry[Any]:
-    # built once, and only if a file has units, because this takes as long as a run of `sagline track`
+    # built once, and only if a file has units, because it takes as long as a run of `sagline track`
     from pint import UnitRegistry
 
     return UnitRegistry(autoconvert_offset_to_baseunit=False)

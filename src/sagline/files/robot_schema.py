@@ -161,7 +161,7 @@ class _Cables(_RobotPart):
     expansion: Any = None
 
     def cable(self) -> Cable:
-        """The cables; the given keys determine the stiffness, and without other keys the diameter gives the section."""
+        """The cables; the stiffness follows from the given keys, and the section by default from the diameter."""
         ways = (("axial_stiffness",), *(("youngs_modulus", key) for key in ("section_area", "radius", "diameter")))
         beside = ["linear_density", "expansion"]
         if self.model_fields_set & {"axial_stiffness", "section_area"}:

@@ -90,7 +90,7 @@ class CsvTable:
             raise line_error(self.path, self.header, "no rows below the names of the columns; allowed: at least one")
 
     def refuse(self, wrong: NDArray[np.bool_], item: str, values: Array, unit: str, allowed: str) -> None:
-        """Refuse a table with a wrong row; the message gives line, value, unit and allowed values of the first one."""
+        """Refuse a table with a wrong row; the message gives line, value, unit, allowed values of the first one."""
         if wrong.any():
             k = int(np.argmax(wrong))
             value = f"{values[k]:.12g} {unit}".rstrip()

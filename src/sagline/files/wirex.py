@@ -136,7 +136,7 @@ def _point(chain: Element, tag: str, k: int) -> list[float]:
 
 
 def _material(root: Element, chain: Element, k: int) -> Element:
-    """The <cable> with the cable_id of a chain, from 1; the first one without an id; empty if none exists."""
+    """The <cable> with the cable_id of a chain, from 1; without an id, the first <cable>; empty if there is none."""
     known = root.findall("cable")
     text = chain.get("cable_id", "1")
     if not known:
@@ -257,7 +257,7 @@ def _inertia(platform: Element, mass: float, size: Array, assumed: dict[str, str
     why = ["taken about the center of mass; the WireX format does not say about which point"]
     missing = [(i, j) for i, j in combinations_with_replacement(range(3), 2) if np.isnan(matrix[i, j])]
     products = [pair for pair in missing if pair[0] != pair[1]]
-    if len(products) not in (0, 3):  # if one or two products are given, the others are errors
+    if len(products) not in (0, 3):  # one or two given products: a missing product is an error
         key = "I" + "".join(_AXES[k] for k in products[0])
         raise InvalidValueError(f"inertiatensor: {key}", "missing", "a number in kg m^2", f"Add {key} to the file.")
     if missing:

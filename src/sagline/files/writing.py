@@ -77,7 +77,7 @@ def staging(folder: Path) -> Iterator[Path]:
 
 
 def _new_place(folder: Path) -> tuple[Path, int]:
-    """New folder and its lock; another folder is made if a process has removed the first one as abandoned."""
+    """New folder and its lock; if another process has removed the folder as abandoned, another folder is made."""
     for _ in range(TRIES):
         place = Path(tempfile.mkdtemp(prefix=PREFIX, suffix=SUFFIX, dir=folder))
         try:

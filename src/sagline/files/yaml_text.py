@@ -92,7 +92,7 @@ def parse_mapping(text: str, origin: Path | str) -> dict[Any, Any]:
         data = yaml.load(text, Loader=_PlainLoader)
     except yaml.MarkedYAMLError as error:
         raise error_at_line(origin, *_cause(error, text)) from None
-    except (yaml.YAMLError, RecursionError, ValueError, OverflowError) as error:  # the last two for \UFFFFFFFF
+    except (yaml.YAMLError, RecursionError, ValueError, OverflowError) as error:  # the last two: \UFFFFFFFF
         reason = f"is not YAML in the form that sagline reads ({_reason(error, text)})"
         raise error_at_line(origin, reason, "Check that this is the file you mean.") from None
     if data is None:
@@ -171,7 +171,7 @@ class _PlainLoader(yaml.SafeLoader):
         return _tag_of(kind, value, implicit)
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
-        # equal keys are checked here, because PyYAML silently keeps the last one; it refuses a wrong !!map itself
+        # equal keys are checked here, because PyYAML silently keeps the last of them; PyYAML refuses a wrong !!map
         keys = [key for key, _ in node.value] if node.id == "mapping" else []
         seen = set()
         for key in (key for key in keys if isinstance(key, yaml.ScalarNode)):

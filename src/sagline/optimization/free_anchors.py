@@ -105,7 +105,7 @@ class FreeAnchors(Free):
         low: Lowest shifts [m], <= 0, shape (K,): along x, y, z, or along each direction in `along`.
         high: Largest shifts [m], shape (K,), >= 0; a coordinate with low = high = 0 is fixed.
         along: Directions, world axes for the frame and platform axes for the platform, shape (K, 3), unit vectors.
-        cables: Indices of the cables whose anchors are shifted, from 0; empty for all.
+        cables: Indices of the cables with shifted anchors, from 0; empty for all.
         symmetry: Relation of the shifts to the shift of the first anchor. "x", "xy" or other axes: mirrored at the
             planes normal to these axes. "turned": rotated about the vertical by the angle between the anchors.
             "together": equal. None: independent.
@@ -135,7 +135,7 @@ class FreeAnchors(Free):
             low: Lowest shifts [m]: three numbers along x, y, z; with `along` one number per direction.
             high: Largest shifts [m], of the same shape.
             along: One or several directions of any nonzero length; None for x, y and z.
-            cables: Indices of the cables whose anchors are shifted, from 0; None for all.
+            cables: Indices of the cables with shifted anchors, from 0; None for all.
             symmetry: "x", "y", "z", "xy", ..., "turned", "together", or None.
 
         Raises:

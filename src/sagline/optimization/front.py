@@ -32,7 +32,7 @@ FRONT: Final = "front.csv"
 class Front(Result):
     """Result of `design`: robots that are better than the initial robot.
 
-    None of them is better than another one in every goal.
+    No robot is better than another robot in every goal.
 
     Attributes:
         start: Initial robot of the search.

@@ -40,7 +40,7 @@ def distribute(
     """Largest tension [N], largest sag [m] and, on request, least stiffness [N/m], by the minimum norm, each (N,).
 
     Values are NaN without tensions. Each of the N pose rows has its own table (m, CABLE_COLUMNS). The stiffness is the
-    smallest one against a force on the center of mass.
+    smallest stiffness against a force on the center of mass.
     """
     method = MinimumNorm()
     options = kernel_options(robot, model, method.alone)

@@ -137,7 +137,7 @@ def checked_request(
             raise InvalidValueError(f"inner[{k}]", brief(one), "FreeAnchors", "Only anchors move from pose to pose.")
     if request.inner and not any(goal.needs == "margin" for goal in request.goals):
         step = "Add Goal('mean_margin'), because anchors move to the largest margin."
-        raise InvalidValueError("inner", "given without a goal on margins", "given with a goal on margins", step)
+        raise InvalidValueError("inner", "given without a goal about margins", "given with a goal about margins", step)
     if request.optimizer == "nsga2":
         _refuse_weights(request.goals)
     _check_platform(request)

@@ -89,7 +89,7 @@ class GroupThread(Thread):
         self._ending = Event()
 
     def hand_over(self, block: Block, data: bytes) -> None:
-        """Queue a block for writing in place of the queued one, and read the PLC's block."""
+        """Queue a block for writing, in place of a queued block, and read the PLC's block."""
         self._outgoing.append(_Outgoing(block, data, self._clock()))
         self._kick.set()
 

@@ -122,7 +122,7 @@ def _bytes(kind: str | tuple[Field, ...]) -> int:
 
 
 AGAIN: Final = "counter_again"
-TORN: Final = "If it continues, the PLC writes it in more than one scan"
+TORN: Final = "If this continues, the PLC writes the block in more than one scan"
 LOAD: Final = "Load the blocks of this version into the PLC: sagline export-scl ROBOT --out plc.scl"
 
 FROM_PLC: Final = Block(
@@ -157,7 +157,7 @@ FROM_PLC: Final = Block(
             36,
             "first and second winch of the group",
         ),
-        Field(AGAIN, "UDInt", 100, "the same as counter, else the block is torn"),
+        Field(AGAIN, "UDInt", 100, "the same as counter, or the block is incomplete"),
     ),
 )
 
@@ -185,7 +185,7 @@ TO_PLC: Final = Block(
             20,
             "first and second winch of the group",
         ),
-        Field(AGAIN, "UDInt", 60, "the same as counter, else the block is torn"),
+        Field(AGAIN, "UDInt", 60, "the same as counter, or the block is incomplete"),
     ),
 )
 

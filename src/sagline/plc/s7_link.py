@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 PORT: Final = 102
 PDU: Final = 240  # [bytes], PDU size of an S7-1200; each block fits in one request
 RACK: Final = 0
-FORBIDDEN: Final = 0x8104  # answer of a CPU whose settings do not permit PUT or GET
+FORBIDDEN: Final = 0x8104  # answer of a CPU with settings that do not permit PUT or GET
 _NAME: Final = "Connection"  # names of the class with IPv6
 _CLOSED: Final = Refusal("the connection was closed", "Connect again")
 SLOT: Final = 1  # rack and slot of every S7-1200 and S7-1500

@@ -58,7 +58,7 @@ class SharedMotion:
         return Pose.from_quaternion(self.position[index], self.quaternion[index])
 
     def thinned(self) -> SharedMotion:
-        """Every n-th sample and the last one, if there are more than screens show, and a note about this."""
+        """Every n-th sample and the last one, if the rate exceeds that of screens, and a note about omitted samples."""
         count, duration = len(self.time), float(self.time[-1])
         every = int((count - 1) / (MOST_RATE * duration)) if duration > 0.0 else 1
         if every <= 1:

@@ -34,7 +34,7 @@ WOUND: Final = 0.002  # largest change of a length with the slider, relative to 
 SPEEDS: Final = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)
 RING: Final = '<div class="ring" data-part="ring" aria-hidden="true"></div>'
 HOME: Final = '<button type="button" class="home" data-part="home">Home</button>'
-AROUND: Final = "Drag, or press the arrow keys, to look around; pinch, scroll or press + and − to come nearer."
+AROUND: Final = "Drag, or press the arrow keys, to look around; pinch, scroll, or press + and − to zoom."
 
 
 def robot_page(robot: Robot) -> str:
@@ -47,7 +47,7 @@ def robot_page(robot: Robot) -> str:
         about=_about(robot),
         plays="shows how the cables tighten and sag when the platform is dragged",
         described=f"{robot.name}: its platform on cables. {AROUND}",
-        hint="Drag the platform; drag beside it to look around.",
+        hint="Drag the platform; drag the background to look around.",
         controlled="Position of the platform",
         controls=_sliders(robot),
         over=RING + HOME,
@@ -55,7 +55,7 @@ def robot_page(robot: Robot) -> str:
         robot=robot,
         still=robot_drawing(robot, at, plan.chord_tension),
         table=_table(robot, plan.chord_tension, plan.unstrained_length),
-        notes=("Tensions of least norm within their limits, elastic catenaries, platform at rest.", *_guides(robot)),
+        notes=("Tensions of least norm within the limits, elastic catenaries, platform at rest.", *_guides(robot)),
         facts=facts,
         states="",
     )

@@ -23,7 +23,7 @@ from sagline.sweep.work import task
 HERE: Final = "127.0.0.1"  # not reachable from other computers
 DASHBOARD: Final = 8787
 PATIENCE: Final = 15.0  # longest wait for a scheduler, and for a worker [s]
-AHEAD: Final = 2  # number of tasks per worker, so that the next task is ready when one is finished
+AHEAD: Final = 2  # number of tasks per worker, so that the next task is ready when a task is finished
 LOOK: Final = 5.0  # time between two checks of the number of workers [s]
 SCHEMES: Final = ("tcp://", "tls://", "ws://", "wss://")
 LOGGERS: Final = ("distributed", "tornado", "bokeh", "asyncio")
@@ -91,13 +91,13 @@ def remote_workers(address: str) -> Iterator[Any]:
         try:
             client = api.Client(address, timeout=PATIENCE, set_as_default=False)
         except (OSError, ValueError, RuntimeError, MemoryError) as error:  # the last if another program answers
-            step = "Start one: dask scheduler; and workers: dask worker ADDRESS."
+            step = "Start a scheduler: dask scheduler; and workers: dask worker ADDRESS."
             raise SaglineError(f"No scheduler answers at {address} ({_first_line(error)}). {step}") from None
         with client:
             try:
                 client.wait_for_workers(1, timeout=PATIENCE)
             except (TimeoutError, OSError):
-                step = f"Start one: dask worker {address}"
+                step = f"Start a worker: dask worker {address}"
                 raise SaglineError(f"The scheduler at {address} has no workers. {step}") from None
             yield client
 

@@ -50,9 +50,9 @@ def run(
     Args:
         request: The request.
         folder: Path of the folder; created if missing. It may contain the same sweep, but no other files.
-        workers: Number of processes of this computer; None for one per processor. Without workers, this process
-            computes the tasks one after the other; this happens if the number is 1, Dask is missing, or there are at
-            most four tasks.
+        workers: Number of processes of this computer; None for one per processor. If the number is 1, Dask is missing,
+            or there are at most four tasks, no workers are started, and this process computes the tasks one after the
+            other.
         scheduler: Address of the Dask scheduler of a cluster, "tcp://10.0.0.1:8786", instead of local workers. All
             workers of the cluster must have access to the folder under the same name.
         progress: Function that is called with the number of finished tasks and the number of all tasks.

@@ -301,7 +301,7 @@ class Machine:
         """Inject a fault.
 
         Args:
-            what: Text for `fault`, or a result of `fault`. A fault whose time has passed begins immediately.
+            what: Text for `fault`, or a result of `fault`. A fault with a time in the past begins immediately.
 
         Raises:
             InvalidValueError: If the fault does not exist, or the machine has no such part.

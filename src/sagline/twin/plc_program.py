@@ -259,8 +259,8 @@ class Program:
     def _drive(self, cell: list[float]) -> None:
         """Advance the set points by a scan, unless this winds in a cable beyond its tension limit.
 
-        The set points move linearly to those of the last command within one cycle. After that, they continue at the
-        rates of the command. Lengths and rates stay within their limits.
+        The set points move linearly to the set points of the last command within one cycle. After that, they continue
+        at the rates of the command. Lengths and rates stay within their limits.
         """
         limit, length, powered, target, rate = self.limits.tension, self.length, self.powered, self._target, self._rate
         left, period, moved = self._left, self.period, []

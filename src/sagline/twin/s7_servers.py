@@ -18,7 +18,7 @@ from sagline.twin.block_servers import LOOPBACK, BlockServers
 
 
 class _S71200(Server):
-    """Server with PDUs as small as those of an S7-1200, which can close its connections."""
+    """Server with the PDU size of an S7-1200, which can close its connections."""
 
     def __init__(self) -> None:
         """Begin without connections."""

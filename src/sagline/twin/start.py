@@ -28,7 +28,7 @@ class _EncoderScale:
     """Conversion between lengths and encoder counts, from the turns of known drums, or with a constant radius.
 
     Attributes:
-        per_meter: Counts per meter of unstrained cable let out, at the reference lengths, (m,).
+        per_meter: Counts per meter of unstrained cable that is paid out, at the reference lengths, (m,).
     """
 
     def __init__(self, robot: Robot, length: Array, counts: Array) -> None:

@@ -177,7 +177,7 @@ class LeastFrequency(Criterion):
 class Clearance(Criterion):
     """The distances between cables, platform and obstacles are above a limit.
 
-    The shapes of the cables are those under the middle load of the set. The pairs of bodies are the same as in
+    The cables have the shapes under the middle load of the set. The pairs of bodies are the same as in
     `clearance`.
 
     Attributes:

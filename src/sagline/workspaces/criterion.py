@@ -125,7 +125,7 @@ class Criterion:
     _limit_range: ClassVar[Mapping[str, float]] = MappingProxyType({})
 
     def __post_init__(self) -> None:
-        """Check the limit, and reject an instance of the interface itself."""
+        """Check the limit, and reject an instance of this abstract class."""
         if type(self) is Criterion:
             step = "Choose one of the criteria, MaximumSag(0.05) for instance."
             raise InvalidValueError("Criterion()", "the abstract base class", "a criterion", step)
@@ -159,7 +159,7 @@ class Criterion:
         return limit
 
     def check(self, robot: Robot) -> None:
-        """Reject robots for which the criterion cannot be evaluated.
+        """Reject a robot if the criterion cannot be evaluated for it.
 
         Args:
             robot: The robot.

@@ -12,7 +12,7 @@ from sagline.core.arrays import Array, Indices
 from sagline.workspaces.grid import Level, level_values
 
 TRIAL = 3  # number of steps of regula falsi in which the width of a bracket must fall to an eighth
-ITERATIONS = 100  # largest number of steps; a jump takes about 45 by bisection, a continuous function 5 to 8
+ITERATIONS = 100  # largest number of steps; a jump takes about 45 (bisection), a continuous function 5 to 8
 
 
 class Brackets(NamedTuple):
@@ -94,7 +94,7 @@ def crossings_of(
     `values` has two arguments, indices of lines and one position on each line, and returns the function of each line. A
     bracket is bisected if an end value is infinite. It is bisected several times if regula falsi is slower than
     bisection, for example at jumps. `precision` is relative to the smaller end value, `narrow` to the length of the
-    line. The weights follow Anderson & Björck 1973; those of the Illinois method are 1/2.
+    line. The weights follow Anderson & Björck 1973 (the Illinois method has weights of 1/2).
     """
     low, high = np.zeros(len(inner)), np.ones(len(inner))
     at_low, at_high = at_inner.copy(), at_outer.copy()

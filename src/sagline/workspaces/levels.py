@@ -50,7 +50,7 @@ class Levels:
     """Smallest value of all criteria, each divided by its scale, at positions of the platform: >= 0 inside.
 
     If the margin is negative, criteria on tensions are ignored, because there are no tensions. The level at a position
-    is the smallest level of all rotations, or the largest one if a single feasible rotation is sufficient.
+    is the smallest level of all rotations, or the largest level if one feasible rotation is sufficient.
 
     Attributes:
         robot: The robot.

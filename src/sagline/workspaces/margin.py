@@ -72,15 +72,15 @@ class Margin(Result):
         value: Largest additional load that can be balanced in every direction [N], shape () or (N,). A moment counts as
             a force at the lever arm. A negative value is the excess of the load. The value is infinite for straight
             cables without limits. It is -infinite if the status has no margin or a cable has no admissible tension. It
-            is never NaN. It is continuous, except for small jumps where its sign comes from the exact curves of sagging
-            cables.
+            is never NaN. It is continuous, except for small jumps where the exact curves of the cables determine its
+            sign.
         low: Lower bound of the margin for all sag forces [N], with the shape of value. If the bound is nonnegative,
             every load of the set is proved feasible. Without sag, both bounds are equal to the value.
         high: Upper bound of the margin [N]; if the bound is negative, a load of the set is proved infeasible.
         direction: Normal of the nearest facet, shape (..., 6): force part, and moment part [1/m], in world axes. Its
             length is 1 if the moment part is multiplied by the lever arm. An additional load opposite to this direction
             exceeds the limits first. If the force part is zero, this load is a pure moment.
-        limiting_cable: The cable with a tension limit that has the largest effect on the value; -1 if there is none;
+        limiting_cable: Index of the cable with a tension limit that has the largest effect on the value, -1 for none,
             with the shape of value.
         status: Codes of `MarginStatus`, with the shape of value.
     """
@@ -180,7 +180,7 @@ def margin(
     arm = None if moment_arm is None else number(moment_arm, "moment_arm", "m", low=0.0)
     prepared = MarginRows(robots, load, model, arm)
     rows = pose_rows(pose)
-    check_memory(f"margins at {len(rows):,} poses", _POSE_BYTES * len(rows), "Take them in parts.")
+    check_memory(f"margins at {len(rows):,} poses", _POSE_BYTES * len(rows), "Divide the poses into parts.")
     found = prepared.rows(rows, report)
     value, low, high, cable, status = (locked(array.reshape(shape)) for array in found[:5])
     direction = locked(found.direction.reshape(*shape, 6))

@@ -1,4 +1,4 @@
-"""Orientations of the platform in a workspace: level, or rotations of which all or any must be feasible."""
+"""Orientations of the platform in a workspace: level, or several rotations; all or any of them must be feasible."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Orientations:
 
     Attributes:
         quaternion: Rotations from platform to world as unit quaternions (x, y, z, w), shape (K, 4).
-        need: "all" if the platform must be feasible in each rotation, "any" if one is sufficient.
+        need: "all" if all rotations must be feasible, "any" if one feasible rotation is sufficient.
     """
 
     quaternion: Array
@@ -133,7 +133,7 @@ class Tilts:
             robot: The robot; its motion pattern gives the axes of rotation of the platform.
 
         Returns:
-            Level orientation first, then the tilted ones.
+            Level orientation, then the tilted orientations.
 
         Raises:
             InvalidValueError: If the platform cannot rotate.

@@ -29,7 +29,7 @@ from sagline.workspaces.wrench_sets import WrenchSet, load_of
 
 
 class ProofVerdict(Status):
-    """Verdict on a box of poses, or on a part of one."""
+    """Verdict on a box of poses, or on a part of a box."""
 
     OPEN = OPEN, "without a proof for the whole box: see the shares; a longer budget proves more cells"
     PROVED_INSIDE = INSIDE, "at every pose every load is balanced by tensions within the limits"
@@ -90,8 +90,8 @@ class Prover:
     def verdicts(self, middle: Array, half: Array, rotations: Array | None = None, turns: Array | float = 0.0) -> Codes:
         """Verdicts (N,) of boxes of poses, block by block; OPEN after the deadline.
 
-        A box is given by its center (N, 3) and half edges (3,) [m], a rotation vector (N, 3), None for level, and the
-        largest rotation relative to it [rad], () or (N,).
+        Arguments: centers (N, 3) and half edges (3,) of the boxes [m], rotation vectors (N, 3), None for level, and the
+            largest rotation relative to these vectors [rad], () or (N,).
         """
         boxes = np.zeros((len(middle), BOX_COLUMNS))
         boxes[:, :3] = middle
@@ -141,7 +141,7 @@ def _bisect(prover: Prover, box: PoseBox, smallest: float) -> Cells:
 
 
 def _decide(prover: Prover, middle: Array, half: Array, tilt: float) -> Codes:
-    """Verdicts of cells of positions, for level poses or for all tilts up to a largest one.
+    """Verdicts of cells of positions, for level poses or for all tilts up to a largest tilt.
 
     Tilts are rotation vectors in a ball, which is covered by cubes. For a planar robot they are rotations about the
     normal of its plane, and their range is divided into intervals. The angle between the rotation at the middle of a

@@ -100,7 +100,7 @@ def _plane_axis(robot: Robot) -> int | None:
 
 
 def _place_of_plane(robot: Robot, axis: int) -> float:
-    """Coordinate along the normal at which a planar robot's cables lie in the plane [m]."""
+    """Coordinate of a planar robot's plane along the normal [m]."""
     return float(robot.frame_anchors[:, axis].mean() - robot.platform_anchors[:, axis].mean())
 
 

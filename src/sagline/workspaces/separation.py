@@ -140,7 +140,7 @@ def exclusion(levels: Levels) -> Exclude | None:
 
 
 def _prover(levels: Levels) -> Prover | None:
-    """Proofs by the margin; None for robots for which there are none."""
+    """Proofs by the margin; None if there are no proofs for the robot."""
     try:
         check_provable(levels.robot)
     except InvalidValueError:

@@ -82,7 +82,7 @@ class Workspace(Result, Saved):
         limiting_cable: Limiting cable at each vertex, shape (V,); -1 if there is none.
         margin: Margin of the loads at each vertex [N], shape (V,).
         open_faces: Faces of the box that the workspace reaches, for example "x low". The workspace may continue beyond
-            them, and the volume is that of the part in the box.
+            these faces; the volume is the volume inside the box.
         x: Coordinates of the nodes of the grid [m], shape (X,).
         y: The same along y, shape (Y,).
         z: The same along z, shape (Z,).

@@ -136,8 +136,8 @@ class Components(Result):
             position: Positions [m], shape (..., 3), each in the set.
 
         Returns:
-            Index of the component, shape (...,), from the nearest node of the cell that is in a component; -1 if the
-            cell has no such node.
+            Index of the component, shape (...,): component of the nearest node of the cell, or -1 if no node of the
+            cell is in a component.
 
         Raises:
             InvalidValueError: If a position does not have this form.

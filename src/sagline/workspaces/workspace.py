@@ -80,7 +80,7 @@ def workspace(
 
     Raises:
         InvalidValueError: If an argument is of the wrong kind, box and orientations both have a tilt, the platform
-            cannot rotate in this way, or a criterion needs tensions but those of the method are not continuous.
+            cannot rotate in this way, or a criterion needs continuous tensions that the method does not give.
         FileError: If a package of the extra "workspace" is not installed.
 
     Examples:

@@ -35,7 +35,7 @@ def _segments(segments: Array) -> str:
 
 
 def _each(values: Array, unit: str) -> str:
-    """Text of three numbers, or of one if they are equal."""
+    """Text of three numbers; a single number if they are equal."""
     if np.ptp(values) == 0.0:
         return n(values[0], unit=unit)
     return f"({', '.join(n(value) for value in values)}) {unit}"
@@ -161,7 +161,7 @@ class WrenchEllipsoid(WrenchSet):
             matrix: Matrix A of the wrenches A s with |s| <= 1, shape (6, 6), instead of the semi-axes.
 
         Raises:
-            InvalidValueError: If a number is not finite or a semi-axis negative, a shape is wrong, or semi-axes and
+            InvalidValueError: If a number is not finite, a semi-axis is negative, a shape is wrong, or semi-axes and
                 matrix are both given.
         """
         axes = _six(force, moment)
