@@ -75,7 +75,7 @@ class _Brief(Repr):
     def repr_instance(self, x: Any, level: int) -> str:
         if isinstance(x, np.ndarray) and x.size > 3:
             return f"an array of {x.dtype} of shape {x.shape}"
-        # the short text of a result would need a summary, which may compute
+        # the short text of a result needs its summary, whose computation may take long
         short = getattr(type(x).__repr__, "__module__", "") == "sagline.core.results"
         if short or (type(x).__module__.startswith("sagline") and len(repr(x)) > self.maxother):
             return f"a {type(x).__name__}"
@@ -245,7 +245,7 @@ def _a(name: str) -> str:
 
 
 def _step_to(value: object, kind: type) -> str:
-    """Instruction for a message: how to get an object of the required type from the given value."""
+    """Next step for a message: how to get an object of the required type from the given value."""
     if isinstance(value, type) and issubclass(value, kind):
         return f"Add parentheses to create one: {value.__name__}()."
     if type(value).__module__.startswith("sagline"):

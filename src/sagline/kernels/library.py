@@ -99,7 +99,7 @@ class Entry:
         raise self._wrong_types()
 
     def bind(self, arguments: tuple[object, ...], numbers: int) -> Bound:
-        """The kernel with these arguments, which it keeps alive; the last numbers may change at each call."""
+        """Kernel with these arguments (kept alive); the last numbers may change at each call."""
         for row, address in self._rows:
             slots = (Slot * row.slots)()
             if self._fill(self._python, address, arguments, slots) == 0:

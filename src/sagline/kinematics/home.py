@@ -77,7 +77,7 @@ def home(
         step = "Add winches to the robot: robot.replace(winches=Winch(drum_radius=..., ...))."
         raise InvalidValueError("winches", "not given", "those of the robot", step)
     if winches.guides is not None:
-        step = "Set length_zero to unstrained_length (1 + winding_tension/EA) of inverse(robot, pose) instead."
+        step = "Set length_zero to unstrained_length * (1 + winding_tension/EA) from inverse(robot, pose)."
         raise InvalidValueError("winches: guides", "given", "None for home", step)
     pose = single_pose(pose)
     refuse_missing_chords(robot, pose)

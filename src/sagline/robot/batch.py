@@ -159,7 +159,7 @@ def _check_alike(first: Robot, other: Robot, index: int) -> None:
         raise InvalidValueError(f"robot[{index}]", brief(other), "a Robot", "Give robots only.")
     if other is first:
         return
-    step = "All robots of a batch must be equal in this; solve the others in another batch."
+    step = "This value must be equal for all robots of a batch; use another batch for other values."
     for name, unit in _ALIKE.items():
         value, wanted = getattr(other, name), getattr(first, name)
         if value != wanted:

@@ -178,7 +178,7 @@ class HasState(Protocol):
 
 
 class OfEquilibrium(Protocol[_P, _R_co]):
-    """A function of an equilibrium, with the equilibrium, a result, or a robot and a pose as first arguments."""
+    """A function whose first argument is an equilibrium, a result with an equilibrium, or a robot (then a pose)."""
 
     @overload
     def __call__(self, state: Equilibrium | HasState, *args: _P.args, **options: _P.kwargs) -> _R_co: ...

@@ -190,7 +190,7 @@ def fastest_speed_profile(place: Array, planes: HalfPlanes) -> SpeedProfile | No
 
 
 def _rows(planes: HalfPlanes, i: int, step: float, reach: Array) -> tuple[Array, Array]:
-    """Bounds on (acceleration, squared speed) at position i: at i, at the next position, and due to reachability."""
+    """Bounds on (acceleration, squared speed) at position i, due to i, to the next position, and to reachability."""
     sheared = planes.rates[i + 1].copy()
     sheared[:, 0] += 2.0 * step * sheared[:, 1]  # the squared speed grows by 2 step times the acceleration
     ahead = np.array([[2.0 * step, 1.0], [-2.0 * step, -1.0], [0.0, -1.0]])

@@ -197,7 +197,7 @@ def EI(frequency: ArrayLike, tolerance: ArrayLike = 0.05) -> Shaper:  # noqa: N8
 
 
 def _several(frequency: ArrayLike, option: ArrayLike, name: str, make: Callable[[float, float], Shaper]) -> Shaper:
-    """The product of one shaper per frequency, each with its option, a number >= 0 and < 1."""
+    """Product of one shaper per frequency; each option is a number >= 0 and < 1."""
     frequencies, options = checked(frequency, "frequency", "Hz", above=0.0), checked(option, name, "", low=0.0)
     if (options >= 1.0).any():
         raise InvalidValueError(name, f"{options.max():g}", ">= 0, < 1", "Give a share, 0.05 for 5 %.")

@@ -16,7 +16,7 @@ _ALONG, _ACROSS, _UP = 0, 1, 2  # axes of a cable
 
 
 class Flexibility(NamedTuple):
-    """Derivatives of the flexibility of every cable, a symmetric matrix [m/N], in world axes."""
+    """Derivatives of the flexibility (symmetric matrix [m/N], world axes) of every cable."""
 
     # with respect to the force on the platform end, symmetric in all axes [m/N^2], shape (..., m, 3, 3, 3)
     by_force: Array

@@ -115,7 +115,7 @@ def _cross_matrices() -> Array:
 
 
 PHASE = 0.45 * np.pi  # largest phase of a transverse wave in an element [rad]
-HALVINGS = 40  # largest number of bisections of a cable, because elements at a fold would become shorter and shorter
+HALVINGS = 40  # largest number of bisections of a cable; at a fold, elements could become arbitrarily short
 CLOSE = 1e-5  # relative step of the frequency for the numerical derivative of the equations
 _UP = np.array([0.0, 0.0, 1.0])
 

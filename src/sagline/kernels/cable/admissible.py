@@ -3,7 +3,7 @@
 The admissible tensions of a cable form one interval. Its ends follow from the robot's limits, a limit of the sag and a
 limit of the stretch. Limits of the frame-end tension are converted to limits of the chord tension. While the chord
 tension grows, the frame-end tension first falls and then rises. Usually the interval is on the rising side. It includes
-the falling side if the frame-end tension is nowhere below its lower limit.
+the falling side if no frame-end tension is below the lower limit.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ def fill_admissible_tensions(
     if high == math.inf:
         high = largest_of_strain(model, cables.stiffness[i])
     if not math.isnan(limits.validity):
-        # the horizontal tension T_x of a vertical cable is zero; a T_adj of zero is then satisfied too
+        # the horizontal tension T_x of a vertical cable is zero, which also satisfies a T_adj of zero
         margin = limits.validity / cables.cosine[i] if limits.validity > 0.0 else 0.0
         low = max(low, half_weight / abs(cables.sine[i]) + margin)
     cables.low[i] = max(low, floor)

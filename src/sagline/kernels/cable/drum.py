@@ -109,8 +109,8 @@ def follow_memory(
 ) -> None:
     """Conversion between unstrained lengths off the drum and lengths along the path of winding.
 
-    On the drum the cable keeps its strain at the winding. This strain is linear between two samples. Cable that was
-    never off the drum has the initial strain. NaN samples are omitted.
+    On the drum the cable keeps the strain with which it was wound. This strain is linear between two samples. Cable
+    that was never off the drum has the initial strain. NaN samples are omitted.
 
     Args:
         given: Lengths off the drum [m], (N, m): unstrained, or along the path of winding.

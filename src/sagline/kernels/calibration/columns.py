@@ -288,7 +288,7 @@ def _fill_center(
 ) -> None:
     """Add to the columns the effect of a shift of the center of mass, the reference point of platform motion.
 
-    Only the part along free motions counts, because a planar platform stays in its plane.
+    Only the part along free motions is added, because a planar platform stays in its plane.
     """
     m = cables.shape[0]
     at, scale = sought.where[kinds.CENTER + axis, 0], sought.scale[kinds.CENTER + axis, 0]

@@ -227,7 +227,7 @@ def polish(problem: PoseProblem, pose: Array, space: ForwardArrays, good: float)
     for iteration in range(POLISH_STEPS):
         platform_stiffness(problem.model, problem.cables, space.rows, space.stiffness)
         best, length = _newton_steps(problem, pose, space, best, good)
-        # the length of a step is the error before the step; the next step would be about length^3/before^2
+        # the length of a step is about the error before it; the next length would be about length^3/before^2
         if length == 0.0 or length * length * length <= LAST_DIGIT * before * before:
             steps = iteration + 1
             break
