@@ -63,4 +63,4 @@ def _no_entry(index: object, size: int) -> NoSuchEntryError:
     allowed = f"{-size} to {size - 1}, a slice, or an array of such numbers or of {size} booleans"
     if size == 0:
         allowed = "a slice, because the batch is empty"
-    return NoSuchEntryError("index", brief(index), allowed, f"There are {size}; count from 0.")
+    return NoSuchEntryError("index", brief(index), allowed, f"The batch has {size}; indices start at 0.")

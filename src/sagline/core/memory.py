@@ -45,8 +45,7 @@ def check_poses(count: int, cable_count: int, behind: bool) -> None:
 def free_memory() -> float:
     """Memory that is still available to this process [bytes]; infinite if the system does not report it.
 
-    Returns the smallest of three values: free memory of the computer, within the limit of the container, and within the
-    limit of the process.
+    Returns the smallest of three free memories: of the computer, of its container, and of this process.
     """
     free = [float("inf")]
     with contextlib.suppress(OSError, ValueError, AttributeError):  # AttributeError: Windows has no sysconf

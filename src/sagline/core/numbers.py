@@ -61,7 +61,7 @@ def n(
 def plus_minus(value: SupportsFloat, error: SupportsFloat, unit: str = "", *, prefixed: bool = True) -> str:
     """Number with its standard error, both rounded to two significant digits of the error: "512 ± 12 kN".
 
-    error: its standard error, in the unit; not finite means unknown; prefixed: True if the unit gets the most readable
+    error: its standard error, in the unit; unknown if not finite; prefixed: True if the unit gets the most readable
     prefix; False in a column of a table.
     """
     number, own = float(value), float(error)

@@ -91,7 +91,7 @@ class KernelCache:
         except OSError as error:
             say_once(
                 f"sagline: compiled kernels cannot be kept in {self._folder.parent} ({error.strerror}), so each run "
-                "compiles them; set NUMBA_CACHE_DIR to a folder that can be written"
+                "compiles them; set NUMBA_CACHE_DIR to a writable folder"
             )
 
     def _file(self, signature: object, codegen: Any) -> Path:

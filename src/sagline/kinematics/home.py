@@ -117,7 +117,7 @@ def _lengths(robot: Robot, pose: Pose, tension: Array, model: CableModel) -> Arr
     least = _least_tension(robot, pose, model, i, float(tension[i]))
     shown, allowed = _cell_reading(robot, i, float(tension[i])), "a tension that the cable can have at this pose"
     if least is not None:
-        allowed = f">= {_cell_reading(robot, i, least):.5g} N there, because of the cable's weight"
+        allowed = f">= {_cell_reading(robot, i, least):.5g} N at this pose, because of the cable's weight"
     step = "Correct the reading, its unit, or the pose."
     raise InvalidValueError(f"cable {i}: frame_end_tension", f"{shown:g} N", allowed, step)
 

@@ -184,7 +184,7 @@ def _motion_of(motion: Path | PoseLike) -> Path | Pose:
 
 
 def _in_world(components: Array, robot: Robot) -> Array:
-    """Wrenches (N, 6) from components along the free motions (N, n); einsum is faster than a thin product."""
+    """Wrenches (N, 6) from components along the free motions (N, n); einsum is faster than thin products."""
     wrench: Array = np.einsum("pi,ij->pj", components, robot.freedom)
     return wrench
 

@@ -66,13 +66,13 @@ class ForwardStatus(Status):
     )
     OVERSTRETCHED = (
         codes.FORWARD_OVERSTRETCHED,
-        "a cable is stretched by more than 10 %: the lengths are too short, real cables would break; "
-        "lengthen the cables of highest tension",
+        "a cable is stretched by more than 10 %, which breaks a real cable: the lengths are too short; "
+        "lengthen the cables with the highest tension",
     )
     UNSTABLE = (
         codes.FORWARD_UNSTABLE,
         "an unstable equilibrium: the platform would leave it; "
-        "start elsewhere, or leave out the start, to find a stable one",
+        "to find a stable equilibrium, omit the start or use another one",
     )
     SINGULAR = (
         codes.FORWARD_SINGULAR,
@@ -80,7 +80,7 @@ class ForwardStatus(Status):
     )
     NOT_CONVERGED = (
         codes.FORWARD_NOT_CONVERGED,
-        "no equilibrium was found within the allowed steps; start closer, or leave out the start to search for one",
+        "no equilibrium was found within the allowed steps; use a closer start, or omit the start",
     )
     NO_LENGTHS = (
         codes.FORWARD_NO_LENGTHS,

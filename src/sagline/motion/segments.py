@@ -53,7 +53,7 @@ class RestProfile:
 
     @property
     def peak_acceleration(self) -> float:
-        """Largest second derivative, at (1 - 2 s)^2 = q = 1/(2 k - 1): c k u^(k - 1) sqrt(q), u = (1 - q)/4."""
+        """Largest second derivative: c k u^(k - 1) sqrt(q) with q = (1 - 2 s)^2 = 1/(2 k - 1) and u = (1 - q)/4."""
         k = self.order
         q = 1.0 / (2 * k - 1)
         return float(self.slope * k * (0.25 * (1.0 - q)) ** (k - 1) * np.sqrt(q))
@@ -66,7 +66,7 @@ class RestProfile:
         return s ** (self.order + 1) * total
 
     def rates(self, s: Array) -> tuple[Array, Array, Array]:
-        """First to third derivatives of the share with respect to s; the first k are exactly 0 at both ends."""
+        """First to third derivatives of the share with respect to s; exactly 0 at both ends up to derivative k."""
         k = self.order
         u, bend = s * (1.0 - s), 1.0 - 2.0 * s
         second = self.slope * k * u ** (k - 1) * bend

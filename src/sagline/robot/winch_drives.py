@@ -75,7 +75,7 @@ class WinchDrive:
         for field in fields:
             if field in given or field not in Winch.__slots__:
                 allowed = f"a field of Winch in addition to {', '.join(given)}"
-                step = "Give Winch(...) by hand if the drive differs."
+                step = "For another drive, use Winch(...)."
                 raise InvalidValueError("field", brief(field), allowed, step)
         radius = number(drum_radius, "drum_radius", "m", above=0.0)
         return Winch(drum_radius=radius, **given, **fields)

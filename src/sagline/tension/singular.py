@@ -54,8 +54,8 @@ def unresisted_motion(robot: Robot, pose: PoseLike) -> UnresistedMotion:
     lever = float(np.linalg.norm(robot.platform_anchors - robot.center_of_mass, axis=1).max()) or 1.0
     units = np.where(np.linalg.norm(robot.freedom[:, 3:], axis=1) > 0.5, 1.0 / lever, 1.0)
     structure = units[:, None] * structure_matrix(robot, pose)
-    # The right singular vectors, a matrix of the size of the squared number of cables, are computed only if the left
-    # ones are not complete.
+    # The right singular vectors form an (m, m) matrix. They are computed only if the left singular vectors are not
+    # complete.
     left, values, _right = np.linalg.svd(structure, full_matrices=structure.shape[1] < structure.shape[0])
     twist = robot.freedom.T @ (units * left[:, -1])
     linear, angular = np.linalg.norm(twist[:3]), np.linalg.norm(twist[3:])

@@ -52,7 +52,7 @@ class _LumpedCables(NamedTuple):
         return (self.element[:, None] * (1.0 / self.stiffness[:, None] + 1.0 / size))[..., None] * forces
 
     def compliance(self, force: Array) -> Array:
-        """Derivative of a chain's platform end with respect to its force (m, 3) [N], shape (m, 3, 3) [m/N]."""
+        """Derivative of the platform ends of chains with respect to their forces (m, 3) [N], shape (m, 3, 3) [m/N]."""
         forces, size = self.elements(force)
         unit = forces / size[..., None]
         across = np.eye(3) - unit[..., :, None] * unit[..., None, :]

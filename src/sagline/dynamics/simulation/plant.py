@@ -189,7 +189,7 @@ class Plant:
 
 
 def _principal_axes(robot: Robot, pose: Pose) -> tuple[Array, Array]:
-    """Principal moments of the platform [kg m^2], (3,), infinite for a blocked rotation, and axes, one per column."""
+    """Principal moments (3,) of the platform [kg m^2], infinite for a blocked rotation, and axes as columns."""
     if robot.motion_pattern == "3R3T":
         moments, axes = np.linalg.eigh(robot.inertia)
         if np.linalg.det(axes) < 0.0:

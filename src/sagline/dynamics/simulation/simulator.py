@@ -228,7 +228,7 @@ class Simulator:
 
     def _take_tension(self, tension: ArrayLike) -> None:
         if self._kind != d.DRUMS:
-            step = "Leave it out: these winches have no motors."
+            step = "Omit it: these winches have no motors."
             raise InvalidValueError("tension", "given", 'None except for winches="robot"', step)
         copy_in(self._expected, tension, "tension", "N")
 
@@ -321,7 +321,7 @@ class Simulator:
             InvalidValueError: If a winch does not exist, the force is not a number >= 0, or the winches have no motors.
         """
         if self._kind != d.DRUMS:
-            step = "Leave it out: these winches have no motors."
+            step = "Omit it: these winches have no motors."
             raise InvalidValueError("force", "given", 'for winches="robot" alone', step)
         self._plant.data[d.FORCE_LIMIT, self._chosen(winches)] = number(force, "force", "N", low=0.0)
 

@@ -75,7 +75,7 @@ def drive_data(robot: Robot, winches: Winches, length: Array, with_wind: bool) -
     if with_wind:
         if robot.cables.diameter is None:
             step = "Give it in the robot file or with Cable(..., diameter=...), or omit wind."
-            raise InvalidValueError("cables: diameter", "not given", "known if there is wind", step)
+            raise InvalidValueError("cables: diameter", "not given", "known for a simulation with wind", step)
         data[d.DRAG] = 0.5 * AIR * ROUND * robot.cables.diameter
     if winch_kind(winches) == d.DRUMS:
         _fill_drums(data, robot, length)

@@ -152,7 +152,7 @@ def check_counts(counts: NDArray[np.int64], frequency: Array) -> None:
         raise InvalidValueError("frequency", value, "a lower one", "Give one nearer to the robot's own.")
     if (lost := np.flatnonzero((counts < 0).any(axis=(0, 2, 3)))).size:
         text = f"at {frequency[lost[0]]:g} Hz a cable cannot be divided into elements with joints away from its nodes"
-        raise SaglineError(f"{text}. Ask for another frequency, and report the robot and its pose.")
+        raise SaglineError(f"{text}. Use another frequency, and report the robot and its pose.")
 
 
 def in_world(found: NDArray[np.float64] | Complex, axes: Array) -> Complex:

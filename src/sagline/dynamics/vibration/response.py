@@ -134,7 +134,9 @@ def response_curves(vibration: Vibration, force: str = "x", motion: str | None =
     state = instance(vibration, Vibration, "vibration").state
     if vibration.status is not VibrationStatus.SOLVED or not vibration.frequency.size:
         reason = vibration.status.name if vibration.status is not VibrationStatus.SOLVED else "no mode below up_to"
-        raise InvalidValueError("vibration", reason, "a stable state with modes", "Ask for another state, or higher.")
+        raise InvalidValueError(
+            "vibration", reason, "a stable state with modes", "Use another state or a higher up_to."
+        )
     _places(force, motion)
     natural = np.concatenate((vibration.frequency, modes(state).frequency))
     found = frequency_response(state, _grid(natural, vibration.up_to), vibration.damping)

@@ -198,7 +198,7 @@ def state_modes(model: VibrationModel, row: int, up_to: float) -> StateModes:
     border = np.searchsorted(frequency, (up_to * (1.0 - BORDER), up_to * (1.0 + BORDER)))
     if not border[0] <= count <= border[1]:
         text = f"vibration up to {up_to:g} Hz: {border[0]} modes were found; the exact count is {count}"
-        raise SaglineError(f"{text}. Ask for another up_to, and report the robot and its pose.")
+        raise SaglineError(f"{text}. Use another up_to, and report the robot and its pose.")
     # cable mass has no static effect, so that the number of modes at exactly 0 Hz does not change
     if count and frequency[0] < SLOW * up_to:
         frequency[: np.count_nonzero(massless_modes(model, row)[0] == 0.0)] = 0.0

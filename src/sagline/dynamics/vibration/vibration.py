@@ -65,7 +65,7 @@ def _most_excited(state: Equilibrium, frequency: Array, shape: Array, path: Path
         item, value = ("path", "without motion") if not segments else ("modes", "without a frequency")
         raise InvalidValueError(item, value, "a motion, and modes that it can excite", "Use another path or state.")
     if np.isnan(frequency).any():
-        step = "Take another: its platform falls."
+        step = "Use a stable state: this platform falls."
         raise InvalidValueError("modes", "of an unstable state", "of a stable one", step)
     frequency, shape = frequency[known], shape[:, known]
     excited = np.max([excitation(state.one_robot, segment, frequency, shape) for segment in segments], axis=0)
@@ -158,8 +158,8 @@ POINTS: Final = 41  # number of points of a cable's shape
 def vibration(state: Equilibrium, *, up_to: float = UP_TO, damping: Damping | None = None) -> Vibration:
     """All modes of a robot with cable mass below a frequency.
 
-    The modes include the platform, and every cable as a string that vibrates about its catenary, in its plane and
-    normal to it. An independent exact count checks the number of modes.
+    Platform and cables vibrate together. Each cable is a string that vibrates about its catenary, in the plane of the
+    cable and normal to the plane. An independent exact count checks the number of modes.
 
     Args:
         state: A single equilibrium; a plan or a solution of one; or a robot and a pose.

@@ -178,7 +178,7 @@ def shape_points(
 
 @kernel
 def _shallow_drop(t: float, model: Model, span: float, rise: float, vertical: float, tension: float) -> float:
-    """Drop below the chord [m] at a fraction t of the chord: b D t (1 - t)/tau; b: sag force at the platform end."""
+    """Drop below the chord [m] at a fraction t of the chord: b D t (1 - t)/tau with the sag force b."""
     if model.code == codes.STRAIGHT or model.code == codes.ELASTIC or tension == 0.0:
         return 0.0
     chord = math.hypot(span, rise)

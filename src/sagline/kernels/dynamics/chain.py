@@ -68,7 +68,7 @@ def fill_element_forces(place: Array, speed: Array, count: int, row: Array, pull
 
 @formula
 def _strain_at_exit(row: Array, distance: float) -> float:
-    """Strain of the element at the frame; it equals the strain of the cable behind it, which slides freely."""
+    """Strain of the element at the frame and of the cable behind it, which slides freely."""
     return (distance + row[RUN]) / (row[REST] + row[BEHIND]) - 1.0
 
 
@@ -324,7 +324,7 @@ def merge_nodes(place: Array, speed: Array, count: int, row: Array) -> None:
 
 @formula
 def wind_on_element(place: Array, j: int, k: int, drag: float, wind: Array) -> tuple[float, float, float]:
-    """Force of a wind across the line from node j to node k [N]; drag: force per square of the speed [N s^2/m^2]."""
+    """Force [N] of the wind on the line between nodes j and k; drag: force per square of the speed [N s^2/m^2]."""
     x, y, z = place[0, k] - place[0, j], place[1, k] - place[1, j], place[2, k] - place[2, j]
     along = (wind[0] * x + wind[1] * y + wind[2] * z) / (x * x + y * y + z * z + TINY)
     return wind_across(wind, along, x, y, z, drag)

@@ -180,7 +180,7 @@ def _transfer_stiffness(phi: Numbers, d: int, k: Numbers, moved: Numbers) -> Non
 
 @glue
 def _first_transfer(phi: Numbers, d: int, give: Numbers, lost: Any, k: Numbers, moved: Numbers) -> None:
-    """`_transfer_stiffness` of the first element; give (d, d) times lost is the compliance of its start, 0 if fixed."""
+    """`_transfer_stiffness` of the first element, whose start has the compliance give * lost, (d, d); 0 if fixed."""
     for a in range(d):
         for b in range(d):
             end, force = phi[a, d + b], phi[d + a, d + b]

@@ -88,7 +88,7 @@ def _normal_equations(free: Array, cables: Array, lengths: Array, space: Forward
 
 @glue
 def _fit_pose(problem: PoseProblem, lengths: Array, pose: Array, space: ForwardArrays) -> tuple[float, int, bool]:
-    """Move pose to a least-squares fit; returns half the sum of squares [m^2], the steps tried, and True on success."""
+    """Move pose to a least-squares fit; returns half the sum of squares [m^2], number of steps, and True on success."""
     cables, body, free = problem.cables, problem.body, problem.free
     rotation, rows = space.rotation, space.rows
     cost = _half_square_error(cables, body, lengths, pose, rotation, rows)

@@ -217,7 +217,7 @@ def _newton_target(
 
 @glue
 def _change_metric(null: Array, curve: Array, target: Array, turned: Array, goal: Array) -> None:
-    """Fill null space (r, m) and target (r,) in coordinates in which the metric L L^T is the ordinary one."""
+    """Fill null space (r, m) and target (r,) in coordinates in which the metric L L^T becomes Euclidean."""
     r, m = null.shape
     for k in range(r):
         goal[k] = 0.0
