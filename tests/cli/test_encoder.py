@@ -110,10 +110,10 @@ def test_what_is_too_much_for_the_winches_is_told() -> None:
 @pytest.mark.parametrize(
     ("text", "line", "named", "allowed"),
     [
-        ("C0,C1\n1,2\n", 1, "column C2", ""),
+        ("C0,C1\n1,2\n", 1, "column count_2", ""),
         ("C0,C1,C2\n", 1, "no rows", "at least one"),
-        ("C0 [mm],C1,C2\n1,2,3\n", 1, "C0 is [mm]", "none"),
-        ("C0,C1,C2\n1,x,3\n", 2, "C1 is x", "a number"),
+        ("C0 [mm],C1,C2\n1,2,3\n", 1, "count_0 is [mm]", "none"),
+        ("C0,C1,C2\n1,x,3\n", 2, "count_1 is x", "a number"),
         ("time,C0,C1,C2\n1,1,2,3\n1,1,2,3\n", 3, "time is 1 s", "a time after the time of the previous row"),
     ],
 )

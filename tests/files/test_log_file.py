@@ -150,11 +150,11 @@ COMMANDED = "length_0,x_commanded,y_commanded,z_commanded"
         ("count_1,count_2\n1,1\n", ("line 1", "missing column count_0; the last is count_2")),
         ("count_9999\n1\n", ("line 1", "unknown column 'count_9999' (did you mean count_999?)")),
         ("count_99999999999\n1\n", ("line 1", "unknown column 'count_99999999999'")),
-        ("L0,length_0\n1,1\n", ("line 1", "unknown column 'L0': lengths are called length_0")),
-        ("count_0,C0\n1,1\n", ("line 1", "unknown column 'C0': counts are called count_0")),
+        ("L0,length_0\n1,1\n", ("line 1", "column length_0 is given twice", "once")),
+        ("count_0,C0\n1,1\n", ("line 1", "column count_0 is given twice")),
         ("count_0,load_cell_1\n1,1\n", ("line 1", "unknown column 'load_cell_1' (did you mean load_cell_0?)")),
         ("count_0,load_cel_0\n1,1\n", ("line 1", "unknown column 'load_cel_0' (did you mean load_cell_0?)")),
-        ("count_0;count_1\n1;2\n", ("line 1", "the columns are separated by semicolons")),
+        ("count_0;count_1\n1;2,x\n", ("line 2", "count_1 is 2,x", "a number")),
         ("count_0\n", ("line 1", "no rows below the names of the columns")),
         ("count_0,count_1\n# time: 5\n1,2\n", ("line 2", "a comment", "comments above the names of the columns")),
         ("# a word\n\ncount_0 [mm]\n1\n", ("line 3", "the unit of count_0 is [mm]", "none")),
@@ -232,3 +232,23 @@ def test_quaternions_of_few_decimals_are_normalized(tmp_path: Path) -> None:
     assert turned is not None
     given = np.array([[0.5001, 0.5, 0.5, 0.5]])
     np.testing.assert_allclose(turned, given / np.linalg.norm(given), rtol=1e-14)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "time [s];L0 [mm];length_1;load_cell_1\n0;2500,5;2,5e0;100\n1,5;2600;2,75;\n",
+        "time [s]\tlength_0 [mm]\tL1\tload_cell_1\n0\t2500.5\t2.5\t1e2\n1.5\t2600\t2,75\t\n",
+        "time [s],length_0 [mm],length_1,load_cell_1\n0,2500.5,2.5,100\n1.5,2600,2.75,\n",
+    ],
+)
+def test_semicolons_tabs_decimal_commas_and_short_names_are_read(tmp_path: Path, text: str) -> None:
+    file = tmp_path / "own.csv"
+    file.write_text("# tension_deviation: 5 N\n" + text, encoding="utf-8")
+    log = sl.load_log(file)
+    assert log.unstrained_length is not None
+    assert log.load_cells is not None
+    assert log.time is not None
+    np.testing.assert_array_equal(log.unstrained_length, [[2.5005, 2.5], [2.6, 2.75]])
+    np.testing.assert_array_equal(log.load_cells, [[np.nan, 100.0], [np.nan, np.nan]])
+    np.testing.assert_array_equal(log.time, [0.0, 1.5])

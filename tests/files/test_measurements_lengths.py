@@ -15,8 +15,8 @@ def written(folder: Path, text: str) -> Path:
 
 def test_lengths_that_look_like_millimeters_are_told(tmp_path: Path) -> None:
     file = written(tmp_path, "L0,L1\n5.25,4.5\n5285,4500\n")
-    allowed = "lengths like the robot's 18.2 m; if these are millimeters, call the column L0 [mm]"
-    with refused("line 3", "L0 is 5285 m", allowed, kind=FileError):
+    allowed = "lengths like the robot's 18.2 m; if these are millimeters, call the column length_0 [mm]"
+    with refused("line 3", "length_0 is 5285 m", allowed, kind=FileError):
         load_lengths(file, 2, 18.2)
 
 

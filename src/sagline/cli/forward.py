@@ -35,9 +35,11 @@ Cell = float | str
 
 def forward(
     name: RobotArgument,
-    file: Annotated[Path, argument("CSV", "Columns L0, L1, ... and optionally time; units in brackets: L0 [mm].")],
+    file: Annotated[
+        Path, argument("CSV", "Columns length_0, length_1, ... and optionally time; units: length_0 [mm].")
+    ],
     counts: Annotated[
-        bool, flag("The columns are C0, C1, ...: encoder counts of the robot's winches.", "--counts")
+        bool, flag("The columns are count_0, count_1, ...: encoder counts of the robot's winches.", "--counts")
     ] = False,
     model: ModelOption = ModelName.CATENARY,
     wrench: WrenchOption = None,

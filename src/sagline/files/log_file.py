@@ -19,7 +19,7 @@ from sagline.files.path_file import EULER, QUATERNION
 from sagline.files.pose_text import QUATERNION_TOLERANCE, PoseEntry, pose_of_entry
 from sagline.files.quantity import in_si
 from sagline.files.reading import read_text
-from sagline.files.table import TABLE_LIMIT, CsvTable, line_error
+from sagline.files.table import TABLE_LIMIT, CsvTable, column_of_cable, line_error, separator_of
 from sagline.files.writing import write_text
 from sagline.files.yaml_text import YamlEntry, parse_mapping, validate
 from sagline.robot.pose import Pose
@@ -37,7 +37,7 @@ XYZ: Final = ("x", "y", "z")
 COMMANDED: Final = "_commanded"
 _MOST: Final = 1000  # largest number of cables
 _OF_CABLE: Final = {"count": "", "length": "m", "load_cell": "N"}  # column of each cable and its unit
-_NUMBERED = re.compile(rf"\s*(count|length)_([0-9]{{1,{len(str(_MOST))}}})\s*(?:\[.*\])?\s*")
+_NUMBERED = re.compile(rf"(count|length)_([0-9]{{1,{len(str(_MOST))}}})")
 USUAL: Final = {"tension": "5 N", "position": "1 mm", "rotation": "1 mrad"}  # standard deviations of the sensors
 
 
@@ -108,16 +108,15 @@ def _comments_of_sensors(sensors: Sensors) -> Iterator[str]:
 def _read(path: Path, text: str) -> tuple[CsvTable, int]:
     """The table, and its number of cables."""
     header = next((line for line in text.split("\n") if line.strip()), "")
-    found = [_NUMBERED.fullmatch(cell) for cell in header.replace('"', "").split(",")]
+    cells = [cell.partition("[")[0].strip() for cell in header.replace('"', "").split(separator_of(text))]
+    found = [_NUMBERED.fullmatch(column_of_cable(cell)) for cell in cells]
     cables = max((min(int(match[2]), _MOST - 1) + 1 for match in found if match), default=1)
     optional_units = {f"load_cell_{k}": "N" for k in range(cables)}
     optional_units |= dict.fromkeys(XYZ, "m") | dict.fromkeys(EULER, "rad") | dict.fromkeys(QUATERNION, "")
     readings = {f"{kind}_{k}": _OF_CABLE[kind] for kind in ("count", "length") for k in range(cables)}
     commanded = {name + COMMANDED: unit for name, unit in optional_units.items() if not name.startswith("load_cell")}
     units = {"time": "s", **readings, **optional_units, **commanded}
-    strangers = {f"C{k}": f"counts are called count_{k}" for k in range(cables)}
-    strangers |= {f"L{k}": f"lengths are called length_{k}" for k in range(cables)}
-    table = CsvTable.read(path, text, units, strangers, frozenset((*readings, *optional_units)))
+    table = CsvTable.read(path, text, units, gaps=frozenset((*readings, *optional_units)))
     kinds = [kind for kind in ("count", "length") if any(name in table.columns for name in _names(kind, cables))]
     if len(kinds) != 1:
         what = "columns of counts and of lengths" if kinds else "neither columns count_0, ... nor length_0, ..."
@@ -233,7 +232,8 @@ def load_log(file: os.PathLike[str] | str, sensors: Sensors | None = None) -> Wi
         0,320530,312004,299911,0.41,0.52,0.39,1012.5,998.1,2003.0
         30,318112,311870,301442,0.44,0.50,0.41,,,
 
-    - `count_0`, `count_1`, ...: encoder counts; or `length_0`, ...: cable lengths off the drums from the controller.
+    - `count_0`, `count_1`, ...: encoder counts; or `length_0`, ...: cable lengths off the drums from the
+      controller. `C0` and `L0` are other names of `count_0` and `length_0`.
     - `load_cell_0`, ...: tensions at the frame ends; cables without a load cell have no column.
     - `x`, `y`, `z`, or some of the three: position of the target in the axes of the measuring system.
     - `qx`, `qy`, `qz`, `qw`, or `alpha`, `beta`, `gamma` (about z, then the new y, then the new x): rotation of the
@@ -242,7 +242,8 @@ def load_log(file: os.PathLike[str] | str, sensors: Sensors | None = None) -> Wi
       commanded pose; without a rotation the platform is level.
     - `time`: time of the row.
 
-    Units are in brackets; the defaults are s, m, N and rad. A cell is blank if the value was not measured. Times and
+    Columns are separated by commas, or by semicolons or tabs; with these, numbers may have a decimal comma. Units are
+    in brackets; the defaults are s, m, N and rad. A cell is blank if the value was not measured. Times and
     commanded poses must not be blank. Comments above the header give the standard deviations of the sensors (one
     number, or one per cable or axis). They also give the pose of the measuring system, `# frame: {position: [1, 0,
     0.5], euler: {alpha: 90 deg}}`, and the target, `# target: [0, 0, 0.1]`. The keys are fields of `Sensors`.

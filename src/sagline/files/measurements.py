@@ -14,7 +14,10 @@ from sagline.files.reading import read_text
 from sagline.files.table import TABLE_LIMIT, CsvTable
 
 # for each kind of column: name of the other kind, and the next step if the file has the other kind
-_OTHERS: Final = {"L": ("C", "these are counts: add --counts"), "C": ("L", "these are lengths: omit --counts")}
+_OTHERS: Final = {
+    "length": ("count", "these are counts: add --counts"),
+    "count": ("length", "these are lengths: omit --counts"),
+}
 UNITS = {"span": "m", "rise": "m", "length": "m", "tension": "N"}
 
 
@@ -33,10 +36,11 @@ class CountSamples(NamedTuple):
 
 
 def load_lengths(file: os.PathLike[str] | str, cable_count: int, size: float = np.inf) -> LengthSamples:
-    """Read a CSV file with one column per cable, L0, L1, ..., and optionally the time."""
-    # Units are in brackets, `time [s],L0 [mm],L1 [mm]`; the defaults are s and m. cable_count: number of cables m of
-    # the robot; size: largest extent of the robot [m]; lengths that are a hundred times larger must have another unit
-    table, names = _read(file, "L", "m", cable_count)
+    """Read a CSV file with one column per cable, length_0, length_1, ..., and optionally the time."""
+    # Units are in brackets, `time [s],length_0 [mm],length_1 [mm]`; the defaults are s and m. `L0` is another name of
+    # `length_0`. cable_count: number of cables m of the robot; size: largest extent of the robot [m]; lengths that are
+    # a hundred times larger must have another unit
+    table, names = _read(file, "length", "m", cable_count)
     for name in names:
         table.refuse(table.columns[name] <= 0.0, name, table.columns[name], "m", "> 0 m")
         table.refuse_millimeters(name, size, f"the robot's {size:.3g} m")
@@ -44,16 +48,16 @@ def load_lengths(file: os.PathLike[str] | str, cable_count: int, size: float = n
 
 
 def load_counts(file: os.PathLike[str] | str, cable_count: int) -> CountSamples:
-    """Read a CSV file with one column per encoder, C0, C1, ..., and optionally the time."""
+    """Read a CSV file with one column per encoder, count_0, count_1, ..., and optionally the time."""
     # The result has times [s] (None if the file has no times) and counts
-    return CountSamples(*_samples(*_read(file, "C", "", cable_count)))
+    return CountSamples(*_samples(*_read(file, "count", "", cable_count)))
 
 
-def _read(file: os.PathLike[str] | str, letter: str, unit: str, cable_count: int) -> tuple[CsvTable, list[str]]:
+def _read(file: os.PathLike[str] | str, kind: str, unit: str, cable_count: int) -> tuple[CsvTable, list[str]]:
     """Table with one column per cable, and names of these columns."""
     path = Path(file)
-    names = _columns(letter, cable_count)
-    other, hint = _OTHERS[letter]
+    names = _columns(kind, cable_count)
+    other, hint = _OTHERS[kind]
     units, strangers = {"time": "s", **dict.fromkeys(names, unit)}, dict.fromkeys(_columns(other, cable_count), hint)
     table = CsvTable.read(path, read_text(path, TABLE_LIMIT), units, strangers)
     table.check_columns(names, f"; the robot has {cable_count} cables")
@@ -61,8 +65,8 @@ def _read(file: os.PathLike[str] | str, letter: str, unit: str, cable_count: int
     return table, names
 
 
-def _columns(letter: str, cable_count: int) -> list[str]:
-    return [f"{letter}{k}" for k in range(cable_count)]
+def _columns(kind: str, cable_count: int) -> list[str]:
+    return [f"{kind}_{k}" for k in range(cable_count)]
 
 
 def _samples(table: CsvTable, names: list[str]) -> tuple[Array | None, Array]:

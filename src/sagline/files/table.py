@@ -24,10 +24,11 @@ TABLE_LIMIT: Final = 64.0  # largest size [MB], about half a million rows
 _TOO_LONG: Final = 100.0  # ratio to the size of the object; a larger length must be in mm
 _NONE: Final[Mapping[str, str]] = MappingProxyType({})
 _COLUMN = re.compile(r"\s*(\w+)\s*(?:\[(.*)\])?\s*")  # name, or name [unit]
+_SHORT, _OF_CABLE = re.compile(r"([LC])([0-9]+)"), {"L": "length", "C": "count"}
 _PLAIN_ROW = re.compile(
     r"(?:[-+.0-9eE \t]*,|nan,)*"
 )  # a text of these characters only is converted by `float`, which is much faster
-_DECIMAL_COMMA = re.compile(r"\s*[-+]?[0-9]+,[0-9]+\s*")
+_DECIMAL_COMMA = re.compile(r"\s*[-+]?[0-9]+,[0-9]+(?:[eE][-+]?[0-9]+)?\s*")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,8 +50,12 @@ class CsvTable:
         strangers: Mapping[str, str] = _NONE,
         gaps: Collection[str] = (),
     ) -> CsvTable:
-        """Read a CSV text; the first row contains the names of the columns, `name` or `name [unit]`."""
-        reader = csv.reader(io.StringIO(text), strict=True)
+        """Read a CSV text; the first row contains the names of the columns, `name` or `name [unit]`.
+
+        Columns are separated by commas, or by semicolons or tabs, and then numbers may have a decimal comma.
+        """
+        mark = separator_of(text)
+        reader = csv.reader(io.StringIO(text), strict=True, delimiter=mark)
         found: dict[str, float | None] = {}
         numbers, lines, header = array("d"), array("q"), 0
         try:
@@ -60,6 +65,8 @@ class CsvTable:
                 if not found:
                     found, header = _factors(path, reader.line_num, row, units, strangers), reader.line_num
                 else:
+                    if mark != ",":
+                        row = [cell.replace(",", ".") if _DECIMAL_COMMA.fullmatch(cell) else cell for cell in row]
                     numbers.extend(_numbers(path, reader.line_num, row, tuple(found), gaps))
                     lines.append(reader.line_num)
         except csv.Error as error:
@@ -104,19 +111,26 @@ class CsvTable:
             self.refuse(far, name, self.columns[name], "m", allowed)
 
 
+def separator_of(text: str) -> str:
+    """Character between the columns of a CSV text: a comma, or a semicolon or a tab if its first row has no comma."""
+    header = re.sub(r"\[.*?\]", "", next((line for line in text.split("\n") if line.strip()), "")).strip()
+    return next((mark for mark in ",;\t" if mark in header), ",")
+
+
+def column_of_cable(name: str) -> str:
+    """Name of a column; `L0` and `C0` are other names of `length_0` and `count_0`."""
+    found = _SHORT.fullmatch(name)
+    return name if found is None else f"{_OF_CABLE[found[1]]}_{found[2]}"
+
+
 def _factors(
     path: FilePath, line: int, header: list[str], units: Mapping[str, str], strangers: Mapping[str, str]
 ) -> dict[str, float | None]:
     """Factor to SI of each column, by the name of the column; None without a unit."""
-    if len(header) == 1 and (other := next((mark for mark in ";\t" if mark in header[0]), None)):
-        shown = {";": "semicolons", "\t": "tabs"}[other]
-        raise line_error(
-            path, line, f"the columns are separated by {shown}; allowed: commas, and points in the numbers"
-        )
     factors: dict[str, float | None] = {}
     for cell in header:
         found = _COLUMN.fullmatch(cell)
-        name, unit = (found[1], found[2]) if found else (cell, None)
+        name, unit = (column_of_cable(found[1]), found[2]) if found else (cell, None)
         if name in strangers:
             raise line_error(path, line, f"unknown column {name!r}: {strangers[name]}")
         if name not in units:
@@ -143,7 +157,7 @@ def _numbers(path: FilePath, line: int, row: list[str], names: tuple[str, ...], 
     if row[0].lstrip().startswith("#"):
         raise line_error(path, line, "a comment; allowed: comments above the names of the columns")
     if len(row) != len(names):
-        comma = ", and a point in the numbers, not a comma" if len(row) == 2 * len(names) else ""
+        comma = ", and decimal points, or semicolons between the columns" if len(row) == 2 * len(names) else ""
         raise line_error(path, line, f"{len(row)} columns; allowed: {len(names)}, as in the header{comma}")
     if gaps:
         row = [cell if name not in gaps or cell.strip() else "nan" for name, cell in zip(names, row, strict=True)]
