@@ -40,7 +40,7 @@ ROWS = {  # rows of a summary: label and number format
     "feasible_share_percent": ("feasible poses [%]", ".4g"),
     "inverse_us_per_pose": ("inverse kinematics [µs per pose]", ".2f"),
 }
-WIDE = 30  # width of a column's head in characters
+WIDE, NARROW = 30, 16  # widths of the robot and of the tension method in a column's head, in characters
 MOST_GAPS = 5  # largest number of printed gaps
 WIDEN = " Move the path, or widen the tension limits."
 SAME_PLACE = 1e-6  # [m], far above rounding errors and far below the distance to a second equilibrium
@@ -148,7 +148,8 @@ def _summary_grid(runs: Sequence[ConfirmedRun]) -> TextTable:
     heads = [""]
     for run in runs:
         name = fill(run.plan.state.one_robot.name, WIDE, break_long_words=False, break_on_hyphens=False)
-        heads.append(f"{name}\n{type(run.plan.state.cables.model).__name__}")
+        how = fill(run.plan.tension.title, NARROW, break_on_hyphens=False)
+        heads.append(f"{name}\n{type(run.plan.state.cables.model).__name__}\n{how}")
     numbers = [summary(run) for run in runs]
     rows = [[label, *(number_text(column[field], form) for column in numbers)] for field, (label, form) in ROWS.items()]
     return TextTable(heads, rows)

@@ -31,7 +31,7 @@ from sagline.robot.drum import drum_lever
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
-from sagline.tension.methods import Closest, method_of
+from sagline.tension.methods import DEFAULT, method_of
 
 MOST_SEED: Final = 2**128
 SAME: Final = 1e-9  # tolerance of the period, as a share of it
@@ -138,7 +138,7 @@ class Context:
         self.period = PERIOD if pace is None else pace.period
         _check_period(link, self.period)
         self.model = Catenary() if model is None else model_of(model)
-        self.method = Closest() if method is None else method_of(method)
+        self.method = method_of(DEFAULT if method is None else method)
         self.settings = optional(settings, TensionSettings, "loop") or TensionSettings()
         self.shadow = flag(shadow, "shadow")
         self.random = np.random.default_rng(None if seed is None else whole_number(seed, "seed", 0, MOST_SEED))

@@ -35,20 +35,19 @@ from sagline.robot.reach import LEVEL
 from sagline.robot.robot import Robot
 from sagline.statics.tables import body_table, cable_table
 from sagline.tension.method import Options, TensionMethod, kernel_options, takes_default_kernel
-from sagline.tension.methods import Closest, method_of
+from sagline.tension.methods import DEFAULT, method_of
 
 KERNELS: Final = "c/kernels.json"
 BAD_INPUT: Final = 9
 FORWARD_STATUS: Final = 10  # number that is added to the status codes of the forward kernel
 COMMENT: Final = re.compile(r"/\*.*?\*/", re.DOTALL)
-_CLOSEST = Closest()
 
 
 def export_c(
     robot: Robot,
     file: str | os.PathLike[str],
     *,
-    tension: TensionMethod | str | Sequence[TensionMethod | str] = _CLOSEST,
+    tension: TensionMethod | str | Sequence[TensionMethod | str] = DEFAULT,
     forward: bool = False,
     single_precision: bool = False,
 ) -> tuple[Path, Path, Path]:

@@ -32,18 +32,17 @@ from sagline.robot.routing import with_routing
 from sagline.statics.balance import external_wrench, inertial_wrench
 from sagline.statics.tables import pose_rows, refuse_missing_chords, robot_terms
 from sagline.tension.method import TensionMethod, Variable, kernel_options, shared_tension
-from sagline.tension.methods import Closest, method_of
+from sagline.tension.methods import DEFAULT, method_of
 
 STANDING: Final = 1e-7  # relative to the fastest cable; a slower cable is at rest (rates are accurate to 1e-8)
 _CATENARY = Catenary()
-_CLOSEST = Closest()
 
 
 def inverse(
     robot: Robot | Sequence[Robot],
     motion: Path | PoseLike,
     model: CableModel | str = _CATENARY,
-    tension: TensionMethod | str = _CLOSEST,
+    tension: TensionMethod | str = DEFAULT,
     wrench: ArrayLike | None = None,
     previous: Plan | ArrayLike | None = None,
     *,

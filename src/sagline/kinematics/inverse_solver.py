@@ -28,7 +28,7 @@ from sagline.robot.batch import has_routing
 from sagline.robot.robot import Robot
 from sagline.statics.tables import robot_terms
 from sagline.tension.method import TensionMethod, kernel_options, takes_default_kernel
-from sagline.tension.methods import Closest, method_of
+from sagline.tension.methods import DEFAULT, method_of
 
 _STATUSES = tuple(sorted(PoseStatus))  # statuses by code; a lookup takes a tenth of the time of a conversion
 # A struct accepts exactly this number of real numbers. It is faster than the assignment of a tuple to an array.
@@ -95,7 +95,7 @@ class InverseSolver:
         """
         without_guides(instance(robot, Robot, "robot"), "InverseSolver", "inverse")
         m, n = robot.cable_count, robot.degrees_of_freedom
-        method = Closest() if tension is None else method_of(tension)
+        method = method_of(DEFAULT if tension is None else tension)
         self._robot = robot
         self._stability = flag(stability, "stability")
         self._options = kernel_options(robot, Catenary() if model is None else model_of(model), method)

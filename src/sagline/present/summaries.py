@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sagline.cables.cable import Cable
-from sagline.cables.model import CableModel
 from sagline.calibration.result import Calibration
 from sagline.calibration.summary import chi_squared_text
 from sagline.core.arguments import word_of
@@ -29,7 +28,6 @@ from sagline.robot.batch import first_of
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.tension.method import TensionMethod
 from sagline.workspaces.space import Workspace
 
 if TYPE_CHECKING:
@@ -144,7 +142,8 @@ def _(robot: Robot) -> Summary:
         there = "in the middle of its test box"
         good = bool(plan.solved)
         lost = f"its equilibrium {there} is unstable" if plan.feasible else f"no tensions hold it {there}"
-        verdict = f"held {there} by {_range(plan.chord_tension)}" if good else lost
+        how = f"{plan.tension.alone.title}, {word_of(type(plan.state.cables.model).__name__)}"
+        verdict = f"held {there} by {_range(plan.chord_tension)} ({how})" if good else lost
     lines = [
         f"{robot.cable_count} cables, {robot.degrees_of_freedom} freedoms ({robot.motion_pattern}), "
         f"platform of {n(robot.mass, '.4g', 'kg')}",
@@ -168,7 +167,7 @@ def middle_plan(robot: Robot) -> Plan | None:
 def _(plan: Plan) -> Summary:
     feasible, name = np.atleast_1d(plan.feasible), plan.state.one_robot.name
     good, count = bool(plan.solved.all()), feasible.size
-    how = method_text(plan.tension, plan.state.cables.model)
+    how = f"{plan.tension.title}, {word_of(type(plan.state.cables.model).__name__)}"
     lines = [f"chord tensions {_range(plan.chord_tension)} ({how})" if feasible.any() else how]
     if np.isfinite(stiffness := plan.stiffness_min).any():
         lines.append(f"least stiffness {n(np.nanmin(stiffness), '.3g', 'N/m')}")
@@ -307,9 +306,3 @@ def _range(numbers: object, unit: str = "N") -> str:
     values = np.asarray(numbers, dtype=np.float64)
     known = values[np.isfinite(values)]
     return f"{n(known.min(), '.4g', unit)} to {n(known.max(), '.4g', unit)}" if known.size else "unknown"
-
-
-def method_text(tension: TensionMethod, model: CableModel) -> str:
-    """Tension distribution method and cable model, as on the command line."""
-    of = "" if tension.variable == "chord" else f" of {tension.variable.replace('_', '-')} tensions"
-    return f"{word_of(type(tension).__name__)}{of}, {word_of(type(model).__name__)}"

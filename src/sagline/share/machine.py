@@ -25,7 +25,7 @@ from sagline.share.calls import AnyArray, Call, described_calls
 from sagline.share.packing import PackedColumn, encode_columns
 from sagline.statics.tables import pose_rows, robot_terms
 from sagline.tension.method import kernel_options
-from sagline.tension.methods import MinimumNorm
+from sagline.tension.methods import DEFAULT
 from sagline.viewer import shapes
 from sagline.viewer.tension_scale import ForceUnit, TensionScale
 
@@ -48,7 +48,7 @@ def drawing_data(robot: Robot) -> dict[str, Any]:
 def model_data(robot: Robot) -> dict[str, Any]:
     """Kernels of inverse and forward kinematics and of the drawing, for page/robot.js, with the data of the robot."""
     behind, m, n = has_routing(robot) or None, robot.cable_count, robot.degrees_of_freedom
-    model, method = Catenary(), MinimumNorm()
+    model, method = Catenary(), DEFAULT.alone
     terms, options, memory = robot_terms(robot), kernel_options(robot, model, method), memory_for(m)
     pose, length, tension = np.zeros((1, tables.POSE_COLUMNS)), np.zeros((1, m)), np.zeros(m)
     wrench, first, reference = (locked(each) for each in (np.zeros((1, 6)), np.zeros(1, np.int64), np.full(m, np.nan)))

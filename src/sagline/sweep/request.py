@@ -24,7 +24,7 @@ from sagline.robot.pose import Pose, PoseLike, pose_of
 from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod, kernel_options
-from sagline.tension.methods import MinimumNorm, method_of
+from sagline.tension.methods import DEFAULT, method_of
 from sagline.workspaces.margin import MarginStatus
 from sagline.workspaces.wrench_sets import WrenchSet, load_of
 
@@ -90,7 +90,6 @@ def variables_of(quantities: Iterable[str]) -> tuple[SweepArray, ...]:
 
 MOST: Final = 1 << 40  # largest number of requests, about a year on a hundred cores
 _CATENARY: Final = Catenary()
-_MINIMUM_NORM: Final = MinimumNorm()
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -126,7 +125,7 @@ class Request(Result):
         quantities: str | Sequence[str] = ("tension",),
         *,
         model: CableModel | str = _CATENARY,
-        tension: TensionMethod | str = _MINIMUM_NORM,
+        tension: TensionMethod | str = DEFAULT.alone,
         around: WrenchSet | None = None,
         moment_arm: float | None = None,
     ) -> None:

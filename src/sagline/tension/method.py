@@ -8,7 +8,7 @@ from typing import ClassVar, Literal, NamedTuple
 import numpy as np
 
 from sagline.cables.model import CableModel
-from sagline.core.arguments import choice
+from sagline.core.arguments import choice, word_of
 from sagline.core.arrays import Array, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.kernels import codes
@@ -67,6 +67,12 @@ class TensionMethod:
     def alone(self) -> TensionMethod:
         """This method for a pose without a previous pose; only `Closest` changes."""
         return self
+
+    @property
+    def title(self) -> str:
+        """Name as on the command line, with the tension variable if this is not the chord tension."""
+        of = "" if self.variable == "chord" else f" of {self.variable.replace('_', '-')} tensions"
+        return word_of(type(self).__name__) + of
 
     @property
     def parameter(self) -> float:

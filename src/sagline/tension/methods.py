@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import ClassVar, Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -308,6 +308,9 @@ METHODS: dict[str, type[TensionMethod]] = {
         PolygonWalk,
     )
 }
+
+# the default of all functions and commands; at poses without a path it is the minimum norm, `DEFAULT.alone`
+DEFAULT: Final = Closest()
 
 
 def method_of(value: TensionMethod | str, item: str = "tension") -> TensionMethod:

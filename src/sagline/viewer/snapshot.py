@@ -22,8 +22,8 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.tension.margin import cable_margins
 from sagline.tension.method import TensionMethod, shared_tension
+from sagline.tension.methods import DEFAULT
 from sagline.tension.methods import METHODS as ALL_METHODS
-from sagline.tension.methods import MinimumNorm
 from sagline.viewer import shapes
 from sagline.viewer.by_hand import BY_HAND, ByHand
 from sagline.viewer.tension_scale import force_unit
@@ -70,7 +70,7 @@ class Settings:
     density: float = 1.0  # factor on the cables' linear density, > 0
     stiffness: float = 1.0  # factor on the cables' axial stiffness, > 0
     model: CableModel = field(default_factory=Catenary)  # cable model of the planned lengths
-    tension: TensionMethod = field(default_factory=MinimumNorm)
+    tension: TensionMethod = DEFAULT.alone
     sag_scale: float = 1.0  # factor on the drawn sag, >= 0
     error_scale: float = 1.0  # factor on the drawn position error, >= 0
 

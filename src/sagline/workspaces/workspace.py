@@ -17,7 +17,7 @@ from sagline.core.progress import Progress
 from sagline.robot.pose import PoseBox
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
-from sagline.tension.methods import MinimumNorm, method_of
+from sagline.tension.methods import DEFAULT, method_of
 from sagline.workspaces.boundary import MOST_CELLS, boundary, uncertain_volume
 from sagline.workspaces.criteria import LeastMargin
 from sagline.workspaces.criterion import Criterion, check_continuous
@@ -32,7 +32,7 @@ from sagline.workspaces.wrench_sets import WrenchSet, load_of
 LEAST_CELLS: Final = 4
 _CROSSED: Final = 100  # approximate number of evaluated poses per cell at the boundary
 ON_BOX: Final = 1e-9  # a vertex counts as on a face if its distance, relative to the box, is smaller
-_CATENARY, _MINIMUM_NORM = Catenary(), MinimumNorm()
+_CATENARY = Catenary()
 
 
 def workspace(
@@ -43,7 +43,7 @@ def workspace(
     orientations: Orientations | Tilts | None = None,
     criteria: Sequence[Criterion] = (),
     model: CableModel | str = _CATENARY,
-    tension: TensionMethod | str = _MINIMUM_NORM,
+    tension: TensionMethod | str = DEFAULT.alone,
     cells: int = 32,
     refine: bool | int = True,
     moment_arm: float | None = None,

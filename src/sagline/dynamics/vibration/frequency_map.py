@@ -31,10 +31,9 @@ from sagline.robot.robot import Robot
 from sagline.statics.slopes import cable_slopes
 from sagline.statics.stiffness import compliance_of
 from sagline.tension.method import TensionMethod
-from sagline.tension.methods import Closest
+from sagline.tension.methods import DEFAULT
 
 BLOCK: Final = 16  # poses per block, about 0.05 s; interrupts are handled between blocks
-_CLOSEST: Final = Closest()
 _ONE_PERCENT: Final = Damping(modal_damping=0.01)
 
 
@@ -76,7 +75,7 @@ def frequency_map(
     poses: PoseLike,
     *,
     up_to: float = UP_TO,
-    tension: TensionMethod | str = _CLOSEST,
+    tension: TensionMethod | str = DEFAULT,
     damping: Damping | None = _ONE_PERCENT,
     progress: Progress | None = None,
 ) -> FrequencyMap:
