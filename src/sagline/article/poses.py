@@ -52,7 +52,7 @@ def _table(study: TenPoses) -> Finding:
         },
         data=(
             table_of(
-                "The ten poses, and our plan for them",
+                "The ten poses, and the plan of sagline for them",
                 ("pose", table.points, ""),
                 ("desired x, y, z [m]", [", ".join(n(x, ".2f") for x in place) for place in table.desired], ""),
                 ("error x, y, z [mm]", [", ".join(n(1e3 * x, ".0f") for x in error) for error in table.error], ""),

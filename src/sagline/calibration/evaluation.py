@@ -30,7 +30,7 @@ from sagline.robot.tolerances import UNCERTAIN, Provenance
 DOUBTFUL: Final = 1e-4
 ODD: Final = 0.1  # largest share of poses that fit badly; above it the whole result is doubtful
 ODD_WEIGHT: Final = 0.5  # a pose with a lower weight fits badly
-TOLERATED: Final = 1.1  # accepted ratio of chi squared to its expected value; no model is more exact in a large log
+TOLERATED: Final = 1.1  # largest accepted ratio of chi squared to its expected value, because no model is exact
 HARMLESS: Final = 1.0  # standard errors: a criticism with smaller changes of all values does not make a result doubtful
 LITTLE: Final = 1e-6  # smallest component of an unobservable direction for a parameter to count as unobservable
 

@@ -117,7 +117,7 @@ class Trial:
         return _TrialResult(quality, departure, moved + off[zeros])
 
     def promise(self, change: Hypothesis, steps: int) -> float:
-        """Predicted sum of squares per row after one more least-squares step than `steps`; infinite without a fit."""
+        """Predicted sum of squares per row after `steps` + 1 least-squares steps; infinite without a fit."""
         most = FEWEST_ROWS if self.log.commanded is None else MOST_ROWS
         problem, poses, _ = self._problem(change, most)
         kept, step = np.ones(len(problem.log.cells), dtype=np.bool_), None

@@ -174,8 +174,8 @@ def _errors(plan: CalibrationPoses, width: int) -> Iterator[str]:
 def _advice(plan: CalibrationPoses, width: int) -> Iterator[str]:
     share, times = plan.share_of_random, plan.share_of_random**-2
     yield from wrap(
-        f"In the observable directions, the errors are {n(share, '.2f')} of those of random poses; "
-        f"{n(times, '.2g')} times this number of random poses has the same errors.",
+        f"In the observable directions, the errors are {n(share, '.2f')} times the errors of random poses. "
+        f"{n(times, '.2g')} times as many random poses have the same errors.",
         width,
     )
     if plan.enough < len(plan):
@@ -190,7 +190,7 @@ MOST: Final = 1_000  # largest number of poses; more take days to measure
 MOST_CANDIDATES: Final = 20_000
 DRAWS: Final = 21  # sets of random poses, for a median
 ENOUGH: Final = 0.01  # relative improvement of an error; smaller ones are irrelevant
-SEEN: Final = 3.0  # smallest ratio to the prior information of a direction; the prior error is then halved
+SEEN: Final = 3.0  # smallest ratio of a direction's information to the prior one; this halves the error
 LOOSE: Final = 10.0  # unit of a parameter without a prior, relative to the usual deviation of an unknown value
 _CATENARY: Final = Catenary()
 

@@ -81,7 +81,7 @@ def symmetries(robot: Robot, sensors: Sensors, turn: Array, *, counted: bool) ->
     shift, share = (np.einsum("rm,rmg->mg", term, table) for term in _length_terms(robot, counted))
     matters = np.ones((kinds.KIND_ROWS, m), dtype=np.bool_)
     matters[kinds.PER_CABLE :, 1:] = False
-    # measuring system and target may change, because few measured points do not determine them
+    # measuring system and target may change, because a few measured points do not determine them
     matters[kinds.SHIFT :] = False
     if sensors.tension_deviation is None:
         matters[[kinds.GAIN, kinds.BIAS]] = False

@@ -100,7 +100,7 @@ def plan_motion(
 
 def check_motion(motion: Motion, robot: Robot, period: float) -> None:
     """Reject a motion that was planned for another robot or another period [s]."""
-    step = "Plan it with this controller: control.plan(path)."
+    step = "Plan the path with this controller: control.plan(path)."
     if abs(motion.period - period) > ON_TICK * period:
         reason = f"its plan is for cycles of {1e3 * motion.period:g} ms; they take {1e3 * period:g} ms"
         raise RefusedError("the path", reason, step)
@@ -136,12 +136,12 @@ def _at_ticks(path: Path, period: float) -> Path:
     missing = np.abs(time[chosen] - ticks) > ON_TICK * period
     if missing.any():
         at = float(ticks[np.argmax(missing)])
-        reason = f"it has no sample at {at:g} s; every cycle of {1e3 * period:g} ms needs one"
+        reason = f"it has no sample at {at:g} s; every cycle of {1e3 * period:g} ms needs a sample"
         raise RefusedError("the path", reason, f"Make the path with rate={1.0 / period:g}, or a multiple of it.")
     if time[-1] - ticks[-1] > ON_TICK * period:
         chosen, ticks = np.append(chosen, len(time) - 1), np.append(ticks, [period * count])
     if len(ticks) < 2:
-        raise RefusedError("the path", f"it takes {time[-1]:g} s, no cycle", "Give a path with a motion.")
+        raise RefusedError("the path", f"it takes {time[-1]:g} s, less than a cycle", "Give a path with a motion.")
     return _path_at(path, chosen, ticks)
 
 

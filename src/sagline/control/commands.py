@@ -81,7 +81,7 @@ AGREEING: Final = 5  # consecutive cycles in which all groups must agree
 SURE: Final = 20  # [cycles], a cause that persists longer is not from the time before the claim
 BEHIND: Final = 10  # largest lag of an echo [commands]
 _LOCKED, _PRESSED, _READY = int(GroupStatus.LOCKED), int(GroupStatus.EMERGENCY), int(GroupStatus.READY)
-_AGAIN: Final = "Try again; if it continues, check the program of the PLC."
+_AGAIN: Final = "Try again; if this continues, check the program of the PLC."
 
 
 class Disagreement(NamedTuple):

@@ -252,7 +252,7 @@ class Fault(ABC):
         within: Time until detection, as text.
         homing: True if the robot must be homed again, because a length is unreliable.
         lasting: True if the fault remains until the next set of rules; each item is reported once.
-        quiet: Time after a report during which repeats are only counted [s].
+        quiet: Time after a report in which repeats are counted, but not reported [s].
         present: True if the condition holds; during a stop by another fault, it is updated after the winches have
             stopped.
         seen: Evidence that all rules of the set use.

@@ -81,7 +81,7 @@ class CableBroken(Fault):
         seen.broken |= new
         cable = int(np.argmax(new))
         return (
-            f"cable {cable} is broken: {cycle.sample.tension[cable]:.4g} N after {seen.before_low[cable]:.4g} N, "
+            f"cable {cable} is broken: {cycle.sample.tension[cable]:.4g} N after {seen.before_low[cable]:.4g} N; "
             f"others have changed by up to {furthest:.4g} N. Drums are locked: support the platform before it moves."
         )
 
@@ -91,9 +91,9 @@ class Slack(Fault):
 
     name = "slack"
     rule = (
-        f"T_A < {SLACK_SHARE:g} of its lower limit ({SIGMAS:g} sigma if the limit is 0) in {SLACK_SAMPLES} samples, "
-        f"while the plan has at least {PLANNED_SHARE:g} of the limit, and the motor does not pull (if the limit "
-        f"is a chord tension, which differs from T_A: 2 x {SIGMAS:g} sigma)"
+        f"T_A < {SLACK_SHARE:g} of its lower limit ({SIGMAS:g} sigma if the limit is 0) in {SLACK_SAMPLES} samples; "
+        f"the planned tension is at least {PLANNED_SHARE:g} of the limit, and the motor does not pull (2 x {SIGMAS:g} "
+        "sigma if the limit is a chord tension, because this differs from T_A)"
     )
     reaction = Reaction.STOPPING
     within = "30 ms"

@@ -30,9 +30,9 @@ class EncoderJump(Fault):
 
     name = "encoder jump"
     rule = (
-        f"|change of length - rate x time| > {1e3 * JUMP:g} mm per cycle between two samples, both for the rate in "
-        "the first sample and for the rate of the set points, if the drive has power and is not at its limit, and its "
-        f"PLC received its commands in time for the last {CATCHING_UP} cycles; or the length is not a number"
+        f"|change of length - rate x time| > {1e3 * JUMP:g} mm per cycle between two samples, both with the rate "
+        "in the first sample and with the rate of the set points; only for drives with power, not at a limit, and with "
+        f"commands in time for the last {CATCHING_UP} cycles; also a length that is not a number"
     )
     reaction = Reaction.STOPPING
     within = "10 ms"

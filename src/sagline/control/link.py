@@ -18,7 +18,7 @@ GROUP_SIZE: Final = 2  # number of winches per PLC
 COUNTERS: Final = 2**31 - 1  # largest counter of commands and blocks; counters start at 1 again after this value
 HEARTBEAT: Final = 0.1  # [s], a PLC stops its winches with a ramp if the command counter does not change for this time
 OWNER_TIMEOUT: Final = 0.5  # [s], another controller may become the owner if the counter does not change for this time
-CHECK: Final = "Check that its PLC or the twin runs, and its connection"  # next step for a silent group
+CHECK: Final = "Check that its PLC or the twin runs and is connected"  # next step for a silent group
 RAMP: Final = 0.2  # duration of the ramp of rates to zero, in the controller and in a PLC [s]
 
 

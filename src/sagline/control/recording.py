@@ -227,7 +227,7 @@ class Journal:
         return self.tell(lambda record: record.event(event))
 
     def tell(self, what: Callable[[Recorder], object]) -> str:
-        """Call a method of the recorder; returns "". After an exception, the recorder is removed; returns a message."""
+        """Call a method of the recorder; after an exception, remove the recorder and return a message, otherwise ""."""
         if self._record is None:
             return ""
         try:

@@ -43,26 +43,26 @@ def _integer(name: str, parts: tuple[str, ...], long_name: str, source: str = ""
 
 TIME: Final = _real("time", (), "s", "time on the clock of the link")
 CYCLES: Final = (
-    Quantity("answered", (), "", "whether there was a sample", values=bool),
+    Quantity("answered", (), "", "true if there was a sample", values=bool),
     Quantity("state", (), "", "state of the controller at the end of the cycle", codes=State),
     _real("late", (), "s", "delay of the start of the cycle"),
-    _real("clock", (), "s", "time on the plan, from its start; none without a plan"),
+    _real("clock", (), "s", "time on the plan, from the start of the plan; none without a plan"),
     _real("position", AXIS, "m", "position of the platform origin, estimated from the encoders"),
     _real("quaternion", TURN, "1", "rotation from platform to world, estimated, scalar last"),
     _integer("estimate", (), f"code of the estimate; {NONE}: none"),
-    _integer("mode", (), f"code of the command's mode; {NONE}: none was sent"),
+    _integer("mode", (), f"code of the command's mode; {NONE}: no command"),
     _real("set_length", CABLE, "m", "set point of the unstrained length, with the zero of homing"),
-    _real("set_rate", CABLE, "m/s", "set point of its rate"),
+    _real("set_rate", CABLE, "m/s", "set point of the rate of the length"),
     _real("set_tension", CABLE, "N", "set point of the tension at the drum"),
-    _real("planned_tension", CABLE, "N", "tension at the frame end planned for the sample"),
+    _real("planned_tension", CABLE, "N", "planned tension at the frame end at the time of the sample"),
     _real("correction", CABLE, "m", "correction of the set length by the tension loop"),
-    _real("age", GROUP, "s", "since the newest good block came in", "samples.age"),
-    _integer("counter", GROUP, "of the blocks", "samples.counter"),
+    _real("age", GROUP, "s", "time since the arrival of the newest valid block", "samples.age"),
+    _integer("counter", GROUP, "counter of the blocks", "samples.counter"),
     _real("plc_time", GROUP, "s", "time of the PLC's block, on the clock of the PLC", "samples.plc_time"),
     _integer("owner", GROUP, "id of the controller that owns the group; 0: none", "samples.owner"),
-    _integer("echo", GROUP, "counter of the last command that the PLC took", "samples.echo"),
+    _integer("echo", GROUP, "counter of the last command that the PLC accepted", "samples.echo"),
     _integer("group_status", GROUP, "bits of the PLC's status", "samples.status"),
-    _integer("group_fault", GROUP, "code of the reason why the PLC acts by itself; 0: none", "samples.fault"),
+    _integer("group_fault", GROUP, "code of the reason why the PLC has stopped its winches; 0: none", "samples.fault"),
     _integer("discarded", GROUP, "number of invalid blocks so far", "samples.discarded"),
     _real(
         "length",
@@ -71,13 +71,13 @@ CYCLES: Final = (
         "unstrained length off the drum, from the encoder, without the zero of homing",
         "samples.length",
     ),
-    _real("rate", CABLE, "m/s", "its rate", "samples.rate"),
-    _real("torque", CABLE, "N m", "of the motor at its shaft, positive when it pays out cable", "samples.torque"),
+    _real("rate", CABLE, "m/s", "rate of the length", "samples.rate"),
+    _real("torque", CABLE, "N m", "torque at the motor's shaft, positive if it pays out cable", "samples.torque"),
     _real("tension", CABLE, "N", "tension at the frame end, from the load cell", "samples.tension"),
     _real("filtered", CABLE, "N", "tension at the frame end, after the filter of the PLC", "samples.filtered"),
-    _integer("counts", CABLE, "of the encoder", "samples.counts"),
+    _integer("counts", CABLE, "counts of the encoder", "samples.counts"),
     _integer("winch_state", CABLE, "code of the winch's state", "samples.state"),
-    _integer("winch_fault", CABLE, "the drive's own code; 0: none", "samples.winch_fault"),
+    _integer("winch_fault", CABLE, "fault code of the drive; 0: none", "samples.winch_fault"),
 )
 EVERY: Final = (TIME, *CYCLES)
 SMALL: Final = frozenset({"estimate", "mode"})  # integers that are stored in one byte
@@ -93,8 +93,8 @@ EVENTS: Final = {  # variables of events
     "time": "time on the clock of the link [s]",
     "cycle": "cycle of the controller, from 0",
     "kind": "state, fault or note",
-    "name": "the state that was entered, or the fault",
-    "state": "of the controller after it",
+    "name": "name of the new state, or of the fault",
+    "state": "state of the controller after the event",
     "text": "message to the operator",
 }
 
@@ -127,12 +127,12 @@ class _CycleField(NamedTuple):
 
 
 CYCLE_FIELDS: Final = {
-    "time": _CycleField(2, "s", "on the clock of the link"),
+    "time": _CycleField(2, "s", "time on the clock of the link"),
     "late": _CycleField(4, "s", "delay of the start of the cycle"),
-    "clock": _CycleField(2, "s", "time on the plan, from its start"),
-    "position": _CycleField(5, "m", "of the platform's origin, estimated from the encoders", True),
-    "tension": _CycleField(1, "N", "at the frame ends, from the load cells", True),
-    "planned_tension": _CycleField(1, "N", "the same as planned", True),
+    "clock": _CycleField(2, "s", "time on the plan, from the start of the plan"),
+    "position": _CycleField(5, "m", "position of the platform's origin, estimated from the encoders", True),
+    "tension": _CycleField(1, "N", "tensions at the frame ends, from the load cells", True),
+    "planned_tension": _CycleField(1, "N", "planned tensions at the frame ends", True),
     "length_error": _CycleField(2, "mm", "set length minus encoder length", True),
     "correction": _CycleField(2, "mm", "corrections of the lengths by the tension loop", True),
 }
@@ -176,8 +176,8 @@ SCHEMAS: Final = {
     TRUTH: _schema(
         "sagline.Truth",
         {
-            "time": _number(_CycleField(0, "s", "on the clock of the twin")),
-            "position": _number(_CycleField(0, "m", "of the platform's origin", True)),
+            "time": _number(_CycleField(0, "s", "time on the clock of the twin")),
+            "position": _number(_CycleField(0, "m", "position of the platform's origin", True)),
             "quaternion": _number(_CycleField(0, "1", "rotation from platform to world, scalar last", True)),
         },
     ),

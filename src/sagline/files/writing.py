@@ -224,7 +224,7 @@ def check_folder(folder: os.PathLike[str] | str) -> None:
 
 
 def create_folder(folder: os.PathLike[str] | str, *, parents: bool = True) -> Path:
-    """The folder, created if missing. Missing parent folders are created if `parents`, or otherwise an error."""
+    """The folder, created if missing; raises an error if parent folders are missing, except with `parents`."""
     path = Path(folder)
     try:
         path.mkdir(parents=parents, exist_ok=True)

@@ -209,7 +209,7 @@ class MachineLink:
         return self._look(machine.time)
 
     def close(self) -> None:
-        """Stop sending; the machine remains."""
+        """Stop sending; the machine continues to exist."""
         self._closed = True
 
     def _send(self, command: Command, now: float) -> None:

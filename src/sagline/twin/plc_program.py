@@ -165,7 +165,7 @@ class Program:
             self.fault = GroupFault.NONE
             if order.enable != self.powered:
                 self._switch(order, encoder)
-                waited = 0.0  # a drive that starts at its position is not too far from its set point
+                waited = 0.0  # a drive starts at its set point, so that it has no deviation
             self._obey(order, waited, cell)
             return
         elif order is not None and waited >= min(HEARTBEAT, order.valid_for) - TINY:

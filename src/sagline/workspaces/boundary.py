@@ -81,11 +81,11 @@ def boundary(
 ) -> Boundary:
     """Boundary, within a box [m], of the set where a function of positions (N, 3) [m] is nonnegative.
 
-    The function may have jumps and infinite values, but not NaN. It is evaluated at the nodes of a grid with `cells`
-    along the longest side, or along each axis. Cells that the boundary crosses are then halved `refine` times. The
-    method of marching cubes gives a closed net of triangles from the signs at the nodes. Its vertices are on the edges
-    of the grid. The volume between net and boundary, and the error bound, follow from the distances between triangles'
-    centers and boundary.
+    The function may have jumps and infinite values, but not NaN. It is evaluated at the nodes of a grid; `cells` is the
+    number of cells along the longest side, or along each axis. Cells that the boundary crosses are then halved `refine`
+    times. The method of marching cubes gives a closed net of triangles from the signs at the nodes. Its vertices are on
+    the edges of the grid. The volume between net and boundary, and the error bound, follow from the distances between
+    triangles' centers and boundary.
     """
     corners = exactly(low, "low", "m", (3,)), exactly(high, "high", "m", (3,))
     for name, a, b in zip("xyz", *corners, strict=True):
