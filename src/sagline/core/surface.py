@@ -1,4 +1,4 @@
-"""Public names: the stubs beside the packages declare them, and each is loaded when it is first used."""
+"""Public names. The stubs of the packages declare them; each name is loaded at its first use."""
 
 from __future__ import annotations
 

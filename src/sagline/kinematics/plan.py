@@ -176,9 +176,9 @@ class Plan(Result, Saved):
         if not np.linalg.norm(turn) > ROUNDING:
             return ()
         return (
-            f"the platform is turned by {turn_in_words(turn[0])}, which motion_pattern {robot.motion_pattern} does "
-            "not allow: the force balance has no moment that holds it; correct the pose, or give the robot another "
-            "motion_pattern",
+            f"the platform is turned by {turn_in_words(turn[0])}, but motion_pattern {robot.motion_pattern} does not "
+            "allow this rotation, and the force balance contains no moment about its axis; correct the pose, or choose "
+            "another motion_pattern",
         )
 
     def _at_the_border(self) -> tuple[str, ...]:

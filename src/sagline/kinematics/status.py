@@ -1,4 +1,4 @@
-"""Status of a pose of a plan, status of a sample of a forward solution, and the next step."""
+"""Statuses of poses of a plan and of samples of a forward solution, with the next step."""
 
 from __future__ import annotations
 

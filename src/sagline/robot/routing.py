@@ -125,7 +125,7 @@ def _routing_of_robot(state: Equilibrium, robot: Robot, *, guided: bool) -> _Rou
     assert contact is not None
     if winches is None or not winches.anything_behind:
         return _Routing(np.zeros(shape), np.zeros(shape), _exit_tension(state))
-    if state.cables.model.code == codes.STRAIGHT:  # inextensible: lengths do not depend on friction
+    if state.cables.model.code == codes.STRAIGHT:  # without stretch, the lengths do not depend on friction
         dead = np.broadcast_to(winches.dead_cable, shape)
         return _Routing(winches.pulley_radius * contact.wrap_angle, dead, _exit_tension(state))
     found = _Routing(*(np.full(shape, np.nan) for _ in _Routing._fields))

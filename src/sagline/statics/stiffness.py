@@ -106,7 +106,7 @@ def stiffness(state: Equilibrium) -> Stiffness:
         Stiffness; NaN if the state has no lengths, or the cables are straight (their stiffness is undefined).
 
     Raises:
-        InvalidValueError: If the state is not one of these.
+        InvalidValueError: If the state has another type.
 
     Examples:
         Platform height change due to 100 N upward, and due to 1 mm more length of cable 0:
@@ -191,7 +191,7 @@ def modes(state: Equilibrium) -> Modes:
         Modes; NaN if the state has no lengths.
 
     Raises:
-        InvalidValueError: If the state is not one of these.
+        InvalidValueError: If the state has another type.
 
     Examples:
         >>> import numpy as np

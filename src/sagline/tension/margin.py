@@ -28,7 +28,7 @@ def limit_margin(state: Equilibrium) -> Array:
         limit, NaN without tensions. The distance depends on the tension distribution.
 
     Raises:
-        InvalidValueError: If the state is not one of these.
+        InvalidValueError: If the state has another type.
 
     Examples:
         >>> import sagline as sl
@@ -67,7 +67,7 @@ def capacity_margin(state: Equilibrium) -> Array:
         pose infeasible, NaN without tensions.
 
     Raises:
-        InvalidValueError: If the state is not one of these.
+        InvalidValueError: If the state has another type.
 
     Examples:
         >>> import sagline as sl

@@ -82,8 +82,8 @@ def frequency_slopes(state: Equilibrium | HasState, together: float = 1e-6) -> F
         FrequencySlopes; NaN where a frequency is NaN.
 
     Raises:
-        InvalidValueError: If the state is not one of these, is a
-            batch, has no lengths, or has shallow cables, pulleys or dead lengths; if the vibration was not solved.
+        InvalidValueError: If the state has another type, is a batch, or has shallow cables, pulleys, dead lengths or no
+            lengths; if the vibration was not solved.
 
     Examples:
         The cable whose stiffness increases the first massless frequency most, and the effect of a heavier platform:

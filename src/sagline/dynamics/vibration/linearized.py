@@ -104,9 +104,9 @@ def linearized(state: Equilibrium, damping: Damping | None = None, inputs: Input
         The system.
 
     Raises:
-        InvalidValueError: If the state is not one of these, is a batch, or has no
-            lengths; for `air_damping`, which acts only on cables with mass; for `loss_time` with "lengths" as inputs,
-            because the tensions then depend on winch speeds.
+        InvalidValueError: If the state has another type, is a batch, or has no lengths; for `air_damping`, which acts
+            only on cables with mass; for `loss_time` with "lengths" as inputs, because the tensions then depend on
+            winch speeds.
 
     Examples:
         Final displacement of the platform after 1 mm of cable 0 is wound in:
