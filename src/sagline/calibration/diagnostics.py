@@ -162,7 +162,7 @@ def _single_mistake(trial: Trial) -> Iterator[str]:
 
 
 def _other_unit(trial: Trial, departure: float) -> Iterator[str]:
-    """Sentence about a unit with which a robot near the given one fits as well; departure: without the change."""
+    """Sentence about another unit of load cells with a smaller departure of the fit from the priors."""
     for unit in CELL_UNITS:
         found = trial.result(Hypothesis(cell_unit=unit))
         if unit and found.quality <= GOOD and found.departure < min(NEAR, 0.5 * departure):

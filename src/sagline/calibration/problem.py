@@ -236,11 +236,7 @@ def _poses(problem: FitProblem, machine: MachineTerms, reported: Array, commande
 
 
 def _aligned(problem: FitProblem, numbers: Array, poses: Array) -> Array:
-    """Parameters after alignment of the measuring system to the poses, if it is unknown and has enough readings.
-
-    The rotation of the measuring system is the mean rotation from measured to platform rotations, or from measured to
-    platform points.
-    """
+    """Parameters after alignment of the measuring system to the poses, if it is unknown and has enough readings."""
     where = problem.parameters.where[kinds.SHIFT : kinds.TURN + 3, 0]
     if where[0] < 0:
         return numbers

@@ -109,10 +109,7 @@ def _restart(problem: FitProblem, state: SearchState, which: Flags) -> SearchSta
 
 
 def _single_cable_outliers(problem: FitProblem, state: SearchState, which: Flags) -> Flags:
-    """Flags of the poses of `which` with a misfit due to a single cable; none if `which` has many poses.
-
-    Such a cable is an outlier, and its pose remains in the fit with a small weight.
-    """
+    """Flags of the poses of `which` with a misfit due to one cable, an outlier; none if `which` has many poses."""
     rows, slipped = np.flatnonzero(which), np.zeros(len(which), dtype=np.bool_)
     if 0 < len(rows) <= min(EXAMINED, FEW * len(which)):
         found = outliers_in(problem, state, rows, rows, count=len(which))

@@ -183,10 +183,10 @@ def interrupt_calls(stop: Callable[[], object]) -> Iterator[None]:
 
 
 def result_in_thread(work: Callable[[], T]) -> Future[T]:
-    """Future result of work in another thread of ordinary priority; without effect on it, the future can be canceled.
+    """Future result of work in another thread of ordinary priority; canceling the future does not stop the work.
 
-    Cycles go on, because compiled kernels release Python's lock. With another process, cycles are late when a long plan
-    arrives.
+    Cycles continue during the work, because compiled kernels release Python's lock. Another process would be worse,
+    because cycles are late when a long plan arrives from it.
     """
     result: Future[T] = Future()
 

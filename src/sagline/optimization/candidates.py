@@ -171,9 +171,7 @@ class PlatformBox:
 
 @frozen(weakref_slot=False)
 class AnchorErrors:
-    """Sample of anchor errors, which is the same for all candidates.
-
-    The errors of all coordinates are independent and normally distributed.
+    """Sample of normally distributed errors of all anchor coordinates, which is the same for all candidates.
 
     Attributes:
         deviation: Standard deviation of each coordinate [m], > 0.

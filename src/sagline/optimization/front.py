@@ -30,9 +30,7 @@ FRONT: Final = "front.csv"
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Front(Result):
-    """Result of `design`: robots that are better than the initial robot.
-
-    No robot is better than another robot in every goal.
+    """Result of `design`: a Pareto front of robots that are better than the initial robot.
 
     Attributes:
         start: Initial robot of the search.

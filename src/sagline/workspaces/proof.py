@@ -175,10 +175,7 @@ def _decide(prover: Prover, middle: Array, half: Array, tilt: float) -> Codes:
 
 
 def _smaller_cubes(cells: Indices, vectors: Array, edges: Array, parts: int, more: int) -> tuple[Indices, Array]:
-    """Parts of each cube that intersect the ball of tilts, and the cell of each part.
-
-    edges: half edges of the cube around the whole ball, one per row.
-    """
+    """Parts of each cube that intersect the ball of tilts, and their cells; edges: half edges around the ball."""
     count = more // parts
     steps = (2.0 * np.arange(count) + 1.0 - count) / more
     places = np.stack(np.meshgrid(*[steps] * len(edges), indexing="ij"), axis=-1).reshape(-1, len(edges))

@@ -58,11 +58,7 @@ def labels_of(level: Level, grid: Grid) -> tuple[Labels, int, tuple[Array, ...]]
 
 
 def _widest_path(values: Array, labels: Labels, start: Indices, ends: Indices) -> Indices | None:
-    """Path of nodes (K, 3) from the nodes `start` to a node of another component; None if not found.
-
-    Nodes are visited in descending order of their values, so that the smallest value along the path is as high as
-    possible.
-    """
+    """Path of nodes (K, 3) from `start` to another component, with the highest smallest value; None if not found."""
     shape, others = values.shape, set(ends.tolist()) - {0}
     before: dict[_Node, _Node | None] = dict.fromkeys((x, y, z) for x, y, z in start.tolist())
     waiting: list[tuple[float, _Node]] = [(-np.inf, node) for node in before]
