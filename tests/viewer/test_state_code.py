@@ -201,6 +201,18 @@ def test_every_control_of_the_robot_is_in_the_code(page: Shown) -> None:
         np.testing.assert_array_equal(names["tension"], tension())
 
 
+def test_rounding_errors_of_a_browser_are_not_copied(page: Shown) -> None:
+    with Client(page.url) as client:
+        client.drag([0.125, 1e-17, 2.0], (1.0, 0.0, -3e-33, -2.7e-48))
+        await_that(lambda: page.position[0] == 0.125)
+    code = asked(page, "copy", "code", "level")["text"]
+    assert "pose = sl.Pose.from_euler([0.125, 0.0, 2.0], 0, 0, 0)" in code
+    page.viewer.later(page.viewer.go_home)
+    await_that(lambda: page.position[0] == 0.0)
+    code = asked(page, "copy", "code", "home")["text"]
+    assert "sl.Pose.from_euler([0.0, 0.0, 2.6], 0, 0, 0)" in code
+
+
 @extended
 def test_a_pose_that_is_typed_is_gone_to_and_another_is_refused_in_a_line(page: Shown) -> None:
     assert asked(page, "pose", " 0.5, -0.25,1.75, 10, 0, 0 ", "a") == {"to": "a"}

@@ -13,6 +13,7 @@ from sagline.robot.pattern import ROTATING
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
+_HOME_DECIMALS: Final = 9  # [m], removes the rounding errors of the middle of a box
 LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
 # [rad] and [m]; smaller deviations count as zero, because they are the rounding errors of seven digits
 ROUNDING = 1e-6
@@ -123,4 +124,4 @@ def bounds(robot: Robot) -> tuple[Array, Array]:
 def home_pose(robot: Robot) -> Pose:
     """Center of the test box of a robot, or of the box around the robot."""
     low, high = bounds(robot) if robot.test_box is None else (robot.test_box.low, robot.test_box.high)
-    return Pose(0.5 * (low + high), np.eye(3))
+    return Pose(np.round(0.5 * (low + high), _HOME_DECIMALS), np.eye(3))

@@ -131,6 +131,7 @@ CABLE_WIDTH, GHOST_WIDTH, TRACE_WIDTH, ARM_WIDTH = 3.5, 1.5, 2.5, 3.0  # line wi
 TRACE_POINTS = 600
 NEAR = 0.03  # anchors closer than this have one label, as a share of the robot's size
 FAR = 5.0  # largest valid distance of the platform from the middle, as a share of the robot's size
+ROUNDING: Final = 1e-12  # smaller components of a pose from a browser are rounding errors [m], or of a quaternion
 APART = 0.0035  # smallest visible distance between chord and cable, as a share of the robot's size
 _ARM = 0.12  # longest arm of the axes, as a share of the robot's size
 _BELOW: Final = np.array([0.02, 0.07, 0.03])  # space for the axes and their names, as shares of the robot's size
@@ -188,7 +189,7 @@ class RobotScene:
         if position.size != 3 or not 0.5 < length < 2.0:
             position = np.full(3, np.nan)
         self.check_near(position)
-        return Pose.from_quaternion(position, unit(np.roll(wxyz, -1)))
+        return Pose.from_quaternion(_without_rounding(position), unit(np.roll(_without_rounding(wxyz), -1)))
 
     def check_near(self, position: Array) -> None:
         """Reject invalid positions and positions far outside the robot."""
@@ -341,6 +342,11 @@ def _move(frame: Any, pose: Pose, other: Pose | None, error_scale: float) -> Non
     if frame.visible and other is not None:
         frame.position = scaled_position(pose, other, error_scale)
         frame.wxyz = np.roll(other.quaternion, 1)
+
+
+def _without_rounding(values: Array) -> Array:
+    """Values with 0 in place of the rounding errors of a browser, which turn a level platform by 1e-48."""
+    return np.where(np.abs(values) < ROUNDING, 0.0, values)
 
 
 def scaled_position(pose: Pose, other: Pose, factor: float) -> Array:

@@ -229,7 +229,13 @@ def _weighed(mass: float) -> str:
 def _planned(snapshot: Snapshot, view: View) -> list[str]:
     """Lines of Python for the plan of a pose."""
     settings, pose = view.settings, snapshot.pose
-    angles = ", ".join(number_text(angle, ".6g") for angle in pose.rotation.as_euler("ZYX", degrees=True))
+    made = [f"pose = sl.Pose.from_euler({_plain(pose.position)}, 0, 0, 0)"]
+    if np.any(pose.quaternion[:3] != 0.0):
+        angles = ", ".join(number_text(angle, ".6g") for angle in pose.rotation.as_euler("ZYX", degrees=True))
+        made = [
+            f"# alpha, beta, gamma = {angles} degrees",
+            f"pose = sl.Pose.from_quaternion({_plain(pose.position)}, {_plain(pose.quaternion)})",
+        ]
     arguments = [
         f"model={_constructor(settings.model)}",
         f"tension={_constructor(settings.tension)}",
@@ -237,9 +243,7 @@ def _planned(snapshot: Snapshot, view: View) -> list[str]:
         *([] if snapshot.previous is None else [f"previous={_plain(snapshot.previous)}"]),
     ]
     return [
-        f"# alpha, beta, gamma = {angles} degrees",
-        f"pose = sl.Pose.from_quaternion({_plain(pose.position)}, {_plain(pose.quaternion)})",
-        *("plan = sl.inverse(", "    robot,", "    pose,"),
+        *(*made, "plan = sl.inverse(", "    robot,", "    pose,"),
         *(f"    {argument}," for argument in arguments),
         *(")", "tension = plan.chord_tension"),
         *([] if snapshot.rest is None else ["rest = sl.confirm(plan).pose  # true equilibrium"]),
