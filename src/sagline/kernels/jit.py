@@ -86,12 +86,12 @@ def kernel(function: F) -> F:
 
 
 def formula(function: F) -> F:
-    """A kernel that the compiler inlines into its callers, so that their loops vectorize."""
+    """A kernel for inlining by the compiler, so that loops of its callers vectorize."""
     return _compiled(function, "formula")
 
 
 def glue(function: F) -> F:
-    """A kernel that is inlined into its callers before the compilation, so that its arguments cost no time."""
+    """A kernel for inlining before the compilation, so that its arguments cost no time."""
     return _compiled(function, "glue")
 
 

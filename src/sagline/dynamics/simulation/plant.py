@@ -25,7 +25,7 @@ from sagline.robot.robot import Robot
 from sagline.statics.tables import cable_table
 
 MARGIN: Final = 5.0  # length beyond the required one for which a drum stores strains [m]
-BROKEN: Final = 1e-12  # share of the stiffness and weight of a cable that remains after it is cut
+BROKEN: Final = 1e-12  # remaining share of stiffness and weight of a broken cable
 NOTES: Final = 1000  # number of recorded unscheduled events after which a run pauses to store them
 
 

@@ -48,7 +48,7 @@ class _ReducedModel(NamedTuple):
     matrix: Array  # symmetric, shape (n + k, n + k): first the platform, then the cable modes [1/s^2]
     platform: Array  # matrix from the first unknowns to platform motions, shape (6, n)
     driven: Array  # matrix from the first unknowns to the excitation of the cable modes, shape (k, n)
-    kept: Flags  # components that are unknowns, the first of the k unknowns, shape (T,)
+    kept: Flags  # mask of the components that are unknowns (the first of the k unknowns), shape (T,)
     beyond: Array  # other components, as combinations of the last of the k unknowns, shape (T - kept, b)
     components: CableComponents  # fixed-end modes of the cables
 

@@ -17,7 +17,7 @@ from sagline.kernels.memory import Memory, block, counters, vector
 
 LP_SOLVED, LP_EMPTY, LP_UNBOUNDED, LP_GAVE_UP = 0, 1, 2, 3
 PIVOTS = 2000
-CAREFUL = 60  # pivots after which ties are broken by label (Bland), which cannot cycle
+CAREFUL = 60  # number of pivots after which labels decide ties (Bland's rule, without cycles)
 ROUNDING = 4e-16  # relative to the largest coordinate of a point
 PIVOT = 1e-11  # smallest pivot, relative to the largest entry of the row
 

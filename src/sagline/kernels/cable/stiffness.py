@@ -2,8 +2,8 @@
 
 In the vertical plane of the cable the stiffness is a 2 x 2 matrix. Normal to this plane it is T_x/x_B = tau/D, which is
 regular on a vertical chord. For the weightless and the exact cable, the force on the platform end is the gradient of an
-energy. The forces of the shallow models are not a gradient. The curl of the parabolic force is of the order of the
-error of the model. The search for equilibria with a shallow model starts from the equilibrium with the exact cable.
+energy. The forces of the shallow models are not a gradient. The curl of the parabolic force is as small as the error of
+the model. The search for equilibria with a shallow model starts from the equilibrium with the exact cable.
 """
 
 from __future__ import annotations

@@ -98,7 +98,7 @@ def add_motion(space: CalibrationArrays, slopes: Slopes) -> None:
 
 @glue
 def fill_motion(free: Array, space: CalibrationArrays, slopes: Slopes, motion: Array) -> None:
-    """Fill the platform's motion per cable length; the last row is its motion per unit of the first unknown."""
+    """Fill the platform motions: one row per cable length, the last row per unit of the first unknown."""
     m = space.by_wrench.shape[0]
     for k in range(6):
         space.six[k] = slopes.wrench[k, 0]

@@ -308,8 +308,8 @@ def insert_node(place: Array, speed: Array, count: int, row: Array) -> None:
 def merge_nodes(place: Array, speed: Array, count: int, row: Array) -> None:
     """Merge the element at the frame with its neighbor, and remove the node between them; updates count and rest.
 
-    The next node takes its momentum. The momentum of the half element at the frame, at the velocity of the entering
-    cable, is subtracted.
+    The next node takes the momentum of the removed node. The half element at the frame moves with the entering cable;
+    its momentum is subtracted.
     """
     element, rest, rate = row[ELEMENT], row[REST], row[RATE]
     whole = element + rest

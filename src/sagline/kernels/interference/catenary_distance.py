@@ -42,7 +42,7 @@ PARTS = 9
 PIECE_COLUMNS = 10
 
 PIECES = 8192  # largest number of pieces of all cables of a pose
-COUNTER = PIECES - 1  # last row: its last column is the number of pieces, its other columns hold an edge of a box
+COUNTER = PIECES - 1  # last row: number of pieces in the last column, an edge of a box in the other columns
 WAITING = 4096  # largest number of waiting pairs of pieces
 PAIRS = 100_000  # largest number of pairs per distance; the search then ends with its present lower bound
 ROUNDING = 1e-13  # rounding error of a lower bound, relative to the coordinates

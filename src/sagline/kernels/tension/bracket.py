@@ -1,11 +1,11 @@
 """Feasibility of a wrench with tensions within their limits, decided on the cables' exact curves.
 
-Tensions that balance the wrench prove that it is feasible. A direction y can prove that it is infeasible: along y each
+Tensions that balance the wrench prove its feasibility. A direction y can prove that it is infeasible: along y each
 cable contributes at most the largest value of its curve. If the sum of these values is less than the demand, no
 tensions balance the wrench. Otherwise a cable cannot be far below its largest value along y, which narrows its range of
 tensions. If the ranges do not become narrower, the range with the most uncertain sag force is split in two.
 
-The shortfall lies between the gap of the first proof and the residual of the least change.
+The gap of the first proof is a lower bound of the shortfall. The residual of the least change is an upper bound.
 """
 
 from __future__ import annotations

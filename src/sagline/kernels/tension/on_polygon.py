@@ -193,7 +193,7 @@ def feasible_interval(bounds: Array, null: Array) -> tuple[float, float]:
 def feasible_corners(bounds: Array, null: Array, corners: Array, labels: Indices) -> int:
     """Fill the corners of the feasible polygon, or for r = 1 the ends of the interval; returns the number, 0 if empty.
 
-    An infinite end of the interval is replaced by the edge of the box around the polygon, and has the label of the box.
+    The edge of the box around the polygon replaces an infinite end of the interval, with the label of the box.
     """
     if null.shape[0] == 2:
         return feasible_polygon(bounds, null, corners, labels)

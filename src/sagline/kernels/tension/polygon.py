@@ -17,7 +17,7 @@ from sagline.kernels.algebra.linear_program import Basis, new_basis
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block, counters
 
-FLAT = 1e-12  # length of a null-space row below which the tension of its cable is constant
+FLAT = 1e-12  # length of a null-space row; the tension of a cable with a shorter row is constant
 SPARE_CORNERS = 6  # corners in addition to two per cable: corners of the box, and the corner to insert
 
 

@@ -1,4 +1,4 @@
-"""Proofs that every pose of a box is wrench-feasible, or that no pose is; docs/model.md, section 13.
+"""Proofs that all poses of a box are wrench-feasible, or that all are infeasible; docs/model.md, section 13.
 
 INSIDE is proved by a tension policy that balances every wrench at every pose within the limits. OUTSIDE is proved by
 one wrench of the set and a direction that varies with the pose. Along this direction, all cables together contribute
@@ -35,7 +35,7 @@ from sagline.kernels.workspaces.wrench_set import Loads, farthest, reach_of_load
 
 OPEN, INSIDE, OUTSIDE = 0, 1, 2  # verdicts
 BOX_COLUMNS = 11  # pose row, half edges, turn
-ATTEMPTS = 3  # iterations of tensions and of the change of their limits by the set of wrenches
+ATTEMPTS = 3  # iterations of tensions and of their limits, which the set of wrenches narrows
 BEYOND = 2.0  # smoothing per cable; a demand with a larger residual is infeasible
 
 LoadTerms = tuple[Array, Array, Array, Array, Indices]  # Loads
