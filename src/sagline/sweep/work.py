@@ -28,7 +28,7 @@ from sagline.workspaces.margin_rows import MarginRows
 
 # statuses of feasible, infeasible, open and lost requests
 INVERSE_ENDS: Final = (PoseStatus.SOLVED, PoseStatus.INFEASIBLE, PoseStatus.BORDERLINE, PoseStatus.NOT_CONVERGED)
-MARGIN_ENDS: Final = (MarginStatus.FEASIBLE, MarginStatus.INFEASIBLE, MarginStatus.OPEN, -1)  # a margin is never lost
+MARGIN_ENDS: Final = (MarginStatus.FEASIBLE, MarginStatus.INFEASIBLE, MarginStatus.OPEN, -1)  # no margin is lost
 ROWS: Final = 1 << 14  # number of requests per call; their arrays fit the cache of the processor
 
 

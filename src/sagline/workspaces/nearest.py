@@ -80,7 +80,7 @@ def _merit(levels: Levels, positions: Array) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
         short = np.where(bare > 0.0, _share(bare, found.margin), bare / weight) - 1.0
     tensions = any(one.needs_tensions for one in levels.criteria)
-    short -= _UNHELD if tensions else 0.0  # levels with tensions are always above
+    short -= _UNHELD if tensions else 0.0  # every level with tensions is above this
     return np.maximum(np.where(found.margin >= 0.0, found.level, short), -_FAR)
 
 

@@ -48,8 +48,8 @@ class Cells(Result):
     """The K cells of a divided box of poses.
 
     Attributes:
-        low: Lowest position of each [m], shape (K, 3).
-        high: Highest position of each [m], shape (K, 3).
+        low: Lowest position of each cell [m], shape (K, 3).
+        high: Highest position of each cell [m], shape (K, 3).
         verdict: Codes of `ProofVerdict`, shape (K,).
     """
 
