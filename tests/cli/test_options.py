@@ -20,6 +20,7 @@ import sagline as sl
 import sagline.cli
 from sagline.cli import values
 from sagline.cli.main import FORMER, MODULES, NAMES, app
+from tests.files.executions import execution
 from tests.tiers import extended
 
 GROUP: Any = get_command(app)
@@ -31,8 +32,8 @@ for _name in NAMES:
 SHARED = sorted(name for name, commands in OPTIONS.items() if len(commands) > 1)
 # commands with figures of numbers; those of the page of `article` and `experiment` are part of it
 DRAWING = {"track", "run", "tension", "vibrate", "simulate", "workspace", "design"}
-# JSON without a table of equal rows, or with files that hold all rows: front.csv, Zarr, a page, --to
-NO_TABLE = {"show", "design", "sweep", "article", "experiment", "log", "cache"}
+# JSON without a table of equal rows, or with files that hold all rows: front.csv, Zarr, a page
+NO_TABLE = {"design", "sweep", "article", "cache"}
 
 
 def conversions() -> Iterator[tuple[str, str]]:
@@ -141,6 +142,23 @@ def test_tables_have_the_numbers_of_json(folder: Path) -> None:
         assert float(row["mass [kg]"]) == robots[row["robot"]]["mass_kg"]
         assert [float(row[f"frame {axis} [m]"]) for axis in "xyz"] == robots[row["robot"]]["frame_size_m"]
     assert sagline_("robots", "--out", "r.csv").exit_code == 2  # without effect
+    cables = json.loads(sagline_("show", "cogiro", "--csv", "--out", "c.csv", "--json").stdout)
+    rows = rows_of(folder / "c.csv")
+    assert [[float(row[f"frame_anchors {axis} [m]"]) for axis in "xyz"] for row in rows] == cables["frame_anchors"][
+        "value"
+    ]
+    assert [float(row["tension_max [N]"]) for row in rows] == cables["tension_max"]["value"]
+
+
+def test_the_cycles_of_a_log_are_a_table(folder: Path) -> None:
+    done = execution()
+    done.save(folder / "run.mcap")
+    assert sagline_("log", "run.mcap", "--csv", "--json").exit_code == 0
+    rows = rows_of(folder / "output" / "run-cycles.csv")
+    np.testing.assert_array_equal([float(row["x [m]"] or "nan") for row in rows], done.position[:, 0])
+    for head, tensions in (("T{} [N]", done.tension), ("planned T{} [N]", done.planned_tension)):
+        found = [[float(row[head.format(k)] or "nan") for k in range(tensions.shape[1])] for row in rows]
+        np.testing.assert_array_equal(found, tensions)
 
 
 def test_a_simulation_has_its_course_in_a_table(folder: Path) -> None:

@@ -8,18 +8,26 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import numpy as np
 
-from sagline.cli.options import JsonOption, OutOption, SeedOption, TrueOption, argument, flag
-from sagline.cli.output import TextTable, number_text, show_table
+from sagline.cli.options import (
+    JsonOption,
+    OutOption,
+    SeedOption,
+    TableOption,
+    TrueOption,
+    argument,
+    flag,
+)
+from sagline.cli.output import Output, TextTable, number_text, show_table
 from sagline.cli.terminal import show_json, show_note, show_text, working
 from sagline.core.errors import InvalidValueError, nearest
 from sagline.core.numbers import n
-from sagline.files.writing import check_files
 
 if TYPE_CHECKING:
     from sagline.article.experiment import Experiment, Tell
     from sagline.robot.robot import Robot
 
 KNOWN: Final = ("article",)
+TABLE: Final = "experiment.csv"
 PARTS: Final = 1000  # steps of the progress bar
 
 
@@ -31,6 +39,7 @@ def experiment(
     true: TrueOption = None,
     seed: SeedOption = 1,
     folder: OutOption = Path("output"),
+    write_table: TableOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Repeat an experiment: home, the ten points of Table 2, home, as one page with the article's numbers.
@@ -57,7 +66,7 @@ def experiment(
     if real.cable_count != nominal.cable_count:
         step = "Begin a robot file with base: article-prototype, and give the values that differ."
         raise InvalidValueError("--true", f"a robot of {real.cable_count} cables", f"{nominal.cable_count}", step)
-    check_files(folder, NAMES)
+    output = Output(folder, "", [*NAMES, *[TABLE] * write_table])
     how = _how(None if true is None else real.name, waits)
     with working("home, ten points, home") as line:
 
@@ -66,6 +75,8 @@ def experiment(
 
         result = in_process(real, nominal, seed=seed, tell=tell) if waits else apart_over_s7(real, nominal, seed, tell)
     place = write_experiment(result, folder, how)
+    if write_table:
+        output.table(TABLE, _rows(result))
     if as_json:
         show_json({finding.key: plain(finding.numbers) for finding in experiment_chapter(result, how).findings})
         return
@@ -95,6 +106,14 @@ def _how(true: str | None, waits: bool) -> str:
     machine = "a twin of the prototype as planned" if true is None else f"a twin of {true}"
     way = "in one process, not in real time" if waits else "over four S7 connections, in real time"
     return f"The controller drove {machine}, {way}; its model was the prototype of Table 1, with our anchors."
+
+
+def _rows(result: Experiment) -> list[list[object]]:
+    """Names of the columns, then number, desired position and both distances of each point."""
+    table = result.table
+    heads = ["point", *(f"desired {axis} [m]" for axis in "xyz"), "distance, article [m]", "distance [m]"]
+    rows = zip(table.points, table.desired.tolist(), table.distance.tolist(), result.distance.tolist(), strict=True)
+    return [[*heads], *([point, *place, theirs, ours] for point, place, theirs, ours in rows)]
 
 
 def _tell(result: Experiment) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -129,18 +129,24 @@ def _plan_of(file: Path, out: Path | None) -> Plan:
 
 
 def plan_rows(plan: Plan) -> list[list[object]]:
-    """A whole plan as a table: time, pose, lengths, tensions and status of each sample; empty cells for NaN."""
+    """A whole plan as a table: time, pose, lengths, tensions and status of each sample."""
     from sagline.kinematics.status import PoseStatus
 
-    pose, lengths, tensions = plan.state.pose, plan.unstrained_length, plan.chord_tension
-    columns: dict[str, Array] = {}
-    if plan.path is not None:
-        columns["time [s]"] = plan.path.time
-    columns |= {f"{axis} [m]": pose.position[..., k] for k, axis in enumerate("xyz")}
-    columns |= {f"q{axis}": pose.quaternion[..., k] for k, axis in enumerate("xyzw")}
-    columns |= {f"L{k} [m]": lengths[..., k] for k in range(lengths.shape[-1])}
-    columns |= {f"T{k} [N]": tensions[..., k] for k in range(tensions.shape[-1])}
-    numbers = np.column_stack([np.atleast_1d(column) for column in columns.values()]).tolist()
     words = [PoseStatus(int(code)).name for code in np.atleast_1d(plan.status)]
-    body = ([*("" if x != x else x for x in row), word] for row, word in zip(numbers, words, strict=True))
-    return [[*columns, "status"], *body]
+    time = None if plan.path is None else plan.path.time
+    cables = {"L{} [m]": plan.unstrained_length, "T{} [N]": plan.chord_tension}
+    return motion_rows(time, plan.state.pose.position, plan.state.pose.quaternion, cables, status=words)
+
+
+def motion_rows(
+    time: Array | None, position: Array, quaternion: Array, cables: Mapping[str, Array], **words: Sequence[str]
+) -> list[list[object]]:
+    """Names of the columns, then time, pose, values of the cables and words of each sample; empty cells for NaN."""
+    columns = {} if time is None else {"time [s]": time}
+    columns |= {f"{axis} [m]": position[..., k] for k, axis in enumerate("xyz")}
+    columns |= {f"q{axis}": quaternion[..., k] for k, axis in enumerate("xyzw")}
+    columns |= {name.format(k): values[..., k] for name, values in cables.items() for k in range(values.shape[-1])}
+    numbers = np.column_stack([np.atleast_1d(column) for column in columns.values()]).tolist()
+    texts = zip(*words.values(), strict=True) if words else [()] * len(numbers)
+    body = ([*("" if x != x else x for x in row), *text] for row, text in zip(numbers, texts, strict=True))
+    return [[*columns, *words], *body]

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import numpy as np
 
-from sagline.cli.options import JsonOption, argument, option
-from sagline.cli.output import TextTable, show_table
+from sagline.cli.lengths import motion_rows
+from sagline.cli.options import JsonOption, OutOption, TableOption, argument, only_with, option
+from sagline.cli.output import Output, TextTable, show_table
 from sagline.cli.terminal import show_json, show_text, working
 from sagline.core.numbers import n
 from sagline.files.writing import check_file
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from sagline.control.recording import Event
     from sagline.core.arrays import Array
 
+TABLE: Final = "-cycles.csv"
 MOST_EVENTS: Final = 20  # largest number of listed events
 MOST_PLANS: Final = 100_000
 # limits of the classes of delay of a cycle [s]
@@ -40,6 +42,8 @@ def log(
     plan: Annotated[
         str | None, option("NUMBER", "Only the cycles of this plan, from 0. Default: all.", "--plan-number")
     ] = None,
+    folder: Annotated[OutOption, only_with("--csv")] = Path("output"),
+    write_table: TableOption = False,
     as_json: JsonOption = False,
 ) -> int:
     """Print the contents of a log of the controller: states, largest errors, late cycles, events.
@@ -51,22 +55,30 @@ def log(
         sagline log killed.mcap --to corrected.mcap
     """
     from sagline.cli.values import whole_of
+    from sagline.control.states import State
     from sagline.files.execution_file import load_execution, save
 
     which = None if plan is None else whole_of(plan, "--plan-number", 0, MOST_PLANS)
     if to is not None:
         check_file(to)
+    output = Output(folder, file.stem, [TABLE] * write_table)
     with working(f"reading {file.name}"):
         done = load_execution(file, which)
     if to is not None:
         with working(f"writing {to.name}"):
             save(done, to)
+    if write_table:
+        cables = {"L{} [m]": done.length, "T{} [N]": done.tension, "planned T{} [N]": done.planned_tension}
+        states = [State(code).name for code in done.state.tolist()]
+        output.table(TABLE, motion_rows(done.time, done.position, done.quaternion, cables, state=states))
     if as_json:
         show_json(_record(done, to))
     elif to is not None:
         show_text(f"{to}: {len(done):,} cycles of {done.robot.name}", whole=True)
     else:
         _tell(done)
+    if not as_json:
+        output.show()
     return 0
 
 

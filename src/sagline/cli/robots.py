@@ -39,6 +39,7 @@ WHOLE = {  # fields of the robot and their units
 ANCHORS = {"frame_anchors": "m", "platform_anchors": "m"}
 MATERIAL = ("linear_density", "axial_stiffness", "diameter", "expansion")  # fields of the robot's cables
 PER_CABLE = (*MATERIAL, "tension_min", "tension_max")
+CABLES = "-cables.csv"
 
 
 def robots(
@@ -79,8 +80,13 @@ def robots(
     output.show()
 
 
-def show(name: RobotArgument, as_json: JsonOption = False) -> None:
-    """Show every value of a robot with its unit; assumed values are marked, with the reason.
+def show(
+    name: RobotArgument,
+    folder: Annotated[OutOption, only_with("--csv")] = Path("output"),
+    write_table: TableOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Show every value of a robot with its unit; assumed values are marked, with the reason. --csv writes its cables.
 
     For example:
 
@@ -88,8 +94,12 @@ def show(name: RobotArgument, as_json: JsonOption = False) -> None:
         sagline show own_robot.yaml --json
     """
     from sagline.files.robot_file import load_robot
+    from sagline.files.writing import file_stem
 
     robot = load_robot(name)
+    output = Output(folder, file_stem(robot.name), [CABLES] * write_table)
+    if write_table:
+        output.table(CABLES, _cables(robot))
     if as_json:
         show_json(_record(robot))
         return
@@ -112,6 +122,20 @@ def show(name: RobotArgument, as_json: JsonOption = False) -> None:
         show_text("* assumed, not in the source:")
         for field, why in robot.assumed.items():
             show_text(f"{field}: {why}", indent=2)
+    output.show()
+
+
+def _cables(robot: Robot) -> list[list[object]]:
+    """Names of the columns, then anchors, material and limits of each cable; empty cells for unknown values."""
+    heads = ["cable", *(f"{field} {axis} [{unit}]" for field, unit in ANCHORS.items() for axis in "xyz")]
+    known = {field: np.asarray(value) for field in PER_CABLE if (value := _value(robot, field)) is not None}
+    columns = [np.broadcast_to(value, robot.cable_count).tolist() for value in known.values()]
+    anchors = np.hstack([_value(robot, field) for field in ANCHORS]).tolist()
+    rows = zip(anchors, *columns, strict=True)
+    return [
+        [*heads, *(f"{field} [{WHOLE[field]}]" for field in known)],
+        *([k, *places, *values] for k, (places, *values) in enumerate(rows)),
+    ]
 
 
 def _short(robot: Robot) -> dict[str, Any]:

@@ -7,8 +7,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
-
+from sagline.cli.lengths import motion_rows
 from sagline.cli.options import (
     USUAL_FORMATS,
     AirDampingOption,
@@ -153,7 +152,9 @@ def simulate(
         simulation = integrate(start, duration=end, step=step, cable_mass=kind, events=events, damping=damping)
         simulation.save(output.file(".nc"))
         if write_table:
-            output.table(".csv", _rows(simulation))
+            pose = simulation.pose
+            rows = motion_rows(simulation.time, pose.position, pose.quaternion, {"T{} [N]": simulation.tensions})
+            output.table(".csv", rows)
         if figures:
             from sagline import plot
 
@@ -232,15 +233,6 @@ def _verdict(simulation: Simulation, summary: Summary) -> str:
     above = rows["cables_above_tension_max"]
     limits = f"above tension_max: {above.text}" if above.value else "all cables stay below tension_max"
     return f"{simulation.robot.name}: tensions up to {rows['tension_max_n'].text}; {limits}."
-
-
-def _rows(simulation: Simulation) -> list[list[object]]:
-    """Names of the columns, then time, pose and tensions of each sample."""
-    columns = {"time [s]": simulation.time}
-    columns |= {f"{axis} [m]": simulation.pose.position[:, k] for k, axis in enumerate("xyz")}
-    columns |= {f"q{axis}": simulation.pose.quaternion[:, k] for k, axis in enumerate("xyzw")}
-    columns |= {f"T{k} [N]": column for k, column in enumerate(simulation.tensions.T)}
-    return [[*columns], *np.column_stack([*columns.values()]).tolist()]
 
 
 def _tell(simulation: Simulation, summary: Summary) -> None:
