@@ -1,4 +1,4 @@
-"""Defects that a reader of a figure sees: axes without numbers, label or unit; cut or overlapping text; equal looks."""
+"""Defects that a reader of a figure sees: axes without numbers or unit; small, cut or overlapping text; equal looks."""
 
 from __future__ import annotations
 
@@ -18,12 +18,13 @@ UNIT = re.compile(r"\[[^\]]+\]")
 NUMBER = re.compile(r"[-−\d.,]+(e[-−]?\d+)?|\$\\mathdefault.*")
 WITHOUT_UNIT = re.compile(r"pose|candidate|row of the log|factor\b.*|correlation|workspace share\b.*")
 TOUCHING = 1.0  # pixels that two texts may share
+SHOWN, SMALLEST = 8.0 / 2.54, 6.0  # width of a figure on a phone or in a column [in], and its smallest text [pt]
 
 
 def defects(figure: Figure) -> list[str]:
     """All defects of a figure, one sentence each."""
     texts = drawn_texts(figure)
-    return [*bare_axes(figure), *cut_texts(figure, texts), *overlaps(texts), *equal_looks(figure)]
+    return [*bare_axes(figure), *cut_texts(figure, texts), *overlaps(texts), *equal_looks(figure), *small_texts(figure)]
 
 
 def drawn_texts(figure: Figure) -> list[tuple[str, Bbox]]:
@@ -86,6 +87,14 @@ def cut_texts(figure: Figure, texts: list[tuple[str, Bbox]]) -> Iterator[str]:
     for text, box in texts:
         if not (sheet.contains(box.x0, box.y0) and sheet.contains(box.x1, box.y1)):
             yield f"{text!r} is cut"
+
+
+def small_texts(figure: Figure) -> Iterator[str]:
+    """Texts too small to read if the figure is scaled to the width of a phone or a column."""
+    scale = min(1.0, SHOWN / figure.get_figwidth())
+    for text in figure.findobj(Text):
+        if text.get_visible() and text.get_text().strip() and scale * text.get_fontsize() < SMALLEST:
+            yield f"{text.get_text()!r} has {scale * text.get_fontsize():.1f} pt"
 
 
 def overlaps(texts: list[tuple[str, Bbox]]) -> Iterator[str]:

@@ -29,7 +29,7 @@ WIDTH, HEIGHT = 4.6, 3.1  # size on a desktop screen [in]; on a phone it is four
 LEFT, RIGHT, BELOW, ABOVE = 0.16, 0.975, 0.5, 0.12  # margins: the first ones relative to the width, the others in [in]
 POINT = 1.0 / 72.0  # [in]
 APART = 40.0  # smallest distance between the numbers of two lines [pt]
-NAME_SIZE = TICK - 0.5  # text size of legends [pt]
+NAME_SIZE = TICK  # text size of legends [pt]
 SHADES = "viridis"
 MOST_POINTS = 400  # largest number of points of a curve over time, to limit the size of the page
 
@@ -230,8 +230,8 @@ def draw_errors(
     scale = matplotlib.cm.ScalarMappable(BoundaryNorm(edges, len(edges) - 1), key)
     bar = ax.figure.colorbar(scale, ax=ax, pad=0.02, extend="both", spacing="uniform")
     bar.set_ticks(list(ticks), labels=[n(tick, ".3g", "m") for tick in ticks])
-    bar.set_label(f"gray: below {n(edges[0], '.3g', 'm')}", fontsize=LABEL - 1.0)
-    bar.ax.tick_params(labelsize=TICK - 1.0)
+    bar.set_label(f"gray: below {n(edges[0], '.3g', 'm')}", fontsize=LABEL)
+    bar.ax.tick_params(labelsize=TICK)
     bar.ax.minorticks_off()
 
 
@@ -246,7 +246,7 @@ def _number_lines(ax: Axes, drawn: ContourSet) -> None:
         drawn,
         manual=ax.transData.inverted().transform(np.reshape(places, (-1, 2)) * figure.dpi / 72.0).tolist(),
         fmt=lambda level: n(abs(level), ".3g", "m"),
-        fontsize=TICK - 0.5,
+        fontsize=TICK,
         inline_spacing=3,
     )
     for text in names:

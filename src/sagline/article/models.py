@@ -174,7 +174,7 @@ def _choice(label: str, heights: Array, errors: Array, caption: str, draw: Drawi
     norm = BoundaryNorm(np.arange(len(names) + 1) - 0.5, len(names))
     scale = matplotlib.cm.ScalarMappable(norm, ListedColormap(colors))
     bar = figure.colorbar(scale, ax=ax, ticks=range(len(names)), pad=0.02)
-    bar.ax.set_yticklabels(names, fontsize=TICK - 0.5)
+    bar.ax.set_yticklabels(names, fontsize=TICK)
     bar.ax.tick_params(length=0.0)
     return draw.panel(figure, caption)
 

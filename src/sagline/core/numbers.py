@@ -7,7 +7,7 @@ from math import floor, isfinite, log10
 from typing import SupportsFloat
 
 ROUNDING = 1e-12  # a smaller difference, relative to the size of the operands, is a rounding error
-PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 POWERS = {prefix: power for power, prefix in PREFIXES.items()}
 HIGHEST = {"m": 3, "g": 3, "s": 0, "rad": 0}  # power of ten of the largest usual prefix; other units use all prefixes
 LONGEST_PLAIN = 1e7  # larger numbers without a prefix are written with a power of ten
@@ -15,7 +15,7 @@ SPACE = "\N{NO-BREAK SPACE}"
 TIGHT = ("", "°")  # units written without a space before them
 
 # first unit of a product, with its prefix; powers of a unit get no prefix, because it would be hard to read
-_scaled = re.compile(r"([fpnµmkMG]?)(rad|Pa|m|g|s|N|J|W)(?![\w²³⁴⁻^])")
+_scaled = re.compile(r"([pnµmkMG]?)(rad|Pa|m|g|s|N|J|W)(?![\w²³⁴⁻^])")
 _superscript = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -50,10 +50,10 @@ def n(
     if error is not None and not (isfinite(error) and error > 0.0):
         return f"{n(number, form, unit)}, uncertainty unknown"
     if error is None:
-        power, symbol = _prefixed(number, form, unit)
+        power, symbol = prefixed_unit(number, form, unit)
         digits = _digits(number * 10.0**power, form)
     else:
-        power, symbol = _prefixed(max(abs(number), error), ".15g", unit)
+        power, symbol = prefixed_unit(max(abs(number), error), ".15g", unit)
         digits = _with_uncertainty(number * 10.0**power, error * 10.0**power)
     return f"{digits}{'' if symbol in TIGHT else SPACE}{symbol}".replace(" ", SPACE)
 
@@ -68,7 +68,7 @@ def plus_minus(value: SupportsFloat, error: SupportsFloat, unit: str = "", *, pr
     if not (isfinite(number) and isfinite(own) and own > 0.0):
         text = n(number, ".6g", unit if prefixed else "")
         return f"{text} ± 0" if own == 0.0 else f"{text}, not told"
-    power, symbol = _prefixed(max(abs(number), own), ".15g", unit) if prefixed else (0, "")
+    power, symbol = prefixed_unit(max(abs(number), own), ".15g", unit) if prefixed else (0, "")
     places = 1 - int(f"{own * 10.0**power:.1e}".partition("e")[2])
     both = (round(each * 10.0**power, places) for each in (number, own))
     digits = " ± ".join(_digits(each, f",.{max(places, 0)}f") for each in both)
@@ -83,7 +83,7 @@ def counted(count: int, noun: str) -> str:
     return f"{count:,} {noun}{'' if count == 1 else 'es' if noun.endswith(('ch', 'x')) else 's'}"
 
 
-def _prefixed(number: float, form: str, unit: str) -> tuple[int, str]:
+def prefixed_unit(number: float, form: str, unit: str) -> tuple[int, str]:
     """Power of ten that converts a number into its most readable unit, and this unit."""
     found = _scaled.match(unit)
     if found is None or number == 0.0 or _reads_well(number, form, 0.1):

@@ -46,7 +46,7 @@ from sagline.workspaces.space import Workspace
 if TYPE_CHECKING:
     from sagline.core.arrays import Array, Flags, Indices
 
-STYLE: Final = replace(PLAIN, name="notebook", width=6.0, height=0.8, direct=True)
+STYLE: Final = replace(PLAIN, name="notebook")
 MOST_SAMPLES: Final = 300  # largest number of points of a line
 MOST_CABLES: Final = 16
 LEVELS: Final = 4  # number of drawn slices of a workspace

@@ -86,7 +86,7 @@ def calibration(found: Calibration, part: str = "all", *, height: float | None =
     choice(part, "part", PARTS)
     at = None if height is None else number(height, "height", "m")
     heights: dict[str, float] = {
-        "residuals": 0.5 + PANEL * (len(_kinds(found)) + current().direct),
+        "residuals": 0.5 + PANEL * (len(_kinds(found)) + 1),
         "correlation": MATRIX,
         "errors": _height_of_maps(found),
     }
@@ -150,7 +150,7 @@ def _residuals(figure: SubFigure, found: Calibration) -> None:
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
     every = f", every {-(-len(found.rows) // MOST_POSES)}th is drawn" if len(shown) < len(found.rows) else ""
     panels[-1].set_xlabel(f"row of the log{every}", fontsize=current().label)
-    figure_legend(figure, panels, "outside right upper", "outside lower center")
+    figure_legend(figure, panels, "outside lower center")
     figure.align_ylabels(panels)
     set_heading(figure, f"{found.robot.name}: {chi_squared_text(found)}")
 
@@ -169,7 +169,7 @@ def _mark_outliers(ax: Axes, found: Calibration, kind: _Kind) -> None:
             left = outlier.row > found.rows[0] + 0.7 * (found.rows[-1] - found.rows[0])
             ax.annotate(
                 f"{cable}{n(outlier.size, '.2g', unit)}", (outlier.row, place), xytext=(-7.0 if left else 7.0, 0.0),
-                textcoords="offset points", fontsize=current().tick - 1.0, va="center", zorder=4.0,
+                textcoords="offset points", fontsize=current().tick, va="center", zorder=4.0,
                 ha="right" if left else "left",
             )  # fmt: skip
             named += 1

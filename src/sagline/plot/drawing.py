@@ -47,7 +47,7 @@ FRAME, GROUND, BODY, WHEEL = "0.45", (0.5, 0.5, 0.5, 0.12), (0.835, 0.369, 0.0, 
 CABLE_WIDTH, FRAME_WIDTH, BODY_WIDTH, THIN, GAP = 1.2, 0.7, 1.1, 0.6, 1.3  # line widths [pt]
 SPECK: Final = 1.5  # shorter pieces of a line between two gaps are omitted [pt]
 SPARE: Final = 0.05  # margin as a share of the picture
-WIDTH, LEAST, MOST = 5.6, 0.35, 1.1  # [in]; smallest and largest ratio of height to width
+LEAST, MOST = 0.35, 1.1  # smallest and largest ratio of height to width
 PLACES: Final = np.linspace(0.12, 0.72, 31)  # positions of the number along a cable, from the frame
 BESIDE, ROOM = 0.8, 0.8  # distances of a number from its cable and from other lines, in text sizes
 CLEAR = 1.15  # distance of a number beside its cable from other lines, in text sizes
@@ -161,7 +161,7 @@ def _axes(ax: Axes | None, scene: _Scene, view: Array, *, bar: bool) -> Axes:
     spare = SPARE * float((high - low).max())
     low, high = low - spare, high + spare
     if ax is None:
-        width = current().width or WIDTH
+        width = current().width
         shape = float(np.clip((high[1] - low[1]) / (high[0] - low[0]), LEAST, MOST))
         tall = min(width * shape * (0.82 if bar else 1.0), current().tallest)
         ax = Sheet(figsize=(width, tall), layout="compressed").add_subplot()

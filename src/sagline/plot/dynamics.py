@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from itertools import pairwise
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
@@ -16,21 +16,19 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 from sagline.core.arguments import choice, instance, listed, text
 from sagline.core.arrays import checked
 from sagline.core.errors import InvalidValueError
-from sagline.core.numbers import ROUNDING, n
+from sagline.core.numbers import ROUNDING, n, prefixed_unit
 from sagline.dynamics.simulation.results import Simulation
 from sagline.dynamics.vibration.frequency_map import FrequencyMap
 from sagline.dynamics.vibration.response import FrequencyResponse, curves_of_response, response_curves
 from sagline.dynamics.vibration.vibration import Vibration
-from sagline.plot.labels import legend_above, name_lines, set_heading, wrap_heading
+from sagline.plot.labels import figure_legend, legend_above, name_lines, set_heading, wrap_heading
 from sagline.plot.sheet import (
     BLUE,
     COLORS,
     DASHED,
     GAP_COLOR,
     MAP_COLORS,
-    TICK,
     VERMILLION,
-    WIDTH,
     axes_or_new,
     color_bar,
     draw_map,
@@ -81,10 +79,10 @@ def energy(simulation: Simulation) -> Figure:
     figure = sheet(height=4.2)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.4, 1.0))
     rise = balance.potential - balance.potential[0]
-    courses = {"kinetic": balance.kinetic, "potential, minus its initial value": rise}
+    courses = {"kinetic": balance.kinetic, "potential, from its start": rise}
     courses |= {"supplied": balance.supplied, "lost": balance.lost}
     if balance.removed.any():
-        courses["removed cables and loads"] = balance.removed
+        courses["removed"] = balance.removed
     for (name, course), color, style in zip(courses.items(), COLORS, ENERGY_STYLES, strict=False):
         above.plot(time, course, color=color, linestyle=style, linewidth=1.2, label=name)
     format_clock(above, time, "energy [J]")
@@ -92,13 +90,14 @@ def energy(simulation: Simulation) -> Figure:
     for event in simulation.events:
         name = event.kind if event.cable is None else f"{event.kind}, cable {event.cable}"
         mark_event(above, event.time, name, GAP_COLOR, 1.0)
-    name_lines(above)
-    below.plot(time, balance.error, color="black", linewidth=1.0, label="error of the balance")
-    format_clock(below, time, "error [J]")
+    figure_legend(figure, [above])
+    widest = _largest(*courses.values(), balance.potential)
+    power, unit = prefixed_unit(max(_largest(balance.error), ROUNDING * widest), ".2g", "J")
+    below.plot(time, balance.error * 10.0**power, color="black", linewidth=1.0, label="error of the balance")
+    format_clock(below, time, f"error [{unit}]")
     for event in simulation.events:
         mark_event(below, event.time, "", GAP_COLOR, 1.0)
-    widest = _largest(*courses.values(), balance.potential)
-    for ax, share in ((above, AT_REST), (below, ROUNDING)):
+    for ax, share in ((above, AT_REST), (below, ROUNDING * 10.0**power)):
         low, high = ax.get_ylim()
         ax.set_ylim(min(low, -share * widest), max(high, share * widest))
     worst = n(_largest(balance.error), ".2g", "J", size=_largest(balance.potential))
@@ -203,8 +202,7 @@ def _legend_of_shares(ax: Axes) -> None:
     ]  # fmt: skip
     handles.append(Line2D([], [], color=VERMILLION, linewidth=0.9, linestyle=DASHED, label="massless"))
     labels = [str(handle.get_label()) for handle in handles]
-    place = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "ncols": 2, "fontsize": TICK, "frameon": False}
-    ax.legend(handles=handles, **(legend_above(ax, labels) if current().direct else place))
+    ax.legend(handles=handles, **legend_above(ax, labels))
 
 
 class _MapQuantity(NamedTuple):
@@ -232,7 +230,7 @@ def frequency_map(found: FrequencyMap, quantity: str = "frequency") -> Figure:
         quantity: "frequency", "massless_frequency", "platform_share", "peak" or "peak_frequency".
 
     Returns:
-        The figure; gray without a solution.
+        The figure; hatched without a solution.
 
     Raises:
         InvalidValueError: If the quantity does not exist, or the poses are not on a grid.
@@ -254,13 +252,14 @@ def frequency_map(found: FrequencyMap, quantity: str = "frequency") -> Figure:
     low, high = (float(known.min()), float(known.max())) if known.size else (0.5, 1.0)
     scale = LogNorm(low, max(high, 1.01 * low)) if logarithmic and low > 0.0 else Normalize(low, high)
     columns = PANELS[shown]
-    count, each = shown // columns, WIDTH / columns
+    count, each = shown // columns, current().width / columns
     tall = np.clip(np.ptp(y) / max(float(np.ptp(x)), 1e-9), 0.4, 1.4) * each
-    figure = sheet(0.5 + count * (0.85 * float(tall) + 0.3))
+    figure = sheet(0.5 + 0.9 * current().narrow + count * (0.85 * float(tall) + 0.5))
     panels = figure.subplots(count, columns, sharex=True, sharey=True, squeeze=False)
     for ax, row in zip(panels.flat, rows, strict=True):
         draw_map(ax, x, y, values[:, :, row], scale, f"$z$ = {z[row]:.3g} m")
-    color_bar(ScalarMappable(scale, MAP_COLORS), list(panels.flat), label, shrink=0.8, pad=0.02)
+    place: dict[str, Any] = {"location": "bottom", "aspect": 30} if current().narrow else {"pad": 0.02}
+    color_bar(ScalarMappable(scale, MAP_COLORS), list(panels.flat), label, shrink=0.8, **place)
     set_heading(figure, found.robot.name)
     return figure
 

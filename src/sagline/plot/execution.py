@@ -20,7 +20,6 @@ from sagline.plot.sheet import (
     PURPLE,
     SKY,
     VERMILLION,
-    WIDTH,
     axes_or_new,
     cable_look,
     draw_components,
@@ -30,7 +29,6 @@ from sagline.plot.sheet import (
     sheet,
     true_runs,
 )
-from sagline.plot.style import current
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -72,7 +70,7 @@ def execution(done: Execution) -> Figure:
         >>> figure = sl.plot.execution(done)  # doctest: +SKIP
     """
     instance(done, Execution, "execution")
-    figure = sheet(height=7.6, width=WIDTH)
+    figure = sheet(height=7.6)
     parts = figure.subplots(4, 1, sharex=True, height_ratios=(0.25, 1.6, 1.0, 1.0))
     draw: tuple[Callable[[Execution, Axes], Axes], ...] = (states, measured_tensions, mendable_tensions, place_errors)
     for part, panel in zip(draw, parts, strict=True):
@@ -113,7 +111,7 @@ def states(done: Execution, ax: Axes | None = None) -> Axes:
     ax.grid(visible=False)
     ax.spines["left"].set_visible(False)
     handles, labels = ax.get_legend_handles_labels()
-    place = legend_above(ax, labels) if current().direct else {**BESIDE, "ncols": 2, "fontsize": current().tick}
+    place = legend_above(ax, labels)
     ax.legend(handles, labels, **{**place, "handlelength": 1.0, "columnspacing": 1.0})
     return ax
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 SECONDS = 10.0  # duration of the film [s], whole periods, so that it repeats without a jump
 PICTURES = 25  # pictures per period
-WIDTH, HEIGHT, DOTS = 6.4, 3.8, 100  # width [in], height [in], dots per inch
+HEIGHT, DOTS = 3.8, 140  # height [in], dots per inch
 COLORS = 48
 LEAST_SHARE = 0.01  # smallest share of a cable in the energy that is written
 
@@ -72,7 +72,7 @@ def film(vibration: Vibration, number: int, file: os.PathLike[str] | str, *, pro
 def _pictures(swing: Swing, progress: Progress | None) -> list[Image.Image]:
     """Pictures of one period, with a common color table."""
     robot, mode = swing.state.one_robot, swing.mode
-    figure = sheet(HEIGHT, WIDTH)
+    figure = sheet(HEIGHT)
     canvas: Any = FigureCanvasAgg(figure)
     figure.set_layout_engine("none")
     ax = figure.add_axes((0.0, 0.05, 1.0, 0.9), projection="3d")

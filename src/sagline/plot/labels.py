@@ -45,10 +45,7 @@ LEADER = 8.0  # distance from the end of a line to its name [pt]
 
 
 def name_lines(ax: Axes, title: str = "") -> None:
-    """Name the lines of axes: in a legend at the right, or, in the styles of journals and slides, at their ends."""
-    if not current().direct:
-        _beside(ax, title)
-        return
+    """Name the lines of axes at their ends, or in a legend above the axes."""
     handles, labels = ax.get_legend_handles_labels()
     ends = _ends(ax, handles, labels)
     if ends:
@@ -59,13 +56,11 @@ def name_lines(ax: Axes, title: str = "") -> None:
         ax.legend(handles, labels, title=title or None, **legend_above(ax, labels, title))
 
 
-def figure_legend(figure: FigureBase, panels: Iterable[Axes], place: Any, narrow: Any = "outside upper center") -> None:
-    """One legend of all lines of some axes; its position is different in the styles of narrow figures."""
-    look, columns = current(), 1
+def figure_legend(figure: FigureBase, panels: Iterable[Axes], place: Any = "outside upper center") -> None:
+    """One legend of all lines of some axes."""
+    look = current()
     handles = {label: line for ax in panels for line, label in zip(*ax.get_legend_handles_labels(), strict=True)}
-    if look.direct:
-        width = figure.get_figure(root=True).get_figwidth()
-        place, columns = narrow, _legend_columns(list(handles), width, look.tick)
+    columns = _legend_columns(list(handles), figure.get_figure(root=True).get_figwidth(), look.tick)
     figure.legend(handles.values(), list(handles), loc=place, ncols=columns, fontsize=look.tick, frameon=False)
 
 
@@ -97,7 +92,7 @@ def set_heading(target: FigureBase | Axes, text: str) -> None:
 def wrap_heading(text: str, size: float) -> str:
     """Heading broken into lines to fit the figure width of the current style."""
     look = current()
-    return text if look.width is None else fill(text, int(SHARE * look.width / POINT / (WIDE[look.font] * size)))
+    return fill(text, int(SHARE * look.width / POINT / (WIDE[look.font] * size)))
 
 
 def break_labels(figure: Figure) -> None:
@@ -191,18 +186,3 @@ def spread_heights(heights: Array, spacing: float) -> Array:
     spaced = np.empty_like(heights)
     spaced[order] = np.clip(placed, min(0.5 * spacing, top), top) + steps
     return spaced
-
-
-def _beside(ax: Axes, title: str) -> None:
-    """A legend to the right of the axes."""
-    size = current().tick
-    ax.legend(
-        loc="upper left",
-        bbox_to_anchor=(1.01, 1.0),
-        borderaxespad=0.0,
-        fontsize=size,
-        title=title or None,
-        title_fontsize=size,
-        frameon=False,
-        handlelength=2.4,
-    )

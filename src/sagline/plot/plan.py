@@ -46,6 +46,7 @@ OTHER_CABLES = "0.82"  # color of the other cables behind each cable
 ROW_HEIGHT = 1.45  # height of a row of panels [in]
 LIMITED = {"chord_tension": "chord", "frame_end_tension": "frame_end"}
 START_COLOR = "#A84300"  # vermilion, dark enough for text
+WIDTH, SIDE = 4.4, 1.5  # width of the axes of a top view, and height of the panel of z [in]
 MOST_ARROWS = 100  # number of arrows along a path
 LEVEL = 1e-9  # a path with a smaller change of height is planar [m]
 
@@ -127,7 +128,7 @@ def overview(plan: Plan) -> Figure:
     for ax, quantity in zip(panels, OVERVIEW, strict=True):
         _draw_cables(ax, plan, quantity, LENGTHS | TENSIONS)
         hide_shared_labels(ax)
-    figure_legend(figure, panels[:1], "outside right center")
+    figure_legend(figure, panels[:1])
     return figure
 
 
@@ -219,7 +220,7 @@ def errors(*confirmations: Confirmation) -> Figure:
         hide_shared_labels(ax)
     for ax, confirmation in zip(panels, confirmations, strict=True):
         _write_flat_error(ax, confirmation)  # on the common scale of all panels
-    figure_legend(figure, panels, "outside right upper")
+    figure_legend(figure, panels)
     return figure
 
 
@@ -297,21 +298,29 @@ def small_multiples(plan: Plan, quantity: str = "chord_tension") -> Figure:
 
 
 def path(path: Path, ax: Axes | None = None) -> Axes:
-    """Top view of a path, with its start and direction.
+    """Top view of a path, with its start and direction; in a new figure, also the height over time below it.
 
     Args:
         path: The path.
-        ax: Axes to draw on; None for a new figure.
+        ax: Axes to draw on; None for a new figure. The height of a level path is in the heading only.
 
     Returns:
-        The axes.
+        The axes of the top view.
 
     Examples:
         >>> import sagline as sl
         >>> axes = sl.plot.path(sl.article_path())
     """
-    ax = axes_or_new(ax, height=3.6, width=4.6)
     x, y, z = instance(path, Path, "path").pose.position.T
+    low, high = float(z.min()), float(z.max())
+    if ax is None:
+        top = 0.7 + WIDTH * float(np.clip(np.ptp(y) / max(float(np.ptp(x)), LEVEL), 0.2, 0.9))
+        heights = (top,) if high - low < LEVEL else (top, SIDE)
+        ax, *below = sheet(sum(heights)).subplots(len(heights), 1, squeeze=False, height_ratios=heights)[:, 0]
+        for side in below:
+            draw_series(side, path.time, z, color=BLUE, linewidth=1.3)
+            format_clock(side, path.time, PLACE[2])
+    ax = axes_or_new(ax)
     ax.plot(x, y, color=BLUE, linewidth=1.3)
     ax.plot(x[0], y[0], "o", color=VERMILLION, markersize=5.0, zorder=3.0)
     ax.set_title("\N{BLACK CIRCLE} start", color=START_COLOR, fontsize=current().tick, loc="left")
@@ -320,7 +329,6 @@ def path(path: Path, ax: Axes | None = None) -> Axes:
         tip = base + 1e-3 * path.twist[k, :2]  # s: short enough to show the direction only
         arrow = {"arrowstyle": "-|>", "color": BLUE, "mutation_scale": 11.0}
         ax.annotate("", (tip[0], tip[1]), (base[0], base[1]), arrowprops=arrow)
-    low, high = float(z.min()), float(z.max())
     height = f"$z$ = {low:g} m" if high - low < LEVEL else f"$z$ from {low:g} m to {high:g} m"
     ax.set_title(height, fontsize=current().tick, loc="right")
     format_axes(ax, *PLACE[:2])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from textwrap import fill
 from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
@@ -22,7 +23,10 @@ if TYPE_CHECKING:
 
     from sagline.core.arrays import Array
 
-MARKERS = "osD^v<>pPX*h"
+MARKERS = "osD^v<>phXP*"
+LARGEST, LEAST = 11.0, 4.0  # sizes of the first and of the last mark [pt]
+SAME = 1e-6  # places closer than this share of the polygon's extent are equal
+LONGEST = 48  # letters per line of the names of equal places
 POINT = 1.0 / 72.0  # [in]
 TRIES, SPARE = 5, 0.03  # largest number of iterations of the axes' size, and its extra growth (relative)
 SHORT = 1e-9  # a side shorter than this share of the longest side has no direction
@@ -34,7 +38,8 @@ def polygon(shape: TensionPolygon, points: Mapping[str, ArrayLike] | None = None
 
     Args:
         shape: The polygon from `tension_polygon`, for two redundant cables.
-        points: Chord tensions (m,) by name, drawn at their positions in the polygon; NaN are omitted. None: no points.
+        points: Chord tensions (m,) by name, drawn at their positions in the polygon; NaN are omitted. Equal ones have
+            one mark with all their names. None: no points.
         ax: Axes to draw on; None for a new figure.
 
     Returns:
@@ -71,17 +76,29 @@ def polygon(shape: TensionPolygon, points: Mapping[str, ArrayLike] | None = None
     for k, side in enumerate(shape.sides):
         ends = corners[[k, (k + 1) % len(corners)]]
         ax.plot(*ends.T, color="0.3", linewidth=1.0, linestyle="-" if side else ":")
-    for k, (name, place) in enumerate(places.items()):
-        if np.isfinite(place).all():
-            color, marker = COLORS[k % len(COLORS)], MARKERS[k % len(MARKERS)]
-            ax.plot(*place, marker, color=color, markersize=6.0, markeredgecolor="white", label=name, linestyle="none")
+    groups = _equal_places(places, SAME * float(np.ptp(corners, axis=0).max()))
+    for k, (place, names) in enumerate(groups):
+        color, marker = COLORS[k % len(COLORS)], MARKERS[k % len(MARKERS)]
+        size = LARGEST - (LARGEST - LEAST) * k / max(len(groups) - 1, 1)  # empty marks, smaller ones inside larger ones
+        look = {"markersize": size, "markerfacecolor": "none", "markeredgewidth": 1.3, "linestyle": "none"}
+        ax.plot(*place, marker, color=color, label=fill(", ".join(names), LONGEST), **look)
     format_axes(ax, r"$\lambda_1$ [N]", r"$\lambda_2$ [N]")
     ax.set_aspect("equal")
     ax.margins(x=0.33, y=0.16)  # space for names
-    if any(np.isfinite(place).all() for place in places.values()):
+    if groups:
         name_lines(ax)
     _name_sides(ax, shape, corners)
     return ax
+
+
+def _equal_places(places: Mapping[str, Array], least: float) -> list[tuple[Array, list[str]]]:
+    """Known places with the names of those that are closer to them than the least distance."""
+    groups: list[tuple[Array, list[str]]] = []
+    for name, place in places.items():
+        if np.isfinite(place).all():
+            same = [names for other, names in groups if np.linalg.norm(place - other) <= least]
+            same[0].append(name) if same else groups.append((place, [name]))
+    return groups
 
 
 class _Name(NamedTuple):

@@ -152,7 +152,7 @@ def robot(robot: Robot, pose: PoseLike | None = None, ax: Axes3D | None = None) 
     where = drawn_pose(instance(robot, Robot, "robot"), pose)
     optional(ax, Axes3D, "ax")
     if ax is None:
-        ax = sheet(height=4.0, width=5.6).add_subplot(projection="3d")
+        ax = sheet(height=4.0).add_subplot(projection="3d")
     plan, points = draw_robot(ax, robot, where)
     format_space_axes(
         ax,

@@ -43,9 +43,8 @@ DASHED: Final[Any] = (0, (4.0, 1.6))  # a line style of Matplotlib
 COMPONENT_STYLES: Final[Any] = ("-", DASHED, (0, (1.0, 1.2)))  # line styles of the x, y and z components
 MAP_COLORS: Final = "cividis"  # readable with all kinds of color vision
 MOST_POINTS: Final = 4000  # largest number of points of a line; a longer line is drawn through the extrema of its parts
-WIDTH = 7.0  # width of a page with margins [in]
 LABEL, TICK = PLAIN.label, PLAIN.tick  # text sizes in the documentation [pt]
-RESOLUTION = 200  # dots per inch
+RESOLUTION = 300  # dots per inch
 
 
 _reference = re.compile(r'(href="#|url\(#)([^")]+)')
@@ -63,7 +62,7 @@ class Sheet(Figure):
         """Create a figure; the arguments are those of Matplotlib."""
         super().__init__(*arguments, **named)
         self.style = current()
-        self._fitted = not self.style.name
+        self._fitted = False
 
     def draw(self, renderer: Any) -> None:
         """Draw in the style of the figure, also objects that Matplotlib makes when drawing, such as tick labels."""
@@ -82,13 +81,13 @@ class Sheet(Figure):
 
     def _repr_png_(self) -> bytes:
         buffer = BytesIO()
-        self.savefig(buffer, format="png", dpi=100)
+        self.savefig(buffer, format="png", dpi=150)
         return buffer.getvalue()
 
 
-def sheet(height: float, width: float = WIDTH) -> Sheet:
+def sheet(height: float) -> Sheet:
     """An empty figure in the current style, with space for labels outside its axes."""
-    return Sheet(figsize=current().size(width, height), layout="constrained")
+    return Sheet(figsize=current().size(height), layout="constrained")
 
 
 def _thicken(figure: Figure, factor: float) -> None:
@@ -103,11 +102,11 @@ def _thicken(figure: Figure, factor: float) -> None:
             collection.set_sizes(factor**2 * collection.get_sizes())
 
 
-def axes_or_new(ax: Axes | None, height: float = 3.0, width: float = WIDTH) -> Axes:
+def axes_or_new(ax: Axes | None, height: float = 3.0) -> Axes:
     """The given Axes, or those of a new figure; InvalidValueError for other objects or for 3D axes."""
     optional(ax, Axes, "ax")
     if ax is None:
-        return sheet(height, width).add_subplot()
+        return sheet(height).add_subplot()
     if ax.name != "rectilinear":
         raise InvalidValueError("ax", f"Axes of the projection {ax.name}", "flat ones", "Make them with add_subplot().")
     return ax
@@ -146,8 +145,8 @@ def hide_shared_labels(ax: Axes) -> None:
 
 
 def draw_map(ax: Axes, x: Array, y: Array, values: Array, scale: Normalize, title: str) -> None:
-    """Values (nx, ny) at the points of a level grid, as colors; gray where there is none."""
-    ax.set_facecolor(GAP_COLOR)
+    """Values (nx, ny) at the points of a level grid, as colors; white with lines where there is none."""
+    ax.patch.set(facecolor="white", hatch="////", edgecolor="0.6")
     edges = _cell_edges(x), _cell_edges(y)
     ax.pcolormesh(*edges, np.ma.masked_invalid(values.T), norm=scale, cmap=MAP_COLORS, rasterized=True)
     ax.set_title(title, fontsize=current().tick)

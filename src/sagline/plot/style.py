@@ -21,7 +21,7 @@ class Style:
 
     Attributes:
         name: Name; "" for the style of the documentation.
-        width: Width of every figure [in]; None for the width of each function.
+        width: Width of every figure [in].
         height: Heights of figures, relative to those of the documentation.
         tallest: Largest height of a figure [in].
         font: Font family of all text.
@@ -29,11 +29,10 @@ class Style:
         label: Size of the text at axes, in titles and at bars [pt].
         tick: Size of numbers and of names of lines [pt].
         line: Widths of lines and sizes of markers, relative to those of the documentation.
-        direct: True if the names of lines are at their ends.
     """
 
     name: str
-    width: float | None
+    width: float
     height: float
     tallest: float
     font: str
@@ -41,16 +40,15 @@ class Style:
     label: float
     tick: float
     line: float
-    direct: bool
 
-    def size(self, width: float, height: float) -> tuple[float, float]:
-        """Width and height [in] of a figure in this style, from the requested ones."""
-        return self.width or width, min(self.height * height, self.tallest)
+    def size(self, height: float) -> tuple[float, float]:
+        """Width and height [in] of a figure in this style, from the requested height."""
+        return self.width, min(self.height * height, self.tallest)
 
     @property
     def narrow(self) -> bool:
         """True if two panels do not fit side by side."""
-        return self.width is not None and self.width < 36.0 * self.tick / 72.0
+        return self.width < 40.0 * self.tick / 72.0
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -63,7 +61,7 @@ class Style:
             **sizes,
             "font.family": [self.font, SANS],
             "mathtext.fontset": self.mathematics,
-            "figure.figsize": self.size(7.0, 3.0),
+            "figure.figsize": self.size(3.0),
             "lines.linewidth": 1.1 * self.line,
             "axes.linewidth": 0.6 * self.line,
             "pdf.fonttype": 42,  # embedded TrueType fonts, because journals refuse Type 3
@@ -72,10 +70,11 @@ class Style:
         }
 
 
-PLAIN: Final = Style("", None, 1.0, PAGE_HEIGHT, SANS, "dejavusans", 9.0, 8.0, 1.0, direct=False)
-_IEEE = Style("ieee", 3.5, 0.75, PAGE_HEIGHT, SERIF, "stix", 9.0, 8.0, 1.0, direct=True)
-_MDPI = Style("mdpi", 5.45, 0.85, PAGE_HEIGHT, SERIF, "stix", 10.0, 9.0, 1.0, direct=True)
-_SLIDES = Style("slides", 6.0, 1.5, SLIDE_HEIGHT, SANS, "dejavusans", 16.0, 14.0, 1.8, direct=True)
+# text of 6 pt or more if the figure is shown 8 cm wide, on a phone or in a column
+PLAIN: Final = Style("", 4.7, 0.85, PAGE_HEIGHT, SANS, "dejavusans", 10.0, 9.0, 1.0)
+_IEEE = Style("ieee", 3.5, 0.75, PAGE_HEIGHT, SERIF, "stix", 9.0, 8.0, 1.0)
+_MDPI = Style("mdpi", 5.45, 0.85, PAGE_HEIGHT, SERIF, "stix", 10.0, 9.0, 1.0)
+_SLIDES = Style("slides", 6.0, 1.5, SLIDE_HEIGHT, SANS, "dejavusans", 16.0, 14.0, 1.8)
 STYLES: Final = {  # styles for one column and for two columns, by name
     # IEEE Author Center, "Size requirements for graphics": 3.5 in and 7.16 in
     "ieee": (_IEEE, replace(_IEEE, width=7.16, height=0.9)),

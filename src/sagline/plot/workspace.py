@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from matplotlib import patheffects
+from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb, to_rgba
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from scipy.ndimage import distance_transform_edt, label
@@ -16,6 +17,7 @@ from sagline.core.arrays import number
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
 from sagline.plot.labels import PLACE, set_heading
+from sagline.plot.limits import Find, cut_at_limits
 from sagline.plot.robot import draw_robot, format_space_axes
 from sagline.plot.sheet import GAP_COLOR, axes_or_new, format_axes, sheet
 from sagline.plot.style import current
@@ -138,6 +140,17 @@ def limit_colors(space: Workspace) -> dict[Key, Color]:
     return colors | {key: _shade(CABLES[-1 - k % len(CABLES)]) for k, key in enumerate(others)}
 
 
+def limit_finder(space: Workspace, keys: Sequence[Key]) -> Find:
+    """Function that gives the indices of the limits at positions (N, 3) [m] among keys."""
+    details, index = space.levels().details, {key: k for k, key in enumerate(keys)}
+
+    def find(positions: Array) -> Indices:
+        found = details(positions)
+        return np.array([index[key] for key in zip(found.criterion.tolist(), found.cable.tolist(), strict=True)])
+
+    return find
+
+
 def _shade(color: tuple[int, int, int]) -> Color:
     """Color in the form of matplotlib."""
     red, green, blue = color
@@ -148,21 +161,44 @@ def _draw_regions(ax: Axes, cut: Slice, space: Workspace, levels: Array, numbers
     """Pale colors by the limit, each region with its name beside the numbers of the lines; gray outside."""
     ax.set_facecolor(OUTSIDE)
     inside = ax.contourf(cut.across, cut.up, cut.level, levels=[0.0, np.inf], colors=["white"], zorder=0.8)
-    pairs = np.stack((cut.criterion, cut.cable), axis=-1).reshape(-1, 2)
-    kinds, which = np.unique(pairs, axis=0, return_inverse=True)
-    region = which.reshape(cut.level.shape)
-    shades, keys = limit_colors(space), [(int(which), int(cable)) for which, cable in kinds]
-    colors = np.array([shades[key] for key in keys])
-    image = ax.pcolormesh(
-        cut.across, cut.up, PALE * colors[region] + 1.0 - PALE, shading="nearest", rasterized=True, zorder=0.9
+    shades, codes = limit_colors(space), np.stack((cut.criterion, cut.cable), axis=-1)
+    keys = list(shades)
+    region = np.array([keys.index((int(which), int(cable))) for which, cable in codes.reshape(-1, 2)])
+    colors = PALE * np.array(list(shades.values())) + 1.0 - PALE
+    region = region.reshape(cut.level.shape)
+    image = ax.pcolormesh(cut.across, cut.up, colors[region], shading="nearest", rasterized=True, zorder=0.9)
+    corners, own = _triangles_at_borders(cut, region, limit_finder(space, keys))
+    borders = PolyCollection(
+        list(corners), facecolors=colors[own], edgecolors="none", antialiased=False, rasterized=True, zorder=0.91
     )
-    image.set_clip_path(inside.get_paths()[0], ax.transData)
+    ax.add_collection(borders, autolim=False)
+    for drawn in (image, borders):
+        drawn.set_clip_path(inside.get_paths()[0], ax.transData)
     figure: Any = ax.get_figure(root=True)
     figure.draw_without_rendering()  # this computes the size of the slice on the sheet
-    boxes = [number.get_window_extent() for number in numbers]
+    boxes: list[BboxBase] = [number.get_window_extent() for number in numbers]
     free = (cut.level >= 0.0) & ~_on_lines(cut.margin, levels)
-    for k, key in enumerate(keys):
-        _name_region(ax, cut, (region == k) & (cut.level >= 0.0), free, _limit_name(key, space), boxes)
+    for k in np.unique(region):
+        name = _limit_name(keys[k], space)
+        boxes += _name_region(ax, cut, (region == k) & (cut.level >= 0.0), free, name, boxes)
+
+
+def _triangles_at_borders(cut: Slice, region: Indices, find: Find) -> tuple[Array, Indices]:
+    """Triangles of the cells whose corners have several limits, cut at the limits: (U, 3, 2), and their limits (U,)."""
+    rows, columns = region.shape
+    place = np.arange(region.size).reshape(rows, columns)
+    cells = np.stack((place[:-1, :-1], place[:-1, 1:], place[1:, 1:], place[1:, :-1]), axis=-1).reshape(-1, 4)
+    limits = region.ravel()[cells]
+    cells = cells[(limits != limits[:, :1]).any(axis=1)]
+    triangles = np.concatenate((cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]))
+
+    def find_in_plane(points: Array) -> Indices:
+        positions = np.full((len(points), 3), cut.plane.at)
+        positions[:, cut.plane.axes] = points
+        return find(positions)
+
+    points = np.stack(np.meshgrid(cut.across, cut.up), axis=-1).reshape(-1, 2)
+    return cut_at_limits(points, triangles, region.ravel(), find_in_plane)
 
 
 def _on_lines(margin: Array, levels: Array) -> Flags:
@@ -174,12 +210,18 @@ def _on_lines(margin: Array, levels: Array) -> Flags:
     return passed
 
 
-def _name_region(ax: Axes, cut: Slice, within: Flags, free: Flags, name: str, boxes: Sequence[BboxBase]) -> None:
-    """Write the name in the middle of each sufficiently large part, between lines if possible, and over no box."""
+def _name_region(
+    ax: Axes, cut: Slice, within: Flags, free: Flags, name: str, boxes: Sequence[BboxBase]
+) -> list[BboxBase]:
+    """Write the name in the middle of each sufficiently large part, between lines if possible, and over no box.
+
+    Returns the boxes of the written names.
+    """
     parts, count = label(within)
     figure: Any = ax.get_figure(root=True)
     points = ax.bbox.width * 72.0 / figure.dpi / cut.across.size
-    written = ax.text(0.0, 0.0, name, fontsize=current().tick, ha="center", va="center", path_effects=HALO, zorder=3.0)
+    look: dict[str, Any] = {"ha": "center", "va": "center", "path_effects": HALO, "zorder": 3.0}
+    written = ax.text(0.0, 0.0, name, fontsize=current().tick, **look)
     toward = ax.transData.inverted()
     half = 0.5 * np.ptp(written.get_window_extent().transformed(toward).get_points(), axis=0)
     written.remove()
@@ -188,14 +230,16 @@ def _name_region(ax: Axes, cut: Slice, within: Flags, free: Flags, name: str, bo
         low, high = box.transformed(toward).get_points() + np.outer((-1.0, 1.0), half)
         across = (low[0] < cut.across) & (cut.across < high[0])
         clear &= ~np.outer((low[1] < cut.up) & (cut.up < high[1]), across)
+    names: list[BboxBase] = []
     for part in range(1, count + 1):
         for area in ((parts == part) & free & clear, (parts == part) & clear):
             depth = distance_transform_edt(np.pad(area, 1))[1:-1, 1:-1]
             row, column = np.unravel_index(int(np.argmax(depth)), depth.shape)
             if points * depth[row, column] >= ROOM:
                 place = cut.across[column], cut.up[row]
-                ax.text(*place, name, fontsize=current().tick, ha="center", va="center", path_effects=HALO, zorder=3.0)
+                names.append(ax.text(*place, name, fontsize=current().tick, **look).get_window_extent())
                 break
+    return names
 
 
 def _draw_lines(ax: Axes, cut: Slice, levels: Array) -> Sequence[Text]:
@@ -204,7 +248,7 @@ def _draw_lines(ax: Axes, cut: Slice, levels: Array) -> Sequence[Text]:
     if levels.size:
         margin = np.ma.masked_where((cut.level < 0.0) | ~np.isfinite(cut.margin), cut.margin)
         drawn = ax.contour(cut.across, cut.up, margin, levels=levels, colors="0.25", linewidths=0.7, zorder=2.0)
-        size = current().tick - 1.0
+        size = current().tick
         numbers = ax.clabel(drawn, fmt=lambda value: n(value, unit="N"), fontsize=size, inline_spacing=3)
         for number in numbers:
             number.set_path_effects([*HALO])
@@ -277,13 +321,21 @@ def _place(space: Workspace) -> Pose:
 
 
 def _draw_hull(ax: Axes3D, space: Workspace, colors: dict[Key, tuple[float, float, float]]) -> None:
-    """Faces of the hull, each in the color of the limit at one of its corners."""
-    vertices, faces, first = _coarser(space.surface.vertices, space.surface.faces)
+    """Faces of the hull in the colors of their limits, cut where the limit changes."""
+    chosen, faces = _coarser(space.surface.vertices, space.surface.faces)
     if not len(faces):
         return
-    kinds = list(zip(space.limiting[first].tolist(), space.limiting_cable[first].tolist(), strict=True))
-    shades = np.array([to_rgb(GAP_COLOR) if kind[0] == BY_BOX else colors[kind] for kind in kinds])
-    corners = vertices[faces]
+    vertices, keys, find = space.surface.vertices[chosen], list(colors), limit_finder(space, list(colors))
+    known = space.limiting[chosen] != BY_BOX
+    free = faces[known[faces].any(axis=1)]
+    limit = np.zeros(len(vertices), dtype=np.int64)
+    used = np.unique(free)
+    limit[used] = find(vertices[used])
+    corners, codes = cut_at_limits(vertices, free, limit, find)
+    shades = np.array([colors[key] for key in keys])[codes]
+    walls = vertices[faces[~known[faces].any(axis=1)]]
+    corners = np.concatenate((corners, walls))
+    shades = np.concatenate((shades, np.tile(to_rgb(GAP_COLOR), (len(walls), 1))))
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     turn, up = np.radians([ax.azim, ax.elev])
     toward = np.array([np.cos(up) * np.cos(turn), np.cos(up) * np.sin(turn), np.sin(up)])
@@ -293,17 +345,17 @@ def _draw_hull(ax: Axes3D, space: Workspace, colors: dict[Key, tuple[float, floa
         ax.add_collection3d(shown)
 
 
-def _coarser(vertices: Array, faces: Indices) -> tuple[Array, Indices, Indices]:
-    """A simplified mesh for print: corners in one cell of a grid are merged."""
+def _coarser(vertices: Array, faces: Indices) -> tuple[Indices, Indices]:
+    """A simplified mesh for print: indices of the kept corners, one of each cell of a grid, and faces of these."""
     if not len(faces):
-        return vertices, faces, np.empty(0, dtype=np.int64)
+        return np.empty(0, dtype=np.int64), faces
     low = vertices.min(axis=0)
     width = float(np.ptp(vertices, axis=0).max()) / FINEST
     cells = np.floor((vertices - low) / width).astype(np.int64)
     _, first, which = np.unique(cells, axis=0, return_index=True, return_inverse=True)
     joined = which.reshape(-1)[faces]
     kept = (joined != np.roll(joined, 1, axis=1)).all(axis=1)
-    return vertices[first], joined[kept], faces[kept, 0]
+    return first, joined[kept]
 
 
 def _draw_bars(ax: Axes, space: Workspace, colors: dict[Key, tuple[float, float, float]]) -> None:
