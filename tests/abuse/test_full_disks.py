@@ -37,7 +37,7 @@ def together(folder: Path) -> None:
 
 
 def drawn(file: Path) -> None:
-    figure = sheet(2.0, 3.0)  # anew: drawing one a second time moves it a little
+    figure = sheet(2.0)  # anew: drawing one a second time moves it a little
     figure.add_subplot().plot([1.0, 2.0])
     sl.plot.save(figure, file)
 

@@ -21,10 +21,16 @@ TOUCHING = 1.0  # pixels that two texts may share
 SHOWN, SMALLEST = 8.0 / 2.54, 6.0  # width of a figure on a phone or in a column [in], and its smallest text [pt]
 
 
-def defects(figure: Figure) -> list[str]:
-    """All defects of a figure, one sentence each."""
+def defects(figure: Figure, shown: float = SHOWN) -> list[str]:
+    """All defects of a figure of a width of `shown` [in], or of its own width if that is less, one sentence each."""
     texts = drawn_texts(figure)
-    return [*bare_axes(figure), *cut_texts(figure, texts), *overlaps(texts), *equal_looks(figure), *small_texts(figure)]
+    return [
+        *bare_axes(figure),
+        *cut_texts(figure, texts),
+        *overlaps(texts),
+        *equal_looks(figure),
+        *small_texts(figure, shown),
+    ]
 
 
 def drawn_texts(figure: Figure) -> list[tuple[str, Bbox]]:
@@ -89,12 +95,14 @@ def cut_texts(figure: Figure, texts: list[tuple[str, Bbox]]) -> Iterator[str]:
             yield f"{text!r} is cut"
 
 
-def small_texts(figure: Figure) -> Iterator[str]:
-    """Texts too small to read if the figure is scaled to the width of a phone or a column."""
-    scale = min(1.0, SHOWN / figure.get_figwidth())
-    for text in figure.findobj(Text):
-        if text.get_visible() and text.get_text().strip() and scale * text.get_fontsize() < SMALLEST:
-            yield f"{text.get_text()!r} has {scale * text.get_fontsize():.1f} pt"
+def small_texts(figure: Figure, shown: float) -> Iterator[str]:
+    """Texts too small to read at the width at which the figure is shown."""
+    scale = min(1.0, shown / figure.get_figwidth())
+    texts: list[Any] = figure.findobj(Text)
+    for text in texts:
+        size = scale * float(text.get_fontsize())
+        if text.get_visible() and text.get_text().strip() and size < SMALLEST:
+            yield f"{text.get_text()!r} has {size:.1f} pt"
 
 
 def overlaps(texts: list[tuple[str, Bbox]]) -> Iterator[str]:

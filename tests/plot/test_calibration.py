@@ -69,7 +69,8 @@ def test_of_many_poses_some_are_drawn_and_all_that_do_not_fit(found: sl.Calibrat
     count = 5 * MOST_POSES
     rows = np.arange(count)
     long = replace(
-        found, rows=rows, residuals=np.resize(found.residuals, (count, 22)),
+        found, rows=rows, residuals=np.resize(found.residuals, (count, 22)), weights=np.ones(count),
+        chi_squared_of_pose=np.ones(count),
         outliers=(replace(found.outliers[0], row=1234),),
     )  # fmt: skip
     ax = plot.calibration(long, "residuals").axes[0]
@@ -117,7 +118,7 @@ def test_maps_are_the_expected_errors_before_and_after(
             away = np.linalg.norm(np.dstack((middles, np.full(middles.shape[:2], 2.0))), axis=-1)
             shown = np.asarray(mesh.get_array()).reshape(away.shape)
             np.testing.assert_allclose(shown, 1e3 * share * size * (0.5 + away), rtol=1e-9)
-            assert (ax.get_xlabel(), figure.axes[0].get_ylabel()) == ("$x$ [m]", "$y$ [m]")
+            assert (figure.axes[1].get_xlabel(), ax.get_ylabel()) == ("$x$ [m]", "$y$ [m]")
         assert [figure.subfigs[0].get_suptitle(), figure.axes[2].get_ylabel()] == snapshot
 
 

@@ -41,7 +41,7 @@ def test_the_response_on_cables_that_hardly_weigh_is_that_of_a_platform_on_sprin
     for k in (0, 200, 500, frequency.size - 1):
         answer = np.linalg.inv((1.0 + 0.04j) * square - (2.0 * np.pi * frequency[k]) ** 2 * mass)
         assert np.asarray(massless.get_ydata())[k] == pytest.approx(abs(answer[1, 1]), rel=1e-6)
-    assert ax.get_ylabel() == snapshot
+    assert ax.get_ylabel().replace("\n", " ") == snapshot
     assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")
     assert ax.get_title(loc="right") == "modal damping 2 %"
 
@@ -70,7 +70,7 @@ def test_the_response_below_all_modes_is_the_compliance(snapshot: SnapshotAssert
     ax = plot.response(made.vibration(state, FREQUENCY, SHARE), "x", "about z")
     static = abs(sl.stiffness(state).compliance[5, 0])
     assert np.asarray(ax.get_lines()[0].get_ydata())[0] == pytest.approx(static, rel=0.1)
-    assert ax.get_ylabel() == snapshot
+    assert ax.get_ylabel().replace("\n", " ") == snapshot
     marks = [np.asarray(line.get_xdata())[0] for line in ax.get_lines()[2:]]
     np.testing.assert_array_equal(marks, FREQUENCY)
 
@@ -120,7 +120,7 @@ def test_what_frequency_response_found_is_drawn_where_it_was_asked_for(snapshot:
         np.testing.assert_array_equal(line.get_xdata(), frequency[:0:-1])
         np.testing.assert_allclose(np.asarray(line.get_ydata()), np.abs(answer[:0:-1, 0, 4]), rtol=1e-15)
     assert [line.get_label() for line in ax.get_lines()] == snapshot
-    assert [ax.get_ylabel(), ax.get_title(loc="right")] == snapshot
+    assert [ax.get_ylabel().replace("\n", " "), ax.get_title(loc="right")] == snapshot
     with refused("frequency", "1 of them above 0 Hz", "two at least", kind=sl.InvalidValueError):
         plot.response(sl.frequency_response(state, [0.0, 2.0]))
     with refused("motion", "'w'", DIRECTIONS, kind=sl.InvalidValueError):
@@ -196,7 +196,7 @@ def test_the_energy_of_a_simulation_and_the_error_of_its_balance() -> None:
     assert [text.get_text() for text in above.texts] == ["break, cable 3"]
     np.testing.assert_array_equal(above.get_lines()[-1].get_xdata(), [1.0, 1.0])
     worst = np.abs(balance.error).max()
-    assert below.get_title(loc="left").endswith(f"at most {worst:.2g}\u00a0J")
+    assert below.get_title(loc="left").endswith(f"most {worst:.2g}\u00a0J")
     assert (above.get_ylabel(), below.get_xlabel()) == ("energy [J]", "time [s]")
 
 
@@ -222,7 +222,7 @@ def test_a_map_has_the_value_of_a_pose_where_the_pose_is(snapshot: SnapshotAsser
             for j, row in enumerate((0.0, 1.0)):
                 k = int(np.flatnonzero(np.all(found.pose.position == (column, row, height), axis=1))[0])
                 assert values[j, i] == found.peak[k]
-    assert figure.axes[-1].get_ylabel() == snapshot
+    assert figure.axes[-1].get_xlabel() == snapshot
     with refused("found", "5 poses that fill no grid", kind=sl.InvalidValueError):
         plot.frequency_map(sl.frequency_map(made.ROBOT, poses[:5], up_to=4.0))
     with refused("quantity", "'mode'", kind=sl.InvalidValueError):

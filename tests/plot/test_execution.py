@@ -64,7 +64,8 @@ def test_a_panel_fits_paper(width: float) -> None:
     """Nothing is drawn beyond the sheet [mm]."""
     from sagline.plot.sheet import sheet
 
-    figure = sheet(2.2, width / 25.4)
+    figure = sheet(2.2)
+    figure.set_size_inches(width / 25.4, 2.2)
     sl.plot.place_errors(execution(), figure.add_subplot())
     figure.draw_without_rendering()
     box = figure.get_tightbbox()

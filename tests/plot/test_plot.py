@@ -41,9 +41,7 @@ def courses(ax: Axes) -> np.ndarray:
 
 
 def legend(ax: Axes) -> list[str]:
-    found = ax.get_legend()
-    assert found is not None
-    return [text.get_text() for text in found.get_texts()]
+    return list(ax.get_legend_handles_labels()[1])
 
 
 @pytest.mark.parametrize(("quantity", "label"), TENSIONS.items())
@@ -51,7 +49,7 @@ def test_tensions(quantity: str, label: str) -> None:
     ax = plot.tensions(made.plan(), quantity)
     np.testing.assert_array_equal(courses(ax), getattr(made.plan().state.cables, quantity).T)
     np.testing.assert_array_equal(ax.get_lines()[0].get_xdata(), PATH.time)
-    assert (ax.get_xlabel(), ax.get_ylabel()) == ("time [s]", label)
+    assert (ax.get_xlabel(), ax.get_ylabel().replace("\n", " ")) == ("time [s]", label)
     assert legend(ax) == [f"cable {i}" for i in range(8)]
 
 
@@ -119,6 +117,20 @@ def test_path_from_above_with_arrows_along_the_motion() -> None:
     expected = [(c, s), (-1, 0), (0, -1), (1, 0), (0, 1), (-c, -s)]  # the article's path, move by move
     np.testing.assert_allclose(directions, expected, atol=1e-6)
     assert ax.get_title(loc="right") == "$z$ = 1.5 m"
+    assert len(ax.figure.axes) == 1  # a level path needs no panel of heights
+
+
+def test_the_height_of_a_path_is_drawn_over_time() -> None:
+    way = sl.quintic_path([(0, 0, 1.5), (0, 0, 2.5), (1, 0, 1.0)], speed=1.0)
+    ax = plot.path(way)
+    _, below = ax.figure.axes
+    assert (below.get_xlabel(), below.get_ylabel()) == ("time [s]", "$z$ [m]")
+    np.testing.assert_array_equal(
+        below.get_lines()[0].get_xydata(), np.column_stack((way.time, way.pose.position[:, 2]))
+    )
+    own = Figure().add_subplot()
+    assert plot.path(way, ax=own) is own
+    assert own.figure.axes == [own]
 
 
 def test_velocity() -> None:
@@ -140,7 +152,7 @@ def test_errors_are_in_millimetres_on_one_scale() -> None:
 
 def test_errors_too_small_to_see_are_told() -> None:
     straight, exact = (sl.confirm(sl.inverse(SUSPENDED, PATH, model=m)) for m in (sl.Straight(), sl.Catenary()))
-    assert [text.get_text() for text in plot.error(exact).texts] == ["largest: 0 (rounding)"]
+    assert [text.get_text() for text in plot.error(exact).texts] == ["largest: 0 (rounding)", "$x$", "$y$", "$z$"]
     left, right = plot.errors(straight, exact).axes
     assert ([t.get_text() for t in left.texts], [t.get_text() for t in right.texts]) == ([], ["largest: 0 (rounding)"])
     shallow = sl.confirm(sl.inverse(SUSPENDED, PATH, model=sl.Parabolic()))
@@ -315,7 +327,7 @@ def test_a_notebook_shows_the_figure() -> None:
 
     figure = plot.overview(made.plan())
     image = Image.open(BytesIO(figure._repr_png_()))  # type: ignore[attr-defined]
-    assert image.size == (700, 500)
+    assert image.size == (705, 1147)
 
 
 @extended

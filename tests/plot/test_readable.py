@@ -7,6 +7,7 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -14,7 +15,7 @@ from typer.testing import CliRunner
 
 import sagline as sl
 from sagline.cli.main import app
-from tests.plot.readable import defects
+from tests.plot.readable import SHOWN, defects
 from tests.tiers import extended
 
 EXAMPLES = (
@@ -76,7 +77,8 @@ def test_figures_of_examples(name: str, style: str | None) -> None:
         doctest.DocTestRunner().run(test, clear_globs=False)
     drawn = {id(one): one for value in space.values() if (one := figure_of(value)) is not None}
     assert drawn
-    assert [defect for figure in drawn.values() for defect in defects(figure)] == []
+    shown = np.inf if style else SHOWN  # a figure of a journal is not scaled
+    assert [defect for figure in drawn.values() for defect in defects(figure, shown)] == []
 
 
 def figure_of(value: object) -> Figure | None:
@@ -93,6 +95,7 @@ def figure_of(value: object) -> Figure | None:
         (lambda figure: figure.axes[3].set_ylabel(""), "no label"),
         (lambda figure: figure.axes[2].set_ylabel("tension"), "no unit"),
         (lambda figure: figure.text(0.99, 0.5, "a long remark"), "cut"),
+        (lambda figure: figure.axes[3].xaxis.label.set_fontsize(8.0), " pt"),
         (lambda figure: [figure.text(0.5, 0.5, text) for text in ("one", "other")], "is over"),
         (lambda figure: figure.axes[0].legend([figure.axes[0].lines[0]] * 2, ["one", "other"]), "looks like"),
     ],

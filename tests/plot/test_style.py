@@ -76,7 +76,7 @@ def test_what_was_before_is_back_afterwards() -> None:
     with ieee, plot.style("slides"), ieee:  # the same one again, and inside itself
         assert figure_of(plot.velocity(PATH)).get_figwidth() == 3.5
     assert dict(matplotlib.rcParams) == before
-    assert figure_of(plot.velocity(PATH)).get_figwidth() == plain == 7.0
+    assert figure_of(plot.velocity(PATH)).get_figwidth() == plain == 4.7
 
     @plot.style("mdpi")
     def drawn() -> Axes:

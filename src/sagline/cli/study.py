@@ -12,7 +12,7 @@ import numpy as np
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary
 from sagline.cli.ending import OUTSIDE
-from sagline.cli.output import Output, TextTable, number_text, show_table
+from sagline.cli.output import Output, TextTable, show_table
 from sagline.cli.terminal import show_note, show_text
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
@@ -41,6 +41,7 @@ ROWS = {  # rows of a summary: label and number format
     "inverse_us_per_pose": ("inverse kinematics [µs per pose]", ".2f"),
 }
 WIDE, NARROW = 30, 16  # widths of the robot and of the tension method in a column's head, in characters
+LONGEST = "unstrained_length_max_m"  # position errors below the rounding error of lengths are zero
 MOST_GAPS = 5  # largest number of printed gaps
 WIDEN = " Move the path, or widen the tension limits."
 SAME_PLACE = 1e-6  # [m], far above rounding errors and far below the distance to a second equilibrium
@@ -151,7 +152,10 @@ def _summary_grid(runs: Sequence[ConfirmedRun]) -> TextTable:
         how = fill(run.plan.tension.title, NARROW, break_on_hyphens=False)
         heads.append(f"{name}\n{type(run.plan.state.cables.model).__name__}\n{how}")
     numbers = [summary(run) for run in runs]
-    rows = [[label, *(number_text(column[field], form) for column in numbers)] for field, (label, form) in ROWS.items()]
+    rows = [
+        [label, *(n(column[field], form, size=1e3 * column[LONGEST]) for column in numbers)]
+        for field, (label, form) in ROWS.items()
+    ]
     return TextTable(heads, rows)
 
 

@@ -42,7 +42,7 @@ PANEL, MATRIX, BESIDE, MAP = (
     1.2,
     2.7,
 )  # [in]: heights of panel and matrix, extra height and width of a map
-LINE: Final = 0.048  # height of a name next to the matrix, as a share of its height
+LINE: Final = 1.3 / 72.0 / (0.75 * MATRIX)  # height of a name of 1 pt next to the matrix, as a share of its height
 LEADER: Final[dict[str, Any]] = {"arrowstyle": "-", "linewidth": 0.5, "relpos": (1.0, 0.5), "shrinkB": 0.0}
 ROUND: Final = FuncFormatter(lambda value, _: f"{value:g}")
 PER_METER: Final = 1e3  # [mm]
@@ -188,8 +188,9 @@ def _correlation(figure: SubFigure, found: Calibration) -> None:
         ax.axvline(edge - 0.5, color="0.3", linewidth=0.6)
     ax.set_xticks([])
     ax.set_yticks([])
+    line = LINE * current().tick * len(names)
     middles = np.array([0.5 * (start + end - 1) for start, end in zip(starts, ends, strict=True)])
-    for start, middle, place in zip(starts, middles, _apart(middles, LINE * len(names), len(names)), strict=True):
+    for start, middle, place in zip(starts, middles, _apart(middles, line, len(names)), strict=True):
         ax.annotate(
             names[start].replace("_", " "), (-0.5, middle), xytext=(-0.5 - 0.05 * len(names), place),
             fontsize=current().tick, ha="right", va="center", annotation_clip=False, arrowprops=LEADER,

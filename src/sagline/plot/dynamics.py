@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
@@ -254,12 +254,11 @@ def frequency_map(found: FrequencyMap, quantity: str = "frequency") -> Figure:
     columns = PANELS[shown]
     count, each = shown // columns, current().width / columns
     tall = np.clip(np.ptp(y) / max(float(np.ptp(x)), 1e-9), 0.4, 1.4) * each
-    figure = sheet(0.5 + 0.9 * current().narrow + count * (0.85 * float(tall) + 0.5))
+    figure = sheet(1.4 + count * (0.85 * float(tall) + 0.5))
     panels = figure.subplots(count, columns, sharex=True, sharey=True, squeeze=False)
     for ax, row in zip(panels.flat, rows, strict=True):
         draw_map(ax, x, y, values[:, :, row], scale, f"$z$ = {z[row]:.3g} m")
-    place: dict[str, Any] = {"location": "bottom", "aspect": 30} if current().narrow else {"pad": 0.02}
-    color_bar(ScalarMappable(scale, MAP_COLORS), list(panels.flat), label, shrink=0.8, **place)
+    color_bar(ScalarMappable(scale, MAP_COLORS), list(panels.flat), label, shrink=0.8, location="bottom", aspect=30)
     set_heading(figure, found.robot.name)
     return figure
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from textwrap import fill
-from typing import TYPE_CHECKING, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -13,7 +13,7 @@ from matplotlib.textpath import TextPath
 from sagline.core.arguments import instance
 from sagline.core.errors import InvalidValueError
 from sagline.plot.labels import name_lines
-from sagline.plot.sheet import COLORS, GAP_COLOR, axes_or_new, format_axes
+from sagline.plot.sheet import COLORS, GAP_COLOR, axes_or_new, format_axes, sheet
 from sagline.plot.style import current
 from sagline.tension.polygon import TensionPolygon
 
@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 MARKERS = "osD^v<>phXP*"
 LARGEST, LEAST = 11.0, 4.0  # sizes of the first and of the last mark [pt]
 SAME = 1e-6  # places closer than this share of the polygon's extent are equal
+CLOSE = 0.06  # places closer than this share of the extent are drawn enlarged too
+AROUND = 1.6  # width of the enlarged part, relative to the extent of its places
+SIZE, ENLARGED = 5.8, 2.6  # heights of the panels [in]
 LONGEST = 48  # letters per line of the names of equal places
 POINT = 1.0 / 72.0  # [in]
 TRIES, SPARE = 5, 0.03  # largest number of iterations of the axes' size, and its extra growth (relative)
@@ -67,28 +70,50 @@ def polygon(shape: TensionPolygon, points: Mapping[str, ArrayLike] | None = None
         raise InvalidValueError(
             f"points[{wrong[0]!r}]", "a batch of tensions", "those of one pose", "Give them one by one."
         )
-    fresh = ax is None
-    ax = axes_or_new(ax, height=4.5)
-    if fresh:
-        cast(Figure, ax.get_figure(root=True)).set_layout_engine("compressed")  # needed for axes of equal scales
     corners = np.asarray(shape.vertices)
-    ax.fill(*corners.T, facecolor=GAP_COLOR, alpha=0.25, edgecolor="none")
-    for k, side in enumerate(shape.sides):
-        ends = corners[[k, (k + 1) % len(corners)]]
-        ax.plot(*ends.T, color="0.3", linewidth=1.0, linestyle="-" if side else ":")
-    groups = _equal_places(places, SAME * float(np.ptp(corners, axis=0).max()))
+    extent = float(np.ptp(corners, axis=0).max())
+    groups = _equal_places(places, SAME * extent)
+    panels = _panels([place for place, _ in groups], CLOSE * extent) if ax is None else [axes_or_new(ax)]
+    for panel in panels:
+        panel.fill(*corners.T, facecolor=GAP_COLOR, alpha=0.25, edgecolor="none")
+        for k, side in enumerate(shape.sides):
+            ends = corners[[k, (k + 1) % len(corners)]]
+            panel.plot(*ends.T, color="0.3", linewidth=1.0, linestyle="-" if side else ":")
+        _draw_places(panel, groups)
+        format_axes(panel, r"$\lambda_1$ [N]", r"$\lambda_2$ [N]")
+        panel.set_aspect("equal")
+    panels[0].margins(x=0.33, y=0.16)  # space for names
+    if groups:
+        name_lines(panels[0])
+    _name_sides(panels[0], shape, corners)
+    return panels[0]
+
+
+def _panels(places: Sequence[Array], near: float) -> list[Axes]:
+    """Axes of a new figure: of the polygon, and of the places near one another, if there are such places."""
+    near_each = [[other for other in places if np.linalg.norm(other - place) < near] for place in places]
+    cluster = max(near_each, key=len, default=[])
+    several = len(cluster) > 1
+    figure = sheet(SIZE + ENLARGED * several)
+    if not several:
+        figure.set_layout_engine("compressed")  # needed for axes of equal scales
+        return [figure.add_subplot()]
+    panels: list[Axes] = list(figure.subplots(2, 1, height_ratios=(SIZE, ENLARGED)))
+    low, high = (end(cluster, axis=0) for end in (np.min, np.max))
+    half = 0.5 * float((high - low).max()) * AROUND
+    for axis, middle in zip("xy", 0.5 * (low + high), strict=True):
+        panels[1].set(**{f"{axis}lim": (middle - half, middle + half)})
+    panels[1].set_title("enlarged", fontsize=current().tick)
+    return panels
+
+
+def _draw_places(ax: Axes, groups: Sequence[tuple[Array, list[str]]]) -> None:
+    """Empty marks, smaller ones inside larger ones."""
     for k, (place, names) in enumerate(groups):
         color, marker = COLORS[k % len(COLORS)], MARKERS[k % len(MARKERS)]
-        size = LARGEST - (LARGEST - LEAST) * k / max(len(groups) - 1, 1)  # empty marks, smaller ones inside larger ones
-        look = {"markersize": size, "markerfacecolor": "none", "markeredgewidth": 1.3, "linestyle": "none"}
-        ax.plot(*place, marker, color=color, label=fill(", ".join(names), LONGEST), **look)
-    format_axes(ax, r"$\lambda_1$ [N]", r"$\lambda_2$ [N]")
-    ax.set_aspect("equal")
-    ax.margins(x=0.33, y=0.16)  # space for names
-    if groups:
-        name_lines(ax)
-    _name_sides(ax, shape, corners)
-    return ax
+        size = LARGEST - (LARGEST - LEAST) * k / max(len(groups) - 1, 1)
+        look: dict[str, Any] = {"markersize": size, "markerfacecolor": "none", "markeredgewidth": 1.3}
+        ax.plot(*place, marker, color=color, linestyle="none", label=fill(", ".join(names), LONGEST), **look)
 
 
 def _equal_places(places: Mapping[str, Array], least: float) -> list[tuple[Array, list[str]]]:

@@ -250,14 +250,15 @@ def format_space_axes(ax: Axes3D, points: Array, title: str) -> None:
     ax.set_title(title, fontsize=current().label, y=0.97)
     low, high = points.min(axis=0), points.max(axis=0)
     low[2] = min(0.0, low[2])
-    size, outward = fit_space(ax, low, high), 11.0 if current().narrow else 7.0
+    size = fit_space(ax, low, high)
+    outward, beside = (17.0, 6.0) if current().narrow else (7.0, -2.0)  # [pt]; the numbers of z are beside their axis
     for name, axis, share in zip(PLACE, (ax.xaxis, ax.yaxis, ax.zaxis), size / size.max(), strict=True):
         axis.set_label_text(name, fontsize=current().label)
-        axis.labelpad = -2.0 if axis is ax.zaxis else outward  # [pt]; the numbers of z are beside their axis
+        axis.labelpad = beside if axis is ax.zaxis else outward
         axis.set_tick_params(labelsize=current().tick, pad=0.0)
         axis.set_major_locator(MaxNLocator(max(1, round(4.5 * share)), steps=[1, 2, 5, 10], prune="both"))
         axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
     ax.grid(visible=False)
     # tall robots and narrow figures need space for their labels
-    zoom = (0.84 - 0.1 * float(size[2] / size.max())) * (0.76 if current().narrow else 1.0)
+    zoom = (0.84 - 0.1 * float(size[2] / size.max())) * (0.78 if current().narrow else 1.0)
     ax.set_box_aspect(size, zoom=zoom)

@@ -8,7 +8,7 @@ import numpy as np
 
 from sagline.core.arguments import instance
 from sagline.dynamics.simulation.results import Simulation
-from sagline.plot.labels import name_lines
+from sagline.plot.labels import figure_legend, name_lines
 from sagline.plot.sheet import (
     GAP_COLOR,
     VERMILLION,
@@ -59,5 +59,7 @@ def simulation(simulation: Simulation) -> Figure:
         for event in simulation.events:
             name = event.kind if event.cable is None else f"{event.kind}, cable {event.cable}"
             mark_event(ax, event.time, name if ax is above else "", GAP_COLOR, 1.0)
-        name_lines(ax)
+        if ax is not above:
+            name_lines(ax)
+    figure_legend(figure, [above])  # above the names of the events
     return figure

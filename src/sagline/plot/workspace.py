@@ -10,7 +10,7 @@ from matplotlib import patheffects
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb, to_rgba
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-from scipy.ndimage import distance_transform_edt, label
+from scipy.ndimage import distance_transform_edt, label, minimum_filter
 
 from sagline.core.arguments import choice, instance
 from sagline.core.arrays import number
@@ -231,11 +231,14 @@ def _name_region(
         across = (low[0] < cut.across) & (cut.across < high[0])
         clear &= ~np.outer((low[1] < cut.up) & (cut.up < high[1]), across)
     names: list[BboxBase] = []
+    box = 2 * np.ceil(half[::-1] / (cut.up[1] - cut.up[0], cut.across[1] - cut.across[0])).astype(int) + 1
     for part in range(1, count + 1):
-        for area in ((parts == part) & free & clear, (parts == part) & clear):
+        within = parts == part
+        fits = minimum_filter(within, tuple(box), mode="constant")
+        for area, room in ((fits & free & clear, 0.0), (fits & clear, 0.0), (within & free & clear, ROOM)):
             depth = distance_transform_edt(np.pad(area, 1))[1:-1, 1:-1]
             row, column = np.unravel_index(int(np.argmax(depth)), depth.shape)
-            if points * depth[row, column] >= ROOM:
+            if points * depth[row, column] > room:
                 place = cut.across[column], cut.up[row]
                 names.append(ax.text(*place, name, fontsize=current().tick, **look).get_window_extent())
                 break
@@ -301,7 +304,7 @@ def workspace(space: Workspace) -> Figure:
     points = np.concatenate((points, space.surface.vertices))
     format_space_axes(ax, points, "")
     ax.set_box_aspect(
-        [np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim()), np.ptp(ax.get_zlim())], zoom=0.86 if narrow else 1.0
+        [np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim()), np.ptp(ax.get_zlim())], zoom=0.78 if narrow else 1.0
     )
     for each in ax.get_children():
         each.set_clip_on(False)
