@@ -21,7 +21,7 @@ ROOT = Path(__file__).parents[2]
 EXPLANATIONS = {"c-kernels.md"}  # pages without steps
 PAGES = sorted(each for each in (ROOT / "docs" / "contributing").glob("*.md") if each.name not in EXPLANATIONS)
 BLOCK = re.compile(r'^```(?P<kind>\w+)(?: title="(?P<file>[^"]+)")?\n(?P<text>.*?)^```$', re.MULTILINE | re.DOTALL)
-COPIED = ("src", "tests", "docs", "pyproject.toml", "README.md", "CHANGELOG.md")
+COPIED = ("src", "tests", "tools", "docs", "pyproject.toml", "README.md", "CHANGELOG.md")
 STEPS = 10
 PLACES = {  # what a page's words stand for in the copy
     ".venv/bin/python": [sys.executable],
