@@ -27,7 +27,7 @@ from sagline.viewer.camera import Framing
 from sagline.viewer.feature import Feature, View
 from sagline.viewer.panel import ControlPanel
 from sagline.viewer.player import Beside, Configuration, InMotion, Played, Player
-from sagline.viewer.robot_scene import TRACE_POINTS, RobotScene
+from sagline.viewer.robot_scene import APART, TRACE_POINTS, RobotScene
 from sagline.viewer.server import Channel
 from sagline.viewer.snapshot import Settings, Snapshot, depends_on_history, snapshot_at
 from sagline.viewer.tension_scale import TensionScale
@@ -247,8 +247,8 @@ class Page:
             return
         played = player.played if player.following else None
         self.panel.show_what_if("" if played is None else played.unchanged)
-        playing = player.clock.playing
-        self._show(View(snapshot, settings, self.scale, self.panel.ghost, self.wrench, played, playing=playing))
+        playing, scale = player.clock.playing, self.panel.color_scale(snapshot.tension)
+        self._show(View(snapshot, settings, scale, self.panel.ghost, self.wrench, played, playing=playing))
 
     def _from_gizmo(self, settings: Settings) -> Snapshot:
         if self._changed is None or self._changed[0] != settings.changes:
@@ -266,12 +266,13 @@ class Page:
         with self.server.atomic():
             if view.played is not None:
                 self.scene.place(snapshot.pose)
-            self.scene.show(snapshot, self.scale, settings.sag_scale, settings.error_scale, ghost=view.ghost)
+            self.scene.show(snapshot, view.scale, settings.sag_scale, settings.error_scale, ghost=view.ghost)
             traced = self.player.number, self._extended, settings.error_scale
             if played is not None and traced != self._traced:
                 self._traced = traced
                 self.scene.show_traces(*played.traces(TRACE_POINTS, settings.error_scale))
-        self.panel.read_out(*self._readings(snapshot))
+        self.panel.read_out(*_readings(snapshot, view.scale))
+        self.panel.show_sag(_largest_sag(snapshot), APART * self.size)
         for feature in self.features:
             key = feature.depends(view)
             if feature not in self._depended or self._depended[feature] != key:
@@ -280,9 +281,17 @@ class Page:
         self.view = view
         self.updates += 1
 
-    def _readings(self, snapshot: Configuration) -> tuple[str, str]:
-        """Verdict and numbers."""
-        if isinstance(snapshot, InMotion):
-            return snapshot.verdict, snapshot.numbers(self.scale)
-        frequencies = modes(snapshot.plan.state).frequency if snapshot.plan is not None and snapshot.feasible else None
-        return readout.verdict(snapshot), readout.numbers_html(snapshot, self.scale, frequencies)
+
+def _readings(snapshot: Configuration, scale: TensionScale) -> tuple[str, str]:
+    """Verdict and numbers."""
+    if isinstance(snapshot, InMotion):
+        return snapshot.verdict, snapshot.numbers(scale)
+    frequencies = modes(snapshot.plan.state).frequency if snapshot.plan is not None and snapshot.feasible else None
+    return readout.verdict(snapshot), readout.numbers_html(snapshot, scale, frequencies)
+
+
+def _largest_sag(snapshot: Configuration) -> float:
+    """Largest sag of the cables of a feasible pose [m]; 0 if there is none, or if cables are in motion."""
+    if isinstance(snapshot, InMotion) or snapshot.plan is None or not snapshot.feasible:
+        return 0.0
+    return float(np.max(snapshot.plan.state.cables.sag))

@@ -8,7 +8,9 @@ from typing import Any
 
 import viser
 
+from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
+from sagline.core.numbers import n
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 from sagline.viewer import readout
@@ -17,6 +19,8 @@ from sagline.viewer.snapshot import METHODS, MODELS, Settings, depends_on_histor
 from sagline.viewer.tension_scale import TensionScale
 
 LEFT_WIDTH, RIGHT_WIDTH = 310, 380  # width of the panel [px]
+BY_LIMITS, BY_POSE = "tension limits", "this pose"
+_ENDS_OF_POSE = "ends: lowest and highest tension of this pose"
 _LIGHTEST, _HEAVIEST = 0.1, 4.0  # limits relative to the robot's mass
 
 
@@ -32,7 +36,7 @@ class ControlPanel:
         forget: Callable[[], None],
     ) -> None:
         """Build the panels. Any thread calls `changed` after a change of a value, and `forget` to reset the history."""
-        self._gui = server.gui
+        self._gui, self._robot, self._limits = server.gui, robot, scale
         self._changed = changed
         self._forget = forget
         self._method_name = next(iter(METHODS))
@@ -45,7 +49,7 @@ class ControlPanel:
         with readings.add_tab("Readings"):
             self._verdict = self._gui.add_html("")
             self._explained = self._gui.add_html("", visible=False)
-            self._gui.add_html(readout.legend(scale, robot))
+            self._legend = self._gui.add_html(readout.legend(scale, robot))
             self._numbers = self._gui.add_html("")
             with self._gui.add_folder("Feasible tensions"):
                 self._polygon = self._gui.add_html("")
@@ -57,6 +61,21 @@ class ControlPanel:
     def ghost(self) -> bool:
         """True if straight cables are drawn beside the sagging ones."""
         return bool(self._ghost.value)
+
+    def color_scale(self, tension: Array) -> TensionScale:
+        """Show and return the scale of colors for the tensions of a pose."""
+        own = self._colors.value == BY_POSE
+        scale = TensionScale.of_pose(tension, self._limits) if own else self._limits
+        self._legend.content = readout.legend(scale, self._robot, _ENDS_OF_POSE if own else "")
+        return scale
+
+    def show_sag(self, sag: float, visible: float) -> None:
+        """Recommend a larger drawing of a largest sag that is not visible [m]."""
+        factor = float(self._sag_scale.value)
+        self._sag_hint.visible = 0.0 < sag * factor < visible
+        if self._sag_hint.visible:
+            text = f"The sag is {n(1e3 * sag, '.2g', 'mm')} or less, too small to be seen here. Draw it larger."
+            self._sag_hint.content = readout.sentence(text)
 
     def settings(self) -> Settings:
         """The settings."""
@@ -165,7 +184,10 @@ class ControlPanel:
     def _build_drawing(self) -> None:
         gui = self._gui
         with gui.add_folder("Drawing"):
+            hint = "Range of the colors: the tension limits, or the tensions of the pose, so that they differ."
+            self._colors = self.watched(gui.add_dropdown("Colors by", (BY_LIMITS, BY_POSE), hint=hint))
             self._sag_scale = self.watched(gui.add_slider("Sag drawn ×", 0.0, 20.0, 0.5, 1.0))
+            self._sag_hint = gui.add_html("", visible=False)
             self._error_scale = self.watched(
                 gui.add_slider("Error drawn ×", 1.0, 200.0, 1.0, 1.0, hint="Position error of the orange platform.")
             )

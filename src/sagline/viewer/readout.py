@@ -68,8 +68,8 @@ def numbers_html(snapshot: Snapshot, scale: TensionScale, frequencies: Array | N
     return html_block("".join(parts))
 
 
-def legend(scale: TensionScale, robot: Robot) -> str:
-    """Colors of the tensions, as a bar with round numbers below."""
+def legend(scale: TensionScale, robot: Robot, ends: str = "") -> str:
+    """Colors of the tensions, as a bar with round numbers below; `ends` names its ends, by default the limits."""
     stops = np.linspace(0.0, 1.0, 12)
     values = scale.low * (scale.high / scale.low) ** stops
     colors = ",".join(
@@ -78,14 +78,14 @@ def legend(scale: TensionScale, robot: Robot) -> str:
     unit = force_unit(robot)
     marks = "".join(
         f'<span style="position:absolute;left:{100 * place:.1f}%;transform:translateX(-{100 * place:.0f}%)">'
-        f"{tick / unit.newtons:g}</span>"
+        f"{float(f'{tick / unit.newtons:.4g}'):g}</span>"
         for tick, place in spaced_ticks(scale)
     )
     return html_block(
         f"<b>Chord tension [{unit.name}]</b>"
         f'<div style="height:12px;background:linear-gradient(to right,{colors});margin-top:3px"></div>'
         f'<div style="position:relative;height:17px">{marks}</div>'
-        f'<div class="quiet">{_ends(robot)}</div>'
+        f'<div class="quiet">{ends or _ends(robot)}</div>'
     )
 
 
@@ -125,7 +125,8 @@ def cable_table_html(heads: Iterable[str], columns: Sequence[Sequence[str]], col
 def spaced_ticks(scale: TensionScale) -> list[tuple[float, float]]:
     """Ticks and their positions, without ticks that would overlap the previous tick."""
     kept: list[tuple[float, float]] = []
-    for tick in scale.ticks():
+    ticks = scale.ticks()
+    for tick in ticks if len(ticks) > 1 else (scale.low, scale.high):
         place = float(scale.fraction(np.array(tick)))
         if not kept or place - kept[-1][1] > 0.11:
             kept.append((tick, place))
@@ -142,7 +143,7 @@ def _summary(snapshot: Snapshot) -> str:
     ]
     if snapshot.plan is not None:
         extra = unit.written(float(capacity_margin(snapshot.plan.state)))
-        rows.append(("Spare force", f"{extra}, in any direction, with redistributed tensions"))
+        rows.append(("Spare force", f"{extra} more in any direction, no moment; redistributed tensions"))
     if (error := snapshot.error) is not None:
         away = float(np.linalg.norm(error))
         rows.append(

@@ -38,6 +38,7 @@ _STEPS = np.array(
 )
 GRAY = np.array([130, 136, 144], dtype=np.uint8)  # color of a cable without a tension
 _SPREAD = 100.0  # ratio of highest to lowest tension for a robot without a lower limit
+_NARROWEST = 1.001  # ratio of highest to lowest tension below which all cables of a pose have one color
 _PER_WEIGHT = 4.0  # ratio of highest tension to platform weight for a robot without an upper limit
 
 
@@ -56,6 +57,15 @@ class TensionScale:
         high = top if isfinite(top) and top > 0.0 else max(_PER_WEIGHT * weight, 10.0 * bottom)
         low = bottom if bottom > 0.0 else high / _SPREAD
         return cls(low, high) if low < high else cls(0.5 * low, 2.0 * high)
+
+    @classmethod
+    def of_pose(cls, tension: Array, otherwise: TensionScale) -> TensionScale:
+        """The scale between the tensions of one pose (m,); `otherwise` without positive tensions."""
+        known = tension[np.isfinite(tension) & (tension > 0.0)]
+        if not known.size:
+            return otherwise
+        low, high = float(known.min()), float(known.max())
+        return cls(low, high) if high > _NARROWEST * low else cls(low / _NARROWEST, high * _NARROWEST)
 
     def fraction(self, tension: Array) -> Array:
         """Positions of tensions on the scale, 0 to 1, clipped at its ends."""

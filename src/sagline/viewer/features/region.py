@@ -269,7 +269,7 @@ class RegionFeature(Feature):
             text += self._without
             if self._result is not None and (hull := self._result[2]) is not None:
                 patches = near_patches(hull, self._place, REACH * self._size)
-            self._margin_html.content = html_block(f"<b>Here</b> {text}")
+            self._margin_html.content = html_block(f"<b>Margin here</b>, force with moment: {text}")
         with self._server.atomic():
             draw_patches(self._nodes, "/wall", patches)
             below = (0.0, 0.0, -_BELOW * self._size)
