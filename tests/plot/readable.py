@@ -59,8 +59,8 @@ def bare_axes(figure: Figure) -> Iterator[str]:
             group = getattr(ax, f"get_shared_{axis}_axes")().get_siblings(ax)
             ticks = [text for other in group for text in tick_texts(other, axis)]
             labels = [text for text in (*(label_of(other, axis) for other in group), common[axis]) if text]
-            if not ticks and (ax.get_label() == "<colorbar>" or ax.images):
-                continue  # the narrow side of a color bar; the rows of a matrix have names
+            if not ticks and (ax.get_label() == "<colorbar>" or ax.images or not ax.spines["left"].get_visible()):
+                continue  # the narrow side of a color bar; the rows of a matrix have names; a band has no scale
             if not ticks or not (labels or any(map(without_number, ticks))):
                 yield f"axes {number}: {axis} has no {'label' if ticks else 'numbers'}"
             elif all(NUMBER.fullmatch(text) for text in ticks) and not any(map(has_unit, labels)):

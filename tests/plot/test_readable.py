@@ -15,7 +15,9 @@ from typer.testing import CliRunner
 
 import sagline as sl
 from sagline.cli.main import app
+from tests.files.executions import execution
 from tests.plot.readable import SHOWN, defects
+from tests.plot.test_workspace import front_of
 from tests.tiers import extended
 
 EXAMPLES = (
@@ -79,6 +81,23 @@ def test_figures_of_examples(name: str, style: str | None) -> None:
     assert drawn
     shown = np.inf if style else SHOWN  # a figure of a journal is not scaled
     assert [defect for figure in drawn.values() for defect in defects(figure, shown)] == []
+
+
+@extended
+@pytest.mark.parametrize("style", [None, "ieee", "mdpi"])
+def test_figures_of_executions_and_optimizations(style: str | None) -> None:
+    done, goals = execution(), ("mean_margin", "least_margin", "largest_sag")
+    with sl.plot.style(style) if style else nullcontext():
+        names = ("execution", "states", "measured_tensions", "mendable_tensions", "place_errors")
+        drawn = [figure_of(getattr(sl.plot, name)(done)) for name in names]
+        drawn += [sl.plot.front(front_of(*goals)), sl.plot.front(front_of(*goals[:1]))]
+    shown = np.inf if style else SHOWN
+    assert [defect for figure in drawn if figure is not None for defect in defects(figure, shown)] == []
+
+
+def test_every_figure_is_tested() -> None:
+    rest = {"execution", "states", "measured_tensions", "mendable_tensions", "place_errors", "front", "calibration"}
+    assert {*EXAMPLES, *rest, "film", "save", "style"} == {*dir(sl.plot)}
 
 
 def figure_of(value: object) -> Figure | None:

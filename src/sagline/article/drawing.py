@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from itertools import count, islice
+from itertools import count
 from math import ceil
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
@@ -11,15 +11,15 @@ import matplotlib
 import numpy as np
 from matplotlib import patheffects
 from matplotlib.colors import BoundaryNorm, ListedColormap
-from matplotlib.textpath import TextPath
 
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
+from sagline.plot.labels import legend_columns
 from sagline.plot.sheet import BLUE, GAP_COLOR, LABEL, TICK, Sheet, cable_look, format_axes, svg_text, unique_names
 from sagline.present.page import Panel
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.contour import ContourSet
@@ -30,6 +30,7 @@ LEFT, RIGHT, BELOW, ABOVE = 0.16, 0.975, 0.5, 0.12  # margins: the first ones re
 POINT = 1.0 / 72.0  # [in]
 APART = 40.0  # smallest distance between the numbers of two lines [pt]
 NAME_SIZE = TICK  # text size of legends [pt]
+SHARES = np.array([0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8])  # places of a number along its line
 SHADES = "viridis"
 MOST_POINTS = 400  # largest number of points of a curve over time, to limit the size of the page
 
@@ -67,9 +68,8 @@ def legend_above(ax: Axes, title: str = "") -> None:
     """Legend above the axes in as many columns as fit; the figure becomes higher by the height of the legend."""
     figure = cast(Sheet, ax.get_figure(root=True))
     handles, labels = ax.get_legend_handles_labels()
-    widest = max(TextPath((0.0, 0.0), label, size=NAME_SIZE).get_extents().width for label in labels)
-    room = ax.get_position().width * figure.get_figwidth() / POINT
-    columns = min(len(labels), max(1, int((room + 1.2 * NAME_SIZE) / (widest + 3.6 * NAME_SIZE))))
+    room = ax.get_position().width * figure.get_figwidth()
+    columns = legend_columns(labels, room, NAME_SIZE)
     rows = ceil(len(labels) / columns) + bool(title)
     grown = (1.45 * rows + 0.4) * NAME_SIZE * POINT
     _grow(figure, grown)
@@ -236,15 +236,18 @@ def draw_errors(
 
 
 def _number_lines(ax: Axes, drawn: ContourSet) -> None:
-    """Numbers near the middle of the lines, apart from each other, with a halo on a dark background."""
-    places: list[tuple[float, float]] = []
-    for path in drawn.get_paths():
-        apart = (place for place in _places(ax, path) if all(np.hypot(*np.subtract(place, p)) > APART for p in places))
-        places.extend(islice(apart, 1))
+    """Numbers near the middle of the lines, apart from one another, with a halo for a dark background."""
     figure: Any = ax.get_figure(root=True)
+    apart, places = APART * POINT * figure.dpi, list[Array]()  # [pixels]
+    inside = ax.bbox.padded(-0.5 * apart)
+    for path in drawn.get_paths():
+        for place in _along_longest(ax, path):
+            if inside.contains(*place) and all(np.hypot(*(place - other)) > apart for other in places):
+                places.append(place)
+                break
     names = ax.clabel(
         drawn,
-        manual=ax.transData.inverted().transform(np.reshape(places, (-1, 2)) * figure.dpi / 72.0).tolist(),
+        manual=ax.transData.inverted().transform(np.reshape(places, (-1, 2))).tolist(),
         fmt=lambda level: n(abs(level), ".3g", "m"),
         fontsize=TICK,
         inline_spacing=3,
@@ -253,19 +256,15 @@ def _number_lines(ax: Axes, drawn: ContourSet) -> None:
         text.set_path_effects([*HALO])
 
 
-def _places(ax: Axes, path: Path) -> Iterator[tuple[float, float]]:
-    """Points on the longest piece of a line [pt], from the middle outward, not close to the axes."""
-    figure: Any = ax.get_figure(root=True)
-    inside = ax.bbox.padded(-0.5 * APART * figure.dpi / 72.0)
+def _along_longest(ax: Axes, path: Path) -> Array:
+    """Points on the longest piece of a line, from its middle outward [pixels], shape (n, 2)."""
     polygons = map(np.asarray, path.to_polygons(closed_only=False))
-    pieces = [ax.transData.transform(piece) * 72.0 / figure.dpi for piece in polygons if len(piece) > 1]
-    if pieces:
-        passed = [np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(piece, axis=0).T)))) for piece in pieces]
-        k = int(np.argmax([way[-1] for way in passed]))
-        for share in (0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8):
-            x, y = (float(np.interp(share * passed[k][-1], passed[k], along)) for along in pieces[k].T)
-            if inside.contains(x * figure.dpi / 72.0, y * figure.dpi / 72.0):
-                yield x, y
+    pieces = [ax.transData.transform(piece) for piece in polygons if len(piece) > 1]
+    passed = [np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(piece, axis=0).T)))) for piece in pieces]
+    if not pieces:
+        return np.empty((0, 2))
+    way, piece = max(zip(passed, pieces, strict=True), key=lambda pair: float(pair[0][-1]))
+    return np.column_stack([np.interp(SHARES * way[-1], way, along) for along in piece.T])
 
 
 def _points(drawn: ContourSet) -> int:

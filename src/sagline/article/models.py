@@ -18,7 +18,7 @@ from sagline.article.sampling import GRAVITY, simulated_cable
 from sagline.article.texts import chapter, finding
 from sagline.core.arrays import Array, checked
 from sagline.core.numbers import n
-from sagline.plot.sheet import COLORS, TICK
+from sagline.plot.sheet import COLORS, LINE_STYLES, TICK
 from sagline.present.page import Chapter, Finding, Panel, Table
 
 if TYPE_CHECKING:
@@ -198,6 +198,7 @@ def _slices(draw: Drawings) -> Finding:
         figure, ax = axes(names[quantity], "length error [mm]")
         error = 1e3 * np.abs(study.length_error).reshape(len(study.models), -1)
         x = -np.degrees(course) if quantity == "angle" else course
+        ax.set_prop_cycle(linestyle=LINE_STYLES)
         for model, row, color in zip(study.models[:-1], error, COLORS, strict=False):
             ax.plot(x, row, color=color, linewidth=1.3, label=_name(model))
         ax.axhline(1e3 * TOLERANCE, color="0.6", linewidth=0.7, linestyle=":")

@@ -12,7 +12,7 @@ from sagline.article.ten_poses import TenPoses, ten_poses, tour
 from sagline.article.texts import chapter, finding
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
-from sagline.plot.sheet import BLUE, COLORS
+from sagline.plot.sheet import BLUE, COLORS, LINE_STYLES
 from sagline.present.page import Chapter, Finding, Table, table_of
 
 AREA = 2e4  # area of a circle per meter of error [pt^2/m]
@@ -130,7 +130,8 @@ def _trends(study: TenPoses, draw: Drawings) -> Finding:
         axis = ax if k < 5 else bx
         line = fit_line(height, 1e3 * trend.error[:, 2])
         course = line.slope * fine + line.intercept
-        axis.plot(fine, course, color=COLORS[k % 5], linewidth=1.2, label=_typical(trend.parameter))
+        look = {"color": COLORS[k % 5], "linestyle": LINE_STYLES[k % 5]}
+        axis.plot(fine, course, **look, linewidth=1.2, label=_typical(trend.parameter))
     for axis in (ax, bx):
         axis.set_ylim(-25.0, 85.0)
         legend_above(axis)

@@ -28,7 +28,7 @@ from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.plot.plan import path as draw_path
 from sagline.plot.robot import robot as draw_robot
-from sagline.plot.sheet import BLUE, COLORS, VERMILLION, Sheet
+from sagline.plot.sheet import BLUE, COLORS, LINE_STYLES, VERMILLION, Sheet, draw_components
 from sagline.present.page import Chapter, Finding, Panel, Table, Verdict
 
 LIMITS = np.array(
@@ -75,8 +75,7 @@ def _path(path: sl.Path, draw: Drawings) -> Finding:
     figure.subplots_adjust(bottom=0.16, top=0.92)
     second, bx = axes("time [s]", "velocity [m/s]")
     part = thinning(len(path))
-    for name, course, color in zip("xy", path.twist.T[:2], COLORS, strict=False):
-        bx.plot(path.time[part], course[part], color=color, linewidth=1.3, label=f"$v_{name}$")
+    draw_components(bx, path.time[part], path.twist[part, :2], "v_{}")
     legend_above(bx)
     speed = np.linalg.norm(path.twist[:, :3], axis=1)
     acceleration = np.linalg.norm(path.twist_rate[:, :3], axis=1)
@@ -148,8 +147,7 @@ def _error(study: PathStudy, draw: Drawings) -> Finding:
 def _error_panel(run: sl.Confirmation, path: sl.Path, caption: str, draw: Drawings) -> Panel:
     part = thinning(len(path))
     figure, ax = axes("time [s]", "position error [mm]", height=2.7)
-    for name, course, color in zip("xyz", 1e3 * run.position_error[part].T, COLORS, strict=False):
-        ax.plot(path.time[part], course, color=color, linewidth=1.1, label=f"${name}$")
+    draw_components(ax, path.time[part], 1e3 * run.position_error[part])
     ax.set_xlim(path.time[0], path.time[-1])
     legend_above(ax)
     return draw.panel(figure, caption)
@@ -204,6 +202,7 @@ def _models(study: PathStudy, draw: Drawings) -> Finding:
     for robot, runs in (("suspended", study.suspended), ("mixed", study.mixed)):
         figure, ax = axes("time [s]", "distance from the plan [mm]")
         part = thinning(len(study.path))
+        ax.set_prop_cycle(linestyle=LINE_STYLES)
         for model, run, color in zip(study.models[:-1], runs, COLORS, strict=False):
             distance = 1e3 * np.linalg.norm(run.position_error[part], axis=1)
             ax.plot(study.path.time[part], distance, color=color, linewidth=1.1, label=type(model).__name__)

@@ -27,6 +27,7 @@ from sagline.plot.sheet import (
     COLORS,
     DASHED,
     GAP_COLOR,
+    LINE_STYLES,
     MAP_COLORS,
     VERMILLION,
     axes_or_new,
@@ -46,7 +47,6 @@ if TYPE_CHECKING:
 
     from sagline.core.arrays import Array
 
-ENERGY_STYLES = ("-", DASHED, (0, (1.0, 1.2)), (0, (5.0, 1.5, 1.0, 1.5)), (0, (7.0, 2.0)))
 AT_REST = 1e-7  # smallest range of the energies that the axis shows, as a share of the potential energy
 THIN, WIDE = 0.6, 3.6  # width of a mode of the cables only, and of the platform only [pt]
 FAINT = 0.4  # opacity of thin lines
@@ -83,7 +83,7 @@ def energy(simulation: Simulation) -> Figure:
     courses |= {"supplied": balance.supplied, "lost": balance.lost}
     if balance.removed.any():
         courses["removed"] = balance.removed
-    for (name, course), color, style in zip(courses.items(), COLORS, ENERGY_STYLES, strict=False):
+    for (name, course), color, style in zip(courses.items(), COLORS, LINE_STYLES, strict=False):
         above.plot(time, course, color=color, linestyle=style, linewidth=1.2, label=name)
     format_clock(above, time, "energy [J]")
     above.set_xlabel("")

@@ -10,7 +10,7 @@ from sagline.control.execution import Execution, null_space_error, position_erro
 from sagline.control.recording import EventKind
 from sagline.control.states import State
 from sagline.core.arguments import instance
-from sagline.plot.labels import legend_above, name_lines
+from sagline.plot.labels import figure_legend, legend_above, name_lines
 from sagline.plot.sheet import (
     BLUE,
     DASHED,
@@ -39,9 +39,6 @@ if TYPE_CHECKING:
     from sagline.core.arrays import Array
 
 PER_METER: Final = 1e3  # [mm]
-BESIDE: Final[dict[str, Any]] = {  # relative heights of the panels; the band of the states is low
-    "loc": "upper left", "bbox_to_anchor": (1.01, 1.6), "borderaxespad": 0.0, "frameon": False,
-}  # fmt: skip
 STATES: Final = {  # states with a separate color
     State.HOMING: ORANGE, State.MOVING: BLUE, State.JOGGING: SKY, State.PAUSING: GREEN, State.STOPPING: PURPLE,
     State.FAULT: VERMILLION, State.EMERGENCY: "#8B0000",
@@ -79,6 +76,9 @@ def execution(done: Execution) -> Figure:
             panel.set_xlabel("")
             panel.tick_params(labelbottom=False)
         _mark_faults(panel, done)
+    own: Any = parts[0].get_legend()
+    own.remove()  # its place is that of the names of the faults
+    figure_legend(figure, parts[:1])
     return figure
 
 

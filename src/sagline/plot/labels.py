@@ -60,7 +60,7 @@ def figure_legend(figure: FigureBase, panels: Iterable[Axes], place: Any = "outs
     """One legend of all lines of some axes."""
     look = current()
     handles = {label: line for ax in panels for line, label in zip(*ax.get_legend_handles_labels(), strict=True)}
-    columns = _legend_columns(list(handles), figure.get_figure(root=True).get_figwidth(), look.tick)
+    columns = legend_columns(list(handles), figure.get_figure(root=True).get_figwidth(), look.tick)
     figure.legend(handles.values(), list(handles), loc=place, ncols=columns, fontsize=look.tick, frameon=False)
 
 
@@ -68,7 +68,7 @@ def legend_above(ax: Axes, labels: Sequence[str], title: str = "") -> dict[str, 
     """Arguments for a legend above the axes, in as many columns as fit."""
     look = current()
     width = cast(Figure, ax.get_figure(root=True)).get_figwidth()
-    columns = _legend_columns([*labels, title], 0.85 * width, look.tick)
+    columns = legend_columns([*labels, title], 0.85 * width, look.tick)
     return {
         "loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "ncols": columns,
         "fontsize": look.tick, "title_fontsize": look.tick, "alignment": "left", "frameon": False,
@@ -76,7 +76,7 @@ def legend_above(ax: Axes, labels: Sequence[str], title: str = "") -> dict[str, 
     }  # fmt: skip
 
 
-def _legend_columns(labels: Sequence[str], width: float, size: float) -> int:
+def legend_columns(labels: Sequence[str], width: float, size: float) -> int:
     """Number of legend columns that fit, at least 1, without empty columns."""
     widest = max((TextPath((0.0, 0.0), label, size=size).get_extents().width for label in labels if label), default=0.0)
     columns = max(1, min(len(labels), int((width / POINT + 1.2 * size) / (widest + 3.6 * size))))

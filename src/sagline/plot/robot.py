@@ -255,7 +255,7 @@ def format_space_axes(ax: Axes3D, points: Array, title: str) -> None:
     for name, axis, share in zip(PLACE, (ax.xaxis, ax.yaxis, ax.zaxis), size / size.max(), strict=True):
         axis.set_label_text(name, fontsize=current().label)
         axis.labelpad = beside if axis is ax.zaxis else outward
-        axis.set_tick_params(labelsize=current().tick, pad=0.0)
+        axis.set_tick_params(labelsize=current().tick, pad=3.0 if axis is ax.zaxis else 0.0)
         axis.set_major_locator(MaxNLocator(max(1, round(4.5 * share)), steps=[1, 2, 5, 10], prune="both"))
         axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
     ax.grid(visible=False)

@@ -40,7 +40,7 @@ BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY = "#0072B2", "#D55E00", "#009E73", 
 COLORS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
 GAP_COLOR = "#BBBBBB"
 DASHED: Final[Any] = (0, (4.0, 1.6))  # a line style of Matplotlib
-COMPONENT_STYLES: Final[Any] = ("-", DASHED, (0, (1.0, 1.2)))  # line styles of the x, y and z components
+LINE_STYLES: Final[Any] = ("-", DASHED, (0, (1.0, 1.2)), (0, (5.0, 1.5, 1.0, 1.5)), (0, (7.0, 2.0)))
 MAP_COLORS: Final = "cividis"  # readable with all kinds of color vision
 MOST_POINTS: Final = 4000  # largest number of points of a line; a longer line is drawn through the extrema of its parts
 LABEL, TICK = PLAIN.label, PLAIN.tick  # text sizes in the documentation [pt]
@@ -207,7 +207,7 @@ def draw_series(ax: Axes, clock: Array, course: Array, **look: Any) -> None:
 
 def draw_components(ax: Axes, clock: Array, courses: Array, name: str = "{}") -> None:
     """The components (N, 3) along x, y and z over time; `name` formats the symbol of an axis."""
-    for axis, course, color, style in zip("xyz", courses.T, COLORS, COMPONENT_STYLES, strict=False):
+    for axis, course, color, style in zip("xyz", courses.T, COLORS, LINE_STYLES, strict=False):
         draw_series(ax, clock, course, color=color, linestyle=style, linewidth=1.2, label=f"${name.format(axis)}$")
 
 
