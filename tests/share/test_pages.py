@@ -156,6 +156,27 @@ def test_a_robot_is_dragged(
         check_look(page)
 
 
+WAITING = """const compile = WebAssembly.instantiate, waited = new Promise((go) => { window.go = go; });
+WebAssembly.instantiate = async (...given) => { await waited; return compile(...given); };"""
+
+
+def test_straight_cables_are_drawn_while_kernels_load(browser: Browser, tmp_path: Path) -> None:
+    robot = sl.load_robot("article-mixed")
+    (tmp_path / "robot.html").write_text(robot_page(robot), encoding="utf-8")
+    context = browser.new_context(viewport={"width": 390, "height": 640})
+    context.add_init_script(WAITING)
+    page = context.new_page()
+    page.goto((tmp_path / "robot.html").as_uri())
+    expect(page.get_by_text("Loading the model").first).to_be_visible()
+    straight = pixels(page)
+    page.evaluate("window.go()")
+    expect(page.get_by_role("status")).to_have_text("Feasible")
+    sagging = pixels(page)
+    context.close()
+    assert len(straight) > 0.5 * len(sagging)  # a picture of the robot, not an empty one
+    assert straight != sagging
+
+
 @pytest.mark.parametrize("height", [640, 844])
 def test_a_platform_that_stands_out_of_its_frame_is_seen_whole(browser: Browser, tmp_path: Path, height: int) -> None:
     robot = sl.load_robot("falcon-7")

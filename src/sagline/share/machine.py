@@ -93,11 +93,12 @@ def model_data(robot: Robot) -> dict[str, Any]:
 def _described(
     robot: Robot, calls: dict[str, Call], pose: Array, draw: tuple[Any, ...], arrays: dict[str, AnyArray] | None = None
 ) -> dict[str, Any]:
-    """Calls and arrays, including the drawing, and the drawn anchors and pulley radii [m]."""
+    """Calls and arrays, including the drawing, and the anchors and pulley radii [m]."""
     drawn = {"pose": pose, "drawn": draw[3], "points": draw[-1]}
     return {
         "kernels": described_calls(calls, drawn | (arrays or {})),
         "anchors": json_numbers(robot.frame_anchors),
+        "ends": json_numbers(robot.platform_anchors),
         "radii": json_numbers(pulleys_of(robot).radius + np.zeros(robot.cable_count)),
     }
 

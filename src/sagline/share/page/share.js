@@ -36,6 +36,13 @@ const share = (() => {
     return moment(rest.pose, rest.tension, { length, verdict: { good: solved ? null : false, words } });
   }
 
+  /** A robot whose kernels are not compiled yet: straight cables without tensions. */
+  function straight() {
+    const pose = robot.posed(facts.home.position, [0, 0, 0, 1]), { anchors, ends } = facts.machine, none = anchors.map(() => NaN);
+    const courses = anchors.map((anchor, i) => [anchor, robot.placed(pose, ends[i])]), all = anchors.map(() => true);
+    return { pose, courses, there: all, taut: all, tension: none, length: none, feasible: true, verdict: { good: null, words: "Loading the model" } };
+  }
+
   /** A sample of a run. */
   function sample(course, k) {
     const row = (name) => course[name].map((column) => column[k]), turned = row("quaternion"), norm = Math.hypot(...turned);
@@ -136,7 +143,6 @@ const share = (() => {
       found("without").hidden = false;
       return null;
     }
-    machine = robot.made(facts.machine, await kernels.made(found("kernels").textContent, facts.machine.kernels));
     let seen = null, trace = null, waiting = false, held = null;
     const view = camera.made(() => redraw());
     const stage = await scene.made(canvas, facts, view), tell = panel.table(facts), put = panel.marks(facts.machine.anchors);
@@ -180,6 +186,8 @@ const share = (() => {
     new ResizeObserver(resize).observe(canvas);
     theme.follow(redraw);
     resize();
+    if (!facts.states) show(straight());
+    machine = robot.made(facts.machine, await kernels.made(found("kernels").textContent, facts.machine.kernels));
     if (!facts.states) {
       let planned = null;
       const reset = winch((cable, more) => show(planned.feasible && more ? wound(planned, cable, more) : planned));
