@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 import sagline as sl
-from sagline.cli.lengths import plan_rows, write_rows
+from sagline.cli.lengths import write_rows
 from sagline.cli.output import csv_text
 from sagline.cli.study import ConfirmedRun, summary
 
@@ -17,7 +17,7 @@ ENDS = sl.Pose(np.array([[0.0, 0.0, 1.5], [1.0, 0.5, 2.0]]), np.stack([np.eye(3)
 
 def test_a_plan_of_a_robot_with_pulleys_is_written_with_all_cable_off_the_drum() -> None:
     plan = sl.inverse(ROBOT, ENDS)
-    rows = list(csv.DictReader(StringIO(csv_text(plan_rows(plan)))))
+    rows = list(csv.DictReader(StringIO(csv_text(plan.table().rows))))
     written = np.array([[float(row[f"L{k} [m]"]) for k in range(8)] for row in rows])
     np.testing.assert_allclose(sl.forward(ROBOT, written, start=ENDS).pose.position, ENDS.position, atol=1e-9)
     tension = np.array([[float(row[f"T{k} [N]"]) for k in range(8)] for row in rows])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -17,7 +17,6 @@ from sagline.core.errors import FileError
 from sagline.files.writing import create_folder, write_text
 
 if TYPE_CHECKING:
-    from sagline.core.arrays import Array
     from sagline.kinematics.plan import Plan
 
 
@@ -126,27 +125,3 @@ def _plan_of(file: Path, out: Path | None) -> Plan:
     if not plan.solved.any():
         raise FileError(file, "has no solved sample", "Plan another path, or raise the limits.")
     return plan
-
-
-def plan_rows(plan: Plan) -> list[list[object]]:
-    """A whole plan as a table: time, pose, lengths, tensions and status of each sample."""
-    from sagline.kinematics.status import PoseStatus
-
-    words = [PoseStatus(int(code)).name for code in np.atleast_1d(plan.status)]
-    time = None if plan.path is None else plan.path.time
-    cables = {"L{} [m]": plan.unstrained_length, "T{} [N]": plan.chord_tension}
-    return motion_rows(time, plan.state.pose.position, plan.state.pose.quaternion, cables, status=words)
-
-
-def motion_rows(
-    time: Array | None, position: Array, quaternion: Array, cables: Mapping[str, Array], **words: Sequence[str]
-) -> list[list[object]]:
-    """Names of the columns, then time, pose, values of the cables and words of each sample; empty cells for NaN."""
-    columns = {} if time is None else {"time [s]": time}
-    columns |= {f"{axis} [m]": position[..., k] for k, axis in enumerate("xyz")}
-    columns |= {f"q{axis}": quaternion[..., k] for k, axis in enumerate("xyzw")}
-    columns |= {name.format(k): values[..., k] for name, values in cables.items() for k in range(values.shape[-1])}
-    numbers = np.column_stack([np.atleast_1d(column) for column in columns.values()]).tolist()
-    texts = zip(*words.values(), strict=True) if words else [()] * len(numbers)
-    body = ([*("" if x != x else x for x in row), *text] for row, text in zip(numbers, texts, strict=True))
-    return [[*columns, *words], *body]

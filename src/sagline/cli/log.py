@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import numpy as np
 
-from sagline.cli.lengths import motion_rows
 from sagline.cli.options import JsonOption, OutOption, TableOption, argument, only_with, option
 from sagline.cli.output import Output, TextTable, show_table
 from sagline.cli.terminal import show_json, show_text, working
@@ -55,7 +54,6 @@ def log(
         sagline log killed.mcap --to corrected.mcap
     """
     from sagline.cli.values import whole_of
-    from sagline.control.states import State
     from sagline.files.execution_file import load_execution, save
 
     which = None if plan is None else whole_of(plan, "--plan-number", 0, MOST_PLANS)
@@ -68,9 +66,7 @@ def log(
         with working(f"writing {to.name}"):
             save(done, to)
     if write_table:
-        cables = {"L{} [m]": done.length, "T{} [N]": done.tension, "planned T{} [N]": done.planned_tension}
-        states = [State(code).name for code in done.state.tolist()]
-        output.table(TABLE, motion_rows(done.time, done.position, done.quaternion, cables, state=states))
+        output.table(TABLE, done.table().rows)
     if as_json:
         show_json(_record(done, to))
     elif to is not None:

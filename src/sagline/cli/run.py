@@ -7,7 +7,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sagline.cli.lengths import plan_rows
 from sagline.cli.options import (
     USUAL_FORMATS,
     FiguresOption,
@@ -72,7 +71,7 @@ def run(
         for name, run in zip(plans, runs, strict=True):
             run.plan.save(output.file(f"{name}.nc"))
             if table:
-                output.table(f"{name}.csv", plan_rows(run.plan))
+                output.table(f"{name}.csv", run.plan.table().rows)
         if figures:
             from sagline import plot
 

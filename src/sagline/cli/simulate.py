@@ -7,7 +7,6 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from sagline.cli.lengths import motion_rows
 from sagline.cli.options import (
     USUAL_FORMATS,
     AirDampingOption,
@@ -152,9 +151,7 @@ def simulate(
         simulation = integrate(start, duration=end, step=step, cable_mass=kind, events=events, damping=damping)
         simulation.save(output.file(".nc"))
         if write_table:
-            pose = simulation.pose
-            rows = motion_rows(simulation.time, pose.position, pose.quaternion, {"T{} [N]": simulation.tensions})
-            output.table(".csv", rows)
+            output.table(".csv", simulation.table().rows)
         if figures:
             from sagline import plot
 

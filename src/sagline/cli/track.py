@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
-from sagline.cli.lengths import plan_rows
 from sagline.cli.options import (
     USUAL_FORMATS,
     FiguresOption,
@@ -93,7 +92,7 @@ def track(
     with working("writing"):
         run.plan.save(output.file(".nc"))
         if table:
-            output.table(".csv", plan_rows(run.plan))
+            output.table(".csv", run.plan.table().rows)
         if figures:
             output.draw(*_figures(run))
     return tell([run], output, as_json=as_json)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 
@@ -20,11 +20,13 @@ from sagline.control.recording import (
     CycleTable,
     Event,
 )
+from sagline.control.states import State
 from sagline.control.tension_loop import TensionSettings
 from sagline.core.arguments import instance, whole_number
 from sagline.core.arrays import Array, Codes, Flags, Indices, locked, number
 from sagline.core.results import Result, Saved
 from sagline.core.status import Status
+from sagline.core.table import Columns, Tabular
 from sagline.kinematics.plan import Plan
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
@@ -105,7 +107,7 @@ class Samples(Result):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Execution(Result, Saved):
+class Execution(Result, Saved, Tabular):
     """Execution of a plan on a machine, in N cycles of m winches.
 
     The command and the sample of a cycle are exchanged at the same time. The sample therefore does not include the
@@ -135,6 +137,16 @@ class Execution(Result, Saved):
         planned_tension: Planned T_A at the time of each sample [N], shape (N, m); NaN without a plan.
         correction: Correction by the tension loop, included in the set points [m], shape (N, m).
     """
+
+    _columns: ClassVar[Columns] = (
+        "time",
+        "@=position",
+        *(f"q{axis}=quaternion.{k}" for k, axis in enumerate("xyzw")),
+        "L#=length",
+        "T#=tension",
+        "planned T#=planned_tension",
+        ("state", State),
+    )
 
     robot: Robot
     plan: Plan | None

@@ -61,6 +61,18 @@ def module_of(result: object) -> Any:
     return import_module(f"sagline.files.{MODULES[next((name for name in names if name in MODULES), names[0])]}")
 
 
+def dataset_of(result: Any) -> Dataset:
+    """Data set of the NetCDF format of a result; without such a format, its table over the dimension row."""
+    named = any(kind.__name__ in MODULES for kind in type(result).__mro__)
+    form = getattr(module_of(result), "FORMAT", None) if named else None
+    if isinstance(form, Format):
+        return form.pack(result)
+    from xarray import Dataset
+
+    table = result.table()
+    return Dataset({name: ("row", values, {"units": table.units[name]}) for name, values in table.columns.items()})
+
+
 def save(result: object, file: os.PathLike[str] | str) -> None:
     """Write a result to a file atomically, in the format of the result's type."""
     module_of(result).save(result, file)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from sagline.core.arguments import callback, instance
 from sagline.core.arrays import Array, Codes, Flags, locked
 from sagline.core.progress import Progress, blocks
 from sagline.core.results import Result
+from sagline.core.table import Columns, Tabular
 from sagline.kinematics.forward import forward
 from sagline.kinematics.forward_rows import ForwardSolution, solve_forward_rows
 from sagline.kinematics.plan import Plan
@@ -26,7 +28,7 @@ BLOCK = 1 << 14  # poses per block, to limit memory
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Confirmation(Result):
+class Confirmation(Result, Tabular):
     """A plan, and the exact equilibria at its lengths.
 
     Attributes:
@@ -35,6 +37,14 @@ class Confirmation(Result):
         status: Codes of `ForwardStatus`, shape () or (N,).
         wrench_residual: Norms of the unbalanced force [N] and moment [N m] at this pose, shape (2,) or (N, 2).
     """
+
+    _columns: ClassVar[Columns] = (
+        "plan.path.time",
+        "pose",
+        "error_@=position_error",
+        "rotation_error",
+        ("status", ForwardStatus),
+    )
 
     plan: Plan
     pose: Pose

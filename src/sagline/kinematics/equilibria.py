@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +15,7 @@ from sagline.core.arrays import Array, Indices, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_memory
 from sagline.core.results import Result
+from sagline.core.table import Columns, Tabular
 from sagline.kernels.forward.problem import ENERGY
 from sagline.kinematics.forward import checked_lengths, from_orientations, start_quaternions
 from sagline.kinematics.forward_rows import ForwardRows, ForwardSolution
@@ -31,7 +33,7 @@ _CATENARY = Catenary()
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Equilibria(Result):
+class Equilibria(Result, Tabular):
     """Result of `equilibria`: K stable equilibria, in order of increasing energy.
 
     Attributes:
@@ -39,6 +41,13 @@ class Equilibria(Result):
         reached: Number of starts that ended in each equilibrium, shape (K,). It is not a probability.
         starts: Number of all starts. Some starts may end at an unstable equilibrium or may not converge.
     """
+
+    _columns: ClassVar[Columns] = (
+        "solutions.pose",
+        "solutions.stiffness_min",
+        "reached",
+        ("solutions.status", ForwardStatus),
+    )
 
     solutions: ForwardSolution
     reached: Indices

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from sagline.cables.model import CableModel
 from sagline.core.arrays import Array, Codes, Flags, Indices, locked
 from sagline.core.progress import Progress, blocks, rows_of
 from sagline.core.results import Result
+from sagline.core.table import Columns, Tabular
 from sagline.kernels import codes, tables
 from sagline.kernels.cable.geometry import CABLE_ROWS
 from sagline.kernels.forward.fit import fit_poses
@@ -35,7 +36,7 @@ from sagline.statics.tables import body_table, cable_table
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class ForwardSolution(Result):
+class ForwardSolution(Result, Tabular):
     """Result of `forward`, single or with a leading axis N.
 
     Attributes:
@@ -52,6 +53,15 @@ class ForwardSolution(Result):
         covariance: Covariance of a pose from measured tensions: displacement of the center of mass [m] and rotation
             vector [rad], world axes, shape (6, 6) or (N, 6, 6). None without measured tensions.
     """
+
+    _columns: ClassVar[Columns] = (
+        "pose",
+        "force_residual=wrench_residual.0",
+        "moment_residual=wrench_residual.1",
+        "stiffness_min",
+        "iterations",
+        ("status", ForwardStatus),
+    )
 
     state: Equilibrium
     status: Codes

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sagline.cables.model import CableStatus
 from sagline.core.arrays import Array, Codes
 from sagline.core.results import Result, Saved
+from sagline.core.table import Columns, Tabular
 from sagline.kinematics.rates import length_rate
 from sagline.kinematics.status import BALANCED, PoseStatus
 from sagline.motion.path import Path
@@ -44,7 +45,7 @@ class Gap(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Plan(Result, Saved):
+class Plan(Result, Saved, Tabular):
     """Result of `inverse`: a single pose with fields of shape (m,), or N poses with fields of shape (N, m).
 
     Attributes:
@@ -77,6 +78,14 @@ class Plan(Result, Saved):
             feasibility, shape () or (N,). Their tensions balance the platform, but the tension distribution method did
             not select them. None for a plan from an old file.
     """
+
+    _columns: ClassVar[Columns] = (
+        "path.time",
+        "state.pose",
+        "L#=unstrained_length",
+        "T#=chord_tension",
+        ("status", PoseStatus),
+    )
 
     state: Equilibrium
     path: Path | None

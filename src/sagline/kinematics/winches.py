@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Final, Literal, get_args
+from typing import Any, ClassVar, Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,6 +13,7 @@ from sagline.core.arguments import choice, instance, optional
 from sagline.core.arrays import Array, Flags, kernel_input, locked, numbers
 from sagline.core.errors import InvalidValueError
 from sagline.core.results import Result
+from sagline.core.table import Columns, Tabular
 from sagline.kernels.cable.drum import MEMORY_ROWS, follow_memory
 from sagline.kinematics.plan import Plan
 from sagline.robot.drum import Drums, drum_tension, drums_of, warmth
@@ -183,7 +184,7 @@ def _rows(robot: Robot, value: ArrayLike, item: str, unit: str) -> Array:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class WinchRates(Result):
+class WinchRates(Result, Tabular):
     """Speeds and torques of the winches along a path, arrays of shape (N, m); NaN where the plan has no solution.
 
     Drum speeds are positive while cable is paid out. Motor quantities are positive if the encoder on the motor shaft
@@ -203,6 +204,12 @@ class WinchRates(Result):
         too_fast: True where motor_speed exceeds the winches' speed_limit; None if the limit is not known.
         too_strong: True where motor_torque exceeds their torque_limit; None if torque or limit is not known.
     """
+
+    _columns: ClassVar[Columns] = (
+        "motor_speed#=motor_speed",
+        "motor_torque#=motor_torque",
+        "drum_tension#=drum_tension",
+    )
 
     drum_speed: Array
     motor_speed: Array

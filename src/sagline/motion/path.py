@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,11 +11,12 @@ from numpy.typing import ArrayLike
 from sagline.core.arrays import Array, checked
 from sagline.core.errors import InvalidValueError
 from sagline.core.results import Shown
+from sagline.core.table import Columns, Tabular
 from sagline.robot.pose import Pose, PoseLike, pose_of
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Path(Shown):
+class Path(Shown, Tabular):
     """Motion of the platform frame over time, in N samples.
 
     Attributes:
@@ -27,6 +29,12 @@ class Path(Shown):
         rests: Times of rest between two segments [s], including first and last time, shape (R,); not necessarily sample
             times. None if unknown, for example for sampled poses.
     """
+
+    _columns: ClassVar[Columns] = (
+        "time",
+        "pose",
+        *(f"{name}=twist.{k}" for k, name in enumerate(("vx", "vy", "vz", "wx", "wy", "wz"))),
+    )
 
     time: Array
     pose: Pose

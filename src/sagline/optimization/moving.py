@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import ClassVar, Final
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import counted, n
 from sagline.core.progress import Progress, blocks
 from sagline.core.results import Result
+from sagline.core.table import Columns, Tabular
 from sagline.optimization.candidates import Candidates, free_parts
 from sagline.optimization.free import DesignVariable, Free
 from sagline.optimization.goals import Goal
@@ -30,7 +31,7 @@ _CATENARY: Final = Catenary()
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class MovingAnchors(Result):
+class MovingAnchors(Result, Tabular):
     """Result of `moving_anchors` at G poses.
 
     Attributes:
@@ -42,6 +43,8 @@ class MovingAnchors(Result):
         fixed_margin: Margin without moved anchors [N], shape (G,).
         moving: The given moving anchors.
     """
+
+    _columns: ClassVar[Columns] = ("pose", "margin", "fixed_margin")
 
     robot: Robot
     pose: Pose

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import wraps
 from importlib import import_module
-from typing import Any, Concatenate, Final, ParamSpec, Protocol, TypeVar, overload
+from typing import Any, ClassVar, Concatenate, Final, ParamSpec, Protocol, TypeVar, overload
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from sagline.core.arrays import Array, Codes, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.indices import batch_length, part_of
 from sagline.core.results import Result
+from sagline.core.table import Columns, Tabular
 from sagline.kernels import tables
 from sagline.robot.batch import (
     Index,
@@ -68,7 +69,7 @@ class Contact(Result):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Equilibrium(Result):
+class Equilibrium(Result, Tabular):
     """Equilibrium of a robot, the input of stiffness, vibration, viewer and files.
 
     A batch is indexed like an array: `state[3]` is a single pose, `state[2:5]` and `state[mask]` are batches. Slices
@@ -83,6 +84,8 @@ class Equilibrium(Result):
         contact: Wrapped and dead lengths of the cables. None without pulleys and dead lengths: each cable then starts
             at its frame anchor, and its length off the drum is its free length.
     """
+
+    _columns: ClassVar[Columns] = ("pose", "L#=unstrained_length", "T#=chord_tension")
 
     robot: Robot | tuple[Robot, ...]
     pose: Pose

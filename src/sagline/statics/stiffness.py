@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from sagline.core.arrays import Array, Flags, locked
 from sagline.core.memory import check_memory
 from sagline.core.results import Result
+from sagline.core.table import Columns, Tabular
 from sagline.robot.batch import bodies_of, first_of
 from sagline.robot.equilibrium import Equilibrium, of_equilibrium
 from sagline.statics.slopes import CableSlopes, cable_slopes, on_platform, tension_slopes
@@ -68,7 +70,7 @@ class Stiffness(Result):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Modes(Result):
+class Modes(Result, Tabular):
     """Result of `modes`, single or with a leading axis N; n is the number of free motions.
 
     Attributes:
@@ -78,6 +80,8 @@ class Modes(Result):
         shape: Motions (displacement of the center of mass, rotation vector, world axes) of unit modal mass, one per
             column, shape (..., 6, n) [m/sqrt(kg), rad/(sqrt(kg) m)].
     """
+
+    _columns: ClassVar[Columns] = ("state.pose", "f#=frequency")
 
     state: Equilibrium
     frequency: Array

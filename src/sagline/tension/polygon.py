@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 from numpy.typing import ArrayLike
 
 from sagline.core.arrays import Array, checked
 from sagline.core.errors import InvalidValueError
 from sagline.core.results import Result
+from sagline.core.table import Columns, Tabular
 
 
 class Side(NamedTuple):
@@ -25,7 +26,7 @@ class Side(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class TensionPolygon(Result):
+class TensionPolygon(Result, Tabular):
     """All tensions within their limits that balance one pose: origin + lambda basis, with lambda in the polygon.
 
     For sagging cables the balance depends on the tensions. The polygon then uses the sag forces T_z - tau sin phi at
@@ -47,6 +48,8 @@ class TensionPolygon(Result):
             chord tension.
         offset: Offset in this equation [N], shape (m,); zero except for the frame-end tension.
     """
+
+    _columns: ClassVar[Columns] = ("T#=tensions",)
 
     vertices: Array
     tensions: Array

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,6 +18,7 @@ from sagline.core.numbers import counted, n
 from sagline.core.progress import Progress
 from sagline.core.results import Result
 from sagline.core.status import Status
+from sagline.core.table import Columns, Tabular
 from sagline.kernels import codes
 from sagline.robot.batch import Robots, first_of, one_a_pose
 from sagline.robot.pose import Pose, PoseLike, pose_of
@@ -61,7 +63,7 @@ _POSE_BYTES = 200.0  # memory per pose for rows and results [bytes]
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Margin(Result):
+class Margin(Result, Tabular):
     """Result of `margin` at a single pose or N of them.
 
     Attributes:
@@ -84,6 +86,8 @@ class Margin(Result):
             with the shape of value.
         status: Codes of `MarginStatus`, with the shape of value.
     """
+
+    _columns: ClassVar[Columns] = ("pose", "value", "low", "high", "limiting_cable", ("status", MarginStatus))
 
     robot: Robots
     pose: Pose

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Final, TypeAlias
+from typing import Any, ClassVar, Final, TypeAlias
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -13,6 +13,7 @@ from sagline.core.arrays import Array, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.fields import NumberFields, rule
 from sagline.core.results import Result, Saved
+from sagline.core.table import Columns, Tabular
 from sagline.dynamics.simulation.winches import Winches
 from sagline.dynamics.vibration.dynamic_stiffness import Damping
 from sagline.robot.pose import Pose
@@ -192,7 +193,7 @@ class Occurrence:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Simulation(Result, Saved):
+class Simulation(Result, Saved, Tabular):
     """Result of `simulate`: N samples of a motion.
 
     Attributes:
@@ -215,6 +216,8 @@ class Simulation(Result, Saved):
         largest_tension: Largest frame-end tension of each cable at any step, including steps between samples [N], shape
             (m,); None if unknown.
     """
+
+    _columns: ClassVar[Columns] = ("time", "pose", "T#=tensions", "L#=length")
 
     robot: Robot
     time: Array

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import ClassVar, Final
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from sagline.core.arrays import Array, Codes, locked, number
 from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.core.progress import Progress, blocks
 from sagline.core.results import Result, Saved
+from sagline.core.table import Columns, Tabular
 from sagline.dynamics.vibration.dynamic_stiffness import Damping, check_model
 from sagline.dynamics.vibration.receptance import Receptance, coupled_receptance, modal_receptance, peak_receptance
 from sagline.dynamics.vibration.robot_modes import (
@@ -38,7 +39,7 @@ _ONE_PERCENT: Final = Damping(modal_damping=0.01)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class FrequencyMap(Result, Saved):
+class FrequencyMap(Result, Saved, Tabular):
     """Result of `frequency_map` at N poses.
 
     Values are NaN except for the statuses SOLVED and FOLDED. Frequencies are also NaN if no mode is below up_to.
@@ -57,6 +58,16 @@ class FrequencyMap(Result, Saved):
             infinite without damping.
         peak_frequency: Frequency of the peak [Hz], shape (N,).
     """
+
+    _columns: ClassVar[Columns] = (
+        "pose",
+        "frequency",
+        "massless_frequency",
+        "platform_share",
+        "peak",
+        "peak_frequency",
+        ("status", VibrationStatus),
+    )
 
     robot: Robot
     pose: Pose

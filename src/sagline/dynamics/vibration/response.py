@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import ClassVar, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,6 +13,7 @@ from sagline.core.arrays import Array, checked, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_memory
 from sagline.core.results import Result
+from sagline.core.table import Columns, Tabular
 from sagline.dynamics.vibration.dynamic_stiffness import Complex, Damping, check_model, check_solved, single_state
 from sagline.dynamics.vibration.receptance import LOWEST, Receptance
 from sagline.dynamics.vibration.robot_modes import check_mode_count, massless_modes, modes_below, vibration_model
@@ -26,7 +27,7 @@ _BYTES: Final = 20_000.0  # bytes per frequency
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class FrequencyResponse(Result):
+class FrequencyResponse(Result, Tabular):
     """Result of `frequency_response` at F frequencies.
 
     A motion is (displacement of the center of mass [m], rotation vector [rad]). A wrench is (force [N], moment [N m])
@@ -43,6 +44,8 @@ class FrequencyResponse(Result):
         deviation: Norm of the error of the compliance at these frequencies, relative to the norm of the exact
             compliance, shape (C,).
     """
+
+    _columns: ClassVar[Columns] = ("frequency", *(f"{name}=compliance.{k}.{k} [m/N]" for k, name in enumerate("xyz")))
 
     state: Equilibrium
     damping: Damping

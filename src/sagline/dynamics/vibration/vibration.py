@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Final
+from typing import ClassVar, Final
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from sagline.core.arguments import brief, instance, optional
 from sagline.core.arrays import Array, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.results import Result
+from sagline.core.table import Columns, Tabular
 from sagline.dynamics.trajectories.segments import RestToRestSegment, segments_of
 from sagline.dynamics.vibration.component_modes import cable_shapes
 from sagline.dynamics.vibration.dynamic_stiffness import Damping, check_model, single_state
@@ -89,7 +90,7 @@ def excitation(robot: Robot, segment: RestToRestSegment, frequency: Array, shape
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Vibration(Result):
+class Vibration(Result, Tabular):
     """Result of `vibration`: all modes of platform and cables below a frequency.
 
     Modes have unit modal mass. Their shapes are therefore in m/sqrt(kg). K is the number of modes.
@@ -114,6 +115,8 @@ class Vibration(Result):
             equilibrium.
         slack_cables: Indices of the cables without linear vibrations.
     """
+
+    _columns: ClassVar[Columns] = ("frequency", "platform_share", "loss")
 
     state: Equilibrium
     up_to: float

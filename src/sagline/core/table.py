@@ -1,0 +1,217 @@
+"""Results with rows as tables: columns of numbers with units, as text, CSV, and in pandas and xarray."""
+
+from __future__ import annotations
+
+import csv
+import os
+from collections.abc import Iterator, Mapping
+from importlib import import_module
+from io import StringIO
+from types import MappingProxyType
+from typing import Any, ClassVar, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sagline.core.errors import FileError
+from sagline.core.results import documented_units, formats
+
+_WRITING: Final = "sagline.files.writing"  # imported by name when a table is written; files build on this module
+_WIDTH, _ENDS = 80, 4  # columns of a terminal; printed rows at the beginning and at the end
+
+# Columns of a result: "label=attribute [unit]", or such a text and the type of its codes. The attribute is dotted; a
+# number selects an entry of its last axis. In the label, # means the number of a cable, @ means x, y and z; without
+# a label, it is the name of the attribute. Without a unit, it is that of the documentation.
+Columns = tuple[str | tuple[str, type[Any]], ...]
+
+
+class Table:
+    """Columns of equal length, by name.
+
+    Attributes:
+        columns: Numbers or words of each column, shape (rows,).
+        units: Unit of each column; "" if it has none.
+    """
+
+    __slots__ = ("columns", "units")
+
+    def __init__(self, columns: Mapping[str, NDArray[Any]], units: Mapping[str, str]) -> None:
+        """Columns, and their units."""
+        self.columns, self.units = MappingProxyType(dict(columns)), MappingProxyType(dict(units))
+
+    def __len__(self) -> int:
+        """Number of rows."""
+        return len(next(iter(self.columns.values()), ()))
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        """A column."""
+        return self.columns[name]
+
+    @property
+    def head(self) -> list[str]:
+        """Names of the columns, with units in brackets."""
+        return [f"{name} [{self.units[name]}]" if self.units[name] else name for name in self.columns]
+
+    @property
+    def rows(self) -> list[list[object]]:
+        """Names of the columns, then the rows; "" for NaN."""
+        body = zip(*(column.tolist() for column in self.columns.values()), strict=True)
+        return [[*self.head], *(["" if cell != cell else cell for cell in row] for row in body)]
+
+    def __repr__(self) -> str:
+        """First and last rows, and the columns that fit into a terminal."""
+        count = len(self)
+        some = [*range(_ENDS), *range(count - _ENDS, count)] if count > 2 * _ENDS else list(range(count))
+        texts: list[list[str]] = []
+        for name, column in zip(self.head, self.columns.values(), strict=True):
+            cells = [name, *(f"{column[k]:.6g}" if column.dtype.kind in "fc" else str(column[k]) for k in some)]
+            width = max(map(len, cells))
+            if texts and sum(len(each[0]) + 2 for each in texts) + width > _WIDTH:
+                break
+            texts.append([cell.rjust(width) for cell in cells])
+        lines = ["  ".join(row) for row in zip(*texts, strict=True)]
+        if count > len(some):
+            lines.insert(_ENDS + 1, "...")
+        hidden = list(self.columns)[len(texts) :]
+        more = f"; not shown: {' to '.join(dict.fromkeys((hidden[0], hidden[-1])))}" if hidden else ""
+        return "\n".join([*lines, f"{count:,} row{'s' * (count != 1)}, {len(self.columns)} columns{more}"])
+
+    def to_csv(self, file: os.PathLike[str] | str | None = None) -> str | None:
+        """The table as CSV; see `Tabular.to_csv`."""
+        text = StringIO()
+        csv.writer(text, lineterminator="\n").writerows(self.rows)
+        if file is None:
+            return text.getvalue()
+        import_module(_WRITING).write_text(file, text.getvalue())
+        return None
+
+    def to_dataframe(self) -> Any:
+        """The table as a DataFrame; see `Tabular.to_dataframe`."""
+        try:
+            pandas = import_module("pandas")
+        except ModuleNotFoundError:
+            raise FileError("package pandas", "is not installed", "Data frames need it: pip install pandas") from None
+        frame = pandas.DataFrame(dict(self.columns))
+        frame.attrs["units"] = dict(self.units)
+        return frame
+
+
+class Tabular:
+    """A result with one row per pose, sample or mode."""
+
+    __slots__ = ()
+    _columns: ClassVar[Columns]
+
+    def table(self) -> Table:
+        """The rows as a table, which prints its first and last rows.
+
+        Returns:
+            Columns by name, with their units: `table["x"]`, `table.units["x"]`.
+
+        Examples:
+            >>> import sagline as sl
+            >>> plan = sl.inverse(sl.load_robot("cogiro"), [(0, 0, 2), (1, 1, 2)])
+            >>> plan.table()["T0"].round(1)
+            array([434.9, 399.2])
+        """
+        found = list(_columns_of(self))
+        return Table({name: values for name, values, _ in found}, {name: unit for name, _, unit in found})
+
+    def to_csv(self, file: os.PathLike[str] | str | None = None) -> str | None:
+        """The rows as CSV; the header has the units in brackets, and NaN is an empty cell.
+
+        Args:
+            file: File to write, atomically; None: the text is returned.
+
+        Returns:
+            The text, or None if a file was written.
+
+        Raises:
+            FileError: If the file cannot be written; an existing file is then unchanged.
+
+        Examples:
+            >>> import sagline as sl
+            >>> plan = sl.inverse(sl.load_robot("cogiro"), (0, 0, 2))
+            >>> print(plan.to_csv()[:24])
+            x [m],y [m],z [m],qx,qy,
+        """
+        return self.table().to_csv(file)
+
+    def to_dataframe(self) -> Any:
+        """The rows as a pandas DataFrame.
+
+        Returns:
+            DataFrame with the columns of `table`; its `attrs["units"]` are their units.
+
+        Raises:
+            FileError: If pandas is not installed.
+
+        Examples:
+            >>> import sagline as sl
+            >>> plan = sl.inverse(sl.load_robot("cogiro"), [(0, 0, 2), (1, 1, 2)])
+            >>> plan.to_dataframe()["status"].tolist()
+            ['SOLVED', 'SOLVED']
+        """
+        return self.table().to_dataframe()
+
+    def to_xarray(self) -> Any:
+        """The result as an xarray Dataset.
+
+        Returns:
+            The data set that `save` writes to a NetCDF file, with units and robot. For results without such a format,
+            the columns of `table` over the dimension row.
+
+        Raises:
+            InvalidValueError: If the result has a cable model, a tension method or a criterion of your own.
+
+        Examples:
+            >>> import sagline as sl
+            >>> plan = sl.inverse(sl.load_robot("cogiro"), [(0, 0, 2), (1, 1, 2)])
+            >>> plan.to_xarray()["chord_tension"].dims
+            ('pose', 'cable')
+        """
+        return formats().dataset_of(self)
+
+
+def _columns_of(result: Tabular) -> Iterator[tuple[str, NDArray[Any], str]]:
+    """Name, values (rows,) and unit of each column that a result has."""
+    for declared in type(result)._columns:
+        text, codes = declared if isinstance(declared, tuple) else (declared, None)
+        text, _, unit = text.removesuffix("]").partition(" [")
+        label, _, place = text.rpartition("=")
+        value, units = _found(result, place)
+        if value is None:
+            continue
+        label, unit = label or place.rpartition(".")[2], unit or ", ".join(units)
+        if hasattr(value, "quaternion"):  # a pose
+            yield from _spread(("x", "y", "z"), value.position, "m")
+            yield from _spread(("qx", "qy", "qz", "qw"), value.quaternion, "")
+        elif "#" in label or "@" in label:
+            parts = "xyz" if "@" in label else map(str, range(value.shape[-1]))
+            yield from _spread([label.replace("#", part).replace("@", part) for part in parts], value, unit)
+        elif codes is not None:
+            yield label, np.array([codes(int(code)).name for code in np.atleast_1d(value)]), ""
+        else:
+            yield label, np.atleast_1d(value), unit
+
+
+def _spread(names: Any, values: NDArray[Any], unit: str) -> Iterator[tuple[str, NDArray[Any], str]]:
+    """One column for each entry of the last axis."""
+    for k, name in enumerate(names):
+        yield name, np.atleast_1d(values[..., k]), unit
+
+
+def _found(result: Any, place: str) -> tuple[Any, list[str]]:
+    """Value of a dotted attribute, and the documented units; None if a part is missing."""
+    units: list[str] = []
+    for name in place.split("."):
+        if result is None:
+            break
+        if name.isdigit():
+            index, size = int(name), result.shape[-1]
+            units = units[index * len(units) // size :][:1]
+            result = result[..., index]
+        else:
+            units = documented_units(type(result), name)
+            result = getattr(result, name)
+    return result, units
