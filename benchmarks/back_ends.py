@@ -1,4 +1,4 @@
-"""Time of the compiled library over that of numba, in one process: `python -m benchmarks.back_ends`."""
+"""Time of the compiled library divided by the time of numba, in one process: `python -m benchmarks.back_ends`."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ POSES, ROUNDS = 400, 15
 
 
 def jobs() -> Iterator[tuple[str, str, Callable[[], object]]]:
-    """Name, entry, and a call of the public interface that reaches it."""
+    """Name of each job, its entry, and a call of a public function that runs this entry."""
     for name in ("cogiro", "ipanema-3", "ipanema-3-pulleys"):
         robot = sl.load_robot(name)
         poses = poses_of(robot, POSES, 1)
@@ -54,7 +54,7 @@ def arrays(value: Any) -> Iterator[Any]:
 
 
 def rows() -> Iterator[Row]:
-    """One row for each job: both are called in turn, and the best times count."""
+    """One row for each job: library and numba are called alternately, and the shortest times count."""
     library = Library.load()
     for name, entry, job in jobs():
         with recorded() as calls:

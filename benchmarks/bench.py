@@ -100,7 +100,7 @@ def speed_of_cables() -> Iterator[Row]:
 
 
 def in_the_box(robot: sl.Robot, count: int) -> sl.Pose:
-    """Feasible poses among `count` random ones of a robot's test box."""
+    """Feasible poses among `count` random poses of a robot's test box."""
     rng, box = np.random.default_rng(3), robot.test_box
     assert box is not None
     pose = sl.Pose.from_euler(rng.uniform(box.low, box.high, (count, 3)), *rng.uniform(-0.05, 0.05, (3, count)))
@@ -108,7 +108,7 @@ def in_the_box(robot: sl.Robot, count: int) -> sl.Pose:
 
 
 def inverse_kinematics() -> Iterator[Row]:
-    """The article's suspended robot on random poses, and one pose at a time."""
+    """Times for random poses of the article's suspended robot in a batch, and for single poses."""
     robot = sl.load_robot("article-suspended")
     rng = np.random.default_rng(1)
     drawn = 6 * POSES // 5  # infeasible poses run other code and are omitted
@@ -146,7 +146,7 @@ def inverse_kinematics() -> Iterator[Row]:
 
 
 def two_threads() -> Iterator[Row]:
-    """Two threads on two cores, half of the poses each, against one thread; runs before `one_core`."""
+    """Two threads on two cores with half of the poses each, compared with one thread; runs before `one_core`."""
     cores = len(os.sched_getaffinity(0))
     if cores < 2:
         return

@@ -101,7 +101,7 @@ def sizes() -> Iterator[Row]:
 
 
 def _work_of(source: Path) -> Path:
-    """A source with the work memory alone."""
+    """A source that contains only the work memory."""
     file = source.with_name("work.c")
     file.write_text('#include "sagline.h"\nextern sagline_work work;\nsagline_work work;\n')
     return file

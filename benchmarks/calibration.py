@@ -30,7 +30,7 @@ MILLION = 1_000_000
 
 
 def problem_of(log: sl.WinchLog) -> FitProblem:
-    """Unknowns of a calibration of CoGiRo by a log."""
+    """Unknowns of a calibration of CoGiRo with a log."""
     sensors = active_sensors(log)
     return FitProblem(
         COGIRO, sl.Catenary(), sensors, parameters_of(COGIRO, UNKNOWNS, sensors, counted=True), readings_table(log)
@@ -136,7 +136,7 @@ def large() -> Iterator[Row]:
 
 
 def poses() -> Iterator[Row]:
-    """40 recommended poses of 500 for 63 unknowns, compared with random poses."""
+    """40 poses that are selected from 500 for 63 unknowns, compared with random poses."""
     for name in ("cogiro", "article-suspended"):
         robot, sensors = with_drums(name), usual_sensors()
         seconds = best_seconds(lambda robot=robot, sensors=sensors: sl.calibration_poses(robot, 40, ALL, sensors), 3)  # type: ignore[misc]

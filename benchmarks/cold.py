@@ -51,7 +51,7 @@ print(sl.inverse(sl.load_robot("cogiro"), sl.Pose.from_euler([0.2, -0.4, 2.4], 0
 
 
 def process(arguments: Sequence[str]) -> tuple[float, float, str]:
-    """Wall seconds, processor seconds of a process and its children, and its standard output."""
+    """Wall time and processor time [s] of a process with its children, and its standard output."""
     before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
     done = subprocess.run(arguments, check=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
     wall, after = time.perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -59,7 +59,7 @@ def process(arguments: Sequence[str]) -> tuple[float, float, str]:
 
 
 def commands() -> Iterator[Row]:
-    """The first length, a robot along a path, and the article's test."""
+    """Times of the first length, of a robot along a path, and of the article's test."""
     with tempfile.TemporaryDirectory() as folder:
         out = ("--out", str(Path(folder) / "out"))
         for name, reach, command in (

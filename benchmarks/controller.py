@@ -31,7 +31,7 @@ class Timed(Spy):
 
 
 def cycles() -> Iterator[Row]:
-    """Home and the ten poses without stops: time of the controller in each cycle."""
+    """Time of the controller in each cycle, for homing and the ten poses without stops."""
     control, machine = rig(imperfect(zero=2e-3))
     link = control._context.link = Timed(machine.link())
     path = sl.quintic_path([HOME.position, *table2().desired], speed=0.2)
@@ -56,7 +56,7 @@ def cycles() -> Iterator[Row]:
 
 
 def stops() -> Iterator[Row]:
-    """Fourteen minutes through the ten poses."""
+    """Times of a run of fourteen minutes through the ten poses."""
     right = tour(imperfect(), SPEED, STAND)
     mean, most = 1e3 * right.error.mean(), 1e3 * right.error.max()
     yield Row("pose error at the ten stops, perfect parameters", "<= 0.05 mm", f"{mean:.3f} mean, {most:.3f} mm worst")

@@ -1,6 +1,7 @@
 """Lateness of the cycles of a controller that drives a twin in another process over S7, in real time.
 
-`python -m benchmarks.cycles --minutes 14`: on a computer without other work. `--priority` is that of `sagline control`.
+`python -m benchmarks.cycles --minutes 14`: on a computer without other work. `--priority` has the same meaning as in
+`sagline control`.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from sagline.control.real_time import set_priority
 from sagline.core.arrays import Array
 from sagline.twin.server import machine_in_process
 
-LATE = 5e-3  # a cycle that is later counts for the fault "cycle late" [s]
+LATE = 5e-3  # cycles with a larger lateness count for the fault "cycle late" [s]
 SPEED = 0.1  # of the tour through the ten poses [m/s]
 LONG = 0.004  # speed of a path that takes a quarter of an hour [m/s]
 CORNERS = ([0.4, 0.3, 1.5], [-0.4, 0.3, 1.5])  # of this path [m]
@@ -43,7 +44,7 @@ class NotedPace(sl.control.Pace):
 
 
 def tours(control: sl.control.Controller, pace: NotedPace, minutes: float, home: sl.Pose) -> Iterator[Row]:
-    """Tours through the ten poses; each is planned while the platform stands."""
+    """Tours through the ten poses; each tour is planned while the platform is at rest."""
     path = sl.quintic_path([home.position, *table2().desired, home.position], speed=SPEED)
     events = len(control.events)
     pace.late.clear()
@@ -63,7 +64,7 @@ def tours(control: sl.control.Controller, pace: NotedPace, minutes: float, home:
 
 
 def planning(control: sl.control.Controller, pace: NotedPace, home: sl.Pose) -> Iterator[Row]:
-    """Plans of a path of a quarter of an hour beside the cycles."""
+    """Plan a path of a quarter of an hour repeatedly, while the cycles continue."""
     path = sl.septic_path([home, *(sl.Pose(place, np.eye(3)) for place in CORNERS), home], speed=LONG)
     pace.late.clear()
     for _ in range(PLANS):

@@ -52,7 +52,7 @@ def percent(flags: Flags) -> str:
 
 
 def far_starts(share: float) -> Iterator[Row]:
-    """CoGiRo from starts with errors of a meter and up to 40 degrees."""
+    """CoGiRo with start poses that have errors of a meter and up to 40 degrees."""
     plan = plan_of(sl.load_robot("cogiro"), int(share * BOX_POSES), seed=1)
     pose, count = plan.state.pose, len(plan.unstrained_length)
     for degrees in (2.0, 10.0, 20.0, 40.0):
@@ -65,7 +65,7 @@ def far_starts(share: float) -> Iterator[Row]:
 
 
 def without_start(share: float) -> Iterator[Row]:
-    """Every preset from its lengths alone, and from the plan's own poses."""
+    """Every preset without a start pose, and with the planned poses as start poses."""
     worst_shift, worst_turn, worst_force = 0.0, 0.0, 0.0
     for name in sl.robot_names():
         robot = wider(sl.load_robot(name))
@@ -104,7 +104,7 @@ def walk(robot: sl.Robot, count: int) -> tuple[sl.Pose, sl.Plan]:
 
 
 def speed(share: float) -> Iterator[Row]:
-    """Times per solution: tracking, distant starts, no starts, and single samples from Python."""
+    """Times per solution: tracking, distant start poses, no start pose, and single samples from Python."""
     robot = sl.load_robot("cogiro")
     pose, plan = walk(robot, TIMED_POSES)
     lengths = plan.unstrained_length
@@ -128,7 +128,7 @@ def speed(share: float) -> Iterator[Row]:
 
 
 def derivatives(share: float) -> Iterator[Row]:
-    """Sensitivities against central differences, which are extrapolated from two steps."""
+    """Sensitivities, compared with central differences that are extrapolated from two step sizes."""
     robot = sl.load_robot("cogiro")
     plan = plan_of(robot, 20, seed=6)
     pose, lengths = plan.state.pose, plan.unstrained_length

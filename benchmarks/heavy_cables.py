@@ -1,6 +1,6 @@
-"""Hulls of robots with heavy cables against verdicts of the inverse: `python -m benchmarks.heavy_cables 1000000 20`.
+"""Hulls of robots with heavy cables, compared with the inverse: `python -m benchmarks.heavy_cables 1000000 20`.
 
-The arguments are the number of verdicts for each robot, and the number of random robots; without them 20,000 and 3.
+The arguments are the number of verdicts for each robot, and the number of random robots. The defaults are 20,000 and 3.
 """
 
 from __future__ import annotations

@@ -44,7 +44,7 @@ def measured(rows: Array, pairs: Indices, precision: float, together: bool = Fal
 
 
 def pairs_of_cables() -> Iterator[Row]:
-    """Two sagging cables, and all pairs of a pose."""
+    """Distances of two sagging cables, and of all pairs of a pose."""
     for name in ROBOTS:
         state = states(name)
         rows = locked(cable_rows(state, np.zeros(1)))
@@ -67,7 +67,7 @@ def brute_force() -> Iterator[Row]:
 
 
 def obstacles() -> Iterator[Row]:
-    """Cables against obstacles."""
+    """Distances between cables and obstacles."""
     state = states("cogiro")
     robot = state.one_robot
     around = (

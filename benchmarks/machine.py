@@ -85,7 +85,7 @@ def course(robot: sl.Robot) -> sl.Path:
 
 
 def formula() -> Iterator[Row]:
-    """Error of catenaries from the exit points of straight cables, compared with exact cables over pulleys."""
+    """Error of catenaries that start at the exit points of straight cables, compared with exact cables over pulleys."""
     for dead in (0.0, 4.0):
         worst = 0.0
         for name in ROBOTS:

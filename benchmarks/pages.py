@@ -1,4 +1,4 @@
-"""Shared pages: sizes, and the times of their kernels in node beside those of Python."""
+"""Sizes of shared pages, and times of their kernels in node and in Python."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ UPDATES, LARGEST = 60, 400  # updates per second, kB
 
 
 def rows_of_robot(robot: sl.Robot, folder: Path) -> list[Row]:
-    """Size of the page; microseconds of one solved pose in node and in Python, whose batch is one call."""
+    """Size of the page, and time of one pose in node and in Python [µs]; Python solves a batch in one call."""
     pose = poses(robot, POSES)
     plan = sl.inverse(robot, pose)
     held = np.flatnonzero(plan.feasible)

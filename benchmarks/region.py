@@ -1,6 +1,6 @@
-"""The region in the viewer: its time after the move of a slider, and the update rate of the page meanwhile.
+"""The region in the viewer: time after the move of a slider, and update rate of the page during this time.
 
-Wall times, with a client that receives the messages of a browser; they depend on the load of the machine.
+The values are wall times, which depend on the load of the machine. A client receives the messages instead of a browser.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Sweeps: workers against a plain loop, and 31 million tension requests of a planar robot of four cables; all cores."""
+"""Sweeps on all cores: workers and a plain loop, and 31 million tension requests of a planar robot with four cables."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def in_a_loop_and_on_workers() -> Iterator[Row]:
 
 
 def without_the_start() -> Iterator[Row]:
-    """Tasks per second of one worker and of two after their start, as in a long sweep."""
+    """Tasks per second of one worker and of two workers, without their start, as in a long sweep."""
     from sagline.sweep.cluster import local_workers, run_tasks
 
     request = asked(POSES // 4, LOADS)  # about twenty tasks; the first and the last would dominate fewer tasks

@@ -55,7 +55,7 @@ SAG = {"PNorm(p=4)": 5, "PNorm(p=16)": 5, "AnalyticCenter": 5}  # additional mic
 def share_batch(  # type: ignore[no-untyped-def]
     sharing_terms, strips, nulls, references, room, previous, otherwise, statuses
 ):
-    """The tension distribution alone, of many factored poses; otherwise as in `inverse_poses`."""
+    """Tension distribution of many factored poses, without the other steps of `inverse_poses`."""
     sharing = Distribution(*sharing_terms)
     r, m = nulls[0].shape
     near, rest = new_reference_point(Memory(*room), previous, r)
@@ -114,7 +114,7 @@ def times() -> Iterator[Row]:
 
 
 def verdicts() -> Iterator[Row]:
-    """Random poses of all presets in and around their test boxes, under wrenches: each verdict proved."""
+    """Random poses of all presets in and around their test boxes, under wrenches; each verdict is proved."""
     rng, robots = np.random.default_rng(1), list(presets())
     chunk = 5000
     rounds = -(-VERDICTS // (chunk * len(robots)))
@@ -144,7 +144,7 @@ def continuity() -> Iterator[Row]:
 
 
 def _steepest(name: str, method: sl.TensionMethod, count: int) -> float:
-    """Largest slope of a tension along a line through the test box, beside its middle [upper limits per meter]."""
+    """Largest slope of a tension along a line through the test box, near its middle [upper limits per meter]."""
     robot = sl.load_robot(name)
     box = robot.test_box
     assert box is not None

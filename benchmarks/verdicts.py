@@ -48,7 +48,7 @@ def in_the_open(name: str) -> Row:
 
 
 def at_the_border(name: str) -> Iterator[Row]:
-    """Poses with a load slightly above the largest feasible one."""
+    """Poses with a load slightly above the largest feasible load."""
     border = found_border(name, 100, 3)
     weight = border.robot.mass * border.robot.gravity
     for over in OVERLOADS:

@@ -36,7 +36,7 @@ def cables() -> Iterator[Row]:
 
 
 def robots() -> Iterator[Row]:
-    """Robots: stored finite elements, the exact count, other element sizes."""
+    """Robots, compared with stored finite elements, with the exact count and with other element sizes."""
     for position, expected in LOWEST_SIX.items():
         found = sl.vibration(at("article-suspended", position), up_to=3.0).frequency[:6]
         off = np.abs(found - expected).max()

@@ -1,4 +1,4 @@
-"""Times of the viewer, warm: `python -m benchmarks.viewer`. Another process is the server; this one is the clients."""
+"""Times of the viewer, warm: `python -m benchmarks.viewer`. The clients run in this process."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ SETTINGS = ((24, 0.5), (64, 2.0))  # number of cells, and longest time [s]
 
 
 def hulls() -> Iterator[Row]:
-    """4,098 rays of ipanema-1, 1 to 10 N, no gravity: its workspace in WireX (9.734 m3 in 0.13 s)."""
+    """4,098 rays of ipanema-1 with 1 to 10 N and without gravity; WireX computes 9.734 m3 in 0.13 s."""
     robot, low, high = ipanema()
     for model, reach in zip(MODELS, (0.13, 0.2), strict=True):
         level = level_of(robot, model)

@@ -13,7 +13,7 @@ still = sl.inverse(robot, path.pose, tension=sl.MinimumNorm())
 
 
 def follow(these: sl.Plan) -> list[float]:
-    """Distance from the path [m], every ms, to three seconds after its end."""
+    """Distance from the path [m], every ms, until 3 seconds after its end."""
     machine = sl.Simulator(robot, plan.state[0])
     lengths = these.unstrained_length
     tensions = these.state.cables.frame_end_tension

@@ -1,6 +1,6 @@
 """`python -m tools.build`: build what the package contains in addition to Python, if it is not up to date.
 
-Building needs a C compiler: the one that the environment variable CC names, `cc`, or that of the package ziglang.
+Building needs a C compiler: the compiler in the environment variable CC, `cc`, or the compiler of the package ziglang.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ FLAGS: Final = (
 # flags of the two files; gcc 12 contracts one expression in spite of -ffp-contract=off
 LEVELS: Final = (("-O2",), ("-O3", "-march=x86-64-v3", "-mno-fma"))
 ZIG: Final = [sys.executable, "-m", "ziglang", "cc", "-mcpu=baseline", "-s"]
-ZIG_LEVELS: Final = (("-O3",),)  # only the file for every processor: zig cannot ask for the kind of processor
+ZIG_LEVELS: Final = (("-O3",),)  # only the file for every processor: zig cannot detect the kind of processor
 
 
 class BuildError(Exception):
@@ -80,7 +80,7 @@ def is_x86() -> bool:
 
 
 def _compile(source: Path, files: list[Path]) -> None:
-    """Compile the files at the same time, with the first compiler that can."""
+    """Compile the files at the same time, with the first compiler that can compile them."""
     reasons = []
     for command in compilers():
         start = time.monotonic()
@@ -116,7 +116,7 @@ def _compile(source: Path, files: list[Path]) -> None:
 
 
 def main() -> int:
-    """Build; 2 with the reason on standard error if that is not possible."""
+    """Build. Exit code 2, with the reason on standard error, if the build is not possible."""
     sys.path[:0] = [str(ROOT), str(ROOT / "src")]
     from tools.translate.types import TranslationError
 

@@ -17,7 +17,7 @@ class Hook(BuildHookInterface[Any]):
     """Builds the library before the files of a wheel are collected."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Build; a wheel with the library is for this platform and any Python."""
+        """Build the library; a wheel that contains it is for this platform and any version of Python."""
         if LATER:
             return
         # another process, because the translator imports the package

@@ -1,8 +1,8 @@
 """Size of the source: `make size` prints one table of counts, to compare a change with the state before.
 
 Code lines are lines with a token that is neither a comment nor part of a docstring. A record type is a NamedTuple, a
-dataclass or an attrs class. A public-looking name is that of a function or class at the top of a module that does not
-begin with an underscore. An inner function is one that no public name reaches.
+dataclass or an attrs class. A public-looking name is the name of a function or class at the top of a module, without an
+underscore at its beginning. An inner function is one that no public name reaches.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def import_lines(tree: ast.Module) -> int:
 
 
 def public_values() -> dict[str, Any]:
-    """Public values by name: those of `sagline`, and those that only a group has, as `plot.tensions`."""
+    """Public values by name: the values of `sagline`, and values of a group alone, such as `plot.tensions`."""
     import sagline
     from sagline.core.surface import public_names
 
@@ -95,14 +95,14 @@ def public_functions() -> dict[tuple[str, str], FunctionType]:
 
 
 def overrides_documented(module: str, name: str) -> bool:
-    """True for a method that overrides one of a base class with an Args section."""
+    """True for a method that overrides a method of a base class with an Args section."""
     kind, _, method = name.rpartition(".")
     bases = getattr(sys.modules[module], kind).__mro__[1:]
     return any("Args:" in (getattr(vars(base).get(method), "__doc__", None) or "") for base in bases)
 
 
 def without_args() -> list[str]:
-    """Public methods with parameters but no Args section, neither their own nor that of the method they override."""
+    """Public methods with parameters, if neither the method nor the overridden method has an Args section."""
     found = []
     for (module, name), function in public_functions().items():
         parameters = set(inspect.signature(function).parameters) - {"self", "cls"}

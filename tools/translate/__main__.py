@@ -11,7 +11,7 @@ from tools.translate.types import TranslationError
 
 
 def main(arguments: list[str]) -> int:
-    """Write the file; 2 with one line on standard error if that is not possible."""
+    """Write the file. Exit code 2, with one line on standard error, if this is not possible."""
     if len(arguments) != 1:
         print("usage: python -m tools.translate OUT.c", file=sys.stderr)
         return 2

@@ -1,9 +1,9 @@
 """Largest number of floating-point operations of a kernel, and the work memory that it takes.
 
-The body is run with bounds instead of values: every branch that is not decided by known values counts with the more
-expensive side, what follows a return is added, and every loop counts with the largest number of its passes. A loop over
-an unknown count is bounded by the array that its variable indexes. Operations are + - * / of floats; a function of the
-C library counts as one.
+The body is run with bounds instead of values. If known values do not decide a branch, its more expensive side counts.
+Statements after a return are added. A loop counts with the largest number of its passes. A loop over an unknown count
+is bounded by the array that its variable indexes. Operations are + - * / of floats; a function of the C library counts
+as one.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from tools.translate.operations import Values
 from tools.translate.program import definition
 
 Names = dict[str, Value]
-PASSES: Final = 6  # over the body of a loop, until its variables stay
+PASSES: Final = 6  # over the body of a loop, until the bounds of its variables do not change
 
 
 class Bounds:
@@ -80,7 +80,7 @@ class _Body(Values):
         return any(self.statement(node) for node in nodes)
 
     def statement(self, node: ast.stmt) -> bool:
-        """Run a statement; True if it returns on every way."""
+        """Run a statement; True if it returns on every path."""
         match node:
             case ast.Assign():
                 value = self.value(node.value)
@@ -122,7 +122,7 @@ class _Body(Values):
         return first and second
 
     def loop(self, node: ast.For) -> None:
-        """The body, until the bounds of its variables stay; its cost counts once for each pass."""
+        """Run the body until the bounds of its variables do not change; its cost counts once for each pass."""
         assert isinstance(node.target, ast.Name)
         name = node.target.id
         variable, passes = self.range_of(node.iter)
@@ -187,7 +187,7 @@ class _Body(Values):
 
 
 def _both(one: Names, two: Names) -> Names:
-    """Variables after two ways."""
+    """Variables after either of two branches."""
     return {name: joined(one.get(name), two[name]) if name in two else one[name] for name in {**one, **two}}
 
 

@@ -1,6 +1,6 @@
 """Bounds of integers as polynomials in n, the degrees of freedom, and r, the redundant cables: m = n + r cables.
 
-Both are at least zero, so that the larger coefficient of each term bounds two polynomials from above.
+Both are nonnegative. The larger coefficient of each term therefore gives an upper bound of two polynomials.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ class Polynomial:
         return polynomial(found)
 
     def most(self, other: Polynomial) -> Polynomial:
-        """Bound of both from above."""
+        """Upper bound of both polynomials."""
         return self._combined(other, max)
 
     def least(self, other: Polynomial) -> Polynomial:
-        """Bound of both from below."""
+        """Lower bound of both polynomials."""
         return self._combined(other, min)
 
 
@@ -143,7 +143,7 @@ def _bounds(value: Value) -> tuple[Polynomial | None, Polynomial | None]:
 
 
 def widened(old: Value, new: Value) -> Value:
-    """The new value, without the bounds of integers that have moved."""
+    """The new value, without the bounds of integers that have changed."""
     if isinstance(old, Int) and isinstance(new, Int):
         return Int(new.low if new.low == old.low else None, new.high if new.high == old.high else None)
     if isinstance(old, Record) and isinstance(new, Record):

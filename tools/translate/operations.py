@@ -147,7 +147,7 @@ class Values:
         return one
 
     def binary(self, op: ast.operator, one: Value, two: Value) -> Value:
-        """An operation; one of floats counts."""
+        """An operation; an operation of floats counts."""
         if isinstance(one, Record) and isinstance(two, Record):
             return Record(one.fields + two.fields, one.items + two.items)
         if FLOAT in (one, two) or isinstance(op, ast.Div):
@@ -296,7 +296,7 @@ def _ordinary_size(bound: Polynomial) -> int:
 
 
 def _all(bounds: list[Polynomial | None], rule: Callable[[Polynomial, Polynomial], Polynomial]) -> Polynomial | None:
-    """A bound of all, if all are known."""
+    """A bound of all values, if all their bounds are known."""
     known = [each for each in bounds if each is not None]
     return reduce(rule, known) if len(known) == len(bounds) else None
 

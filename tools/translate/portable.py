@@ -94,7 +94,7 @@ ENTRIES: Final[tuple[tuple[str, str, tuple[Type, ...]], ...]] = (
 
 
 def parts() -> Iterator[tuple[list[str], str]]:
-    """Names and text of each part, in the order in which C needs them; no names for what every source begins with."""
+    """Names and text of each part, in the order of C; the common beginning of all sources has no names."""
     program = Program()
     for entry, symbol, types in ENTRIES:
         program.export(s.functions()[entry], types, symbol)
@@ -125,7 +125,7 @@ def single_constants() -> Iterator[None]:
 
 
 def in_single(text: str) -> str:
-    """The same text with numbers and functions of single precision; comments stay."""
+    """The same text with numbers and functions of single precision; comments do not change."""
     comments, code = COMMENT.findall(text), COMMENT.split(text)
     found = [FUNCTION.sub(r"\1f(", NUMBER.sub(r"\1F", part.replace("double", "float"))) for part in code]
     return "".join(each for pair in zip(found, [*comments, ""], strict=True) for each in pair)

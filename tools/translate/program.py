@@ -40,7 +40,7 @@ ELEMENTS: Final = {
 def definition(function: FunctionType) -> ast.FunctionDef:
     """Syntax tree of a function, with its decorators and the lines of its file."""
     lines, _ = inspect.findsource(function)
-    first = function.__code__.co_firstlineno  # that of the first decorator; of `def` where a back end removed them
+    first = function.__code__.co_firstlineno  # of the first decorator, or of `def` without decorators
     named = (node for node in ast.walk(_tree("".join(lines))) if getattr(node, "name", "") == function.__name__)
     definitions = (node for node in named if isinstance(node, ast.FunctionDef))
     return next(each for each in definitions if first in (each.lineno, *(line.lineno for line in each.decorator_list)))

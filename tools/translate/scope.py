@@ -146,7 +146,7 @@ class Scope:
 
     @contextmanager
     def aside(self, deeper: int = 0) -> Iterator[list[str]]:
-        """Collect lines apart from those of the function."""
+        """Collect lines separately from the lines of the function."""
         lines, self.lines = self.lines, []
         self.depth += deeper
         try:
@@ -160,7 +160,7 @@ class Scope:
         return f"t_{self.temporaries}"
 
     def hold(self, value: Value) -> Value:
-        """The value under a name, so that it can be repeated."""
+        """Assign the value to a variable, so that it can be used repeatedly."""
         if PATH.fullmatch(value.text):
             return value
         name = self.temporary()

@@ -144,7 +144,7 @@ SL_HELPER double sl_absolute(double _Complex a) { return hypot(creal(a), cimag(a
 
 
 def _elements() -> str:
-    """Macros for an element of an array by its indices: AT for contiguous arrays, VIEW for those with strides."""
+    """Macros for an element of an array by its indices: AT for contiguous arrays, VIEW for arrays with strides."""
     lines = ["", "/* Elements of contiguous arrays, and of views with strides. */"]
     for rank in range(1, RANKS):
         names = [f"i{axis}" for axis in range(rank)]

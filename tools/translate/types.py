@@ -24,7 +24,7 @@ class TranslationError(Exception):
 
 
 class JoinError(Exception):
-    """Two types without a common one."""
+    """Two types without a common type."""
 
 
 class Scalar(IntEnum):

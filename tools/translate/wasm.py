@@ -31,7 +31,7 @@ def source() -> str:
 
 
 def compile_c(text: str, target: str, out: Path, *options: str) -> None:
-    """Compile C by the compiler in the package ziglang, with the C library of a target; write the file whole or not."""
+    """Compile C by the compiler in the package ziglang, with the C library of a target; write the file atomically."""
     with tempfile.TemporaryDirectory(dir=out.parent, prefix=".kernels") as folder:
         code, made = Path(folder) / "kernels.c", Path(folder) / out.name
         code.write_text(text, encoding="utf-8")
