@@ -36,12 +36,7 @@ MOST_POSES: Final = 1500  # largest number of drawn poses; of more, evenly chose
 MOST_NAMED: Final = 8  # largest number of named outliers
 POINTS: Final = 25  # points along each side of a map
 MARKS: Final = ("o", "s", "^", "D")
-PANEL, MATRIX, BESIDE, MAP = (
-    0.95,
-    3.2,
-    1.2,
-    2.7,
-)  # [in]: heights of panel and matrix, extra height and width of a map
+PANEL, MATRIX, BESIDE, MAP = 1.3, 3.8, 1.2, 2.7  # [in]: heights of panel and matrix, extra height and width of a map
 LINE: Final = 1.3 / 72.0 / (0.75 * MATRIX)  # height of a name of 1 pt next to the matrix, as a share of its height
 LEADER: Final[dict[str, Any]] = {"arrowstyle": "-", "linewidth": 0.5, "relpos": (1.0, 0.5), "shrinkB": 0.0}
 ROUND: Final = FuncFormatter(lambda value, _: f"{value:g}")
