@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import ArrayLike
 
 import sagline as sl
-from sagline.viewer.tension_scale import GRAY, TensionScale
+from sagline.viewer.tension_scale import GRAY, TensionScale, cable_color
 
 SCALE = TensionScale(10.0, 1000.0)
 
@@ -56,6 +56,13 @@ def test_tensions_are_told_apart_whatever_colors_one_sees(sight: str) -> None:
     apart = np.linalg.norm(seen[:, None] - seen, axis=2)[~np.eye(9, dtype=bool)]
     assert apart.min() > 8.0
     assert np.all(np.diff(seen[:, 2]) > 0.0)  # ever less blue, more yellow
+
+
+@pytest.mark.parametrize("sight", SIGHTS)
+def test_eight_cables_are_told_apart_whatever_colors_one_sees(sight: str) -> None:
+    seen = lab(linear([cable_color(k) for k in range(8)]) @ np.transpose(SIGHTS[sight]))
+    apart = np.linalg.norm(seen[:, None] - seen, axis=2)[~np.eye(8, dtype=bool)]
+    assert apart.min() > 20.0
 
 
 def test_linear_colors_come_back_through_the_srgb_curve() -> None:

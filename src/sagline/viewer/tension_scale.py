@@ -14,11 +14,11 @@ from sagline.robot.robot import Robot
 
 Color = tuple[int, int, int]  # red, green and blue, 0 to 255
 
-# The most different hues come first, because most robots have up to eight cables. Each color is visible on a white and
-# on a dark background.
+# Most robots have up to eight cables. The first eight colors differ for all kinds of color vision. Each color is
+# visible on a white and on a dark background.
 CABLES: Final[tuple[Color, ...]] = (
-    (14, 147, 132), (232, 160, 32), (122, 92, 196), (94, 156, 60), (206, 84, 128), (24, 135, 196),
-    (158, 104, 66), (150, 146, 20), (70, 96, 210), (210, 100, 56), (44, 170, 110), (176, 80, 176),
+    (17, 118, 142), (217, 167, 10), (98, 93, 240), (130, 190, 106), (238, 149, 166), (154, 169, 240),
+    (130, 99, 81), (104, 114, 21), (70, 96, 210), (210, 100, 56), (44, 170, 110), (176, 80, 176),
     (80, 140, 150), (196, 146, 96), (124, 164, 30), (160, 60, 80),
 )  # fmt: skip
 NONE: Final[Color] = (150, 155, 162)  # color without a limiting cable
