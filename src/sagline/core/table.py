@@ -112,7 +112,7 @@ class Tabular:
             >>> import sagline as sl
             >>> plan = sl.inverse(sl.load_robot("cogiro"), [(0, 0, 2), (1, 1, 2)])
             >>> plan.table()["T0"].round(1)
-            array([434.9, 399.2])
+            array([370.6, 302.4])
         """
         found = list(_columns_of(self))
         return Table({name: values for name, values, _ in found}, {name: unit for name, _, unit in found})
