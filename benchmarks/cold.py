@@ -77,7 +77,7 @@ def viewer() -> Iterator[Row]:
     _, _, shown = process((sys.executable, "-c", VIEW, str(time.time())))
     first, region = map(float, shown.split())
     yield Row("sagline view cogiro: cables and all readings", "<= 15 s", f"{first:.1f} s")
-    yield Row("region of the platform, after these", "<= 10 s", f"{region - first:.1f} s")
+    yield Row("region of the platform, after the readings", "<= 10 s", f"{region - first:.1f} s")
 
 
 def main() -> None:

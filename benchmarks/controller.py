@@ -47,11 +47,15 @@ def cycles() -> Iterator[Row]:
     whole = time.perf_counter() - whole
     half, rare = 1e3 * np.quantile(own, (0.5, 0.999))
     real = control.period * len(own) / whole
-    yield Row("compute of a cycle: forward, law, faults", "p50 0.2, p99.9 0.5 ms", f"{half:.3f}, {rare:.3f} ms")
+    yield Row(
+        "computing time of a cycle: forward kinematics, control law, faults",
+        "p50 0.2, p99.9 0.5 ms",
+        f"{half:.3f}, {rare:.3f} ms",
+    )
     yield Row(
         "controller and machine, of real time", ">= 80", f"{real:.0f} ({1e6 * whole / len(own):.0f} us per cycle)"
     )
-    yield Row("of that the machine", "", f"{1e6 * link.seconds / len(own):.0f} us per cycle")
+    yield Row("part of the machine in this time", "", f"{1e6 * link.seconds / len(own):.0f} us per cycle")
     yield Row(f"planning and checking {path.duration:.0f} s", "", f"{planning:.2f} s, {path.duration / planning:.0f} x")
 
 
@@ -63,8 +67,16 @@ def stops() -> Iterator[Row]:
     on, off = (tour(imperfect(zero=2e-3), SPEED, STAND, loop=loop) for loop in (None, OFF))
     errors = [float(np.sqrt(np.mean(one.tension**2))) for one in (off, on)]
     moved = 1e3 * np.linalg.norm(on.place - off.place, axis=1).max()
-    yield Row("zeros wrong by 2 mm rms: null-space tension", "<= 1.5 N", f"{errors[0]:.1f} -> {errors[1]:.2f} N")
-    yield Row("platform displacement by the loop", "<= 0.05 mm", f"{moved:.3f} mm, acting {1e2 * on.acting:.1f} %")
+    yield Row(
+        "length zeros wrong by 2 mm rms: tension error in the null space",
+        "<= 1.5 N",
+        f"{errors[0]:.1f} -> {errors[1]:.2f} N",
+    )
+    yield Row(
+        "displacement of the platform by the tension loop",
+        "<= 0.05 mm",
+        f"{moved:.3f} mm, acting {1e2 * on.acting:.1f} %",
+    )
 
 
 PARTS = (cycles, stops)

@@ -72,7 +72,7 @@ def planning(control: sl.control.Controller, pace: NotedPace, home: sl.Pose) -> 
     late = np.array(pace.late)
     rare, most = 1e3 * np.quantile(late, (0.99, 1.0))
     measured = f"{rare:.2f}, {most:.2f} ms; {_beyond(late, LATE)} of {len(late):,} later than 5 ms"
-    yield Row(f"lateness beside plans of {path.duration / 60.0:.0f} minutes: 99 %, largest", "", measured)
+    yield Row(f"lateness during plans of {path.duration / 60.0:.0f} minutes: 99 %, largest", "", measured)
 
 
 def _beyond(late: Array, limit: float) -> int:

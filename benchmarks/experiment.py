@@ -19,7 +19,7 @@ def experiment() -> Iterator[Row]:
     speed = f"{took:.0f} s, {found.duration / took:.0f} x"
     yield Row(f"the experiment, {found.duration / 60:.1f} minutes of a machine", "<= 30 s", speed)
     error = f"{1e3 * found.distance.mean():.3f} mm in the mean, {1e3 * found.distance.max():.3f} mm at most"
-    yield Row("pose error at its ten stops, cells 1 N noise and 2 N bias, 15 N stiction", "<= 0.05 mm", error)
+    yield Row("pose error at the ten stops; cells with 1 N noise and 2 N bias, 15 N stiction", "<= 0.05 mm", error)
 
 
 PARTS = (experiment,)

@@ -84,9 +84,9 @@ def without_start(share: float) -> Iterator[Row]:
         worst_turn = max(worst_turn, float(angle_error(back, pose).max()))
         load = robot.mass * robot.gravity
         worst_force = max(worst_force, float(back.wrench_residual[:, 0].max()) / max(load, 1.0))
-    yield Row("inverse and forward there and back, all presets: position; rotation", "1e-9 m; 1e-9 rad",
+    yield Row("pose error after inverse and forward kinematics, all presets: position; rotation", "1e-9 m; 1e-9 rad",
               f"{worst_shift:.1e} m; {worst_turn:.1e} rad")  # fmt: skip
-    yield Row("unbalanced force then, of the platform's weight", "", f"{worst_force:.1e}")
+    yield Row("unbalanced force after that, relative to the platform's weight", "", f"{worst_force:.1e}")
 
 
 def walk(robot: sl.Robot, count: int) -> tuple[sl.Pose, sl.Plan]:
@@ -110,13 +110,13 @@ def speed(share: float) -> Iterator[Row]:
     lengths = plan.unstrained_length
     assert plan.feasible.all()
     time = best_seconds(lambda: sl.forward(robot, lengths, start=pose[0])) / len(lengths)
-    yield Row("tracking CoGiRo (2 mm, 1 mrad steps), batch", "≤ 25 µs per solve", f"{1e6 * time:.1f} µs")
+    yield Row("trajectory of CoGiRo (steps of 2 mm and 1 mrad), batch", "≤ 25 µs per solve", f"{1e6 * time:.1f} µs")
     plan = plan_of(robot, TIMED_POSES, seed=4)
     start = moved(plan.state.pose, 1.0, 20.0, seed=5)
     time = best_seconds(lambda: sl.forward(robot, plan.unstrained_length, start=start)) / len(start)
-    yield Row("far start (1 m, 20°), batch", "≤ 150 µs", f"{1e6 * time:.1f} µs")
+    yield Row("start pose wrong by 1 m and 20°, batch", "≤ 150 µs", f"{1e6 * time:.1f} µs")
     time = best_seconds(lambda: sl.forward(robot, plan.unstrained_length)) / len(start)
-    yield Row("no start, batch", "", f"{1e6 * time:.1f} µs")
+    yield Row("no start pose, batch", "", f"{1e6 * time:.1f} µs")
     solver = sl.ForwardSolver(robot, start=pose[0])
     rows = [row.copy() for row in lengths]
     position, quaternion = np.empty(3), np.empty(4)
@@ -153,8 +153,8 @@ def derivatives(share: float) -> Iterator[Row]:
 
     compliance = max(worst(found.compliance[..., k], slope(pushed(k), 10.0)) for k in range(6))
     by_length = max(worst(found.length_sensitivity[..., i], slope(wound(i), 2e-4)) for i in range(8))
-    yield Row("compliance against central differences, relative", "1e-7", f"{compliance:.1e}")
-    yield Row("sensitivity to lengths against central differences, relative", "1e-7", f"{by_length:.1e}")
+    yield Row("relative difference of compliance and central differences", "1e-7", f"{compliance:.1e}")
+    yield Row("relative difference of length sensitivity and central differences", "1e-7", f"{by_length:.1e}")
 
 
 def main(share: float = 1.0) -> list[Row]:

@@ -63,7 +63,7 @@ def pairs_of_cables() -> Iterator[Row]:
 def brute_force() -> Iterator[Row]:
     """The sixty nearest pairs of four robots, compared with dense samples and a simplex search."""
     worst = agreement(nearest_cable_pairs())
-    yield Row("60 nearest cable pairs against 1,501 x 1,501 points and simplex", "1e-12 m", f"{worst:.0e} m")
+    yield Row("60 nearest cable pairs, compared with 1,501 x 1,501 points and simplex", "1e-12 m", f"{worst:.0e} m")
 
 
 def obstacles() -> Iterator[Row]:
@@ -78,11 +78,15 @@ def obstacles() -> Iterator[Row]:
     alone = best_seconds(lambda: ClearanceRows(robot).distances(state), RUNS)
     rows = ClearanceRows(robot, around)
     seconds = best_seconds(lambda: rows.distances(state), RUNS) - alone
-    yield Row("a cable against a box, a ball or a rod, to 0.1 mm", "", f"{1e6 * seconds / len(state) / 24:.2f} us")
+    yield Row(
+        "distance of a cable and a box, a ball or a rod, to 0.1 mm", "", f"{1e6 * seconds / len(state) / 24:.2f} us"
+    )
     meshed = ClearanceRows(robot, (box_mesh([1.0, 2.0, 1.0], [3.0, 1.0, 0.5]),))
     some = state[:20]
     seconds = best_seconds(lambda: meshed.distances(some), 3)
-    yield Row("a cable against a mesh of 12 triangles, to 0.1 mm", "", f"{1e6 * seconds / len(some) / 8:.0f} us")
+    yield Row(
+        "distance of a cable and a mesh of 12 triangles, to 0.1 mm", "", f"{1e6 * seconds / len(some) / 8:.0f} us"
+    )
 
 
 PARTS = (pairs_of_cables, brute_force, obstacles)

@@ -101,7 +101,7 @@ def links() -> Iterator[Row]:
         p50, p99 = 1e3 * np.quantile(slowest, (0.5, 0.99))
         yield Row(name, target, f"p50 {p50:.2f} ms, p99 {p99:.2f} ms")
         if kind == "s7":
-            yield Row("exchange, which waits for none of them", "", f"p50 {1e6 * np.median(taken):.0f} us")
+            yield Row("`exchange`, which does not wait for the PLCs", "", f"p50 {1e6 * np.median(taken):.0f} us")
 
 
 if __name__ == "__main__":

@@ -43,7 +43,7 @@ def hard_cables() -> Iterator[Row]:
     """Random cables over pulleys, with dead length: length from tension, and the tension back."""
     tension, found, expected, _statuses = there_and_back(38_000, seed=3)
     worst = (np.abs(found - tension) / expected).max()
-    yield Row("38,000 random cables there and back, of one rounding of the length", "4", f"{worst:.1f} at most")
+    yield Row("38,000 random cables, tension to length and back, relative to one rounding", "4", f"{worst:.1f} at most")
 
 
 def speed() -> Iterator[Row]:
@@ -55,7 +55,7 @@ def speed() -> Iterator[Row]:
         poses = poses[sl.inverse(bare, poses).feasible & sl.inverse(over, poses).feasible]
         ratio, seconds = ratio_of(partial(sl.inverse, motion=poses), over, bare)
         shown = f"{ratio:.2f} ({1e6 * seconds / len(poses):.2f} us)"
-        yield Row(f"{name}: exact inverse, of that without", "<= 1.3", shown)
+        yield Row(f"{name}: exact inverse, relative to the robot without pulleys", "<= 1.3", shown)
         path = course(bare)
         plans = {id(one): sl.inverse(one, path) for one in (bare, over)}
 
@@ -65,7 +65,7 @@ def speed() -> Iterator[Row]:
 
         ratio, seconds = ratio_of(track, over, bare)
         shown = f"{ratio:.2f} ({1e6 * seconds / len(path):.2f} us)"
-        yield Row(f"{name}: forward along a path, of that without", "<= 2", shown)
+        yield Row(f"{name}: forward along a path, relative to the robot without pulleys", "<= 2", shown)
 
 
 def ratio_of(run: Callable[[sl.Robot], object], one: sl.Robot, other: sl.Robot) -> tuple[float, float]:
@@ -92,7 +92,7 @@ def formula() -> Iterator[Row]:
             robot = sl.load_robot(name).replace(winches=sl.Winch(0.05, dead_cable=dead))
             worst = max(worst, formula_error(robot, random_poses(robot, 500, np.random.default_rng(1))))
         what = f"{dead:g} m of dead length" if dead else "no dead length"
-        yield Row(f"straight exit and catenary from it, {what}", "none", f"{1e6 * worst:.1f} um off at most")
+        yield Row(f"exit point of a straight cable, {what}", "none", f"{1e6 * worst:.1f} um off at most")
 
 
 PARTS = (counts, hard_cables, speed, formula)

@@ -52,7 +52,7 @@ def robots() -> Iterator[Row]:
     off_12, off = (np.abs(few.frequency[:n] - found_all[:n]).max() for n in (12, few.count))
     size = len(reduced_model(setting, 0, UP_TO).matrix)
     shown = f"{off_12:.0e} Hz; all {few.count}: {off:.0e} Hz, {size} unknowns"
-    yield Row("cogiro: lowest twelve, up to 20 Hz against up to 50 Hz", "1e-5 Hz", shown)
+    yield Row("cogiro: lowest twelve frequencies, with modes up to 20 Hz and up to 50 Hz", "1e-5 Hz", shown)
 
 
 def speed() -> Iterator[Row]:
@@ -68,7 +68,7 @@ def speed() -> Iterator[Row]:
     places = np.random.default_rng(0).uniform([-3, -2, 1], [3, 2, 3], (64, 3))
     poses, robot = sl.Pose.from_euler(places, 0, 0, 0), sl.load_robot("cogiro")
     taken = 1e3 * best_seconds(lambda: sl.frequency_map(robot, poses, up_to=UP_TO)) / len(poses)
-    yield Row("cogiro: a map, up to 20 Hz, a pose", "<= 3 ms", f"{taken:.1f} ms")
+    yield Row("cogiro: one pose of a map, up to 20 Hz", "<= 3 ms", f"{taken:.1f} ms")
     frequency = np.linspace(1.0, UP_TO, 1000)
     for words, damping in (("modal", sl.Damping(modal_damping=0.01)), ("stretch", sl.Damping(loss_time=1e-4))):
         found = sl.frequency_response(state := middle("cogiro"), frequency, damping)

@@ -130,7 +130,7 @@ def calls() -> Iterator[Row]:
     poses = sl.Pose(rng.uniform(robot.test_box.low, robot.test_box.high, (315, 3)), np.eye(3))
     one = pose_rows(poses[0])
     own = best_of_calls(lambda: prepared.rows(one)) * 1e6
-    yield Row("margin of one pose a call, prepared", "<= 20 us beside the margin itself", f"{own:.1f} us in all")
+    yield Row("margin of one pose per call, prepared", "<= 20 us beside the margin itself", f"{own:.1f} us in all")
     table = np.repeat(cable_table(robot), 600, axis=0)
     table[:, :, :3] += rng.uniform(-0.5, 0.5, (600, 8, 3))
     tiled = np.tile(pose_rows(poses), (600, 1))
