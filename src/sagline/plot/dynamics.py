@@ -255,6 +255,7 @@ def frequency_map(found: FrequencyMap, quantity: str = "frequency") -> Figure:
     count, each = shown // columns, current().width / columns
     tall = np.clip(np.ptp(y) / max(float(np.ptp(x)), 1e-9), 0.4, 1.4) * each
     figure = sheet(1.4 + count * (0.85 * float(tall) + 0.5))
+    figure.set_layout_engine("compressed")  # panels of equal scales
     panels = figure.subplots(count, columns, sharex=True, sharey=True, squeeze=False)
     for ax, row in zip(panels.flat, rows, strict=True):
         draw_map(ax, x, y, values[:, :, row], scale, f"$z$ = {z[row]:.3g} m")
