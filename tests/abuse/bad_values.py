@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 
 import sagline as sl
 from sagline.core.results import Result
+from sagline.core.table import Tabular
 
 REFUSED, SAME, EITHER = "refused", "the same answer", "refused or answered"
 UNITS: pint.UnitRegistry[Any] = pint.UnitRegistry()
@@ -74,7 +75,15 @@ def bad_values(kind: str, valid: Any, optional: bool) -> Iterator[Bad]:
     ):
         if not (kind in ("text",) and isinstance(value, str)) and not (kind == "file" and isinstance(value, str)):
             yield Bad(label, value, EITHER if kind == "index" and value is ... else REFUSED)
-    yield from KINDS[kind](valid)
+    for bad in KINDS[kind](valid):
+        yield Bad(bad.label, bad.value, EITHER) if _is_also_taken(bad.value, valid) else bad
+
+
+def _is_also_taken(value: Any, valid: Any) -> bool:
+    """True for positions in the place of poses, and for a result with a state in the place of an equilibrium."""
+    if isinstance(valid, sl.Pose | sl.Path):
+        return isinstance(value, list | tuple | np.ndarray)
+    return isinstance(valid, sl.Equilibrium) and isinstance(getattr(value, "state", None), sl.Equilibrium)
 
 
 def _array(valid: Any) -> Iterator[Bad]:
@@ -414,7 +423,7 @@ def _object(valid: Any) -> Iterator[Bad]:
     hollow[()] = valid
     yield Bad("an object in an array without axes", hollow, REFUSED)
     for other in strangers():
-        related = {*type(other).__bases__} & {*kind.__bases__} - {object, Result}  # another model or method
+        related = {*type(other).__bases__} & {*kind.__bases__} - {object, Result, Tabular}  # another model or method
         if not isinstance(other, kind) and not related:
             yield Bad(f"a {type(other).__name__}", other, REFUSED)
 

@@ -100,12 +100,17 @@ RESULTS = frozenset(
 LINKS = frozenset({"plc.ModbusLink", "plc.S7Link", "twin.Server", "twin.Server.run"})
 CRITERIA = ("Clearance", "Criterion", "InFrame", "LeastFrequency", "LeastMargin", "LeastStiffness", "MaximumSag")
 # asked by sagline itself, with numbers of its own
+TABULAR = (
+    *("Confirmation", "Equilibria", "Equilibrium", "ForwardSolution", "FrequencyMap", "FrequencyResponse", "Margin"),
+    *("Modes", "MovingAnchors", "Path", "Simulation", "TensionPolygon", "Vibration", "WinchRates", "control.Execution"),
+)
 INTERNAL = frozenset(
     {"TensionMethod.preference", "QuadraticProgram.preference", "twin.Machine.deliver"}
     | {"control.Fault", "control.Fault.look", "control.Fault.found", "control.Histogram.add"}
     | {"control.TensionLoop.step", "control.Gains.at", "control.Link", "control.Link.exchange", "control.Recorder"}
     | {"plc.ModbusLink.exchange", "plc.S7Link.exchange"}
     | {"Orientations.at", "Tilts.sampled"}
+    | {f"{name}.to_csv" for name in TABULAR}  # one method for all: see "Plan.to_csv"
     | {f"{name}.{method}" for name in (*CRITERIA, "PositionError") for method in ("check", "judge", "scale", "values")}
     | {"Clearance.excluded", "Criterion.excluded"}
     | {"AnchorErrors.added", "FreeAnchors.bound", "FreeCable.bound", "FreeLimit.bound", "Goal.values"}
@@ -255,9 +260,11 @@ def _robots(given: _Given) -> dict[str, Call]:
         "Winch.per_cable": Call(sl.Winch(0.05).per_cable, _all(count=("whole", 3))),
         "Robot": Call(sl.Robot, _all(**fields)),
         "Robot.replace": Call(robot.replace, _all(**{name: fields[name] for name in ("mass", "tension_min", "name")})),
+        "Robot.with_payload": Call(robot.with_payload, _all(mass=("number", 2.0), at=("array", [0.0, 0.5, 1.0], True))),
         "Robot: plane": Call(flat.replace, _all(plane_normal=("array", [0.0, 0.0, 2.0]))),
         "PoseBox": Call(sl.PoseBox, _all(low=("array", [0.0, 1.0, 2.0]), high=numbers, tilt=("number", 0.25))),
         "Pose": Call(sl.Pose, _all(position=box, rotation=("array", np.eye(3)))),
+        "Pose: x, y, z": Call(partial(sl.Pose, 1.0, 2.0), _all(z=("number", 3.0, True))),
         "Pose.from_euler": Call(sl.Pose.from_euler, _all(position=box, alpha=angle, beta=angle, gamma=angle)),
         "Pose.from_quaternion": Call(
             sl.Pose.from_quaternion, _all(position=box, quaternion=("array", [0.0, 0.0, 0.0, 1.0]))
@@ -821,6 +828,7 @@ def _files(given: _Given) -> dict[str, Call]:
     lowest = sl.frequency_map(made.ROBOT, sl.Pose([[0.0, 0.0, 1.5]], np.eye(3)), up_to=3.0)
     return {
         "FrequencyMap.save": Call(lowest.save, _all(file=("file", str(folder / "saved.nc")))),
+        "Plan.to_csv": Call(given.run.to_csv, _all(file=("file", str(folder / "saved.csv"), True))),
         "Plan.save": Call(given.run.save, _all(file=("file", str(folder / "saved.nc")))),
         "save_plan": Call(sl.save_plan, _all(plan=("one", given.run), file=("file", str(folder / "saved.nc")))),
         "load_plan": Call(sl.load_plan, _all(file=("file", names["run.nc"]))),
@@ -1261,6 +1269,7 @@ def _in_time(given: _Given) -> dict[str, Call]:
                 events=("objects", sl.Break(3, 0.02)),
             ),
         ),
+        "simulate: pose": Call(partial(sl.simulate, given.robot, duration=0.02), _all(pose=("one", given.pose))),
         "simulate: wind": Call(
             partial(sl.simulate, in_wind, duration=0.02),
             _all(wind=("table", ([0.0, 1.0], np.ones((2, 3))), True)),

@@ -195,5 +195,7 @@ def test_positions_and_lists_of_poses_take_the_place_of_a_pose() -> None:
         single_pose(np.zeros((2, 3)), "start")
     with refused("pose", "'here'", "a Pose"):
         pose_of("here")
+    with refused("pose"):
+        pose_of(np.array(turned, dtype=object))  # no axes
     with refused("pose[1]", "nan m"):
         pose_of((0.0, np.nan, 0.0))

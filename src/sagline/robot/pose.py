@@ -284,7 +284,7 @@ def pose_of(value: PoseLike, item: str = "pose") -> Pose:
     """A pose unchanged; poses in a list as a batch; level poses at positions [m], shape (3,) or (N, 3)."""
     if not isinstance(value, list | tuple | np.ndarray):
         return instance(value, Pose, item)
-    if len(value) and isinstance(value, list | tuple) and all(isinstance(one, Pose) for one in value):
+    if isinstance(value, list | tuple) and value and all(isinstance(one, Pose) for one in value):
         return Pose._adopt(*(np.vstack([getattr(one, name) for one in value]) for name in Pose.__slots__))
     return Pose(checked(value, item, "m", shape=(3,)))
 
