@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import csv
 import json
+import shutil
 from collections import defaultdict
 from collections.abc import Iterator
 from importlib import import_module
@@ -23,6 +24,7 @@ from sagline.cli.main import FORMER, MODULES, NAMES, app
 from tests.files.executions import execution
 from tests.tiers import extended
 
+EXAMPLES = Path(__file__).parents[2] / "examples"
 GROUP: Any = get_command(app)
 OPTIONS: dict[str, dict[str, Any]] = defaultdict(dict)  # name of an option -> command -> option
 for _name in NAMES:
@@ -114,6 +116,18 @@ def test_out_is_a_folder_or_the_main_file(folder: Path) -> None:
     assert ".nc" in done.stderr
     (folder / "plan.txt").mkdir()  # a folder that exists is one, whatever its name
     assert sagline_(*words, "--out", "plan.txt").exit_code == 0
+
+
+@pytest.mark.parametrize(
+    "words", ["article errata", "examples", "sweep own_sweep.yaml", "design cogiro design.yaml", "run"]
+)
+def test_where_files_have_fixed_names_out_is_a_folder(words: str, folder: Path) -> None:
+    for file in ("own_sweep.yaml", "own_planar.yaml", "design.yaml"):
+        shutil.copy(EXAMPLES / file, folder)
+    before = names_in(folder)
+    done = sagline_(*words.split(), "--out", "into.nc")
+    assert (done.exit_code, done.stderr.count("\n"), names_in(folder)) == (2, 1, before)
+    assert "into.nc" in done.stderr
 
 
 def test_files_to_stdout_and_elsewhere_are_the_same(folder: Path) -> None:

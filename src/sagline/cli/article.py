@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Annotated
 
 from sagline.cli.options import JsonOption, OutOption, argument
+from sagline.cli.output import Output
 from sagline.cli.terminal import show_json, show_note, working
-from sagline.files.writing import check_files
 
 
 def article(
@@ -35,7 +35,7 @@ def article(
     """
     from sagline.article.report import NAMES, write_article
 
-    check_files(folder, NAMES)
+    Output(folder, "", NAMES)  # it refuses files that cannot be written
     what = "repeating the studies of the article"
     with working(what) as line:
 

@@ -8,9 +8,10 @@ from pathlib import Path
 from shlex import quote
 
 from sagline.cli.options import ForceOption, OutOption
+from sagline.cli.output import Output
 from sagline.cli.terminal import show_text
 from sagline.core.errors import FileError
-from sagline.files.writing import atomic_file, check_folder, create_folder
+from sagline.files.writing import atomic_file, create_folder
 
 KINDS = (".py", ".yaml", ".csv", ".wcrfx")
 
@@ -28,7 +29,7 @@ def examples(
         sagline track own_robot.yaml own_path.yaml
     """
     sources = example_files()
-    check_folder(folder)
+    Output(folder, "", [file.name for file in sources])  # it refuses files that cannot be written
     existing = [file.name for file in sources if (folder / file.name).exists()]
     if existing and not force:
         raise FileError(folder / existing[0], "exists", "Choose another folder with --out, or replace it with --force.")

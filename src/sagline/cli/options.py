@@ -139,7 +139,7 @@ def flag(text: str, *names: str) -> Any:
 
 def out_option(default: str | bool = True) -> Any:
     """`--out`; text for the default value if it is None."""
-    text = "Folder for the files, or the main file if the name has its suffix."
+    text = "Folder for the files. With a suffix it is the main file; the other files are named after it."
     return typer.Option("--out", metavar="DIR|FILE", help=text, show_default=default)
 
 

@@ -74,7 +74,7 @@ STEP = "Give the cable and the time of the break: --break 3@2.5s."
 
 _PathOption = Annotated[
     Path | None,
-    argument("PATH", "Waypoints in .yaml, or time and pose in .csv. Default: at rest in the middle of the test box."),
+    argument("PATH", "Waypoints in .yaml, or time and pose in .csv. Default: at rest at the pose of --pose."),
 ]
 _ShaperOption = Annotated[
     _ShaperKind, choice_option("SHAPER", "Input shaper of the path", _ShaperKind), only_with("PATH")

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Annotated
 
 from sagline.cli.ending import OUTSIDE
 from sagline.cli.options import JsonOption, argument, only_without, option, out_option
-from sagline.cli.output import TextTable, number_text, show_table
+from sagline.cli.output import Output, TextTable, number_text, show_table
 from sagline.cli.terminal import show_json, show_note, show_text, working
 from sagline.core.errors import SaglineError
 from sagline.core.numbers import counted
-from sagline.files.writing import check_folder, create_folder
+from sagline.files.writing import create_folder
 
 if TYPE_CHECKING:
     from sagline.sweep.result import Sweep
@@ -58,7 +58,7 @@ def sweep(
     count = None if workers is None else whole_of(workers, "--workers", 1, MOST_WORKERS)
     request = load_sweep(file)
     folder = Path("output") / file.stem if out is None else out
-    check_folder(folder)
+    Output(folder, "", ["done"])  # it refuses a folder that cannot be written
     parent = folder.absolute().parent
     made = [place for place in (parent, *parent.parents) if not place.exists()]
     create_folder(parent)
