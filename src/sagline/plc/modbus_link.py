@@ -31,8 +31,15 @@ class ModbusLink(BlockLink):
     The blocks have the same bytes as in `S7Link`: DB101 from holding register 0, DB102 from 100, DB103 from 200.
 
     Examples:
-        >>> link = sl.plc.ModbusLink("192.168.0.11,192.168.0.12,192.168.0.13,192.168.0.14", robot)
-        ... # doctest: +SKIP
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("article-prototype")
+        >>> machine = sl.twin.Machine(robot, period=sl.twin.SCAN)
+        >>> server = sl.twin.Server(machine, modbus=True)
+        >>> link = sl.plc.ModbusLink(server.addresses, robot)
+        >>> print(len(link.groups))
+        4
+        >>> link.close()
+        >>> server.close()
     """
 
     def __init__(

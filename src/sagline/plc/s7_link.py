@@ -32,8 +32,15 @@ class S7Link(BlockLink):
     """The link (`sagline.control.link.Link`) to S7-1200 PLCs, or to a twin.
 
     Examples:
-        >>> link = sl.plc.S7Link("127.0.0.1:11021,127.0.0.1:11022,127.0.0.1:11023,127.0.0.1:11024", robot)
-        ... # doctest: +SKIP
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("article-prototype")
+        >>> machine = sl.twin.Machine(robot, period=sl.twin.SCAN)
+        >>> server = sl.twin.Server(machine)
+        >>> link = sl.plc.S7Link(server.addresses, robot)
+        >>> print(len(link.groups))
+        4
+        >>> link.close()
+        >>> server.close()
     """
 
     def __init__(self, addresses: str | Sequence[str], robot: Robot | int, *, timeout: float = 2.0) -> None:

@@ -38,8 +38,8 @@ def simulation(simulation: Simulation) -> Figure:
 
     Examples:
         >>> import sagline as sl
-        >>> state = sl.inverse(sl.load_robot("cogiro"), sl.Pose.from_euler((1.0, 0.5, 2.0), 0.0, 0.0, 0.0)).state
-        >>> motion = sl.simulate(state, duration=0.5, events=sl.Break(cable=3, time=0.1))
+        >>> robot, broken = sl.load_robot("cogiro"), sl.Break(cable=3, time=0.1)
+        >>> motion = sl.simulate(robot, (1.0, 0.5, 2.0), duration=0.5, events=broken)
         >>> figure = sl.plot.simulation(motion)
     """
     time, pose = instance(simulation, Simulation, "simulation").time, simulation.pose

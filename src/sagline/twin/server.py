@@ -43,8 +43,13 @@ class Server:
         addresses: "host:port" of each group's PLC, in the groups' order.
 
     Examples:
-        >>> server = sl.twin.Server(sl.twin.Machine(robot, period=sl.twin.SCAN))  # doctest: +SKIP
-        ... server.run()
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("article-prototype")
+        >>> server = sl.twin.Server(sl.twin.Machine(robot, period=sl.twin.SCAN))
+        >>> server.scan()  # run() repeats this in real time
+        >>> print(len(server.addresses), server.machine.time == sl.twin.SCAN)
+        4 True
+        >>> server.close()
     """
 
     def __init__(self, machine: Machine, *, host: str = LOOPBACK, port: int = 0, modbus: bool = False) -> None:
