@@ -213,13 +213,13 @@ def test_energy_that_grows_by_itself_stops_the_run_and_names_time_and_cable(monk
     state = still()
     with refused("step", next_step="Give step=0.018.", kind=sl.InvalidValueError) as caught:
         sl.simulate(state, wrench=np.array([50.0, 0, 0, 0, 0, 0]), duration=60.0, integrator="splitting")
-    assert re.search(r"at 0\.\d+ s .* cable \d", caught.value.value)
+    assert re.search(r"at 0\.\d+ s, .* cable \d", caught.value.value)
 
 
 def test_energy_that_fades_by_itself_stops_the_run_too() -> None:
     with refused("step", next_step="Give step=0.01.") as caught:
         sl.simulate(still(), wrench=np.array([50.0, 0, 0, 0, 0, 0]), duration=60.0, step=0.05)
-    assert re.search(r"^0\.05 s, .* at \d+\.\d s .* cable \d", caught.value.value)
+    assert re.search(r"^0\.05 s, .* at \d+\.\d s, .* cable \d", caught.value.value)
 
 
 def test_damping_is_that_of_the_linear_system() -> None:
