@@ -192,7 +192,11 @@ StyleOption = Annotated[FigureStyle, STYLE, only_with("--figures")]
 FormatsOption = Annotated[
     Any,
     converted_option(
-        "FORMATS", f"Formats of the figures, with commas between: {', '.join(FORMATS)}.", "formats_of", "--format"
+        "FORMATS",
+        f"Formats of the figures, with commas between: {', '.join(FORMATS)}.",
+        "formats_of",
+        "--format",
+        known=FORMATS,
     ),
     only_with("--figures"),
 ]

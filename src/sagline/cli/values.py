@@ -58,13 +58,11 @@ def ratio(text: str, item: str) -> float:
     return quantity(number, item, "", low=0.0) / (100.0 if percent else 1.0)
 
 
-def formats_of(text: str, item: str) -> tuple[str, ...]:
+def formats_of(text: str, item: str, known: tuple[str, ...]) -> tuple[str, ...]:
     """Formats of figures from "png, pdf"."""
-    from sagline.cli.options import FORMATS
-
     found = tuple(dict.fromkeys(part.strip().lower() for part in text.split(",")))
-    if not set(found) <= set(FORMATS):
-        raise InvalidValueError(item, repr(text), ", ".join(FORMATS), f"Give one or several: {item} png,pdf.")
+    if not set(found) <= set(known):
+        raise InvalidValueError(item, repr(text), ", ".join(known), f"Give one or several: {item} png,pdf.")
     return found
 
 

@@ -231,7 +231,7 @@ def _errors(figure: SubFigure, found: Calibration, at: float | None) -> None:
     bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     bar.ax.yaxis.set_minor_locator(NullLocator())
     without = ", without shift and turn of the world" if own else ""
-    set_heading(figure, f"at $z$ = {n(z, '.3g', 'm')}{without}; dots: poses of the log")
+    set_heading(figure, f"at z = {n(z, '.3g', 'm')}{without}; dots: poses of the log")
 
 
 def _height_of_maps(found: Calibration) -> float:

@@ -84,9 +84,10 @@ def legend_columns(labels: Sequence[str], width: float, size: float) -> int:
 
 
 def set_heading(target: FigureBase | Axes, text: str) -> None:
-    """Add a heading of a figure or of axes, broken into lines to fit the width."""
+    """Add a heading without formulas to a figure or to axes, broken into lines to fit the width."""
     size = current().label
-    (target.suptitle if isinstance(target, FigureBase) else target.set_title)(wrap_heading(text, size), fontsize=size)
+    add = target.suptitle if isinstance(target, FigureBase) else target.set_title
+    add(wrap_heading(text, size), fontsize=size, parse_math=False)  # names may contain dollar signs
 
 
 def wrap_heading(text: str, size: float) -> str:
