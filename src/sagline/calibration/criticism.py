@@ -15,7 +15,7 @@ from sagline.calibration.findings import Criticism
 from sagline.calibration.identifiability import OPEN, append_rows
 from sagline.calibration.least_squares import whitened_at
 from sagline.calibration.observations import BLOCK
-from sagline.calibration.parameters import KINDS, Unknown, parameters_of
+from sagline.calibration.parameters import KINDS, Parameters, Unknown, parameters_of
 from sagline.calibration.problem import Fit, FitProblem, SearchState, machine_at, reported_lengths
 from sagline.core.arrays import Array, Indices
 from sagline.core.errors import InvalidValueError
@@ -31,25 +31,19 @@ class FixedTerms(NamedTuple):
     """Readings of a fit as a linear problem in P estimated parameters and F fixed parameters.
 
     Attributes:
-        problem: The problem with all P + F parameters; the fixed parameters are the last F.
-        slopes: Derivatives of the P values by the internal parameters, (P,).
-        solution: Step of the internal parameters by a change of the rows, (P, K).
-        fixed: Part of `effect` that no step of the estimated parameters can reproduce, (K, F).
-        effect: Derivatives of the rows by the fixed parameters, (K, F).
+        parameters: All P + F parameters; the fixed parameters are the last F.
+        deviation: Prior standard deviations of the internal fixed parameters, (F,).
+        shifts: Change of the P values by the internal fixed parameters, (P, F).
+        fixed: Derivatives of the rows by the fixed parameters, without the part that a step of the estimated parameters
+            can reproduce, (K, F).
         misfit: Remaining misfit, (K,).
     """
 
-    problem: FitProblem
-    slopes: Array
-    solution: Array
+    parameters: Parameters
+    deviation: Array
+    shifts: Array
     fixed: Array
-    effect: Array
     misfit: Array
-
-    @property
-    def shifts(self) -> Array:
-        """Change of the P values by the internal fixed parameters, (P, F)."""
-        return np.asarray(-self.slopes[:, None] * (self.solution @ self.effect))
 
 
 def fixed_terms(problem: FitProblem, unknowns: Sequence[Unknown], fit: Fit) -> FixedTerms | None:
@@ -76,9 +70,11 @@ def fixed_terms(problem: FitProblem, unknowns: Sequence[Unknown], fit: Fit) -> F
     whole, scale = np.vstack((triangle, priors)), problem.scale
     left, sizes, right = np.linalg.svd(whole[:, :count] * scale, full_matrices=False)
     seen = sizes > OPEN * sizes[0]
-    left, solution = left[:, seen], scale[:, None] * right[seen].T / sizes[seen] @ left[:, seen].T
-    rest = whole[:, count:] - left @ (left.T @ whole[:, count:])
-    return FixedTerms(wider, state.machine.slopes[:count], solution, rest[:, :-1], whole[:, count:-1], rest[:, -1])
+    left, known_part = left[:, seen], left[:, seen].T @ whole[:, count:]
+    rest = whole[:, count:] - left @ known_part
+    steps = scale[:, None] * (right[seen].T / sizes[seen] @ known_part[:, :-1])
+    shifts = -state.machine.slopes[:count, None] * steps
+    return FixedTerms(wider.parameters, wider.prior_deviation[count:], shifts, rest[:, :-1], rest[:, -1])
 
 
 def criticisms_of(terms: FixedTerms, standard_error: Array) -> tuple[Criticism, ...]:
@@ -88,7 +84,7 @@ def criticisms_of(terms: FixedTerms, standard_error: Array) -> tuple[Criticism, 
     and with a common value. Kinds of load cells are also tested for single cables. The test with the best information
     criterion (AIC) is kept. The largest reduction comes first.
     """
-    groups = list(_groups(terms.problem, len(terms.slopes)))
+    groups = list(_groups(terms.parameters, len(terms.shifts)))
     best: dict[str, tuple[float, Criticism]] = {}
     for kind, name, which, common in groups:
         criticism, worth = _score_test(
@@ -103,23 +99,21 @@ def _score_test(
     terms: FixedTerms, standard_error: Array, kind: str, name: str, which: Indices, columns: Array
 ) -> tuple[Criticism, float]:
     """Result of the test of fixed parameters along directions (F, C), and minus its information criterion."""
-    count = len(terms.slopes)
-    rows, prior = terms.fixed[:, which] @ columns, terms.problem.prior_deviation[count:][which][: columns.shape[1]]
+    rows, prior = terms.fixed[:, which] @ columns, terms.deviation[which][: columns.shape[1]]
     score = rows.T @ terms.misfit
     step = np.linalg.solve(rows.T @ rows + np.diag(1.0 / prior**2), score)
     fall = max(float(score @ step), 0.0)
     shift = terms.shifts[:, which] @ columns @ step
-    moved = np.divide(np.abs(shift), standard_error, out=np.zeros(count), where=standard_error > 0.0)
+    moved = np.divide(np.abs(shift), standard_error, out=np.zeros(len(shift)), where=standard_error > 0.0)
     most = int(np.argmax(moved))
-    chance, label = float(chdtrc(step.size, fall)), terms.problem.parameters.labels[most]
+    chance, label = float(chdtrc(step.size, fall)), terms.parameters.labels[most]
     return Criticism(name, kind, fall, chance, label, float(shift[most]), float(moved[most])), fall - 2.0 * step.size
 
 
 def considered_covariance(terms: FixedTerms) -> Array:
     """Covariance of the values due to the stated tolerances of fixed parameters, (P, P) (Schmidt)."""
-    count = len(terms.slopes)
-    stated = np.flatnonzero(terms.problem.parameters.stated[count:])
-    effect = terms.shifts[:, stated] * terms.problem.prior_deviation[count:][stated]
+    stated = np.flatnonzero(terms.parameters.stated[len(terms.shifts) :])
+    effect = terms.shifts[:, stated] * terms.deviation[stated]
     return np.asarray(effect @ effect.T)
 
 
@@ -142,9 +136,9 @@ def _other_kinds(problem: FitProblem, robot: Robot) -> Iterator[Unknown]:
             yield other
 
 
-def _groups(problem: FitProblem, first: int) -> Iterator[tuple[str, str, Indices, bool]]:
+def _groups(parameters: Parameters, first: int) -> Iterator[tuple[str, str, Indices, bool]]:
     """Kind, name and indices of each group of fixed parameters; True if they have one value."""
-    names, cables = np.array(problem.parameters.names[first:]), problem.parameters.cables[first:]
+    names, cables = np.array(parameters.names[first:]), parameters.cables[first:]
     for name in dict.fromkeys(names.tolist()):
         which = np.flatnonzero(names == name)
         yield name, name, which, False

@@ -157,14 +157,11 @@ class Findings(Result):
     @property
     def chi_squared_of_all(self) -> tuple[float, int]:
         """Chi squared of the readings of all poses without outliers, with any weight, and its expected value."""
-        rows = [outlier.row for outlier in self.outliers]
-        more = (self.weights < 1.0) & ~np.isin(self.rows, rows)
-        fewer = (self.weights == 1.0) & np.isin(self.rows, rows)
+        counted = ~np.isin(self.rows, [outlier.row for outlier in self.outliers])
+        change = counted.astype(np.int64) - (self.weights == 1.0)  # 1: added, -1: removed
         readings = np.count_nonzero(~np.isnan(self.residuals[:, self.robot.cable_count :]), axis=1)
-        squares = self.chi_squared_of_pose[more].sum() - self.chi_squared_of_pose[fewer].sum()
-        return float(self.chi_squared + squares), self.degrees_of_freedom + int(
-            readings[more].sum() - readings[fewer].sum()
-        )
+        chi_squared = self.chi_squared + float(self.chi_squared_of_pose @ change)
+        return chi_squared, self.degrees_of_freedom + int(readings @ change)
 
     @property
     def standard_error(self) -> Array:
