@@ -26,9 +26,10 @@ from sagline.cli.options import (
     out_option,
     quantity_option,
 )
-from sagline.cli.output import csv_text, is_file
+from sagline.cli.output import is_file
 from sagline.cli.terminal import show_json, show_note, show_pieces, show_text, working
 from sagline.core.errors import FileError, InvalidValueError, printable
+from sagline.core.table import csv_text
 from sagline.files.writing import check_files, create_folder, file_stem, write_text
 
 if TYPE_CHECKING:

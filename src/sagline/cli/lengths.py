@@ -11,9 +11,10 @@ import numpy as np
 
 from sagline.cli.ending import OUTSIDE
 from sagline.cli.options import FileOption, argument, option
-from sagline.cli.output import csv_text, file_of
+from sagline.cli.output import file_of
 from sagline.cli.terminal import show_data, show_note, working
 from sagline.core.errors import FileError
+from sagline.core.table import csv_text
 from sagline.files.writing import create_folder, write_text
 
 if TYPE_CHECKING:

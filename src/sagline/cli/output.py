@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from io import StringIO
 from itertools import pairwise
 from math import isnan
 from pathlib import Path
@@ -22,6 +20,7 @@ from rich.text import Text
 from sagline.cli.options import FigureStyle
 from sagline.cli.terminal import FREE, show_json, show_pieces, show_text
 from sagline.core.errors import FileError, printable
+from sagline.core.table import csv_text
 from sagline.files.writing import check_files, check_folder, create_folder, write_text
 
 if TYPE_CHECKING:
@@ -115,13 +114,6 @@ def _split(columns: range, count: int) -> Iterable[range]:
 def number_text(number: float, form: str) -> str:
     """A number with a true minus sign; a dash for NaN."""
     return "–" if isnan(number) else format(number, f"z{form}").replace("-", "−")  # z: no negative zero
-
-
-def csv_text(rows: Iterable[Sequence[object]]) -> str:
-    """The text of a CSV file: names of the columns with units in brackets, then rows; floats keep their last bit."""
-    text = StringIO()
-    csv.writer(text, lineterminator="\n").writerows(rows)
-    return text.getvalue()
 
 
 def is_file(out: Path) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib import import_module
 from io import StringIO
 from types import MappingProxyType
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sagline.core.errors import FileError
+from sagline.core.numbers import counted
 from sagline.core.results import documented_units, formats
 
 _WRITING: Final = "sagline.files.writing"  # imported by name when a table is written; files build on this module
@@ -23,6 +24,13 @@ _WIDTH, _ENDS = 80, 4  # columns of a terminal; printed rows at the beginning an
 # number selects an entry of its last axis. In the label, # means the number of a cable, @ means x, y and z; without
 # a label, it is the name of the attribute. Without a unit, it is that of the documentation.
 Columns = tuple[str | tuple[str, type[Any]], ...]
+
+
+def csv_text(rows: Iterable[Sequence[object]]) -> str:
+    """The text of a CSV file: names of the columns with units in brackets, then rows; floats keep their last bit."""
+    text = StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()
 
 
 class Table:
@@ -74,15 +82,14 @@ class Table:
             lines.insert(_ENDS + 1, "...")
         hidden = list(self.columns)[len(texts) :]
         more = f"; not shown: {' to '.join(dict.fromkeys((hidden[0], hidden[-1])))}" if hidden else ""
-        return "\n".join([*lines, f"{count:,} row{'s' * (count != 1)}, {len(self.columns)} columns{more}"])
+        return "\n".join([*lines, f"{counted(count, 'row')}, {len(self.columns)} columns{more}"])
 
     def to_csv(self, file: os.PathLike[str] | str | None = None) -> str | None:
         """The table as CSV; see `Tabular.to_csv`."""
-        text = StringIO()
-        csv.writer(text, lineterminator="\n").writerows(self.rows)
+        text = csv_text(self.rows)
         if file is None:
-            return text.getvalue()
-        import_module(_WRITING).write_text(file, text.getvalue())
+            return text
+        import_module(_WRITING).write_text(file, text)
         return None
 
     def to_dataframe(self) -> Any:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
-from io import StringIO
 from pathlib import Path
 from typing import Final
 
@@ -15,6 +13,7 @@ from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.progress import Progress
 from sagline.core.results import Result
+from sagline.core.table import csv_text
 from sagline.files.robot_file import dump_robot
 from sagline.files.writing import atomic_files, create_folder, file_stem
 from sagline.optimization.candidates import Candidates
@@ -100,9 +99,7 @@ class Front(Result):
         rows = [[self.start.name, *self.start_values.tolist(), *(part.start for part in self.parts)]]
         for robot, goals, values in zip(robots, self.values, self.changed, strict=False):
             rows.append([robot.name, *goals.tolist(), *values.tolist()])
-        text = StringIO()
-        csv.writer(text, lineterminator="\n").writerows([heads, *rows])
-        texts = [text.getvalue(), *(dump_robot(robot) for robot in robots)]
+        texts = [csv_text([heads, *rows]), *(dump_robot(robot) for robot in robots)]
         with atomic_files(place, names) as parts:
             for part, content in zip(parts, texts, strict=True):
                 part.write_bytes(content.encode())
