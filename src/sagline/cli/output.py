@@ -20,7 +20,6 @@ from rich.text import Text
 from sagline.cli.options import FigureStyle
 from sagline.cli.terminal import FREE, show_json, show_pieces, show_text
 from sagline.core.errors import FileError, printable
-from sagline.core.table import csv_text
 from sagline.files.writing import check_files, check_folder, create_folder, write_text
 
 if TYPE_CHECKING:
@@ -181,6 +180,8 @@ class Output:
 
     def table(self, part: str, rows: Iterable[Sequence[object]]) -> None:
         """Write a table as CSV."""
+        from sagline.core.table import csv_text  # not loaded for the help
+
         write_text(self.file(part), csv_text(rows))
 
     def draw(self, *figures: Callable[[], Figure | Axes]) -> None:
