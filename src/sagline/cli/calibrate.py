@@ -29,7 +29,6 @@ from sagline.cli.options import (
 from sagline.cli.output import is_file
 from sagline.cli.terminal import show_json, show_note, show_pieces, show_text, working
 from sagline.core.errors import FileError, InvalidValueError, printable
-from sagline.core.table import csv_text
 from sagline.files.writing import check_files, create_folder, file_stem, write_text
 
 if TYPE_CHECKING:
@@ -221,6 +220,7 @@ def _log(file: Path, deviations: dict[str, float]) -> WinchLog:
 def _written(found: Calibration, request: _Request, line: Any) -> list[Path]:
     """Write the robot if the search has converged, the whole result and the figure; returns the files."""
     from sagline.calibration.findings import CalibrationStatus
+    from sagline.core.table import csv_text
     from sagline.files.robot_file import dump_robot
 
     files = []

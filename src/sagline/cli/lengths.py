@@ -14,7 +14,6 @@ from sagline.cli.options import FileOption, argument, option
 from sagline.cli.output import file_of
 from sagline.cli.terminal import show_data, show_note, working
 from sagline.core.errors import FileError
-from sagline.core.table import csv_text
 from sagline.files.writing import create_folder, write_text
 
 if TYPE_CHECKING:
@@ -93,6 +92,8 @@ def encoder(
 
 def write_rows(plan: Plan, name: str, rows: Sequence[Sequence[float]], out: Path | None) -> int:
     """Write the rows of solved samples, with times; `name` formats a column; returns the exit code."""
+    from sagline.core.table import csv_text
+
     kept = np.atleast_1d(plan.solved)
     header = [name.format(k) for k in range(len(rows[0]))]
     body = [row for row, is_kept in zip(rows, kept, strict=True) if is_kept]
