@@ -21,6 +21,13 @@ POSES = [HERE, (30.0, 0.0, 1.0), (0.0, 0.0, 1.0)]
 PLAN = sl.inverse(ROBOT, POSES)
 ONE = sl.inverse(ROBOT, HERE)
 PATH = sl.quintic_path([(0, 0, 1.5), (1, 1, 2)], speed=1.5, rate=10.0)
+LOG = sl.WinchLog(
+    unstrained_length=np.full((2, 2), 3.0),
+    load_cells=[[80.0, np.nan], [70.0, 75.0]],
+    time=[0.0, 1.0],
+    commanded=sl.Pose([HERE, HERE]),
+    sensors=sl.Sensors(tension_deviation=1.0),
+)
 RESULTS: dict[str, tuple[Callable[[], Any], int, dict[str, str]]] = {  # result, rows, some units
     "plan": (lambda: PLAN, 3, {"x": "m", "L7": "m", "T0": "N", "qw": "", "status": ""}),
     "plan of a path": (lambda: sl.inverse(ROBOT, PATH), len(PATH), {"time": "s"}),
@@ -34,6 +41,8 @@ RESULTS: dict[str, tuple[Callable[[], Any], int, dict[str, str]]] = {  # result,
     "map": (lambda: sl.frequency_map(ROBOT, [HERE, HERE], up_to=3.0), 2, {"peak": "m/N"}),
     "margin": (lambda: sl.margin(ROBOT, POSES), 3, {"value": "N"}),
     "polygon": (lambda: sl.tension_polygon(ROBOT, HERE), 4, {"T0": "N"}),
+    "clearances": (lambda: sl.clearance(PLAN), 3, {"distance": "m", "low": "m", "d0": "m"}),
+    "log": (lambda: LOG, 2, {"time": "s", "length_1": "m", "load_cell_0": "N", "x_commanded": "m"}),
     "equilibria": (lambda: sl.equilibria(ROBOT, ONE.unstrained_length, starts=3), 1, {"stiffness_min": "N/m"}),
 }
 

@@ -135,7 +135,8 @@ def test_functions_of_an_equilibrium_take_every_kind_of_start() -> None:
         np.testing.assert_allclose(number(function(solution, *further)), expected, rtol=1e-6, atol=1e-7)
     np.testing.assert_array_equal(sl.stiffness(ROBOT, pose=[here, here]).matrix[1], sl.stiffness(plan).matrix)
     np.testing.assert_array_equal(sl.vibration(ROBOT, here).frequency, sl.vibration(plan.state, up_to=20.0).frequency)
-    assert sl.frequency_slopes(plan).mass_sensitivity[0] == sl.frequency_slopes(plan.state).mass_sensitivity[0]
+    for start in ((plan,), (ROBOT, here)):
+        assert sl.frequency_slopes(*start).mass_sensitivity[0] == sl.frequency_slopes(plan.state).mass_sensitivity[0]
 
 
 def test_a_robot_at_an_infeasible_pose_is_refused_with_its_shortfall() -> None:

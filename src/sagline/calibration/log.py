@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from attrs import evolve, field, fields, frozen
@@ -14,6 +14,7 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.fields import given, if_known, reduced, rule
 from sagline.core.indices import part_of
 from sagline.core.results import Result, Saved
+from sagline.core.table import Columns, Tabular
 from sagline.robot.pose import Pose, PoseLike, single_pose, unit
 from sagline.robot.robot import Robot
 
@@ -116,7 +117,7 @@ _UNIT = 1e-6  # tolerance of the norm of a quaternion; sufficient for quaternion
 
 
 @frozen(eq=False, repr=False, weakref_slot=False)
-class WinchLog(_Replaceable, Saved):
+class WinchLog(_Replaceable, Saved, Tabular):
     """Readings of a robot at rest at N poses; NaN where a reading is missing.
 
     Attributes:
@@ -152,6 +153,17 @@ class WinchLog(_Replaceable, Saved):
         >>> len(log.rows(slice(0, 1)))
         1
     """
+
+    _columns: ClassVar[Columns] = (
+        "time",
+        "count_#=counts",
+        "length_#=unstrained_length",
+        "load_cell_#=load_cells",
+        "@=position",
+        "q@=rotation",
+        "@_commanded=commanded.position",
+        "q@_commanded=commanded.quaternion",
+    )
 
     counts: Array | None = field(default=None, converter=if_known)
     unstrained_length: Array | None = field(default=None, converter=if_known)

@@ -21,8 +21,8 @@ _WRITING: Final = "sagline.files.writing"  # imported by name when a table is wr
 _WIDTH, _ENDS = 80, 4  # columns of a terminal; printed rows at the beginning and at the end
 
 # Columns of a result: "label=attribute [unit]", or such a text and the type of its codes. The attribute is dotted; a
-# number selects an entry of its last axis. In the label, # means the number of a cable, @ means x, y and z; without
-# a label, it is the name of the attribute. Without a unit, it is that of the documentation.
+# number selects an entry of its last axis. In the label, # means the number of a cable, @ means x, y, z (and w);
+# without a label, it is the name of the attribute. Without a unit, it is that of the documentation.
 Columns = tuple[str | tuple[str, type[Any]], ...]
 
 
@@ -194,7 +194,7 @@ def _columns_of(result: Tabular) -> Iterator[tuple[str, NDArray[Any], str]]:
             yield from _spread(("x", "y", "z"), value.position, "m")
             yield from _spread(("qx", "qy", "qz", "qw"), value.quaternion, "")
         elif "#" in label or "@" in label:
-            parts = "xyz" if "@" in label else map(str, range(value.shape[-1]))
+            parts = "xyzw"[: value.shape[-1]] if "@" in label else map(str, range(value.shape[-1]))
             yield from _spread([label.replace("#", part).replace("@", part) for part in parts], value, unit)
         elif codes is not None:
             yield label, np.array([codes(int(code)).name for code in np.atleast_1d(value)]), ""

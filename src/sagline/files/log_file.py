@@ -200,26 +200,6 @@ def _commanded(table: CsvTable) -> Pose | None:
     return Pose.from_quaternion(position, rotation)
 
 
-def _log_columns(log: WinchLog) -> Iterator[tuple[str, Array]]:
-    """Name with unit, and values (N,), of each column of a log."""
-    m = log.readings.shape[1]
-    if log.time is not None:
-        yield "time [s]", log.time
-    pairs: list[tuple[Iterable[str], str, Array | None]] = [
-        (_names("count", m), "", log.counts),
-        (_names("length", m), " [m]", log.unstrained_length),
-        (_names("load_cell", m), " [N]", log.load_cells),
-        (XYZ, " [m]", log.position),
-        (QUATERNION, "", log.rotation),
-    ]
-    if log.commanded is not None:
-        pairs.append(([name + COMMANDED for name in XYZ], " [m]", log.commanded.position))
-        pairs.append(([name + COMMANDED for name in QUATERNION], "", log.commanded.quaternion))
-    for names, unit, values in pairs:
-        if values is not None:
-            yield from ((f"{name}{unit}", column) for name, column in zip(names, values.T, strict=True))
-
-
 def load_log(file: os.PathLike[str] | str, sensors: Sensors | None = None) -> WinchLog:
     """Read readings of a robot's encoders, load cells and (optional) measuring system at poses at rest.
 
@@ -295,8 +275,8 @@ def save(log: WinchLog, file: os.PathLike[str] | str) -> None:
 
 def dump_log(log: WinchLog) -> str:
     """CSV text of a log, in SI units, with the sensors in comments."""
-    columns = dict(_log_columns(instance(log, WinchLog, "log")))
-    lines = [*_comments_of_sensors(log.sensors), ",".join(columns)]
-    rows = np.column_stack(list(columns.values())).tolist()
+    table = instance(log, WinchLog, "log").table()
+    lines = [*_comments_of_sensors(log.sensors), ",".join(table.head)]
+    rows = np.column_stack(list(table.columns.values())).tolist()
     lines += [",".join("" if v != v else repr(v).removesuffix(".0") for v in row) for row in rows]
     return "\n".join(lines) + "\n"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import prod
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +16,7 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_memory
 from sagline.core.progress import blocks
 from sagline.core.results import Result
+from sagline.core.table import Columns, Tabular
 from sagline.interference.mesh import Mesh, extent_text
 from sagline.interference.obstacles import Box, Capsule, Sphere
 from sagline.interference.pairs import Obstacle, box_rows, cable_rows, pairs_of, rod_row, rows_of_parts
@@ -168,7 +169,7 @@ _NUMBERS = 9  # number of values per pair and pose: distance, lower bound and tw
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Clearances(Result):
+class Clearances(Result, Tabular):
     """Least distances between sagging cables, platform and obstacles, at one pose or N poses.
 
     Attributes:
@@ -181,6 +182,8 @@ class Clearances(Result):
         left_out: Omitted pairs, with the reasons.
         precision: Largest difference between distance and proved bound [m].
     """
+
+    _columns: ClassVar[Columns] = ("distance", "low", "d#=pair_distance")
 
     pairs: tuple[tuple[str, str], ...]
     pair_distance: Array

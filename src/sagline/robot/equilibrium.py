@@ -198,18 +198,27 @@ def equilibrium_of(start: Any, pose: PoseLike | None = None, item: str = "state"
     return state if isinstance(state, Equilibrium) else instance(start, Equilibrium, item)
 
 
-def of_equilibrium(function: Callable[Concatenate[Equilibrium, _P], _R_co]) -> OfEquilibrium[_P, _R_co]:
-    """Let a function of an equilibrium also accept a result, or a robot and a pose."""
+def of_result(function: Callable[Concatenate[Equilibrium | HasState, _P], _R_co]) -> OfEquilibrium[_P, _R_co]:
+    """Let a function of an equilibrium or of a result also accept a robot and a pose."""
 
     @wraps(function)
     def call(*given: Any, **options: Any) -> _R_co:
         start, *rest = given or (options.pop("state", None),)
-        pose = None
         if isinstance(start, Robot):
-            pose = options.pop("pose") if "pose" in options else rest.pop(0) if rest else None
-        return function(equilibrium_of(start, pose), *rest, **options)
+            start = equilibrium_of(start, options.pop("pose") if "pose" in options else rest.pop(0) if rest else None)
+        return function(start, *rest, **options)
 
     return call
+
+
+def of_equilibrium(function: Callable[Concatenate[Equilibrium, _P], _R_co]) -> OfEquilibrium[_P, _R_co]:
+    """Let a function of an equilibrium also accept a result, or a robot and a pose."""
+
+    @wraps(function)
+    def of_state(start: Equilibrium | HasState, /, *args: _P.args, **options: _P.kwargs) -> _R_co:
+        return function(equilibrium_of(start), *args, **options)
+
+    return of_result(of_state)
 
 
 def limited_tension(robot: Robots, cables: CableState, contact: Contact | None = None) -> Array:

@@ -23,7 +23,7 @@ from sagline.dynamics.vibration.mode_sensitivities import (
     string_data,
 )
 from sagline.dynamics.vibration.vibration import Vibration, VibrationStatus
-from sagline.robot.equilibrium import Equilibrium, HasState, equilibrium_of
+from sagline.robot.equilibrium import Equilibrium, HasState, equilibrium_of, of_result
 from sagline.statics.stiffness import modes
 
 
@@ -70,12 +70,14 @@ class FrequencySlopes(Result):
     wrench_sensitivity: Array
 
 
+@of_result
 def frequency_slopes(state: Equilibrium | HasState, together: float = 1e-6) -> FrequencySlopes:
     """Sensitivities of every natural frequency to the robot's data, pose and wrench, from analytic derivatives.
 
     Args:
-        state: A single equilibrium, or a plan of one, for the massless frequencies of `modes`; or a vibration, for
-            frequencies with cable mass. Cables are exact or weightless, without pulleys and dead lengths.
+        state: A single equilibrium, a plan of one, or a robot and then a pose, for the massless frequencies of `modes`;
+            or a vibration, for frequencies with cable mass. Cables are exact or weightless, without pulleys and dead
+            lengths.
         together: Largest relative difference of adjacent frequencies that count as equal.
 
     Returns:
