@@ -1,11 +1,4 @@
-"""README and documentation: the code runs and prints what they say, the commands exist.
-
-The blocks of a page run in order, in one namespace and one empty folder. A block
-
-- of `python` is run, unless the line `<!-- not run: why -->` stands before it;
-- of any kind is written to a file first, if the line `<!-- file: name -->` stands before it;
-- of `text title="output"` must be what the blocks of Python before it printed since the last such block;
-- of `sh` is not run, but its lines that begin with `sagline` must be understood by the command.
+"""README and documentation: the code runs and prints what they say, the commands exist; see tools/pages/snippets.py.
 
 A line `<!-- drawn by: sagline ... -->` shows the figures that a command draws; it must be understood as well.
 """
@@ -16,7 +9,7 @@ import shlex
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import pytest
 import typer
@@ -24,41 +17,19 @@ import typer.main
 
 from sagline.cli.main import app
 from tests.tiers import extended
+from tools.pages.snippets import BLOCK, blocks, executed
 
 pytestmark = extended
 
 ROOT = Path(__file__).parents[2]
 WIDTH = 80  # columns that a page shows without scrolling
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
-BLOCK = re.compile(
-    r"(?:^ *<!-- (?P<mark>not run|file): (?P<what>[^\n]+?) -->\n+)?"
-    r"^(?P<indent> *)```(?P<kind>\w*)(?P<title>[^\n`]*)\n(?P<text>.*?)^(?P=indent)```$",
-    re.MULTILINE | re.DOTALL,
-)
-
-
-class Block(NamedTuple):
-    """A fenced block of a page."""
-
-    kind: str
-    title: str
-    mark: str | None
-    what: str
-    text: str
-    line: int
-
-
-def blocks(page: Path) -> Iterator[Block]:
-    text = page.read_text(encoding="utf-8")
-    for found in BLOCK.finditer(text):
-        body = re.sub(f"^{found['indent']}", "", found["text"], flags=re.MULTILINE)
-        line = text[: found.start("text")].count("\n")
-        yield Block(found["kind"], found["title"].strip(), found["mark"], found["what"] or "", body, line)
 
 
 def commands(page: Path) -> Iterator[str]:
-    yield from re.findall(r"^<!-- drawn by: (sagline .+) -->$", page.read_text(encoding="utf-8"), re.MULTILINE)
-    for block in blocks(page):
+    text = page.read_text(encoding="utf-8")
+    yield from re.findall(r"^<!-- drawn by: (sagline .+) -->$", text, re.MULTILINE)
+    for block in blocks(text):
         if block.kind == "sh":
             for line in block.text.replace("\\\n", " ").splitlines():
                 if line.removeprefix("$ ").startswith("sagline"):
@@ -71,20 +42,23 @@ def name_of(page: Path) -> str:
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_the_code_runs_and_prints_what_the_page_says(
-    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     for suffix in ("yaml", "csv"):
         for file in (ROOT / "examples").glob(f"*.{suffix}"):
             shutil.copy(file, tmp_path)
-    names: dict[str, Any] = {"__name__": "__main__"}
-    for block in blocks(page):
-        if block.mark == "file":
-            Path(block.what).write_text(block.text, encoding="utf-8")
-        elif block.kind == "python" and block.mark is None:
-            exec(compile("\n" * block.line + block.text, page, "exec"), names)
-        elif (block.kind, block.title) == ("text", 'title="output"'):
-            assert capsys.readouterr().out.rstrip() == block.text.rstrip(), f"{name_of(page)}, line {block.line}"
+    text = page.read_text(encoding="utf-8")
+    assert executed(text, str(page)) == text
+
+
+def test_a_page_prints_what_its_code_prints(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    file = "  <!-- file: a.txt -->\n  ```yaml\n  7\n  ```\n\n"
+    code = "```python\nfrom pathlib import Path\nx = Path('a.txt').read_text()\nprint(x)\n```\n"
+    rest = "<!-- not run: why -->\n```python\nx = 8\n```\n\n```python\nprint(x)\nprint()\n```\n"
+    page = file + code + '  ```text title="output"\n{}  ```\n' + rest + '```text title="output"\n{}```\n'
+    assert executed(page.format("  old\n", ""), "page") == page.format("  7\n", "7\n")
 
 
 @pytest.mark.parametrize(
@@ -105,12 +79,13 @@ def test_the_commands_exist(line: str) -> None:
 
 def test_the_pages_are_found_and_their_blocks_too() -> None:
     assert ROOT / "docs" / "model.md" in PAGES
-    assert [block.kind for block in blocks(ROOT / "README.md")].count("python") == 2
+    assert [block.kind for block in blocks(PAGES[0].read_text(encoding="utf-8"))].count("python") == 2
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_no_line_of_code_is_wider_than_a_page(page: Path) -> None:
-    lines = [(block.line + i, line) for block in blocks(page) for i, line in enumerate(block.text.splitlines(), 1)]
+    found = blocks(page.read_text(encoding="utf-8"))
+    lines = [(block.line + i, line) for block in found for i, line in enumerate(block.text.splitlines(), 1)]
     assert [(number, line) for number, line in lines if len(line) > WIDTH] == []
 
 

@@ -13,9 +13,9 @@ from typer.testing import CliRunner
 import sagline as sl
 from sagline.cli.main import app
 from sagline.core.arrays import Array
-from tests.docs.test_snippets import blocks
 from tests.examples.test_commands import lines_of
 from tests.tiers import extended
+from tools.pages.snippets import BLOCK, executed
 
 pytestmark = extended
 ROOT = Path(__file__).parents[2]
@@ -55,15 +55,10 @@ def test_the_commands_lead_from_homing_to_poses(tmp_path: Path, monkeypatch: pyt
     """The blocks of the page up to its commands, and then these, in a folder with the files of `sagline examples`."""
     monkeypatch.chdir(tmp_path)
     assert CliRunner().invoke(app, ["examples", "--out", "."]).exit_code == 0
-    names: dict[str, Any] = {}
-    lines: list[list[str]] = []
-    for block in blocks(ROOT / "docs" / "winches.md"):
-        if block.mark == "file":
-            Path(block.what).write_text(block.text, encoding="utf-8")
-        elif block.kind == "python" and not lines:
-            exec(block.text, names)
-        elif block.kind == "sh":
-            lines += lines_of(block.text)
+    page = (ROOT / "docs" / "winches.md").read_text(encoding="utf-8")
+    commands = next(found for found in BLOCK.finditer(page) if found["kind"] == "sh")
+    executed(page[: commands.start()], "winches.md")
+    lines = lines_of(commands["text"])
     assert [words[0] for words in lines] == ["track", "encoder", "forward"]
     for words in lines:
         result = CliRunner().invoke(app, [*words, "--no-figures"] if words[0] == "track" else words)

@@ -1,0 +1,1 @@
+"""The documentation as plain Markdown: `python -m tools.pages` runs what the pages of docs show, into build/pages."""
