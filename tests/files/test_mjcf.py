@@ -249,7 +249,7 @@ def test_a_platform_end_in_a_pulley_is_refused() -> None:
     with pytest.raises(CableGeometryError, match=r"cable 2: .* pulley"):
         dump_mjcf(robot, Pose(place, np.eye(3)), [9.0] * 8)
     with refused(
-        "cable 2: unstrained length", "4 m", "> 4 m, the dead length behind its pulley", kind=InvalidValueError
+        "cable 2: unstrained length", "4 m", "> 4 m, the dead length between drum and pulley", kind=InvalidValueError
     ):
         dump_mjcf(OVER_PULLEYS, POSE, [9.0, 9.0, 4.0, 9.0, 9.0, 9.0, 9.0, 9.0])
 

@@ -103,7 +103,7 @@ def test_samples_without_an_answer_have_no_rates() -> None:
 
 
 def test_poses_without_times_have_no_rates(plan: sl.Plan) -> None:
-    with refused("plan", "one of poses without times"):
+    with refused("plan", "a plan of poses without times"):
         sl.winch_rates(sl.inverse(wound(), plan.state.pose[0]))
 
 

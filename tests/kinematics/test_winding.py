@@ -291,7 +291,7 @@ def test_windings_that_are_none_are_refused(winding: Any, parts: tuple[str, ...]
 def test_what_does_not_take_guides_says_so() -> None:
     robot = machine("cogiro")
     pose = sl.Pose.from_euler([0.5, 0.5, 2.0], 0.0, 0.0, 0.0)
-    with refused("winding", "'path' for poses without one"):
+    with refused("winding", "'path' for poses without a path"):
         sl.inverse(robot, pose, winding="path")
     for solver in (sl.InverseSolver, sl.ForwardSolver):
         with refused("winches: guides", "given", f"None for {solver.__name__}"):

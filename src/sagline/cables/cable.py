@@ -26,11 +26,11 @@ class Cable:
         expansion: Coefficient of thermal expansion [1/K], shape (...), negative for most fibers; None if not known.
 
     Raises:
-        InvalidValueError: If a density is negative, a stiffness or diameter not positive, or the shapes do not
+        InvalidValueError: If a density is negative, a stiffness or diameter is not positive, or the shapes do not
             broadcast.
 
     Examples:
-        A fiber of 67 g/m and 44 kN, and two cables at once:
+        A cable with 67 g/m and EA = 44 kN, then two cables in one object:
 
         >>> import sagline as sl
         >>> cable = sl.Cable(linear_density=0.067, axial_stiffness=44e3)
@@ -76,8 +76,8 @@ class Cable:
         Args:
             linear_density: Mass per unstrained length [kg/m], >= 0.
             youngs_modulus: Young's modulus E of the whole rope [Pa], > 0; the modulus of its fibers or wires is larger.
-            section_area: Section area A to which E refers [m^2], > 0; for a rope usually only the area of its fibers or
-                metal.
+            section_area: Section area A to which E refers [m^2], > 0; for a rope, this is usually only the area of its
+                fibers or wires.
             diameter: Diameter of the rope [m], > 0; None if unknown. The section area cannot be computed from the
                 diameter.
             expansion: Coefficient of thermal expansion [1/K], or None.
@@ -86,8 +86,8 @@ class Cable:
             Cable of axial stiffness EA.
 
         Raises:
-            InvalidValueError: If a density is negative, a modulus, area or diameter not positive, or the shapes do not
-                broadcast.
+            InvalidValueError: If a density is negative, a modulus, area or diameter is not positive, or the shapes do
+                not broadcast.
 
         Examples:
             >>> import sagline as sl
@@ -134,7 +134,7 @@ class Cable:
         return {name: value for name in self.__slots__ if (value := getattr(self, name)) is not None}
 
     def _part(self, index: int | slice | NDArray[Any], shape: tuple[int, ...]) -> Cable:
-        """Material of a part of a batch of the given shape; unchanged if it has no axis for the batch."""
+        """Material at an index of a batch of the given shape; the same object if all poses have one material."""
         own = self.linear_density.shape
         if len(own) < len(shape):
             return self

@@ -20,17 +20,17 @@ MOST_ELEMENTS = 2
 class Creep:
     """Creep strain of a cable: one or two Kelvin-Voigt elements (spring parallel to damper) in series with the cable.
 
-    Elastic axial stiffness and one element give the standard linear solid. Two elements give the five-element model of
-    polymer ropes. The creep is recoverable: without tension the strain returns to zero.
+    The elastic cable and one element form the standard linear solid. The elastic cable and two elements form the
+    five-element model of polymer ropes. The creep is recoverable: without tension the strain returns to zero.
 
     Attributes:
         axial_stiffness: Stiffness k of each element [N], > 0, shape (1,) or (2,). Under a constant tension T, the
             strain of an element approaches T/k.
-        time: Retardation time of each element [s], > 0, of the same shape. After this time, 1/e of the final strain T/k
-            is missing.
+        time: Retardation time of each element [s], > 0, of the same shape. After this time, the strain of the element
+            is 63 % (1 - 1/e) of T/k.
 
     Examples:
-        A fiber rope under 1 kN, after a second, a minute and an hour:
+        Strain of a fiber rope under 1 kN after a second, a minute and an hour:
 
         >>> import sagline as sl
         >>> creep = sl.Creep(axial_stiffness=[1e6, 4e5], time=[30.0, 1200.0])
@@ -66,7 +66,7 @@ class Creep:
             object.__setattr__(self, name, locked(np.array(np.broadcast_to(values, shape))))
 
     def strain(self, time: ArrayLike, tension: ArrayLike, *, settled: bool = False) -> Array:
-        """Creep strain for a time series of tensions; unstrained lengths become L (1 + strain).
+        """Creep strain for a time series of tensions. Creep increases an unstrained length L to L (1 + strain).
 
         The strain is exact for tensions that vary linearly between samples.
 

@@ -37,7 +37,7 @@ class CableStatus(Status):
         "the empirical model is not valid here, because the lowest point of the cable is inside the span; "
         "raise the tension above w D/(2 |sin phi|), or use Catenary()",
     )
-    TOO_SLACK = codes.CABLE_TOO_SLACK, "the chord tension is below a thousandth of the cable's weight; raise it"
+    TOO_SLACK = codes.CABLE_TOO_SLACK, "the chord tension is below 0.1 % of the cable's weight; raise the tension"
     NOT_CONVERGED = codes.CABLE_NOT_CONVERGED, "the iteration did not converge; please report this cable's data"
 
 
@@ -65,7 +65,7 @@ class CableModel:
     weightless: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
-        """Refuse to create the interface, which is not a cable model."""
+        """Refuse to create an object of the interface itself, which is not a cable model."""
         if type(self) is CableModel:
             step = "Choose one of the models, Catenary() for instance."
             raise InvalidValueError("CableModel()", "the abstract base class", "a cable model", step)
@@ -111,7 +111,7 @@ class CableModel:
             InvalidValueError: If a tension or gravity is negative or not finite, or shapes do not broadcast.
 
         Examples:
-            One cable, then the cable at three tensions:
+            The state of a cable at one tension, then at three tensions:
 
             >>> import sagline as sl
             >>> model = sl.Catenary()
@@ -139,7 +139,7 @@ class CableModel:
     def from_length(
         self, cable: Cable, span: ArrayLike, rise: ArrayLike, unstrained_length: ArrayLike, gravity: float = 9.81
     ) -> CableState:
-        """Forces of cables of given unstrained lengths.
+        """Forces of cables with given unstrained lengths.
 
         All arguments broadcast to one shape (...).
 
@@ -177,7 +177,7 @@ class CableModel:
         tension: Array,
         status: Codes,
     ) -> CableState:
-        """State of the solved batch, in the shape of the arguments."""
+        """State of the solved batch; its arrays have the shape of the arguments."""
         return CableState(
             model=self,
             cable=cable,
@@ -227,7 +227,7 @@ class CableState(Result):
         horizontal_tension: T_x [N], >= 0.
         vertical_force: T_z [N], up positive.
         chord_tension: tau = T_x/cos phi [N].
-        status: Codes of `CableStatus`; only SOLVED, SLACK and BELOW_VALIDITY have values, other codes have NaN.
+        status: Codes of `CableStatus`. Forces and lengths are NaN unless the code is SOLVED, SLACK or BELOW_VALIDITY.
     """
 
     model: CableModel
@@ -287,7 +287,7 @@ class CableState(Result):
 
     @property
     def frame_end_tension(self) -> Array:
-        """Tension at the frame end, at the load cell of a winch [N]."""
+        """Tension at the frame end [N], which the load cell of a winch measures."""
         return np.hypot(self.horizontal_tension, self.vertical_force - self.cable_weight)
 
     @property
@@ -297,14 +297,14 @@ class CableState(Result):
 
     @property
     def sag(self) -> Array:
-        """Largest vertical drop below the chord [m]; on a vertical chord, below the lower end."""
+        """Largest vertical distance of the cable below its chord [m]; below its lower end if the chord is vertical."""
         out = np.empty(self.unstrained_length.size)
         batch.largest_sags(self.model.terms(self.gravity), *self._columns(), out)
         return out.reshape(self.shape)
 
     @property
     def closure_residual(self) -> Array:
-        """Closure error of the state [m]: error in the equations of its cable model."""
+        """Closure error of the state [m]: error with which the state satisfies the equations of its cable model."""
         out = np.empty(self.unstrained_length.size)
         batch.closures(self.model.terms(self.gravity), *self._columns(), out)
         return out.reshape(self.shape)

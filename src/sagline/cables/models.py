@@ -47,8 +47,9 @@ class Empirical(CableModel):
     smaller T_x have the status BELOW_VALIDITY. For a given length, T_x is on the decreasing branch of (48).
 
     Attributes:
-        k_h: Intercept constant [m/s^2]; the magnitude of the published value 4.845 (exactly g/2 for a shallow cable).
-        k_p: Sag constant [m^2/s^4]; the published value 4.385 (exactly g^2/24 for a shallow cable).
+        k_h: Intercept constant [m/s^2]. The default is the magnitude of the published value, 4.845; theory gives g/2
+            for a shallow cable.
+        k_p: Sag constant [m^2/s^4]. The default is the published value 4.385; theory gives g^2/24 for a shallow cable.
 
     Source:
         Gia Luan & Truong Thinh 2020, equations (21), (27), (28), (45), (48); docs/model.md, section 3.
@@ -71,7 +72,7 @@ class Empirical(CableModel):
 
 @dataclass(frozen=True, slots=True)
 class Parabolic(CableModel):
-    """A shallow cable of first order: L = D (1 + (w D cos phi)^2/(24 tau^2))/(1 + tau/EA), T_z = tau sin phi + w D/2.
+    """First-order shallow cable: L = D (1 + (w D cos phi)^2/(24 tau^2))/(1 + tau/EA), T_z = tau sin phi + w D/2.
 
     For a given length, tau is the positive root of a cubic equation.
 
@@ -94,7 +95,7 @@ class Catenary(CableModel):
 
 
 MODELS: dict[str, type[CableModel]] = {
-    model.__name__: model  # coarse to exact
+    model.__name__: model  # in the order of increasing accuracy
     for model in (
         Straight,
         Elastic,
@@ -106,5 +107,5 @@ MODELS: dict[str, type[CableModel]] = {
 
 
 def model_of(value: CableModel | str, item: str = "model") -> CableModel:
-    """A cable model, unchanged, or the cable model with a name such as "elastic"."""
+    """Return a cable model unchanged; convert a name such as "elastic" to a cable model."""
     return named(value, CableModel, MODELS, item)

@@ -1,4 +1,4 @@
-"""A batch of cables to solve: checks and flattening of operands; results in the shape of the arguments."""
+"""A batch of cables to solve: operands are checked and flattened; results get the shape of the arguments."""
 
 from __future__ import annotations
 
@@ -53,10 +53,7 @@ class Problem(NamedTuple):
         return np.empty(size), np.empty(size), np.empty(size), np.empty(size, dtype=np.int8)
 
     def shaped(self, field: Array) -> Array:
-        """A result or an operand in the batch's shape, locked.
-
-        Shape of the result: (...).
-        """
+        """Write-locked result or operand in the shape of the batch, (...)."""
         whole = field.size == math.prod(self.shape)
         return locked(field.reshape(self.shape) if whole else np.broadcast_to(field, self.shape))
 
@@ -69,5 +66,5 @@ def _checked_span(span: ArrayLike) -> Array:
 
 
 def _flat(field: Array, shape: tuple[int, ...]) -> Array:
-    """Flatten to one axis: the whole batch, or a single value for the whole batch."""
+    """Flatten an operand to one axis: one value per cable of the batch, or a single value for all cables."""
     return field.reshape(1) if field.size == 1 else kernel_input(field, shape).reshape(-1)

@@ -1,4 +1,4 @@
-"""A small catalogue of ropes for cables. Properties follow from the diameter; each rope names its source."""
+"""A small catalogue of ropes for cables. The diameter determines the properties; each rope names its source."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Final
 from sagline.cables.cable import Cable
 from sagline.core.arrays import checked
 
-SAFETY = 5.0  # ratio of breaking force to highest allowed tension, as usual for general lifting
+SAFETY = 5.0  # breaking force divided by the highest allowed tension; usual value for general lifting
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +23,7 @@ class Rope:
         stiffness_factor: Axial stiffness divided by the squared diameter [Pa].
         strength_factor: Breaking force divided by the squared diameter [Pa].
         source: Source of the numbers.
-        assumed: Assumed values with the reason.
+        assumed: Assumed values, and the reasons.
     """
 
     name: str
@@ -35,18 +35,12 @@ class Rope:
     assumed: str
 
     def cable(self, diameter: float) -> Cable:
-        """A cable of this rope.
-
-        Units: diameter [m].
-        """
+        """A cable of this rope, from the diameter [m]."""
         square = float(checked(diameter, "diameter", "m", shape=(), above=0.0)) ** 2
         return Cable(self.density_factor * square, self.stiffness_factor * square, diameter=diameter)
 
     def breaking_force(self, diameter: float) -> float:
-        """Minimum breaking force of a new rope.
-
-        Units: diameter [m]; returns [N].
-        """
+        """Minimum breaking force [N] of a new rope, from the diameter [m]."""
         return self.strength_factor * diameter**2
 
 
@@ -64,7 +58,7 @@ def _steel(name: str, construction: str, mass: float, section: float, strength: 
 
 
 def _braid(name: str, fiber: str, modulus: float, strength: float, source: str) -> Rope:
-    """A braided rope of a fiber with given modulus [Pa] and strength [Pa]."""
+    """A braided rope from the modulus [Pa] and the strength [Pa] of its fiber."""
     section = 0.7853981633974483 * _BRAID_FILL
     return Rope(
         name=name,
@@ -79,7 +73,7 @@ def _braid(name: str, fiber: str, modulus: float, strength: float, source: str) 
 
 
 _STEEL_MODULUS = 100e9  # modulus for the metallic section [Pa]
-_BRAID_FILL = 2.0 / 3.0  # share of fiber in the area of the nominal diameter
+_BRAID_FILL = 2.0 / 3.0  # fiber area divided by the area of the circle with the nominal diameter
 _POLYETHYLENE = 975.0  # [kg/m^3], assumed: a common value of the fiber
 _DSM = "DSM Dyneema, fact sheet UHMWPE fiber, CIS YA100 (2010): {}; density 975 kg/m^3 assumed"
 

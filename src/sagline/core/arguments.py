@@ -21,7 +21,7 @@ from sagline.core.errors import FileError, InvalidValueError, nearest, printable
 
 T = TypeVar("T")
 
-# how to get an object of each type, for the end of the message about a wrong type
+# type -> how to get an object of this type; this sentence ends the message about a wrong type
 HOW_TO_GET: Final = MappingProxyType(
     {
         "AnchorErrors": "Give AnchorErrors(deviation), for instance 0.01 m, or None.",
@@ -75,7 +75,7 @@ class _Brief(Repr):
     def repr_instance(self, x: Any, level: int) -> str:
         if isinstance(x, np.ndarray) and x.size > 3:
             return f"an array of {x.dtype} of shape {x.shape}"
-        # the short text of a result needs its summary, whose computation may take long
+        # a result computes its summary for its short text, which may take long
         short = getattr(type(x).__repr__, "__module__", "") == "sagline.core.results"
         if short or (type(x).__module__.startswith("sagline") and len(repr(x)) > self.maxother):
             return f"a {type(x).__name__}"
@@ -103,7 +103,7 @@ def instance(value: object, kind: type[T], item: str) -> T:
 
 
 def optional(value: object, kind: type[T], item: str) -> T | None:
-    """Return an argument unchanged after a check of its type; None is allowed."""
+    """Return an argument unchanged after a check of its type; the argument may also be None."""
     return None if value is None else instance(value, kind, item)
 
 
@@ -118,12 +118,12 @@ def choice(value: Any, item: str, allowed: Iterable[str]) -> Any:
 
 
 def word_of(name: str) -> str:
-    """Name of a class in words, as on the command line: minimum-norm of MinimumNorm."""
+    """Name of a class on the command line: "minimum-norm" for MinimumNorm."""
     return re.sub("(?<!^)(?=[A-Z])", "-", name).lower()
 
 
 def named(value: str | T, kind: type[T], kinds: Mapping[str, type[T]], item: str) -> T:
-    """An object of a type, unchanged; for a name such as "minimum-norm", an object with default options."""
+    """Return an object of the type unchanged; a name such as "minimum-norm" becomes an object with default options."""
     if not isinstance(value, str):
         return instance(value, kind, item)
     words = {word_of(name): kind for name, kind in kinds.items()}
@@ -150,7 +150,7 @@ def label(value: Any, item: str) -> str:
 
 
 def integer(value: Any) -> int | None:
-    """Value as an integer; Booleans and arrays, even with one element, are not accepted.
+    """Value as an integer; a Boolean or an array, even with one element, is not accepted.
 
     Returns the integer, or None if the value is not an integer.
     """
@@ -245,7 +245,7 @@ def _a(name: str) -> str:
 
 
 def _step_to(value: object, kind: type) -> str:
-    """Next step for a message: how to get an object of the required type from the given value."""
+    """Next step in a message: how to get an object of the required type from the given value."""
     if isinstance(value, type) and issubclass(value, kind):
         return f"Add parentheses to create one: {value.__name__}()."
     if type(value).__module__.startswith("sagline"):

@@ -21,9 +21,10 @@ Codes = NDArray[np.int8]
 Indices = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-LARGEST: Final = 1e50  # larger than any value of a machine in any unit; the square and cube are still finite
-FARTHEST: Final = 1e6  # largest coordinate of a point [m], larger than on any machine
-SMALLEST: Final = 1e-50  # smallest value of a quantity that must be positive
+# limit of all values: larger than any value of a machine in any unit, but with a finite square and cube
+LARGEST: Final = 1e50
+FARTHEST: Final = 1e6  # largest allowed coordinate of a point [m], larger than on any machine
+SMALLEST: Final = 1e-50  # smallest allowed value of a quantity that must be positive
 _KINDS = {"c": "complex", "M": "dates", "m": "durations of a calendar", "V": "records"}
 
 
@@ -47,7 +48,7 @@ def checked(
     """Locked float64 copy of a caller's value; raises an error that names the problem.
 
     unit: unit of the value, for the message; "" if dimensionless; shape: required trailing axes, with None for any
-    length; leading axes are arbitrary; None (default) accepts every shape; above: strict lower limit of every value;
+    length; leading axes are arbitrary; None (default) accepts every shape; above: limit that every value must exceed;
     missing: True if NaN is allowed. Returns a float64 array, C-contiguous, write-locked, that owns its memory. An array
     with all these properties, such as a result of sagline, is returned without a copy.
     """
@@ -69,7 +70,7 @@ def numbers(value: ArrayLike, item: str, unit: str) -> Array:
     _refuse_masked_or_with_unit(value, item, unit)
     try:
         size = value.size if isinstance(value, np.ndarray) else len(value)  # type: ignore[arg-type]
-    except Exception:  # a number has no length, and an object of the caller may raise any error
+    except Exception:  # a number has no length, and a caller's object may raise any error
         size = 1
     check_memory(item, 8.0 * size, "Give fewer numbers.")
     try:
@@ -87,7 +88,7 @@ def numbers(value: ArrayLike, item: str, unit: str) -> Array:
 def number(value: Any, item: str, unit: str, *, low: float = -np.inf, above: float = -np.inf) -> float:
     """A single finite number.
 
-    above: strict lower limit of the value.
+    above: limit that the value must exceed.
     """
     return float(exactly(value, item, unit, (), low=low, above=above))
 

@@ -8,7 +8,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Final
 
-_WORD: Final = 60  # number of leading characters of the given text that are compared with known words
+_WORD: Final = 60  # number of characters at the beginning of a given text that are compared with known words
 LONGEST: Final = 299  # largest number of characters of a terminal line; longer messages are shortened
 HEAD: Final = "Error: "  # prefix of a message
 MOST: Final = LONGEST - len(HEAD)  # largest number of characters of a message
@@ -20,7 +20,7 @@ class SaglineError(Exception):
 
 
 class SaglineWarning(UserWarning):
-    """Valid result that needs care; the text states the reason and the next step."""
+    """Warning about a valid result; the text states the reason and the next step."""
 
 
 class InvalidValueError(SaglineError, ValueError):
@@ -84,7 +84,7 @@ class FileError(SaglineError):
 
     @classmethod
     def of(cls, path: Path | str, error: InvalidValueError) -> FileError:
-        """The error of a value in a file.
+        """Convert the error of a value to the error of the file that contains the value.
 
         Args:
             path: The file.
@@ -134,7 +134,7 @@ def printable(text: str, kept: str = "") -> str:
 
 
 def is_seen(character: str) -> bool:
-    """True for a character that is visible, or a space of any width.
+    """True for a visible character, and for a space of any width.
 
     Invisible formatting marks, such as U+200E and U+200B, give False.
     """
@@ -142,7 +142,7 @@ def is_seen(character: str) -> bool:
 
 
 def nearest(word: str, known: Iterable[str]) -> str | None:
-    """The known word that was probably intended, for "Did you mean".
+    """The known word that the user probably meant, for the question "Did you mean".
 
     Returns the nearest known word, or None if no word is similar.
 

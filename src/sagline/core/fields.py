@@ -1,9 +1,9 @@
 """Fields of input types. The declaration of a field is the only definition of its name, default, unit and range.
 
 A type is `attrs.frozen`. Each field has a converter, which gives type checkers the type of the constructor argument.
-Its metadata are the arguments of `sagline.core.arrays.checked`. `__attrs_post_init__` checks the values. It is
-`check_fields` if each field declares its complete check. A dataclass of single numbers derives from `NumberFields` and
-declares its ranges in the same way.
+Its metadata are the arguments of `sagline.core.arrays.checked`. `__attrs_post_init__` checks the values. If each field
+declares its complete check, this method is `check_fields`. A dataclass of single numbers derives from `NumberFields`
+and declares its ranges in the same way.
 """
 
 from __future__ import annotations
@@ -40,17 +40,17 @@ def given_by_name(value: Mapping[str, ArrayLike]) -> Mapping[str, Array]:
 
 
 def rule(unit: str = "", **limits: Any) -> dict[str, Any]:
-    """Metadata of a field: arguments of `checked`."""
+    """Metadata of a field: the arguments with which `checked` checks its value."""
     return {"unit": unit, **limits}
 
 
 def checked_by(check: Callable[..., Any], *arguments: Any, **limits: Any) -> dict[str, Any]:
-    """Metadata of a field: a check from `core.arguments`, with arguments in addition to value and name."""
+    """Metadata of a field: a check from `core.arguments`, and its arguments after value and name."""
     return {"check": lambda value, item: check(value, item, *arguments, **limits)}
 
 
 def check_fields(made: Any) -> None:
-    """Check each field of a new object with its `checked_by`; None is allowed if it is the default."""
+    """Check each field of a new object with its `checked_by`; None is allowed if None is the default."""
     for about in fields(type(made)):
         value = getattr(made, about.name)
         if "check" in about.metadata and not (value is None and about.default is None):
@@ -60,7 +60,7 @@ def check_fields(made: Any) -> None:
 class NumberFields:
     """Base of dataclasses with single numbers as fields. Fields with a `rule` as metadata are checked at construction.
 
-    A field whose rule has `most` is a whole number from 0 to `most`. None is allowed if it is the default.
+    A field whose rule has `most` is a whole number from 0 to `most`. None is allowed if None is the default.
     """
 
     __slots__ = ()
@@ -77,7 +77,7 @@ class NumberFields:
 
 
 def reduced(value: Any) -> tuple[Any, tuple[type[Any], dict[str, Any]]]:
-    """Reduction for pickle through the constructor, which checks and locks a loaded value."""
+    """Pickle the object through its constructor, which checks and locks a loaded value."""
     kind = type(value)
     values = {about.name: getattr(value, about.name) for about in fields(kind)}
     return _constructed, (kind, {name: dict(own) if isinstance(own, Mapping) else own for name, own in values.items()})

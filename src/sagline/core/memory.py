@@ -10,8 +10,8 @@ from typing import Final
 from sagline.core.errors import InvalidValueError
 
 UNASKED: Final = 1 << 26  # smaller allocations are not checked [bytes]
-_POSE_BYTES, _CABLE_BYTES = 400.0, 64.0  # measured memory for a pose and for each of its cables [bytes]
-_BEHIND_BYTES = 72.0  # measured memory for the routing of each cable [bytes]
+_POSE_BYTES, _CABLE_BYTES = 400.0, 64.0  # measured memory per pose, and per cable of a pose [bytes]
+_BEHIND_BYTES = 72.0  # measured memory per cable for its routing [bytes]
 _GROUPS: Final = (  # files with the memory limit and the used memory of a container
     ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"),
     ("/sys/fs/cgroup/memory/memory.limit_in_bytes", "/sys/fs/cgroup/memory/memory.usage_in_bytes"),
@@ -32,7 +32,7 @@ def check_memory(item: str, size: float, next_step: str) -> None:
 
 
 def check_poses(count: int, cable_count: int, behind: bool) -> None:
-    """Refuse a forward or inverse solution for more poses than fit into memory.
+    """Refuse forward or inverse kinematics of a batch that does not fit into memory.
 
     cable_count: number of cables m of the robot.
     """

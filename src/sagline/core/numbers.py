@@ -6,11 +6,12 @@ import re
 from math import floor, isfinite, log10
 from typing import SupportsFloat
 
-ROUNDING = 1e-12  # a smaller difference, relative to the size of the operands, is a rounding error
+ROUNDING = 1e-12  # relative to the size of the operands; a smaller difference is a rounding error
 PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 POWERS = {prefix: power for power, prefix in PREFIXES.items()}
-HIGHEST = {"m": 3, "g": 3, "s": 0, "rad": 0}  # power of ten of the largest usual prefix; other units use all prefixes
-LONGEST_PLAIN = 1e7  # larger numbers without a prefix are written with a power of ten
+# unit -> power of ten of its largest usual prefix; other units use all prefixes
+HIGHEST = {"m": 3, "g": 3, "s": 0, "rad": 0}
+LONGEST_PLAIN = 1e7  # a number without a prefix that exceeds this limit is written with a power of ten
 SPACE = "\N{NO-BREAK SPACE}"
 TIGHT = ("", "°")  # units written without a space before them
 
@@ -30,13 +31,14 @@ def n(
     """Number with its unit, for display.
 
     A number from 0.1 to 1000 keeps the given unit. Any other number gets the prefix with which it is between 1 and
-    1000, or a power of ten if no such prefix exists. The minus sign is U+2212. The space before a unit does not break.
+    1000, or a power of ten if no such prefix exists. The minus sign is U+2212. No line break is possible at the space
+    before a unit.
 
-    value: the number, in the unit; "–" if not finite; form: format of the digits, as in `format`; not used with an
-    uncertainty; unit: its unit, such as "mm", "kg/m", "%"; "" if dimensionless; uncertainty: standard uncertainty in
-    the unit, or None; its two digits follow the value in parentheses: 43.98(10) is 43.98 ± 0.10; size: size of the
-    operands if the value is a difference, in the unit; a value up to `ROUNDING` times the size is written as "0
-    (rounding)".
+    value: the number, in the unit; a number that is not finite is written as "–"; form: format of the digits, as in
+    `format`; not used with an uncertainty; unit: its unit, such as "mm", "kg/m", "%"; "" if dimensionless; uncertainty:
+    standard uncertainty in the unit, or None; its two digits are written in parentheses after the value: 43.98(10)
+    means 43.98 ± 0.10; size: size of the operands if the value is a difference, in the unit; a value up to `ROUNDING`
+    times the size is written as "0 (rounding)".
 
     Source:
         ISO 80000-1:2022, 7.2 (prefixes); JCGM 100:2008, 7.2.2 (uncertainty in parentheses).
@@ -61,8 +63,8 @@ def n(
 def plus_minus(value: SupportsFloat, error: SupportsFloat, unit: str = "", *, prefixed: bool = True) -> str:
     """Number with its standard error, both rounded to two significant digits of the error: "512 ± 12 kN".
 
-    error: its standard error, in the unit; unknown if not finite; prefixed: True if the unit gets the most readable
-    prefix; False in a column of a table.
+    error: standard error of the value, in the unit; infinite or NaN if unknown; prefixed: True to write the unit with
+    its most readable prefix; False in a column of a table.
     """
     number, own = float(value), float(error)
     if not (isfinite(number) and isfinite(own) and own > 0.0):

@@ -7,7 +7,8 @@ from typing import TypeAlias
 
 from sagline.core.arrays import Array
 
-Progress: TypeAlias = Callable[[int, int], None]  # called after each block: number done, total number
+# called after each block with the number of finished rows and the number of all rows
+Progress: TypeAlias = Callable[[int, int], None]
 
 
 def blocks(count: int, size: int, progress: Progress | None = None) -> Iterator[slice]:
@@ -20,5 +21,5 @@ def blocks(count: int, size: int, progress: Progress | None = None) -> Iterator[
 
 
 def rows_of(array: Array, part: slice) -> Array:
-    """Block of an array with one row for all entries or one row per entry."""
+    """Rows of a block; an array with a single row, which applies to all entries, is returned unchanged."""
     return array if len(array) == 1 else array[part]

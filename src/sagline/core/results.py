@@ -27,7 +27,7 @@ def formats() -> Any:
 
 
 def documented_units(kind: type[Any], name: str) -> list[str]:
-    """Units in the documentation of an attribute of a class, in order: N and N m of "force [N], moment [N m]"."""
+    """Units in the documentation of a class attribute, in order: "force [N], moment [N m]" gives N and N m."""
     own = getattr(kind, name, None)
     text = own.__doc__ if isinstance(own, property) else None
     if text is None:
@@ -43,9 +43,9 @@ def set_fields(target: object, **values: Any) -> None:
 
 
 class Shown:
-    """Base class for the display as a short summary, in Jupyter with a figure.
+    """Base class of objects that are displayed as a short summary, and in Jupyter also as a figure.
 
-    Classes with long arrays do not generate a representation: `dataclass(repr=False)`.
+    A class with long arrays uses `dataclass(repr=False)`, so that its representation is this summary.
     """
 
     __slots__ = ()
@@ -56,7 +56,7 @@ class Shown:
         return text
 
     def _repr_html_(self) -> str | None:
-        """Summary and figure as HTML; None if not available, so that Jupyter displays the ordinary text."""
+        """Summary and figure as HTML; with None, Jupyter displays the plain text instead."""
         with suppress(Exception):  # an error of the display must not turn a finished cell into a failed cell
             shown: str | None = import_module(_PAGES).html_of(self)
             return shown
@@ -72,24 +72,24 @@ class ByFields:
     __slots__ = ()
 
     def __reduce__(self) -> tuple[Any, tuple[type[ByFields], dict[str, Any]]]:
-        """Pickle by fields, which locks the arrays of the loaded object."""
+        """Pickle the object by its fields; loading locks the arrays."""
         return _again, (type(self), {field.name: getattr(self, field.name) for field in fields(self)})  # type: ignore[arg-type]
 
 
 class Result(ByFields, Shown):
-    """An immutable result, also after pickling."""
+    """A result that is immutable, also after it was pickled and loaded."""
 
     __slots__ = ()
 
     def __repr__(self) -> str:
-        """First line of the text from `__str__` if the class defines it; otherwise the summary."""
+        """Representation: the first line of `__str__` if the class defines `__str__`; otherwise the summary."""
         if type(self).__str__ is object.__str__:
             return super().__repr__()
         return f"<{type(self).__name__}: {str(self).splitlines()[0]}>"
 
 
 class Saved:
-    """A result with a file format, see `sagline.files.format`."""
+    """A result that can be saved in a file; `sagline.files.format` declares the formats."""
 
     __slots__ = ()
 

@@ -16,7 +16,7 @@ _LINE = re.compile(r"^from (\.\S*) import (?:(\w+) as \2|\*)$", re.MULTILINE)
 
 @cache
 def public_names(package: str, *, listed: bool = False) -> dict[str, str]:
-    """Public names of a package and the modules that contain them; `listed`: without those of `import *`."""
+    """Public names of a package and the modules that contain them; listed: True to omit the names from `import *`."""
     stub = Path(__file__).parents[1].joinpath(*package.split(".")[1:], "__init__.pyi")
     found: dict[str, str] = {}
     for place, name in _LINE.findall(stub.read_text(encoding="utf-8")):
@@ -29,15 +29,15 @@ def public_names(package: str, *, listed: bool = False) -> dict[str, str]:
 
 
 class Group(ModuleType):
-    """A package that lists the names of its stub, and loads each name when it is first used."""
+    """A package that lists the names in its stub, and loads each name at its first use."""
 
     @property
     def __all__(self) -> list[str]:
-        """The listed names."""
+        """Names that `import *` imports."""
         return sorted(public_names(self.__name__, listed=True))
 
     def __dir__(self) -> list[str]:
-        """The listed names."""
+        """Names that `dir` lists."""
         return self.__all__
 
     def __getattr__(self, name: str) -> Any:
@@ -58,5 +58,5 @@ class Group(ModuleType):
 
 
 def group(package: str) -> None:
-    """Make a package, which is being imported, a `Group`."""
+    """Change the class of a package to `Group` while the package is imported."""
     sys.modules[package].__class__ = Group

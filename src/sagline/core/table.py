@@ -1,4 +1,4 @@
-"""Results with rows as tables: columns of numbers with units, as text, CSV, and in pandas and xarray."""
+"""Tables of results: columns of numbers with units, for printing, CSV, pandas and xarray."""
 
 from __future__ import annotations
 
@@ -17,12 +17,14 @@ from sagline.core.errors import FileError
 from sagline.core.numbers import counted
 from sagline.core.results import documented_units, formats
 
-_WRITING: Final = "sagline.files.writing"  # imported by name when a table is written; files build on this module
+# imported by name when a table is written, because `files` imports this module
+_WRITING: Final = "sagline.files.writing"
 _WIDTH, _ENDS = 80, 4  # columns of a terminal; printed rows at the beginning and at the end
 
-# Columns of a result: "label=attribute [unit]", or such a text and the type of its codes. The attribute is dotted; a
-# number selects an entry of its last axis. In the label, # means the number of a cable, @ means x, y, z (and w);
-# without a label, it is the name of the attribute. Without a unit, it is that of the documentation.
+# Declaration of the columns of a result: each column is a text "label=attribute [unit]", or a tuple of this text and
+# the type of its status codes. An attribute may have dots; a number after a dot is an index of the last axis. In a
+# label, # means the number of a cable, and @ means x, y, z (and w). The default label is the name of the attribute. The
+# default unit is the unit in its documentation.
 Columns = tuple[str | tuple[str, type[Any]], ...]
 
 
@@ -34,7 +36,7 @@ def csv_text(rows: Iterable[Sequence[object]]) -> str:
 
 
 class Table:
-    """Columns of equal length, by name.
+    """Columns of equal length, each with a name and a unit.
 
     Attributes:
         columns: Numbers or words of each column, shape (rows,).
@@ -44,7 +46,7 @@ class Table:
     __slots__ = ("columns", "units")
 
     def __init__(self, columns: Mapping[str, NDArray[Any]], units: Mapping[str, str]) -> None:
-        """Columns, and their units."""
+        """Store columns and units."""
         self.columns, self.units = MappingProxyType(dict(columns)), MappingProxyType(dict(units))
 
     def __len__(self) -> int:
@@ -125,10 +127,10 @@ class Tabular:
         return Table({name: values for name, values, _ in found}, {name: unit for name, _, unit in found})
 
     def to_csv(self, file: os.PathLike[str] | str | None = None) -> str | None:
-        """The rows as CSV; the header has the units in brackets, and NaN is an empty cell.
+        """The rows as CSV. The header contains the units in brackets; an empty cell means NaN.
 
         Args:
-            file: File to write, atomically; None: the text is returned.
+            file: File that is written atomically; with None, the method returns the text.
 
         Returns:
             The text, or None if a file was written.
@@ -148,7 +150,7 @@ class Tabular:
         """The rows as a pandas DataFrame.
 
         Returns:
-            DataFrame with the columns of `table`; its `attrs["units"]` are their units.
+            DataFrame with the columns of `table`; `attrs["units"]` contains the units of the columns.
 
         Raises:
             FileError: If pandas is not installed.
@@ -165,8 +167,8 @@ class Tabular:
         """The result as an xarray Dataset.
 
         Returns:
-            The data set that `save` writes to a NetCDF file, with units and robot. For results without such a format,
-            the columns of `table` over the dimension row.
+            The data set that `save` writes to a NetCDF file, with units and robot. If the result has no NetCDF format,
+            the data set contains the columns of `table`, with the dimension `row`.
 
         Raises:
             InvalidValueError: If the result has a cable model, a tension method or a criterion of your own.
@@ -203,13 +205,13 @@ def _columns_of(result: Tabular) -> Iterator[tuple[str, NDArray[Any], str]]:
 
 
 def _spread(names: Any, values: NDArray[Any], unit: str) -> Iterator[tuple[str, NDArray[Any], str]]:
-    """One column for each entry of the last axis."""
+    """One column for each entry along the last axis."""
     for k, name in enumerate(names):
         yield name, np.atleast_1d(values[..., k]), unit
 
 
 def _found(result: Any, place: str) -> tuple[Any, list[str]]:
-    """Value of a dotted attribute, and the documented units; None if a part is missing."""
+    """Value of an attribute such as "pose.position", or None if a part is missing; and its documented units."""
     units: list[str] = []
     for name in place.split("."):
         if result is None:

@@ -77,7 +77,7 @@ class ClearanceRows:
             self._meshed = Meshed(self.pairs, (self._platform, *obstacles), precision)
 
     def distances(self, state: Equilibrium, *, together: bool = False) -> _Distances:
-        """Least distance of every pair at every pose; with `together`, only the least distance of a pose is exact."""
+        """Distance of every pair at every pose; with `together`, only the smallest distance of each pose is exact."""
         single = not state.pose.shape
         count, several = 1 if single else len(state), len(self.pairs.names)
         out = _Distances(np.empty((count, several)), np.empty((count, several)), np.empty((count, several, 2, 3)))
@@ -99,7 +99,7 @@ class ClearanceRows:
         return out
 
     def least(self, state: Equilibrium) -> tuple[Array, Indices]:
-        """Least distance (N,) [m] of all pairs and the pair's index; NaN without tensions; faster than `distances`."""
+        """Smallest distance (N,) [m], and index of its pair; NaN without tensions; faster than `distances`."""
         lost = np.asarray(np.isnan(np.atleast_2d(state.free_length)).any(axis=1))
         found = np.nan_to_num(self.distances(state, together=True).value, nan=np.inf)
         if not found.shape[1]:
@@ -108,7 +108,7 @@ class ClearanceRows:
         return np.where(lost, np.nan, found.min(axis=1)), pair
 
     def of_platform(self, pose: Pose, half: Array) -> Array:
-        """Upper bound (N,) [m] of the platform's distance from obstacles, at positions up to `half` (3,) [m] away.
+        """Upper bound (N,) [m] of the platform's distance from obstacles at all positions up to `half` (3,) [m] away.
 
         The platform is replaced by a box that is smaller by `half`. This box is a part of the platform at each of these
         positions. Meshes are omitted.
@@ -145,7 +145,7 @@ def _box_row(one: Box | Mesh) -> Array:
 
 
 def _platform_of(robot: Robots) -> Box | None:
-    """Platform as a box of its size around its anchors, None without a size; an error if robots of a batch differ."""
+    """Box of the platform's size around its anchors; None if the size is unknown; refuses robots that differ."""
     one = first_of(robot)
     for other in () if isinstance(robot, Robot) else robot[1:]:
         if not all(_alike(getattr(one, name), getattr(other, name)) for name in ("platform_size", "platform_anchors")):
@@ -163,8 +163,9 @@ def _alike(one: Array | None, other: Array | None) -> bool:
 
 NO_TENSIONS = "no tensions are known, so that the cables have no shape; use a feasible pose"
 NOTHING = "nothing is measured"
-_SHOWN = 8  # number of printed pairs per pose, and of lines about omitted pairs
-_TOO_LARGE = 100.0  # largest mesh relative to the robot; a larger mesh must be in millimeters
+_SHOWN = 8  # largest number of printed pairs per pose, and of printed lines about omitted pairs
+# largest extent of a mesh, relative to the robot; the unit of a larger mesh is probably the millimeter
+_TOO_LARGE = 100.0
 _NUMBERS = 9  # number of values per pair and pose: distance, lower bound and two points
 
 
@@ -179,7 +180,7 @@ class Clearances(Result, Tabular):
         pair_low: Proved lower bound of each distance [m], of the same shape.
         nearest: Nearest points of each pair, on the center lines of cables and rods [m], shape (P, 2, 3) or (N, P, 2,
             3).
-        left_out: Omitted pairs, with the reasons.
+        left_out: Pairs that were not measured, with the reasons.
         precision: Largest difference between distance and proved bound [m].
     """
 
@@ -194,7 +195,7 @@ class Clearances(Result, Tabular):
 
     @property
     def distance(self) -> Array:
-        """Least distance of all pairs [m], shape () or (N,); infinite without measured pairs."""
+        """Smallest distance of all pairs [m], shape () or (N,); infinite if no pair was measured."""
         return self._least(self.pair_distance)
 
     @property
@@ -204,11 +205,11 @@ class Clearances(Result, Tabular):
 
     @property
     def between(self) -> Any:
-        """Nearest pair: two names, or two names for each of N poses; a sentence if no distance is known."""
+        """Names of the nearest pair, or of the nearest pair at each of N poses; a sentence if no distance is known."""
         return self._between(self.pair_distance) if self._single else tuple(map(self._between, self.pair_distance))
 
     def __str__(self) -> str:
-        """Nearest pairs, in a few lines."""
+        """Summary with the nearest pairs, in a few lines."""
         rows = np.atleast_2d(self.pair_distance)
         lost = int(np.isnan(rows).any(axis=1).sum())
         least = np.where(np.isnan(rows), np.inf, rows)
@@ -259,21 +260,21 @@ def clearance(
     """Least distances between sagging cables, platform and obstacles.
 
     Cables have the shape of their model, such as a catenary, and begin at the exit point of their pulley. The distances
-    are accurate to about 1e-12 m (with meshes 1e-7 m). It is proved that other points are closer by at most the
-    precision.
+    are accurate to about 1e-12 m (with meshes 1e-7 m). A proof shows that the true distance is smaller by at most
+    `precision`.
 
     Args:
         state: An equilibrium, single or N of them; a plan or a solution; or a robot and its poses.
-        obstacles: One or several obstacles: Box, Capsule, Sphere and Mesh. Obstacles are solid: a body inside is in
-            contact.
+        obstacles: One or several obstacles: Box, Capsule, Sphere and Mesh. Obstacles are solid: a body inside an
+            obstacle is in contact with it.
         precision: Largest difference between a distance and its proved bound [m], > 0.
-        cable_radius: Radius of the cables [m], one for all or one per cable, >= 0; None for the radius of the robot's
-            cables if known, else 0.
+        cable_radius: Radius of the cables [m], one for all or one per cable, >= 0. None: half the diameter of the
+            robot's cables, or 0 if the diameter is unknown.
         platform: Shape of the platform in the platform frame. None: a box of the robot's platform_size around its
             anchors, if this size is known.
         from_anchor: Length of cable next to an anchor that the measurement ignores [m], > 0. It applies to two cables
-            with a common anchor, to cables and platform, and to obstacles near frame anchors. None: pairs of cables
-            with a common anchor, and of cable and platform, are omitted and listed in `left_out`.
+            with a common anchor, to cables and platform, and to obstacles near frame anchors. None: pairs of two cables
+            with a common anchor, and pairs of a cable and the platform, are omitted and listed in `left_out`.
 
     Returns:
         Clearances.
@@ -310,7 +311,7 @@ def clearance(
 
 
 def check_obstacles(given: Any, robot: Robot) -> tuple[Obstacle, ...]:
-    """Checked obstacles as a tuple; rejects a mesh that is 100 times larger than the robot."""
+    """Checked obstacles as a tuple; refuses a mesh that is 100 times larger than the robot."""
     found = obstacles_of(given, "obstacles")
     for one in found:
         if isinstance(one, Mesh):
@@ -330,7 +331,7 @@ def obstacles_of(given: Any, item: str) -> tuple[Obstacle, ...]:
 
 
 def _check_size(mesh: Mesh, robot: Robot) -> None:
-    """Reject a very large mesh, whose unit must be wrong."""
+    """Refuse a very large mesh, whose unit is probably wrong."""
     own, size = np.ptp(mesh.bounds, axis=0).max(), np.subtract(*reversed(bounds(robot))).max()
     if own > _TOO_LARGE * size:
         value = f"{extent_text(mesh.bounds)} large, and the robot {size:.4g} m"

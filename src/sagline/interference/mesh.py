@@ -17,8 +17,8 @@ from sagline.core.numbers import counted
 from sagline.core.results import Result, set_fields
 from sagline.robot.pose import PoseLike, single_pose
 
-MOST: Final = 1_000_000  # triangles
-_AT_ONCE: Final = 1 << 19  # triangles times points
+MOST: Final = 1_000_000  # largest number of triangles of a mesh
+_AT_ONCE: Final = 1 << 19  # largest number of triangles times points in one step
 
 
 def _as_faces(value: ArrayLike) -> Indices:
@@ -30,12 +30,13 @@ def _as_faces(value: ArrayLike) -> Indices:
 class Mesh(Result):
     """A closed surface of triangles, at rest in the world; for a platform, in the platform frame.
 
-    The enclosed volume is solid. If all triangles face inward, the enclosed volume is free and everything outside is
-    solid.
+    The enclosed volume is solid. If all triangles face inward, the outside is solid instead, and the enclosed volume is
+    free.
 
     Attributes:
         vertices: Corners [m], shape (V, 3).
-        faces: Triangles as indices of their corners, counter-clockwise seen from outside the solid, shape (F, 3).
+        faces: Indices of the three corners of each triangle, counter-clockwise as seen from outside the solid, shape
+            (F, 3).
         name: Name in messages and results.
 
     Raises:
@@ -92,7 +93,7 @@ class Mesh(Result):
         """Copy of the mesh at a pose.
 
         Args:
-            pose: A single pose of its frame.
+            pose: A single pose: position and rotation of the mesh's frame in the world.
 
         Returns:
             Mesh.
@@ -111,7 +112,7 @@ class Mesh(Result):
             points: Points in the frame of the mesh [m], shape (..., 3).
 
         Returns:
-            Flags, shape (...).
+            True for each point in the solid, shape (...).
 
         Raises:
             InvalidValueError: If a coordinate is not finite.
@@ -142,7 +143,7 @@ def _faces(given: Any, corners: int) -> Indices:
 
 
 def _open_edges(faces: Indices) -> int:
-    """Number of edges without a neighbor in the opposite direction."""
+    """Number of edges that no neighboring triangle has in the opposite direction."""
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     count = int(faces.max()) + 1
     ways = np.concatenate((start * count + end, end * count + start))
@@ -152,7 +153,7 @@ def _open_edges(faces: Indices) -> int:
 
 
 def check_coordinates(corners: Array) -> None:
-    """Refuse corners [m] that are too far away for any machine."""
+    """Refuse corners [m] with larger coordinates than on any machine."""
     if (far := float(np.abs(corners).max(initial=0.0))) > FARTHEST:
         step = "Correct them, or the unit of their file."
         raise InvalidValueError("vertices", f"up to {far:g} m away", f"up to {FARTHEST:g} m", step)

@@ -1,4 +1,4 @@
-"""Least distances from meshes, with python-fcl. Distances of cables: branch and bound on the chords of pieces.
+"""Least distances from meshes, with python-fcl. Distances of cables follow by branch and bound over cable pieces.
 
 fcl computes the distance between triangles, and between triangles and a segment, with full precision. The bulge of a
 cable piece is an upper bound of its distance from its chord. A box is twelve triangles and a sphere is a segment of
@@ -27,10 +27,11 @@ from sagline.robot.pose import Pose
 
 Form = Box | Capsule | Sphere | Mesh
 MISSING: Final = 'Meshes need python-fcl, which is not installed. Run: pip install "sagline[workspace]"'
-ROUNDING: Final = 1e-12  # margin of a lower bound for rounding, relative to the coordinates
+ROUNDING: Final = 1e-12  # rounding error that is subtracted from a lower bound, relative to the coordinates
 _PIECES: Final = 4000  # largest number of examined cable pieces per distance
-_SEARCHES: Final = 60  # iterations for the nearest point of a cable, to full precision
-_SIGNS: Final = np.array(list(product((-0.5, 0.5), repeat=3)))  # signs of a box's corners, and indices of its triangles
+_SEARCHES: Final = 60  # iterations that give the nearest point of a cable with full precision
+# corners of a box as signs of its half edges, and its triangles as indices of corners
+_SIGNS: Final = np.array(list(product((-0.5, 0.5), repeat=3)))
 _FACES: Final = np.reshape([int(n) for n in "013032467475045051237276026064157173"], (12, 3))
 
 
@@ -39,7 +40,7 @@ class _Solid(NamedTuple):
 
     Attributes:
         geometry: Geometry of the body.
-        radius: Radius to subtract from distances [m].
+        radius: Radius of a rod or ball, which is subtracted from distances [m].
         mesh: Triangles of the body; None for rods and balls.
         inner: A point inside the body [m].
         place: Rotation and position of a body at rest.
@@ -111,7 +112,7 @@ class Meshed:
         return self._fcl.CollisionObject(solid.geometry, self._fcl.Transform(*at.get(number, solid.place)))
 
     def _apart(self, one: Any, other: Any) -> tuple[float, Array, Array]:
-        """Distance of two bodies [m], 0 for contact, and their nearest points; the point of a mesh is the first."""
+        """Distance of two bodies [m], 0 for contact, and their nearest points; the point on a mesh comes first."""
         request, result = self._fcl.DistanceRequest(True), self._fcl.DistanceResult()
         distance = max(float(self._fcl.distance(one, other, request, result)), 0.0)
         return distance, *result.nearest_points
@@ -211,7 +212,7 @@ def _along(start: Array, end: Array) -> tuple[tuple[Array, Array], float]:
 
 
 def _proved(low: float, value: float, place: Array) -> float:
-    """Lower bound minus rounding errors, >= 0."""
+    """Lower bound, reduced by the possible rounding error, >= 0."""
     return max(min(low, value) - ROUNDING * (1.0 + value + float(np.abs(place).max())), 0.0)
 
 
@@ -220,7 +221,7 @@ def _polished(
     nearest: tuple[float, float, Array, Array],
     row: Array,
 ) -> tuple[float, float, Array, Array]:
-    """Nearest point of a cable near a start point, by golden sections and parabolas (Brent)."""
+    """Nearest point of a cable, searched from a start point by golden sections and parabolas (Brent's method)."""
     from scipy.optimize import minimize_scalar
 
     reach = 0.02 * float(row[shapes.LAST] - row[shapes.FIRST])

@@ -22,7 +22,7 @@ ROUNDING: Final = 1e-14  # tolerance for products of unit vectors
 
 
 def _rotation(value: ArrayLike, item: str) -> Array:
-    """Checked rotation matrix, replaced by the nearest rotation matrix if it differs by more than rounding."""
+    """Checked rotation matrix; a matrix with more than rounding errors is replaced by the nearest rotation matrix."""
     matrix = exactly(value, item, "", (3, 3))
     nearest = Pose(np.zeros(3), matrix).matrix
     return matrix if np.abs(matrix.T @ matrix - np.eye(3)).max() < ROUNDING else nearest
@@ -127,9 +127,9 @@ class Sphere(Result):
 def frame_beams(robot: Robot, radius: float) -> tuple[Capsule, ...]:
     """Twelve beams with round ends at the edges of a robot's frame.
 
-    The frame is the same as in drawings: a box with the robot's frame_size below its highest anchors, or the box of its
-    anchors down to the floor. Frame anchors are on the frame or near it. Therefore exclude the first part of each cable
-    with the argument `from_anchor` of `clearance`.
+    The frame is the same as in drawings: a box with the robot's frame_size, whose top is at the highest anchors; if
+    frame_size is unknown, the box around the anchors, down to the floor. Frame anchors are on the frame or near it.
+    Therefore exclude the first part of each cable with the argument `from_anchor` of `clearance`.
 
     Args:
         robot: The robot.

@@ -19,7 +19,7 @@ from sagline.robot.pose import Pose
 
 
 class _CablePart(NamedTuple):
-    """A whole cable, or a cable without a part at its frame end, at its platform end, or at both ends."""
+    """Measured part of a cable: the whole cable, or the cable without a length at one end or at both ends."""
 
     cable: int
     off_frame: bool = False
@@ -27,7 +27,7 @@ class _CablePart(NamedTuple):
 
 
 def cable_rows(state: Equilibrium, radius: Array) -> Array:
-    """Rows of cables, starting at the exit point; radius (m,) or (N, m) [m]; NaN without tension."""
+    """Rows of cables from their exit points on; radius: (m,) or (N, m) [m]; NaN for a cable without tension."""
     cables, ends = state.cables, _platform_ends(state)
     exits = state.exit_point
     out = np.zeros((*cables.shape, shapes.COLUMNS))
@@ -101,7 +101,7 @@ def box_rows(box: Box, pose: Pose | None = None) -> Array:
 Obstacle = Box | Capsule | Sphere | Mesh
 
 PLATFORM: Final = "platform"
-_SAME = 1e-9  # anchors closer than this, relative to the robot's extent, count as one anchor
+_SAME = 1e-9  # relative to the robot's extent; anchors with a smaller distance count as one anchor
 _NO_LENGTH = "cables and platform: give from_anchor, the length of cable at its anchor to exclude"
 
 
@@ -113,7 +113,7 @@ class Pairs(NamedTuple):
         by_kernel: Numbers of the pairs that kernels measure, shape (P, 2).
         with_mesh: Numbers of the pairs with at least one mesh, shape (Q, 2).
         names: Names of all pairs, in the order of their numbers.
-        left_out: Omitted pairs, with the reasons.
+        left_out: Pairs that are not measured, with the reasons.
     """
 
     parts: tuple[_CablePart, ...]

@@ -29,13 +29,14 @@ BLOCK = 1 << 14  # poses per block, to limit memory
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Confirmation(Result, Tabular):
-    """A plan, and the exact equilibria at its lengths.
+    """A plan, and the exact equilibria for its lengths.
 
     Attributes:
         plan: The plan, of any cable model.
         pose: Equilibrium pose with catenary cables of the planned lengths; NaN if the plan has no solution.
         status: Codes of `ForwardStatus`, shape () or (N,).
-        wrench_residual: Norms of the unbalanced force [N] and moment [N m] at this pose, shape (2,) or (N, 2).
+        wrench_residual: Norms of the unbalanced force [N] and moment [N m] at the equilibrium pose, shape (2,) or (N,
+            2).
     """
 
     _columns: ClassVar[Columns] = (
@@ -79,7 +80,8 @@ def confirm(plan: Plan, *, progress: Progress | None = None) -> Confirmation:
     Args:
         plan: A plan of any cable model. The cable model of the plan causes the pose errors; with the exact model they
             are only rounding errors.
-        progress: Called about every tenth of a second: number of confirmed poses, total number.
+        progress: Function that is called about ten times per second with the number of confirmed poses and of all
+            poses.
 
     Returns:
         The plan with its exact equilibrium poses.
@@ -111,7 +113,7 @@ def confirm(plan: Plan, *, progress: Progress | None = None) -> Confirmation:
 
 
 def _forward(state: Equilibrium, progress: Progress | None) -> ForwardSolution:
-    """Forward kinematics with lengths and friction of a state."""
+    """Forward kinematics for the lengths of a state, with the friction of the state."""
     robot, winding = state.robot, None if state.contact is None else state.contact.winding
     if not differs(robot, winding):
         return forward(robot, state.unstrained_length, state.pose, wrench=state.wrench, progress=progress)
@@ -123,5 +125,5 @@ def _forward(state: Equilibrium, progress: Progress | None) -> ForwardSolution:
 
 
 def _from(first: int, count: int, progress: Progress) -> Progress:
-    """Progress callback for a part of the poses; it adds the number of poses before the part."""
+    """Progress callback for a part of the poses; it also counts the poses before this part."""
     return lambda done, _: progress(first + done, count)

@@ -1,4 +1,4 @@
-"""All stable equilibria that a search finds."""
+"""Search for all stable equilibria of a platform at given lengths."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ from sagline.robot.robot import Robot
 from sagline.robot.routing import differs, with_routing
 from sagline.statics.balance import external_wrench
 
-START_BYTES = 250.0  # memory per cable and start during the solution
-_SAME = 1e-6  # largest distance of equal poses, relative to the mean length and in radians
+START_BYTES = 250.0  # memory per cable and per start of the search [bytes]
+_SAME = 1e-6  # poses with a smaller distance, relative to the mean length and in radians, count as equal
 _KEPT = (*STABLE, ForwardStatus.FITTED)
 _CATENARY = Catenary()
 
@@ -38,8 +38,10 @@ class Equilibria(Result, Tabular):
 
     Attributes:
         solutions: The equilibria, a batch of K.
-        reached: Number of starts that ended in each equilibrium, shape (K,). It is not a probability.
-        starts: Number of all starts. Some starts may end at an unstable equilibrium or may not converge.
+        reached: Number of starts of the search that ended in each equilibrium, shape (K,). This number is not a
+            probability.
+        starts: Number of all starts of the search. A start may also end at an unstable equilibrium, or may not
+            converge.
     """
 
     _columns: ClassVar[Columns] = (
@@ -69,15 +71,15 @@ def equilibria(
     """Stable equilibria of a robot at given lengths, found by a search over orientations.
 
     For a fixed orientation the energy is convex in the position. Therefore only orientations are searched. The
-    orientations of the starts are uniformly random. The position of a start is the only equilibrium position for its
-    orientation. A robot without rotations has exactly one equilibrium. For other robots the list can be incomplete,
-    because no start may reach an equilibrium.
+    orientations of the starts are uniformly random. The position of a start is the equilibrium position for its
+    orientation, of which there is only one. A robot without rotations has exactly one equilibrium. For other robots the
+    list can be incomplete, because no start may reach an equilibrium.
 
     Args:
         robot: The robot, with m cables.
         unstrained_length: L [m], > 0, shape (m,).
         model: Cable model. The shallow models have no energy; their equilibria are sorted by the number of starts. For
-            straight cables, the results are local least-squares fits, sorted by misfit.
+            straight cables, the results are local least-squares fits, sorted by their sum of squares.
         wrench: External plus inertial wrench about the center of mass, world axes [N, N m], shape (6,); None for zero.
         starts: Number of initial orientations, >= 1.
         seed: Seed of the random orientations.
@@ -137,7 +139,7 @@ def _quaternions(robot: Robot, count: int, seed: int) -> Array:
 
 
 def _distinct(found: ForwardRows, length: float) -> tuple[Indices, Indices]:
-    """One index per stable equilibrium, in order of energy, and number of starts that reached this equilibrium."""
+    """Index of each different stable equilibrium, in order of energy, and number of starts that ended there."""
     kept = np.flatnonzero(np.isin(found.pose_status, _KEPT))
     chosen: list[int] = []
     counts: list[int] = []
@@ -156,7 +158,7 @@ def _distinct(found: ForwardRows, length: float) -> tuple[Indices, Indices]:
 
 
 def _distance(row: Array, other: Array, length: float) -> float:
-    """Distance of two pose rows: maximum of relative displacement and angle."""
+    """Distance of two pose rows: the larger of relative displacement and angle."""
     shift = float(np.linalg.norm(row[:3] - other[:3])) / length
     sign = np.copysign(1.0, row[3:] @ other[3:])
     return max(shift, 2.0 * float(np.linalg.norm(row[3:] - sign * other[3:])))

@@ -41,9 +41,10 @@ from sagline.statics.balance import external_wrench
 from sagline.statics.tables import pose_rows
 
 _TILTS = (25.0, 60.0)  # tilts of further starts if the level start fails [degree]
-DEPTH = 0.1  # depth of the first position below the center, relative to the mean length
+DEPTH = 0.1  # distance of the first position below the center, relative to the mean length
 _LIMIT_SLACK = 0.01  # largest relative excess of a tension that counts as within its limits
-_POOR = np.array([0, 1, 2, 3, 4, 5, 6, 0])  # rank of each status; FITTED has the rank of SOLVED
+# status -> rank, a smaller rank is better; FITTED has the same rank as SOLVED
+_POOR = np.array([0, 1, 2, 3, 4, 5, 6, 0])
 
 
 def search(
@@ -53,8 +54,9 @@ def search(
 
     With a fixed orientation the platform has a single equilibrium, because the energy is convex in the position. Any
     start leads to this equilibrium. The search over all motions then starts there. The first start orientation is
-    level. Without a stable equilibrium within the tension limits, a sample is repeated from tilted starts. The best
-    result is kept: first by status, then by the number of cables outside their limits, then by energy.
+    level. If no stable equilibrium within the tension limits is found, the search is repeated from tilted starts. The
+    results are compared first by status, then by the number of cables outside their limits, then by energy; the best
+    result is kept.
 
     lengths: unstrained lengths (N, m), rows of NaN are skipped; wrenches: external plus inertial (1 or N, 6); progress:
     called after each block with the number of finished samples and the total number.
@@ -164,7 +166,7 @@ def _is_plausible(robot: Robots, model: CableModel, found: ForwardRows) -> Flags
 
 
 def _rank(robot: Robots, model: CableModel, found: ForwardRows) -> Array:
-    """Rows (status, cables outside their limits, energy) for comparison: a smaller row is better, (N, 3)."""
+    """Rows (rank of the status, number of cables outside their limits, energy), (N, 3); the smaller row is better."""
     energy = np.nan_to_num(found.numbers[:, ENERGY], nan=0.0)
     return np.stack((_POOR[found.pose_status].astype(np.float64), outside_limits(robot, model, found), energy), axis=1)
 
@@ -203,13 +205,14 @@ def forward(
         model: Cable model; the default is exact.
         wrench: External plus inertial wrench on the platform about its center of mass in world axes, without gravity:
             force [N], then moment [N m], shape (6,) or (N, 6). None for zero.
-        tension_measured: Load cell data. Lengths then also count as measured. Lengths and tensions are corrected within
-            their deviations until they agree, and the result has the covariance of the pose.
-        winding: Last direction of the drums, for the friction of pulleys and guides: +1 winding in, -1 paying out, 0 at
-            rest, shape (m,) or (N, m). None: no friction. An iteration computes the change of the lengths due to
-            friction and guides. With load cells, this change is computed only once, at the measured lengths. With high
-            friction and soft cables, several nearby poses can be equilibria.
-        progress: Called about every tenth of a second: number of solved samples, total number.
+        tension_measured: Load cell data, or None. With load cell data, lengths and tensions count as measured values
+            with standard deviations. The result is the least-squares fit to both, with the covariance of the pose.
+        winding: Last direction of each drum, which determines the friction of pulleys and guides: +1 winding in, -1
+            paying out, 0 at rest, shape (m,) or (N, m). None: no friction. Friction and guides change the lengths; an
+            iteration computes this change. With load cell data, the change is computed only once, at the measured
+            lengths. With high friction and soft cables, several nearby poses can be equilibria.
+        progress: Function that is called about ten times per second with the number of solved samples and of all
+            samples.
 
     Returns:
         ForwardSolution, single or with a leading axis N.
@@ -263,7 +266,7 @@ def forward(
 def checked_lengths(robot: Robots, lengths: ArrayLike) -> Array:
     """Lengths of a caller, shape (m,) or (N, m), positive and longer than the dead length, or whole rows of NaN.
 
-    robot: gives number of cables, dead length, and name for messages; or one robot per sample; lengths: the caller's
+    robot: the robot of all samples, or one robot per sample; lengths: the caller's
     lengths [m]. Returns write-locked array of shape (m,) or (N, m).
     """
     array = numbers(lengths, "unstrained_length", "m")
@@ -304,7 +307,7 @@ def dead_only(lengths: Array, dead: Array) -> InvalidValueError:
     return InvalidValueError(
         f"{sample}cable {index[-1]}: unstrained length",
         f"{lengths[index]:.9g} m",
-        f"> {dead[index]:.9g} m, the dead length behind its pulley",
+        f"> {dead[index]:.9g} m, the dead length between drum and pulley",
         "Give the length of all cable off the drum, or correct dead_cable.",
     )
 

@@ -88,7 +88,7 @@ class ForwardSolution(Result, Tabular):
 
     @property
     def slack(self) -> Flags:
-        """True for slack cables, shape (m,) or (N, m): tau is at most half the weight of a cable of chord length.
+        """True for slack cables, shape (m,) or (N, m): tau is at most half the weight of a cable as long as the chord.
 
         Such a cable sags by a quarter of its chord or more. A weightless cable is slack if its tension is zero.
         """
@@ -97,7 +97,7 @@ class ForwardSolution(Result, Tabular):
         return np.asarray(cables.chord_tension <= 0.5 * density * cables.gravity * cables.chord)
 
 
-BLOCK = 1 << 13  # cables per block, which take a few to 130 ms; interrupts are handled between blocks
+BLOCK = 1 << 13  # cables per block; a block takes at most 130 ms, and interrupts are handled between blocks
 
 
 class ForwardRows(NamedTuple):
@@ -128,7 +128,7 @@ class ForwardRows(NamedTuple):
         )
 
     def last_pose(self, before: Array) -> Array:
-        """Last pose row with a result, (1, POSE_COLUMNS), or the given previous row."""
+        """Last pose row with a result, (1, POSE_COLUMNS); the given previous row if no sample has a result."""
         found = ~np.isin(self.pose_status, (codes.FORWARD_NOT_CONVERGED, codes.FORWARD_NO_LENGTHS))
         which = np.flatnonzero(found)[-1:]
         return locked(self.poses[which]) if which.size else before
@@ -140,7 +140,7 @@ class ForwardRows(NamedTuple):
 
     @classmethod
     def empty(cls, count: int, cables: int, behind: bool | None) -> ForwardRows:
-        """Empty arrays for a batch; behind: True with pulleys or dead lengths."""
+        """Empty arrays for a batch; behind: True if any cable has a pulley or a dead length."""
         return cls(
             np.empty((count, tables.POSE_COLUMNS)),
             np.empty((tables.RESULT_ROWS if behind else tables.BARE_ROWS, count, cables)),
@@ -220,7 +220,7 @@ def solve_forward_rows(
 
 
 def new_chain(cables: int, freedoms: int) -> LastEquilibriumArrays:
-    """Memory of a chain of samples at its start: NaN."""
+    """Arrays that pass the last equilibrium of a chain to the next sample; at the start of the chain they are NaN."""
     return (
         np.full((CABLE_ROWS, cables), np.nan),
         np.full((freedoms, freedoms), np.nan),

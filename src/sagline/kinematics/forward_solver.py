@@ -34,7 +34,7 @@ class ForwardStep(NamedTuple):
         position: Position of the platform origin [m], shape (3,).
         quaternion: Rotation platform -> world, scalar last, shape (4,).
         chord_tension: tau of the cables [N], shape (m,).
-        status: Type of equilibrium, or reason for the failure.
+        status: Kind of the equilibrium, or reason why no equilibrium was found.
         stiffness_min: Smallest stiffness [N/m], as in `ForwardSolution`.
         force_residual: Norm of the unbalanced force [N].
         moment_residual: Norm of the unbalanced moment [N m].
@@ -61,8 +61,10 @@ class ForwardSolver:
 
         Args:
             robot: The robot.
-            model: Cable model with forces; the default is the exact one.
-            start: Initial pose of the first step; None: a search, which takes several hundred microseconds.
+            model: Cable model; the default is the exact model. The model `Straight` is refused, because it has no
+                forces.
+            start: Initial pose of the first step; with None, the first step searches its pose in several hundred
+                microseconds.
 
         Raises:
             InvalidValueError: If the model is Straight, which has no forces, start is a batch, the robot's winches have
@@ -72,7 +74,7 @@ class ForwardSolver:
         self._model = Catenary() if model is None else model_of(model)
         if self._model.code == codes.STRAIGHT:
             raise InvalidValueError(
-                "model", "Straight()", "a model with forces", "Use forward() to fit straight cables."
+                "model", "Straight()", "a cable model other than Straight", "Use forward() to fit straight cables."
             )
         m, behind = robot.cable_count, has_routing(robot)
         self._dead = None if robot.winches is None else dead_cable(robot)
@@ -85,7 +87,7 @@ class ForwardSolver:
         self._status: Codes = np.empty(1, dtype=np.int8)
         self._arguments: tuple[Any, ...] = (
             (self._model.code, *self._model.parameters, behind or None),
-            True,  # the chain continues from the last equilibrium
+            True,  # arrays that keep the last equilibrium for the next sample
             (
                 robot.freedom,
                 body_table(robot),
@@ -108,7 +110,7 @@ class ForwardSolver:
         """Clear the last pose. The next step starts at the given pose, or searches.
 
         Args:
-            start: Initial pose of the next step; None: a search.
+            start: Initial pose of the next step; with None, the next step searches its pose.
 
         Raises:
             InvalidValueError: If start is a batch, or not a pose.

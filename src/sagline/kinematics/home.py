@@ -24,7 +24,8 @@ from sagline.statics.tables import body_table, cable_table, pose_rows, refuse_mi
 
 _CATENARY = Catenary()
 MISSED: Final = 1e-9  # largest relative error of a tension; a cable with a larger error cannot have this tension
-LARGEST_STRAIN: Final = 0.5  # above the strain of any rope; a larger strain is due to a wrong unit of a measured value
+# largest accepted strain, above that of any rope; a larger strain is due to a wrong unit of a measured value
+LARGEST_STRAIN: Final = 0.5
 HALVINGS: Final = 50  # largest number of bisections for the smallest tension of a cable
 PRECISION: Final = 1e-4  # relative precision of this smallest tension
 
@@ -38,7 +39,7 @@ def home(
     *,
     temperature: ArrayLike = 0.0,
 ) -> Robot:
-    """Robot with calibrated winch zeros: count and length zeros from one pose with known tensions.
+    """Copy of a robot with new zeros of counts and lengths, which follow from one pose with known tensions.
 
     Args:
         robot: A robot with winches.
@@ -75,7 +76,7 @@ def home(
     winches = instance(robot, Robot, "robot").winches
     if winches is None:
         step = "Add winches to the robot: robot.replace(winches=Winch(drum_radius=..., ...))."
-        raise InvalidValueError("winches", "not given", "those of the robot", step)
+        raise InvalidValueError("winches", "not given", "a robot with winches", step)
     if winches.guides is not None:
         step = "Set length_zero to unstrained_length * (1 + winding_tension/EA) from inverse(robot, pose)."
         raise InvalidValueError("winches: guides", "given", "None for home", step)
@@ -103,7 +104,7 @@ def _tensions(robot: Robot, winches: Winch, reading: Array) -> Array:
     least = [f"> {b:g} N{', its load_cell_bias' if b else ''}" for b in bias]
     _check_readings(~(tension > 0.0), reading, least, "A cable only pulls; correct the reading.")
     strongest = LARGEST_STRAIN * robot.cables.axial_stiffness
-    holds = [f"<= {r:.6g} N, where it is {LARGEST_STRAIN:.0%} longer" for r in strongest * gain + bias]
+    holds = [f"<= {r:.6g} N, at which the cable is {LARGEST_STRAIN:.0%} longer" for r in strongest * gain + bias]
     _check_readings(tension > strongest, reading, holds, "Correct the reading, its unit, or axial_stiffness.")
     return tension
 
@@ -130,7 +131,7 @@ def _cell_reading(robot: Robot, cable: int, tension: float) -> float:
 
 
 def _lengths_and_reached(robot: Robot, pose: Pose, tension: Array, model: CableModel) -> tuple[Array, Flags]:
-    """Unstrained lengths off the drums, and True for each cable that has its given tension at this length."""
+    """Unstrained lengths off the drums, and True for each cable that reaches its given tension."""
     m = robot.cable_count
     held, length = np.empty(m), np.empty(m)
     table, body = cable_table(robot)[0], body_table(robot)[0]
@@ -153,7 +154,7 @@ def _least_tension(robot: Robot, pose: Pose, model: CableModel, cable: int, low:
             break
         centered_positions = math.sqrt(low * high)
         low, high = (low, centered_positions) if can(centered_positions) else (centered_positions, high)
-    return high * (1.0 + PRECISION)  # rounded up, so that the five digits in the message are large enough
+    return high * (1.0 + PRECISION)  # rounded up, so that the number in the message, with five digits, is large enough
 
 
 def _check_whole(winches: Winch, length: Array) -> None:

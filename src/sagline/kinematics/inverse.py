@@ -34,7 +34,8 @@ from sagline.statics.tables import pose_rows, refuse_missing_chords, robot_terms
 from sagline.tension.method import TensionMethod, Variable, kernel_options, shared_tension
 from sagline.tension.methods import DEFAULT, method_of
 
-STANDING: Final = 1e-7  # relative to the fastest cable; a slower cable is at rest (rates are accurate to 1e-8)
+# relative to the fastest cable; a slower cable counts as at rest, because rates are accurate to 1e-8
+STANDING: Final = 1e-7
 _CATENARY = Catenary()
 
 
@@ -62,15 +63,15 @@ def inverse(
             pose is solved independently.
         wrench: External wrench on the platform about its center of mass in world axes, without gravity and inertia:
             force [N], then moment [N m], shape (6,) or (N, 6). None for zero.
-        previous: Plan before this one; `Closest` starts with its last feasible tensions. Or tensions, in the tension
-            variable [N], shape (m,).
-        winding: Direction of the drums, for the friction of pulleys and guides: +1 winding in, -1 paying out, 0 at
-            rest, shape (m,) or (N, m); or "path": the direction of the length changes along the path without friction.
-            Friction affects only wrapped and dead lengths. None: no friction.
+        previous: Initial reference tensions of `Closest`: a plan, whose last feasible tensions are used, or tensions in
+            the tension variable [N], shape (m,).
+        winding: Direction of each drum, which determines the friction of pulleys and guides: +1 winding in, -1 paying
+            out, 0 at rest, shape (m,) or (N, m). With "path", the length changes of the plan without friction determine
+            the directions. Friction affects only wrapped and dead lengths. None: no friction.
         stability: True to check the stability of every equilibrium. False saves about a tenth of the time; the status
             UNSTABLE is then not used.
-        progress: Called every few hundredths of a second: number of finished poses (solved, or infeasible with known
-            reason), total number.
+        progress: Function that is called several times per second with the number of finished poses and of all poses. A
+            pose is finished if it is solved, or infeasible for a known reason.
 
     Returns:
         Plan with fields of shape (m,) for a single pose, (N, m) otherwise. At a pose without a solution, feasible is
@@ -147,7 +148,7 @@ def inverse(
 
 
 def equilibrium_at(robot: Robot, pose: PoseLike) -> Equilibrium:
-    """Equilibrium at a pose, or at a batch; InvalidValueError with the shortfall at an infeasible single pose."""
+    """Equilibrium at one pose or at a batch; raises an error with the shortfall if a single pose is infeasible."""
     plan = inverse(robot, pose)
     if not plan.state.pose.shape and not plan.feasible:
         why, short = PoseStatus(int(plan.status)), float(plan.shortfall)
@@ -157,13 +158,13 @@ def equilibrium_at(robot: Robot, pose: PoseLike) -> Equilibrium:
 
 
 def _given_winding(winding: Winding | None, motion: Path | Pose) -> ArrayLike | None:
-    """Checked winding directions of the caller; None if not given, or if they follow from the path."""
+    """Checked winding directions of the caller; None if the caller gives none, or "path"."""
     if not isinstance(winding, str):
         return winding
     if choice(winding, "winding", ("path",)) and isinstance(motion, Path):
         return None
     step = "Plan along a Path, or give +1, -1 or 0 for each cable."
-    raise InvalidValueError("winding", "'path' for poses without one", "numbers, or None", step)
+    raise InvalidValueError("winding", "'path' for poses without a path", "numbers, or None", step)
 
 
 def _with_path_friction(plan: Plan) -> Plan:
@@ -189,7 +190,7 @@ def _in_world(components: Array, robot: Robot) -> Array:
 
 
 def _reference(robot: Robot, previous: Plan | ArrayLike | None, variable: Variable) -> Array:
-    """Initial reference tensions in the tension variable (m,): given, from the last feasible pose of a plan, or NaN."""
+    """Initial reference in the tension variable (m,): given, tensions of a plan's last feasible pose, or NaN."""
     if previous is None:
         return np.full(robot.cable_count, np.nan)
     if not isinstance(previous, Plan):
@@ -207,7 +208,7 @@ def _reference(robot: Robot, previous: Plan | ArrayLike | None, variable: Variab
 
 
 def last_tensions(plan: Plan, variable: Variable) -> Array | None:
-    """Last tensions of a plan that the distribution method computed, (m,) [N], or None."""
+    """Tensions of the last pose that the distribution method solved in a plan, (m,) [N]; None without such a pose."""
     at_border = np.zeros_like(plan.feasible) if plan.at_border is None else plan.at_border
     feasible = np.flatnonzero(np.atleast_1d(plan.feasible & ~at_border))
     if not feasible.size:

@@ -35,7 +35,7 @@ class InverseRows(NamedTuple):
 
     @classmethod
     def empty(cls, count: int, cables: int, freedoms: int, behind: bool) -> InverseRows:
-        """Empty arrays for a batch; behind: True with pulleys or dead lengths."""
+        """Empty arrays for a batch; behind: True if any cable has a pulley or a dead length."""
         return cls(
             np.empty((tables.RESULT_ROWS if behind else tables.BARE_ROWS, count, cables)),
             np.empty((count, cables), dtype=np.int8),
@@ -76,9 +76,9 @@ def solve_inverse_rows(
     """Run the kernel over poses.
 
     rows: pose rows (N, POSE_COLUMNS); loads: external plus inertial wrenches (1 or N, 6); reference: initial tensions
-    of `Closest`, in its variable (m,), or NaN; replaced by the last feasible tensions; stability: True to mark solved
-    poses without a proof of stability as UNPROVED_STABILITY; progress: called after each block with the number of
-    finished poses, without undecided ones, and the total number.
+    of `Closest`, in its variable (m,), or NaN; the kernel overwrites them with the last feasible tensions; stability:
+    True to mark solved poses without a proof of stability as UNPROVED_STABILITY; progress: called after each block with
+    the number of finished poses, which does not include undecided poses, and the number of all poses.
     """
     shared = first_of(robot)
     behind = has_routing(robot)
@@ -98,17 +98,18 @@ def solve_inverse_rows(
 class Verdicts(NamedTuple):
     """Proofs for infeasible poses. The first axis of all arrays is the N poses."""
 
-    # Lower bound and sufficient value of the smallest change of the force [N], (N, 2): 0 at a solved pose, NaN if the
-    # load is not the cause of the failure.
+    # Smallest change of the force that makes the pose feasible [N]: lower bound and sufficient value, (N, 2). The
+    # values are 0 at a solved pose, and NaN if the load is not the cause of the failure.
     brackets: Array
-    reliefs: Array  # sufficient change of the force along the free motions [N], (N, n); NaN if not needed or unknown
+    # sufficient change of the force, along the free motions [N], (N, n); NaN if it is not needed or not known
+    reliefs: Array
     farkas: Array  # Farkas vectors along the free motions, (N, n)
     blocking: Flags  # cables whose limits oppose the needed wrench, (N, m)
     at_border: Flags  # True for poses that this search solved in place of the tension distribution method, (N,)
 
     @classmethod
     def empty(cls, count: int, cables: int, freedoms: int) -> Verdicts:
-        """Arrays for a batch without verdicts: all NaN or False."""
+        """Arrays for a batch that has no verdicts yet: all values are NaN or False."""
         return cls(
             np.full((count, 2), np.nan),
             np.full((count, freedoms), np.nan),
@@ -119,7 +120,7 @@ class Verdicts(NamedTuple):
 
     @property
     def shortfall(self) -> Array:
-        """Smallest known sufficient change of the force [N], (N,); infinite only with a proof that none exists."""
+        """Smallest known sufficient change of the force [N], (N,); infinite if a proof shows that none exists."""
         proved, enough = self.brackets[:, PROVED], self.brackets[:, ENOUGH]
         return np.where(np.isinf(enough) & np.isfinite(proved), np.nan, enough)
 
@@ -143,7 +144,8 @@ def decide_rows(
     """Decide the feasibility of poses without a result from the iterations, and fill the results of feasible poses.
 
     terms: from `robot_terms`; rows: pose rows (N, POSE_COLUMNS); loads: external plus inertial wrenches (1 or N,
-    6); progress: called after each block with the number of finished poses, including feasible ones, and their total.
+    6); progress: called after each block with the number of all finished poses, which includes feasible poses, and the
+    number of all poses.
     """
     count, n = found.needed.shape
     m = found.cable_status.shape[1]

@@ -30,7 +30,7 @@ from sagline.statics.tables import robot_terms
 from sagline.tension.method import TensionMethod, kernel_options, takes_default_kernel
 from sagline.tension.methods import DEFAULT, method_of
 
-_STATUSES = tuple(sorted(PoseStatus))  # statuses by code; a lookup takes a tenth of the time of a conversion
+_STATUSES = tuple(sorted(PoseStatus))  # status of each code; this lookup takes a tenth of the time of a conversion
 # A struct accepts exactly this number of real numbers. It is faster than the assignment of a tuple to an array.
 _POSE = struct.Struct(f"{tables.POSE_COLUMNS}d").pack_into
 QUATERNION_TOLERANCE = 1e-6  # largest relative deviation of the length of a quaternion, as in `Pose.from_quaternion`
@@ -39,14 +39,14 @@ ROUNDING = 1e-15  # relative deviation of the length below which no normalizatio
 
 
 class InverseStep(NamedTuple):
-    """Result of one pose; NaN without a solution. An unstable equilibrium has values.
+    """Result of one pose. Its numbers are NaN at a pose without a solution, but not at an unstable equilibrium.
 
     Attributes:
         unstrained_length: L [m], shape (m,).
         chord_tension: tau [N], shape (m,).
         horizontal_tension: T_x [N], shape (m,).
         vertical_force: T_z on the cable at its platform end [N], shape (m,).
-        status: Reason for a missing solution, or SOLVED.
+        status: SOLVED, or the reason why the pose has no solution.
         shortfall: Smallest change of the force that would make the pose feasible [N].
     """
 
@@ -84,7 +84,7 @@ class InverseSolver:
 
         Args:
             robot: The robot, with at least as many cables as degrees of freedom.
-            model: Cable model; the default is the exact one.
+            model: Cable model; the default is the exact model.
             tension: Tension distribution method; the default is `Closest`, relative to the previous step.
             stability: True to check the stability of every equilibrium. False saves a tenth of a microsecond per step;
                 the status UNSTABLE is then not used.
@@ -108,7 +108,8 @@ class InverseSolver:
         self._load = self._wrench[0].data
         self._reference = np.full(m, np.nan)
         self._found = InverseRows.empty(1, m, n, has_routing(robot))
-        self._status = self._found.pose_status.data  # a read takes a fifth of the time of an array of one element
+        # reading it takes a fifth of the time of reading an array of one element
+        self._status = self._found.pose_status.data
         self._loaded = False  # True if the wrench of the last step was not zero
         self._lengths = self._found.results[tables.LENGTH, 0]
         # The views are read-only, because kernels are compiled for read-only inputs. Values are written through the

@@ -20,7 +20,8 @@ from sagline.statics.stiffness import stiffness
 
 _STEPS = 100
 _HALVINGS = 20
-# smallest predicted gain, relative to the sum of squares; the optimum is then closer than 1e-4 standard deviations
+# The fit ends if the predicted decrease of the sum of squares, relative to the sum, is smaller than this number. The
+# optimum is then closer than 1e-4 standard deviations.
 _TOLERANCE = 1e-8
 
 
@@ -57,12 +58,14 @@ def fit_measurements(
     For each sample, Gauss-Newton iterations find the lengths L_true with the smallest sum ((L_true - L)/sigma_L)^2 +
     sum ((T_A - reading)/sigma_T)^2. The platform is in equilibrium at L_true.
 
-    found: equilibria at the measured lengths (N samples), where the search starts; replaced in place; loads: external
-    plus inertial wrenches (1 or N, 6). Returns the covariances of (displacement of the center of mass, rotation
-    vector), (N, 6, 6); NaN without a solution.
+    found: equilibria at the measured lengths (N samples), where the search starts; the fits overwrite them; loads:
+    external plus inertial wrenches (1 or N, 6). Returns the covariances of (displacement of the center of mass,
+    rotation vector), (N, 6, 6); NaN without a solution.
     """
     if model.code == codes.STRAIGHT:
-        raise InvalidValueError("model", "Straight()", "a model with forces", "Use Catenary() with measured tensions.")
+        raise InvalidValueError(
+            "model", "Straight()", "a cable model other than Straight", "Use Catenary() with measured tensions."
+        )
     lengths = found.results[tables.LENGTH]
     readings = _fitting("frame_end_tension", measured.frame_end_tension, lengths.shape)
     deviations = (
@@ -91,7 +94,7 @@ def _fitting(name: str, value: Array, shape: tuple[int, ...]) -> Array:
 
 
 class _Fit(NamedTuple):
-    """Fit of one sample."""
+    """Best fit to the lengths and tensions of one sample."""
 
     robot: Robot
     model: CableModel
@@ -131,7 +134,7 @@ class _Fit(NamedTuple):
         return np.concatenate((lengths, tensions[~np.isnan(tensions)]))
 
     def moved(self, found: ForwardRows, step: Array) -> ForwardRows | None:
-        """Equilibrium after a step, which is halved until the fit improves; None if it does not improve."""
+        """Equilibrium after a step that is halved until the fit improves; None if the fit does not improve."""
         lengths = found.results[tables.LENGTH]
         now = self.misfit(found)
         for _ in range(_HALVINGS):

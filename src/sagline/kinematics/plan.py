@@ -24,7 +24,7 @@ from sagline.tension.method import TensionMethod
 
 
 class Gap(NamedTuple):
-    """Consecutive poses of a plan without a solution, or of unstable equilibria.
+    """Gap in a plan: consecutive poses that have no solution, or consecutive unstable equilibria.
 
     Attributes:
         first: Index of the first pose.
@@ -33,7 +33,7 @@ class Gap(NamedTuple):
         shortfall: Largest finite shortfall in the gap [N]; infinite if all shortfalls are infinite, NaN if none is
             known.
         cables: Indices of the cables whose limits oppose the wrench at any pose of the gap.
-        hopeless: Number of poses that need more than a change of the force to become feasible.
+        hopeless: Number of poses of the gap that no change of the force alone makes feasible.
     """
 
     first: int
@@ -54,7 +54,7 @@ class Plan(Result, Saved, Tabular):
         tension: Tension distribution method.
         status: Codes of `PoseStatus`, shape () or (N,).
         shortfall: Smallest change of the force on the platform that makes the pose feasible [N], shape () or (N,); 0
-            for a feasible pose, infinite if a proof shows that a change of only the force is not sufficient, NaN if the
+            for a feasible pose, infinite if a proof shows that no change of the force alone is sufficient, NaN if the
             force is not the cause or no value was found.
         wrench_residual: Norms of the unbalanced force [N] and moment [N m] in the platform's free motions,
             shape (2,) or (N, 2).
@@ -70,10 +70,10 @@ class Plan(Result, Saved, Tabular):
         needed: The wrench J tau that the chord tensions must supply, shape (6,) or (N, 6), due to weight, given wrench,
             and the sag forces T_z - tau sin phi. Without a solution, the sag forces belong to the tensions with the
             smallest unbalanced wrench. None for a plan from an old file.
-        bracket: Proved lower bound and sufficient value of the shortfall [N], shape (2,) or (N, 2); infinite if no
-            sufficient value was found. None for a plan from an old file.
+        bracket: Proved lower bound of the shortfall, and a sufficient value [N], shape (2,) or (N, 2). The sufficient
+            value is infinite if none was found. None for a plan from an old file.
         relief: Change of the force that makes the pose feasible, in world axes [N], shape (3,) or (N, 3). Its magnitude
-            is the sufficient value of the shortfall. NaN if not needed or unknown. None for a plan from an old file.
+            is the sufficient value in `bracket`. NaN if no change is needed or known. None for a plan from an old file.
         at_border: True for feasible poses at which the iterations found no tensions, close to the border of
             feasibility, shape () or (N,). Their tensions balance the platform, but the tension distribution method did
             not select them. None for a plan from an old file.
@@ -142,7 +142,7 @@ class Plan(Result, Saved, Tabular):
 
     @property
     def wrap_angle(self) -> Array | None:
-        """Wrap angle Psi of the cables on their pulleys [rad]; None without pulleys and dead lengths."""
+        """Wrap angle Psi of the cables on their pulleys [rad]; None if there are no pulleys and no dead lengths."""
         return None if self.state.contact is None else self.state.contact.wrap_angle
 
     @property
@@ -166,9 +166,9 @@ class Plan(Result, Saved, Tabular):
 
     @property
     def gaps(self) -> tuple[Gap, ...]:
-        """Gaps in order: consecutive poses that are not solved. A single pose counts as a batch of one.
+        """Gaps in order: ranges of consecutive poses that are not solved. A single pose counts as a batch of one.
 
-        Infeasible and unstable poses next to each other are separate gaps.
+        Adjacent infeasible and unstable poses are in separate gaps.
         """
         kind = np.where(np.atleast_1d(self.solved), 0, np.where(np.atleast_1d(self.feasible), 1, 2))
         edges = np.flatnonzero(np.diff(np.concatenate(([0], kind, [0]))))
@@ -176,12 +176,13 @@ class Plan(Result, Saved, Tabular):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Warnings: rotation that is not free, poses at the border of feasibility, poses outside a model's validity."""
+        """Warnings about rotations that are not free, poses near infeasibility, and a model outside its validity."""
         return (*self._turned_away(), *self._at_the_border(), *self._below_validity())
 
     def _turned_away(self) -> tuple[str, ...]:
         robot = first_of(self.state.robot)
-        turn = forbidden_turn(robot, self.state.pose, LEVEL)[:1]  # equal at all poses, otherwise `inverse` refuses them
+        # the rotation is equal at all poses; `inverse` refuses other poses
+        turn = forbidden_turn(robot, self.state.pose, LEVEL)[:1]
         if not np.linalg.norm(turn) > ROUNDING:
             return ()
         return (

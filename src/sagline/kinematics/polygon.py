@@ -24,7 +24,7 @@ from sagline.tension.method import Options, Variable, check_sharing, kernel_opti
 from sagline.tension.methods import Centroid, MinimumNorm
 from sagline.tension.polygon import Side, TensionPolygon
 
-MERGED = 1e-10  # largest distance of corners that are merged, relative to the largest tension
+MERGED = 1e-10  # corners with a smaller distance, relative to the largest tension, are merged
 
 _CATENARY = Catenary()
 
@@ -67,7 +67,7 @@ def tension_polygon(
     plan = inverse(robot, pose, model, MinimumNorm(variable), wrench, stability=False)
     if plan.status not in (PoseStatus.SOLVED, PoseStatus.INFEASIBLE):
         raise InvalidValueError(
-            "pose", "one without a balance", "a pose that `inverse` can solve", PoseStatus(int(plan.status)).text
+            "pose", "a pose without solution", "a pose that `inverse` can solve", PoseStatus(int(plan.status)).text
         )
     options = kernel_options(robot, model, MinimumNorm(variable))
     return polygon_at(robot, pose, options, plan.state.wrench, plan.chord_tension, _pulls(plan), bool(plan.feasible))
@@ -114,7 +114,7 @@ def _pulls(plan: Plan) -> Array:
 def _sides_of(
     count: int, null: Array, limits: Array, corners: Array, labels: Indices
 ) -> tuple[Array, tuple[Side | None, ...]]:
-    """Vertices (h, r) and the limits of the sides."""
+    """Vertices (h, r) of the polygon, and the limit that forms each side."""
     r, m = null.shape
     origin, low, high = limits[bounds.START], limits[bounds.LOW], limits[bounds.HIGH]
     if r == 0 or count == 0:
@@ -133,7 +133,7 @@ def _sides_of(
 
 
 def _limit_at(end: float, row: Array, origin: Array, low: Array, high: Array) -> Side | None:
-    """Limit at an end of an interval."""
+    """Tension limit at one end of the feasible interval."""
     if not np.isfinite(end):
         return None
     there = origin + row * end
@@ -143,7 +143,7 @@ def _limit_at(end: float, row: Array, origin: Array, low: Array, high: Array) ->
 
 
 def _tensions(vertices: Array, null: Array, origin: Array) -> Array:
-    """Tensions at the vertices; at infinite vertices, finite for cables that the null space does not affect."""
+    """Tensions at the vertices; at an infinite vertex, only tensions that the null space does not change are finite."""
     with np.errstate(invalid="ignore"):
         steps = vertices[:, :, None] * null
     moved = np.where(null == 0.0, 0.0, steps)

@@ -28,7 +28,7 @@ _CONSTANT = 1e-9  # smaller differences of a wrench, relative to its largest com
 
 
 class _Instant(NamedTuple):
-    """Poses, a batch of N, and external plus inertial wrenches (N, 6), at a time close to every sample."""
+    """Poses and external plus inertial wrenches (N, 6) at N times, each close to one sample."""
 
     pose: Pose
     wrench: Array
@@ -50,8 +50,8 @@ class _Instants(NamedTuple):
 def _instants(robot: Robots, path: Path, wrench: Array) -> _Instants:
     """Poses and wrenches one step before and after each sample of a path; the step depends on the speed.
 
-    path: the path; if it has no jerk, a spline through its accelerations gives it; wrench: external plus inertial
-    wrench at the samples (N, 6); the external part is interpolated by a spline.
+    path: the path; if its jerk is unknown, a spline through its accelerations supplies the jerk; wrench: external plus
+    inertial wrench at the samples (N, 6); the external part is interpolated by a spline.
     """
     jerk = path.jerk if path.jerk is not None else _rate(path.time, path.twist_rate)
     external = wrench - inertial_wrench(robot, path.pose, path.twist, path.twist_rate)
@@ -93,8 +93,9 @@ def _poses_later(path: Path, jerk: Array, h: float) -> Pose:
 
 TENSION_STEP = 1e-5  # relative step of a tension, for derivatives at a fixed pose
 LEAST_STEP = 1e-6  # smallest step [N], used at zero tension
-AT_LIMIT = 1e-8  # largest distance from a limit that counts as at the limit, relative to the tension
-OUTWARD = 1e-9  # a slower approach to a limit, relative to the largest rate, does not cross the limit
+AT_LIMIT = 1e-8  # relative to the tension; a tension that is closer to a limit counts as at the limit
+# relative to the largest rate; a tension that approaches its limit at a smaller rate does not cross the limit
+OUTWARD = 1e-9
 
 
 class _PlacedCables(NamedTuple):
@@ -146,7 +147,7 @@ def _held_limit_rates(
     )
 
     def slopes(values: Callable[[_PlacedCables], Array]) -> tuple[Array, Array]:
-        """Derivatives with respect to tau at a fixed pose, and with respect to time at fixed tensions."""
+        """Derivatives of the values with respect to tau at a fixed pose, and with respect to time at fixed tensions."""
         by_tau, drift = ((values(last) - values(first)) / by for first, last, by in (by_tension, by_time))
         return by_tau, drift
 
@@ -167,11 +168,11 @@ def _held_limit_rates(
 
 
 class _RateConditions(NamedTuple):
-    """Conditions on the rates x of the chord tensions."""
+    """Conditions that the rates x of the chord tensions satisfy."""
 
     structure: Array  # structure matrix J, shape (N, n, m)
     matrix: Array  # balance condition: matrix x = right, shape (N, n, m)
-    right: Array  # right side of this condition, shape (N, n)
+    right: Array  # right side of the balance condition, shape (N, n)
     scale: Array  # the rate of the tension variable, scale x + drift, is minimized; shape (N, m)
     drift: Array  # shape (N, m)
     gap_slope: Array  # the distance to the nearest limit has the rate gap_slope x + gap_drift, shape (N, m)
@@ -215,7 +216,7 @@ def _smallest_rates(conditions: _RateConditions, at_limit: Flags) -> Array:
 
 
 def _variable_tension(cables: CableState, method: TensionMethod) -> Array:
-    """Tension in the variable of the distribution method."""
+    """Tensions in the variable of the tension distribution method."""
     if method.variable == "frame_end":
         return cables.frame_end_tension
     return cables.horizontal_tension if method.variable == "horizontal" else cables.chord_tension
@@ -231,11 +232,11 @@ def _supplied_wrench(cables: _PlacedCables, tension: Array) -> Array:
 def _nearest_limits(
     here: _PlacedCables, state: Equilibrium, method: TensionMethod
 ) -> tuple[Array, Callable[[_PlacedCables], Array]]:
-    """Distance of each cable from its nearest limit (N, m), and a function of the tensions for this distance."""
+    """Distance of each tension from its nearest limit (N, m), and a function that computes this distance."""
     limits = limits_of(state.robot)
 
     def gaps(at: _PlacedCables) -> Array:
-        """Distances to all limits (N, m, 2 or 3), positive within the limits."""
+        """Distances of the tensions from all limits (N, m, 2 or 3), positive within the limits."""
         cables = at.cables
         limited = limited_tension(state.robot, cables)
         found = [limited - limits.low, limits.high - limited]
@@ -259,16 +260,16 @@ def _nearest_limits(
 def length_rate(state: Equilibrium, path: Path, tension: TensionMethod, feasible: Flags) -> Array:
     """Rate of the unstrained lengths along the path with the planned tension distribution.
 
-    Geometry and tensions both change: L(t) = L(pose(t), tau(t)). Most methods depend only on the pose. They are solved
-    again shortly before and after each sample, at poses extrapolated by the path's twist, twist rate and jerk.
-    `Closest` depends on its previous tensions. Its rates are the smallest rates of the tensions that keep the balance.
-    Cables that would cross a limit are held at the limit. With pulleys, `Closest` is solved again for two steps after
-    each sample.
+    Geometry and tensions both change: L(t) = L(pose(t), tau(t)). The tensions of most methods depend only on the pose.
+    They are computed again shortly before and after each sample, at poses that the path's twist, twist rate and jerk
+    determine. `Closest` depends on its previous tensions. Its rates are the smallest rates of the tensions that keep
+    the balance. Cables that would cross a limit are held at the limit. With pulleys, `Closest` is solved again for two
+    steps after each sample.
 
-    state: robot, poses, wrench and cables along the path; path: the path; if it has no jerk, a spline through its
-    accelerations gives it; feasible: True for samples with a solution, shape (N,). Returns dL/dt [m/s], shape (N, m),
-    accurate to 1e-8 of its largest value; NaN where the plan has no solution. At a discontinuity of the rate, for
-    example where a cable reaches a limit, the value belongs to one of the two sides.
+    state: robot, poses, wrench and cables along the path; path: the path; if its jerk is unknown, a spline through its
+    accelerations supplies the jerk; feasible: True for samples with a solution, shape (N,). Returns dL/dt [m/s], shape
+    (N, m), accurate to 1e-8 of its largest value; NaN where the plan has no solution. At a discontinuity of the rate,
+    for example where a cable reaches a limit, the value belongs to one side of the discontinuity.
 
     Source:
         docs/model.md, section 7.

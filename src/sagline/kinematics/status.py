@@ -76,11 +76,11 @@ class ForwardStatus(Status):
     )
     SINGULAR = (
         codes.FORWARD_SINGULAR,
-        "an equilibrium without resistance to some motion: the pose is not determined",
+        "an equilibrium in which no cable resists some motion: the lengths do not determine the pose",
     )
     NOT_CONVERGED = (
         codes.FORWARD_NOT_CONVERGED,
-        "no equilibrium was found within the allowed steps; use a closer start, or omit the start",
+        "no equilibrium was found within the allowed number of steps; use a closer start, or omit the start",
     )
     NO_LENGTHS = (
         codes.FORWARD_NO_LENGTHS,

@@ -21,7 +21,7 @@ from sagline.robot.robot import Robot
 from sagline.robot.winch import Winch
 
 Winding = Literal["constant", "remembered"]
-LARGEST: Final = 2.0**53  # [counts], larger whole numbers are not exact as floats
+LARGEST: Final = 2.0**53  # [counts]; floats do not represent larger whole numbers exactly
 
 
 def encoder_counts(
@@ -96,7 +96,7 @@ def lengths_from_counts(
     Args:
         robot: A robot whose winches have a drum, counts, and the zeros of counts and lengths.
         counts: Encoder counts, shape (m,) or (N, m); NaN if unknown.
-        winding: Same as in `encoder_counts`; "remembered" needs the tensions.
+        winding: Same as in `encoder_counts`; "remembered" requires drum_tension.
         drum_tension: Tension of the cables at the drum for each sample [N], of the shape of counts; only for
             winding="remembered". For a plan, use `winch_rates(plan).drum_tension`.
         temperature: Temperature of the cables minus the temperature for which the winch lengths are valid [K].
@@ -140,7 +140,7 @@ def lengths_from_counts(
 
 
 def _remembered_lengths(drums: Drums, robot: Robot, given: Array, tension: Array, *, unstrained: bool) -> Array:
-    """Lengths (N, m) with the tensions that the cable keeps on the drums."""
+    """Lengths (N, m) if the cable on the drums keeps the tension with which it was wound."""
     strain = np.atleast_2d(tension / robot.cables.axial_stiffness)
     if (loose := strain <= -1.0).any():
         p, i = (int(index) for index in np.argwhere(loose)[0])
@@ -193,8 +193,8 @@ class WinchRates(Result, Tabular):
     Attributes:
         drum_speed: Speed of the drum [rad/s].
         motor_speed: Speed of the motor's shaft [rad/s]: drum_speed times gear.
-        motor_acceleration: Acceleration of the motor's shaft [rad/s^2], from differences of the length rates of the
-            samples, without the jump at the end of a layer.
+        motor_acceleration: Acceleration of the motor's shaft [rad/s^2], from differences of the length rates at the
+            samples; the jump at the end of a layer is not included.
         drum_tension: Tension of the cable where it leaves the drum [N], with friction if the plan has winding
             directions.
         motor_torque: Torque of the motor at its shaft [N m]: inertia torque, minus the torque of the cable tension
@@ -202,7 +202,7 @@ class WinchRates(Result, Tabular):
             the inertia of the winches is unknown.
         count_rate: Count rate of the encoder [1/s]; None if counts_per_turn is not known.
         too_fast: True where motor_speed exceeds the winches' speed_limit; None if the limit is not known.
-        too_strong: True where motor_torque exceeds their torque_limit; None if torque or limit is not known.
+        too_strong: True where motor_torque exceeds the winches' torque_limit; None if torque or limit is not known.
     """
 
     _columns: ClassVar[Columns] = (
@@ -231,7 +231,7 @@ class WinchRates(Result, Tabular):
 
 
 def winch_rates(plan: Plan) -> WinchRates:
-    """Speeds and torques of the winches along a plan, and samples at which they exceed their limits.
+    """Speeds and torques of the winches along a plan, and the samples at which a winch exceeds a limit.
 
     The lever of the cable is the change of its length per drum turn divided by 2 pi, so that power is conserved. It
     differs from the pitch radius of the layer for two reasons. The pitch of the helix adds about 0.01 %. The moving
@@ -244,7 +244,7 @@ def winch_rates(plan: Plan) -> WinchRates:
             cables is known, both are necessary. Several layers or a moving exit also need drum_width and cable_length.
 
     Returns:
-        Rates, at every sample.
+        Speeds and torques of the winches at every sample.
 
     Raises:
         InvalidValueError: If the plan has no path, data are missing (the message names them), or the remaining cable
@@ -272,7 +272,7 @@ def winch_rates(plan: Plan) -> WinchRates:
     """
     robot, rate = instance(plan, Plan, "plan").state.one_robot, plan.length_rate
     if plan.path is None or rate is None:
-        raise InvalidValueError("plan", "one of poses without times", "one along a path", "Plan along a Path.")
+        raise InvalidValueError("plan", "a plan of poses without times", "a plan along a path", "Plan along a Path.")
     winches, stretch, lever = _levers(robot, plan.unstrained_length)
     speed = rate * stretch / lever
     acceleration = winches.gear * _differences(plan.path.time, rate * stretch) / lever
@@ -296,7 +296,7 @@ def winch_rates(plan: Plan) -> WinchRates:
 
 
 def _levers(robot: Robot, length: Array) -> tuple[Winch, Array, Array]:
-    """The winches, the stretch of the cable on the drums, and the levers of the cables (N, m) [m]."""
+    """The winches, the stretch factor of the cable on the drums, and the levers of the cables (N, m) [m]."""
     winches, cables = robot.winches, robot.cables
     bare = cables.diameter is None and winches is not None and winches.groove_pitch is None
     if bare and winches is not None and winches.drum_radius is not None:

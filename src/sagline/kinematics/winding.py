@@ -18,8 +18,9 @@ from sagline.robot.robot import Robot
 from sagline.robot.routing import with_routing
 
 Winding = ArrayLike | Literal["path"]
-ITERATIONS: Final = 100  # usually about ten; more for large changes of the routing length or high friction
-MEMORY: Final = 5  # previous iterations used in Anderson mixing
+# usually about ten are needed, but more for large changes of the routing length or for high friction
+ITERATIONS: Final = 100
+MEMORY: Final = 5  # number of previous iterations that Anderson mixing uses
 _RANK: Final = 1e-6
 TOLERANCE: Final = 1e-13  # convergence tolerance, relative to a length
 _OPEN = (codes.FORWARD_NOT_CONVERGED, codes.FORWARD_NO_LENGTHS)
@@ -71,14 +72,14 @@ def iterate_routing(
     The lengths for the kernels are the given lengths minus the correction for guides and friction. Each iteration
     computes the correction at the last tensions, until convergence.
 
-    found: equilibria for straight guided cables without friction, at the lengths minus the initial correction; lengths:
-    unstrained lengths (N, m); loads: external plus inertial wrenches (1 or N, 6); winding: directions of friction,
-    shape (m,) or (N, m), or None; taken: initial correction for guides and friction [m], (N, m); None for zero. Returns
-    the results; NOT_CONVERGED if the iteration does not converge, or a cable is too slack for a catenary between its
-    guides.
+    found: equilibria for straight guided cables without friction, at the given lengths minus the initial correction;
+    lengths: unstrained lengths (N, m); loads: external plus inertial wrenches (1 or N, 6); winding: directions of
+    friction, shape (m,) or (N, m), or None; taken: initial correction for guides and friction [m], (N, m); None for
+    zero. Returns the results; NOT_CONVERGED if the iteration does not converge, or a cable is too slack for a catenary
+    between its guides.
     """
     more = np.zeros(lengths.shape) if taken is None else taken.copy()
-    past: deque[tuple[Array, Array]] = deque(maxlen=MEMORY)  # input and residual
+    past: deque[tuple[Array, Array]] = deque(maxlen=MEMORY)  # input and residual of the last iterations
     still = np.flatnonzero(~np.isin(found.pose_status, _OPEN))
     for _ in range(ITERATIONS):
         if not still.size:
@@ -119,7 +120,7 @@ def _anderson_step(taken: Array, missed: Array, past: list[tuple[Array, Array]])
 
 
 def _routing_change(robot: Robots, model: CableModel, found: ForwardRows, winding: Array | None) -> Array:
-    """Correction of the routing lengths for guides and friction [m], (N, m); NaN for a cable that is too slack."""
+    """Change of the lengths due to guides and friction [m], (N, m); NaN for a cable that is too slack."""
     shape = (len(found.poses),)
     plain = found.solution(robot, model, np.zeros(6), shape).state
     real = with_routing(plain, winding)

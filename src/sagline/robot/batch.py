@@ -15,10 +15,10 @@ from sagline.core.errors import InvalidValueError
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
-Robots: TypeAlias = Robot | tuple[Robot, ...]  # type of a checked robot or robots
+Robots: TypeAlias = Robot | tuple[Robot, ...]  # a robot, or a checked batch of robots
 Index: TypeAlias = int | slice | NDArray[Any]  # index of a batch
 
-# common properties and their units
+# properties that are equal for all robots of a batch, and their units
 _ALIKE = {"cable_count": "", "motion_pattern": "", "tension_limits_of": "", "gravity": " m/s^2"}
 
 
@@ -49,14 +49,14 @@ def check_count(robot: Robots, poses: int | None) -> None:
 
 
 def one_a_pose(robot: Robot | Sequence[Robot], poses: int | None) -> Robots:
-    """Check the robot, or the tuple with one robot per pose: `together` and `check_count` in one call."""
+    """Check the robot, or the tuple with one robot per pose: `together`, then `check_count`."""
     robots = together(robot)
     check_count(robots, poses)
     return robots
 
 
 def first_of(robot: Robots) -> Robot:
-    """The robot, or the first of several robots, from which common properties are read; refuses an empty selection."""
+    """The robot, or the first of several robots, whose common properties apply to all; refuses an empty selection."""
     if isinstance(robot, Robot):
         return robot
     if not robot:
@@ -65,7 +65,7 @@ def first_of(robot: Robots) -> Robot:
 
 
 def robots_at(robot: Robots, index: Index) -> Robots:
-    """The robot of all poses, or the robots at the poses of an index."""
+    """The single robot of all poses; if each pose has its robot, the robots at the poses of an index."""
     if isinstance(robot, Robot):
         return robot
     chosen = np.arange(len(robot))[index]
@@ -93,7 +93,7 @@ def has_routing(robot: Robots) -> bool:
 
 
 class _Bodies(NamedTuple):
-    """Inertia of the platform; for several robots with a leading axis N."""
+    """Inertia data of the platform; the arrays of several robots have a leading axis N."""
 
     mass: Array  # [kg], shape () or (N,)
     center_of_mass: Array  # in the platform frame [m], shape (3,) or (N, 3)
@@ -185,9 +185,9 @@ def outward(robot: Robots, pose: Pose) -> Array:
 def points_on_pulleys(robot: Robots, pose: Pose, angle: Array) -> Array:
     """Points on the pulleys, measured along the cables from the entry points.
 
-    pose: one pose, or a batch of N, which defines the swivel angles of the pulleys; angle: angle on the pulley from the
-    frame anchor [rad], shape (..., m); the wrap angle gives the exit point. Returns points in the world [m], shape
-    (..., m, 3); frame anchors for cables without a pulley.
+    pose: one pose, or a batch of N, which defines the swivel angles of the pulleys; angle: angle along the pulley
+    [rad], 0 at the frame anchor and the wrap angle at the exit point, shape (..., m). Returns points in the world [m],
+    shape (..., m, 3); frame anchors for cables without a pulley.
     """
     radius, entry = pulleys_of(robot)
     away = outward(robot, pose) * (radius * (1.0 - np.cos(angle)))[..., None]
@@ -203,7 +203,7 @@ def pulley_centers(robot: Robot, pose: Pose) -> Array:
 
 
 def dead_cable(robot: Robots) -> Array:
-    """Length of each cable between pulley and drum [m], (m,) or (N, m). A length off the drum cannot be smaller."""
+    """Dead length of each cable [m], (m,) or (N, m): lower bound of its length off the drum."""
     if not isinstance(robot, Robot):
         return np.stack([dead_cable(one) for one in robot])
     return np.zeros(robot.cable_count) if robot.winches is None else robot.winches.dead_cable

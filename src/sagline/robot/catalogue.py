@@ -51,9 +51,10 @@ def preset_text(name: str) -> str:
 LAYOUTS: Final = ("top", "mixed", "bottom")
 COUNTS: Final = {"top": (8, 6), "mixed": (8, 7)}
 THINNEST, THICKEST = 0.0003, 0.08  # allowed diameters of ropes for cable robots [m]
-SLACK_LIMIT = 0.05  # lower tension limit, relative to the weight of the platform
-_CORNERS = np.array([[0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.5, -0.5]])  # counter-clockwise, per edge
-_POSTS = np.array([[0.5, -0.5], [-0.5, -0.5], [0.0, 0.5]])  # a triangle in the same rectangle
+SLACK_LIMIT = 0.05  # lower tension limit of a cable, relative to the weight of the platform
+# in counter-clockwise order, relative to the edges of the frame
+_CORNERS = np.array([[0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.5, -0.5]])
+_POSTS = np.array([[0.5, -0.5], [-0.5, -0.5], [0.0, 0.5]])  # posts at the corners of a triangle in the same rectangle
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,7 +92,7 @@ class Design:
         cables: int = 8,
         layout: str = "top",
     ) -> None:
-        """Check the data that `Robot` does not check, or reports in other terms.
+        """Check the data that `Robot` does not check, or that the messages of `Robot` describe in other terms.
 
         Args:
             name: Name of the robot.
@@ -174,7 +175,7 @@ class Design:
     def placed(self, share: float) -> PoseBox:
         """Box of platform positions around the center of the frame.
 
-        share: edges of the box relative to the edges of frame minus platform, 0 to 1.
+        share: edges of the box, divided by the difference of frame edges and platform edges, 0 to 1.
         """
         middle = np.array([0.0, 0.0, 0.5 * self.frame[2]])
         half = 0.5 * share * (self.frame - self.platform)

@@ -70,7 +70,7 @@ def cables(given: Cable, count: int) -> Cable:
 
 
 def winch_of_each_cable(given: Winch | None, frame: Array) -> Winch | None:
-    """The winches, one per cable, or None; with guides, the dead length ends at the frame anchors (m, 3)."""
+    """The winches, one per cable, or None. Guides determine the dead lengths up to the frame anchors (m, 3)."""
     winch = optional(given, Winch, "winches")
     return None if winch is None else winch.per_cable(len(frame))._run_to(frame)
 

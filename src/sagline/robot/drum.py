@@ -19,7 +19,7 @@ from sagline.robot.robot import Robot
 from sagline.robot.routing import actual_routing, differs
 from sagline.robot.winch import Winch
 
-ROUNDING: Final = 1e-6  # tolerance in turns beyond a full or an empty drum
+ROUNDING: Final = 1e-6  # number of turns that are tolerated beyond a full or an empty drum
 _ZERO_STEP: Final = (
     "Give it in the robot file, or determine it with home(robot, pose, frame_end_tension) and save the new robot; "
     "then plan again."
@@ -47,7 +47,7 @@ class Drums:
     most: Array
 
     def turns(self, length: Array) -> tuple[Array, Array]:
-        """Turns on the drums, and cable length per turn.
+        """Turns on the drums, and change of cable length per turn.
 
         length: lengths off the drums [m], shape (N, m); NaN gives NaN. Returns turns, and change of length per turn
         [m], both of shape (N, m).
@@ -92,7 +92,7 @@ class Drums:
         return lengths
 
     def zero_and_rate(self) -> tuple[Array, Array]:
-        """Turns on the drums at count_zero, where the length off the drum is length_zero, and counts per turn paid out.
+        """Turns on the drums at count_zero, which belong to length_zero, and counts per turn paid out.
 
         Returns both of shape (m,).
         """
@@ -138,7 +138,7 @@ def drums_of(robot: Robot) -> Drums:
     """The drums of a robot.
 
     robot: the robot. Its winches need drum_radius and groove_pitch. Its cables need a diameter. Several layers also
-    need drum_width and cable_length. A moving exit also needs cable_length.
+    need drum_width and cable_length. If the cable exit moves along the drum, cable_length is also needed.
     """
     winches, diameter = robot.winches, robot.cables.diameter
     names = ["drum_radius", "groove_pitch"]
@@ -211,7 +211,7 @@ def _limits(winches: Winch, robot: Robot) -> tuple[Array, Array, Array]:
 
 
 def drum_tension(state: Equilibrium) -> Array:
-    """Tension of the cables at the drum, with friction if the state has winding directions.
+    """Tension of the cables at the drum; friction is included if the state has winding directions.
 
     Along an exact cable without friction, T + T^2/(2 EA) - w z is constant (z is the height). With the other models,
     the cable between pulley and drum has no weight, and its tension is the chord tension.
@@ -289,8 +289,8 @@ def _at(item: str, sample: int, cable: int, samples: int) -> str:
 def drum_lever(robot: Robot, length: Array) -> Array:
     """Cable length per radian of drum rotation [m], at given lengths off the drums.
 
-    length: unstrained lengths off the drums [m], (m,) or (N, m). Returns the lever of the layer at these lengths;
-    without drum data, drum_radius plus half the cable diameter. The shape is the shape of the lengths.
+    length: unstrained lengths off the drums [m], (m,) or (N, m). Returns the levers of the layers in use, with the
+    shape of the lengths. If drum data are unknown, the lever is drum_radius plus half the cable diameter.
     """
     winch = robot.winches
     if winch is None or winch.drum_radius is None:

@@ -33,7 +33,7 @@ from sagline.robot.robot import Robot
 
 _P = ParamSpec("_P")
 _R_co = TypeVar("_R_co", covariant=True)
-# imported by name if a robot and a pose are given, because inverse kinematics imports this module
+# imported by name when it is needed, because inverse kinematics imports this module
 _INVERSE: Final = "sagline.kinematics.inverse"
 
 
@@ -46,9 +46,9 @@ class Contact(Result):
         wrapped_length: Unstrained length on the pulley [m].
         dead_length: Unstrained length between pulley and drum [m].
         chord_tension: T_x/cos phi along the tangent from the platform end to the pulley [N]. Tension distribution and
-            limits apply to this tension. The chord of the free span starts at the actual exit point and is another
-            line.
-        chord_sine: sin phi of the tangent chord.
+            limits apply to this tension. The chord of the free span is another line, which starts at the actual exit
+            point.
+        chord_sine: sin phi of this tangent.
         winding: The direction of friction: +1 winding in, -1 paying out, 0 at rest; None: no friction.
     """
 
@@ -60,10 +60,7 @@ class Contact(Result):
     winding: Array | None = None
 
     def part(self, index: Index) -> Contact:
-        """Contact of a part of a batch.
-
-        Returns the contact at the poses of the index.
-        """
+        """Contact at the poses of the index."""
         known = {name: field for name in self.__slots__ if (field := getattr(self, name)) is not None}
         return Contact(**{name: locked(field[index, ...]) for name, field in known.items()})
 
@@ -81,8 +78,8 @@ class Equilibrium(Result, Tabular):
         wrench: External plus inertial wrench on the platform about its center of mass, world axes, without
             gravity: force [N], moment [N m], shape (6,) or (N, 6).
         cables: State of the free spans, from their exit points to their platform ends, fields of shape (m,) or (N, m).
-        contact: Wrapped and dead lengths of the cables. None without pulleys and dead lengths: each cable then starts
-            at its frame anchor, and its length off the drum is its free length.
+        contact: Wrapped and dead lengths of the cables. None if the robot has neither pulleys nor dead lengths: each
+            cable then starts at its frame anchor, and its length off the drum is its free length.
     """
 
     _columns: ClassVar[Columns] = ("pose", "L#=unstrained_length", "T#=chord_tension")
@@ -107,9 +104,9 @@ class Equilibrium(Result, Tabular):
 
     @property
     def chord_tension(self) -> Array:
-        """Chord tension tau = T_x/cos phi [N], shape (m,) or (N, m); over a pulley, with phi of the tangent chord.
+        """Chord tension tau = T_x/cos phi [N], shape (m,) or (N, m); on a pulley, phi belongs to the tangent.
 
-        Tension distribution and limits of the chord tension apply to this tension.
+        Tension distribution and limits apply to this tension, unless the robot limits the frame-end tension.
         """
         return self.cables.chord_tension if self.contact is None else self.contact.chord_tension
 
@@ -181,7 +178,7 @@ class HasState(Protocol):
 
 
 class OfEquilibrium(Protocol[_P, _R_co]):
-    """A function whose first argument is an equilibrium, a result with an equilibrium, or a robot (then a pose)."""
+    """A function of an equilibrium, of a result with an equilibrium, or of a robot and a pose."""
 
     @overload
     def __call__(self, state: Equilibrium | HasState, *args: _P.args, **options: _P.kwargs) -> _R_co: ...
@@ -225,7 +222,7 @@ def limited_tension(robot: Robots, cables: CableState, contact: Contact | None =
     """Tension to which the limits of a robot apply: chord tension or frame-end tension.
 
     robot: the robot, or several with common properties; cables: state of their cables, fields of shape (m,) or (N, m);
-    contact: pulleys and dead lengths, or None. Returns tensions [N], of the shape of the cable fields.
+    contact: their contact with pulleys, or None. Returns tensions [N] with the shape of the cable fields.
     """
     if first_of(robot).tension_limits_of == "frame_end":
         return cables.frame_end_tension
@@ -235,7 +232,7 @@ def limited_tension(robot: Robots, cables: CableState, contact: Contact | None =
 def cables_of_results(
     robot: Robots, model: CableModel, results: Array, status: Codes, shape: tuple[int, ...]
 ) -> tuple[CableState, Contact | None]:
-    """States of the free spans of solved poses, and their contact (None without pulleys and dead lengths).
+    """States of the free spans of solved poses, and their contact, or None if no cable has a pulley or a dead length.
 
     results: rows as in `sagline.kernels.tables`, (RESULT_ROWS, N, m); status: status of each cable, (N, m); shape: ()
     for a single pose, (N,) for a batch.
@@ -268,7 +265,7 @@ def cables_of_results(
 
 
 def _free_chord_tension(span: Array, rise: Array, horizontal: Array, tension: Array) -> Array:
-    """Chord tensions of the free spans; for a vertical span, the given chord tension."""
+    """Chord tensions of the free spans; a vertical free span keeps the given chord tension."""
     level = np.where(span > 0.0, span, 1.0)
     own: Array = np.where(span > 0.0, horizontal * (np.hypot(span, rise) / level), tension)
     return own

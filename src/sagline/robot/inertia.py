@@ -46,7 +46,7 @@ def without_cables(robot: Robot, *cables: int) -> Robot:
     """Robot after the failure of some cables. The weight of these cables on the platform is also removed.
 
     Args:
-        robot: The whole robot.
+        robot: The robot before the failure.
         cables: Indices of the broken cables, 0 to m - 1.
 
     Returns:

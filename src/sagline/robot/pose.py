@@ -28,8 +28,8 @@ _ROUNDING = 4.0 * np.finfo(np.float64).eps
 def unit(vectors: Array) -> Array:
     """Normalize vectors along the last axis.
 
-    If the length of a vector differs from 1 only by rounding errors, the vector is returned unchanged. Files, pickles
-    and copies normalize again, which must not change values. Zero vectors give NaN; check lengths first.
+    If the length of a vector differs from 1 only by rounding errors, the vector is returned unchanged. Loading and
+    copying repeat the normalization, which must not change values. Zero vectors give NaN; check lengths first.
 
     vectors: shape (..., k). Returns array of the same shape; the given array itself if all lengths are 1.
     """
@@ -81,7 +81,7 @@ class PoseBox:
     __reduce__ = reduced
 
 
-_MATRIX_TOLERANCE = 1e-9  # largest accepted element of Q Q^T - 1 for a rotation matrix Q
+_MATRIX_TOLERANCE = 1e-9  # largest element of Q Q^T - 1 for which a matrix Q is accepted as a rotation
 _QUATERNION_TOLERANCE = 1e-6  # tolerance that accepts a quaternion with seven digits
 
 
@@ -227,8 +227,8 @@ class Pose:
             points: Coordinates in the platform frame [m], shape (..., 3).
 
         Returns:
-            Coordinates in the world [m]: shape (..., 3) for a single pose, (N, ..., 3) for a batch of N. NaN for a pose
-            without a solution.
+            Coordinates in the world [m]: shape (..., 3) for a single pose, (N, ..., 3) for a batch of N. The
+            coordinates are NaN for a pose without a solution.
 
         Raises:
             InvalidValueError: If a coordinate is not finite, or the last axis is not x, y, z.
@@ -277,11 +277,11 @@ class Pose:
         return Pose.from_quaternion, (self.position, self.quaternion)
 
 
-PoseLike = Pose | Sequence[Pose] | ArrayLike  # positions [m] are level poses
+PoseLike = Pose | Sequence[Pose] | ArrayLike  # an array contains the positions [m] of level poses
 
 
 def pose_of(value: PoseLike, item: str = "pose") -> Pose:
-    """A pose unchanged; poses in a list as a batch; level poses at positions [m], shape (3,) or (N, 3)."""
+    """Convert to poses: a list of poses becomes a batch; positions [m], shape (3,) or (N, 3), become level poses."""
     if not isinstance(value, list | tuple | np.ndarray):
         return instance(value, Pose, item)
     if isinstance(value, list | tuple) and value and all(isinstance(one, Pose) for one in value):

@@ -13,7 +13,7 @@ from sagline.robot.pattern import ROTATING
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
-_HOME_DECIMALS: Final = 9  # [m], removes the rounding errors of the middle of a box
+_HOME_DECIMALS: Final = 9  # decimals of the home position [m], which remove the rounding errors of the middle of a box
 LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
 # [rad] and [m]; smaller deviations count as zero, because they are the rounding errors of seven digits
 ROUNDING = 1e-6
@@ -25,8 +25,8 @@ def check_reach(robot: Robot, pose: Pose, item: str) -> None:
     The orientation of a platform without rotations is arbitrary but constant. A planar platform rotates only about the
     normal of its plane, and remains in one of the parallel planes.
 
-    robot: the robot, or the first of several with a common pattern; pose: a batch, or one pose. A single pose and NaN
-    are always accepted.
+    robot: the robot, or the first of several robots with the same pattern; pose: a batch, or one pose. A single pose
+    and NaN are always accepted.
     """
     pattern, normal = robot.motion_pattern, robot.plane_normal
     if pattern == "3R3T" or len(pose.shape) == 0 or len(pose) == 0:
@@ -59,7 +59,7 @@ def check_plane(robot: Robot, pose: Pose, item: str) -> None:
 
 
 def forbidden_turn(robot: Robot, pose: Pose, other: Array) -> Array:
-    """Rotation from a given orientation to each pose, minus the part that the motion pattern allows.
+    """Forbidden part of the rotation from a given orientation to each pose, according to the motion pattern.
 
     pose: one pose or a batch of N; other: the orientation, a unit quaternion, shape (4,). Returns sin(angle/2) times
     the axis, shape (N, 3); zeros if all motions are free.
@@ -86,8 +86,8 @@ def turn_in_words(turn: Array) -> str:
 def out_of_plane(robot: Robot, pose: Pose) -> Array:
     """Distance between the platform ends of a planar robot and the plane of its frame ends.
 
-    pose: one pose or a batch of N. Returns the signed distance [m], shape (N,); zeros if the robot is not planar, or if
-    its frame ends or its platform ends are not in one plane.
+    pose: one pose or a batch of N. Returns the signed distance [m], shape (N,); the distances are zero if the robot is
+    not planar, or if its frame ends or its platform ends are not in one plane.
     """
     away = np.zeros(len(np.atleast_2d(pose.position)))
     if robot.plane_normal is None:
@@ -99,7 +99,7 @@ def out_of_plane(robot: Robot, pose: Pose) -> Array:
     return distance
 
 
-_FLAT: Final = 0.05  # largest height difference, relative to the size of the robot, of anchors that are all at the top
+_FLAT: Final = 0.05  # anchors with a smaller height difference, relative to the size of the robot, are all at the top
 
 
 def bounds(robot: Robot) -> tuple[Array, Array]:

@@ -35,7 +35,7 @@ class Robot(Shown):
         platform_anchors: Platform ends of the cables in the platform frame [m], shape (m, 3).
         cables: Material of the cables, one for all or one per cable; fields of shape (m,).
         winches: Pulleys, dead lengths, drums and motors, one for all cables or one per cable, fields of shape (m,).
-            None if the cables start at the frame anchors, without winches.
+            None if the robot has no winches, and the cables start at the frame anchors.
         mass: Mass of the platform [kg], > 0.
         inertia: Inertia about the center of mass in the platform frame [kg m^2], shape (3, 3). It is positive definite,
             and no principal moment is larger than the sum of the other two. A planar pattern requires only a positive
@@ -52,14 +52,14 @@ class Robot(Shown):
         frame_size: Edges of the frame, for drawing [m], shape (3,), or None.
         test_box: Box of poses, or None; almost all of its poses are wrench-feasible.
         source: Source of the numbers.
-        assumed: Reason for each field whose values are not from the source, by field name.
+        assumed: Field name -> reason, for each field whose values are not from the source.
         notes: Further remarks for users.
         tolerances: Standard deviations of quantities of the robot, by name, in SI units, > 0, from a drawing or data
             sheet; infinite if unknown. A deviation is one number for the whole field, one number per axis for a
             quantity with three components, or an array of the shape of the field. Names: frame_anchors,
             platform_anchors, center_of_mass (with three components each), mass, and per cable length_zero, drum_radius,
             linear_density, axial_stiffness, pulley_radius, dead_cable, load_cell_gain, load_cell_bias.
-        calibration: Calibration that identified some of the values, with standard errors; or None.
+        calibration: Calibration that identified some of the values, and their standard errors; or None.
 
     Raises:
         InvalidValueError: If a field is wrong; the message names it, with its index.
@@ -153,7 +153,7 @@ class Robot(Shown):
     def replace(self, **changes: Any) -> Robot:
         """A robot with some fields changed, checked like a new one.
 
-        The tolerances remain unchanged. A calibration loses the standard errors of replaced values.
+        The tolerances remain unchanged. The standard errors of replaced values are removed from the calibration.
 
         Args:
             changes: Fields of `Robot` and their new values.
@@ -183,7 +183,8 @@ class Robot(Shown):
         Args:
             mass: Mass of the payload [kg], >= 0.
             at: Place of the payload in the platform frame [m], a point, shape (3,). None: the payload is distributed
-                like the mass of the platform; the inertia increases in proportion, and the center of mass stays.
+                like the mass of the platform. The inertia then increases in proportion to the mass, and the center of
+                mass does not move.
 
         Returns:
             A new robot; this one remains unchanged.
@@ -202,7 +203,7 @@ class Robot(Shown):
             return self.replace(mass=whole, inertia=self.inertia * (whole / self.mass))
         lever = exactly(at, "at", "m", (3,)) - self.center_of_mass
         share = mass / whole
-        # parallel axes: both masses about their common center, with the reduced mass
+        # parallel axis theorem for two masses about their common center, with the reduced mass
         added = share * self.mass * (lever @ lever * np.eye(3) - np.outer(lever, lever))
         center = self.center_of_mass + share * lever
         return self.replace(mass=whole, inertia=self.inertia + added, center_of_mass=center)

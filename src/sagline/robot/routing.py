@@ -36,7 +36,7 @@ _TINY: Final = 1e-300
 
 
 class _Routing(NamedTuple):
-    """Results of the routing: cable from the exit points to the drums, arrays of shape (N, m)."""
+    """Results for the cables between exit points and drums, arrays of shape (N, m)."""
 
     wrapped: Array  # unstrained length on the pulleys [m]
     dead: Array  # unstrained length between pulleys and drums [m]; NaN if the cable is too slack for a catenary
@@ -44,10 +44,10 @@ class _Routing(NamedTuple):
 
 
 class _ExitState(NamedTuple):
-    """State of the cables at their exit points, arrays of shape (K,) for the K cables of the calculation."""
+    """State of K cables at their exit points, arrays of shape (K,)."""
 
     tension: Array  # T_A at the exit point P [N]
-    weight: Array  # w [N/m]; 0 if the cable of the model has no weight behind P
+    weight: Array  # w [N/m]; 0 if the cable model has no weight between P and the drum
     stiffness: Array  # EA [N]
     wrap: Array  # psi [rad]
     sine: Array  # sin psi
@@ -58,7 +58,7 @@ class _ExitState(NamedTuple):
     rolling: Array  # 1 + f while winding in, 1 - f while paying out, 1 at rest
 
     def entering(self, bend: Array) -> Array:
-        """Tension on the drum side of the pulley [N], with an additional bend at the frame anchor [rad]."""
+        """Tension [N] on the drum side of the pulley, after an additional bend [rad] at the frame anchor."""
         rubbed = self.tension * np.exp(self.friction * (self.wrap + bend)) * self.rolling
         drop = 2.0 * self.weight * self.radius * self.entry * self.sine / self.stiffness
         return _tension_after(rubbed, drop, self.stiffness)
@@ -81,8 +81,9 @@ def with_routing(state: Equilibrium, winding: Array | None) -> Equilibrium:
     """Equilibrium with the lengths of the actual routing between exit points and drums.
 
     state: equilibrium with the routing of the kernels; winding: +1 winding in, -1 paying out, 0 at rest, shape (m,) or
-    (N, m); None: no friction. Returns the equilibrium with corrected wrapped and dead lengths, NaN if a cable is too
-    slack for a catenary between guides. Without guides and friction, returns the given equilibrium.
+    (N, m); None: no friction. Returns the equilibrium with corrected wrapped and dead lengths; they are NaN for a cable
+    that is too slack for a catenary between its guides. Returns the given equilibrium if there are no guides and no
+    friction.
     """
     if state.contact is None or (winding is None and not differs(state.robot, None)):
         return state
@@ -113,7 +114,7 @@ def actual_routing(state: Equilibrium) -> _Routing:
 
 
 def _routing(state: Equilibrium, *, guided: bool) -> _Routing:
-    """The routing; several robots are evaluated one by one. guided: True for a straight guided cable."""
+    """Compute the routing, separately for each of several robots; guided: True for straight guided cables."""
     if isinstance(state.robot, Robot):
         return _routing_of_robot(state, state.robot, guided=guided)
     parts = [_routing_of_robot(state[i], one, guided=guided) for i, one in enumerate(state.robot)]
@@ -125,7 +126,8 @@ def _routing_of_robot(state: Equilibrium, robot: Robot, *, guided: bool) -> _Rou
     assert contact is not None
     if winches is None or not winches.anything_behind:
         return _Routing(np.zeros(shape), np.zeros(shape), _exit_tension(state))
-    if state.cables.model.code == codes.STRAIGHT:  # without stretch, the lengths do not depend on friction
+    # a cable that does not stretch has the same length with and without friction
+    if state.cables.model.code == codes.STRAIGHT:
         dead = np.broadcast_to(winches.dead_cable, shape)
         return _Routing(winches.pulley_radius * contact.wrap_angle, dead, _exit_tension(state))
     found = _Routing(*(np.full(shape, np.nan) for _ in _Routing._fields))
@@ -178,7 +180,7 @@ def _exit_state(state: Equilibrium, robot: Robot, winches: Winch, known: Flags, 
 
 
 def _tension_after(tension: Array, drop: Array, stiffness: Array) -> Array:
-    """Tension [N] at a point with a smaller (1 + e)^2, by a given drop; T + T^2/(2 EA) - w z is constant."""
+    """Tension [N] at a point where (1 + strain)^2 is smaller by a given drop; T + T^2/(2 EA) - w z is constant."""
     strain = tension / stiffness
     gained = strain * (2.0 + strain) - drop  # (1 + strain)^2 - 1
     with np.errstate(invalid="ignore"):
@@ -244,7 +246,8 @@ def _guided_spans(
 def _span(model: CableModel, cable: Cable, step: Array, tension: Array, gravity: float) -> CableState:
     """Catenaries over steps (K, 3) with given tension at the upper ("platform") ends; NaN if there is no solution.
 
-    The upper tension has a minimum over the chord tension, and increases above it. No catenary has a smaller one.
+    As the chord tension grows, the upper tension first falls to a minimum and then rises. No catenary has a smaller
+    upper tension than this minimum.
     """
     level, rise = np.hypot(step[:, 0], step[:, 1]), step[:, 2]
     weight = 0.0 if model.weightless else cable.linear_density * gravity

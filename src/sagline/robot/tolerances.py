@@ -1,4 +1,4 @@
-"""Tolerances of the quantities of a robot: names, units and shapes; provenance of calibrated values."""
+"""Tolerances of the quantities of a robot: names, units and shapes; calibrations that identified quantities."""
 
 from __future__ import annotations
 
@@ -90,8 +90,8 @@ def value_of(robot: object, name: str) -> Array | None:
 def of_share(share: ArrayLike, value: Array | None, item: str) -> Array:
     """Standard deviation of a quantity from a relative deviation.
 
-    share: the relative deviation, shape () or the shape of the quantity; value: value of the quantity, or None if
-    unknown. Returns the deviation in the unit and the shape of the quantity.
+    share: the relative deviation, one number or an array with the shape of the quantity; value: value of the quantity,
+    or None if unknown. Returns the deviation in the unit and the shape of the quantity.
     """
     if value is None:
         raise InvalidValueError(item, "in percent", "a field that is given", f"Give {item} in its unit, or the field.")
@@ -136,7 +136,7 @@ class Provenance:
         )
 
     def _of(self, cables: int) -> Provenance:
-        """Provenance with every standard error expanded to the shape of its field for a given number of cables."""
+        """Copy in which every standard error has the shape of its field for the given number of cables."""
         errors = deviations(self.standard_error, "calibration: standard_error", cables, low=0.0)
         return Provenance(self.log, self.date, errors, self.note)
 

@@ -15,12 +15,14 @@ from sagline.core.fields import given, if_known, reduced, rule
 from sagline.core.memory import check_memory
 from sagline.robot.pose import unit
 
-UPRIGHT: Final = 1e-9  # tolerance of a vertical swivel axis, as the sine of an angle
-_AGREEING: Final = 1e-9  # largest relative difference between a given dead length and the dead length from the guides
+UPRIGHT: Final = 1e-9  # sine of the largest angle between a swivel axis and the vertical
+# largest relative difference between a given dead length and the dead length that follows from the guides
+_AGREEING: Final = 1e-9
 MOST_LAYERS: Final = 1000
 LARGEST_PULLEY: Final = 10.0  # [m], above the largest sheaves of mine hoists and cable cars
 MOST_NAMED: Final = 3  # largest number of fields in a message
-_AXES: Final = {"swivel_axis": 1, "guides": 2}  # number of array axes of a field for one cable, if it is not a number
+# number of array axes that a field has for one cable, if its value is not a single number
+_AXES: Final = {"swivel_axis": 1, "guides": 2}
 
 
 @frozen(eq=False, weakref_slot=False)
@@ -42,9 +44,9 @@ class Winch:
             `forward`.
         rolling_friction: Share f of the tension that the pulley's bearing takes, >= 0, < 1. On the drum side of the
             pulley, the tension is multiplied by 1 + f while winding in and by 1 - f while paying out.
-        dead_cable: Length of the straight guided cable from drum to pulley [m], >= 0. If the exit moves along the drum,
-            this is the length for the exit opposite the first pulley. With guides, the robot computes it as the sum of
-            the distances.
+        dead_cable: Length of the straight guided cable from drum to pulley [m], >= 0. If the point where the cable
+            leaves the drum moves along the drum, this is the length while that point is opposite the first pulley. With
+            guides, the robot computes it as the sum of the distances.
         dead_rise: Height of the pulley's entry above the drum [m], at most dead_cable in magnitude; negative below the
             drum. With guides, the robot computes it.
         guides: Eyelets, or pulleys small enough to be points, along the cable from the drum to the frame anchor, world
@@ -53,7 +55,7 @@ class Winch:
             guided. Stiffness and sensitivities use a straight guided cable of the same length.
         drum_radius: Radius of the drum to the surface under the cable [m]; None if the drum is not known.
         drum_width: Usable width along the drum axis [m], >= groove_pitch; a layer has drum_width/groove_pitch turns,
-            not necessarily a whole number. None: wide enough for one layer.
+            not necessarily a whole number. None: the drum is wide enough for all cable in one layer.
         groove_pitch: Distance between adjacent turns along the drum axis [m].
         layers: Largest possible number of layers on the drum, a whole number from 1 to 1000.
         drum_distance: Distance from the drum to the first pulley, perpendicular to the drum axis [m]; None: the cable
@@ -150,7 +152,7 @@ class Winch:
 
     @property
     def anything_behind(self) -> bool:
-        """True if a cable has a pulley or a dead length. A robot computes the dead length from guides."""
+        """True if any cable has a pulley or a dead length. Dead lengths from guides are known only in a robot."""
         return bool(self.pulley_radius.any() or self.dead_cable.any())
 
     def per_cable(self, count: int) -> Winch:
@@ -188,7 +190,7 @@ class Winch:
         return f"winches: {', '.join(differ[:MOST_NAMED])}{', ...' if len(differ) > MOST_NAMED else ''}"
 
     def _part(self, index: NDArray[Any]) -> Winch:
-        """The winches of some of the cables, with fields of shape (m,)."""
+        """The winches of some cables; these winches have fields of shape (m,)."""
         return self.replace(**{name: field[index] for name, field in self.known().items()})
 
     def replace(self, **changes: Any) -> Winch:
@@ -219,14 +221,14 @@ class Winch:
         """Copy of these winches with the dead length computed from their guides.
 
         Args:
-            frame_anchors: End points of the guides, world axes [m], shape (m, 3).
+            frame_anchors: Points where the cables end after their last guides, world axes [m], shape (m, 3).
 
         Returns:
-            Winch with fields of shape (m,); the same object without guides.
+            Winch with fields of shape (m,). If these winches have no guides, the result is the same object.
 
         Raises:
             InvalidValueError: If the last guide is at the frame anchor, or if a given dead length or rise (not 0)
-                differs from the value from the guides by more than a relative error of 1e-9.
+                differs from the value that follows from the guides by more than a relative error of 1e-9.
         """
         if self.guides is None:
             return self

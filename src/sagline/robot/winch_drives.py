@@ -18,7 +18,7 @@ _SHORT: Final = 1e-4  # unit of the data sheets [kg m^2]
 
 @dataclass(frozen=True, slots=True)
 class WinchDrive:
-    """Data sheet of a motor, including its gear, if any.
+    """Data sheet of a motor, and of its gear if it has one.
 
     Attributes:
         name: Name for `winch_drive`.
@@ -29,7 +29,7 @@ class WinchDrive:
         rated_speed: Speed of the motor's shaft at rated torque [rad/s].
         speed_limit: Largest speed of the motor's shaft [rad/s].
         source: The data sheet.
-        assumed: Assumptions, and unused data.
+        assumed: Assumptions, and data in the sheet that are not used.
     """
 
     name: str

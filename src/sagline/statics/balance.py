@@ -32,8 +32,8 @@ def inertial_wrench(robot: Robot | Sequence[Robot], pose: PoseLike, twist: Array
         Force -M p_c'' [N] and moment -(Gamma w' + w x Gamma w) [N m] about the center of mass, shape (N, 6).
 
     Raises:
-        InvalidValueError: If the number of several robots is not N or the robots do not fit together, or the numbers of
-            poses, twists and twist rates differ.
+        InvalidValueError: If robot is a sequence whose length is not N or whose robots do not fit together, or if the
+            numbers of poses, twists and twist rates differ.
 
     Examples:
         >>> import sagline as sl
@@ -66,10 +66,7 @@ def inertial_wrench(robot: Robot | Sequence[Robot], pose: PoseLike, twist: Array
 
 
 def external_wrench(wrench: ArrayLike | None, count: int | None) -> Array:
-    """Checked wrench of a caller; zeros for None.
-
-    Shapes: wrench [N]; returns (6,) or (N, 6).
-    """
+    """Checked wrench of a caller, (6,) or (N, 6) [N, N m]; None becomes zeros."""
     if wrench is None:
         return locked(np.zeros(6))
     array = checked(wrench, "wrench", "N or N m", shape=(6,))
@@ -102,14 +99,14 @@ def structure_matrix(robot: Robot | Sequence[Robot], pose: PoseLike) -> Array:
     """Structure matrix J: the wrenches of unit chord tensions about the center of mass, in world axes.
 
     Args:
-        robot: The robot; or a sequence of N that fit together (see `inverse`), one per pose.
+        robot: The robot; or a sequence of N robots that fit together (see `inverse`), one per pose.
         pose: One pose or a batch of N.
 
     Returns:
         Matrix with the columns (u_i; r_i x u_i) along the platform's free motions, shape (n, m) or (N, n, m).
 
     Raises:
-        InvalidValueError: If the number of several robots is not N, or the robots do not fit together.
+        InvalidValueError: If robot is a sequence whose length is not N, or whose robots do not fit together.
         CableGeometryError: If both ends of a cable coincide, or one is inside its pulley; the message names pose and
             cable.
 
@@ -169,7 +166,7 @@ def article_balance(robot: Robot, pose: PoseLike, k_h: float = 4.845) -> Article
     cosine, sine = geometry[rows.AZIMUTH_X], geometry[rows.AZIMUTH_Y]
     bx, by, bz = geometry[rows.LEVER_X], geometry[rows.LEVER_Y], geometry[rows.LEVER_Z]
     pull = k_h * robot.cables.linear_density * geometry[rows.CHORD]
-    with np.errstate(divide="ignore", invalid="ignore"):  # infinite value times a zero lever
+    with np.errstate(divide="ignore", invalid="ignore"):  # the product of an infinite value and a zero lever is zero
         slope = geometry[rows.RISE] / geometry[rows.SPAN]
         h = -np.stack(
             (cosine, sine, slope, by * slope - bz * sine, bz * cosine - bx * slope, bx * sine - by * cosine), axis=-2

@@ -137,7 +137,7 @@ def tension_slopes(state: Equilibrium, slopes: CableSlopes) -> TensionSlopes:
 
 
 def _at_anchors(state: Equilibrium, slopes: CableSlopes, forces: Array) -> Array:
-    """Derivatives of the tension without pulleys, from force changes (..., m, 7, 3) at the platform ends."""
+    """Derivatives of the tension if there are no pulleys, from force changes (..., m, 7, 3) at the platform ends."""
     cables = state.cables
     at_frame, forces = slopes.force.copy(), forces.copy()
     at_frame[..., 2] -= cables.cable_weight
@@ -149,7 +149,7 @@ def _at_anchors(state: Equilibrium, slopes: CableSlopes, forces: Array) -> Array
 
 
 def _leaving(state: Equilibrium, slopes: CableSlopes, forces: Array, ends: Array) -> Array:
-    """Derivatives of the tension with pulleys, from H = T + T^2/(2 EA) - w z, which is constant along the cable.
+    """Derivatives of the tension if there are pulleys, from H = T + T^2/(2 EA) - w z, which is constant along a cable.
 
     Shapes: forces (..., m, 7, 3).
     """

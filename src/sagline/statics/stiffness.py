@@ -16,10 +16,10 @@ from sagline.robot.equilibrium import Equilibrium, of_equilibrium
 from sagline.statics.slopes import CableSlopes, cable_slopes, on_platform, tension_slopes
 from sagline.statics.strings import strings_below, strings_of
 
-_SINGULAR = 1e-14  # smallest determinant of a regular matrix with diagonal elements of 1
-# relative to the largest squared frequency; values of smaller magnitude count as zero
+_SINGULAR = 1e-14  # smallest determinant of a matrix with diagonal elements of 1 that counts as regular
+# relative to the largest squared frequency; a squared frequency of smaller magnitude counts as zero
 NEUTRAL, UNSTABLE = 1e-13, 1e-10
-_STIFFNESS_BYTES, _MODES_BYTES = 2500.0, 800.0  # memory per cable of a state, during the calculation
+_STIFFNESS_BYTES, _MODES_BYTES = 2500.0, 800.0  # memory per cable of a state that the calculation needs [bytes]
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -50,8 +50,8 @@ class Stiffness(Result):
             [m/m, rad/m].
         tension_sensitivity: d(tension at the frame end of cable i)/dL_j with the platform in equilibrium, shape (...,
             m, m) [N/m].
-        null_lengths: Orthonormal columns of length changes that do not move the platform (first order), shape (..., m,
-            m - n), with n the number of free motions; without columns if m <= n.
+        null_lengths: Orthonormal columns of length changes that do not move the platform (to first order), shape (...,
+            m, m - n) with the number n of free motions; without columns if m <= n.
     """
 
     state: Equilibrium
@@ -77,8 +77,8 @@ class Modes(Result, Tabular):
         state: The equilibrium of the calculation.
         frequency: Natural frequencies [Hz], ascending, shape (..., n); 0 for motions without stiffness, NaN for
             unstable motions.
-        shape: Motions (displacement of the center of mass, rotation vector, world axes) of unit modal mass, one per
-            column, shape (..., 6, n) [m/sqrt(kg), rad/(sqrt(kg) m)].
+        shape: Mode shapes, scaled to a modal mass of 1, as columns (displacement of the center of mass, rotation
+            vector) in world axes, shape (..., 6, n) [m/sqrt(kg), rad/(sqrt(kg) m)].
     """
 
     _columns: ClassVar[Columns] = ("state.pose", "f#=frequency")
@@ -91,8 +91,8 @@ class Modes(Result, Tabular):
     def above_strings(self) -> Flags:
         """True for modes above the lowest frequency of a cable with fixed ends.
 
-        Above this frequency the cables vibrate, and the platform modes do not approximate the modes of the robot (see
-        `vibration`). The shape is (..., n); the value is False for a motion without stiffness.
+        Above this frequency the cables vibrate, and these modes do not approximate the modes of the robot (see
+        `vibration`). The result has the shape (..., n), and is False for a motion without stiffness.
         """
         frequency = np.nan_to_num(self.frequency.reshape(-1, self.frequency.shape[-1]))
         below = strings_below(strings_of(self.state), frequency)
@@ -107,13 +107,13 @@ def stiffness(state: Equilibrium) -> Stiffness:
         state: An equilibrium, single or N of them; a plan or a solution; or a robot and its poses.
 
     Returns:
-        Stiffness; NaN if the state has no lengths, or the cables are straight (their stiffness is undefined).
+        Stiffness; NaN if the state has no lengths, or the cables are straight, because their stiffness is undefined.
 
     Raises:
         InvalidValueError: If the state has another type.
 
     Examples:
-        Platform height change due to 100 N upward, and due to 1 mm more length of cable 0:
+        Change of the platform height due to an upward force of 100 N, and due to 1 mm more length of cable 0:
 
         >>> import numpy as np
         >>> import sagline as sl
@@ -151,7 +151,7 @@ def stiffness(state: Equilibrium) -> Stiffness:
 
 
 def _by_frame_anchor(slopes: CableSlopes, compliance: Array) -> Array:
-    """Frame anchor sensitivity (..., 6, m, 3). A motion da of the frame end acts like -da at the platform end."""
+    """Frame anchor sensitivity (..., 6, m, 3). A motion da of the frame end acts like a motion -da of the platform end."""
     columns = [compliance @ on_platform(slopes.blocks[..., k], slopes.levers) for k in range(3)]
     return np.stack(columns, axis=-1)
 
@@ -238,8 +238,8 @@ def smallest_stiffness(state: Equilibrium) -> Array:
 def natural_frequency(squares: Array) -> Array:
     """Frequencies [Hz] from squared angular frequencies, shape (..., n).
 
-    A motion without stiffness, such as a rotation about a single rope, has 0 Hz. Its square is only a rounding error.
-    The frequency of an unstable motion is NaN.
+    A motion without stiffness, such as a rotation about a single rope, has 0 Hz. Its squared frequency is only a
+    rounding error. The frequency of an unstable motion is NaN.
     """
     largest = np.abs(squares).max(axis=-1, keepdims=True, initial=0.0)
     known = np.where(squares > NEUTRAL * largest, squares, np.where(squares < -UNSTABLE * largest, np.nan, 0.0))
@@ -252,12 +252,12 @@ def _check_state(state: Equilibrium, cable_bytes: float) -> None:
 
 
 def compliance_of(freedom: Array, matrix: Array) -> Array:
-    """Inverse of a stiffness on the free motions (n, 6), zero for the other motions; NaN if it is singular."""
+    """Inverse of a stiffness for the free motions (n, 6), zero for other motions; NaN if the stiffness is singular."""
     return freedom.T @ _inverse(freedom @ matrix @ freedom.T) @ freedom
 
 
 def _inverse(matrix: Array) -> Array:
-    """Inverse of each matrix; NaN where it is singular or NaN."""
+    """Inverse of each matrix; NaN for a matrix that is singular or contains NaN."""
     unit = np.eye(matrix.shape[-1])
     known = np.where(np.isnan(matrix).any(axis=(-1, -2), keepdims=True), 0.0, matrix)
     diagonal = np.abs(np.einsum("...ii->...i", known))
@@ -270,10 +270,7 @@ def _inverse(matrix: Array) -> Array:
 
 
 def mass_matrix(state: Equilibrium) -> Array:
-    """Mass and inertia of the platform about the center of mass, in world axes.
-
-    Returns (..., 6, 6) [kg, kg m^2].
-    """
+    """Mass and inertia of the platform about the center of mass, in world axes, (..., 6, 6) [kg, kg m^2]."""
     rotation = state.pose.matrix
     body = bodies_of(state.robot)
     mass = np.zeros((*state.pose.shape, 6, 6))

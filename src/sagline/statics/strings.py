@@ -17,9 +17,10 @@ from sagline.robot.batch import anchors_of, cables_of, first_of
 from sagline.robot.equilibrium import Equilibrium
 from sagline.statics.tables import cable_table
 
-FOLD = 1e-6  # smallest tension relative to the weight; below it a cable is folded and has no linear vibration
-COUNTING = 0.75 * np.pi  # phase of an element for the mode count [rad], < pi; gives a relative frequency error of 1e-13
-# smallest tension relative to EA; below it a cable is slack, and its two stiffnesses differ too much to compute
+FOLD = 1e-6  # relative to the weight; a cable with a smaller tension is folded and has no linear vibration
+# phase of an element for counting modes [rad], < pi; the relative error of a frequency is then 1e-13
+COUNTING = 0.75 * np.pi
+# relative to EA; a cable with a smaller tension is slack, and its two stiffnesses differ too much for the computation
 SLACK = 1e-7
 _TINY = 1e-300
 
@@ -62,10 +63,7 @@ def strings_of(state: Equilibrium) -> Strings:
 
 
 def strings_below(strings: Strings, frequency: Array) -> Indices:
-    """Number of natural frequencies of the cables with both ends fixed, by the Wittrick-Williams count.
-
-    Shapes: frequency (N, F) [Hz]; returns (N, F, m).
-    """
+    """Number (N, F, m) of natural frequencies below `frequency` (N, F) [Hz], for cables with both ends fixed."""
     below = np.zeros((*frequency.shape, strings.taut.shape[1]), dtype=np.int64)
     waves, room = undamped(frequency), np.empty(collocation.ROOM)
     for row, taut in enumerate(strings.taut):
@@ -78,10 +76,7 @@ def strings_below(strings: Strings, frequency: Array) -> Indices:
 
 
 def undamped(frequency: Array) -> Array:
-    """Waves of undamped frequencies, for kernels.
-
-    Shapes: frequency (N, F) [Hz]; returns (N, F, WAVE_COLUMNS).
-    """
+    """Waves in undamped cables at frequencies (N, F) [Hz], for kernels, (N, F, WAVE_COLUMNS)."""
     waves = np.zeros((*frequency.shape, collocation.WAVE_COLUMNS))
     waves[..., collocation.OMEGA] = omega = 2.0 * np.pi * frequency
     waves[..., collocation.SQUARE] = omega**2
@@ -106,10 +101,7 @@ def _axes(state: Equilibrium) -> Array:
 
 
 def taut_of(table: Array) -> Flags:
-    """True for cables that have linear vibrations: neither folded nor slack.
-
-    Shapes: table (N, m, STRING_COLUMNS); returns (N, m).
-    """
+    """True for cables that have linear vibrations: neither folded nor slack, (N, m); table: (N, m, STRING_COLUMNS)."""
     top = table[..., columns.VERTICAL]
     hanging = table[..., columns.WEIGHT] * table[..., columns.LENGTH]
     vertical = np.maximum(np.maximum(top - hanging, -top), 0.0)

@@ -15,37 +15,25 @@ from sagline.robot.robot import Robot
 
 
 def cable_table(robot: Robots) -> Array:
-    """Anchors, material and limits of the cables, columns as in kernels.tables.
-
-    Returns (1 or N, m, CABLE_COLUMNS).
-    """
+    """Anchors, material and limits of the cables, columns as in kernels.tables, (1 or N, m, CABLE_COLUMNS)."""
     robots = (robot,) if isinstance(robot, Robot) else robot
     return locked(np.array([_cable_rows(one) for one in robots]))
 
 
 def body_table(robot: Robots) -> Array:
-    """Mass, gravity and center of mass of the platform, columns as in kernels.tables.
-
-    Returns (1 or N, BODY_COLUMNS).
-    """
+    """Mass, gravity and center of mass of the platform, columns as in kernels.tables, (1 or N, BODY_COLUMNS)."""
     robots = (robot,) if isinstance(robot, Robot) else robot
     return locked(np.array([[one.mass, one.gravity, *one.center_of_mass] for one in robots]))
 
 
 def pose_rows(pose: Pose) -> Array:
-    """Positions and quaternions of a pose or a batch.
-
-    Returns (N, POSE_COLUMNS).
-    """
+    """Positions and quaternions of a pose or a batch, (N, POSE_COLUMNS)."""
     rows = np.concatenate((np.atleast_2d(pose.position), np.atleast_2d(pose.quaternion)), axis=1)
     return locked(rows)
 
 
 def robot_terms(robot: Robots) -> tuple[Array, Array, Array]:
-    """Arrays for kernels of one or several robots.
-
-    Returns (n, 6).
-    """
+    """Arrays for kernels, of one or several robots: free motions (n, 6), body_table and cable_table."""
     return first_of(robot).freedom, body_table(robot), cable_table(robot)
 
 
@@ -71,10 +59,7 @@ def _behind(robot: Robot) -> Array:
 
 
 def chord_geometry(robot: Robots, pose: Pose) -> Array:
-    """Geometry of every cable at every pose, rows as in `sagline.kernels.cable.geometry`.
-
-    Returns (N, GEOMETRY_ROWS, m).
-    """
+    """Geometry of every cable at every pose, rows as in `sagline.kernels.cable.geometry`, (N, GEOMETRY_ROWS, m)."""
     cables, poses = cable_table(robot), pose_rows(pose)
     out = np.empty((len(poses), rows.GEOMETRY_ROWS, cables.shape[1]))
     with np.errstate(all="ignore"):
@@ -83,10 +68,7 @@ def chord_geometry(robot: Robots, pose: Pose) -> Array:
 
 
 def touching_angle(robot: Robot, pose: Pose) -> Array:
-    """Wrap angle psi of straight cables, from the tangents of the platform ends to the pulleys.
-
-    Returns (m,) [rad].
-    """
+    """Wrap angle psi of straight cables, from the tangents between platform ends and pulleys, (m,) [rad]."""
     radius, entry = pulleys_of(robot)
     geometry = chord_geometry(robot, pose)[0]
     angle = np.arctan2(geometry[rows.COSINE], entry * geometry[rows.SINE])
@@ -94,7 +76,7 @@ def touching_angle(robot: Robot, pose: Pose) -> Array:
 
 
 def refuse_missing_chords(robot: Robots, pose: Pose, geometry: Array | None = None) -> None:
-    """Refuse poses at which a cable has no chord, because its ends coincide or no tangent to its pulley exists."""
+    """Refuse poses at which a cable has no chord, because its ends coincide or there is no tangent to its pulley."""
     chord = (chord_geometry(robot, pose) if geometry is None else geometry)[:, rows.CHORD]
     missing = np.argwhere(~(chord >= SHORTEST_CHORD))
     if not len(missing):

@@ -1,4 +1,4 @@
-"""Margins of a pose: distance to tension limits, and additional load."""
+"""Margins of a pose: distance of the tensions from their limits, and largest additional load."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def limit_margin(state: Equilibrium) -> Array:
 
     Returns:
         Smallest distance [N] between the tension of a cable and its limits, shape () or (N,); 0 if a cable is at its
-        limit, NaN without tensions. The distance depends on the tension distribution.
+        limit, NaN for a pose without tensions. The distance depends on the tension distribution.
 
     Raises:
         InvalidValueError: If the state has another type.
@@ -42,10 +42,7 @@ def limit_margin(state: Equilibrium) -> Array:
 
 
 def cable_margins(state: Equilibrium) -> Array:
-    """Distance between the tension of each cable and its nearest limit; `limit_margin` is the smallest distance.
-
-    Returns (m,) or (N, m) [N].
-    """
+    """Distance between the tension of each cable and its nearest limit, (m,) or (N, m) [N]."""
     tension, limits = state.limited_tension, limits_of(state.robot)
     margins: Array = np.minimum(tension - limits.low, limits.high - tension)
     return margins
@@ -55,16 +52,16 @@ def cable_margins(state: Equilibrium) -> Array:
 def capacity_margin(state: Equilibrium) -> Array:
     """Largest additional force in any direction that tensions within the limits can balance at each pose.
 
-    The moment does not change. The result is exact for weightless cables. For sagging cables, the sag forces of the
-    state are kept constant. The computing time is proportional to the number of faces, the binomial coefficient of m
-    over n - 1. For eight cables, 56 faces take about twenty microseconds per pose.
+    The moment on the platform does not change. The result is exact for weightless cables. For sagging cables, the sag
+    forces of the state are kept constant. The computing time is proportional to the number of faces, the binomial
+    coefficient of m over n - 1. For eight cables, 56 faces take about twenty microseconds per pose.
 
     Args:
         state: An equilibrium, single or N of them; a plan or a solution; or a robot and its poses.
 
     Returns:
         Force [N], shape () or (N,), independent of the tension distribution; infinite if no additional force makes the
-        pose infeasible, NaN without tensions.
+        pose infeasible, NaN for a pose without tensions.
 
     Raises:
         InvalidValueError: If the state has another type.

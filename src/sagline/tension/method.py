@@ -25,7 +25,7 @@ VARIABLES = {
 }
 
 # rows of the array of cable preferences
-ROOT_WEIGHT, GOAL = 0, 1  # square root of a cable's weight, and target tension [N]
+ROOT_WEIGHT, GOAL = 0, 1  # root of the weight of a cable in the sum of squares, and its target tension [N]
 PREFERENCE_ROWS = 2
 
 
@@ -36,8 +36,8 @@ class TensionMethod:
     Attributes:
         code: Code of the method in the kernels (`sagline.kernels.codes`).
         needs_upper_limits: True if every cable must have a finite upper limit.
-        most_redundant: Largest number of redundant cables of the method; None for any number.
-        continuous: True if tensions follow the pose without jumps.
+        most_redundant: Largest number of redundant cables for which the method works; None for any number.
+        continuous: True if the tensions change without jumps when the pose changes continuously.
         variable: The tension variable of the method: "chord" (default), "horizontal" (T_x of the article), or
             "frame_end" (the tension at the load cell of the winch). Minimum-norm results depend on the variable. A
             vertical cable has no horizontal tension. A pose directly under an anchor is therefore singular in the
@@ -65,18 +65,18 @@ class TensionMethod:
 
     @property
     def alone(self) -> TensionMethod:
-        """This method for a pose without a previous pose; only `Closest` changes."""
+        """Method for a pose without a previous pose: this method, except for `Closest`."""
         return self
 
     @property
     def title(self) -> str:
-        """Name as on the command line, with the tension variable if this is not the chord tension."""
+        """Name on the command line, followed by the tension variable if the variable is not the chord tension."""
         of = "" if self.variable == "chord" else f" of {self.variable.replace('_', '-')} tensions"
         return word_of(type(self).__name__) + of
 
     @property
     def parameter(self) -> float:
-        """Numerical parameter of some methods: an exponent, or the code of an optimum."""
+        """Numerical parameter, which only some methods have: an exponent, or the code of an optimum."""
         return 0.0
 
     def preference(self, cables: int) -> Array:
@@ -104,10 +104,7 @@ class TensionMethod:
 
 
 def shared_tension(state: Equilibrium, variable: Variable) -> Array:
-    """Tensions of a state in the variable of the tension distribution method.
-
-    Returns (m,) or (N, m) [N].
-    """
+    """Tensions of a state in the variable of the tension distribution method, (m,) or (N, m) [N]."""
     match variable:
         case "chord":
             return state.chord_tension
@@ -135,7 +132,7 @@ def kernel_options(robot: Robots, model: CableModel, tension: TensionMethod) -> 
     else:
         for index, one in enumerate(robot):
             check_sharing(one, tension, f"robot[{index}]")
-    # the tension of a weightless cable is equal along the cable, so that the frame-end tension is the chord tension
+    # a weightless cable has the same tension everywhere, so that its frame-end tension is its chord tension
     alike = model.weightless and tension.variable == "frame_end"
     variable = codes.CHORD_TENSION if alike else tension.variable_code
     weight, goal = (locked(row) for row in tension.preference(shared.cable_count))
@@ -147,12 +144,12 @@ def kernel_options(robot: Robots, model: CableModel, tension: TensionMethod) -> 
 
 
 def takes_default_kernel(tension: TensionMethod) -> bool:
-    """True if the method minimizes the distance to a reference in a linear variable, which uses a shorter kernel."""
+    """True if the method minimizes the distance to a reference in a linear variable; a shorter kernel does this."""
     return tension.code <= codes.QUADRATIC_PROGRAM and tension.variable_code != codes.FRAME_END_TENSION
 
 
 def check_sharing(robot: Robot, tension: TensionMethod, name: str | None = None) -> None:
-    """Refuse a robot for which a tension distribution method is undefined."""
+    """Refuse a robot for which a tension distribution method is not defined."""
     n, m = robot.degrees_of_freedom, robot.cable_count
     called = name or robot.name
     item = f"{called}: number of cables"

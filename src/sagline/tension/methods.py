@@ -20,8 +20,8 @@ from sagline.tension.method import GOAL, PREFERENCE_ROWS, ROOT_WEIGHT, TensionMe
 class MinimumNorm(TensionMethod):
     """Feasible tensions with the smallest Euclidean norm: the projection of 0 onto the feasible set.
 
-    The result depends only on the pose. A closed path therefore ends with the initial tensions. Unneeded cables are at
-    their lower limits. Choose this method for repeated motions, and for low tensions in general.
+    The result depends only on the pose. A closed path therefore ends with its initial tensions. Cables that are not
+    needed are at their lower limits. Choose this method for repeated motions, and for low tensions in general.
 
     Source:
         Gia Luan & Truong Thinh 2020, (53); docs/model.md, section 5.
@@ -46,7 +46,7 @@ class Closest(TensionMethod):
 
     @property
     def alone(self) -> TensionMethod:
-        """Minimum norm, because previous tensions do not exist."""
+        """The minimum-norm method, because there are no previous tensions."""
         return MinimumNorm(self.variable, self.lowest_point_margin)
 
 
@@ -54,9 +54,9 @@ class Closest(TensionMethod):
 class QuadraticProgram(TensionMethod):
     """The feasible tensions with the smallest weighted sum of squared distances to targets.
 
-    For tensions times the root weights, the method is a projection onto the feasible set. It is exact and continuous.
-    For up to two redundant cables it needs no iterations. Choose this method to keep a pretension, or to reduce the
-    load of some cables.
+    In terms of the tensions times the roots of the weights, the method is a projection onto the feasible set. It is
+    exact and continuous. For up to two redundant cables it needs no iterations. Choose this method to keep a
+    pretension, or to reduce the load of some cables.
 
     Attributes:
         weights: Weight of each cable, > 0, shape () or (m,).
@@ -110,8 +110,8 @@ class LowestSum(TensionMethod):
 
     The method minimizes the total motor torque. The number of cables at their limits is at least the redundancy. The
     tensions are not continuous: along a path the optimum can jump to another corner. If all points of a side are
-    optimal, the point with the smallest norm is selected (a corner, for more than two redundant cables). Choose this
-    method for static loads.
+    optimal, the point with the smallest norm is selected; with more than two redundant cables, this point is a corner.
+    Choose this method for static loads.
 
     Source:
         Borgstrom, Jordan, Sukhatme, Batalin & Kaiser 2009, "Rapid computation of optimally safe tension
@@ -124,10 +124,11 @@ class LowestSum(TensionMethod):
 
 @dataclass(frozen=True, slots=True)
 class LowestMaximum(TensionMethod):
-    """Feasible tensions with the smallest infinity-norm; if not unique, with the smallest Euclidean norm among these.
+    """Feasible tensions with the smallest infinity-norm; among several, those with the smallest Euclidean norm.
 
-    The method minimizes the largest cable load, and thus the required size of the winches. Only the largest tension is
-    continuous. Choose this method to size cables and drives. For motions use `PNorm`, a smooth approximation.
+    The method minimizes the largest cable load, and thus the required size of the winches. The largest tension is
+    continuous, but the other tensions may jump. Choose this method to size cables and drives. For motions use `PNorm`,
+    a smooth approximation.
 
     Source:
         Gosselin & Grenier 2011, "On the determination of the force distribution in overconstrained cable-driven
@@ -138,7 +139,8 @@ class LowestMaximum(TensionMethod):
     continuous: ClassVar[bool] = False
 
 
-LARGEST = 32.0  # largest exponent; above it, rounding hides the powers of small tensions in Newton's method
+# largest exponent; for a larger one, the powers of small tensions would be lost by rounding in Newton's method
+LARGEST = 32.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,12 +176,12 @@ class PNorm(TensionMethod):
 
 @dataclass(frozen=True, slots=True)
 class Centroid(TensionMethod):
-    """The centroid (barycenter) of the feasible polygon; the center of the interval for one redundant cable.
+    """The centroid (barycenter) of the feasible polygon; with one redundant cable, the center of the feasible interval.
 
-    The tensions are continuous and far from all limits, so that slackness and overload are unlikely. They are higher
-    than necessary. The result is the same in every variable. For more than two redundant cables use `AnalyticCenter`.
-    Choose this method for a stiff, robust setup if energy is unimportant. If the feasible set is unbounded, it has no
-    centroid, and the pose gets the status UNBOUNDED.
+    The tensions are continuous and far from all limits, so that slackness and overload are unlikely. The tensions are
+    higher than necessary. The result is the same for every tension variable. For more than two redundant cables use
+    `AnalyticCenter`. Choose this method for a stiff, robust setup if energy is unimportant. If the feasible set is
+    unbounded, it has no centroid, and the pose gets the status UNBOUNDED.
 
     Source:
         Mikelsons, Bruckmann, Hiller & Schramm 2008, "A real-time capable force calculation algorithm for redundant
@@ -196,8 +198,9 @@ class AnalyticCenter(TensionMethod):
 
     The tensions are smooth wherever the feasible set has an interior, because limits never become active. Near the
     border of the workspace, the set shrinks to a point, and the tensions converge to this point. The method supports
-    any number of redundant cables. The result is the same in every variable. Choose this method for controllers that
-    require differentiable tensions. An unbounded feasible set has no center; the pose gets the status UNBOUNDED.
+    any number of redundant cables. The result is the same for every tension variable. Choose this method for
+    controllers that require differentiable tensions. An unbounded feasible set has no center; the pose gets the status
+    UNBOUNDED.
 
     Source:
         Di Paola, Goldsztejn, Zoso & Caro 2023, "Analytic center based tension distribution for cable-driven
@@ -226,9 +229,9 @@ class ClosedForm(TensionMethod):
 class ImprovedClosedForm(TensionMethod):
     """Closed form with iterations; each iteration fixes the cable with the largest violation at its limit.
 
-    The number of iterations is at most the number of redundant cables. Nearly all feasible poses get a result. The
-    other feasible poses get the status NOT_COVERED. The tensions are continuous except where the fixed cable changes.
-    Choose this method if ClosedForm fails too early.
+    The number of iterations is at most the number of redundant cables. Nearly all feasible poses get a result; the
+    others get the status NOT_COVERED. The tensions are continuous except where the fixed cable changes. Choose this
+    method if ClosedForm gives no result at too many feasible poses.
 
     Source:
         Pott 2014, "An improved force distribution algorithm for over-constrained cable-driven parallel robots".
@@ -243,7 +246,7 @@ class ImprovedClosedForm(TensionMethod):
 class Puncture(TensionMethod):
     """First point within the limits on the line from the minimum-norm solution to the (improved) closed form.
 
-    The method gives low tensions in the computing time of a closed form. It solves the same poses as
+    The method gives low tensions, and is as fast as a closed form. It solves the same poses as
     `ImprovedClosedForm`: a few feasible poses get the status NOT_COVERED, 2 of 1,200 in a test with ipanema-3. Choose
     this method for low tensions on hardware that is too slow for a polygon.
 
@@ -264,8 +267,8 @@ _OPTIMA = {"1-norm": WALK_SUM, "2-norm": WALK_NORM, "centroid": WALK_CENTROID}
 class PolygonWalk(TensionMethod):
     """Algorithm for n + 2 cables: a walk around the feasible polygon to its best point.
 
-    The results are equal to the results of `LowestSum`, `MinimumNorm` and `Centroid`. These methods clip the polygon,
-    which is faster. Choose this method for comparison with the published algorithm.
+    The results are equal to the results of `LowestSum`, `MinimumNorm` and `Centroid`, which clip the polygon and are
+    faster. Choose this method for comparison with the published algorithm.
 
     Attributes:
         optimum: "1-norm", "2-norm" (default) or "centroid".
@@ -309,10 +312,10 @@ METHODS: dict[str, type[TensionMethod]] = {
     )
 }
 
-# the default of all functions and commands; at poses without a path it is the minimum norm, `DEFAULT.alone`
+# The default method of all functions and commands. At poses without a path, `DEFAULT.alone` applies: the minimum norm.
 DEFAULT: Final = Closest()
 
 
 def method_of(value: TensionMethod | str, item: str = "tension") -> TensionMethod:
-    """A tension distribution method unchanged, or one by its name on the command line: "minimum-norm"."""
+    """Return a tension distribution method unchanged; convert a name such as "minimum-norm" to a method."""
     return named(value, TensionMethod, METHODS, item)

@@ -34,18 +34,19 @@ class TensionPolygon(Result, Tabular):
 
     Attributes:
         vertices: Corners, counter-clockwise, in coordinates of the null space [N], shape (h, 2); Omega_lambda of the
-            article. For one redundant cable, the ends of an interval, possibly infinite, shape (2, 1). Without
-            redundant cables, one point without coordinates, shape (1, 0). If no tensions are feasible, the shape is (0,
-            r).
+            article. For one redundant cable, the vertices are the ends of an interval, possibly infinite, shape (2, 1).
+            Without redundant cables, there is one point without coordinates, shape (1, 0). If no tensions are feasible,
+            the shape is (0, r).
         tensions: Tensions at the vertices [N], in the tension variable, shape (h, m); Omega_t of the article.
-        sides: The limit of side k, which connects vertices k and k + 1 (for an interval, the limit at vertex k). None
-            for a side at infinity, where the polygon is unbounded; the vertices of this side represent infinity.
-        bounded: True if every side is a limit.
+        sides: For each side k, which connects vertices k and k + 1, its tension limit; for an interval, the limit at
+            vertex k. None for a side at infinity, where the polygon is unbounded; the vertices of this side represent
+            infinity.
+        bounded: True if no side is at infinity.
         basis: Orthonormal basis of the null space, shape (r, m).
         origin: The minimum-norm tensions that balance the wrench, without limits [N], shape (m,).
-        scale: Factor in: tension variable = scale * chord tension + offset, shape (m,). It is 1 for the chord tension
-            and cos phi for the horizontal tension. For the frame-end tension it is the derivative with respect to the
-            chord tension.
+        scale: Factor of each cable in the equation `tension variable = scale * chord tension + offset`, shape (m,). It
+            is 1 for the chord tension and cos phi for the horizontal tension. For the frame-end tension it is the
+            derivative with respect to the chord tension.
         offset: Offset in this equation [N], shape (m,); zero except for the frame-end tension.
     """
 

@@ -19,8 +19,8 @@ class UnresistedMotion(NamedTuple):
     Attributes:
         twist: Velocity of the center of mass and angular velocity, world axes, shape (6,). Its angular part has length
             1; if the platform does not rotate, its linear part has length 1.
-        resistance: Largest rate of a cable length in this motion, relative to the most constrained motion; 0 at a
-            singular pose, except for rounding.
+        resistance: Largest rate of a cable length in this motion, divided by the rate in the most constrained motion; 0
+            at a singular pose, except for rounding.
         text: Description of the motion.
     """
 
