@@ -11,10 +11,10 @@ CATENARY = 4
 
 # Status of the calculation of one cable.
 CABLE_SOLVED = 0
-CABLE_SLACK = 1  # carries no chord tension
+CABLE_SLACK = 1  # slack: the cable has no chord tension
 CABLE_NO_TENSION = 2  # the straight model does not determine a tension from a length
 CABLE_BELOW_VALIDITY = 3  # the empirical model's lowest point lies inside the span
-CABLE_TOO_SLACK = 4  # outside the practical range: half the weight exceeds RANGE times the chord tension
+CABLE_TOO_SLACK = 4  # too slack for the model: half the weight exceeds RANGE times the chord tension
 CABLE_NOT_CONVERGED = 5
 
 # Tension distribution methods.
@@ -56,7 +56,7 @@ UNPROVED_STABILITY = 10  # solved, and `stabilities_of_poses` decides whether it
 # Status of the forward calculation of one sample.
 FORWARD_SOLVED = 0
 FORWARD_LOOSE = 1  # stable, with fewer taut cables than degrees of freedom
-FORWARD_OVERSTRETCHED = 2  # unrealistic strain: the cables are too short to meet the platform
+FORWARD_OVERSTRETCHED = 2  # unrealistic strain: the cables are too short to hold the platform
 FORWARD_UNSTABLE = 3  # an equilibrium, but not a minimum of the energy
 FORWARD_SINGULAR = 4  # an equilibrium with an unconstrained motion
 FORWARD_NOT_CONVERGED = 5

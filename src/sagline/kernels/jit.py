@@ -47,7 +47,9 @@ def backend() -> str:
         except LibraryError as error:
             reason, step = f"{error}; ", "Run `make env` in the clone." if error.stale else INSTALL
             if chosen:
-                raise InvalidValueError(VARIABLE, "c", "numba or python here", f"{error}. {step}") from error
+                raise InvalidValueError(
+                    VARIABLE, "c", "another back end: numba or python", f"{error}. {step}"
+                ) from error
         else:
             return "c"
     if chosen in ("", "numba"):
@@ -56,7 +58,9 @@ def backend() -> str:
                 say_once(f"sagline: {reason}numba compiles the kernels at their first use. {step}")
             return "numba"
         if chosen:
-            raise InvalidValueError(VARIABLE, "numba", "c or python here", "Install numba, or unset the variable.")
+            raise InvalidValueError(
+                VARIABLE, "numba", "another back end: c or python", "Install numba, or unset the variable."
+            )
     if not chosen:
         say_once(f"sagline: {reason}the kernels run as plain Python, which is about 500 times slower. {step}")
     return "python"
@@ -86,17 +90,17 @@ def kernel(function: F) -> F:
 
 
 def formula(function: F) -> F:
-    """A kernel for inlining by the compiler, so that loops of its callers vectorize."""
+    """A kernel that the compiler copies into its callers, so that their loops vectorize."""
     return _compiled(function, "formula")
 
 
 def glue(function: F) -> F:
-    """A kernel for inlining before the compilation, so that its arguments cost no time."""
+    """A kernel that is copied into its callers before the compilation, so that its arguments cost no time."""
     return _compiled(function, "glue")
 
 
 def _compiled(function: F, kind: str) -> F:
-    """The function for the back end; unchanged for the compiled library, which contains the kernels."""
+    """The function for the back end; unchanged if the back end is the compiled library, which contains the kernels."""
     if backend() == "numba":
         from sagline.kernels.with_numba import compiled
 
@@ -109,9 +113,10 @@ def _compiled(function: F, kind: str) -> F:
 
 
 def bound(function: Callable[..., object], *arguments: object, numbers: int = 0) -> Callable[..., object]:
-    """An entry with its arguments, for many calls. A call takes a microsecond less than a call of the entry.
+    """An entry that keeps its arguments for many calls. A call saves a microsecond compared with a call of the entry.
 
-    The contents of the arrays may change between calls. Each call gives new values of the last `numbers` arguments.
+    The contents of the arrays may change between calls. Each call supplies new values for the last arguments, whose
+    number is `numbers`.
     """
     if isinstance(function, Entry):
         return function.bind(arguments, numbers)

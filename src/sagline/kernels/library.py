@@ -19,7 +19,7 @@ SUFFIX: Final = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 FOLDER: Final = SOURCES / "compiled"
 FILES: Final = (f"kernels{SUFFIX}", f"kernels_v3{SUFFIX}")
 SHORT_MEMORY, WRONG_TYPES = 1, -1
-FUNCTIONS: Final = (  # of Python's stable interface, in the order of `Python` in python.c
+FUNCTIONS: Final = (  # functions of Python's stable interface, in the order of `Python` in python.c
     "PyObject_GetBuffer",
     "PyBuffer_Release",
     "PyTuple_Size",
@@ -34,7 +34,7 @@ FUNCTIONS: Final = (  # of Python's stable interface, in the order of `Python` i
 )
 
 
-# conversion of a number and member of its slot, for each letter of a format
+# letter of a format -> conversion of a number, and member of its slot
 CONVERSIONS: Final[dict[str, tuple[Callable[[Any], Any], str]]] = {
     "f": (float, "f"),
     "i": (operator.index, "i"),
@@ -50,13 +50,13 @@ class LibraryError(Exception):
     """
 
     def __init__(self, reason: str, *, stale: bool = False) -> None:
-        """Store the reason."""
+        """Store the reason why the library cannot be used."""
         super().__init__(reason)
         self.stale = stale
 
 
 class Slot(ctypes.Union):
-    """A number or pointer of an argument."""
+    """Slot of an argument: a number or a pointer."""
 
     _fields_ = (("f", ctypes.c_double), ("i", ctypes.c_int64), ("p", ctypes.c_void_p))
 
@@ -77,7 +77,7 @@ class _Row(ctypes.Structure):
 
 
 class Entry:
-    """A compiled kernel that Python calls, for one or several sets of argument types."""
+    """A compiled kernel that Python calls, with one version per set of argument types."""
 
     def __init__(self, function: Callable[..., object], rows: list[_Row], library: ctypes.PyDLL, python: Any) -> None:
         """Store the rows of the function; `library` and `python` as in `Library`."""
@@ -99,7 +99,7 @@ class Entry:
         raise self._wrong_types()
 
     def bind(self, arguments: tuple[object, ...], numbers: int) -> Bound:
-        """Kernel with these arguments (kept alive); the last numbers may change at each call."""
+        """Kernel with these arguments, which it keeps alive; the last numbers may change at each call."""
         for row, address in self._rows:
             slots = (Slot * row.slots)()
             if self._fill(self._python, address, arguments, slots) == 0:
@@ -126,7 +126,7 @@ class Bound:
         self._last = [(slot, *CONVERSIONS[kind]) for slot, kind in zip(last, kinds, strict=True)]
 
     def __call__(self, *numbers: float) -> object:
-        """Run the kernel with new last numbers."""
+        """Run the kernel with new values of the last numbers."""
         for (slot, convert, member), number in zip(self._last, numbers, strict=True):
             setattr(slot, member, convert(number))
         if self._call(self._slots, ctypes.addressof(self._result)):
@@ -178,7 +178,7 @@ class Library:
         """The library for this processor.
 
         Raises:
-            LibraryError: If it cannot be used.
+            LibraryError: If no library can be used.
         """
         everywhere, newer = (folder / name for name in FILES)
         library = cls(everywhere)

@@ -1,7 +1,7 @@
 """Work memory of kernels. Kernels do not allocate memory themselves, which avoids reference counting.
 
-Python passes one flat array of numbers and one flat array of counters. `block`, `vector` and `counters` take named
-arrays from these, one after the other.
+Python passes one flat array of numbers and one flat array of counters. `block`, `vector` and `counters` cut named
+arrays from these two arrays, one after the other.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from sagline.kernels.jit import glue
 
 
 class Memory(NamedTuple):
-    """Memory of a kernel, or its unused part."""
+    """Memory of a kernel, or the part of this memory that is not used yet."""
 
     numbers: Array  # flat array of numbers
     counters: Indices  # flat array of counters

@@ -23,7 +23,7 @@ ENTRY: Final = "entry"  # name of the decorator of kernels that Python calls
 
 
 def plain(function: F) -> F:
-    """A kernel in plain Python, with the line numbers of its file. The functions that it calls must also be plain.
+    """A kernel in plain Python, with the line numbers of its file. Functions that the kernel calls must also be plain.
 
     Args:
         function: A function of the subset that docs/contributing/c-kernels.md defines.
@@ -33,7 +33,7 @@ def plain(function: F) -> F:
     module = ast.parse(textwrap.dedent("".join(lines)))
     ast.increment_lineno(module, first - 1)
     _Compiled().visit(module)
-    # the replacements are variables of a function around the kernel, so that its module does not change
+    # the replacements are variables of a function around the kernel, so that the module of the kernel does not change
     around = ast.parse(f"def around({', '.join(REPLACEMENTS)}): return {function.__name__}")
     outer = around.body[0]
     assert isinstance(outer, ast.FunctionDef)
@@ -67,11 +67,11 @@ class _Compiled(ast.NodeTransformer):
         return node
 
     def visit_Name(self, node: ast.Name) -> ast.AST:
-        """Functions of math and NumPy that raise no exceptions."""
+        """Replace functions of math and NumPy by functions that raise no exceptions."""
         return ast.copy_location(ast.Name("_math", node.ctx), node) if node.id in ("math", "np") else node
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
-        """Convert elements of arrays to numbers of Python; numbers of NumPy warn, and NumPy integers overflow."""
+        """Convert array elements to numbers of Python, because numbers of NumPy warn, and NumPy integers overflow."""
         self.generic_visit(node)
         return _call("_number", node) if isinstance(node.ctx, ast.Load) else node
 
@@ -101,12 +101,12 @@ def _call(name: str, *arguments: ast.expr) -> ast.Call:
 
 
 def _argument(value: Any) -> Any:
-    """An argument of an entry, with its numbers as numbers of Python."""
+    """An argument of an entry, whose numbers are converted to numbers of Python."""
     return tuple(map(_argument, value)) if type(value) is tuple else _number(value)
 
 
 def _number(value: Any) -> Any:
-    """A number of NumPy as a number of Python; other values unchanged."""
+    """Convert a number of NumPy to a number of Python; return other values unchanged."""
     return value.item() if isinstance(value, np.generic) else value
 
 
@@ -116,7 +116,7 @@ def _numbers(values: Iterable[Any]) -> Iterable[Any]:
 
 
 def _quotient(a: Any, b: Any) -> Any:
-    """Quotient a / b; for b = 0, inf or NaN with the sign of zero."""
+    """Quotient a / b; if b = 0, the result is inf with the sign of a times the sign of b, or NaN if a = 0."""
     try:
         return a / b
     except ZeroDivisionError:
@@ -126,7 +126,7 @@ def _quotient(a: Any, b: Any) -> Any:
 
 
 def _whole_quotient(a: Any, b: Any) -> Any:
-    """Quotient a // b; 0 for integers with b = 0."""
+    """Quotient a // b; if b = 0, the result is 0 for integers."""
     try:
         return a // b
     except ZeroDivisionError:
@@ -134,7 +134,7 @@ def _whole_quotient(a: Any, b: Any) -> Any:
 
 
 def _remainder(a: Any, b: Any) -> Any:
-    """Remainder a % b; for b = 0, 0 for integers, else NaN."""
+    """Remainder a % b; if b = 0, the result is 0 for integers and NaN for floats."""
     try:
         return a % b
     except ZeroDivisionError:
@@ -142,7 +142,7 @@ def _remainder(a: Any, b: Any) -> Any:
 
 
 def _power(base: Any, exponent: Any) -> Any:
-    """Power base ** exponent, by squaring for whole exponents of floats."""
+    """Power base ** exponent; a power of a float with a whole exponent is computed by repeated squaring."""
     if isinstance(base, int) and isinstance(exponent, int) and exponent >= 0:
         return base**exponent
     if not isinstance(exponent, int):
@@ -162,7 +162,7 @@ def _hypotenuse(x: float, y: float) -> float:
 
 
 def _without_exceptions(function: Callable[..., Any]) -> Callable[..., Any]:
-    """A function of math that returns the inf or NaN of NumPy instead of an exception."""
+    """A function of math that returns inf or NaN as NumPy does, instead of raising an exception."""
 
     def call(*arguments: float) -> Any:
         try:

@@ -44,7 +44,7 @@ def digest(folder: Path, sources: Iterable[Path]) -> str:
 
 @cache
 def digest_of_kernels() -> str:
-    """Digest of all kernels and of the module that loads their library, without the other back ends."""
+    """Digest of all kernels and of the module that loads their library; the other back ends are not included."""
     return digest(SOURCES, set(SOURCES.rglob("*.py")) - BACK_ENDS | {SOURCES / "library.py"})
 
 
@@ -67,7 +67,7 @@ def sources_of(module: str, sources: Path) -> frozenset[Path]:
 
 @cache
 def _imported(source: str) -> frozenset[str]:
-    """Names that a file imports from the kernels: modules and names in modules."""
+    """Names that a file imports from the kernels: modules, and names in modules."""
     names = set()
     for match in IMPORT.finditer(source):
         package = match[1]
@@ -90,5 +90,5 @@ def folder_of(function_module: str) -> Path:
 
 @cache
 def say_once(line: str) -> None:
-    """Write a line to standard error, but each line only once per process."""
+    """Write a line to standard error; each line is written only once per process."""
     print(line, file=sys.stderr, flush=True)

@@ -12,7 +12,7 @@ PLATFORM_X, PLATFORM_Y, PLATFORM_Z = 3, 4, 5  # platform anchor, platform frame 
 DENSITY = 6  # [kg/m]
 STIFFNESS = 7  # [N]
 TENSION_MIN, TENSION_MAX = 8, 9  # [N]
-# pulley at the frame anchor, and dead length behind it; all zero without pulley and dead length
+# pulley at the frame anchor, and dead length; all numbers are zero if there is neither pulley nor dead length
 PULLEY_RADIUS = 10  # R [m]
 ENTRY = 11  # s: +1 if the cable enters the pulley from below, -1 if from above
 DEAD_CABLE, DEAD_RISE = 12, 13  # length from drum to pulley, height of the pulley's entry above the drum [m]
@@ -27,9 +27,9 @@ BODY_COLUMNS = 5
 # pose row: position of the platform origin [m], unit quaternion, scalar last
 POSE_COLUMNS = 7
 
-# rows of the result of one pose, m values each; rows from WRAP on exist only with pulleys or dead lengths
+# rows of the result of one pose, m values each; rows from WRAP on exist only if there are pulleys or dead lengths
 SPAN, RISE, LENGTH, HORIZONTAL, VERTICAL, TENSION = 0, 1, 2, 3, 4, 5
-WRAP, WRAPPED, DEAD = 6, 7, 8  # wrap angle [rad], unstrained length on the pulley and behind it [m]
+WRAP, WRAPPED, DEAD = 6, 7, 8  # wrap angle [rad], unstrained length on the pulley, and dead length [m]
 SINE = 9  # sin phi of the chord that touches the pulley
 RESULT_ROWS = 10
-BARE_ROWS = WRAP  # without winches
+BARE_ROWS = WRAP  # robots without winches

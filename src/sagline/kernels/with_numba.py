@@ -1,4 +1,4 @@
-"""Kernels compiled by numba, and their machine code on disk. A digest checks the files.
+"""Kernels that numba compiles, and their machine code on disk. A digest in each file shows whether it is damaged.
 
 Each kernel has one file per set of argument types, written atomically. A damaged file is replaced after a new
 compilation. If the folder cannot be used, every process compiles the kernels again, and one line on standard error
@@ -28,7 +28,7 @@ _dumps: Any = serialize.dumps
 
 
 class KernelCache:
-    """Machine code of one kernel. It replaces numba's own cache, which uses paths as keys and does not check files."""
+    """Machine code of one kernel on disk. numba's own cache is not used, because it does not check files."""
 
     def __init__(self, function: Callable[..., object], folder: Path, *, announced: bool = False) -> None:
         """Set the folder for a function, without reading or writing."""
@@ -67,7 +67,7 @@ class KernelCache:
                     f"sagline: numba compiles {self._code.co_name}, which takes some seconds; where a C compiler is "
                     "available, the installation of sagline builds all kernels"
                 )
-            return None  # no such file, or no access: `save_overload` reports the cause
+            return None  # the file does not exist or cannot be read; `save_overload` reports the cause
         if not is_whole(content):
             say_once(f"sagline: {file} is damaged; its kernel is compiled again")
             return None
@@ -100,7 +100,7 @@ class KernelCache:
         return self._folder / f"{self._name}.{hashlib.sha256(key.encode()).hexdigest()[:16]}{SUFFIX}"
 
 
-INNER: Final = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # a third of the time to compile
+INNER: Final = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # this takes a third of the time of a compilation
 OPTIONS: Final[dict[str, dict[str, Any]]] = {
     "entry": {"nogil": True},
     "kernel": INNER,
@@ -110,7 +110,7 @@ OPTIONS: Final[dict[str, dict[str, Any]]] = {
 
 
 def compiled(function: F, kind: str) -> F:
-    """A kernel whose machine code is kept on disk; a division by zero gives inf or NaN as in NumPy.
+    """A kernel whose machine code is kept on disk; a division by zero gives inf or NaN, as in NumPy.
 
     Kernels allocate no memory (`sagline.kernels.memory`). They need no reference counting (_nrt), which would take a
     quarter of their time for arrays in NamedTuples.
@@ -120,7 +120,7 @@ def compiled(function: F, kind: str) -> F:
 
 
 def kept(dispatcher: F, folder: Path, *, announced: bool = False) -> F:
-    """A compiled function whose machine code is kept in a folder. One line announces its compilation if requested."""
+    """A compiled function whose machine code is kept in a folder. If requested, one line announces the compilation."""
     numbas: Any = dispatcher
     numbas._cache = KernelCache(numbas.py_func, folder, announced=announced)
     return dispatcher

@@ -166,7 +166,7 @@ def article_balance(robot: Robot, pose: PoseLike, k_h: float = 4.845) -> Article
     cosine, sine = geometry[rows.AZIMUTH_X], geometry[rows.AZIMUTH_Y]
     bx, by, bz = geometry[rows.LEVER_X], geometry[rows.LEVER_Y], geometry[rows.LEVER_Z]
     pull = k_h * robot.cables.linear_density * geometry[rows.CHORD]
-    with np.errstate(divide="ignore", invalid="ignore"):  # the product of an infinite value and a zero lever is zero
+    with np.errstate(divide="ignore", invalid="ignore"):  # a zero lever times an infinite slope gives NaN
         slope = geometry[rows.RISE] / geometry[rows.SPAN]
         h = -np.stack(
             (cosine, sine, slope, by * slope - bz * sine, bz * cosine - bx * slope, bx * sine - by * cosine), axis=-2

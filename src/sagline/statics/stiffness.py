@@ -151,7 +151,7 @@ def stiffness(state: Equilibrium) -> Stiffness:
 
 
 def _by_frame_anchor(slopes: CableSlopes, compliance: Array) -> Array:
-    """Frame anchor sensitivity (..., 6, m, 3). A motion da of the frame end acts like a motion -da of the platform end."""
+    """Frame anchor sensitivity (..., 6, m, 3). A motion da of the frame end acts like -da of the platform end."""
     columns = [compliance @ on_platform(slopes.blocks[..., k], slopes.levers) for k in range(3)]
     return np.stack(columns, axis=-1)
 

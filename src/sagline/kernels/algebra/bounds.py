@@ -15,7 +15,7 @@ from sagline.kernels.jit import formula, kernel
 START, LOW, HIGH = 0, 1, 2
 STRIP_ROWS = 3
 
-TOLERANCE = 1e-12  # relative to the largest bound; a smaller violation counts as none
+TOLERANCE = 1e-12  # relative to the largest bound; a smaller violation does not count
 
 
 @formula
@@ -31,7 +31,7 @@ def largest_bound(bounds: Array) -> float:
 
 @kernel
 def box_radius(largest: float, bounds: Array) -> float:
-    """Half width of a box that contains all common points of two-sided bounds; a large box for one-sided bounds."""
+    """Half width of a box that contains all points within two-sided bounds; for one-sided bounds, a large number."""
     for i in range(bounds.shape[1]):
         if bounds[HIGH, i] == math.inf:
             return 1e4 * largest
@@ -53,7 +53,7 @@ def side_of(bounds: Array, label: int) -> float:
 
 @formula
 def most_violated_bound(rows: Array, bounds: Array, point: Array, slack: float, first: bool) -> int:
-    """Label of the most violated side, or of the first violated one; -1 if no violation exceeds the slack."""
+    """Label of the most violated side, or of the first violated side; -1 if no violation exceeds the slack."""
     d, k = rows.shape
     worst = slack
     label = -1

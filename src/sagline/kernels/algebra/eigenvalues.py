@@ -1,4 +1,4 @@
-"""Smallest eigenvalue of a small symmetric matrix, and a bound of the largest."""
+"""Smallest eigenvalue of a small symmetric matrix, and an upper bound of its largest eigenvalue."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from sagline.core.arrays import Array
 from sagline.kernels.jit import formula, kernel
 
 STEPS = 100
-STILL = 1e-16  # relative to the largest eigenvalue: a shorter step is below rounding
+STILL = 1e-16  # relative to the largest eigenvalue; a shorter step is smaller than the rounding error
 
 
 @formula
 def _tridiagonalize(matrix: Array, diagonal: Array, beside: Array, vector: Array) -> None:
-    """Reduce a matrix to a similar tridiagonal one (Householder): fill diagonal and beside, (n,); overwrites matrix."""
+    """Reduce a matrix to tridiagonal form (Householder): fill diagonal and beside, (n,); overwrites matrix."""
     n = matrix.shape[0]
     product = diagonal  # used as work memory; the diagonal is filled at the end
     for k in range(n - 2):
@@ -94,8 +94,8 @@ def _lowest_eigenvalue(diagonal: Array, beside: Array, sign: float) -> float:
 def extreme_eigenvalues(matrix: Array, diagonal: Array, beside: Array, work: Array, flat: float) -> tuple[float, float]:
     """Smallest and largest eigenvalue of a symmetric matrix (n, n); all arrays are overwritten.
 
-    The largest eigenvalue is computed only if |smallest| <= flat times its upper bound. Otherwise the upper bound is
-    returned, which takes less time. The bound is at most three times the largest eigenvalue.
+    The largest eigenvalue has an upper bound, which is at most three times as large. If |smallest| exceeds flat times
+    this bound, the bound is returned instead of the largest eigenvalue, which takes less time.
     """
     _tridiagonalize(matrix, diagonal, beside, work)
     low = _lowest_eigenvalue(diagonal, beside, 1.0)

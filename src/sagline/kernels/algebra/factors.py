@@ -1,8 +1,8 @@
 """Small dense systems: Cholesky factor, Gauss elimination, orthonormal frames, and Householder factors.
 
 A matrix (n, m), n <= m, is factored as matrix.T = Q R with an orthogonal Q. The first n columns of Q give the
-minimum-norm solutions. The other columns span the null space. The loops are short, so that one sum would wait for its
-last term. They therefore add several independent sums.
+minimum-norm solutions. The other columns span the null space. In the short loops a single sum would have to wait for
+each term. The loops therefore add several independent sums.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import math
 from sagline.core.arrays import Array
 from sagline.kernels.jit import formula, kernel
 
-LEAST_PIVOT = 1e-15  # relative to the original diagonal element: a smaller pivot is rounding
+LEAST_PIVOT = 1e-15  # relative to the original diagonal element; a smaller pivot is only a rounding error
 
 
 @kernel
@@ -89,7 +89,7 @@ def solve_general(matrix: Array, right: Array) -> bool:
 
 @formula
 def orthogonalize_row(frame: Array, count: int, triangle: Array) -> float:
-    """Make row `count` of a frame (.., d) orthogonal to the orthonormal rows before it.
+    """Make row `count` of a frame (.., d) orthogonal to the rows before it, which are orthonormal.
 
     The subtracted components fill column `count` of the triangle above its diagonal. Returns the squared length of the
     new row.
@@ -122,12 +122,12 @@ def normalize_row(frame: Array, count: int, triangle: Array, square: float) -> N
 
 HEADS, FACTORS = 0, 1
 
-RANK = 1e-9  # smallest diagonal entry of R relative to its row; rank is lost below it
+RANK = 1e-9  # relative to its row of the matrix; a matrix with a smaller diagonal entry of R does not have full rank
 
 
 @formula
 def factorize(reduced: Array, diagonals: Array) -> bool:
-    """QR in place; returns whether the matrix (n, m) has full rank.
+    """QR factorization in place; returns True if the matrix (n, m) has full rank.
 
     Afterwards row k of reduced contains column k of R above the diagonal, then the vector v of reflection k. In
     diagonals (2, n), row HEADS is the diagonal of R, and row FACTORS contains 2/|v|^2 of the reflections.
@@ -196,7 +196,7 @@ def pseudo_inverse(reduced: Array, diagonals: Array, q: Array, inverse: Array) -
 
 @formula
 def minimum_norm(inverse: Array, right: Array, solution: Array) -> None:
-    """Fill the solution (m,) of least norm of matrix . solution = right (n,)."""
+    """Fill the minimum-norm solution (m,) of the equations matrix . solution = right (n,)."""
     n, m = inverse.shape
     for i in range(m):
         solution[i] = 0.0

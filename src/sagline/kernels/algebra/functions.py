@@ -1,7 +1,8 @@
 """Hyperbolic functions without cancellation.
 
 For h^2 <= 4 they are Taylor polynomials in h^2, which the compiler can vectorize. Terms below 1e-18 are omitted. Each
-polynomial is summed in four interleaved chains, because each product of a single chain waits for the previous one.
+polynomial is the sum of four independent chains, because in a single chain each product would wait for the previous
+product.
 """
 
 from __future__ import annotations
@@ -70,7 +71,7 @@ def cosh(h: float) -> float:
 
 @formula
 def sinh_excess(h: float) -> float:
-    """The difference sinh(h) - h, to full relative precision, for any h below 700."""
+    """The difference sinh(h) - h for any h below 700, with full relative precision."""
     y = h * h
     if y <= POLYNOMIAL_LIMIT:
         return h * y * sinh_excess_polynomial(y)
@@ -110,7 +111,7 @@ def atanhc_excess_polynomial(y: float) -> float:
 
 @formula
 def atanhc_excess(u: float) -> float:
-    """Value of atanh(u)/u - 1 for 0 <= u < 1. Its relative error is below rounding up to u = 0.25 and 1e-14 above."""
+    """Value of atanh(u)/u - 1 for 0 <= u < 1. The relative error is below rounding for u <= 0.25, and 1e-14 above."""
     y = u * u
     if y <= EXCESS_LIMIT:
         return atanhc_excess_polynomial(y)
@@ -123,7 +124,7 @@ LESS, MORE = math.sqrt(2.0) - 1.0, math.sqrt(2.0) + 1.0  # tangents of pi/8 and 
 
 @formula
 def _arctangent_ratio(y: float) -> float:
-    """The ratio atan(t)/t for y = t^2 <= tan(pi/8)^2; a Chebyshev fit, its error below 2e-18."""
+    """The ratio atan(t)/t for y = t^2 <= tan(pi/8)^2; a Chebyshev fit with an error below 2e-18."""
     q = y * y
     r = q * q
     a = 1.0 + r * (0.11111110717862655437 + r * 0.058457120303033402825)
@@ -135,7 +136,7 @@ def _arctangent_ratio(y: float) -> float:
 
 @formula
 def angle(sine: float, cosine: float) -> float:
-    """Angle of a direction, 0 to pi [rad]; sine >= 0. A common positive factor of sine and cosine has no effect."""
+    """Angle with this sine and cosine, 0 to pi [rad]; sine >= 0. A positive factor of both has no effect."""
     level = abs(cosine)
     steep = sine > MORE * level
     middle = sine > LESS * level

@@ -1,8 +1,8 @@
-"""Linear programs in few unknowns, over bounds: the dual simplex method.
+"""Linear programs with few unknowns and with bounds, solved by the dual simplex method.
 
-The method visits points that are optimal for their active sides. It ends at a point that satisfies all bounds, or if a
-side contradicts the active sides, which proves infeasibility. If only the limits change, the sides of the last solution
-are still optimal, and the search starts from them.
+The method visits points that are optimal for their active sides. It ends at a point that satisfies all bounds. It also
+ends if a side contradicts the active sides, which proves infeasibility. If only the limits change, the sides of the
+last solution are still optimal, and the next search starts from them.
 """
 
 from __future__ import annotations
@@ -17,19 +17,20 @@ from sagline.kernels.memory import Memory, block, counters, vector
 
 LP_SOLVED, LP_EMPTY, LP_UNBOUNDED, LP_GAVE_UP = 0, 1, 2, 3
 PIVOTS = 2000
-CAREFUL = 60  # number of pivots after which labels decide ties (Bland's rule, without cycles)
+CAREFUL = 60  # number of pivots after which ties are decided by label (Bland's rule), so that the search cannot cycle
 ROUNDING = 4e-16  # relative to the largest coordinate of a point
 PIVOT = 1e-11  # smallest pivot, relative to the largest entry of the row
 
 
 class Basis(NamedTuple):
-    """The active sides of an optimal point. The next program with the same rows and cost can start from them.
+    """The active sides of an optimal point, from which the next program with the same rows and cost can start.
 
     A finite limit must stay finite in the next program, because a side at infinity cannot be active.
     """
 
-    # labels of the active sides, (d + 1,). The last entry is the side that contradicts them if the bounds have no
-    # common point. labels[0] is -1 without a basis. Labels from 2k on are sides of a box that replaces infinity.
+    # labels of the active sides, (d + 1,). If the bounds have no common point, the last entry is the side that
+    # contradicts the others. labels[0] is -1 if there is no basis. Labels from 2k on are sides of a box that replaces
+    # infinity.
     labels: Indices
     weights: Array  # multipliers of the infeasibility proof, (d + 1,), >= 0
     inverse: Array  # inverse of the matrix of the sides' normals, (d, d)
@@ -46,7 +47,7 @@ def new_basis(memory: Memory, d: int) -> tuple[Basis, Memory]:
 
 @formula
 def _growth_along_edge(rows: Array, label: int, inverse: Array, j: int) -> float:
-    """Growth of normal . x of a bound along edge j of the present basis."""
+    """Growth of normal . x along edge j of the present basis, for the normal of a bound."""
     total = 0.0
     for i in range(inverse.shape[0]):
         total += rows[i, label // 2] * inverse[i, j]
@@ -114,9 +115,9 @@ def _move_to_vertex(rows: Array, bounds: Array, cost: Array, radius: float, basi
 
 @kernel
 def lowest_point(rows: Array, bounds: Array, cost: Array, slack: float, basis: Basis, point: Array) -> int:
-    """Fill the point (d,) of least cost . x that satisfies all bounds up to a slack; returns the outcome.
+    """Fill the point (d,) with the least cost . x among the points within all bounds; returns the outcome.
 
-    A slack of 0 means the usual tolerance. A program whose solution is on the box counts as unbounded.
+    Bounds may be violated by `slack`; 0 means the usual tolerance. A program with a solution on the box is unbounded.
     """
     labels, weights, inverse = basis
     d = cost.size
@@ -135,10 +136,10 @@ def lowest_point(rows: Array, bounds: Array, cost: Array, slack: float, basis: B
         far = 0.0
         for k in range(d):
             far = max(far, abs(point[k]))
-        seen = max(slack, ROUNDING * d * far)  # far from the origin, rounding errors exceed the slack
+        seen = max(slack, ROUNDING * d * far)  # far from the origin, a rounding error can exceed the slack
         entering = most_violated_bound(rows, bounds, point, seen, careful)
         if entering < 0:
-            _move_to_vertex(rows, bounds, cost, radius, basis, point)  # removes the rounding of many pivots
+            _move_to_vertex(rows, bounds, cost, radius, basis, point)  # removes the rounding errors of many pivots
             entering = most_violated_bound(rows, bounds, point, seen, careful)
         if entering < 0:
             outcome = LP_SOLVED

@@ -1,4 +1,4 @@
-"""Point nearest to a target that satisfies all bounds, for any number of unknowns: a dual active-set method.
+"""The point within all bounds that is nearest to a target, for any number of unknowns: a dual active-set method.
 
 The method starts from the target. It adds violated sides one by one, and drops sides with a negative multiplier, until
 all sides are satisfied; docs/model.md, section 5. The search starts with the active sides of a similar problem, which
@@ -21,7 +21,7 @@ from sagline.kernels.jit import glue, kernel
 from sagline.kernels.memory import Memory, block, counters
 
 EXCHANGES = 2000
-DEPENDENT = 1e-10  # a side depends on the others if a smaller part of its normal is outside their span
+DEPENDENT = 1e-10  # a side counts as dependent on the others if the part of its normal outside their span is smaller
 
 # rows of `pushes`
 PUSH, SHARE = 0, 1  # multipliers of the active sides, and components of the entering side
@@ -30,7 +30,7 @@ PUSH, SHARE = 0, 1  # multipliers of the active sides, and components of the ent
 class ActiveSet(NamedTuple):
     """The active sides of a nearest point, and work arrays."""
 
-    labels: Indices  # number of sides, then their labels, (d + 2,)
+    labels: Indices  # number of active sides, then their labels, (d + 2,)
     frame: Array  # orthonormal frame of the active sides, and a row for the entering side, (d + 1, d)
     triangle: Array  # triangular factor, (d + 1, d + 1)
     pushes: Array  # rows PUSH and SHARE, (2, d + 1)
@@ -53,7 +53,7 @@ def _point_on_active_sides(rows: Array, bounds: Array, held: ActiveSet, target: 
     count, d = labels[0], point.size
     for k in range(d):
         point[k] = target[k]
-    for c in range(count):  # distance of the edge from the target along row c of the frame
+    for c in range(count):  # distance of the active sides from the target, along row c of the frame
         label = labels[1 + c]
         miss = side_of(bounds, label)
         size = 0.0
@@ -97,9 +97,10 @@ def _drop_side(rows: Array, held: ActiveSet, leaving: int) -> None:
 
 @kernel
 def nearest_point(rows: Array, bounds: Array, target: Array, slack: float, held: ActiveSet, point: Array) -> bool:
-    """Fill the point (d,) nearest to the target (d,) that satisfies all bounds up to a slack; False if none exists.
+    """Fill the point (d,) within all bounds, up to a slack, that is nearest to a target (d,); False if none exists.
 
-    held: active sides of a similar problem, or labels[0] = 0 without one; filled with the active sides of the point.
+    held: active sides of a similar problem, or labels[0] = 0 if there is none; overwritten with the active sides of the
+    point.
     """
     labels, frame, triangle, pushes = held
     d = target.size

@@ -1,8 +1,8 @@
-"""Data of one pose: cables in place, their limits, and the factored force balance.
+"""Data of one pose: the cables, their limits, and the factored force balance.
 
 Only this module prepares a pose. The tension distribution methods use the variable t = scale tau + offset, where tau is
-the chord tension. The variable is a chord, horizontal or frame-end tension, possibly weighted. Limits and minimum norm
-refer to t - offset.
+the chord tension. The variable is a chord, horizontal or frame-end tension, possibly weighted. Limits and minimum-norm
+tensions are stored as t - offset.
 """
 
 from __future__ import annotations
@@ -45,7 +45,8 @@ class Balance(NamedTuple):
     geometry: Array  # rows of `cable_geometry`, (GEOMETRY_ROWS, m)
     full: Array  # structure matrix, (6, m)
     matrix: Array  # structure matrix along the free motions, (n, m)
-    reduced: Array  # structure matrix in the distribution's variable, later its Householder reflections, (n, m)
+    # structure matrix for the distribution's variable, overwritten by its Householder reflections, (n, m)
+    reduced: Array
     diagonals: Array  # diagonals of the QR factors, (2, n)
     q: Array  # orthogonal factor and one work row, (m + 1, m)
     inverse: Array  # transposed pseudo-inverse in the distribution's variable, (n, m)
@@ -55,7 +56,7 @@ class Balance(NamedTuple):
     scale: Array  # scale of the distribution's variable, (m,)
     offset: Array  # offset of the distribution's variable [N], (m,)
     bounds: Array  # minimum-norm tensions (row START) and limits, in the distribution's variable, (3, m)
-    tension: Array  # distributed tensions, in the distribution's variable less its offset [N], (m,)
+    tension: Array  # distributed tensions, in the distribution's variable minus its offset [N], (m,)
 
 
 @glue
@@ -92,7 +93,7 @@ def set_pose(
     cables: Cables,
     balance: Balance,
 ) -> int:
-    """Fill cables and balance of one pose, with first-order sag forces; returns POSE_SOLVED or the failure.
+    """Fill cables and balance of one pose, with first-order sag forces; returns POSE_SOLVED or a status of failure.
 
     weight: root weights of the cables in the distribution's variable, (m,).
     """
@@ -149,7 +150,7 @@ def _choose_variable(variable: int, weight: Array, cables: Cables, balance: Bala
 
 @glue
 def scale_limits(cables: Cables, balance: Balance, i: int) -> None:
-    """Fill the limits of one cable in the distribution's variable, without the limit of the strain."""
+    """Fill the limits of one cable in the distribution's variable; the limit of the strain is not included."""
     limited = cables.high[i] < math.inf and not is_limited_by_strain(cables, i)
     balance.bounds[LOW, i] = cables.low[i] * balance.scale[i]
     balance.bounds[HIGH, i] = cables.high[i] * balance.scale[i] if limited else math.inf
@@ -183,5 +184,5 @@ def fill_needed_wrench(platform: Platform, cables: Cables, balance: Balance) -> 
 
 @glue
 def start_from_minimum_norm(balance: Balance) -> None:
-    """Fill START of the bounds with the tensions of least norm that supply the needed wrench."""
+    """Fill row START of the bounds with the minimum-norm tensions that supply the needed wrench."""
     minimum_norm(balance.inverse, balance.right, balance.bounds[START])

@@ -30,7 +30,7 @@ def is_rotation(freedom: Array, k: int) -> bool:
 
 @kernel
 def symmetric_part(free: Array, full: Array, matrix: Array) -> None:
-    """Fill the symmetric part of free K free^T (n, n)."""
+    """Fill the symmetric part of the product free K free^T, (n, n)."""
     matrix_along(free, full, matrix)
     for j in range(matrix.shape[0]):
         for k in range(j):
@@ -41,7 +41,7 @@ def symmetric_part(free: Array, full: Array, matrix: Array) -> None:
 
 @formula
 def matrix_along(free: Array, full: Array, matrix: Array) -> None:
-    """Fill free K free^T (n, n)."""
+    """Fill the product free K free^T, (n, n)."""
     n = free.shape[0]
     for j in range(n):
         for k in range(n):
@@ -70,7 +70,7 @@ def components_along(free: Array, full: Array, part: Array) -> float:
 
 @formula
 def fill_motion_of_components(free: Array, part: Array, motion: Array) -> None:
-    """Fill the motion (6,) of components (n,) along the free motions."""
+    """Fill the motion (6,) from its components (n,) along the free motions."""
     for a in range(6):
         motion[a] = 0.0
     for j in range(free.shape[0]):
@@ -89,7 +89,7 @@ def norm(vector: Array) -> float:
 
 @formula
 def fill_structure_matrix(geometry: Array, matrix: Array) -> None:
-    """Fill J (6, m): its columns are (u; r x u) with u the unit vector from platform end to frame end."""
+    """Fill J (6, m). Its columns are (u; r x u), where u is the unit vector from platform end to frame end."""
     for i in range(geometry.shape[1]):
         x = -geometry[g.COSINE, i] * geometry[g.AZIMUTH_X, i]
         y = -geometry[g.COSINE, i] * geometry[g.AZIMUTH_Y, i]
@@ -107,9 +107,9 @@ def fill_structure_matrix(geometry: Array, matrix: Array) -> None:
 def needed_wrench(geometry: Array, body: Array, wrench: Array, sag_force: Array, needed: Array) -> None:
     """Fill the wrench (6,) that the chord tensions must supply: J tau = needed.
 
-    It balances three loads. The first is the platform's weight, which no other argument includes. The second is the
-    given wrench, external plus inertial, about the center of mass. The third are the sag forces T_z - tau sin phi (m,)
-    of the cables, which act at the platform ends.
+    This wrench balances three loads. The first is the platform's weight, which no other argument includes. The second
+    is the given wrench, external plus inertial, about the center of mass. The third are the sag forces T_z - tau sin
+    phi (m,) of the cables, which act at the platform ends.
     """
     fz = body[tables.MASS] * body[tables.GRAVITY] - wrench[2]
     mx = -wrench[3]
@@ -131,7 +131,7 @@ def along_freedom(freedom: Array, full: Array, part: Array) -> None:
     """Fill the components (n,) of a wrench (6,) along the platform's free motions (n, 6)."""
     n = freedom.shape[0]
     for k in range(n):
-        if n == 6:  # every motion is free
+        if n == 6:  # all motions are free
             part[k] = full[k]
         else:
             part[k] = 0.0

@@ -1,9 +1,9 @@
-"""Admissible chord tensions of a cable at a pose, which all tests of feasibility use; docs/model.md, section 5.
+"""Admissible chord tensions of a cable at a pose, for all tests of feasibility; docs/model.md, section 5.
 
 The admissible tensions of a cable form one interval. Its ends follow from the robot's limits, a limit of the sag and a
-limit of the stretch. Limits of the frame-end tension are converted to limits of the chord tension. While the chord
-tension grows, the frame-end tension first falls and then rises. Usually the interval is on the rising side. It includes
-the falling side if no frame-end tension is below the lower limit.
+limit of the stretch. Limits of the frame-end tension are converted to limits of the chord tension. As the chord tension
+grows, the frame-end tension first falls and then rises. Usually the interval contains only tensions on the rising side.
+If no frame-end tension is below the lower limit, it also contains tensions on the falling side.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from sagline.kernels.cable.states import frame_end_tension, taut_at_frame_end
 from sagline.kernels.cable.terms import Chord, Material, Model
 from sagline.kernels.jit import formula, glue, kernel
 
-LOOSEST = 5.0  # largest X = wD/(2 tau), of a cable fifteen times as long as its chord, almost without tension
-# Largest strain; the cable is then twice as long as without tension. Applies if the robot has no upper limit.
+LOOSEST = 5.0  # largest X = wD/(2 tau): a cable that is fifteen times as long as its chord and almost without tension
+# Largest strain, at which a cable is twice as long as without tension. It applies if the robot has no upper limit.
 LARGEST_STRAIN = 1.0
 SMALLEST = 1e-100  # smallest chord tension of a catenary without weight [N]; the equations divide by the tension
 SECTIONS = 80  # steps of the search for the smallest admissible tension of a slack cable
@@ -31,12 +31,13 @@ class TensionLimits(NamedTuple):
     """Limits of the tensions."""
 
     quantity: int  # code of the tension to which the robot's limits apply
-    validity: float  # T_adj [N] of the article's bound (54), T_x > w D/(2 |tan phi|) + T_adj; NaN omits the bound
+    # T_adj [N] of the article's bound (54), T_x > w D/(2 |tan phi|) + T_adj; NaN if the bound does not apply
+    validity: float
 
 
 @formula
 def sags(model: Model, half_weight: float) -> bool:
-    """True if a cable sags (its length is infinite at zero tension); half_weight: wD/2 [N]."""
+    """True if a cable sags, so that its length is infinite at zero tension; half_weight: wD/2 [N]."""
     return half_weight > 0.0 and model.code != codes.STRAIGHT and model.code != codes.ELASTIC
 
 
@@ -100,9 +101,9 @@ def fill_admissible_tensions(
 def _limits_at_chord(
     model: Model, chord: Chord, material: Material, pulley: Pulley, low: float, high: float, floor: float
 ) -> tuple[float, float]:
-    """Limits of the chord tension from limits of the tension at the frame end [N].
+    """Limits of the chord tension [N] that follow from limits of the frame-end tension.
 
-    Returns infinity and zero if every chord tension gives a frame-end tension above its upper limit.
+    Returns infinity and zero if the frame-end tension is above its upper limit at every chord tension.
     """
     largest = taut_at_frame_end(model, chord, material, pulley, high, -1.0)
     if largest < 0.0:
@@ -117,11 +118,11 @@ def _limits_at_chord(
 def _slackest_at_frame_end(
     model: Model, chord: Chord, material: Material, pulley: Pulley, tension: float, floor: float, taut: float
 ) -> float:
-    """Smallest chord tension of the range with frame-end tensions up to `tension` [N]; `taut` is the largest.
+    """Smallest chord tension [N] of the range in which the frame-end tension is at most `tension`.
 
-    Golden sections find one chord tension of this range. The result is below it.
+    Golden sections find a chord tension inside the range, and then its smallest chord tension.
 
-    floor: lower bound of the result [N]; taut: chord tension on the rising side with the given tension [N].
+    floor: lower bound of the result [N]; taut: largest chord tension of the range, on the rising side [N].
     """
     if tension == math.inf or frame_end_tension(model, chord, material, pulley, floor) <= tension:
         return min(floor, taut)

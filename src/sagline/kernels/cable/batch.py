@@ -18,7 +18,7 @@ from sagline.kernels.cable.models import from_length, from_tension, sag_of_shall
 from sagline.kernels.cable.terms import Chord, Material, Model, Terms, model_of
 from sagline.kernels.jit import entry, kernel
 
-CHUNK = 256  # cables per chunk: the buffers of this length fit into the fastest cache of the processor
+CHUNK = 256  # cables per chunk; buffers of this length fit into the fastest cache of the processor
 BUFFERS = 11
 
 
@@ -49,8 +49,8 @@ def batch_from_tension(
 ) -> None:
     """Length, forces on the platform end and status of every cable at its chord tension.
 
-    Loops without branches solve all cables of a chunk as ordinary catenaries. Cables that are not ordinary are then
-    solved again, one by one. Each loop computes one result, because the compiler does not vectorize loops with more.
+    Loops without branches solve all cables of a chunk as ordinary catenaries. The other cables are then solved again,
+    one by one. Each loop computes one result, because the compiler does not vectorize loops with several results.
     buffer is a work array, (BUFFERS, CHUNK).
     """
     model = model_of(terms)
@@ -132,7 +132,7 @@ def batch_from_length(
 def batch_end(
     horizontal: Array, vertical: Array, length: Array, weight: Array, stiffness: Array, x_out: Array, z_out: Array
 ) -> None:
-    """Platform ends of exact catenaries with the given forces and lengths; all operands of full length."""
+    """Platform ends of exact catenaries with the given forces and lengths; all operands have one entry per cable."""
     for i in range(x_out.shape[0]):
         x_out[i], z_out[i] = catenary_end(horizontal[i], vertical[i], length[i], weight[i], stiffness[i])
 
@@ -178,7 +178,7 @@ def shape_points(
 
 @kernel
 def _shallow_drop(t: float, model: Model, span: float, rise: float, vertical: float, tension: float) -> float:
-    """Drop below the chord [m] at a fraction t of the chord: b D t (1 - t)/tau with the sag force b."""
+    """Vertical distance below the chord [m] at a fraction t of the chord: b D t (1 - t)/tau with the sag force b."""
     if model.code == codes.STRAIGHT or model.code == codes.ELASTIC or tension == 0.0:
         return 0.0
     chord = math.hypot(span, rise)
@@ -190,9 +190,10 @@ def _shallow_drop(t: float, model: Model, span: float, rise: float, vertical: fl
 def _catenary_sag(
     span: float, rise: float, length: float, horizontal: float, vertical: float, weight: float, stiffness: float
 ) -> float:
-    """Largest drop below the chord [m]; on a vertical chord, the drop below its lower end."""
+    """Largest vertical distance of a cable below its chord [m]; below its lower end if the chord is vertical."""
     slope = rise / span if span > 0.0 else 0.0
-    # length between the frame end and the point whose tangent is parallel to the chord (the turning point if vertical)
+    # length from the frame end to the point whose tangent is parallel to the chord, or to the turning point if the
+    # chord is vertical
     part = length - (vertical - horizontal * slope) / weight
     part = min(max(part, 0.0), length)
     x, z = catenary_end(horizontal, vertical - weight * (length - part), part, weight, stiffness)
@@ -214,7 +215,7 @@ def largest_sags(
     tension: Array,
     sag_out: Array,
 ) -> None:
-    """Largest drop below the chord of every cable."""
+    """Largest vertical distance of every cable below its chord."""
     model = model_of(terms)
     for i in range(sag_out.shape[0]):
         weight = density[i] * model.gravity
@@ -239,7 +240,8 @@ def closures(
 ) -> None:
     """Error of each cable in the equations of its model [m].
 
-    For a catenary, the distance between computed end and platform end; for other models, the error of the length.
+    For a catenary, the error is the distance between computed end and platform end; for other models, the error of the
+    length.
     """
     model = model_of(terms)
     for i in range(residual_out.shape[0]):
@@ -265,7 +267,7 @@ def closures(
 def creep_strains(
     time: Array, tension: Array, stiffness: Array, delay: Array, settled: Flags, strain_out: Array
 ) -> None:
-    """Sum of the delayed strains of springs with parallel dampers, exact for piecewise linear tensions.
+    """Sum of the delayed strains of elements, each a spring parallel to a damper; exact for piecewise linear tensions.
 
     Samples whose tension is NaN are omitted; the tension is then linear in time between their neighbors.
 
@@ -274,7 +276,7 @@ def creep_strains(
         tension: Tensions [N], (N, m).
         stiffness: Stiffness of each element [N], (k,).
         delay: Delay time of each element [s], (k,).
-        settled: True if the first tension has acted for a long time, (1,); otherwise the initial strain is zero.
+        settled: True if the first tension has acted for a long time, (1,); if False, the initial strain is zero.
         strain_out: (N, m).
     """
     for i in range(tension.shape[1]):
@@ -289,7 +291,8 @@ def creep_strains(
                     strain = tension[p, i] / stiffness[k] if settled[0] else 0.0
                 else:
                     step = time[p] - time[before]
-                    late = (tension[p, i] - tension[before, i]) / step * delay[k]  # lag after the initial transient
+                    # remaining lag of the strain, after the initial transient
+                    late = (tension[p, i] - tension[before, i]) / step * delay[k]
                     begin, end = tension[before, i] - late, tension[p, i] - late
                     strain = (end + (strain * stiffness[k] - begin) * math.exp(-step / delay[k])) / stiffness[k]
                 strain_out[p, i] += strain

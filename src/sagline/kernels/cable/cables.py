@@ -15,14 +15,14 @@ class Cables(NamedTuple):
     """Data of the cables of one pose, with m values per field.
 
     The free span of a cable is the part between the exit point at its pulley and its platform end. If no cable has a
-    pulley or dead length, each free span is the whole cable. Its fields then use the memory of the cable's fields.
+    pulley or dead length, each free span is the whole cable, and its fields use the memory of the cable's fields.
     """
 
     machine: bool  # True if any cable has a pulley or dead length
     density: Array  # [kg/m]
     stiffness: Array  # EA [N]
     half_weight: Array  # wD/2 [N]
-    chord: Array  # D [m]; for a cable over a pulley, length of the tangent from the platform end
+    chord: Array  # D [m]; for a cable over a pulley, length of the tangent from platform end to pulley
     sine: Array  # sin phi
     cosine: Array  # cos phi
     low: Array  # smallest admissible chord tension [N]

@@ -1,4 +1,4 @@
-"""One elastic catenary (Irvine), solved for any of its three unknowns without cancellation.
+"""One elastic catenary (Irvine), solved for platform end, length or force without cancellation.
 
 docs/model.md, section 2. Forces act on the cable at its platform end; z points up. The equations
 are written in ratios that stay regular as the weight per length w goes to zero.
@@ -27,16 +27,16 @@ RANGE = 500.0  # largest X = wD/(2 tau): sinh X overflows above it; practical ca
 TAUT_STRAIN = 0.01  # largest e = tau/EA at which two Newton steps reach full precision
 ORDINARY_STRAIN = 0.1  # largest e at which three Newton steps reach full precision
 STEPS = 80
-# Relative steps after which the next step is below rounding. Newton's method squares the error; Halley's method cubes
-# it.
+# Relative steps after which the next step is smaller than the rounding error. Newton's method squares the error;
+# Halley's method cubes it.
 SMALL_NEWTON_STEP = 1e-9
 SMALL_HALLEY_STEP = 1e-6
-SPLIT = 134217729.0  # 2^27 + 1, which splits a mantissa into halves
+SPLIT = 134217729.0  # 2^27 + 1, a factor that splits a mantissa into halves
 
 
 @kernel
 def slack_series(horizontal: float, vertical_a: float, vertical: float, tension_a: float, tension_b: float) -> float:
-    """Ratio atanh(u)/u of P1 for u = (T_zB - T_zA)/(T_A + T_B) in any range; infinite for a fold (u = 1)."""
+    """Ratio atanh(u)/u of P1 for any u = (T_zB - T_zA)/(T_A + T_B); infinite for a folded cable (u = 1)."""
     total = tension_a + tension_b
     u = (vertical - vertical_a) / total
     # T_A + T_B times (1 - u), from sums of positive terms instead of a subtraction
@@ -88,7 +88,7 @@ def _ordinary_newton_step(ratio: float, square: float, cosine2: float, sine2: fl
 
 @formula
 def ordinary_length_ratio(half_weight: float, sine: float, cosine: float, strain: float) -> float:
-    """P3 by two Newton steps: L/D for X = wD/(2 tau) <= 2 and e = tau/EA <= 0.01; a third step is needed up to e = 0.1.
+    """P3 by two Newton steps: L/D for X = wD/(2 tau) <= 2 and e = tau/EA <= 0.01; up to e = 0.1, add a third step.
 
     Without branches and inner loops, a loop over cables vectorizes.
     """
@@ -104,13 +104,13 @@ def ordinary_length_ratio(half_weight: float, sine: float, cosine: float, strain
 
 @formula
 def ordinary_length_ratio_near(half_weight: float, sine: float, cosine: float, strain: float, ratio: float) -> float:
-    """One Newton step on an approximate ratio, which is the ratio at a similar tension or the result of two steps."""
+    """One Newton step from an approximate ratio: the ratio at a similar tension, or the result of two steps."""
     return _ordinary_newton_step(ratio, half_weight * half_weight, cosine * cosine, sine * sine, strain)
 
 
 @kernel
 def length_ratio(half_weight: float, sine: float, cosine: float, strain: float) -> tuple[float, int]:
-    """P3 for any cable: L/D and a status, by Newton steps within a bracket."""
+    """P3 for any cable: L/D and a status, by Newton steps within two bounds of the solution."""
     if is_ordinary(half_weight, strain):
         ratio = ordinary_length_ratio(half_weight, sine, cosine, strain)
         if strain > TAUT_STRAIN:
@@ -198,7 +198,7 @@ def relative_excess(span: float, rise: float, length: float) -> float:
 
 @formula
 def _parameter_start(xi: float, zeta: float, kappa: float, excess: float) -> float:
-    """First guess of h: root of xi^2 h^3/3 + excess h = 2 kappa (1 + excess), or the deep-sag asymptote."""
+    """Initial value of h: root of xi^2 h^3/3 + excess h = 2 kappa (1 + excess), or the asymptote for deep sag."""
     scale = 3.0 / (xi * xi)
     p = scale * excess
     q = 2.0 * scale * kappa * (1.0 + excess)
@@ -242,7 +242,7 @@ def _catenary_parameter(xi: float, zeta: float, kappa: float, excess: float) -> 
             high = h
         else:
             low = h
-        if error > 1.0:  # the function is exponential here: Newton steps on its logarithm
+        if error > 1.0:  # the function is nearly exponential here, and Newton steps solve for its logarithm
             new = h - math.log1p(error) * (1.0 + error) / slope
         else:  # Halley
             new = h - error * slope / (slope * slope - error * bend)

@@ -27,8 +27,8 @@ def cable_courses(
         cables: Row of the cable_table, (m, CABLE_COLUMNS).
         body: Row of the body_table.
         pose: Pose row.
-        tension: Chord tensions [N], (m,); NaN for none.
-        wraps: Number of points on the pulleys, 0 or at least 2; without pulley all are the frame anchor.
+        tension: Chord tensions [N], (m,); NaN for a cable without a tension.
+        wraps: Number of points on each pulley, 0 or at least 2; if a cable has no pulley, all are at its frame anchor.
         rotation: Work array, (3, 3).
         geometry: Work array, (GEOMETRY_ROWS, m).
         points: Filled, world axes [m], (m, points, 3).
@@ -40,7 +40,7 @@ def cable_courses(
     for i in range(tension.size):
         pulley, material = pulley_at(cables, i), Material(cables[i, tables.DENSITY], cables[i, tables.STIFFNESS])
         chord, tau, weight = Chord(geometry[CHORD, i], geometry[SINE, i], geometry[COSINE, i]), tension[i], 0.0
-        sine, cosine = chord.cosine, pulley.entry * chord.sine  # of the wrap angle of a straight cable
+        sine, cosine = chord.cosine, pulley.entry * chord.sine  # sine and cosine of the wrap angle of a straight cable
         length, horizontal, vertical = 0.0, 0.0, 0.0
         if tau > 0.0:
             weight = material.density * gravity
@@ -68,7 +68,7 @@ def cable_courses(
 
 @glue
 def _write_point(cables: Array, geometry: Array, i: int, x: float, z: float, points: Array, k: int) -> None:
-    """Write a point of a cable's vertical plane, from its frame anchor [m], in world axes."""
+    """Write a point in world axes [m]; its coordinates in a cable's vertical plane are relative to the frame anchor."""
     points[i, k, 0] = cables[i, tables.FRAME_X] + geometry[AZIMUTH_X, i] * x
     points[i, k, 1] = cables[i, tables.FRAME_Y] + geometry[AZIMUTH_Y, i] * x
     points[i, k, 2] = cables[i, tables.FRAME_Z] + z

@@ -1,6 +1,6 @@
-"""Cable on a drum: number of turns as a function of the length off the drum, and strain from the winding.
+"""Cable on a drum: number of turns as a function of the length off the drum, and strain of the wound cable.
 
-Turns are counted from the first groove of the drum, where the cable is fastened. They increase while cable is wound in.
+The number of turns is zero at the first groove, where the cable is fastened, and increases while cable is wound in.
 Layer k lies in the grooves between the turns of layer k - 1, and advances in the opposite direction. docs/model.md,
 section 10.
 """
@@ -15,11 +15,13 @@ from sagline.kernels.jit import entry, formula
 # columns of the table of drums
 PITCH_RADIUS, LAYER_RISE, GROOVE_PITCH, LAYER_TURNS, LAYERS, DISTANCE, OFFSET = range(7)
 DRUM_COLUMNS = 7
-# rows of a drum's memory. Each column is a piece of cable, between its deeper end, wound first, and its upper end.
+# Rows of a drum's memory. Each column is a piece of cable between its deeper end, which was wound first, and its upper
+# end.
 DEEP_LENGTH, DEEP_PATH, DEEP_STRAIN, TOP_STRAIN = range(4)
 MEMORY_ROWS = 4
-STEPS = 60  # limit of Newton steps; a convex function of one variable needs two or three
-SETTLED = 1e-8  # size of the last step, in turns or relative to all turns; the next step would be its square
+STEPS = 60  # largest number of Newton steps; for a convex function of one variable, two or three are sufficient
+# size of the last step, in turns or relative to all turns; the next step would have the square of this size
+SETTLED = 1e-8
 
 
 @formula
@@ -37,7 +39,7 @@ def _turn_length(drum: Array, layer: int) -> float:
 
 @formula
 def _exit_position(drum: Array, layer: int, turns: float) -> tuple[float, float]:
-    """Axial position where the cable leaves the drum, relative to the pulley's middle, and its change per turn."""
+    """Axial position at which the cable leaves the drum, relative to the pulley's middle, and its change per turn."""
     if layer % 2 == 0:
         return drum[OFFSET] + drum[GROOVE_PITCH] * turns, drum[GROOVE_PITCH]
     return drum[OFFSET] + drum[GROOVE_PITCH] * (drum[LAYER_TURNS] - turns), -drum[GROOVE_PITCH]
@@ -45,7 +47,7 @@ def _exit_position(drum: Array, layer: int, turns: float) -> tuple[float, float]
 
 @formula
 def _wound_length(drum: Array, layer: int, turns: float) -> float:
-    """Decrease of the length off the drum [m] due to the first turns of a layer; convex and increasing."""
+    """Cable length [m] that the first turns of a layer take up; a convex and increasing function of the turns."""
     first, _ = _exit_position(drum, layer, 0.0)
     place, _ = _exit_position(drum, layer, turns)
     distance = drum[DISTANCE]
@@ -54,13 +56,13 @@ def _wound_length(drum: Array, layer: int, turns: float) -> float:
 
 @entry
 def turns_of_lengths(drums: Array, starts: Array, length: Array, turns_out: Array, travel_out: Array) -> None:
-    """Turns on each drum, and its travel in a turn [m], at lengths off the drum.
+    """Turns on each drum, and change of length per turn [m], at given lengths off the drum.
 
     Turns are negative beyond the empty drum, and exceed the drum's capacity beyond its last layer.
 
     Args:
         drums: Table, (m, DRUM_COLUMNS).
-        starts: Length off the drum where each layer begins, (m, layers + 1): falling.
+        starts: Length off the drum at which each layer begins, in decreasing order, (m, layers + 1).
         length: Lengths at the winding tension [m], (N, m).
         turns_out: (N, m).
         travel_out: [m], (N, m).
@@ -110,7 +112,7 @@ def follow_memory(
     """Conversion between unstrained lengths off the drum and lengths along the path of winding.
 
     On the drum the cable keeps the strain with which it was wound. This strain is linear between two samples. Cable
-    that was never off the drum has the initial strain. NaN samples are omitted.
+    that was never off the drum has the initial strain. Samples with NaN are omitted.
 
     Args:
         given: Lengths off the drum [m], (N, m): unstrained, or along the path of winding.

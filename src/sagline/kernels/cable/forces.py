@@ -1,7 +1,7 @@
 """Forces of all cables of one pose at their unstrained lengths.
 
 Most calls are for a pose close to the previous pose. Two Halley steps from the previous parameter h therefore solve
-ordinary catenaries. These loops have no branches, so that they vectorize. Cables that have not converged are then
+ordinary catenaries. These loops have no branches, so that they vectorize. The cables that have not converged are then
 solved one by one, without the previous h.
 """
 
@@ -22,8 +22,8 @@ from sagline.kernels.jit import formula, glue
 
 CLOSE = 0.1  # relative first step up to which two Halley steps are accurate
 ORDINARY = 2.0  # largest h at which the polynomials have full precision
-PASSES = 30  # largest number of passes over pulleys; one or two suffice from a nearby pose
-MISSED = 1e-13  # tolerance of the platform end, relative to the cable's length
+PASSES = 30  # largest number of passes for cables over pulleys; from a nearby pose, one or two are sufficient
+MISSED = 1e-13  # largest error of the platform end, relative to the cable's length
 
 
 @formula
@@ -51,7 +51,7 @@ def _halley_step(h: float, xi2: float, zeta2: float, kappa: float, excess: float
 
 @formula
 def _square_share(part: float, length: float) -> float:
-    """The square of part/length."""
+    """The square of the ratio part/length."""
     ratio = part / length
     return ratio * ratio
 
@@ -67,7 +67,7 @@ class _EquivalentCables(NamedTuple):
 
 @glue
 def _two_halley_steps(gravity: float, cables: Array, asked: _EquivalentCables, rows: Array) -> None:
-    """Two Halley steps for every cable from the stored parameter. A loop with one result vectorizes."""
+    """Two Halley steps for every cable from the stored parameter; the loop has one result, so that it vectorizes."""
     m = cables.shape[0]
     for i in range(m):
         rows[g.KAPPA, i] = 0.5 * cables[i, tables.DENSITY] * gravity * asked.length[i] / asked.stiffness[i]
@@ -99,7 +99,8 @@ def forces_from_lengths(model: Model, cables: Array, rows: Array, behind: bool |
     the replacement; docs/model.md, section 10.
 
     cables: rows of the cable_table, (m, CABLE_COLUMNS); rows: as in `sagline.kernels.cable.geometry`, (CABLE_ROWS, m);
-    behind: `Model.behind` as a separate argument; None excludes the code of pulleys from compilation.
+    behind: `Model.behind` as a separate argument: None if no cable has a pulley, so that the code for pulleys is not
+    compiled.
     """
     if behind is None:
         bare = _EquivalentCables(rows[g.SPAN], rows[g.RISE], rows[g.LENGTH], cables[:, tables.STIFFNESS])

@@ -38,9 +38,9 @@ def tangent(radius: float, entry: float, span: float, rise: float) -> tuple[floa
     """Length, sin phi and cos phi of the tangent from a pulley to a point; NaN if no tangent exists.
 
     The pulley is in the cable's vertical plane. Span and rise are measured from the point where the cable enters the
-    pulley. entry is +1 for a cable that enters from below. A point inside the pulley, or past its near side, has no
-    tangent. After half a turn on the pulley the cable is vertical, and its exit is twice the radius away from its
-    entry. The point is then straight below the exit, or above it if the cable enters from above.
+    pulley. entry is +1 for a cable that enters from below. There is no tangent from a point inside the pulley or on its
+    near side. After half a turn on the pulley, the cable is vertical, and exit and entry are two radii apart. The point
+    is then exactly below the exit, or above the exit if the cable enters from above.
     """
     across = span - radius
     along = entry * rise
@@ -56,7 +56,7 @@ def tangent(radius: float, entry: float, span: float, rise: float) -> tuple[floa
 def cable_geometry(cables: Array, body: Array, pose: Array, rotation: Array, geometry: Array) -> None:
     """Fill the geometry rows (GEOMETRY_ROWS, m) of one pose; a vertical cable gets azimuth 0.
 
-    The chord of a cable over a pulley is the tangent from its platform end, NaN if no tangent exists.
+    The chord of a cable over a pulley is the tangent from its platform end to the pulley; NaN if no tangent exists.
     """
     _rotation_matrix(pose, rotation)
     for i in range(cables.shape[0]):
@@ -106,18 +106,18 @@ def cable_geometries(robots: Array, bodies: Array, poses: Array, rotation: Array
 LENGTH = GEOMETRY_ROWS  # unstrained length [m]
 HORIZONTAL, VERTICAL, TENSION = LENGTH + 1, LENGTH + 2, LENGTH + 3  # T_x, T_z, tau [N]
 STATUS = LENGTH + 4  # status of the cable
-# rows of `cable_forces`; PARAMETER is the h of the previous pose, NaN without one
+# rows of `cable_forces`; PARAMETER is the h of the previous pose, or NaN if there is none
 PARAMETER, KAPPA, EXCESS, FIRST, SECOND = LENGTH + 5, LENGTH + 6, LENGTH + 7, LENGTH + 8, LENGTH + 9
 XX, XZ, ZX, ZZ = LENGTH + 10, LENGTH + 11, LENGTH + 12, LENGTH + 13  # in-plane stiffness [N/m]
 SOFT = LENGTH + 14  # EA of the cable that `cable_forces` solves [N]
 # Rows of cables over pulleys. The ASKED rows contain span, rise and length [m] of an equivalent cable without a pulley.
-# The OFF rows contain corrections [m] of span, rise and length, which make the forces of both cables equal. The next
+# The OFF rows contain corrections [m] of span, rise and length, with which both cables have equal forces. The next
 # pose starts with these corrections.
 ASKED_SPAN, ASKED_RISE, ASKED_LENGTH = LENGTH + 15, LENGTH + 16, LENGTH + 17
 OFF_X, OFF_Z, OFF_LENGTH = LENGTH + 18, LENGTH + 19, LENGTH + 20
 FREE_SPAN, FREE_RISE, FREE_LENGTH = LENGTH + 21, LENGTH + 22, LENGTH + 23  # of the free span [m]
 WRAP, WRAP_SINE, WRAP_COSINE = LENGTH + 24, LENGTH + 25, LENGTH + 26  # psi [rad]
 LEAVING, TOTAL = LENGTH + 27, LENGTH + 28  # tension T_A at the exit point, and T_A + T_B [N]
-BEHIND, END_X, END_Z = LENGTH + 29, LENGTH + 30, LENGTH + 31  # length behind the chord; end of the free span [m]
+BEHIND, END_X, END_Z = LENGTH + 29, LENGTH + 30, LENGTH + 31  # length between chord and drum; end of the free span [m]
 ACROSS = LENGTH + 32  # stiffness normal to the plane [N/m]
 CABLE_ROWS = LENGTH + 33

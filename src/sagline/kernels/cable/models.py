@@ -1,4 +1,4 @@
-"""The switch between cable models, and the shallow cable: length from tension, and tension from length.
+"""Selection of the cable model, and the shallow cable: length from tension, and tension from length.
 
 The shallow cable is a straight line of tension tau plus a vertical force b on its platform end; docs/model.md, section
 3. The same equations are used for the parabolic model (b = wD/2, k = g^2/24, stretching tension tau) and the empirical
@@ -24,7 +24,7 @@ STEPS = 60
 
 @kernel
 def stretching_tension(tension: float, sine: float, cosine: float, sag_force: float) -> float:
-    """Magnitude of the force on the platform end [N]; the chord tension if the sag force is 0."""
+    """Magnitude of the force on the platform end [N]; if the sag force is 0, this is the chord tension."""
     return math.hypot(tension * cosine, tension * sine + sag_force)
 
 
@@ -32,7 +32,7 @@ def stretching_tension(tension: float, sine: float, cosine: float, sag_force: fl
 def shallow_length_ratio(
     tension: float, sine: float, cosine: float, sag_force: float, sag: float, stiffness: float
 ) -> float:
-    """Ratio L/D. sag is k (rho D cos phi)^2 [N^2]; sag_force is b [N] if the stretching tension includes it, else 0."""
+    """Ratio L/D. sag: k (rho D cos phi)^2 [N^2]; sag_force: b [N] if it is part of the stretching tension, else 0."""
     return (1.0 + sag / (tension * tension)) / (1.0 + stretching_tension(tension, sine, cosine, sag_force) / stiffness)
 
 
@@ -42,8 +42,9 @@ def shallow_tension(
 ) -> tuple[float, bool]:
     """Chord tension of a shallow cable from its length, and True if it was found.
 
-    The first Newton steps use the cubic of the parabolic model and start from above. The other steps use the length of
-    the cable model and stay within a bracket. A cable without sag that is longer than its chord has the tension 0.
+    The first Newton steps use the cubic equation of the parabolic model and start above its root. The other steps use
+    the length of the cable model and stay within two bounds. A cable without sag that is longer than its chord has no
+    tension.
     """
     p = (length - chord) / length * stiffness
     q = stiffness * chord * sag / length
@@ -123,7 +124,7 @@ def from_tension(model: Model, chord: Chord, material: Material, tension: float)
 
 @kernel
 def from_length(model: Model, span: float, rise: float, material: Material, length: float) -> tuple[Force, int]:
-    """Force on the platform end and status of a cable of given length."""
+    """Force on the platform end, and status, of a cable with a given length."""
     if model.code == codes.STRAIGHT:
         return Force(math.nan, math.nan, math.nan), codes.CABLE_NO_TENSION
     weight = material.density * model.gravity

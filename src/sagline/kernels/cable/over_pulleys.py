@@ -1,9 +1,10 @@
-"""Cables over pulleys, of given unstrained lengths, at one pose; docs/model.md, section 10.
+"""Cables over pulleys with given unstrained lengths, at one pose; docs/model.md, section 10.
 
 Each cable is replaced by an equivalent cable without a pulley, which starts where the chord touches the pulley. The
-length behind this point makes the equivalent cable shorter. Its stretch makes the equivalent cable softer. The error of
-the platform end corrects span and rise in the next pass. The next pose starts with these corrections, so that a nearby
-pose needs only one or two passes. Each loop has one result and no branches, so that it vectorizes.
+equivalent cable is shorter by the length between this point and the drum. It is softer, because it also includes the
+stretch of this length. The error of the platform end corrects span and rise in the next pass. The next pose starts with
+these corrections, so that a nearby pose needs only one or two passes. Each loop has one result and no branches, so that
+it vectorizes.
 """
 
 from __future__ import annotations
@@ -56,7 +57,7 @@ def _wrap_at(rows: Array, i: int) -> Wrap:
 
 @glue
 def start_passes(cables: Array, rows: Array) -> None:
-    """Fill the cable lengths behind the chords, and reset corrections if the previous pose left no parameter."""
+    """Fill the cable lengths between chords and drums; reset the corrections of cables without a previous parameter."""
     for i in range(rows.shape[1]):
         rows[g.BEHIND, i] = straight_behind(pulley_at(cables, i), chord_at(rows, i))
     for i in range(rows.shape[1]):
@@ -91,10 +92,10 @@ def fill_equivalent_cables(model: Model, cables: Array, rows: Array) -> None:
 
 @glue
 def update_from_equivalent_cables(model: Model, cables: Array, rows: Array) -> float:
-    """Fill forces and free spans from the equivalent cables; returns the largest error, relative to the length.
+    """Fill forces and free spans from the equivalent cables; returns the largest error, relative to the cable length.
 
-    The error corrects the equivalent cables of the next pass. It is the error of the platform end for the exact cable,
-    and the error of the length for the shallow cables.
+    This error corrects the equivalent cables in the next pass. For the exact cable it is the error of the platform end,
+    and for the shallow cables it is the error of the length.
     """
     if model.code == codes.CATENARY:
         _exit_points_from_forces(model, cables, rows)
@@ -177,7 +178,7 @@ def _end_errors(rows: Array) -> float:
 
 @glue
 def _length_errors(model: Model, cables: Array, rows: Array) -> float:
-    """`_end_errors` for shallow and weightless cables, which leave along the chord; 0 without weight."""
+    """`_end_errors` for shallow and weightless cables, which leave along the chord; 0 for weightless cables."""
     largest = 0.0
     for i in range(rows.shape[1]):
         material, pulley, chord = material_at(cables, i), pulley_at(cables, i), chord_at(rows, i)
@@ -201,22 +202,22 @@ def _length_errors(model: Model, cables: Array, rows: Array) -> float:
 
 @formula
 def _weight_per_length(model: Model, material: Material) -> float:
-    """Weight per length of the cable behind P [N/m]; nonzero for the exact cable only."""
+    """Weight per length [N/m] of the cable between P and the drum; zero except for the exact cable."""
     return material.density * model.gravity if model.code == codes.CATENARY else 0.0
 
 
 @formula
 def behind_at(model: Model, cables: Array, rows: Array, i: int) -> Behind:
-    """Unstrained cable behind P, after `update_from_equivalent_cables`."""
+    """Unstrained cable between P and the drum, after `update_from_equivalent_cables`."""
     return behind_cable(model, material_at(cables, i), pulley_at(cables, i), rows[g.LEAVING, i], _wrap_at(rows, i))
 
 
 @formula
 def end_motion_per_length(model: Model, cables: Array, rows: Array, i: int) -> tuple[float, float, float]:
-    """Motion of the platform end at fixed force: x and z per meter of cable; equivalent cable length per newton of H.
+    """Motion of the platform end at a fixed force: x and z per meter of cable; equivalent cable length per newton of H.
 
-    An increase of H stretches the part behind P. The platform end then moves as if cable were let out. The third value
-    is this length of cable per newton of H.
+    An increase of H stretches the part between P and the drum. The platform end then moves as if cable were paid out.
+    The third value is the length of this cable per newton of H.
     """
     material, pulley, wrap, tension = (
         material_at(cables, i),
@@ -234,7 +235,7 @@ def end_motion_per_length(model: Model, cables: Array, rows: Array, i: int) -> t
 
 @formula
 def stiffness_in_series(model: Model, cables: Array, rows: Array, i: int, plane: PlaneStiffness) -> PlaneStiffness:
-    """In-plane stiffness of a cable: its free span in series with the part behind P."""
+    """In-plane stiffness of a cable: its free span in series with the part between P and the drum."""
     if not rows[g.LEAVING, i] > 0.0:
         return plane
     x, z, gives = end_motion_per_length(model, cables, rows, i)
@@ -260,7 +261,7 @@ def across_pulley(cables: Array, rows: Array, i: int) -> float:
 
 @formula
 def energy_over(model: Model, cables: Array, rows: Array, i: int) -> float:
-    """Energy [J] that the part behind P adds to the energy of the free span."""
+    """Energy [J] that the part between P and the drum adds to the energy of the free span."""
     material, tension = material_at(cables, i), rows[g.LEAVING, i]
     weight, free = _weight_per_length(model, material), rows[g.FREE_LENGTH, i]
     return energy_behind(pulley_at(cables, i), weight, material.stiffness, tension, _wrap_at(rows, i), free)

@@ -18,11 +18,11 @@ from sagline.kernels.algebra.functions import angle
 from sagline.kernels.cable.terms import Chord, Force, Material, Model
 from sagline.kernels.jit import formula, kernel
 
-LEAST_TURNED = -0.8  # limit of the derivative in a Newton step, which would turn the cable too far near -1
+LEAST_TURNED = -0.8  # smallest derivative in a Newton step; a derivative near -1 would turn the cable too far
 
 
 class Pulley(NamedTuple):
-    """Pulley and dead length behind one frame anchor."""
+    """Pulley at one frame anchor, and dead length between pulley and drum."""
 
     radius: float  # R [m]; 0 for an eyelet
     entry: float  # s, +1 if the cable enters from below, -1 if from above
@@ -39,7 +39,7 @@ class Wrap(NamedTuple):
 
 
 class Behind(NamedTuple):
-    """Unstrained lengths [m] of the cable behind P: on the pulley, and between drum and pulley."""
+    """Unstrained lengths [m] of the cable between P and the drum: on the pulley, and between drum and pulley."""
 
     wrapped: float
     dead: float
@@ -112,8 +112,8 @@ def exit_after(
 ) -> tuple[float, float]:
     """Sine and cosine of the wrap angle after one Newton step.
 
-    force: T_x and T_zA of a cable that leaves at the angle before the step. If this angle grows by d, the free span
-    loses the length R d/E_A, and T_zA grows by the weight of this length.
+    force: T_x and T_zA of a cable that leaves at the angle before the step. If the wrap angle grows by d, the free span
+    becomes shorter by R d/E_A, and T_zA grows by the weight of this length.
     """
     horizontal, vertical_a = force
     tension = math.sqrt(horizontal * horizontal + vertical_a * vertical_a)
@@ -129,7 +129,7 @@ def exit_after(
 
 @formula
 def straight_behind(pulley: Pulley, chord: Chord) -> float:
-    """Length of an unstrained cable behind the point where the chord touches the pulley [m]."""
+    """Length of an unstrained cable [m] between the drum and the point where the chord touches the pulley."""
     return pulley.radius * angle(chord.cosine, pulley.entry * chord.sine) + pulley.dead
 
 
@@ -151,7 +151,7 @@ def _strains(
 
 @formula
 def behind(pulley: Pulley, weight: float, stiffness: float, tension: float, wrap: Wrap) -> Behind:
-    """Unstrained lengths on the pulley and behind it, from the tension at P; weight: weight per length [N/m]."""
+    """Unstrained lengths on the pulley and between drum and pulley, from the tension at P; weight: per length [N/m]."""
     strained, first, last = _strains(pulley, weight, stiffness, tension, wrap.sine)
     beta = weight * pulley.radius / stiffness
     falls = pulley.entry * beta * (1.0 - wrap.cosine - wrap.angle * wrap.sine)
@@ -161,7 +161,7 @@ def behind(pulley: Pulley, weight: float, stiffness: float, tension: float, wrap
 
 @formula
 def behind_cable(model: Model, material: Material, pulley: Pulley, tension: float, wrap: Wrap) -> Behind:
-    """`behind` for any model: only the exact cable has weight behind P, and the straight cable does not stretch."""
+    """`behind` for any model: only the exact cable has weight beyond P, and the straight cable does not stretch."""
     if model.code == codes.STRAIGHT:
         return Behind(pulley.radius * wrap.angle, pulley.dead)
     weight = material.density * model.gravity if model.code == codes.CATENARY else 0.0
@@ -170,7 +170,7 @@ def behind_cable(model: Model, material: Material, pulley: Pulley, tension: floa
 
 @formula
 def softness(pulley: Pulley, weight: float, stiffness: float, tension: float, wrap: Wrap) -> float:
-    """Compliance S [m/N]: unstrained length that the part behind P releases per newton of H. It moves P by E_A^2 S."""
+    """Compliance S [m/N]: unstrained length that the part beyond P releases per newton of H; P moves by E_A^2 S."""
     strained, first, last = _strains(pulley, weight, stiffness, tension, wrap.sine)
     on_pulley = pulley.radius * wrap.angle / (strained * strained * strained)
     return (on_pulley + 2.0 * pulley.dead / ((first + last) * first * last)) / stiffness
@@ -178,7 +178,7 @@ def softness(pulley: Pulley, weight: float, stiffness: float, tension: float, wr
 
 @formula
 def energy_behind(pulley: Pulley, weight: float, stiffness: float, tension: float, wrap: Wrap, free: float) -> float:
-    """Energy [J] of the part behind P, plus the energy to lift the free span (unstrained length `free`) from A to P."""
+    """Energy [J] of the part beyond P, and the energy to lift the free span (unstrained length `free`) from A to P."""
     radius, entry, dead, _rise = pulley
     strained, entering, drawn = _strains(pulley, weight, stiffness, tension, wrap.sine)
     first, last = entering - 1.0, drawn - 1.0
@@ -200,7 +200,7 @@ def energy_behind(pulley: Pulley, weight: float, stiffness: float, tension: floa
 def _length_behind_by(
     pulley: Pulley, weight: float, stiffness: float, force: Force, free: float, change: Change, grown: float
 ) -> tuple[float, float]:
-    """Changes of psi and of the unstrained length behind P at a fixed force on the platform end.
+    """Changes of psi and of the unstrained length beyond P at a fixed force on the platform end.
 
     weight: weight per length [N/m]; stiffness: EA [N]; free: unstrained length of the free span [m]; change: changes of
     the parameters (the length has no effect here); grown: increase of the free span's unstrained length.
@@ -247,7 +247,7 @@ def end_by(
     more = _length_behind_by(pulley, weight, material.stiffness, force, free, change, 1.0)[1] - still
     grown = (change.length - still) / (1.0 + more)
     turned = _length_behind_by(pulley, weight, material.stiffness, force, free, change, grown)[0]
-    # the free span grows at P, where its stretch is E_A, and P moves along the tangent
+    # cable is added to the free span at P, where its stretch is E_A, and P moves along the tangent
     feed = strained * grown + pulley.radius * turned
     softer = -free * change.stiffness / (material.stiffness * material.stiffness)
     x = softer * force.horizontal + by_weight.x * change.weight

@@ -1,4 +1,4 @@
-"""Sag forces T_z - tau sin phi of the cables of one pose as curves over their chord tensions.
+"""Sag forces T_z - tau sin phi of the cables of one pose, as functions of their chord tensions.
 
 If the platform end of a cable is below its frame end, its sag force is not monotone in the tension. The sag force falls
 while the sag is deep, rises while the sag becomes shallow, and falls again because of the stretch. On a range of
@@ -23,8 +23,8 @@ from sagline.kernels.memory import Memory, block
 SLOPE_STEP = 1e-4  # relative step of the central difference of the sag force
 SHRINKINGS = 30
 TURN_ERROR = 1e-10  # bound of the error of the sag force at an extremum, relative to half the cable's weight
-SHRINKS = 0.9  # largest ratio of a section to the section before it; the search ends above it
-SMALLEST_GAIN = 1e-15  # smallest gain relative to the terms of the sum
+SHRINKS = 0.9  # the search ends if the ratio of a section to the section before it is larger
+SMALLEST_GAIN = 1e-15  # relative to the terms of the sum; the search ends if the decrease of the bound is smaller
 
 # Rows of the extrema of the cables' sag forces, (TURN_ROWS, m); NaN if a cable has no such extremum.
 LEAST_TENSION, LEAST_SAG_FORCE, MOST_TENSION, MOST_SAG_FORCE = 0, 1, 2, 3
@@ -32,7 +32,7 @@ TURN_ROWS = 4
 
 
 class Curves(NamedTuple):
-    """The cables of one pose as curves of sag force over chord tension."""
+    """The cables of one pose, whose sag forces are functions of their chord tensions."""
 
     model: Model  # cable model
     cables: Cables  # the cables; their tensions and sag forces are overwritten
@@ -51,7 +51,7 @@ class Section(NamedTuple):
 
 @glue
 def new_curves(model: Model, cables: Cables, statuses: Codes, memory: Memory) -> tuple[Curves, Memory]:
-    """Work arrays for the curves of cables in place, and the remaining memory."""
+    """Work arrays for the curves of the cables of a pose, and the remaining memory."""
     turns, memory = block(memory, TURN_ROWS, cables.low.size)
     return Curves(model, cables, turns, statuses), memory
 
@@ -69,7 +69,7 @@ def sag_forces_at(curves: Curves, tau: Array, sag_force: Array) -> None:
     for i in range(tau.size if change > SAME_EXIT else 0):
         curves.statuses[i] = codes.CABLE_NOT_CONVERGED
     for i in range(tau.size):
-        if curves.model.code != codes.CATENARY:  # the same at every tension, including zero
+        if curves.model.code != codes.CATENARY:  # the sag force is the same at every tension, including zero
             curves.cables.sag_force[i] = shallow_sag_force(
                 curves.model, curves.cables.chord[i], curves.cables.density[i]
             )
@@ -128,10 +128,10 @@ def sag_force_range(curves: Curves, i: int, section: Section) -> tuple[float, fl
 
 @kernel
 def most_along(curves: Curves, i: int, section: Section, along: float, hanging: float) -> float:
-    """Upper bound of along * tau - b * sag_force(tau) on a section [N]; exact if an end of the section is optimal.
+    """Upper bound of along * tau - b * sag_force(tau) on a section [N]; exact if the maximum is at an end.
 
-    The value at one end and the range of the sag force limit the distance to a better tension. The section is shortened
-    to this distance. This step is repeated.
+    From the value at one end and the range of the sag force follows the largest distance to a better tension. The
+    section is shortened to this distance, and the step is repeated.
 
     section: range of chord tensions, whose upper end may be infinite; along, b: factors of chord tension and sag force.
     """
@@ -166,11 +166,11 @@ GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 # and at the tension sqrt(EA wD |sin phi|/6). In 200,000 random cables with X <= 1 and e <= 0.01, the exact extrema were
 # at 0.28 to 1.03 times this X and at 0.58 to 1.0 times this tension.
 START_OF_LEAST, START_OF_MOST = 1.25, 0.9
-# Limit for the growth of the sag force at its first-order peak, relative to the sum of its terms. The growth changes
-# by a smaller share between this peak and the exact peak in all random cables of the tests. Below minus this limit the
-# growth is negative everywhere; otherwise golden sections search the exact peak.
+# Limit of the growth of the sag force at its first-order peak, relative to the sum of its terms. In all random cables
+# of the tests, the growth changes by a smaller share from this peak to the exact peak. If the growth is below minus
+# this limit, it is negative everywhere; otherwise golden sections search the exact peak.
 FALLS_FOR_SURE = 0.3
-FIRST_ORDER = 1.0  # largest X at which the first order is used; the first-order peak of a steep cable has a larger X
+FIRST_ORDER = 1.0  # largest X at which the first order is used; a steep cable has its first-order peak at a larger X
 
 # Rows of the work array.
 A, B, AT_A, AT_B, TENSION, GROWTH, RISEN, LAST = 0, 1, 2, 3, 4, 5, 6, 7
@@ -179,7 +179,7 @@ ROWS = 8
 
 @kernel
 def _growths(curves: Curves, tau: Array, growth: Array) -> None:
-    """Fill the growth of the sag forces (m,): derivatives with respect to the logarithm of the chord tension [N]."""
+    """Fill the growth of the sag forces (m,) [N]: derivatives with respect to the logarithm of the chord tension."""
     cables = curves.cables
     for i in range(tau.size):
         cables.last_sag_force[i] = tau[i] * (1.0 + SLOPE_STEP)
@@ -193,7 +193,7 @@ def _growths(curves: Curves, tau: Array, growth: Array) -> None:
 
 @formula
 def _growth_of(curves: Curves, i: int, tau: float) -> float:
-    """Growth of the sag force of cable i: derivative with respect to the logarithm of its chord tension [N]."""
+    """Growth of the sag force of cable i [N]: derivative with respect to the logarithm of its chord tension."""
     above, below = sag_force_at(curves, i, tau * (1.0 + SLOPE_STEP)), sag_force_at(curves, i, tau * (1.0 - SLOPE_STEP))
     return (above - below) / (2.0 * SLOPE_STEP)
 
@@ -235,7 +235,7 @@ def _rising_tension_between(curves: Curves, i: int, low: float, high: float) -> 
 
 @glue
 def _find_rises(curves: Curves, work: Array) -> None:
-    """Fill RISEN with a tension between A and B at which the sag force of the cable rises; NaN if it never rises."""
+    """Fill row RISEN with a tension between A and B at which the sag force of a cable rises; NaN if it never rises."""
     cables = curves.cables
     for i in range(work.shape[1]):
         best = 1.5 * cables.half_weight[i] * cables.cosine[i] * cables.cosine[i] / abs(cables.sine[i])
@@ -269,8 +269,8 @@ def _find_extremum(curves: Curves, rising: bool, work: Array, tensions: Array, s
     The steps start at TENSION and stay within the remaining range from A to B. The first step uses the first-order
     slope. Each later step uses the slope between the last two points.
 
-    rising: True if the sag forces rise at A and fall at B, False for the opposite; tensions: (m,), NaN for cables to
-    skip, filled; sag forces: (m,), filled.
+    rising: True if the sag forces rise at A and fall at B, False for the opposite; tensions: filled, (m,), but NaN
+    stays for cables to skip; sag forces: filled, (m,).
     """
     m = tensions.size
     for step in range(STEPS):

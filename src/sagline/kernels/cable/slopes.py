@@ -39,7 +39,7 @@ class _MachineSlopes(NamedTuple):
 
 @formula
 def force_change(plane: PlaneStiffness, end: PlaneVector) -> PlaneVector:
-    """Change of force if the platform end cannot move: minus stiffness times the prevented motion."""
+    """Change of the force if the platform end cannot move: minus the stiffness times the motion that it would make."""
     return PlaneVector(-(plane.xx * end.x + plane.xz * end.z), -(plane.zx * end.x + plane.zz * end.z))
 
 
@@ -146,7 +146,7 @@ def slopes_over(
     if weight > 0.0:
         x, z = _catenary_by_weight(force.horizontal, force.vertical, free, weight, material.stiffness)
         by_weight = EndMotion(x, z)
-    if force.horizontal == 0.0 and force.vertical == weight * free:  # no force at P
+    if force.horizontal == 0.0 and force.vertical == weight * free:  # there is no force at P
         none = PlaneVector(0.0, 0.0)
         return _ForceSlopes(none, none, none), _MachineSlopes(none, none)
     heavier = model.gravity if weight > 0.0 else 0.0

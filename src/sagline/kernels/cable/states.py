@@ -1,4 +1,4 @@
-"""All cables of one pose: length ratios and sag forces at chord tensions, limits of tensions, lengths off drums."""
+"""All cables of one pose: length ratios and sag forces at chord tensions, and lengths off the drums."""
 
 from __future__ import annotations
 
@@ -26,21 +26,22 @@ from sagline.kernels.jit import entry, glue, kernel
 # is then 3e-8 at X = 2 and 5e-15 at X = 0.01. The error is proportional to the square of the change, so that converged
 # iterations have full precision.
 NEAR = 1e-3
-CONTACTS = 40  # largest number of passes for the exit point; a taut cable needs three
-SAME_EXIT = 1e-9  # largest change of the exit direction that counts as converged; the error is its square
+CONTACTS = 40  # largest number of passes for the exit point; for a taut cable, three are sufficient
+SAME_EXIT = 1e-9  # largest change of the exit direction that counts as converged; the remaining error is its square
 LIMIT_STEPS = 30
 LIMIT_PRECISION = 1e-13  # relative
-LIMIT_MISS = 1e-6  # relative; larger than the remaining error of a slack cable after all passes
-SECANT = 1e-6  # smallest relative step of a secant; the slope of a shorter one is mostly rounding
-TAUT = 1.25  # chord tension in units of wD/2, larger than the one with the least frame-end tension
+LIMIT_MISS = 1e-6  # relative tolerance, larger than the remaining error of a slack cable after all passes
+SECANT = 1e-6  # smallest relative step of a secant; the slope of a shorter secant is mostly rounding error
+TAUT = 1.25  # chord tension in units of wD/2 that is larger than the chord tension with the least frame-end tension
 
 
 @glue
 def _fill_exit_points(model: Model, cables: Cables, fresh: bool) -> float:
     """Fill the free spans and their tensions; the forces at the pulleys determine the exit points.
 
-    The forces follow from the last lengths and sag forces at the present chord tensions; without them (fresh) they are
-    first-order values. Cables of the shallow models leave along their chord. Returns the largest change of a direction.
+    The forces follow from the last lengths and sag forces at the present chord tensions; if these do not exist yet
+    (fresh), first-order values are used. Cables of the shallow models leave along their chord. Returns the largest
+    change of a direction.
     """
     exact = model.code == codes.CATENARY
     change = 0.0
@@ -161,7 +162,8 @@ def frame_end_tension(model: Model, chord: Chord, material: Material, pulley: Pu
 def chord_tension_at_frame_end(model: Model, chord: Chord, material: Material, pulley: Pulley, tension: float) -> float:
     """Chord tension at which the tension at the frame end has a given value, on the taut side.
 
-    If the frame-end tension is always larger, the result is the chord tension with its least value for a parabola.
+    If every frame-end tension is larger, the result is the chord tension at which a parabola has its least frame-end
+    tension.
     """
     loosest = 0.5 * material.density * model.gravity * chord.length * chord.sine
     return taut_at_frame_end(model, chord, material, pulley, tension, max(loosest, 0.0))
@@ -201,7 +203,7 @@ def taut_at_frame_end(
 
 
 class _CableAtTension(NamedTuple):
-    """Cable fixed at a pose: length off the drum [m], sag force [N], tension at the frame end [N]."""
+    """State of a cable at a pose: length off the drum [m], sag force [N], tension at the frame end [N]."""
 
     length: float
     sag_force: float
@@ -210,13 +212,14 @@ class _CableAtTension(NamedTuple):
 
 @kernel
 def hold_cable(model: Model, chord: Chord, material: Material, pulley: Pulley, tau: float) -> _CableAtTension:
-    """A cable at a chord tension, including the cable on its pulley and behind it; sag force: T_z - tau sin phi."""
+    """State of a cable at a chord tension, including the cable on its pulley and the dead length."""
     weightless = model.code == codes.STRAIGHT or model.code == codes.ELASTIC
     weight = 0.0 if weightless else material.density * model.gravity
     length, sag_force, _status = solve_cable_state(model, chord, material, pulley, tau)
     horizontal, vertical = tau * chord.cosine, tau * chord.sine + sag_force - weight * length
     tension = math.sqrt(horizontal * horizontal + vertical * vertical)
-    # with the shallow models, a cable leaves along its chord; its tension behind the chord is the chord tension
+    # with the shallow models, a cable leaves along its chord, and its tension between chord and drum is the chord
+    # tension
     sine, cosine, there = chord.cosine, pulley.entry * chord.sine, tau
     if model.code == codes.CATENARY:
         there = tension
@@ -245,8 +248,9 @@ def lengths_at_frame_ends(
         body: Row of the body_table.
         pose: Pose row.
         tension: Tensions at the frame ends [N], (m,).
-        tension_out: Tensions at these lengths [N], (m,). A given tension below the least possible one is replaced.
-        length_out: (m,).
+        tension_out: Filled with the frame-end tensions at these lengths [N], (m,). They differ from given tensions that
+            are below the least possible tension.
+        length_out: Filled with the lengths off the drums [m], (m,).
         rotation: Work array, (3, 3).
         geometry: Work array, (GEOMETRY_ROWS, m).
     """

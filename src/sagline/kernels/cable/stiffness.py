@@ -42,7 +42,7 @@ def force_of(rows: Array, i: int) -> Force:
 def series_excess(
     horizontal: float, vertical_a: float, vertical: float, tension_a: float, tension_b: float, weight_length: float
 ) -> float:
-    """atanh(u)/u - 1 of P1; infinite for a fold."""
+    """Value of atanh(u)/u - 1 of P1; infinite for a folded cable."""
     u = weight_length / (tension_a + tension_b)
     if u <= 0.5:
         return atanhc_excess(u)
@@ -66,7 +66,7 @@ def catenary_stiffness(
     excess = series_excess(horizontal, vertical_a, vertical, tension_a, tension_b, weight * length)
     stretch = 1.0 / stiffness
     turn = 1.0 / (tension_a + tension_b)
-    if product == 0.0:  # an end without force
+    if product == 0.0:  # the force at one end is zero
         return PlaneStiffness(0.0, 0.0, 0.0, 1.0 / (length * (stretch + turn)))
     c = horizontal * (vertical_a + vertical) / product
     level = (square - vertical_a * vertical) / product
@@ -77,7 +77,7 @@ def catenary_stiffness(
         p = 1.0 - level
         q = c * c / p
     zz = stretch + turn * q
-    if excess == math.inf:  # a fold does not resist small sideways motions
+    if excess == math.inf:  # a folded cable does not resist small sideways motions
         return PlaneStiffness(0.0, 0.0, 0.0, 1.0 / (length * zz))
     xx = stretch + turn * (2.0 * excess + p)
     determinant = stretch * (stretch + 2.0 * turn * (1.0 + excess)) + 2.0 * turn * turn * q * excess
@@ -108,7 +108,8 @@ def shallow_slopes(
 ) -> _ShallowSlopes:
     """Derivatives of tau of a shallow cable with respect to chord and cable data.
 
-    They follow from L (1 + s/EA) = D (1 + S/tau^2) with S = k (rho x_B)^2 and s = |T| (empirical) or tau (parabolic).
+    The derivatives follow from L (1 + s/EA) = D (1 + S/tau^2) with S = k (rho x_B)^2 and s = |T| (empirical) or tau
+    (parabolic).
     """
     chord = math.sqrt(span * span + rise * rise)
     cosine = span / chord
@@ -196,7 +197,7 @@ def plane_of(rows: Array, i: int) -> PlaneStiffness:
 
 @formula
 def catenary_energy(span: float, rise: float, length: float, force: Force, weight: float, stiffness: float) -> float:
-    """Energy of strain and weight V = T.B - C(T) [J] of the exact cable, with the frame end at height 0."""
+    """Energy V = T.B - C(T) [J] of strain and weight of the exact cable; the frame end has height 0."""
     horizontal, vertical, _ = force
     weight_length = weight * length
     vertical_a = vertical - weight_length
@@ -220,7 +221,7 @@ def elastic_energy(chord: float, length: float, tension: float, stiffness: float
 
 @formula
 def _cable_energy(model: Model, span: float, rise: float, material: Material, length: float, force: Force) -> float:
-    """Energy [J] of a cable of the exact or the weightless model; NaN for the others."""
+    """Energy [J] of a cable with the exact or a weightless model; NaN for other models."""
     weight = material.density * model.gravity
     if model.code == codes.CATENARY and weight > 0.0:
         return catenary_energy(span, rise, length, force, weight, material.stiffness)
@@ -234,7 +235,8 @@ def energy_of_cables(model: Model, cables: Array, rows: Array, behind: bool | No
     """Energy [J] of all cables of a pose, and the sum of the magnitudes of its terms.
 
     cables: rows of the cable_table, (m, CABLE_COLUMNS); rows: as in `sagline.kernels.cable.geometry`, (CABLE_ROWS, m),
-    after `cable_forces`; behind: `Model.behind` as a separate argument; None excludes code of pulleys.
+    after `cable_forces`; behind: `Model.behind` as a separate argument: None if no cable has a pulley, so that the code
+    for pulleys is not compiled.
     """
     x = g.SPAN if behind is None else g.FREE_SPAN
     z = g.RISE if behind is None else g.FREE_RISE

@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 from sagline.kernels.jit import glue
 
-Terms = tuple[int, float, float, float]  # a Model as passed from Python: numba identifies plain tuples faster
+# a Model as Python passes it: a plain tuple, whose type numba identifies faster
+Terms = tuple[int, float, float, float]
 
 
 class Model(NamedTuple):
@@ -19,14 +20,13 @@ class Model(NamedTuple):
     k_h: float  # the empirical model's constant of the sag force
     k_p: float  # the empirical model's constant of the sag
     gravity: float  # [m/s^2]
-    # True if cables of given lengths may have pulleys or dead lengths; None excludes the code of pulleys from
-    # compilation
+    # True if cables with given lengths may have pulleys or dead lengths; if None, the code for pulleys is not compiled
     behind: bool | None = None
 
 
 @glue
 def model_of(terms: Terms) -> Model:
-    """`Model` from the plain tuple that Python passes."""
+    """Convert the plain tuple from Python to a `Model`."""
     return Model(terms[0], terms[1], terms[2], terms[3], None)
 
 

@@ -1,4 +1,4 @@
-"""Derivatives of the readings of one pose: direct effect of every unknown, and effect of the platform motion."""
+"""Derivatives of the readings of one pose: direct effect of every unknown, and its effect through platform motion."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def in_axes(axes: Array, vector: Triple) -> Triple:
 
 @formula
 def opposite(vector: Triple) -> Triple:
-    """Negative of a vector."""
+    """The vector in the opposite direction."""
     return -vector[0], -vector[1], -vector[2]
 
 
@@ -88,7 +88,7 @@ def fill_length(space: CalibrationArrays, i: int, force: Triple, moment: Triple,
 
 @glue
 def add_motion(space: CalibrationArrays, slopes: Slopes) -> None:
-    """Add to the columns the changes of the readings when wrench changes move the platform."""
+    """Add to the columns the changes of the readings due to the platform motion that wrench changes cause."""
     for j in range(slopes.work.shape[0]):
         for k in range(6):
             share = space.moved[j, k]
@@ -98,7 +98,7 @@ def add_motion(space: CalibrationArrays, slopes: Slopes) -> None:
 
 @glue
 def fill_motion(free: Array, space: CalibrationArrays, slopes: Slopes, motion: Array) -> None:
-    """Fill the platform motions: one row per cable length, the last row per unit of the first unknown."""
+    """Fill the platform motions: one row per meter of each cable, and a last row per unit of the first unknown."""
     m = space.by_wrench.shape[0]
     for k in range(6):
         space.six[k] = slopes.wrench[k, 0]
@@ -133,7 +133,7 @@ def _force_by_motion(ends: Array, i: int, vector: Triple) -> Triple:
 
 @formula
 def _tension_by_motion(ends: Array, i: int, shares: Array) -> Triple:
-    """Change of the frame-end tension due to a motion of the platform end at equal height: K^T times the slopes."""
+    """Change of the frame-end tension due to a horizontal motion of the platform end: K^T times the slopes."""
     x, y, z = shares[i, 0], shares[i, 1], shares[i, 2]
     return (
         ends[i, 0] * x + ends[i, 3] * y + ends[i, 6] * z,
@@ -150,7 +150,7 @@ def _tension_by_force(shares: Array, i: int, force: Triple) -> float:
 
 @formula
 def _in_world_axes(rows: Array, i: int, pair: PlaneVector) -> Triple:
-    """A vector of a cable's plane in world axes."""
+    """Convert a vector in a cable's plane to world axes."""
     return pair.x * rows[g.AZIMUTH_X, i], pair.x * rows[g.AZIMUTH_Y, i], pair.z
 
 
@@ -205,7 +205,7 @@ def fill_ends(model: Model, cables: Array, space: CalibrationArrays) -> None:
 
 @glue
 def fill_readings_by_wrench(sensing: Sensing, free: Array, m: int, reach: Triple, space: CalibrationArrays) -> None:
-    """Fill the change of every reading when a unit wrench moves the platform; requires the factored stiffness."""
+    """Fill the change of every reading due to the motion under a unit wrench; requires the factored stiffness."""
     for j in range(space.moved.shape[0]):
         six = space.six
         if j < m:
@@ -273,7 +273,7 @@ def fill_cable(
 
 @formula
 def _free_displacement(free: Array, vector: Triple) -> Triple:
-    """Part of a displacement along the platform's free motions."""
+    """The part of a displacement that the platform's free motions allow."""
     x, y, z = 0.0, 0.0, 0.0
     for k in range(free.shape[0]):
         if not is_rotation(free, k):
@@ -288,7 +288,7 @@ def _fill_center(
 ) -> None:
     """Add to the columns the effect of a shift of the center of mass, the reference point of platform motion.
 
-    Only the part along free motions is added, because a planar platform stays in its plane.
+    Only the part that the free motions allow is added, because a planar platform stays in its plane.
     """
     m = cables.shape[0]
     at, scale = sought.where[kinds.CENTER + axis, 0], sought.scale[kinds.CENTER + axis, 0]

@@ -1,6 +1,6 @@
-"""Rows of the table of unknowns (KIND_ROWS, m): index of the unknown for each robot parameter, -1 if known.
+"""Rows of the table of unknowns (KIND_ROWS, m): for each robot parameter, the index of its unknown, or -1 if known.
 
-Rows for the platform or the measuring system use the column of the first cable.
+Rows for the platform or the measuring system use only the column of the first cable.
 """
 
 from __future__ import annotations

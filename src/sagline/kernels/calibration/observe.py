@@ -1,7 +1,7 @@
 """Whitened residuals and derivatives of readings at equilibria; docs/model.md, section 14.
 
-The true lengths at every pose are also unknown. They are eliminated pose by pose: errors of the measured lengths count
-as noise of the residual, whose covariance is then diag(sigma^2) + sigma_L^2 A A^T.
+The true lengths at every pose are also unknown. They are eliminated pose by pose: the errors of the measured lengths
+are treated as noise of the residual. The covariance of the residual is then diag(sigma^2) + sigma_L^2 A A^T.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ from sagline.kernels.memory import Memory
 
 @glue
 def whiten(sensing: Sensing, residual: Array, space: CalibrationArrays, work: Array) -> None:
-    """Omit missing readings and fill W, with W^T W the inverse of the covariance."""
+    """Omit missing readings, and fill W so that W^T W is the inverse of the covariance."""
     readings, m = work.shape[0], residual.size - BESIDE
     for j in range(residual.size):
         if not (abs(residual[j]) < math.inf and space.deviation[j] < math.inf):
@@ -112,7 +112,7 @@ def store_linearization(
 
 @formula
 def _rotation_between(reading_arrays: Array, pose: Array, frame: Array) -> Triple:
-    """Rotation vector from the predicted to the measured rotation of the platform, in the measuring system's axes."""
+    """Rotation vector between predicted and measured rotation of the platform, in the measuring system's axes."""
     # predicted rotation reading: conj(frame) * pose
     fx, fy, fz, fw = -frame[3], -frame[4], -frame[5], frame[6]
     ax = fw * pose[3] + fx * pose[6] + fy * pose[5] - fz * pose[4]
@@ -166,7 +166,7 @@ def observe(
     memory: tuple[Array, Indices],
     found: LinearizationArrays,
 ) -> None:
-    """Residuals and derivatives at N equilibria; NaN for equilibria that are not stable.
+    """Residuals and derivatives at N equilibria; NaN at unstable equilibria.
 
     Args:
         model: Cable model as in `forward_poses`: the exact or the weightless one.
@@ -175,7 +175,7 @@ def observe(
         reading_arrays: `PoseReadings`.
         unknown_arrays: `Unknowns`.
         memory: `memory_for` the number of cables.
-        found: `Linearization`, filled.
+        found: `Linearization`, which is filled.
     """
     batch, sensors, readings = ForwardSamples(*given), Sensing(*sensing), PoseReadings(*reading_arrays)
     sought, answer = Unknowns(*unknown_arrays), Linearization(*found)

@@ -16,8 +16,8 @@ from sagline.kernels.cable.terms import Chord, Material, Terms, model_of
 from sagline.kernels.jit import entry
 from sagline.kernels.memory import Memory, block, vector
 
-ITERATIONS = 3  # iterations of balancing, few because the sag forces depend weakly on the tensions
-LEAST = 0.2  # smallest ratio of a corrected tension to the measured one
+ITERATIONS = 3  # iterations of balancing; a few are sufficient, because the sag forces depend weakly on the tensions
+LEAST = 0.2  # smallest ratio of a corrected tension to its measured value
 
 
 @entry

@@ -30,7 +30,7 @@ class _FrameEndSlopes(NamedTuple):
 
 @formula
 def frame_end_slopes(model: Model, cables: Array, rows: Array, i: int) -> _FrameEndSlopes:
-    """Slopes of cable i, whose forces must be known; zero without a force at the frame end."""
+    """Slopes of cable i, whose forces must be known; zero if the force at the frame end is zero."""
     material = material_at(cables, i)
     gravity = model.gravity if model.code == codes.CATENARY else 0.0
     weight = material.density * gravity

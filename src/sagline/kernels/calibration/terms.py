@@ -43,7 +43,7 @@ class Unknowns(NamedTuple):
     """The P unknowns."""
 
     where: Indices  # index of the unknown for each row of `kinds`, (KIND_ROWS, m), -1 if known
-    scale: Array  # derivative of that row with respect to the unknown, (KIND_ROWS, m)
+    scale: Array  # derivative of the parameter of each row with respect to its unknown, (KIND_ROWS, m)
     paid: Array  # derivatives of the measured lengths with respect to zero, drum radius and EA, (3, N, m)
 
 
@@ -57,8 +57,9 @@ class Linearization(NamedTuple):
     misfit: Array  # whitened residuals, (N, R)
     residual: Array  # readings minus predictions at the given lengths [N, m, rad], (N, m + 6); NaN if missing
     back: Array  # change of the true lengths per whitened residual [m], (N, m, R)
-    # motion of the platform about its center of mass [m, rad], world axes, (N, m + 1, 6). The first m rows are per
-    # cable length, the last row is per unit of the first unknown. (0, m + 1, 6) if not requested.
+    # Motions of the platform about its center of mass [m, rad], world axes, (N, m + 1, 6). The first m rows are motions
+    # per meter of each cable; the last row is the motion per unit of the first unknown. The shape is (0, m + 1, 6) if
+    # the caller does not need the motions.
     motion: Array
     work: Array  # work array: slopes of the readings and of the wrench on the platform, (R + 6, P)
 

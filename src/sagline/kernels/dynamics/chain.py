@@ -1,4 +1,4 @@
-"""A cable with mass as a chain: the nodes are fixed material points, and the elements transmit only tension.
+"""A cable with mass as a chain of elements, which transmit only tension, between nodes, which are material points.
 
 docs/model.md, section 11. Node 0 is the platform end, and the last node is the frame end. Nodes are therefore added and
 removed at the end of the arrays. All elements have the same unstrained length, except the element at the frame, which
@@ -31,10 +31,10 @@ EXIT_X, EXIT_Y, EXIT_Z = 0, 1, 2  # exit point of the chain, world axes [m]
 ELEMENT = 3  # unstrained length of an element [m]
 DENSITY, STIFFNESS = 4, 5  # [kg/m], [N]
 LOSS_TIME = 6  # [s]
-AIR_RATE = 7  # force of the air per velocity and mass of the cable [1/s]
+AIR_RATE = 7  # damping force of the air per velocity and mass of the cable [1/s]
 BEHIND, RUN = 8, 9  # cable between drum and exit point: unstrained length, and length of the path [m]
 WIND = 10  # force of the wind per length and square of the speed [N s^2/m^3]
-SMOOTH = 11  # share of a new value in the filtered mean tension that detects a slack cable
+SMOOTH = 11  # weight of a new value in the filtered mean tension, by which a slack cable is detected
 GRAVITY = 12  # [m/s^2]
 REST, RATE = 13, 14  # unstrained length of the element at the frame [m], and rate of cable paid out [m/s]
 STEP = 15  # time step of the damping forces [s]
@@ -46,10 +46,11 @@ TINY = 1e-300
 
 @formula
 def fill_element_forces(place: Array, speed: Array, count: int, row: Array, pulls: Array) -> float:
-    """Fill force/length of every element [N/m]; returns the power lost in the elements [W].
+    """Fill the ratio force/length of every element [N/m]; returns the power lost in the elements [W].
 
-    place: of the nodes [m], (3, nodes): node 0 is at the platform, node count + 1 at the frame; speed: of the nodes
-    [m/s], used if the elements have damping; pulls: filled, then two rows of work, (3 nodes,).
+    place: positions of the nodes [m], (3, nodes), node 0 at the platform and node count + 1 at the frame; speed:
+    velocities of the nodes [m/s], used if the elements have damping; pulls: filled, followed by two work rows, (3
+    nodes,).
     """
     element, stiffness = row[ELEMENT], row[STIFFNESS]
     inverse = 1.0 / element
@@ -68,7 +69,7 @@ def fill_element_forces(place: Array, speed: Array, count: int, row: Array, pull
 
 @formula
 def _strain_at_exit(row: Array, distance: float) -> float:
-    """Strain of the element at the frame and of the cable behind it, which slides freely."""
+    """Strain of the element at the frame, and of the cable between it and the drum, which slides freely."""
     return (distance + row[RUN]) / (row[REST] + row[BEHIND]) - 1.0
 
 
@@ -98,12 +99,12 @@ def _opening_speed(speed: Array, j: int, x: float, y: float, z: float) -> float:
 
 @kernel
 def _add_damping(place: Array, speed: Array, count: int, row: Array, pulls: Array) -> float:
-    """Add the damping force of every taut element; the sum is never a compression; returns the power lost [W].
+    """Add damping forces to taut elements; the sum is never a compression. Returns the power lost [W].
 
     The forces follow from the speeds after the step (implicit Euler), so that damping does not limit the time step.
-    They are the solution of a tridiagonal system, because an element changes the speeds of its two nodes. The platform
-    and the frame node keep their speeds. Elastic forces and weight also act on the other nodes. The power is the value
-    at the mean speed of the step.
+    Each force changes the speeds of the element's two nodes, so that the forces solve a tridiagonal system. The
+    platform and the frame node keep their speeds; elastic forces and weight also act on the other nodes. The power is
+    the power at the mean speed of the step.
     """
     size = place.shape[1]
     viscous = row[STIFFNESS] * row[LOSS_TIME]
@@ -155,7 +156,7 @@ def _add_damping(place: Array, speed: Array, count: int, row: Array, pulls: Arra
 
 @formula
 def fill_frame_node_velocity(place: Array, speed: Array, count: int, row: Array) -> None:
-    """Fill the velocity of the frame node: L' (1 + strain) along the cable."""
+    """Fill the velocity of the frame node, which is L' (1 + strain) along the cable."""
     for c in range(3):
         speed[c, count + 1] = row[RATE] * (place[c, count] - place[c, count + 1]) / row[REST]
 
@@ -181,8 +182,8 @@ def kick_nodes(place: Array, speed: Array, count: int, row: Array, pulls: Array,
 def drift_nodes(place: Array, speed: Array, count: int, row: Array, before: float, h: float) -> None:
     """Move the nodes for h [s]; the node next to the frame keeps its momentum while its mass changes.
 
-    place: of the nodes [m]; speed: of the nodes [m/s]; before: unstrained length of the element at the frame before the
-    motion [m] (row: after it); h: time [s].
+    place: positions of the nodes [m]; speed: their velocities [m/s]; before: unstrained length of the element at the
+    frame before the motion [m]; row: row of the cable, with this length after the motion; h: time [s].
     """
     old, new = row[ELEMENT] + before, row[ELEMENT] + row[REST]
     middle = 0.5 * (old + new)
@@ -246,7 +247,7 @@ def potential(place: Array, count: int, row: Array) -> tuple[float, float]:
 
 @kernel
 def whole_force(place: Array, speed: Array, count: int, row: Array, pulls: Array) -> float:
-    """Energy that the winch loses per unwound length [N]: H = T + T^2/(2 EA) - w z minus kinetic energy per length.
+    """Energy per length paid out [N] that the winch loses: H = T + T^2/(2 EA) - w z minus kinetic energy per length.
 
     The energies of `kinetic` and `potential` change by -H times the rate.
     """
@@ -286,10 +287,10 @@ def mean_tension(pulls: Array, count: int, row: Array) -> float:
 
 @kernel
 def insert_node(place: Array, speed: Array, count: int, row: Array) -> None:
-    """Insert a node in the element at the frame, one element length from its inner end; updates count and rest.
+    """Insert a node in the element at the frame, one element length from its free end; updates count and rest.
 
-    Tension, mass and momentum, including the half element at the frame, do not change. Without cable behind the exit
-    point, position and velocity are linear along the element, and the center of mass does not change.
+    Tension, mass and momentum, including the half element at the frame, do not change. If there is no cable between
+    exit point and drum, position and velocity are linear along the element, and the center of mass does not change.
     """
     rest, rate = row[REST], row[RATE]
     distance, left = _element_distance(place, count), rest - row[ELEMENT]

@@ -1,4 +1,4 @@
-"""Simulation of a platform on chains: arrays, inputs over time, and forces and powers of the steps."""
+"""Simulation of a platform on chains: arrays, time tables of inputs, and forces and powers of the steps."""
 
 from __future__ import annotations
 
@@ -172,7 +172,7 @@ def power_of_given_wrench(run: ChainRun) -> float:
 
 @kernel
 def kick_chains(run: ChainRun, h: float, begins: bool) -> None:
-    """Update the nodes' velocities by forces, wind and air during a time; a step starts in reverse order."""
+    """Update the nodes' velocities by forces, wind and air during a time; at the start of a step, in reverse order."""
     chains, audit = run.chains, run.drives.audit
     blows = run.wind[0] != 0.0 or run.wind[1] != 0.0 or run.wind[2] != 0.0
     for i in range(chains.counts.shape[0]):

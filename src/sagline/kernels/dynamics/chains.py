@@ -1,4 +1,4 @@
-"""Motion of the platform on cables with mass: chains instead of exact catenaries, one force evaluation per step.
+"""Motion of the platform on cables with mass, modeled as chains; the forces are evaluated once per step.
 
 The integrator is the symplectic splitting of `sagline.kernels.dynamics.motion`. Its kicks and drifts also move the
 nodes of the chains. Winches, time tables and audit are as in that module. docs/model.md, section 11.
@@ -51,7 +51,8 @@ from sagline.kernels.jit import entry, glue, kernel
 ENDED = progress.COUNTERS  # additional counter of cables with mass; FAILED: cable that ended the run
 DONE, LONG, SHORT, GROWN = range(4)
 FEWEST = 2  # smallest number of free nodes of a chain
-GROWTH = 0.5  # energy error relative to the energy convertible into motion; phase errors cause smaller energy errors
+# largest energy error, relative to the energy that can become motion; phase errors cause smaller energy errors
+GROWTH = 0.5
 
 
 @glue
@@ -145,7 +146,7 @@ def record_chain_step(run: ChainRun, records: Records, stock: Array) -> None:
 
 @glue
 def _split_step(run: ChainRun, now: float) -> None:
-    """One step from a time on; the stored forces match the state before and after the step."""
+    """One step that starts at a time; the stored forces belong to the state before the step, then after it."""
     h, half, drives, rows, chains = run.step, 0.5 * run.step, run.drives, run.rows, run.chains
     drives.audit[d.SUPPLIED] += half * power_of_given_wrench(run)
     kick_body(run.state, run.inertia, run.force, half)
@@ -191,7 +192,7 @@ def run_chains(
     steps: int,
     every: int,
 ) -> None:
-    """Integrate some steps. A run in several calls gives bitwise the same result as in one call.
+    """Integrate some steps. Several calls give bitwise the same result as one call with all steps.
 
     Args:
         rules: See `Rules`; `stride` is the number of steps per control period of drums.
@@ -203,13 +204,13 @@ def run_chains(
         courses: Time tables of lengths, wrenches and wind velocity, as in `motion.run_massless`.
         kept: As in `motion.run_massless`, with one more counter. The work array has ROOM numbers plus two for each
             column of the table of lengths.
-        chain_arrays: `Chains`, in and out.
-        stock: Initial energies that are convertible into motion, (2,), in and out; NaN before the first call.
-        records: Filled as in `motion.run_massless`, and points of the cables (R, m, points, 3) at equal material steps,
-            starting at the exit point.
-        steps: Largest number of steps; the run ends before if the records are full. With 0 the present state is
+        chain_arrays: `Chains`, with the state before the steps; overwritten with the state after them.
+        stock: Initial energies that can become motion, (2,); NaN before the first call, which fills them.
+        records: Filled as in `motion.run_massless`, and with points of the cables (R, m, points, 3) at equal material
+            steps, starting at the exit point.
+        steps: Largest number of steps; the run ends earlier if the records are full. With 0, only the present state is
             recorded.
-        every: Number of steps per record; the first record is the start.
+        every: Number of steps between records; the first record is the initial state.
     """
     kind, _remembered, stride = rules
     step, gravity, filtering = numbers

@@ -1,9 +1,9 @@
-"""Exact dynamic stiffness of one cable, and the number of its natural frequencies below a given frequency.
+"""Exact dynamic stiffness of one cable, and number of its natural frequencies below a given frequency.
 
 Elements are joined one by one, starting at the frame end; docs/model.md, section 11. The transfer matrix of an element
-solves u' = C f, f' = -mu u about the state of rest, by collocation at eight Gauss points. Normal to the plane of the
-cable, the motion has one equation. In the plane it has two equations. The same code solves both. Without damping the
-numbers are real, with damping complex.
+follows from u' = C f, f' = -mu u about the state of rest, by collocation at eight Gauss points. The motion normal to
+the cable's plane has one component, and the motion in the plane has two; the same code solves both. The numbers are
+real without damping and complex with damping.
 """
 
 from __future__ import annotations
@@ -154,10 +154,11 @@ def transfer(c: Numbers, mu: Any, size: float, d: int, system: Numbers, phi: Num
 OMEGA, SQUARE, DRAG, ACROSS, ALONG = 0, 1, 2, 3, 4
 WAVE_COLUMNS = 5
 ROOM = (5 * STAGES, 20)  # shape of the work array
-MESHES = 8  # number of meshes to try if a joint is near a vibration node of the cable between frame end and joint
-SHORTER = 0.0618034  # relative decrease of the element length per mesh; not a ratio of small integers
-ROUNDING = 2.0**-52  # growth of mu per mesh, because omega may be exactly a held frequency
-CLEAR = 1e-6  # smallest motion of a joint relative to its static motion; below it accuracy is lost
+# largest number of meshes, which are tried one by one if a joint is near a vibration node of the cable up to this joint
+MESHES = 8
+SHORTER = 0.0618034  # relative decrease of the element length from mesh to mesh; not a ratio of small integers
+ROUNDING = 2.0**-52  # growth of mu from mesh to mesh, because omega may be exactly a held frequency
+CLEAR = 1e-6  # smallest motion of a joint, relative to its static motion, with sufficient accuracy
 # columns of a cable's result: in its plane, and normal to it
 XX, XZ, ZZ, YY = 0, 1, 2, 3
 FOUND = 4
@@ -194,7 +195,7 @@ def _first_transfer(phi: Numbers, d: int, give: Numbers, lost: Any, k: Numbers, 
 
 @formula
 def _stiffness_from_transfer(moved: Numbers, d: int, k: Numbers) -> None:
-    """Fill k = force end^-1; moved has the rows of end, then the rows of force."""
+    """Fill k = force end^-1; the rows of moved are the rows of end, followed by the rows of force."""
     if d == 1:
         k[0, 0] = moved[2, 0] / moved[0, 0]
     else:
@@ -260,7 +261,7 @@ def _cable_stiffness_at(
     for number in range(MOST_ELEMENTS + 1):
         size = element_length(string, start, omega, phase)
         last = is_at_end(string, start + size)
-        # at zero frequency the end moves by the integral of C per unit of force
+        # at zero frequency, a unit force moves the end by the integral of C
         fill_flexibility(string, Wave(wave.mu, 1.0, 1.0), start, size, d == 1, c)
         fill_integral(c, size, d, moved)
         for a in range(d):
@@ -296,7 +297,7 @@ def _cable_stiffness_at(
 def dynamic_stiffnesses(
     strings: Array, waves: Numbers, phase: float, room: Numbers, found: Numbers, counts: Indices
 ) -> None:
-    """Dynamic part of the stiffness of N rows of m strings.
+    """Dynamic part of the stiffness of m strings at N poses.
 
     Args:
         strings: (N, m, STRING_COLUMNS).

@@ -1,6 +1,7 @@
-"""Drives: ideal winch, second-order winch, or drum with motor, control loops and friction; cable on the drum.
+"""Drives of winches: ideal, of second order, or a drum with motor, control loops and friction; cable on the drum.
 
-Lengths s are measured along the path of winding, outward; docs/model.md, sections 10 and 11.
+Lengths s are measured along the path of winding, and increase while cable is paid out; docs/model.md, sections 10 and
+11.
 """
 
 from __future__ import annotations
@@ -13,17 +14,17 @@ from sagline.kernels import tables
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.jit import formula, glue, kernel
 
-BIN = 0.005  # length of cable on the drum with one common strain [m]
+BIN = 0.005  # length of a bin [m]: a piece of the cable on the drum that has a single strain
 
 
 @kernel
 def wind_in(layer: Array, place: float, step: float, strain: float, stiffness: float) -> float:
-    """Wind cable of a given strain onto a drum; returns the energy [J] lost when the strain is averaged within a bin.
+    """Wind cable of a given strain onto a drum; returns the energy [J] that is lost because a bin has a single strain.
 
-    The cable in a bin has one strain. Its strained length and its unstrained length are preserved.
+    The strained and the unstrained length of the cable in a bin do not change when its strain is averaged.
 
-    layer: strain in each bin of the cable on the drum, (B,), the last bin without end; place: length let out before
-    [m]; step: length to wind in [m], > 0; stiffness: EA [N].
+    layer: strain in each bin of the cable on the drum, (B,); the last bin has no end; place: length paid out before
+    this step [m]; step: length to wind in [m], > 0; stiffness: EA [N].
     """
     lost = 0.0
     first, last = _bin_of(layer, place - step), _bin_of(layer, place)
@@ -43,10 +44,10 @@ def wind_in(layer: Array, place: float, step: float, strain: float, stiffness: f
 
 @kernel
 def pay_out(layer: Array, place: float, step: float, stiffness: float) -> tuple[float, float]:
-    """Mean strain of the cable that a drum lets out, and the energy [J] lost by averaging.
+    """Mean strain of the cable that a drum pays out, and the energy [J] that is lost by averaging.
 
-    layer: strain in each bin of the cable on the drum, (B,), the last bin without end; place: length let out before
-    [m]; step: length to let out [m], > 0; stiffness: EA [N].
+    layer: strain in each bin of the cable on the drum, (B,); the last bin has no end; place: length paid out before
+    this step [m]; step: length to pay out [m], > 0; stiffness: EA [N].
     """
     first, last = _bin_of(layer, place), _bin_of(layer, place + step)
     if first == last:
@@ -75,7 +76,8 @@ NO, YES, NEW = 0.0, 1.0, 2.0
 # rows of the state of the drives of m cables, (DRIVE_ROWS, m)
 RATE = 0  # dL/dt of the unstrained length [m/s]
 WOUND, SPEED = 1, 2  # length s paid out [m], and its rate [m/s]
-FORCE, INTEGRAL = 3, 4  # force of the motor at the cable, outward; integral part of its controller [N]
+# force of the motor at the cable, positive in the direction of paying out; integral part of its controller [N]
+FORCE, INTEGRAL = 3, 4
 AT_FRAME, WHOLE, AT_DRUM = 5, 6, 7  # frame-end tension including damping; H and drum tension without damping [N]
 STRETCHING = 8  # damping part of H [N]
 FILTERED = 9  # frame-end tension after the load cell's filter [N]
@@ -88,7 +90,7 @@ DRIVE_ROWS = 19
 
 # rows of the parameters of the drives, (DATA_ROWS, m)
 INERTIA = 0  # inertia of motor, gear and drum at the cable [kg]
-FORCE_LIMIT, SPEED_LIMIT = 1, 2  # of the motor [N], [m/s]
+FORCE_LIMIT, SPEED_LIMIT = 1, 2  # limits of the motor: force [N] and speed [m/s]
 FRICTION = 3  # Coulomb friction [N]
 POSITION_GAIN, SPEED_GAIN, INTEGRAL_GAIN = 4, 5, 6  # [1/s], [N s/m], [N/m]
 BANDWIDTH, RATIO = 7, 8  # second-order winch: omega [rad/s], damping ratio
@@ -100,7 +102,7 @@ DATA_ROWS = 12
 # sums over a run [J]
 SUPPLIED, LOST, ON_DRUMS, GIVEN_POWER, LOST_POWER = 0, 1, 2, 3, 4
 START, START_POTENTIAL, BEGIN = 5, 6, 7  # energy at the start and its potential part [J]; time of step 0 [s]
-MOVED = 8  # largest sum, until now, of kinetic energy, change of potential energy, supplied and lost energy
+MOVED = 8  # largest sum so far of kinetic energy, change of potential energy, supplied and lost energy
 AUDIT_SIZE = 9
 
 LOOP_PERIOD = 1e-3  # [s]
@@ -119,7 +121,7 @@ class Drives(NamedTuple):
 
 @formula
 def _kick_lagging(drives: Drives, rows: Array, targets: Array, time: float, begins: bool) -> None:
-    """Update the rates of second-order winches: explicit at the start of a step, adjoint at its end."""
+    """Update the rates of second-order winches: explicitly at the start of a step, by the adjoint method at its end."""
     for i in range(rows.shape[1]):
         omega, ratio = drives.data[BANDWIDTH, i], drives.data[RATIO, i]
         push = omega * omega * (targets[i] - rows[g.LENGTH, i])
@@ -152,7 +154,7 @@ def _kick_drums(drives: Drives, time: float) -> None:
 
 @formula
 def _fill_stored_strain(drives: Drives, cables: Array, time: float) -> None:
-    """Fill the strain of the cable that the drums let out or take in during a step."""
+    """Fill the strain of the cable that the drums pay out or wind in during a step."""
     for i in range(cables.shape[0]):
         strain, lost = drives.data[WINDING_STRAIN, i], 0.0
         if drives.remembered:
@@ -169,7 +171,7 @@ def _fill_stored_strain(drives: Drives, cables: Array, time: float) -> None:
 
 @formula
 def turn_drums(drives: Drives, cables: Array, rows: Array, gravity: float, time: float) -> None:
-    """Let out or take in cable for a time, and update the energy of the cable on the drums."""
+    """Pay out or wind in cable for a time, and update the energy of the cable on the drums."""
     _fill_stored_strain(drives, cables, time)
     for i in range(cables.shape[0]):
         step, strain = time * drives.now[SPEED, i], drives.now[STORED, i]
@@ -216,7 +218,7 @@ def close_loops(drives: Drives, targets: Array, rates: Array, period: float) -> 
 
 @formula
 def tension_at_drum(whole: float, lifted: float, stiffness: float) -> float:
-    """Tension at the drum [N] from H at the drum: H at the frame end minus the weight of the cable in between."""
+    """Tension at the drum [N], from H at the frame end minus the weight of the cable between drum and frame end."""
     fallen = whole - lifted
     return 2.0 * fallen / (1.0 + math.sqrt(max(1.0 + 2.0 * fallen / stiffness, 0.0)))
 
@@ -252,7 +254,7 @@ def store_step_start(drives: Drives, rows: Array) -> None:
 
 @glue
 def turn_winches(drives: Drives, cables: Array, rows: Array, gravity: float, time: float) -> None:
-    """Let out or take in cable for a time, except with ideal winches, which follow their set points."""
+    """Pay out or wind in cable for a time, except with ideal winches, which follow their set points."""
     if drives.kind == DRUMS:
         turn_drums(drives, cables, rows, gravity, time)
     elif drives.kind == SECOND_ORDER:
@@ -273,6 +275,6 @@ def add_winch_energy(drives: Drives, cables: Array, rows: Array, time: float) ->
 
 @glue
 def filter_tensions(drives: Drives, share: float) -> None:
-    """Update the filtered tensions; share is the weight of the new reading."""
+    """Update the filtered tensions; share: weight of the new reading."""
     for i in range(drives.now.shape[1]):
         drives.now[FILTERED, i] += share * (drives.now[AT_FRAME, i] - drives.now[FILTERED, i])

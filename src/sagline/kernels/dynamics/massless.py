@@ -24,7 +24,8 @@ SPLITTING, RUNGE_KUTTA = 0, 1
 DAMPED, LOADED, BLOWN = 1, 2, 4  # bits of the active damping and loads
 
 Losses = tuple[float, float]
-ModelTerms = tuple[int, float, float, float, bool | None]  # with gravity; True for pulleys or dead lengths, else None
+# code, k_h, k_p, gravity; True for pulleys or dead lengths, else None
+ModelTerms = tuple[int, float, float, float, bool | None]
 Rules = tuple[int, int, int, int, int]  # integrator, winches, remembered, damping and loads, steps per control period
 Numbers = tuple[float, float, float, float]  # step [s], loss_time [s], air damping [N s/m^2], weight of a new reading
 Robot = tuple[Array, Array, Array, Array]  # cables, body, inertia, freedom
@@ -104,7 +105,7 @@ def cable_gravity(run: MasslessRun) -> float:
 
 @kernel
 def add_wind_on_cables(cables: Array, drag: Array, rows: Array, wind: Array, given: Array) -> None:
-    """Add half of the wind force on every cable, which is normal to its chord, to a wrench (6,)."""
+    """Add to a wrench (6,) half of the wind force on every cable; this force is normal to the chord."""
     for i in range(cables.shape[0]):
         x = rows[g.AZIMUTH_X, i] * rows[g.COSINE, i]
         y = rows[g.AZIMUTH_Y, i] * rows[g.COSINE, i]
@@ -128,7 +129,7 @@ def _add_at_end(rows: Array, i: int, x: float, y: float, z: float, wrench: Array
 
 @glue
 def project_on_freedom(freedom: Array, wrench: Array, part: Array) -> None:
-    """Remove the part of a wrench that the guides of the platform support."""
+    """Remove the part of a wrench that acts along motions that the platform cannot make."""
     if freedom.shape[0] < 6:
         components_along(freedom, wrench, part)
         fill_motion_of_components(freedom, part, wrench)
@@ -166,15 +167,15 @@ def damp_cables(
 ) -> float:
     """Fill the damping wrench (6,) of the cables; returns the power lost.
 
-    The strain rate is the same along a whole cable, including the part behind the free span. Cable that is paid out
-    lengthens the span by its strained length. The chord rate minus the rate of this length stretches the cable or
-    changes its sag. Only the stretch causes damping, with the factor EA/L. The share of the stretch is the elastic
-    compliance divided by the total compliance: 1 for a taut cable, 0 for a slack cable. For the damping of the air, the
-    cable moves like its chord.
+    The strain rate is the same along a whole cable, including the part between exit point and drum. Cable that is paid
+    out lengthens the span by its strained length. The rate of the chord minus the rate of this length is the rate at
+    which the cable stretches or changes its sag. Only stretching causes damping, with the factor EA/L. The fraction of
+    stretching is the elastic compliance divided by the total compliance: 1 for a taut cable, 0 for a slack cable. For
+    the damping of the air, the cable moves like its chord.
 
     losses: loss_time [s], and air damping [N s/m^2]; weight_of: gravity if the cables have weight, else 0 [m/s^2];
-    turning: velocity of the center of mass, and angular velocity, (6,); now: state of the drives, filled with the
-    damping parts of the tensions; wrench: filled.
+    turning: velocity of the center of mass, and angular velocity, (6,); now: state of the drives, in which the damping
+    parts of the tensions are filled; wrench: filled.
     """
     lost = 0.0
     for k in range(6):

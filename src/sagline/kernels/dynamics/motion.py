@@ -1,7 +1,7 @@
 """Motion of the platform on massless cables: one compiled loop over the time steps.
 
-There are two integrators. The symplectic splitting (kick, drift, free rotation, kick) has order 2, one evaluation of
-the cables per step, and an energy error without drift. The classical Runge-Kutta method has order 4 and four
+There are two integrators. The symplectic splitting (kick, drift, free rotation, kick) has order 2 and one evaluation of
+the cables per step, and its energy error does not grow. The classical Runge-Kutta method has order 4 and four
 evaluations per step. docs/model.md, section 11.
 """
 
@@ -54,7 +54,8 @@ from sagline.kernels.dynamics.rigid_body import (
 from sagline.kernels.forward.platform import platform_energy
 from sagline.kernels.jit import entry, glue, kernel
 
-GROWTH = 0.1  # largest energy error relative to the exchanged energy MOVED; above it the step is too long
+# largest energy error, relative to the exchanged energy MOVED; if the error is larger, the step is too long
+GROWTH = 0.1
 
 
 @kernel
@@ -96,7 +97,7 @@ def record_step(run: MasslessRun, records: Records) -> None:
 
 @glue
 def runge_kutta_step(run: MasslessRun, now: float) -> None:
-    """One step of the classical Runge-Kutta method; the stored forces match the state before and after."""
+    """One step of the classical Runge-Kutta method; the stored forces belong to the state before it, then after it."""
     h, drives, rows, state = run.step, run.drives, run.rows, run.state
     m, lagging = rows.shape[1], drives.kind == d.SECOND_ORDER
     supplied, lost = 0.0, 0.0
@@ -146,7 +147,7 @@ def runge_kutta_step(run: MasslessRun, now: float) -> None:
 
 @glue
 def splitting_step(run: MasslessRun, now: float) -> None:
-    """One step of the splitting from a time on; the stored forces match the state before and after."""
+    """One step of the splitting from a given time; the stored forces belong to the state before, then after it."""
     h, half, drives, rows = run.step, 0.5 * run.step, run.drives, run.rows
     fill_damping(run)
     add_powers(drives, half)
@@ -176,7 +177,7 @@ def splitting_step(run: MasslessRun, now: float) -> None:
 
 @glue
 def _start_run(run: MasslessRun, records: Records, room: Array) -> None:
-    """Prepare the start of a run, or its continuation after an event."""
+    """Prepare the start of a run, or the continuation of a run after an event."""
     at, now = run.at, run.drives.now
     time = run.drives.audit[d.BEGIN] + at[progress.STEPS] * run.step
     at[progress.READY] = 1
@@ -205,7 +206,7 @@ def run_massless(
     steps: int,
     every: int,
 ) -> None:
-    """Integrate some steps. A run in several calls gives bitwise the same result as in one call.
+    """Integrate some steps. Several calls give bitwise the same result as one call with all steps.
 
     Args:
         model: See `ModelTerms`.
@@ -214,13 +215,15 @@ def run_massless(
         robot: Rows of the cable_table, with platform anchors in principal axes relative to the center of mass; row of
             the body_table with the center of mass at zero; row of inertia; free motions (n, 6).
         data: Data of the drives, (DATA_ROWS, m).
-        courses: Time tables of lengths, wrenches and wind velocity. Lengths (K, m) are unstrained. For drums the table
-            has lengths s along the path of winding, then expected tensions, (K, 2 m).
-        kept: State of a run, in and out, and work arrays.
+        courses: Time tables of lengths, wrenches and wind velocity. Lengths (K, m) are unstrained. For drums, each row
+            of the table contains lengths s along the path of winding, then expected tensions, (K, 2 m).
+        kept: State of a run before the steps, which is overwritten with the state after them; and work arrays.
         records: Filled: states with angular velocity instead of angular momentum, frame-end tensions, lengths,
             energies, notes.
-        steps: Largest number of steps; the run ends before if the records are full. With 0 only the start is evaluated.
-        every: Number of steps per record, starting with the initial state; 0 records only the last step.
+        steps: Largest number of steps; the run ends earlier if the records are full. With 0, only the initial state is
+            evaluated.
+        every: Number of steps between records; the first record is the initial state. With 0, only the last step is
+            recorded.
     """
     integrator, kind, _remembered, _work, stride = rules
     step, filtering = numbers[0], numbers[3]

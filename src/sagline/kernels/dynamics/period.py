@@ -27,10 +27,10 @@ def begin_period(
         given: Unstrained lengths (m,); for drums also expected tensions (m,); wrench (6,).
         least: Lower bounds of the lengths, (m,).
         stretch: Factors from unstrained lengths to lengths of the time table, (m,).
-        lengths: Unstrained lengths at the end of the last period and of this one, (2, m).
-        course: See `tables_in_time.Course`, with two instants.
+        lengths: Unstrained lengths at the end of the last period and at the end of this period, (2, m).
+        course: The time table, see `Course`, with two instants.
         load: Wrench on the platform, (6,).
-        at: Counters of the run.
+        at: Counters of the run, see `progress`.
         with_tension: True if tensions are given; otherwise the present tensions are kept.
         with_wrench: True if a wrench is given; otherwise the present wrench is kept.
         end: End of the period [s].
@@ -70,7 +70,7 @@ def begin_period(
 
 @entry
 def read_cells(tension: Array, cells: Array, noise: Array, reading: Array) -> None:
-    """Fill the readings of load cells, (m,): gain, bias and noise, within their range.
+    """Fill the readings of load cells, (m,): tensions with gain, bias and noise, limited to the range of the cells.
 
     Args:
         tension: Filtered tensions [N], (m,).
@@ -93,8 +93,8 @@ def read_encoders(
         wound: Lengths off the drums [m], (m,).
         stretch: Factors from lengths off the drums to lengths along the path of winding, (m,).
         zero: Counts at zero turns, (m,).
-        rate: Counts per turn let out, (m,).
-        room: (3, 1, m).
+        rate: Counts per turn paid out, (m,).
+        room: Work array, (3, 1, m).
         counts: Filled.
     """
     path, turns, travel = room[0], room[1], room[2]

@@ -27,10 +27,10 @@ class CubicTable(NamedTuple):
 
 @formula
 def interpolate_table(course: CubicTable, at: int, now: float, shift: float, value: Array, rate: Array) -> int:
-    """Fill values and rates (n,) of a table at a time; returns the interval of this time, searched from `at` forward.
+    """Fill values and rates (n,) of a table at a time; returns the interval of this time. The search starts at `at`.
 
-    shift: small time offset. At an instant of the table, a negative shift selects the interval before the instant, a
-    positive shift the interval after it.
+    shift: small time offset. At an instant of the table, a negative shift selects the interval that ends there, and a
+    positive shift selects the interval that starts there.
     """
     times, last, moment = course.time, course.time.shape[0] - 1, now + shift
     while at < last - 1 and moment >= times[at + 1]:
@@ -60,10 +60,10 @@ def interval_ends(course: CubicTable, at: int, moment: float) -> bool:
     return at < course.time.shape[0] - 1 and moment >= course.time[at + 1]
 
 
-# counters, in and out
+# counters of a run, which each call updates
 STEPS, LENGTH_AT, WRENCH_AT, WIND_AT, NOTES, RECORDS, READY, FAILED, RENEWED = range(9)
 COUNTERS = 9
-# columns of the notes: event, time and cable; largest tensions before and after it
+# columns of the notes: event, time and cable; largest tensions before and after the event
 NOTE_TIME, NOTE_KIND, NOTE_CABLE, NOTE_BEFORE, NOTE_AFTER = range(5)
 NOTE_COLUMNS = 5
 NOTE_SLACK, NOTE_SATURATED = 0.0, 1.0
@@ -78,7 +78,7 @@ ROUNDING = 1e-9  # tolerance of the energy, relative to the sum of all its parts
 def note_events(
     drives: Drives, rows: Array, cables: Array, at: Indices, now: float, weight_of: float, notes: Array
 ) -> None:
-    """Update the largest tensions, and record new events: a cable that becomes slack, a drive at its limit."""
+    """Update the largest tensions, and record new events: a cable becomes slack, or a drive reaches its limit."""
     largest = 0.0
     for i in range(rows.shape[1]):
         tension = drives.now[d.AT_FRAME, i]

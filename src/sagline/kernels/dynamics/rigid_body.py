@@ -16,7 +16,8 @@ from sagline.kernels.jit import entry, formula
 
 CENTER, TURN, VELOCITY, MOMENTUM = 0, 3, 7, 10
 STATE_COLUMNS = 13
-MASS, MOMENTS = 0, 1  # the row of inertia: mass [kg], principal moments [kg m^2], infinite where the body cannot turn
+# row of inertia: mass [kg], principal moments [kg m^2], which are infinite for axes about which the body cannot turn
+MASS, MOMENTS = 0, 1
 INERTIA_COLUMNS = 4
 
 Triple = tuple[float, float, float]
@@ -48,7 +49,7 @@ def _into_body(state: Array, x: float, y: float, z: float) -> Triple:
 
 @formula
 def _turn_about(a: float, b: float, c: float, w: float, pa: float, pb: float, pc: float, share: float) -> Six:
-    """Rotate by the angle share * pa [rad] about the first of three axes in cyclic order.
+    """Rotate by the angle share * pa [rad] about the first axis; the three axes are in cyclic order.
 
     The arguments are the quaternion's components along the axes and its scalar, and the components of the angular
     momentum along the axes. The results are the new quaternion, and the angular momentum along the second and third
@@ -69,7 +70,7 @@ def _turn_about(a: float, b: float, c: float, w: float, pa: float, pb: float, pc
 
 @formula
 def free_turn(state: Array, inertia: Array, time: float) -> None:
-    """Rotate the body for a time without moment: a symmetric sequence of exact rotations about principal axes."""
+    """Rotate the body for a time without a moment: a symmetric sequence of exact rotations about principal axes."""
     x, y, z, w = state[TURN], state[TURN + 1], state[TURN + 2], state[TURN + 3]
     px, py, pz = _into_body(state, state[MOMENTUM], state[MOMENTUM + 1], state[MOMENTUM + 2])
     by_x, by_y = 0.5 * time / inertia[MOMENTS], 0.5 * time / inertia[MOMENTS + 1]
@@ -129,7 +130,7 @@ def platform_state(state: Array, inertia: Array, center: Array, turn: Array, out
     """Fill the state of the platform frame: position of its origin, quaternion, velocity and angular velocity (13,).
 
     Args:
-        state: State, as in the module's docstring.
+        state: Row of 13 numbers, see the beginning of this module.
         inertia: Row of inertia.
         center: Center of mass, relative to the frame's origin, in principal axes (3,).
         turn: Quaternion of the rotation from frame axes to principal axes, (4,).

@@ -26,15 +26,15 @@ from sagline.kernels.jit import entry, formula, kernel
 
 LARGEST_DEGREE = 48
 LEAST_DEGREE = 6
-HALF_WAVE = 1.5  # polynomial degrees per half wavelength
-ALWAYS = 7.0  # polynomial degrees in addition to the degrees for the waves
+HALF_WAVE = 1.5  # polynomial degree per half wavelength
+ALWAYS = 7.0  # polynomial degree that is added to the degree for the waves
 MOST_PHASE = math.pi * (LARGEST_DEGREE - ALWAYS) / HALF_WAVE
 
 Rule = tuple[Array, Array, Array, Array]
 
 
 class Lobatto(NamedTuple):
-    """Gauss-Lobatto nodes on [-1, 1], weights, slopes and integrals. First axis: degree p; unused entries are 0."""
+    """Gauss-Lobatto nodes on [-1, 1], weights, slopes and integrals; first axis: degree p; unused entries are 0."""
 
     nodes: Array  # (p, i)
     weights: Array  # (p, i)
@@ -64,7 +64,7 @@ def element_from(string: String, omega: float, start: float, first: int) -> _Ele
 
 @formula
 def _element_flexibility(string: String, s: float) -> tuple[float, float, float, float, float, float, float]:
-    """Matrices C^-1 and C at a material point: xx, xz, zz of each, and C normal to the plane."""
+    """Matrices C^-1 and C at a material point: the entries xx, xz, zz of each, and C normal to the plane."""
     vertical = vertical_at(string, s)
     square = string.horizontal * string.horizontal + vertical * vertical
     across = 1.0 / math.sqrt(square) + 1.0 / string.stiffness
@@ -102,7 +102,7 @@ def add_element(string: String, part: _Element, lobatto: Lobatto, plane: Array, 
 
 @kernel
 def add_sums(string: String, part: _Element, lobatto: Lobatto, points: Array) -> None:
-    """Fill s and the integral of C from the frame end, and add the mass, at the nodes of an element."""
+    """Fill s and the integral of C from the frame end to each node of an element, and add the mass at each node."""
     n = part.degree + 1
     half = 0.5 * part.size
     for q in range(n):
@@ -124,7 +124,7 @@ def add_sums(string: String, part: _Element, lobatto: Lobatto, points: Array) ->
 
 @kernel
 def add_stretch(string: String, part: _Element, lobatto: Lobatto, plane: Array) -> None:
-    """Add the stretch part of one element's stiffness."""
+    """Add the part of one element's stiffness that is due to stretching."""
     n = part.degree + 1
     half = 0.5 * part.size
     for q in range(n):
@@ -174,7 +174,7 @@ def node_counts(strings: Array, omega: float, counts: Indices) -> None:
 
 @formula
 def _fill_rest_shapes(points: Array, count: int, carried: Array, still: Array) -> None:
-    """Fill static shapes xx, xz, zx, zz, yy times roots of masses, (nodes, 5), and the mass in this motion, (4,)."""
+    """Fill static shapes xx, xz, zx, zz, yy times roots of masses, (nodes, 5), and masses of these motions, (4,)."""
     end = points[count - 1]
     determinant = end[2] * end[4] - end[3] * end[3]
     for k in range(4):
@@ -196,7 +196,7 @@ def _fill_rest_shapes(points: Array, count: int, carried: Array, still: Array) -
 
 @formula
 def _constrain_unknown(matrix: Array, unknown: int, stiffness: float) -> None:
-    """Fix an unknown: decouple it, and set its diagonal stiffness."""
+    """Fix an unknown: decouple it from the other unknowns, and set its diagonal stiffness."""
     for j in range(matrix.shape[0]):
         matrix[unknown, j] = matrix[j, unknown] = 0.0
     matrix[unknown, unknown] = stiffness
@@ -241,9 +241,9 @@ def spectral_matrices(
         points: Filled: s, mass and integrals of C of every node, (m, nodes, 6); s is NaN for unused nodes.
         plane: Filled: scaled stiffness in the plane, (m, 2 nodes, 2 nodes), node by node [1/s^2].
         normal: Filled: scaled stiffness normal to the plane [1/s^2], (m, nodes, nodes).
-        carried: Filled: static motion of the nodes per motion of the platform end, times the root of the node's mass,
+        carried: Filled: static motion of each node per motion of the platform end, times the root of the node's mass,
             (m, nodes, 5).
-        still: Filled: mass of the cable in this static motion: xx, xz, zz, yy, (m, 4) [kg].
+        still: Filled: effective masses of the cable in this static motion, xx, xz, zz, yy, (m, 4) [kg].
     """
     lobatto = Lobatto(*rule)
     stiff = 1e6 * omega * omega
@@ -313,7 +313,7 @@ def interpolate(strings: Array, omega: float, rule: Rule, points: Array, values:
 
 @entry
 def stretch_matrices(strings: Array, omega: float, rule: Rule, points: Array, matrices: Array) -> None:
-    """Fill the stretch part of the scaled in-plane stiffness, (m, 2 nodes, 2 nodes)."""
+    """Fill the part of the scaled in-plane stiffness that is due to stretching, (m, 2 nodes, 2 nodes)."""
     lobatto = Lobatto(*rule)
     for i in range(strings.shape[0]):
         string = string_at(strings, i)

@@ -18,11 +18,11 @@ LENGTH = 2  # unstrained length of the free span [m]
 WEIGHT = 3  # weight per length [N/m]
 STIFFNESS = 4  # EA [N]
 DENSITY = 5  # [kg/m]
-# compliance [m/N] of the cable behind the frame end: (x, z)^T (x, z) in the plane, one value normal to it
+# compliance [m/N] of the cable between frame end and drum: (x, z)^T (x, z) in the plane, and one value normal to it
 BEHIND_X, BEHIND_Z, BEHIND_Y = 6, 7, 8  # the first two in [sqrt(m/N)]
 STRING_COLUMNS = 9
 
-SMOOTH = 0.5  # longest element with smooth flexibility C, in units of min N/w
+SMOOTH = 0.5  # length of the longest element in which the flexibility C is smooth, in units of min N/w
 TINY = 1e-300
 
 
@@ -72,7 +72,7 @@ def slowness(string: String, force: float) -> float:
 
 @formula
 def shortest_wave(string: String, omega: float) -> float:
-    """Half the wavelength of a transverse wave at the largest force [m], where it is longest."""
+    """Half the wavelength of a transverse wave [m] at the largest force, where the wave is longest."""
     low, high = abs(vertical_at(string, 0.0)), abs(string.vertical)
     force = math.hypot(string.horizontal, max(low, high))
     return math.pi / (omega * slowness(string, force) + TINY)
@@ -80,14 +80,14 @@ def shortest_wave(string: String, omega: float) -> float:
 
 @formula
 def _longest_element(string: String, start: float, end: float, omega: float, phase: float) -> float:
-    """Longest element [m] in an interval with smooth C and at most the given phase [rad] of a transverse wave."""
+    """Length [m] of the longest element in an interval with smooth C and at most the given phase [rad] of a wave."""
     force = _least_force(string, start, end)
     return min(SMOOTH * force / (string.weight + TINY), phase / (omega * slowness(string, force) + TINY))
 
 
 @formula
 def is_at_end(string: String, s: float) -> bool:
-    """True if the sum of the elements' lengths equals the cable's length except for rounding."""
+    """True if the sum of the elements' lengths differs from the cable's length only by rounding."""
     return s >= string.length * (1.0 - 1e-12)
 
 
@@ -115,7 +115,7 @@ def fill_routing_compliance(
         wraps: Wrap angles [rad], (N, m).
         leaving: Tensions at the exit points [N], (N, m).
         rows: Work array, (CABLE_ROWS, m).
-        strings: Table of strings, with its other columns already filled.
+        strings: Table of strings, whose other columns are already filled.
     """
     bare = model_of(terms)
     model = Model(bare.code, bare.k_h, bare.k_p, bare.gravity, True)

@@ -1,7 +1,7 @@
-"""Forward kinematics of straight cables: a least-squares pose by the Levenberg-Marquardt method.
+"""Forward kinematics of straight cables: the least-squares pose, found by the Levenberg-Marquardt method.
 
 The model is for comparison with the exact cable. It does not distinguish slack cables from taut cables. All lengths
-have the same weight. A mirrored pose fits as well as the true pose.
+have the same weight. A mirrored pose fits the lengths as well as the true pose.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ from sagline.kernels.memory import Memory
 
 FIT_STEPS = 200
 FIRST_DAMPING = 1e-3  # relative to the largest diagonal element
-SMALL_STEP = 1e-14  # largest last step, in the problem's units
+SMALL_STEP = 1e-14  # a fit ends at a smaller step, in the problem's units
 NOTHING = 1e-13  # a fit ends at a smaller relative decrease of the cost
 
 
@@ -88,7 +88,7 @@ def _normal_equations(free: Array, cables: Array, lengths: Array, space: Forward
 
 @glue
 def _fit_pose(problem: PoseProblem, lengths: Array, pose: Array, space: ForwardArrays) -> tuple[float, int, bool]:
-    """Move pose to a least-squares fit; returns half the sum of squares [m^2], number of steps, and True on success."""
+    """Move a pose to the best fit; returns half the sum of squares [m^2], number of steps, and True on success."""
     cables, body, free = problem.cables, problem.body, problem.free
     rotation, rows = space.rotation, space.rows
     cost = _half_square_error(cables, body, lengths, pose, rotation, rows)
@@ -116,7 +116,7 @@ def _fit_pose(problem: PoseProblem, lengths: Array, pose: Array, space: ForwardA
             _normal_equations(free, cables, lengths, space)
             fitted = gain <= NOTHING * cost
         else:
-            fitted = length <= 1e-7  # rounding of squared errors: square root of machine precision
+            fitted = length <= 1e-7  # squared errors have a rounding error of the square root of machine precision
             damping = max(10.0 * damping, 1e-12 * largest)
         if fitted:
             steps = iteration + 1
@@ -133,7 +133,7 @@ def fit_poses(
     memory: tuple[Array, Indices],
     found: SolutionArrays,
 ) -> None:
-    """Fit all samples; arguments as in `forward_poses`. Forces are NaN; the energy is half the sum of squares."""
+    """Fit all samples; arguments as in `forward_poses`. Forces are NaN, and the energy is half the sum of squares."""
     batch, answer, kept = ForwardSamples(*given), Solutions(*found), LastEquilibrium(*chain)
     count, m = batch.lengths.shape
     space, rest = new_forward_arrays(Memory(*memory), kept.rows, kept.factor)

@@ -45,7 +45,7 @@ from sagline.kernels.memory import Memory
 
 FLAT = 1e-9  # relative to the largest stiffness; a smaller stiffness counts as zero
 OVERSTRETCHED = 0.1  # strain above which a result is unrealistic
-PREDICTION, FROM_START, DOWNHILL = 0, 1, 2  # methods for the equilibrium, in the order of use
+PREDICTION, FROM_START, DOWNHILL = 0, 1, 2  # methods for finding the equilibrium, in the order in which they are tried
 
 
 @glue
@@ -58,7 +58,7 @@ def _stability(low: float, high: float) -> int:
 
 @glue
 def _support_status(model: Model, cables: Array, rows: Array, needed: int) -> int:
-    """Support status of a stable platform; needed: required number of taut cables."""
+    """Status of a stable platform: held by enough taut cables or not; needed: required number of taut cables."""
     taut = 0
     strain = 0.0
     for i in range(cables.shape[0]):
@@ -98,10 +98,11 @@ def _find_pose(
     space: ForwardArrays,
     pose: Array,
 ) -> tuple[int, float]:
-    """Fill the equilibrium by the first reliable method; returns the number of steps and the sum of tensions.
+    """Find the equilibrium by the first method that succeeds; returns the number of steps and the sum of tensions.
 
-    On return, space contains unbalance, stiffness and its factor at the pose. If the first number of the factor is NaN,
-    the factor does not exist. exact: model with an energy; its equilibrium is the start for the model of the problem.
+    On return, space contains unbalance, stiffness and factor of the stiffness at the pose. The first number of the
+    factor is NaN if there is no factor. exact: a model with an energy, whose equilibrium is the start for the model of
+    the problem.
     """
     model, cables, body, wrench, free = problem.model, problem.cables, problem.body, problem.wrench, problem.free
     steps, size, known = 0, 0.0, 0.0
@@ -135,7 +136,7 @@ def _find_pose(
 def _fill_stability(
     problem: PoseProblem, pose: Array, arcs: Array, size: float, space: ForwardArrays, numbers: Array
 ) -> int:
-    """Fill the numbers of the pose in the work arrays, without residuals and steps; returns the status."""
+    """Fill the numbers of the pose in the work arrays, except residuals and steps; returns the status."""
     model, cables, body = problem.model, problem.cables, problem.body
     numbers[ENERGY] = platform_energy(model, cables, body, problem.wrench, pose, space.rotation, space.rows)[0]
     symmetric_part(arcs, space.stiffness, space.matrix)
@@ -151,7 +152,7 @@ def _fill_stability(
 
 @glue
 def _store_chain(chain: LastEquilibrium, pose: Array, wrench: Array) -> None:
-    """Keep a pose with a factored stiffness as the last equilibrium."""
+    """Store a pose and its factored stiffness as the last equilibrium."""
     if not math.isnan(chain.factor[0, 0]):
         copy_pose(pose, chain.last)
         for k in range(6):
@@ -193,11 +194,11 @@ def forward_poses(
     Args:
         model: Cable model, the empirical model's constants, and True if cables may have pulleys or dead lengths, else
             None. For shallow models, only the last steps use the model; the descent before them uses the exact cable.
-        chained: True if each sample starts at the last result, and the first sample at starts[0].
+        chained: True if each sample starts at the previous result, and the first sample at starts[0].
         given: `ForwardSamples`.
-        chain: `LastEquilibrium`. A chain of samples that starts at its pose continues from its stored stiffness.
+        chain: `LastEquilibrium`. A chain of samples that starts at this pose also uses the stored stiffness.
         memory: `memory_for` the number of cables.
-        found: `Solutions`, filled.
+        found: `Solutions`, which is filled.
     """
     batch, answer, kept = ForwardSamples(*given), Solutions(*found), LastEquilibrium(*chain)
     code, k_h, k_p, behind = model

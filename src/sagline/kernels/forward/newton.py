@@ -1,6 +1,6 @@
-"""Steps to an equilibrium: Newton's method from a nearby pose, energy descent with a trust region from a distant pose.
+"""Search for an equilibrium: Newton's method from a nearby pose, or energy descent with a trust region.
 
-docs/model.md, section 6. From almost any start, the descent ends in a stable equilibrium. Steps have the problem's
+docs/model.md, section 6. The descent ends in a stable equilibrium from almost any start. Steps are in the problem's
 units.
 """
 
@@ -75,10 +75,10 @@ SHORTENINGS = 10
 NEAR_STEPS = 6
 NEAR = 3e-3  # length of a full Newton step below which Newton's method replaces the descent
 PREDICTED = 0.03  # longest first-order step
-SHRINKING = 0.3  # largest ratio of a Newton step to the previous one
-FRESH = 1e-4  # largest distance from its pose at which a factored stiffness is reused
+SHRINKING = 0.3  # largest ratio of a Newton step to the previous Newton step
+FRESH = 1e-4  # largest distance from the pose of a factored stiffness at which this stiffness is used again
 BALANCED = 1e-9  # relative to the sum of tensions and weight; a smaller unbalance counts as zero
-LAST_DIGIT = 1e-15  # a shorter step is below rounding
+LAST_DIGIT = 1e-15  # a shorter step is only a rounding error
 
 
 @glue
@@ -98,7 +98,7 @@ def _add_length_change(model: Model, cables: Array, lengths: Array, rows: Array,
 
 @kernel
 def solve_step(factor: Array, part: Array, step: Array) -> float:
-    """Fill the step (n,) that removes an unbalance (n,), with the factored stiffness; returns the step length."""
+    """Fill the step (n,) that removes an unbalance (n,), from the factored stiffness; returns the step length."""
     for j in range(part.shape[0]):
         step[j] = -part[j]
     solve_lower(factor, step)
@@ -108,7 +108,7 @@ def solve_step(factor: Array, part: Array, step: Array) -> float:
 
 @glue
 def predict(problem: PoseProblem, lengths: Array, start: Array, last: Array, space: ForwardArrays, pose: Array) -> bool:
-    """Fill the first-order change due to new lengths and wrench; False without a stored equilibrium at the start.
+    """Fill the first-order change due to new lengths and wrench; False if no equilibrium is stored for the start.
 
     Afterwards the rows contain the new lengths.
     """
@@ -133,9 +133,9 @@ def newton_from(problem: PoseProblem, pose: Array, space: ForwardArrays) -> tupl
     """Full Newton steps with the symmetric stiffness; returns the number of steps and the last sum of tensions.
 
     The number is 0 if the stiffness is not positive definite or the first step is too long. The pose is then unchanged,
-    and matrix is its stiffness. The number is -1 if the steps do not decrease fast enough. On return, all of space
-    except the stiffness belongs to the pose. The skew part of the stiffness is half of a given moment. It is neglected,
-    which costs one additional step.
+    and matrix is its stiffness. The number is -1 if the steps do not decrease fast enough. On return, all arrays of
+    space belong to the final pose, except the stiffness. The skew part of the stiffness, which is half of a given
+    moment, is neglected; this costs one additional step.
     """
     model, cables, body, wrench, free = problem.model, problem.cables, problem.body, problem.wrench, problem.free
     rotation, rows, gradient = space.rotation, space.rows, space.gradient
@@ -168,7 +168,7 @@ def newton_from(problem: PoseProblem, pose: Array, space: ForwardArrays) -> tupl
         if not length <= SHRINKING * before:
             steps = -min(iteration, 1)
             break
-        last = length * length <= LAST_DIGIT * before  # the steps decrease at a constant ratio
+        last = length * length <= LAST_DIGIT * before  # the ratio of successive steps is constant
         before = length
         age += length
         step_pose(free, body, pose, step, space.motion, space.trial)
@@ -180,10 +180,10 @@ def newton_from(problem: PoseProblem, pose: Array, space: ForwardArrays) -> tupl
 def _newton_steps(
     problem: PoseProblem, pose: Array, space: ForwardArrays, best: float, good: float
 ) -> tuple[float, float]:
-    """One Newton step on the wrench balance, shortened until the unbalance is below best; requires the stiffness.
+    """One Newton step for the force balance, shortened until the unbalance is below `best`; requires the stiffness.
 
     Returns the new unbalance and the length of the step. If no step is better, the length is 0 and the pose is
-    unchanged. If the unbalance is below good, only the full step is tried; a worse full step is then due to rounding.
+    unchanged. If the unbalance is below `good`, only the full step is tried, because rounding can make it worse.
     """
     model, cables, body, wrench, free = problem.model, problem.cables, problem.body, problem.wrench, problem.free
     step, trial, part = space.step, space.trial, space.part
@@ -197,7 +197,7 @@ def _newton_steps(
         share = -1.0
         for shortening in range(SHORTENINGS + 1):
             last = shortening == SHORTENINGS or (shortening > 0 and best <= good)
-            if last:  # no step improves the unbalance: restore the pose
+            if last:  # no step reduces the unbalance: restore the pose
                 copy_pose(pose, trial)
             else:
                 for j in range(step.shape[0]):
@@ -216,7 +216,7 @@ def _newton_steps(
 
 @glue
 def polish(problem: PoseProblem, pose: Array, space: ForwardArrays, good: float) -> int:
-    """Newton steps on the wrench balance until it no longer improves; returns the number of steps.
+    """Newton steps for the force balance until the unbalance no longer decreases; returns the number of steps.
 
     good: an unbalance below this counts as zero. The work arrays belong to the pose before and after the steps. The
     stiffness may belong to a pose that differs by rounding errors.
@@ -227,7 +227,7 @@ def polish(problem: PoseProblem, pose: Array, space: ForwardArrays, good: float)
     for iteration in range(POLISH_STEPS):
         platform_stiffness(problem.model, problem.cables, space.rows, space.stiffness)
         best, length = _newton_steps(problem, pose, space, best, good)
-        # the length of a step is about the error before it; the next length would be about length^3/before^2
+        # the length of a step is about the error before the step; the next length would be about length^3/before^2
         if length == 0.0 or length * length * length <= LAST_DIGIT * before * before:
             steps = iteration + 1
             break
@@ -244,10 +244,9 @@ NOISE = 4e-15  # rounding error of an energy, relative to the sum of its parts
 
 @glue
 def descend(problem: PoseProblem, pose: Array, space: ForwardArrays, known: float) -> tuple[int, float]:
-    """Decrease the energy until a full Newton step is short. A start in balance does not move, even if it is unstable.
+    """Decrease the energy until a full Newton step is short. A start in equilibrium does not move, even if unstable.
 
-    known: the sum of tensions from `unbalance` at the pose; 0 unless space belongs to the pose and matrix is its
-    stiffness.
+    known: the sum of tensions at the pose, if space belongs to this pose and matrix is its stiffness; otherwise 0.
 
     Returns the number of tried steps, and the sum of tensions at the pose (0 if the last tried pose is not the result).
     """
@@ -272,7 +271,7 @@ def descend(problem: PoseProblem, pose: Array, space: ForwardArrays, known: floa
             for k in range(3):  # the work of a given moment along the motion
                 gain += wrench[3 + k] * motion[3 + k]
             noise = NOISE * (size + new_size)
-            fresh = gain + noise >= 0.1 * promised  # False for NaN too
+            fresh = gain + noise >= 0.1 * promised  # also False for NaN
             if not fresh:
                 radius = 0.3 * min(length, radius)
                 tensions = 0.0

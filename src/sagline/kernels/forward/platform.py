@@ -1,7 +1,7 @@
-"""The platform on cables of given lengths: wrench at a pose, and derivatives of the wrench due to motions.
+"""The platform on cables of given lengths: wrench at a pose, and derivatives of the wrench with respect to motions.
 
-A motion consists of the displacement of the center of mass and a rotation vector in world axes, which rotates the
-present orientation from the left. The unbalance is minus the total wrench on the platform: the gradient of the energy.
+A motion is a displacement of the center of mass and a rotation vector in world axes. Its rotation is applied after the
+rotation of the pose. The unbalance is minus the total wrench on the platform: the gradient of the energy.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Six = tuple[float, float, float, float, float, float]
 def unbalance(
     model: Model, cables: Array, body: Array, wrench: Array, pose: Array, rotation: Array, rows: Array, gradient: Array
 ) -> float:
-    """Fill rotation, geometry, cable forces and statuses, and the unbalance (6,) as gradient, at a pose.
+    """Fill rotation, geometry, cable forces, statuses and unbalance (6,), which is the energy's gradient, at a pose.
 
     The rows must contain the lengths. Returns the sum of the tensions and the platform's weight [N], to which the
     unbalance is relative.
@@ -80,7 +80,7 @@ def platform_energy(
 
 @formula
 def end_stiffness(rows: Array, i: int) -> tuple[Triple, Triple, Triple]:
-    """Stiffness of cable i against displacements of its platform end in world axes [N/m], row by row."""
+    """Stiffness of cable i against displacements of its platform end, world axes [N/m], as nine numbers row by row."""
     xx, xz, zx, zz = plane_of(rows, i)
     across = rows[g.ACROSS, i]
     c, s = rows[g.AZIMUTH_X, i], rows[g.AZIMUTH_Y, i]
@@ -146,14 +146,14 @@ def platform_stiffness(model: Model, cables: Array, rows: Array, stiffness: Arra
 
 @kernel
 def step_pose(free: Array, body: Array, pose: Array, step: Array, motion: Array, moved: Array) -> None:
-    """Fill the pose after a step (n,) along the free motions, and this step as a motion (6,)."""
+    """Fill the pose after a step (n,) along the free motions, and the motion (6,) of this step."""
     fill_motion_of_components(free, step, motion)
     moved_pose(body, pose, motion, moved)
 
 
 @formula
 def moved_pose(body: Array, pose: Array, motion: Array, moved: Array) -> None:
-    """Fill the pose after a motion (6,): displacement of the center of mass, then rotation about it."""
+    """Fill the pose after a motion (6,): displacement of the center of mass, and rotation about the center of mass."""
     angle2 = motion[3] * motion[3] + motion[4] * motion[4] + motion[5] * motion[5]
     angle = math.sqrt(angle2)
     w = math.cos(0.5 * angle)
@@ -176,7 +176,7 @@ def moved_pose(body: Array, pose: Array, motion: Array, moved: Array) -> None:
 
 @formula
 def turned(pose: Array, x: float, y: float, z: float) -> Triple:
-    """A vector of the platform frame in world axes."""
+    """Convert a vector from the platform frame to world axes."""
     qx, qy, qz, qw = pose[3], pose[4], pose[5], pose[6]
     tx = 2.0 * (qy * z - qz * y)
     ty = 2.0 * (qz * x - qx * z)

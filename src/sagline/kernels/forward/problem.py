@@ -12,7 +12,7 @@ from sagline.kernels.cable.terms import Model
 from sagline.kernels.jit import glue, kernel
 from sagline.kernels.memory import Memory, block, vector
 
-UNIT_SHARE = 0.2  # displacement with the weight of a rotation by 1 rad, relative to the mean length
+UNIT_SHARE = 0.2  # relative to the mean length; a displacement of this size has the same weight as a rotation by 1 rad
 
 # columns of the numbers that describe one solution
 ENERGY, FORCE_RESIDUAL, MOMENT_RESIDUAL, STIFFNESS_MIN, ITERATIONS = 0, 1, 2, 3, 4
@@ -23,7 +23,7 @@ LAST_WRENCH = tables.POSE_COLUMNS
 LAST_COLUMNS = LAST_WRENCH + 6
 
 ForwardTerms = tuple[int, float, float, bool | None]  # code, k_h, k_p; True for pulleys or dead lengths, else None
-SampleArrays = tuple[Array, Array, Array, Array, Array, Array]  # as passed from Python: exact tuples are fastest
+SampleArrays = tuple[Array, Array, Array, Array, Array, Array]  # as Python passes it: plain tuples are fastest
 SolutionArrays = tuple[Array, Array, Codes, Array, Codes]
 LastEquilibriumArrays = tuple[Array, Array, Array]
 
@@ -65,7 +65,7 @@ class PoseProblem(NamedTuple):
     cables: Array  # rows of the cable_table, (m, CABLE_COLUMNS)
     body: Array  # row of the body_table, (BODY_COLUMNS,)
     wrench: Array  # external plus inertial wrench, about the center of mass, (6,)
-    unit: float  # norm of the units, which converts a sum of forces to a component along the free motions
+    unit: float  # norm of the units; a sum of forces times this norm is comparable to components along the free motions
 
 
 class ForwardArrays(NamedTuple):
@@ -100,7 +100,7 @@ def new_forward_arrays(memory: Memory, rows: Array, factor: Array) -> tuple[Forw
 
 @glue
 def new_motions(memory: Memory, n: int) -> tuple[Array, Array, Array, Array]:
-    """Arrays: free motions (n, 6) in units of steps and in units of stiffness comparisons, and two pose rows."""
+    """Arrays: free motions (n, 6) in the units of steps, free motions in the units of stiffness, and two pose rows."""
     free, memory = block(memory, n, 6)
     arcs, memory = block(memory, n, 6)
     poses, memory = block(memory, 2, tables.POSE_COLUMNS)
@@ -109,13 +109,13 @@ def new_motions(memory: Memory, n: int) -> tuple[Array, Array, Array, Array]:
 
 @glue
 def row_of(array: Array, p: int) -> Array:
-    """Row p of an array with a leading axis of 1 or N."""
+    """Row p of an array with N rows; the only row of an array with one row."""
     return array[min(p, array.shape[0] - 1)]
 
 
 @glue
 def problem_at(model: Model, given: ForwardSamples, p: int, free: Array, arcs: Array) -> PoseProblem:
-    """Problem of sample p of a batch, with the gravity of its body in the model; fills the free motions."""
+    """Problem of sample p of a batch; its model has the gravity of its robot. Fills the free motions."""
     body, cables = row_of(given.bodies, p), row_of(given.robots, p)
     placed = Model(model.code, model.k_h, model.k_p, body[tables.GRAVITY], model.behind)
     unit = _fill_free(given.freedom, given.lengths[p], free)
@@ -168,7 +168,7 @@ def copy_pose(source: Array, target: Array) -> None:
 
 @glue
 def clear_solution(found: Solutions, p: int, status: int, cable_status: int) -> None:
-    """Fill the arrays for a sample without a result: NaN, zero as the number of iterations, and the statuses."""
+    """Fill the arrays for a sample without a result: NaN as values, zero iterations, and the statuses."""
     for k in range(tables.POSE_COLUMNS):
         found.poses[p, k] = math.nan
     for i in range(found.statuses.shape[1]):

@@ -18,14 +18,14 @@ from sagline.kernels.forward.problem import ForwardSamples, ForwardTerms, Sample
 from sagline.kernels.jit import entry, formula, glue
 from sagline.kernels.memory import Memory, block, vector
 
-# index of the datum
+# index of the quantity with respect to which the force is differentiated
 BY_LENGTH, BY_DENSITY, BY_STIFFNESS, BY_RADIUS, BY_DEAD = 0, 1, 2, 3, 4
 DATA = 5
 
 
 @formula
 def _fill_in_world_axes(pair: PlaneVector, rows: Array, i: int, vector: Array) -> None:
-    """Fill a vector (3,) of a cable's plane in world axes."""
+    """Fill a vector (3,) in world axes from its components in a cable's plane."""
     vector[0] = pair.x * rows[g.AZIMUTH_X, i]
     vector[1] = pair.x * rows[g.AZIMUTH_Y, i]
     vector[2] = pair.z
@@ -74,7 +74,7 @@ def describe_states(
         memory: `memory_for` the number of cables.
         matrices: Filled: stiffness of the platform, (N, 6, 6).
         blocks: Filled: stiffness of every cable's platform end in world axes, (N, m, 3, 3).
-        slopes: Filled: dT of every cable by its data, (N, DATA, m, 3).
+        slopes: Filled: derivatives of the force T of every cable with respect to its data, (N, DATA, m, 3).
         levers: Filled: vectors from the center of mass to the platform ends, (N, m, 3).
     """
     batch = ForwardSamples(*given)

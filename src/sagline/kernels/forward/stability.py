@@ -1,4 +1,4 @@
-"""Stability of poses without a proof in their solution, decided by the smallest stiffness."""
+"""Stability of poses whose solution did not prove it: the smallest stiffness decides."""
 
 from __future__ import annotations
 

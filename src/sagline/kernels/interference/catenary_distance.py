@@ -1,4 +1,4 @@
-"""Least distances of sagging cables from cables, rods and boxes; branch and bound proves their bounds.
+"""Least distances of sagging cables from cables, rods and boxes, with bounds that branch and bound proves.
 
 A cable is divided into pieces. The bulge of a piece is an upper bound of the distance between piece and chord. The
 distance of two chords minus both bulges is a lower bound of the distance of the pieces. Points of the cables give an
@@ -42,9 +42,11 @@ PARTS = 9
 PIECE_COLUMNS = 10
 
 PIECES = 8192  # largest number of pieces of all cables of a pose
-COUNTER = PIECES - 1  # last row: number of pieces in the last column, an edge of a box in the other columns
+# index of the last row, which contains the number of pieces in its last column, and an edge of a box before it
+COUNTER = PIECES - 1
 WAITING = 4096  # largest number of waiting pairs of pieces
-PAIRS = 100_000  # largest number of pairs per distance; the search then ends with its present lower bound
+# largest number of examined pairs per distance; after this number the search ends with its present lower bound
+PAIRS = 100_000
 ROUNDING = 1e-13  # rounding error of a lower bound, relative to the coordinates
 FAR = 1e300
 
@@ -74,7 +76,7 @@ def _whole_piece(piece: Array, row: Array) -> None:
 
 @kernel
 def _split_piece(pieces: Array, index: int, row: Array) -> None:
-    """Split a piece in the middle, or at the lowest point of the cable if it separates two parts of a fold."""
+    """Split a piece in the middle, or, for a folded cable, at its lowest point."""
     count = int(pieces[COUNTER, PARTS])
     piece, one, other = pieces[index], pieces[count], pieces[count + 1]
     middle = 0.5 * (piece[BEGIN] + piece[END])
@@ -96,7 +98,7 @@ def _split_piece(pieces: Array, index: int, row: Array) -> None:
 
 @kernel
 def _chord_distance(pieces: Array, i: int, j: int, box: Array, to_a_box: bool) -> tuple[float, float, float, float]:
-    """Distance of two pieces' chords [m], a lower bound for the pieces, and the nearest shares of the cables."""
+    """Distance of two pieces' chords [m], lower bound for the pieces, and shares at the nearest points."""
     one = pieces[i]
     if to_a_box:
         square, low, s = to_box(one, box)
@@ -137,7 +139,7 @@ def _least_of_pair(
 ) -> tuple[float, float, float, float]:
     """Least distance of a cable from another cable or a box [m], a proved lower bound, and the two points.
 
-    Pairs farther apart than `enough` are not refined; their lower bound is at least `enough` - precision.
+    For distances above `enough` the search ends early, with a lower bound of at least `enough` - precision.
     """
     to_a_box = other[KIND] == BOX
     distance, low, s, t = _chord_distance(pieces, i, j, other, to_a_box)
@@ -218,7 +220,7 @@ def _edges_to_box(box: Array, other: Array, edge: Array, nearest: Array, best: f
 
 @kernel
 def _least_of_boxes(box: Array, other: Array, edge: Array, nearest: Array) -> float:
-    """Least distance of two boxes [m], 0 if they touch: the distance of an edge of one box from the other box."""
+    """Least distance of two boxes [m], 0 if they touch: the least distance of an edge of one box from the other box."""
     best = _edges_to_box(box, other, edge, nearest, FAR)
     turned = _edges_to_box(other, box, edge, nearest, best)
     if turned < best:
@@ -229,7 +231,7 @@ def _least_of_boxes(box: Array, other: Array, edge: Array, nearest: Array) -> fl
 
 @kernel
 def _set_nearest(one: Array, other: Array, s: float, t: float, nearest: Array) -> None:
-    """Set the nearest points of a pair from their shares."""
+    """Set the nearest points of a pair from their shares of the cable lengths."""
     x, y, z = point(one, s)
     nearest[0, 0], nearest[0, 1], nearest[0, 2] = x, y, z
     if other[KIND] == BOX:

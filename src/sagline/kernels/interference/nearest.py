@@ -8,7 +8,8 @@ from sagline.kernels.jit import kernel
 
 STEPS = 30
 HALVINGS = 6
-SMALL = 1e-8  # last step, relative to the cable's length; Newton's method squares the error
+# relative to the cable's length; the search ends after a smaller step, because Newton's method squares the error
+SMALL = 1e-8
 FLAT = 1e-13  # relative to the product of curvatures; a smaller determinant means parallel cables
 
 
@@ -22,7 +23,7 @@ def square_between(one: Array, other: Array, s: float, t: float) -> float:
 
 @kernel
 def _newton_step(one: Array, other: Array, s: float, t: float) -> tuple[float, float, float]:
-    """Squared distance at two shares, and the shares (within their ranges) after a Newton step."""
+    """Squared distance at two shares of the cable lengths, and the shares, within their ranges, after a Newton step."""
     ax, ay, az = point(one, s)
     bx, by, bz = point(other, t)
     rx, ry, rz = ax - bx, ay - by, az - bz
@@ -45,7 +46,7 @@ def _newton_step(one: Array, other: Array, s: float, t: float) -> tuple[float, f
             determinant = max(hss * htt - hst * hst, FLAT * uu * vv)
         ds = -(gs * htt - gt * hst) / determinant
         dt = -(gt * hss - gs * hst) / determinant
-        # a reached bound stays active; then only the other share changes
+        # a share at a bound stays there; then only the other share changes
         new_s, new_t = min(max(s + ds, one[FIRST]), one[LAST]), min(max(t + dt, other[FIRST]), other[LAST])
         if new_s != s + ds and new_t == t + dt:
             new_t = min(max(t - (gt + hst * (new_s - s)) / htt, other[FIRST]), other[LAST])

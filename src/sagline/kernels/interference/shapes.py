@@ -24,7 +24,7 @@ LENGTH = 11  # L [m]                               |                four times i
 WEIGHT = 12  # w [N/m]
 STIFFNESS = 13  # EA [N]
 SPAN, RISE, DROP = HORIZONTAL, VERTICAL, LENGTH
-AXES = 5  # nine: directions of a box's edges as columns of a matrix, row by row
+AXES = 5  # nine: nine numbers: matrix, row by row, whose columns are the directions of a box's edges
 HALF = 14  # three: half the edges of a box [m]
 COLUMNS = 17
 
@@ -70,7 +70,7 @@ def slopes(row: Array, share: float) -> tuple[float, float, float, float]:
 
 @kernel
 def level_point(row: Array) -> float:
-    """Position of a catenary's horizontal tangent as a fraction of its length, possibly beyond its ends."""
+    """Position of a catenary's horizontal tangent as a fraction of its length; it can be beyond an end of the cable."""
     if row[KIND] != HANGING:
         return -1.0
     return 1.0 - row[VERTICAL] / (row[WEIGHT] * row[LENGTH])
@@ -100,7 +100,7 @@ def bulge(row: Array, first: float, last: float, chord2: float) -> float:
     elif v0 < -slack and v1 > slack:
         bend = math.inf
     by_curvature = 0.125 * part * part * (bend + weight * give)
-    if by_curvature * by_curvature < 1e-4 * chord2:  # shallow piece: the other bound is not smaller
+    if by_curvature * by_curvature < 1e-4 * chord2:  # for a shallow piece the second bound is not smaller
         return by_curvature
     arc = part * (1.0 + math.sqrt(most2) * give)
     by_length = 0.5 * math.sqrt(max(arc * arc - chord2, 0.0))
@@ -112,7 +112,7 @@ STEPS = 12  # Newton steps; the slope has at most six straight parts
 
 @kernel
 def between_segments(one: Array, other: Array) -> tuple[float, float, float, float]:
-    """Squared distance [m^2] of segments (x0, y0, z0, x1, y1, z1), its lower bound, and the nearest shares."""
+    """Squared distance [m^2] of segments (x0, y0, z0, x1, y1, z1), its lower bound, and their nearest shares."""
     ax, ay, az = one[3] - one[0], one[4] - one[1], one[5] - one[2]
     bx, by, bz = other[3] - other[0], other[4] - other[1], other[5] - other[2]
     rx, ry, rz = one[0] - other[0], one[1] - other[1], one[2] - other[2]
@@ -141,7 +141,7 @@ def between_segments(one: Array, other: Array) -> tuple[float, float, float, flo
 
 @kernel
 def in_box_axes(box: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """A vector in a box's axes."""
+    """Convert a vector to a box's axes."""
     return (
         box[AXES] * x + box[AXES + 3] * y + box[AXES + 6] * z,
         box[AXES + 1] * x + box[AXES + 4] * y + box[AXES + 7] * z,

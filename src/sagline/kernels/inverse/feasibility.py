@@ -43,8 +43,8 @@ from sagline.kernels.tension.nearest import Distribution
 from sagline.kernels.tension.on_polygon import feasible_interval
 from sagline.kernels.tension.polygon import feasible_polygon
 
-SUPPORT = 1e-9  # smallest component of a cable that opposes the wrench, relative to the largest one
-AT_LIMIT = 1e-9  # largest distance from a limit that counts as at the limit, relative to the limit
+SUPPORT = 1e-9  # smallest component of a cable that opposes the wrench, relative to the largest component of all cables
+AT_LIMIT = 1e-9  # relative to the limit; a tension with a smaller distance counts as at the limit
 PROVED, ENOUGH = 0, 1  # columns of the brackets
 
 
@@ -61,9 +61,9 @@ def decide_poses(
     answers: Answers,
     verdicts: tuple[Array, Array, Array, Flags],
 ) -> None:
-    """Check the poses that the distribution iterations reported as infeasible, in terms of chord tensions.
+    """Check with chord tensions whether poses are feasible that the distribution iterations reported as infeasible.
 
-    Tensions are filled for each pose that proves to be feasible.
+    The tensions of feasible poses are filled.
 
     Args:
         model_terms: As in `inverse_poses`.
@@ -72,7 +72,8 @@ def decide_poses(
         poses: Rows (N, POSE_COLUMNS).
         wrenches: External plus inertial wrenches about the center of mass, (1 or N, 6).
         which: Indices of the poses, (K,).
-        covers: True if the method finds every feasible distribution. If False, a feasible pose gets POSE_NOT_COVERED.
+        covers: True if the method finds a distribution at every feasible pose. If False, a feasible pose gets
+            POSE_NOT_COVERED.
         memory: `memory_for` the number of cables.
         answers: As in `inverse_poses`; overwritten for these poses.
         verdicts: Filled for these poses: lower and upper bound of the smallest sufficient change of the force [N],
@@ -143,10 +144,10 @@ def _pose_status(statuses: Codes) -> int:
 
 
 class DemandArrays(NamedTuple):
-    """Work arrays for the demand on the cables of a pose."""
+    """Work arrays for the demand on the cables at a pose."""
 
     weight: Array  # root weights of the cables in the distribution's variable: ones, (m,)
-    demand: Demand  # size is not filled
+    demand: Demand  # the field `size` is not filled
     change: TensionChange
 
 
@@ -167,7 +168,7 @@ def new_demand(memory: Memory, m: int, freedom: Array) -> tuple[DemandArrays, Me
 def demand_of_pose(platform: Platform, cables: Cables, balance: Balance, work: DemandArrays) -> tuple[Demand, float]:
     """Fill the demand of a pose on its cables, and the tensions at the start of the search.
 
-    Returns the demand, and the lever arm [m] by which moments are divided.
+    Returns the demand, and the lever arm [m] by which its moments are divided.
     """
     demand = work.demand
     n, m = balance.matrix.shape
@@ -207,7 +208,7 @@ def demand_of_pose(platform: Platform, cables: Cables, balance: Balance, work: D
 
 @glue
 def _write_proof(demand: Demand, change: TensionChange, lever: float, farkas: Array) -> None:
-    """Fill the direction of the proof; its force part has length 1, or its moment part if the force part is zero."""
+    """Fill the direction of the proof; its force part has length 1, or, without a force part, its moment part."""
     n = farkas.size
     for k in range(n):
         farkas[k] = change.direction[k] if k < demand.soft else change.direction[k] / lever
@@ -241,7 +242,7 @@ def polygon_of_pose(
     memory: tuple[Array, Indices],
     polygon: tuple[Array, Array, Array, Array, Array, Indices],
 ) -> int:
-    """Fill the feasible set of one pose at fixed sag forces; returns the number of corners.
+    """Fill the set of feasible tensions of one pose at fixed sag forces; returns the number of its corners.
 
     Args:
         model_terms: As in `inverse_poses`.
@@ -250,7 +251,8 @@ def polygon_of_pose(
         robot_terms: As in `inverse_poses`, of one robot.
         pose: Row (POSE_COLUMNS,).
         wrench: External plus inertial wrench about the center of mass, (6,).
-        carried: Chord tensions and sag forces of the cables, (m,) each; for NaN, first-order sag forces are used.
+        carried: Chord tensions and sag forces of the cables, (m,) each; if they are NaN, first-order sag forces are
+            used.
         memory: `memory_for` the number of cables.
         polygon: Filled: scale and offset of the variable, (m,) each; minimum norm and limits, (3, m); null space (r,
             m); for r = 2 corners and labels as in `feasible_polygon`; for r = 1 the ends of the interval, corners[0, 0]
@@ -301,7 +303,7 @@ def margins_of_poses(
     memory: tuple[Array, Indices],
     margins: Array,
 ) -> None:
-    """Fill the capacity margins [N] (N,) of poses at given sag forces (N, m); NaN where the sag forces are NaN."""
+    """Fill the capacity margins [N] (N,) of poses with given sag forces (N, m); NaN where the sag forces are NaN."""
     limits = TensionLimits(*limit_terms)
     freedom, _bodies, robots = robot_terms
     count, m = sag_forces.shape

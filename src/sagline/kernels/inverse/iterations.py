@@ -44,8 +44,9 @@ def linearize_ends(model: Model, distribution: Distribution, cables: Cables, bal
 
 
 ITERATIONS = 30
-FREE_ITERATIONS = 8  # iterations after which the reference is fixed, so that rounding cannot change a tie
-CONVERGED = 1e-10  # largest change of a converged sag force [N], or relative to the largest tension:
+# iterations after which the reference is fixed, so that rounding cannot change the choice between equal tensions
+FREE_ITERATIONS = 8
+CONVERGED = 1e-10  # largest change of a converged sag force, in N and relative to the largest tension:
 SAG_ROUNDING = 1e-15
 
 
@@ -57,8 +58,8 @@ def distribute_and_solve_cables(
     """Distribute the tensions and solve the cables until their sag forces converge; returns the pose's status.
 
     cables: the cables from `set_pose`, with tensions, ratios and sag forces to be filled; work: work arrays for
-    frame-end tensions and for methods that are not projections, or None to exclude both from compilation; statuses:
-    filled with the status of each cable, (m,).
+    frame-end tensions and for methods that are not projections, or None so that both are not compiled; statuses: filled
+    with the status of each cable, (m,).
     """
     near.held.labels[0] = 0
     if work is not None:
@@ -114,7 +115,7 @@ def distribute_and_solve_cables(
 
 @glue
 def strain_admits_tensions(cables: Cables) -> bool:
-    """True if the strain of all cables without upper limit is allowed; distribution methods ignore this limit."""
+    """True if no cable without upper limit exceeds the largest strain, which distribution methods ignore."""
     for i in range(cables.tau.size):
         if cables.tau[i] > cables.high[i] and is_limited_by_strain(cables, i):
             return False
@@ -123,7 +124,7 @@ def strain_admits_tensions(cables: Cables) -> bool:
 
 @glue
 def fix_reference(balance: Balance, near: ReferencePoint) -> None:
-    """Make the present tensions the reference, and release an active bound of a tie."""
+    """Make the present tensions the reference, and release an active bound that is only due to a tie."""
     near.held.labels[0] = 0
     for k in range(balance.null.shape[0]):
         near.reference[k] = 0.0
@@ -133,7 +134,7 @@ def fix_reference(balance: Balance, near: ReferencePoint) -> None:
 
 @glue
 def take_tensions(cables: Cables, balance: Balance) -> tuple[float, float]:
-    """Copy the distributed tensions to the cables; returns the largest relative change and largest tension [N]."""
+    """Copy the distributed tensions to the cables; returns the largest relative change and the largest tension [N]."""
     largest = 0.0
     moved = 0.0
     for i in range(cables.tau.size):

@@ -1,7 +1,7 @@
 """Inverse kinematics of a batch of poses: tensions that balance the platform, and unstrained lengths of the cables.
 
 docs/model.md, sections 4 and 5. For the exact cable, the sag forces T_z - tau sin phi depend on the tensions. The
-balance is therefore solved repeatedly, with the sag forces of the last iteration, until they converge.
+balance is therefore solved repeatedly with the last sag forces, until the sag forces converge.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ Answers = tuple[Array, Codes, Array, Array, Codes]  # results, statuses, residua
 
 @glue
 def platform_at(robots: Robots, poses: Array, wrenches: Array, p: int) -> Platform:
-    """Platform at pose p; robots and wrenches have one row in total or one row per pose."""
+    """Platform at pose p; robots and wrenches have a single row for all poses, or one row per pose."""
     freedom, bodies, cables = robots
     body, cable_rows = bodies[min(p, bodies.shape[0] - 1)], cables[min(p, cables.shape[0] - 1)]
     return Platform(freedom, body, cable_rows, poses[p], wrenches[min(p, wrenches.shape[0] - 1)])
@@ -45,7 +45,7 @@ def platform_at(robots: Robots, poses: Array, wrenches: Array, p: int) -> Platfo
 
 @glue
 def model_at(terms: ModelTerms, body: Array) -> Model:
-    """Cable model in the gravity of a body."""
+    """Cable model with the gravity of a row of the body_table."""
     return Model(terms[0], terms[1], terms[2], body[tables.GRAVITY], None)
 
 
@@ -75,13 +75,13 @@ def inverse_poses(
             cable_table, (1 or N, m, CABLE_COLUMNS).
         poses: Rows (N, POSE_COLUMNS).
         wrenches: External plus inertial wrenches about the center of mass, (1 or N, 6).
-        previous: Reference tensions in the distribution's variable (m,), NaN for the minimum norm. With CLOSEST, filled
-            with the tensions of the last feasible pose.
+        previous: Reference tensions in the distribution's variable (m,), NaN for the minimum norm. CLOSEST overwrites
+            them with the tensions of the last feasible pose.
         memory: `memory_for` the number of cables.
-        otherwise: True for any method. None for projections onto a reference in chord or horizontal tensions, which
-            excludes the code of all other methods from compilation.
+        otherwise: True for any method. None if the method is a projection onto a reference in chord or horizontal
+            tensions; the code of all other methods is then not compiled.
         stability: True to prove the stability of each equilibrium. A solved pose without a proof then gets
-            UNPROVED_STABILITY. None excludes the proof from compilation.
+            UNPROVED_STABILITY. With None, the proof is not compiled.
         answers: Filled: span and rise of the free spans, unstrained length off the drum, T_x, T_z, tau, then the rows
             for pulleys and dead lengths, if any, (RESULT_ROWS, N, m); status of each cable, (N, m); norms of the
             unbalanced force [N] and moment [N m] along the free motions, (N, 2); wrench that J tau must supply along
@@ -170,7 +170,8 @@ def _write_behind(solved: bool, model: Model, cables: Cables, results: Array, p:
             results[tables.WRAP, p, i] = results[tables.WRAPPED, p, i] = math.nan
             results[tables.DEAD, p, i] = results[tables.SINE, p, i] = math.nan
     if solved:
-        tension = cables.last_sag_force  # exit points of the cables; the previous sag forces are no longer needed
+        # memory for the exit points of the cables, because the previous sag forces are no longer needed
+        tension = cables.last_sag_force
         for i in range(m):
             tension[i] = cables.tau[i]
         if model.code == codes.CATENARY:

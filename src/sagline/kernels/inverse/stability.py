@@ -23,7 +23,7 @@ from sagline.kernels.cable.terms import Model
 from sagline.kernels.jit import glue
 from sagline.kernels.memory import Memory, block, vector
 
-ROUNDING = 0.01  # smallest margin of a valid proof
+ROUNDING = 0.01  # a proof with a smaller margin is not valid
 
 
 class StabilityArrays(NamedTuple):
@@ -32,8 +32,8 @@ class StabilityArrays(NamedTuple):
     compliance: Array  # compliance of the platform ends along their chords [m/N], (m,)
     torque: Array  # sum of r T^T, T the force on a cable at its platform end [N m], (3, 3)
     geometric: Array  # geometric stiffness of the rotations [N m], (k, k)
-    elastic: Array  # upper bound of the compliance of the rotations [1/(N m)], later its factor L, (k, k)
-    proof: Array  # G L, then 1 + L^T G L, (2 k, k)
+    elastic: Array  # upper bound of the compliance of the rotations [1/(N m)], overwritten by its factor L, (k, k)
+    proof: Array  # the matrices G L and 1 + L^T G L, one below the other, (2 k, k)
 
 
 @glue
@@ -49,7 +49,7 @@ def new_stability_arrays(memory: Memory, m: int, k: int) -> tuple[StabilityArray
 
 @glue
 def proves_stability(model: Model, platform: Platform, cables: Cables, balance: Balance, work: StabilityArrays) -> bool:
-    """True if the equilibrium of a solved pose is proved to be stable; False without a proof."""
+    """True if it is proved that the equilibrium of a solved pose is stable."""
     k = work.geometric.shape[0]
     if model.code != codes.CATENARY and model.code != codes.ELASTIC:
         return False
@@ -113,7 +113,8 @@ def _fill_geometric_stiffness(platform: Platform, cables: Cables, balance: Balan
 def _fill_compliances(model: Model, cables: Cables, compliance: Array) -> None:
     """Fill upper bounds of the compliances u.(dB/dT) u of the platform ends along their chords, (m,) [m/N].
 
-    The bounds are exact without pulleys. They are infinite for deep sag, which is outside the range of the polynomial.
+    The bounds are exact if there are no pulleys. They are infinite for deep sag, which is outside the range of the
+    polynomial.
     """
     for i in range(cables.tau.size):
         length = cables.ratio[i] * cables.free_chord[i]

@@ -1,11 +1,12 @@
-"""Feasibility of a wrench with tensions within their limits, decided on the cables' exact curves.
+"""Feasibility of a wrench with tensions within their limits, decided with the exact sag forces of the cables.
 
-Tensions that balance the wrench prove its feasibility. A direction y can prove that it is infeasible: along y each
-cable contributes at most the largest value of its curve. If the sum of these values is less than the demand, no
-tensions balance the wrench. Otherwise a cable cannot be far below its largest value along y, which narrows its range of
-tensions. If the ranges do not become narrower, the range with the most uncertain sag force is split in two.
+Tensions that balance the wrench prove its feasibility. A direction y can prove that the wrench is infeasible: along y,
+the contribution of each cable has a largest value. If the sum of these values is less than the demand, no tensions
+balance the wrench. Otherwise the contribution of a cable cannot be far below its largest value, which narrows the range
+of its tension. If the ranges do not become narrower, the range with the most uncertain sag force is split in two.
 
-The gap of the first proof is a lower bound of the shortfall. The residual of the least change is an upper bound.
+The gap between the demand and the sum in the first proof is a lower bound of the shortfall. The residual of the least
+change of the wrench is an upper bound.
 """
 
 from __future__ import annotations
@@ -28,12 +29,12 @@ from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block, vector
 from sagline.kernels.tension.least_change import Demand, TensionChange, least_change, norm_of_part
 
-PLENTY = 1e6  # largest tension of a cable without limit, relative to the largest force
+PLENTY = 1e6  # upper end of the tensions of a cable without limit, relative to the largest force
 FEASIBLE = 1e-9  # relative to the largest force; a smaller residual of the balance counts as zero
-CERTAIN = 1e-14  # relative to the terms of the sum; a smaller gap may be rounding
-NODES = 300  # number of examined ranges after which the search stops without a result
+CERTAIN = 1e-14  # relative to the terms of the sum; a smaller gap may be a rounding error
+NODES = 300  # number of examined ranges; after this number the search ends without a result
 DEPTH = 40  # largest number of waiting ranges
-STANDSTILL = 0.7  # a range is split if more than this share of the uncertainty remains after narrowing
+STANDSTILL = 0.7  # a range is split if narrowing leaves more than this share of its uncertainty
 
 # Rows of a range (RANGE_ROWS, m): least and largest tensions, and the sag forces at them.
 LEAST, LARGEST, AT_LEAST, AT_LARGEST = 0, 1, 2, 3
@@ -48,7 +49,7 @@ def _section_of(range_: Array, i: int) -> Section:
 
 @formula
 def component_along(columns: Array, direction: Array, i: int) -> float:
-    """Component of a column along a direction."""
+    """Component of a column of a matrix along a direction."""
     total = 0.0
     for k in range(direction.size):
         total += direction[k] * columns[k, i]
@@ -59,7 +60,7 @@ def component_along(columns: Array, direction: Array, i: int) -> float:
 def _spare_capacity(curves: Curves, demand: Demand, range_: Array, direction: Array, tops: Array) -> float:
     """Capacity of the cables along a direction minus the demand [N]; a negative value proves infeasibility.
 
-    The value is an upper bound that includes rounding. tops is filled with the largest contribution of each cable,
+    The value is an upper bound that includes rounding errors. tops: filled with the largest contribution of each cable,
     (m,).
     """
     spare = 0.0
@@ -171,7 +172,7 @@ def _split_range(curves: Curves, waiting: Array, top: int, i: int, tau: float) -
 
 @glue
 def _first_range(curves: Curves, size: float, range_: Array) -> None:
-    """Fill the range of the admissible tensions. The upper end for a straight cable without limit is finite."""
+    """Fill the range of the admissible tensions. The upper end is finite, even for a straight cable without limit."""
     cables = curves.cables
     for i in range(cables.low.size):
         low, high = cables.low[i], cables.high[i]
@@ -189,7 +190,7 @@ def _approach_demand(
 ) -> tuple[float, bool]:
     """Compute the tensions in a range whose wrench is closest to the demand.
 
-    Returns the residual force [N], and True if the moments balance. If the moments cannot be balanced, the force is
+    Returns the residual force [N], and True if the moments balance. If the moments cannot balance, the force is
     infinite, and the direction has only a moment part.
     """
     n, m = demand.matrix.shape
@@ -215,10 +216,10 @@ def decide_feasibility(
 ) -> tuple[int, float, float, bool]:
     """Feasibility of a demand with tensions within the cables' limits.
 
-    nodes: largest number of examined ranges; change: start of the search, filled with the tensions of least residual,
+    nodes: largest number of examined ranges; change: initial tensions, overwritten with the tensions of least residual,
     this residual and its direction. Returns POSE_SOLVED, POSE_INFEASIBLE, POSE_BORDERLINE, or POSE_NOT_CONVERGED after
-    an arithmetic failure; the lower and upper bound of the shortfall [N]; and True if the one direction proves
-    infeasibility over the whole first range.
+    an arithmetic failure; the lower and upper bound of the shortfall [N]; and True if a single direction proves
+    infeasibility for the whole first range.
     """
     n, m = demand.matrix.shape
     tops, rest = vector(memory, m)  # largest contribution of each cable along a direction [N]

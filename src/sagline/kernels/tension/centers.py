@@ -15,14 +15,14 @@ from sagline.kernels.tension.norms import program_status
 from sagline.kernels.tension.on_polygon import centroid, feasible_corners
 from sagline.kernels.tension.polygon import WorkArrays
 
-THIN = 1e-9  # smallest thickness of a set with a center, relative to the largest tension
+THIN = 1e-9  # relative to the largest tension; a thinner feasible set has no center
 NEWTON_STEPS = 200
 CENTERED = 1e-18  # square of the Newton decrement at which the search ends
 
 
 @kernel
 def share_at_center(bounds: Array, null: Array, point: Array, work: WorkArrays) -> int:
-    """Move the point (r,) to the analytic center, starting from the previous center, if any."""
+    """Move the point (r,) to the analytic center; the search starts from the previous center if there is one."""
     corners, labels, known = work.corners, work.labels, work.known
     if known[0] > 0 and keeps_limits_inside(bounds, null, point) and _analytic_center(bounds, null, work.rest, point):
         return codes.POSE_SOLVED
@@ -67,7 +67,8 @@ def deepest_point(bounds: Array, null: Array, work: WorkArrays, point: Array) ->
     """Fill the point (r,) whose tensions are farthest from their nearest limits; returns the pose's status."""
     r, m = null.shape
     rows, memory = block(work.rest, r + 1, 2 * m)
-    halves, memory = block(memory, STRIP_ROWS, 2 * m)  # one bound per limit, narrowed by the depth, which is an unknown
+    # one bound per limit; the distance from all limits is an additional unknown, by which the bounds are narrowed
+    halves, memory = block(memory, STRIP_ROWS, 2 * m)
     vectors, memory = block(memory, 2, r + 1)
     cost, found = vectors[0], vectors[1]
     for i in range(m):

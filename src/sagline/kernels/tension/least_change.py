@@ -1,4 +1,4 @@
-"""Least change of a wrench to a feasible wrench, with tensions within their limits, on the cables' exact curves.
+"""Least change that makes a wrench feasible with tensions within their limits and with the exact sag forces.
 
 The wrench of cable i on the platform is the curve J_i tau - G_i s_i(tau) with the sag force s_i. Newton steps replace
 the curves by their tangents. Each step is a least-squares problem within limits. The moments are hard equations, so
@@ -30,9 +30,10 @@ NEWTON_STEPS = 40
 HALVINGS = 12
 STEADINESS = 1e-8  # weight of the squared change of a tension, relative to the weight of the squared wrench
 DECREASE = 1e-4  # share of the predicted decrease that a step must reach
-STIFFEST = 1e3  # largest weight of a curvature; a larger one would make the normal matrix ill-conditioned
-STANDS = 1e-13  # smallest predicted decrease, relative to the largest force; the search ends below it
-STEADY = 1e-6  # relative to the residual; smaller changes of the tensions do not change the direction of the residual
+STIFFEST = 1e3  # largest weight of a curvature; a larger weight would make the normal matrix ill-conditioned
+STANDS = 1e-13  # relative to the largest force; the search ends if the predicted decrease is smaller
+# relative to the residual; a smaller change of the tensions does not change the direction of the residual
+STEADY = 1e-6
 
 
 class Demand(NamedTuple):
@@ -58,17 +59,17 @@ class _Tangents(NamedTuple):
     """One Newton step, with h hard and k soft rows and d = m - h unknowns."""
 
     matrix: Array  # J - G dsag_force/dtau, (n, m)
-    reduced: Array  # hard rows of `matrix`, later their Householder reflections, (h, m)
+    reduced: Array  # hard rows of `matrix`, overwritten by their Householder reflections, (h, m)
     diagonals: Array  # diagonals of their QR factors, (2, h)
     q: Array  # orthogonal factor, and a work row, (m + 1, m)
     inverse: Array  # transposed pseudo-inverse of the hard rows, (h, m)
     soft: Array  # soft rows along the null space of the hard rows, (k, d)
-    normal: Array  # normal matrix of `soft` and of the weights of change, later its factor, (d, d)
+    normal: Array  # normal matrix of `soft` and of the weights of change, overwritten by its factor, (d, d)
     rows: Array  # derivatives of the tensions with respect to the unknowns, (d, m)
     bounds: Array  # optimal tensions without limits, and the limits, (3, m)
     unknowns: Array  # right side, a target of zeros, and the point, (3, d)
     held: ActiveSet  # active limits of the last point
-    push: Array  # slopes of the sag forces, later multipliers of the limits, (m,)
+    push: Array  # slopes of the sag forces, overwritten by the multipliers of the limits, (m,)
     bend: Array  # weights of the squared changes of the tensions, (m,)
     multipliers: Array  # residual of the last step, and multipliers of its hard rows [N], (n,)
     trial: tuple[Array, Array, Array]  # tensions, (m,), sag forces, (m,), and residual, (n,), of a trial step
@@ -240,10 +241,10 @@ def _point_along(soft: int, change: TensionChange, step: _Tangents) -> float:
 
 @glue
 def _line_search(curves: Curves, demand: Demand, rest: float, change: TensionChange, step: _Tangents) -> bool:
-    """Halve a step until it reaches the required decrease; False if no step does, or if the last step is worse.
+    """Halve a step until it gives the required decrease; False if no step does, or if the result is worse.
 
-    The weight of the hard residual exceeds the multipliers of the hard rows. A step therefore cannot increase the hard
-    residual to decrease the soft one.
+    The weight of the hard residual exceeds the multipliers of the hard rows. A step therefore cannot decrease the soft
+    residual by an increase of the hard residual.
     """
     n, m = demand.matrix.shape
     soft = demand.soft
@@ -280,11 +281,11 @@ def _line_search(curves: Curves, demand: Demand, rest: float, change: TensionCha
 
 @kernel
 def least_change(curves: Curves, demand: Demand, ranges: Array, change: TensionChange, memory: Memory) -> float:
-    """Change tensions within their ranges until the residual of the demand is least; returns its length [N].
+    """Change tensions within their ranges until the residual of the demand is least; returns the residual's length [N].
 
-    ranges: least and largest tensions, rows 0 and 1; change: start of the search, filled with the result. The result is
-    the length of the soft residual [N]. It is infinite if hard rows and ranges contradict each other on the tangents,
-    and NaN if the hard rows are linearly dependent.
+    ranges: least and largest tensions, rows 0 and 1; change: start of the search, overwritten with the result. The
+    returned length is that of the soft residual [N]. It is infinite if hard rows and ranges contradict each other on
+    the tangents, and NaN if the hard rows are linearly dependent.
     """
     n, m = demand.matrix.shape
     soft = demand.soft

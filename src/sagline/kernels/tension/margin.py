@@ -19,14 +19,15 @@ from sagline.kernels.algebra.factors import normalize_row, orthogonalize_row
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block, counters
 
-MOST_FACES = 1 << 40  # upper bound of the loop; never reached
+MOST_FACES = 1 << 40  # largest number of passes of the loop, which is never reached
 ALONG = 1e-13  # a column lies in the face if its component along the unit normal is smaller
-DEPENDENT = 1e-20  # a column depends on the others if a smaller share of its squared length is outside their span
+# a column counts as dependent on the others if the share of its squared length outside their span is smaller
+DEPENDENT = 1e-20
 
 
 @glue
 def next_choice(chosen: Indices, m: int) -> int:
-    """Replace a combination by the next one; returns the first changed position, -1 after the last combination."""
+    """Replace a combination by the next combination; returns the first changed position, or -1 after the last."""
     count = chosen.size
     place = -1
     for k in range(count):
@@ -62,7 +63,7 @@ def extend_frame(matrix: Array, chosen: Indices, first: int, frame: Array, trian
 
 @glue
 def complete_frame(frame: Array, triangle: Array) -> None:
-    """Fill the last row of a frame (n, n), which is perpendicular to all others."""
+    """Fill the last row of a frame (n, n), which is perpendicular to all other rows."""
     n = frame.shape[0]
     best = 0
     least = math.inf
@@ -79,7 +80,7 @@ def complete_frame(frame: Array, triangle: Array) -> None:
 
 @formula
 def zonotope_reach(matrix: Array, low: Array, high: Array, normal: Array) -> tuple[float, float]:
-    """Largest values of normal . J t and of -normal . J t over all t within their limits; may be infinite."""
+    """Largest values of normal . J t and of -normal . J t for all tensions t within their limits; may be infinite."""
     n, m = matrix.shape
     forward = 0.0
     backward = 0.0

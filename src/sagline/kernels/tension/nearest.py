@@ -47,7 +47,7 @@ def new_reference_point(memory: Memory, previous: Array, r: int) -> tuple[Refere
 
 @glue
 def set_reference(distribution: Distribution, offset: Array, null: Array, near: ReferencePoint) -> None:
-    """Fill the reference point in the null space for the tension distribution.
+    """Fill the reference point of the tension distribution in the null space.
 
     offset: offset of the distribution's variable (m,).
     """
@@ -96,5 +96,5 @@ def share_nearest(bounds: Array, null: Array, near: ReferencePoint, tension: Arr
 
 @glue
 def is_nearest(distribution: Distribution) -> bool:
-    """True if a method is a projection onto a reference."""
+    """True if a method gives the feasible tensions nearest to a reference."""
     return distribution.method <= codes.QUADRATIC_PROGRAM

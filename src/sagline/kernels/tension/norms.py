@@ -1,6 +1,6 @@
 """Distributions with the least norm of the tensions: sum and maximum by linear programs, p-norms by Newton steps.
 
-Each Newton step is projected onto the feasible set in the metric of the step.
+Each Newton step is projected onto the feasible set, with distances in the metric of the step.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block, vector
 from sagline.kernels.tension.nearest import ReferencePoint
 
-TIED = 1e-10  # relative; smaller differences of sums count as ties, and smaller weights count as zero
+TIED = 1e-10  # relative; sums with a smaller difference count as equal, and smaller weights count as zero
 
 
 @formula
 def program_status(outcome: int) -> int:
-    """Status of the pose from a linear program's outcome."""
+    """Status of the pose that belongs to the outcome of a linear program."""
     if outcome == LP_SOLVED:
         return codes.POSE_SOLVED
     if outcome == LP_UNBOUNDED:
@@ -83,7 +83,7 @@ def share_lowest_sum(bounds: Array, null: Array, near: ReferencePoint, basis: Ba
 def share_lowest_maximum(
     bounds: Array, offset: Array, null: Array, near: ReferencePoint, basis: Basis, memory: Memory
 ) -> int:
-    """Fill the point (r,) of `near` that minimizes the largest tension (if not unique, nearest to the reference).
+    """Fill the point (r,) of `near` with the least maximum tension; among several, the point nearest to the reference.
 
     The program's last unknown is the largest tension.
     """
@@ -128,8 +128,8 @@ def share_lowest_maximum(
 
 STEPS = 200
 HALVINGS = 40
-CLOSE = 1e-2  # relative to the largest tension; after a shorter step, the exponent is increased
-STILL = 1e-12  # relative to the largest tension; a shorter step ends the search
+CLOSE = 1e-2  # relative to the largest tension; the exponent is increased after a shorter step
+STILL = 1e-12  # relative to the largest tension; the search ends after a shorter step
 
 
 @kernel

@@ -1,8 +1,8 @@
 """Methods on the corners of the feasible polygon or interval: its centroid, and the polygon walk.
 
-The limits of two cables form a parallelogram. The walk starts at one of its corners and follows the border of the
-included limits. At the line of a violated limit, the walk turns into this line and includes the limit. After a full
-turn without violated limits, the walk has visited all corners. If a limit is still violated after a full turn, the
+The limits of two cables form a parallelogram. The walk starts at a corner of this parallelogram and follows the border
+of the included limits. At the line of a violated limit, the walk turns into this line and includes the limit. After a
+full turn without violated limits, the walk has visited all corners. If a limit is still violated after a full turn, the
 polygon is empty.
 
 Source:
@@ -71,7 +71,7 @@ def walk_polygon(bounds: Array, null: Array, memory: Memory, corners: Array, lab
     met, memory = counters(memory, 2 * m)  # 1 for an included limit
     a, b = most_independent(null)
     line = 2 * a
-    # start: the corner from which line a runs counter-clockwise, with the inside on its left
+    # start: the corner at which line a begins; it runs counter-clockwise, with the inside on its left
     other = 2 * b
     cross = lines[line, 0] * lines[other, 1] - lines[line, 1] * lines[other, 0]
     if cross > 0.0:
@@ -134,7 +134,7 @@ WALK_SUM, WALK_NORM, WALK_CENTROID = 0.0, 1.0, 2.0  # the optimum of the polygon
 def distribute_on_polygon(
     method: int, parameter: float, bounds: Array, null: Array, near: ReferencePoint, work: WorkArrays
 ) -> int:
-    """Fill the point (r,) of `near` by centroid or polygon walk; tries the sides of the last polygon first."""
+    """Fill the point (r,) of `near` by centroid or polygon walk; the sides of the last polygon are tried first."""
     r, m = null.shape
     corners, labels, known = work.corners, work.labels, work.known
     count = known[0]
@@ -167,7 +167,7 @@ def distribute_on_polygon(
 
 @kernel
 def feasible_interval(bounds: Array, null: Array) -> tuple[float, float]:
-    """Ends of the feasible interval for r = 1. If it is empty, the first end exceeds the second."""
+    """Ends of the feasible interval for r = 1. If the interval is empty, the first end exceeds the second."""
     slack = TOLERANCE * largest_bound(bounds)
     first = -math.inf
     last = math.inf
@@ -242,7 +242,7 @@ def centroid(corners: Array, count: int) -> tuple[float, float]:
 def lowest_corner(
     bounds: Array, null: Array, corners: Array, count: int, goal_x: float, goal_y: float
 ) -> tuple[float, float]:
-    """The point with the least sum of tensions. If a whole side has the least sum, the point nearest to the goal."""
+    """The point with the least sum of tensions; if a whole side has this sum, its point nearest to the goal."""
     r, m = null.shape
     gx = 0.0
     gy = 0.0

@@ -18,14 +18,15 @@ from sagline.kernels.tension.norms import share_by_norm, share_lowest_maximum, s
 from sagline.kernels.tension.on_polygon import distribute_on_polygon
 from sagline.kernels.tension.polygon import WorkArrays
 
-DEPENDENT = 1e-10  # a cable depends on the fixed cables if the squared length of its remaining row is smaller
+# a cable counts as dependent on the fixed cables if the squared length of its remaining row is smaller
+DEPENDENT = 1e-10
 
 
 @kernel
 def share_near_middle(method: int, bounds: Array, null: Array, memory: Memory, tension: Array) -> bool:
     """Fill the tensions (m,) by the closed form, the improved closed form or the puncture method.
 
-    Returns whether the method found tensions within their limits.
+    Returns True if the method found tensions within their limits.
 
     Source:
         Pott, Bruckmann & Mikelsons 2009; Pott 2014; Mueller, Reichert & Bruckmann 2015.
@@ -55,7 +56,7 @@ def share_near_middle(method: int, bounds: Array, null: Array, memory: Memory, t
 def _hold_violated(bounds: Array, null: Array, slack: float, memory: Memory, tension: Array) -> bool:
     """Fix the cable with the largest violation at its limit and distribute the rest again, until no limit is violated.
 
-    The tensions change in place, by orthogonal steps in the null space. A fixed cable remains fixed.
+    The tensions change in place, by orthogonal steps in the null space. A cable that was fixed remains fixed.
     """
     r, m = null.shape
     held, memory = block(memory, r + 1, r)
@@ -116,9 +117,9 @@ def distribute_by_other_method(
     work: WorkArrays,
     tension: Array,
 ) -> int:
-    """Fill the tensions (m,) in the distribution's variable less its offset; return POSE_SOLVED or the failure.
+    """Fill the tensions (m,) in the distribution's variable minus its offset; return POSE_SOLVED or the failure.
 
-    If the solution is not unique, the one nearest to the reference is selected.
+    Among several solutions, the solution nearest to the reference is selected.
     """
     method, parameter = distribution.method, distribution.parameter
     status = codes.POSE_SOLVED

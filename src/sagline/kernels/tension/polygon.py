@@ -25,7 +25,7 @@ SPARE_CORNERS = 6  # corners in addition to two per cable: corners of the box, a
 def _cut_polygon(
     corners: Array, labels: Indices, count: int, x: float, y: float, side: float, label: int, slack: float
 ) -> int:
-    """Keep the part of the polygon where (x, y) . corner >= side; returns the number of corners left.
+    """Keep the part of the polygon where (x, y) . corner >= side; returns the number of remaining corners.
 
     The corners change in place. The border of a half-plane crosses the border of a convex polygon at most twice.
     """
@@ -55,7 +55,7 @@ def _cut_polygon(
 
 @formula
 def _crossing(corners: Array, inside: int, outside: int, x: float, y: float, side: float) -> tuple[float, float]:
-    """Intersection of the line (x, y) . corner = side with the edge between two corners, which it separates."""
+    """Intersection of the line (x, y) . corner = side with the edge between two corners, one on each side."""
     px, py = corners[inside, 0], corners[inside, 1]
     qx, qy = corners[outside, 0], corners[outside, 1]
     depth = x * px + y * py - side
@@ -84,9 +84,9 @@ def _shift_corners(corners: Array, labels: Indices, count: int, leaving: int, en
 
 @glue
 def widest_pair(null: Array) -> tuple[int, int, float]:
-    """Two cables whose rows span a large parallelogram, and its signed area.
+    """Two cables whose rows span a large parallelogram, and the signed area of the parallelogram.
 
-    The first cable has the longest row; the second one gives the largest area with it.
+    The first cable has the longest row. The second cable gives the largest area together with the first cable.
     """
     m = null.shape[1]
     first = second = 0
@@ -150,7 +150,8 @@ def feasible_polygon(bounds: Array, null: Array, corners: Array, labels: Indices
         below, above = bounds[LOW, i] - bounds[START, i], bounds[HIGH, i] - bounds[START, i]
         if least > above + slack or most < below - slack or below > above + slack:
             return 0
-        if abs(x) + abs(y) < FLAT or i == a or i == b:  # satisfied from the start, except for rounding
+        # the initial polygon already satisfies this limit, except for rounding
+        if abs(x) + abs(y) < FLAT or i == a or i == b:
             continue
         for upper in range(2):
             if least < below - slack if upper == 0 else most > above + slack:
@@ -164,9 +165,9 @@ def feasible_polygon(bounds: Array, null: Array, corners: Array, labels: Indices
 
 @kernel
 def polygon_again(bounds: Array, null: Array, corners: Array, labels: Indices, count: int) -> bool:
-    """Fill the corners of a polygon with known sides; False if the feasible polygon has other sides.
+    """Fill the corners of the feasible polygon from its known sides; False if the polygon has other sides.
 
-    The known sides are still correct if they follow each other in this order, and if no limit cuts off a corner.
+    The known sides are correct if they follow each other in this order, and if no limit excludes a corner.
     """
     m = null.shape[1]
     slack = TOLERANCE * largest_bound(bounds)
@@ -214,7 +215,7 @@ def nearest_on_side(ax: float, ay: float, bx: float, by: float, x: float, y: flo
 
 @kernel
 def nearest_corner_point(corners: Array, count: int, x: float, y: float) -> tuple[float, float]:
-    """Projection of a point outside a convex polygon onto it."""
+    """Projection of an outer point onto a convex polygon."""
     best = math.inf
     best_x = x
     best_y = y
@@ -230,13 +231,13 @@ def nearest_corner_point(corners: Array, count: int, x: float, y: float) -> tupl
 
 
 class WorkArrays(NamedTuple):
-    """Work arrays whose content is kept between iterations."""
+    """Work arrays that keep their content from one iteration to the next."""
 
     corners: Array  # corners of the feasible polygon, (2m + SPARE_CORNERS, 2)
     labels: Indices  # labels of its sides, (2m + SPARE_CORNERS,)
-    known: Indices  # number of corners of the last polygon, (1,); 0 without a polygon
+    known: Indices  # number of corners of the last polygon, (1,); 0 if there is none
     basis: Basis  # basis of the linear program of the last iteration
-    rest: Memory  # memory whose content is not kept
+    rest: Memory  # memory that does not keep its content
 
 
 @glue

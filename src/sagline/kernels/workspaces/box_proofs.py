@@ -1,4 +1,4 @@
-"""Proofs for a box of poses: a tension policy within the limits, or a direction that separates demand and wrenches."""
+"""Proofs for a box of poses: tensions within the limits, or a direction between demand and available wrenches."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ from sagline.kernels.workspaces.pose_box import MOTIONS, CablesInBox, PoseRange,
 from sagline.kernels.workspaces.sag_force_bounds import fall, fall_rate, rise, rise_rate, sag_force_slope
 from sagline.kernels.workspaces.wrench_set import Loads, dot6, reach_of_loads
 
-POOREST_INVERSE = 1e-6  # largest error of the pseudo-inverse; above it the pose is almost singular, without proof
-HEADROOM = 1.2  # ratio of the box of tensions for the proof to the first estimate
-ITERATIONS = 3  # iterations of this estimate
+# largest error of the pseudo-inverse; with a larger error the pose is almost singular, and there is no proof
+POOREST_INVERSE = 1e-6
+HEADROOM = 1.2  # size of the box of tensions for the proof, divided by its first estimate
+ITERATIONS = 3  # number of iterations of this estimate
 
 
 class Precision(NamedTuple):
@@ -38,9 +39,9 @@ def proves_inside(
     precision: Precision,
     memory: Memory,
 ) -> bool:
-    """True if the tensions tau + J^+ z are within the limits at all poses of a box; z: demand of poses and loads.
+    """True if the tensions tau + J^+ z are within the limits at all poses of a box; z: change of the demand.
 
-    centered.give is filled with the change of each tension due only to the set of wrenches [N].
+    centered.give is filled with the part of each tension change that is due to the set of wrenches [N].
     """
     n, m = place.matrix.shape
     inverse, memory = block(memory, m, n)
@@ -143,8 +144,8 @@ def proves_inside(
     return possible
 
 
-BORNE = 0.3  # largest share of the gap that a free cable may use
-PIECES = 4  # pieces of the tension range below the tension of a cable; the lower end of a piece is half its upper end
+BORNE = 0.3  # largest share of the gap that a cable between its limits may use
+PIECES = 4  # number of pieces of the range below the tension of a cable; the lower end of a piece is half its upper end
 
 # rows of the cables' contributions along a direction
 VALUE, BENT, SPREAD, HANGING, HANGING_SPREAD, HANGING_BENT = 1, 2, 3, 4, 5, 6
@@ -161,10 +162,10 @@ def proves_outside(
     precision: Precision,
     memory: Memory,
 ) -> bool:
-    """True if a direction y, varying with the pose, separates demand and available wrenches at all poses of a box.
+    """True if a direction y, which depends on the pose, separates demand and available wrenches in a box of poses.
 
-    The direction is the residual of the centered tensions, with its derivatives by the pose. A small correction of the
-    direction makes the contribution of cables between their limits zero or less.
+    The direction is the residual of the centered tensions, with its derivatives with respect to the pose. After a small
+    correction of the direction, the cables between their limits contribute zero or less.
     """
     n, m = place.matrix.shape
     wide, memory = block(memory, 7 + MOTIONS, m)
@@ -255,11 +256,11 @@ def proves_outside(
 
 @kernel
 def _measure_direction(place: CablesInBox, box: PoseRange, direction: Array, turning: Array, rows: Array) -> None:
-    """Fill the contributions per newton of tension and of sag force along a direction, and their changes in a box.
+    """Fill the contributions along a direction, per newton of tension and of sag force, and their changes in a box.
 
-    direction: y at the middle, (6,); turning: slopes of y with each motion, (MOTIONS, 6); rows: filled for tensions,
-    then for sag forces, with the value at the middle, the largest linear change (SPREAD), and the largest deviation
-    from the linear change (BENT).
+    direction: y at the middle, (6,); turning: derivatives of y with respect to each motion, (MOTIONS, 6); rows: filled
+    for tensions, then for sag forces, with the value at the middle, the largest linear change (SPREAD), and the largest
+    deviation from the linear change (BENT).
     """
     m = place.way.size
     motions = MOTIONS if box.turn > 0.0 else 3
@@ -302,7 +303,7 @@ def _measure_direction(place: CablesInBox, box: PoseRange, direction: Array, tur
                 vz += direction[3] * rx + direction[4] * ry
             slope = place.slopes[motion]
             change = vx * place.full[0, i] + vy * place.full[1, i] + vz * place.full[2, i]
-            # only the derivative of the unit vector
+            # only the derivative of the unit vector contributes
             change += x * slope[i] + y * slope[m + i] + z * slope[2 * m + i]
             if motion < 3:
                 half = box.half[motion]
@@ -338,7 +339,7 @@ def _most_of_run(slope: float, rate: float, most: float, width: float) -> float:
 
 @kernel
 def _most_of_cable(place: CablesInBox, curves: Curves, ranges: Ranges, tau: float, i: int, rows: Array) -> float:
-    """Upper bound over a box: gain of a cable's contribution along y if its tension differs from tau."""
+    """Upper bound, in a box, of the increase of a cable's contribution along y if its tension differs from tau."""
     low, high = ranges.lowest[i], ranges.highest[i]
     bend, spread, hanging = rows[BENT, i], rows[SPREAD, i], rows[HANGING, i]
     weight = abs(hanging)

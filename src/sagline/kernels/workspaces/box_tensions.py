@@ -1,4 +1,4 @@
-"""Tensions for a box of poses: limits for all its poses, and tensions well inside these limits at its middle.
+"""Tensions for a box of poses: limits that apply at all its poses, and tensions well inside these limits at its middle.
 
 Centered tensions minimize a sum of two terms. The first term is the smoothing times the sum over cables of -log(tau -
 low) - log(high - tau). The second term is half the squared residual of the demand. If the demand is feasible, the
@@ -26,7 +26,8 @@ from sagline.kernels.workspaces.sag_force_bounds import has_sag, largest_sag_for
 STEPS = 40
 REDUCTION = 0.1  # smallest factor of the smoothing per step
 TO_LIMIT = 0.95  # largest step, relative to the distance to a limit
-CENTERED = 0.2  # relative error of slack times barrier force at the center, without effect on the validity of proofs
+# largest relative error of slack times barrier force at the center; it has no effect on the validity of proofs
+CENTERED = 0.2
 FARTHEST = 50.0  # upper end of the search for a tension without limit, relative to the sum of all forces
 
 
@@ -38,16 +39,16 @@ class Centered(NamedTuple):
     tau: Array  # tensions, strictly inside, (m,)
     below: Array  # barrier forces of the lower limits [N], (m,), > 0
     above: Array  # barrier forces of the upper limits [N], (m,), > 0
-    give: Array  # inverse of the barrier's stiffness for each tension, (m,)
+    give: Array  # inverse of the second derivative of the barrier for each tension, (m,)
     right: Array  # demand on the chord tensions [N], (n,)
-    left: Array  # its residual, (n,)
-    normal: Array  # working space, (n, n)
-    vector: Array  # working space, (n,)
+    left: Array  # residual of the demand, (n,)
+    normal: Array  # work array, (n, n)
+    vector: Array  # work array, (n,)
 
 
 @glue
 def new_centered(memory: Memory, m: int, n: int) -> tuple[Centered, Memory]:
-    """Work arrays for m cables and n rows, without tensions, and the remaining memory."""
+    """Work arrays for m cables and n rows, which contain no tensions yet, and the remaining memory."""
     wide, memory = block(memory, 6, m)
     thin, memory = block(memory, 3 + n, n)
     centered = Centered(wide[0], wide[1], wide[2], wide[3], wide[4], wide[5], thin[0], thin[1], thin[3:], thin[2])
@@ -165,11 +166,12 @@ def find_center(matrix: Array, smoothing: float, centered: Centered) -> float:
     return square
 
 
-SMOOTHNESS = 0.01  # residual due to the smoothing, relative to the change of the demand over a box
+SMOOTHNESS = 0.01  # residual that is due to the smoothing, relative to the change of the demand in a box
 SLACK = 0.45  # largest X at which a frame-end limit changes at most as fast as the sag force
-LEAST_WIDTH = 0.05  # smallest range of the search after subtracting the set of wrenches, relative to the full range
+# smallest range of the search that remains after the set of wrenches is subtracted, relative to the full range
+LEAST_WIDTH = 0.05
 ITERATIONS = 2  # iterations of tensions and their sag forces
-LEAST_WAY = 1e-4  # lower bound of the displacement that determines the smoothing, relative to a chord
+LEAST_WAY = 1e-4  # smallest displacement that determines the smoothing, relative to a chord
 
 
 class Ranges(NamedTuple):
@@ -205,11 +207,12 @@ def set_ranges(quantity: int, place: CablesInBox, curves: Curves, ranges: Ranges
 
 @kernel
 def _move_limits(place: CablesInBox, curves: Curves, i: int, ranges: Ranges) -> None:
-    """Separate the chord limits that follow from frame-end limits at the middle, by their change in a box.
+    """Widen or narrow the chord limits that follow from frame-end limits at the middle, by their change in a box.
 
-    Away from slackness, a limit changes at most as fast as the sag force. A limit that may be slack somewhere in the
-    box is replaced. Proofs of feasibility use the least limit without slackness; proofs of infeasibility use zero. If a
-    cable has no admissible tension at the middle, its admissible tensions elsewhere in the box, if any, are slack.
+    If a cable is not slack, a limit changes at most as fast as the sag force. A limit at which the cable may be slack
+    somewhere in the box is replaced: in proofs of feasibility by the least limit without slackness, in proofs of
+    infeasibility by zero. If a cable has no admissible tension at the middle, it is slack at any admissible tension
+    elsewhere in the box.
     """
     cables = curves.cables
     way = place.way[i]
@@ -225,10 +228,10 @@ def _move_limits(place: CablesInBox, curves: Curves, i: int, ranges: Ranges) -> 
 
 @kernel
 def tighten(freedom: Array, place: CablesInBox, curves: Curves, upward: float, ranges: Ranges) -> None:
-    """Reduce the largest tensions to the values that the load can cause, if all cables pull up.
+    """If all cables pull upward, reduce the largest tensions to the values that the load can cause.
 
     The vertical parts of all tensions balance weight, load and sag forces. The vertical part of one tension is
-    therefore at most this sum minus the smallest vertical parts of the others.
+    therefore at most this load minus the smallest vertical parts of the other tensions.
 
     freedom: rows that select the free motions, (n, 6); upward: largest vertical force that the cables must supply,
     without sag forces [N].
@@ -287,7 +290,7 @@ def _fill_demand(
 ) -> None:
     """Fill the demand on the chord tensions, with the sag forces at the present tensions.
 
-    load: wrench, (6,); centered: contains tensions, its right side is filled; ranges: its sag forces are filled.
+    load: wrench, (6,); centered: its tensions are used, its right side is filled; ranges: the sag forces are filled.
     """
     n, m = place.matrix.shape
     sag_forces_at(curves, centered.tau, ranges.sag_force)
@@ -306,7 +309,7 @@ def _fill_demand(
 
 @glue
 def _smoothing_of(place: CablesInBox, geometry: Array, tau: Array) -> float:
-    """Smoothing for a box [N^2], proportional to the squared change of the wrench of the tensions in the box."""
+    """Smoothing for a box [N^2], proportional to the square of the change in the box of the wrench of the tensions."""
     square = 0.0
     for i in range(tau.size):
         change = tau[i] * max(place.way[i] / geometry[g.CHORD, i], LEAST_WAY)
@@ -318,7 +321,7 @@ def _smoothing_of(place: CablesInBox, geometry: Array, tau: Array) -> float:
 def search_limits(ranges: Ranges, taken: Array, size: float, centered: Centered) -> bool:
     """Fill the limits of the search for tensions: the limits of the box, narrowed by `taken` (m,).
 
-    Returns False if a lower limit exceeds an upper one.
+    Returns False if a lower limit exceeds the upper limit.
     """
     possible = True
     for i in range(taken.size):

@@ -1,9 +1,9 @@
-"""Margin on the exact curves of the cables, near zero, where the bounds of the sag forces do not decide its sign.
+"""Margin with the exact sag forces of the cables, if bounds of the sag forces do not decide its sign.
 
 Let y be the normal of the limiting facet, and e the load with y . e = 1 N. The margin near zero is the largest multiple
-of e that the cables can supply in addition to the demand. Newton steps on the exact curves find this multiple. All
-components of the balance are hard equations, except the component along e. Farther from zero, the decision of `inverse`
-confirms the sign of the margin.
+of e that the cables can supply in addition to the demand. Newton steps with the exact sag forces find this multiple.
+All components of the balance are hard equations, except the component along e. Farther from zero, the decision of
+`inverse` confirms the sign of the margin.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from sagline.kernels.tension.bracket import decide_feasibility
 from sagline.kernels.tension.least_change import Demand, TensionChange, least_change
 from sagline.kernels.workspaces.sag_force_bounds import HIGH, LOW, SAG_FORCE_LOW, SLOPE
 
-EXACT = 1e-5  # error bound of a margin on the exact curves, relative to the largest force
-NARROW = 1e-3  # relative to the largest force; within narrower bounds, the margin in the limiting facet is used
-CLOSE = 1e-3  # relative to the largest force; the sign of a smaller margin on the exact curves is not confirmed
-NEAR = 1e-2  # relative to the largest force; a smaller margin gets only a short confirming search
-SHORT, LONG = 4, 300  # numbers of examined ranges
-HARDLY = 1e-9  # value at a decided pose whose margin has the other sign, relative to the largest force
+EXACT = 1e-5  # bound of the error of a margin with exact sag forces, relative to the largest force
+NARROW = 1e-3  # relative to the largest force; if the bounds are narrower, the margin in the limiting facet is used
+CLOSE = 1e-3  # relative to the largest force; the sign of a smaller margin with exact sag forces is not confirmed
+NEAR = 1e-2  # relative to the largest force; the search that confirms a smaller margin is short
+SHORT, LONG = 4, 300  # largest numbers of examined ranges
+HARDLY = 1e-9  # value at a pose where the decision and the margin have different signs, relative to the largest force
 FURTHER = 1.01  # start of the search, relative to the upper bound of the margin
 IN_FACET = 1e-9  # relative to the terms of the product; a secant with a smaller product is in the facet
 
@@ -39,7 +39,7 @@ VALUE, BELOW, ABOVE = 0, 1, 2  # rows of a margin (3,) [N]
 
 
 class LimitingFacet(NamedTuple):
-    """The limiting facet of a pose if the bounds of the margin do not decide its sign."""
+    """The limiting facet of a pose at which the bounds of the margin do not decide its sign."""
 
     direction: Array  # unit normal y, (6,)
     columns: Array  # wrench of the secants per newton of chord tension, (6, m)
@@ -61,9 +61,9 @@ def settle_margin(
     margin: Array,
     memory: Memory,
 ) -> int:
-    """Replace a margin (3,) by its value on the exact curves; returns the status of the margin.
+    """Replace a margin (3,) by its value with exact sag forces; returns the status of the margin.
 
-    platform: with the least favorable wrench of the set.
+    platform: contains the least favorable wrench of the set.
     """
     cables = curves.cables
     m, n = cables.low.size, platform.freedom.shape[0]
@@ -109,7 +109,7 @@ def settle_margin(
 
 @glue
 def _write_value(margin: Array, exact: float, error: float) -> None:
-    """Fill value and bounds from a margin on the exact curves [N].
+    """Fill value and bounds from a margin with exact sag forces [N].
 
     The value has the sign of the exact margin. It is continuous where the bounds begin to decide the sign.
     """
@@ -127,9 +127,9 @@ def _write_value(margin: Array, exact: float, error: float) -> None:
 
 @glue
 def _margin_in_facet(platform: Platform, facet: LimitingFacet, curves: Curves, load: Array, memory: Memory) -> float:
-    """Margin on the exact curves, from the tensions at which the load meets the facet; NaN outside the facet.
+    """Margin with exact sag forces, from the tensions at which the load meets the facet; NaN outside the facet.
 
-    The tensions follow from the secants. Within narrow bounds, their errors have a second-order effect on the margin.
+    The tensions follow from the secants. If the bounds are narrow, their errors have only a second-order effect.
     """
     columns, y, bands = facet.columns, facet.direction, facet.bands
     n, m = platform.freedom.shape[0], columns.shape[1]
@@ -190,7 +190,7 @@ def _component(freedom: Array, k: int, columns: Array, i: int) -> float:
 
 @glue
 def _fill_load(freedom: Array, facet: LimitingFacet, load: Array) -> None:
-    """Fill the load e (n,) along the free motions with y . e = 1; without a force part, a moment."""
+    """Fill the load e (n,) along the free motions with y . e = 1; e is a moment if y has no force part."""
     y = facet.direction
     pure = y[0] == 0.0 and y[1] == 0.0 and y[2] == 0.0
     weight = 1.0 if pure else facet.arm * facet.arm
@@ -206,7 +206,8 @@ def _largest_multiple(
 ) -> float:
     """Largest multiple of a load that the cables supply in addition to a demand; infinite or NaN if not found.
 
-    A reflection turns the load to the first component, the only soft one. The search starts beyond the upper bound.
+    A reflection turns the load to the first component, which is the only soft component. The search starts beyond the
+    upper bound.
     """
     n, m = demand.matrix.shape
     rows, rest = block(memory, 2 * n + 4, m)

@@ -19,9 +19,10 @@ from sagline.core.arrays import Array, Indices
 from sagline.kernels.jit import formula, glue
 from sagline.kernels.memory import Memory, block, counters
 
-RANK = 1e-9  # relative to the largest entry, as in `kernels.algebra.factors`; at a smaller pivot, rank is lost
-DEPENDENT = 1e-10  # largest minor of columns that count as linearly dependent
-LIMIT = 1 << 40  # largest number of steps; never reached
+# relative to the largest entry, as in `kernels.algebra.factors`; if a pivot is smaller, the rank is not full
+RANK = 1e-9
+DEPENDENT = 1e-10  # columns with a smaller minor count as linearly dependent
+LIMIT = 1 << 40  # largest number of steps, which is never reached
 MOST_FREE = 6  # largest number of free motions
 
 # Subsets of up to six rows, as bits. Subsets of size k of n rows are ORDER[n, START[n, k] : START[n, k + 1]].
@@ -40,7 +41,7 @@ class Facets(NamedTuple):
     """State of the walk over the facets."""
 
     # One row per column of the basis, (n, m + 7): components along the m columns, six components in world axes, and the
-    # sum of the absolute values of these six, with moments times the lever arm.
+    # sum of the absolute values of these six components, with moments times the lever arm.
     table: Array
     others: Array  # components of the other columns along the rows, scaled to a largest entry of 1, (r, n)
     minors: Array  # minors of the present subset and of its leading parts, for each set of rows, (n, 2^n)
@@ -123,7 +124,7 @@ def _subtract_row(row: Array, factor: float, other: Array) -> None:
 
 @glue
 def next_subset(facets: Facets, n: int, depth: int) -> int:
-    """Advance to the next subset of the other columns, with their minors; returns its size, -1 after the last.
+    """Advance to the next subset of the other columns, and fill its minors; returns its size, or -1 after the last.
 
     depth: size of the present subset; the first subset is empty.
     """

@@ -1,4 +1,4 @@
-"""The cables over a box of poses: geometry at the middle, and bounds of its change in the box.
+"""The cables in a box of poses: geometry at the middle, and bounds of its change in the box.
 
 A box contains all positions within half an edge of its middle along each axis. At each position, the orientations
 differ from the orientation at the middle by a rotation about any axis, up to a given angle. If the angle is zero, all
@@ -16,8 +16,8 @@ from sagline.kernels.cable import geometry as g
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block
 
-BEND = 0.57735027  # half of 2/sqrt(3), the largest second derivative of x/|x| times |x|^2, rounded up
-MOTIONS = 6  # three of translation, three of rotation
+BEND = 0.57735027  # half of the largest second derivative of x/|x| times |x|^2, which is 2/sqrt(3), rounded up
+MOTIONS = 6  # number of motions: three translations and three rotations
 
 
 class PoseRange(NamedTuple):
@@ -32,7 +32,7 @@ class CablesInBox(NamedTuple):
 
     rows: Array  # free motions, with rotations per lever arm, so that all components are in newtons, (n, 6)
     full: Array  # structure matrix, (6, m)
-    matrix: Array  # its components along the rows, (n, m)
+    matrix: Array  # components of the structure matrix along the free motions, (n, m)
     lever: Array  # levers from center of mass to platform end, world axes [m], (3, m)
     slopes: Array  # derivatives of the structure matrix with respect to each motion, (MOTIONS, 6 * m)
     way: Array  # largest displacement of a platform end [m], (m,)
@@ -152,7 +152,7 @@ def norm3(x: float, y: float, z: float) -> float:
 
 @formula
 def most_of_linear(box: PoseRange, slopes: Array) -> float:
-    """Largest value, in a box, of a linear function with these slopes (MOTIONS,) and the value zero at the middle."""
+    """Largest value, in a box, of a linear function with slopes (MOTIONS,) that is zero at the middle."""
     most = abs(slopes[0]) * box.half[0] + abs(slopes[1]) * box.half[1] + abs(slopes[2]) * box.half[2]
     if box.turn > 0.0:
         most += box.turn * norm3(slopes[3], slopes[4], slopes[5])

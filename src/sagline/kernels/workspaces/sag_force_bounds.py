@@ -1,8 +1,8 @@
 """Bounds of the sag forces within the chord tension limits, and of their changes with tension and platform end.
 
 The sag force of an inextensible cable is tau X (L/D) + tau sin phi (X coth X - 1) with X = wD/(2 tau). This module
-bounds its slopes in closed form. Stretch decreases the slopes with respect to position. Stretch changes the slope over
-the tension by at most -wD/(2 EA); docs/model.md, section 13.
+bounds its slopes in closed form. Stretch decreases the slopes with respect to position. It changes the slope with
+respect to tension by at most -wD/(2 EA); docs/model.md, section 13.
 """
 
 from __future__ import annotations
@@ -18,16 +18,17 @@ from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory
 
 # Rows of the bands (BAND_ROWS, m).
-LOW, HIGH = 0, 1  # smallest and largest admissible chord tension [N]; the latter is infinite for straight cables only
+# smallest and largest admissible chord tension [N]; only for straight cables, the largest tension can be infinite
+LOW, HIGH = 0, 1
 SAG_FORCE_LOW, SAG_FORCE_HIGH = 2, 3  # sag forces at LOW and HIGH [N]
 SLOPE = 4  # slope of the secant of the sag force from LOW to HIGH
-UNDER, OVER = 5, 6  # least and largest difference of the sag force from its secant [N], <= 0 and >= 0
+UNDER, OVER = 5, 6  # least difference between sag force and secant [N], <= 0, and largest difference, >= 0
 BAND_ROWS = 7
 
 
 @glue
 def fill_bands(curves: Curves, bands: Array, memory: Memory) -> bool:
-    """Fill the bands of the cables in place; False if a cable is too slack at any tension."""
+    """Fill the bands of the cables of a pose; False if a cable is too slack at every tension."""
     cables = curves.cables
     m = cables.low.size
     for i in range(m):
@@ -58,7 +59,7 @@ def fill_bands(curves: Curves, bands: Array, memory: Memory) -> bool:
 
 @formula
 def _from_secant(cables: Cables, i: int, low: float, high: float) -> tuple[float, float]:
-    """Lower and upper bound, <= 0 and >= 0, of a sag force minus its secant between two chord tensions [N].
+    """Lower bound (<= 0) and upper bound (>= 0) of a sag force minus its secant between two chord tensions [N].
 
     The sag force of an inextensible cable is a sum of convex functions of the tension. Only the term wD/2 sin phi (X/3
     - ...) is concave if the platform end is below the frame end. The secant of 1/tau is above 1/tau by at most
@@ -101,9 +102,10 @@ def has_sag(curves: Curves, i: int) -> bool:
 
 @kernel
 def sag_force_slope(curves: Curves, i: int, way: float, tension: float) -> float:
-    """Largest derivative of a sag force with respect to the position of the platform end [N/m], above a chord tension.
+    """Largest derivative of a sag force with respect to the platform end's position [N/m], above a given chord tension.
 
-    way: largest distance of the platform end from its position in `curves` [m]; tension: least chord tension [N].
+    way: largest distance of the platform end from its position in `curves` [m]; tension: lower bound of the chord
+    tension [N].
     """
     cables = curves.cables
     if curves.model.code != codes.CATENARY:
@@ -121,7 +123,7 @@ def sag_force_slope(curves: Curves, i: int, way: float, tension: float) -> float
 
 @kernel
 def largest_sag_force(curves: Curves, i: int, tension: float) -> float:
-    """Upper bound of a sag force [N], at or above a chord tension."""
+    """Upper bound of a sag force [N] at all chord tensions from a given tension on."""
     cables = curves.cables
     if not has_sag(curves, i):
         return cables.sag_force[i]

@@ -60,9 +60,11 @@ from sagline.kernels.workspaces.wrench_set import (
     worst_wrench,
 )
 
-ALONG = 1e-13  # rounding error of the product of a normal with a column in its facet, relative to its terms
-IN_PLANE = 1e-10  # relative to the same terms; a secant with a smaller product counts as in the facet
-PURE = 1e-9  # a unit normal (moments times lever arm) with a smaller force part counts as a pure moment
+# rounding error of the product of a normal with a column in its facet, relative to the terms of the product
+ALONG = 1e-13
+# relative to the same terms; if the product with a secant is smaller, the secant counts as part of the facet
+IN_PLANE = 1e-10
+PURE = 1e-9  # a unit normal (moments times lever arm) whose force part is smaller counts as a pure moment
 
 # Rows of the cables' weights (COUNT_ROWS, m).
 WIDTH = 0  # half the range of the tensions
@@ -80,9 +82,10 @@ ROUNDING = 6 * TOGETHER
 BY_ENDS = 7 * TOGETHER  # half ranges of the cables' wrenches
 # largest decrease and increase of the wrenches because the sag forces differ from their secants
 DECREASE, INCREASE = 8 * TOGETHER, 9 * TOGETHER
-IN_FACET = 2 * TOGETHER  # the same for the cables whose secants are in the facet, two rows further
-AGAINST, FOR = 12 * TOGETHER, 13 * TOGETHER  # extent of the set in both directions
-UP, DOWN = 14 * TOGETHER, 15 * TOGETHER  # largest contributions of cables without limit in both directions
+IN_FACET = 2 * TOGETHER  # the same quantities for cables whose secants are in the facet, two rows further
+AGAINST, FOR = 12 * TOGETHER, 13 * TOGETHER  # extent of the set in both directions of the normal
+# largest contributions of cables without upper limit, in both directions of the normal
+UP, DOWN = 14 * TOGETHER, 15 * TOGETHER
 WORK = 16 * TOGETHER  # two rows
 LENGTH = 18 * TOGETHER  # inverse of the normal's length
 MARGINS = 19 * TOGETHER  # three rows: VALUE, BELOW, ABOVE
@@ -129,7 +132,7 @@ def signed_margins(
         set_terms: The set of loads.
         arms: Lever arm of the norm, and mean lever arm [m], (1 or R,) each.
         poses: Rows (N, POSE_COLUMNS).
-        memory: twice `memory_for` the number of cables plus FACET_SIZE numbers, and codes of the cables (m,).
+        memory: two times `memory_for` the number of cables, FACET_SIZE numbers, and codes of the cables (m,).
         margins: Filled: value, lower and upper bound [N], (3, N); normal of the facet with the least distance, in world
             axes, of length 1 with moments divided by the lever arm, (N, 6); index of the cable whose limit has the
             largest effect on the value, or -1, (N,); status from the two bounds, (N,).
@@ -203,7 +206,7 @@ def signed_margins(
 
 @glue
 def _fill_facet_table(freedom: Array, full: Array, lever: float, table: Array) -> None:
-    """Fill the table for the choice of a basis: one row per free motion, moments divided by the mean lever arm."""
+    """Fill the table from which a basis is selected: one row per free motion, moments divided by the mean lever arm."""
     m = full.shape[1]
     rows_along_freedom(freedom, full, table)
     for k in range(freedom.shape[0]):
@@ -277,7 +280,7 @@ def _measure_all_facets(
             held = 0
         if depth < 0:
             break
-    margin[BELOW] = min(margin[BELOW], margin[VALUE])  # this holds except for rounding
+    margin[BELOW] = min(margin[BELOW], margin[VALUE])  # true except for rounding errors
     margin[ABOVE] = max(margin[ABOVE], margin[VALUE])
     for k in range(3):
         if abs(margin[k]) >= AS_GOOD_AS_INFINITE:
@@ -286,7 +289,7 @@ def _measure_all_facets(
 
 @formula
 def _add_normal(facets: Facets, depth: int, rows: int, m: int, measured: Array, b: int) -> bool:
-    """Fill the normal from a set of rows, one more than the columns of the present subset; False if it is zero."""
+    """Fill the normal from a set of rows, one more than the present subset has columns; False if the normal is zero."""
     minors = facets.minors[depth]
     x = y = z = u = v = w = 0.0
     sign = 1.0
@@ -319,7 +322,7 @@ def _add_normal(facets: Facets, depth: int, rows: int, m: int, measured: Array, 
 def _measure_facets(
     counts: _FacetWeights, wrenches: WrenchSetArrays, held: int, measured: Array, margin: Array, direction: Array
 ) -> None:
-    """Update the margin (3,) and its normal (6,) with both sides of the stored facets."""
+    """Update the margin (3,) and its normal (6,) if a side of a stored facet has a smaller margin."""
     _sum_cables(counts, held, measured)
     normals, work = measured[: 6 * TOGETHER].reshape((6, TOGETHER)), measured[WORK : WORK + 2 * TOGETHER]
     reach_of_set(wrenches, normals, held, work.reshape((2, TOGETHER)), measured[AGAINST:], measured[FOR:])
@@ -344,7 +347,7 @@ def _measure_facets(
 
 @glue
 def _sum_cables(counts: _FacetWeights, held: int, measured: Array) -> None:
-    """Fill half the ranges of the cables' wrenches along the stored normals, and the changes due to secant errors."""
+    """Fill half the ranges of the cables' wrenches along the stored normals, and their changes due to secant errors."""
     rows = counts.rows
     for b in range(held):
         measured[BY_ENDS + b] = 0.0
@@ -398,7 +401,7 @@ def _measure_lengths(counts: _FacetWeights, held: int, measured: Array) -> None:
 
 @glue
 def _measure_sides(middle: Array, held: int, measured: Array) -> None:
-    """Fill the margins from the nearer side of each stored facet."""
+    """Fill the margins of the stored facets, each from the nearer side of the facet."""
     e0, e1, e2 = middle[0], middle[1], middle[2]
     e3, e4, e5 = middle[3], middle[4], middle[5]
     for b in range(held):

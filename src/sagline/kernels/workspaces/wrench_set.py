@@ -1,4 +1,4 @@
-"""Sets of wrenches on the platform: support function for margins, and extent about the center for proofs.
+"""Sets of wrenches on the platform: support function for margins, and extent relative to the center for proofs.
 
 docs/model.md, section 13.
 """
@@ -19,7 +19,7 @@ class Loads(NamedTuple):
 
     center: Array  # center, (6,)
     segments: Array  # segments, (S, 6)
-    ellipsoids: Array  # each A adds all A^T s with |s| <= 1, (E, 6, 6)
+    ellipsoids: Array  # matrices; each matrix A adds all wrenches A^T s with |s| <= 1, (E, 6, 6)
     corners: Array  # corners of polytopes, (C, 6)
     sizes: Indices  # corners of each polytope, (P,)
 
@@ -32,7 +32,7 @@ def dot6(a: Array, b: Array) -> float:
 
 @formula
 def _reach_of_ellipsoid(axes: Array, against: Array) -> float:
-    """Extent of an ellipsoid to either side of its center."""
+    """Extent of an ellipsoid from its center along a direction."""
     square = 0.0
     for k in range(6):
         along = dot6(axes[k], against)
@@ -42,7 +42,7 @@ def _reach_of_ellipsoid(axes: Array, against: Array) -> float:
 
 @kernel
 def reach_of_loads(loads: Loads, against: Array) -> float:
-    """Largest -against . (w - center) over the set."""
+    """Largest value of -against . (w - center) for the wrenches w of the set."""
     most = 0.0
     for s in range(loads.segments.shape[0]):
         most += abs(dot6(loads.segments[s], against))
@@ -96,7 +96,7 @@ class WrenchSetArrays(NamedTuple):
 
     own: Array  # segments of the pose: box, linear accelerations, angular accelerations, (9, 6)
     segments: Array  # segments, each from -row to +row, (S, 6)
-    ellipsoids: Array  # ellipsoids; each matrix A adds all A^T s with |s| <= 1, (E, 6, 6)
+    ellipsoids: Array  # ellipsoids; each matrix A adds all wrenches A^T s with |s| <= 1, (E, 6, 6)
     corners: Array  # corners of all polytopes, one polytope after the other, (C, 6)
     sizes: Indices  # number of corners of each polytope, (P,)
 
@@ -132,7 +132,7 @@ def place_set(terms: SetTerms, body: Array, inertia: Array, rotation: Array, wre
 def reach_of_set(
     wrenches: WrenchSetArrays, normals: Array, count: int, work: Array, against: Array, along: Array
 ) -> None:
-    """Fill the largest -y . w and the largest y . w [N] for the first `count` normals.
+    """Fill the largest -y . w and the largest y . w [N] of the set for the first `count` normals y.
 
     normals: y, (6, B); work: work array, (2, B); against: filled, (B,); along: filled, (B,).
     """
@@ -176,7 +176,7 @@ def _add_ellipsoids(ellipsoids: Array, normals: Array, count: int, work: Array, 
 def _add_polytopes(
     corners: Array, sizes: Indices, sign: float, normals: Array, count: int, work: Array, total: Array
 ) -> None:
-    """Add the extent of polytopes along the normals, or against them."""
+    """Add the extent of polytopes in the directions of the normals, or in the opposite directions."""
     first = 0
     for p in range(sizes.size):
         for b in range(count):
@@ -211,7 +211,7 @@ def _multiply(wrench: Array, normals: Array, count: int, out: Array) -> bool:
 
 @kernel
 def worst_wrench(center: Array, wrenches: WrenchSetArrays, direction: Array, wrench: Array) -> bool:
-    """Fill the wrench of the set with the largest -direction . w, (6,); True if it is the only wrench of the set."""
+    """Fill the wrench w of the set with the largest -direction . w, (6,); True if the set has no other wrench."""
     farthest(Loads(center, wrenches.segments, wrenches.ellipsoids, wrenches.corners, wrenches.sizes), direction, wrench)
     single = wrenches.segments.shape[0] == 0 and wrenches.ellipsoids.shape[0] == 0
     for p in range(wrenches.sizes.size):
