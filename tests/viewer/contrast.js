@@ -45,7 +45,7 @@
     add(element, node.data, element instanceof SVGElement ? style.fill : style.color);
   }
   for (const field of document.querySelectorAll("input, textarea")) {
-    if (field.type !== "checkbox" && field.type !== "hidden") add(field, field.value, getComputedStyle(field).color);
+    if (!["checkbox", "hidden", "range"].includes(field.type)) add(field, field.value, getComputedStyle(field).color);
     if (!field.value) add(field, field.placeholder, getComputedStyle(field, "::placeholder").color);
   }
   return found;

@@ -122,19 +122,29 @@ def box(page: Page, selector: str) -> FloatRect:
     return found
 
 
-def type_in(page: Page, label: str, value: str) -> None:
-    """Set a slider by the number beside it."""
-    field = page.locator(f"//label[contains(., '{label}')]/following::input[contains(@class, 'NumberInput')]").first
-    field.fill(value)
-    field.press("Enter")
-
-
-def test_a_slider_changes_cables_and_numbers(browser: Browser) -> None:
+def test_a_factor_changes_cables_and_numbers_and_is_undone_by_keys(browser: Browser) -> None:
     with opened(browser, sl.load_robot("cogiro")) as (page, viewer):
         assert page.get_by_text("Natural frequencies").is_visible()
-        type_in(page, "Cable density", "10")
-        await_that(page, lambda: viewer.view is not None and viewer.view.settings.density == 10.0)
+        field = page.get_by_role("spinbutton", name="Cable density")
+        slider = page.get_by_role("slider", name="Cable density")
+
+        def shows(density: float, place: float) -> bool:
+            shown = viewer.view is not None and viewer.view.settings.density == density
+            return shown and float(field.input_value()) == density and float(slider.input_value()) == place
+
+        await_that(page, lambda: shows(1.0, 0.5))
+        field.fill("25")
+        field.press("Enter")
+        await_that(page, lambda: shows(10.0, 1.0))
         page.get_by_text("650 g/m").wait_for()
+        slider.press("Home")
+        await_that(page, lambda: shows(0.1, 0.0))
+        slider.press("Control+z")
+        await_that(page, lambda: shows(10.0, 1.0) or shows(1.0, 0.5))  # quick changes are one step
+        slider.press("Control+Shift+z")
+        await_that(page, lambda: shows(0.1, 0.0))
+        page.get_by_role("button", name="Reset all").click()
+        await_that(page, lambda: shows(1.0, 0.5))
 
 
 def test_the_platform_is_lit_without_a_picture_of_surroundings(browser: Browser) -> None:

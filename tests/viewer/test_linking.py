@@ -136,7 +136,7 @@ def test_another_page_comes_to_the_same(one: Shown, other: Shown, count: int) ->
 def test_all_controls_of_the_page_are_in_it(one: Shown, other: Shown) -> None:
     handles = [each for each in controls(one.server) if hasattr(each, "label")]
     wanted = {id(each) for each in handles if each.label != "sagline" and not each._impl.is_button}
-    named = one.viewer.feature(StateFeature)._controls._handles()
+    named = one.viewer.feature(StateFeature).controls._handles()
     assert {id(each) for each in named.values()} == wanted
     assert all(name.startswith(short(each.label)) for name, each in named.items())
     assert {"slice", "cable-model", "mode", "modes-up-to"} <= set(named)

@@ -9,6 +9,7 @@ import pytest
 import sagline as sl
 from sagline.viewer.features import FEATURES
 from sagline.viewer.page import Page
+from sagline.viewer.readout import factor_slider
 from sagline.viewer.tension_scale import TensionScale
 from tests.viewer.client import Client, await_that
 from tests.viewer.shown import Shown, handle, shown
@@ -22,6 +23,17 @@ def test_the_scale_of_a_pose_ends_at_its_tensions() -> None:
     assert TensionScale.of_pose(np.array([np.nan, 0.0]), LIMITS) is LIMITS
     equal = TensionScale.of_pose(np.full(3, 50.0), LIMITS)
     assert equal.fraction(np.array(50.0)) == pytest.approx(0.5)
+
+
+def test_a_factor_of_one_is_in_the_middle_and_the_left_end_may_be_zero() -> None:
+    ends = {}
+    for low, high, least in ((0.1, 10.0, 0.1), (0.05, 20.0, 0.0), (1.0, 200.0, 1.0)):
+        html = factor_slider("Factor ×", low, high, least, "")
+        ends[high] = re.findall(r"--at:([\d.]+)%\">([\d.]+)<", html)
+        assert f'min="{least:g}" max="{high:g}"' in html
+    assert ends[10.0] == [("0", "0.1"), ("50", "1"), ("100", "10")]
+    assert ends[20.0] == [("0", "0"), ("50", "1"), ("100", "20")]
+    assert ends[200.0] == [("0", "1"), ("100", "200")]
 
 
 @pytest.fixture(scope="module")

@@ -93,7 +93,7 @@ class LinkedControls:
     def __init__(self, gui: viser.GuiApi) -> None:
         """Store the present values as defaults; links contain only values that differ from the defaults."""
         self._gui = gui
-        self._defaults = {name: handle.value for name, handle in self._handles().items()}
+        self._defaults = self.values()
 
     def _handles(self) -> dict[str, Any]:
         """Controls by their names; viser has no public list of them."""
@@ -117,13 +117,17 @@ class LinkedControls:
         if unknown is not None:
             raise InvalidValueError("the link", f"with {unknown[:LONGEST]!r}", "controls of this page", STEP)
         values = self._defaults | {name: _value(handles[name], name, text) for name, text in texts.items()}
+        return lambda: self.put(values)
 
-        def put() -> None:
-            for name, handle in handles.items():
-                if name in values:
-                    handle.value = values[name]
+    def values(self) -> dict[str, Any]:
+        """Values of all controls by their names."""
+        return {name: handle.value for name, handle in self._handles().items()}
 
-        return put
+    def put(self, values: dict[str, Any]) -> None:
+        """Set the named controls."""
+        for name, handle in self._handles().items():
+            if name in values:
+                handle.value = values[name]
 
 
 def _text(handle: Any) -> str:

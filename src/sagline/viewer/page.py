@@ -84,6 +84,8 @@ class Page:
         view: The shown view; None at first. While features follow a new view, it is the previous view.
         features: All features, in the order of their updates.
         updates: Number of views that were shown.
+        dragging: Clients that drag the platform.
+        previous: Plan of the previous pose, for a method that depends on history; None without one.
     """
 
     def __init__(
@@ -116,6 +118,8 @@ class Page:
         self.framing = Framing(server, *self.extent)
         self.view: View | None = None
         self.updates = 0
+        self.dragging: set[int | None] = set()
+        self.previous: Plan | None = None
         self.features: tuple[Feature, ...] = ()
         self.player = Player(played, self._put_on, beside)
         self.features = tuple(feature for make in features if (feature := make(self)) is not None)
@@ -124,7 +128,6 @@ class Page:
         self._traced: tuple[int, int, float] = (0, 0, 0.0)  # key of the drawn traces
         self._extended = 0  # number of extensions of the played motion
         self._changed: tuple[tuple[float, float, float], Robot] | None = None  # settings, and the robot with these
-        self._previous: Plan | None = None  # plan of the previous pose, for a method that depends on history
 
     def serve(self) -> None:
         """React to clients until `stop`; the calling thread does all the work."""
@@ -227,14 +230,18 @@ class Page:
         @self.scene.gizmo.on_update
         async def _(event: viser.TransformControlsEvent) -> None:
             if event.phase == "start":
+                self.dragging.add(event.client_id)
                 self.later(self.player.leave)
+            elif event.phase == "end":
+                self.dragging.discard(event.client_id)
             self.refresh()
 
+        self.server.on_client_disconnect(lambda client: self.dragging.discard(client.client_id))
         home = self.server.gui.add_button("Platform back home", icon=viser.Icon.HOME)
         home.on_click(lambda _: self.later(self.go_home))
 
     def _forget(self) -> None:
-        self._previous = None
+        self.previous = None
 
     def _update(self) -> None:
         """Solve and show the present state once."""
@@ -254,11 +261,11 @@ class Page:
         if self._changed is None or self._changed[0] != settings.changes:
             self._changed = (settings.changes, settings.applied(self.robot))
         robot, pose = self._changed[1], self.scene.dragged_pose()
-        snapshot = snapshot_at(robot, pose, settings, self._previous, self.wrench)
+        snapshot = snapshot_at(robot, pose, settings, self.previous, self.wrench)
         if not depends_on_history(settings.tension):
             self._forget()  # the tensions of another method are not a history
         elif snapshot.feasible:
-            self._previous = snapshot.plan
+            self.previous = snapshot.plan
         return snapshot
 
     def _show(self, view: View) -> None:

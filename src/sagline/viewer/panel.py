@@ -41,6 +41,7 @@ class ControlPanel:
         self._forget = forget
         self._method_name = next(iter(METHODS))
         self._by_hand: ByHand | None = None
+        self._sliders: dict[str, viser.GuiHtmlHandle] = {}  # sliders of the factors by their labels
         self._gui.main_panel.dock_left()
         self._gui.main_panel.set_width(LEFT_WIDTH)
         self._build_what_if(robot)
@@ -100,7 +101,8 @@ class ControlPanel:
     def show_what_if(self, reason: str) -> None:
         """Show the controls that change the robot, or the reason why the robot cannot be changed."""
         shown = not reason
-        for handle in (self._mass, self._density, self._stiffness, self._model, self._method):
+        factors = (self._sliders[each.label] for each in (self._density, self._stiffness))
+        for handle in (self._mass, *factors, self._model, self._method):
             handle.visible = shown
         self._of_run.visible = not shown
         self._of_run.content = readout.html_block(f'<div class="quiet">{reason}</div>')
@@ -157,12 +159,8 @@ class ControlPanel:
                     hint="Mass of the platform with its load; the inertia scales with it.",
                 )
             )  # fmt: skip
-            self._density = self.watched(
-                gui.add_slider("Cable density ×", 0.1, 10.0, 0.1, 1.0, hint="Factor on the cables' mass per length.")
-            )
-            self._stiffness = self.watched(
-                gui.add_slider("Cable stiffness ×", 0.1, 10.0, 0.1, 1.0, hint="Factor on the cables' EA.")
-            )
+            self._density = self._add_factor("Cable density ×", 0.1, 10.0, "Factor on the cables' mass per length.")
+            self._stiffness = self._add_factor("Cable stiffness ×", 0.1, 10.0, "Factor on the cables' EA.")
             self._model = self.watched(
                 gui.add_dropdown(
                     "Cable model",
@@ -181,16 +179,25 @@ class ControlPanel:
             )
             self._forgetting.on_click(lambda _: self._forget())
 
+    def _add_factor(self, label: str, low: float, high: float, hint: str, least: float | None = None) -> Any:
+        """Add a factor, initially 1, with a logarithmic slider; `least` at its left end may be 0 instead of `low`.
+
+        The slider is HTML that browser/factors.js connects with the hidden number: sliders of viser are linear.
+        """
+        least = low if least is None else least
+        self._sliders[label] = self._gui.add_html(readout.factor_slider(label, low, high, least, hint))
+        return self.watched(self._gui.add_number(label, 1.0, min=least, max=high, step=0.1, visible=False))
+
     def _build_drawing(self) -> None:
         gui = self._gui
         with gui.add_folder("Drawing"):
             hint = "Range of the colors: the tension limits, or the tensions of the pose, so that they differ."
             self._colors = self.watched(gui.add_dropdown("Colors by", (BY_LIMITS, BY_POSE), hint=hint))
-            self._sag_scale = self.watched(gui.add_slider("Sag drawn ×", 0.0, 20.0, 0.5, 1.0))
+            hint = "Factor on the drawn sag; 0, at the left end, draws straight cables."
+            self._sag_scale = self._add_factor("Sag drawn ×", 0.05, 20.0, hint, 0.0)
             self._sag_hint = gui.add_html("", visible=False)
-            self._error_scale = self.watched(
-                gui.add_slider("Error drawn ×", 1.0, 200.0, 1.0, 1.0, hint="Position error of the orange platform.")
-            )
+            hint = "Factor on the drawn position error of the orange platform."
+            self._error_scale = self._add_factor("Error drawn ×", 1.0, 200.0, hint)
             self._ghost = self.watched(
                 gui.add_checkbox("Straight cables beside", False, hint="Drawn if the sag of a cable is visible.")
             )

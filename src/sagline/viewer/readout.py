@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from html import escape
+from math import log
 from typing import Final
 
 import numpy as np
@@ -101,6 +102,19 @@ def definitions(rows: Iterable[tuple[str, str]], kind: str = "") -> str:
     """HTML of a list of names and descriptions, optionally with a class of page.css."""
     start = f'<dl class="{kind}">' if kind else "<dl>"
     return start + "".join(f"<dt>{name}</dt><dd>{text}</dd>" for name, text in rows) + "</dl>"
+
+
+def factor_slider(label: str, low: float, high: float, least: float, hint: str) -> str:
+    """HTML of a logarithmic slider of a factor with a field of its value; see browser/factors.js."""
+    names = {least if mark == low else mark: log(mark / low) / log(high / low) for mark in sorted({low, 1.0, high})}
+    marks = "".join(f'<span style="--at:{100.0 * place:.4g}%">{mark:g}</span>' for mark, place in names.items())
+    return html_block(
+        f'<div class="factor" data-factor="{label}" data-low="{low:g}" title="{hint}">'
+        f"<span>{label.replace(' ×', '&nbsp;×')}</span><div>"
+        f'<input type="range" min="0" max="1" step="0.01" value="{names[1.0]:.2f}" aria-label="{label}">'
+        f'<div class="marks" aria-hidden="true">{marks}</div></div>'
+        f'<input type="number" min="{least:g}" max="{high:g}" step="any" value="1" aria-label="{label}"></div>'
+    )
 
 
 def swatch(color: Array | Color) -> str:

@@ -18,17 +18,18 @@
   const handlers = new Map(); // handlers by topic
   const latest = new Map(); // last value of each topic, for handlers that are added later
   const topics = new Map(); // topics by the uuid of their elements
+  const numbers = new Map(); // labels of hidden numbers by their uuid
   const unsent = new Map(); // last unsent message of each topic
   let count = 0;
   let worker, uuid; // worker that connects the client to its server; uuid of the field for messages of the page
 
   let welcome = false; // true if the server accepts messages, that is, after it knows the camera
 
-  const post = (value) =>
+  const post = (uuid, value) =>
     worker.postMessage({ type: "send", message: { type: "GuiUpdateMessage", uuid, updates: { value } } });
   const flush = () => {
     if (!welcome || uuid === undefined) return;
-    unsent.forEach(post);
+    unsent.forEach((value) => post(uuid, value));
     unsent.clear();
   };
   const deliver = (topic, value) => {
@@ -43,6 +44,11 @@
       unsent.delete(topic); // topics are sent in the order of their last values
       unsent.set(topic, text);
       flush();
+    },
+    // Set a hidden number.
+    set(label, value) {
+      for (const [of, name] of numbers) if (name === label && welcome) post(of, value);
+      deliver(`number ${label}`, value);
     },
     // Handle the values of a topic, starting with the last one that has arrived.
     on(topic, handler) {
@@ -60,6 +66,11 @@
       content(message.uuid, message.props.content);
     } else if (message.type === "GuiUpdateMessage" && topics.has(message.uuid) && "content" in message.updates) {
       content(message.uuid, message.updates.content);
+    } else if (message.type === "GuiNumberMessage" && !message.props.visible) {
+      numbers.set(message.uuid, message.props.label);
+      deliver(`number ${message.props.label}`, message.value);
+    } else if (message.type === "GuiUpdateMessage" && numbers.has(message.uuid) && "value" in message.updates) {
+      deliver(`number ${numbers.get(message.uuid)}`, message.updates.value);
     }
   };
   const content = (from, text) => {
@@ -84,6 +95,7 @@
           deliver("connected", true);
         } else if (data?.type === "closed") {
           uuid = undefined; // a restarted server has another field
+          numbers.clear();
           welcome = false;
           deliver("connected", false);
           reason = data.closeReason === "Connection closed" ? "" : data.closeReason; // the client's text for no reason

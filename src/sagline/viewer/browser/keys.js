@@ -19,6 +19,7 @@
     ["← → on a slider", "change its value; Home and End: the ends"],
     ["W A S D, Q E", "move the camera, outside of text fields"],
     ["arrow keys, off the robot", "turn the camera"],
+    ["Ctrl Z, Ctrl Y", "undo, redo"],
     ["?", "this list"],
   ];
   let size = 3;
@@ -27,6 +28,21 @@
   let due = false;
 
   const typing = ({ tagName, isContentEditable }) => /INPUT|TEXTAREA|SELECT/.test(tagName) || isContentEditable;
+  // In a field whose text was changed, the keys of undo belong to the field.
+  let edited = null;
+  document.addEventListener("input", (event) => {
+    edited = event.isTrusted ? event.target : null;
+  });
+  document.addEventListener("focusout", () => {
+    edited = null;
+  });
+  const onHistory = (event) => {
+    const key = event.key.toLowerCase();
+    if (!(event.ctrlKey || event.metaKey) || event.altKey || !["z", "y"].includes(key)) return false;
+    if (edited && edited === event.target && edited.type !== "range") return false;
+    window.sagline.send("history", key === "z" && !event.shiftKey ? "undo" : "redo");
+    return true;
+  };
   const send = () => {
     due = false;
     window.sagline.send("nudge", steps.map((count) => count * SIZES[size]));
@@ -71,13 +87,15 @@
 
   // Registered before viser's client, whose camera also listens on the document.
   document.addEventListener("keydown", (event) => {
-    if (event.target.matches?.("canvas[data-engine]") && onScene(event)) {
+    if (onHistory(event)) event.preventDefault();
+    else if (event.target.matches?.("canvas[data-engine]") && onScene(event)) {
       event.preventDefault();
       event.stopImmediatePropagation();
-    } else if (event.key === "?" && !typing(event.target)) {
+    } else if (event.key === "Enter" && edited) edited = null;
+    else if (event.key === "?" && !typing(event.target)) {
       event.preventDefault();
       help();
-    } else if (TURNS_CAMERA.has(event.key) && event.target.closest?.("[role], button, summary, dialog")) {
+    } else if (TURNS_CAMERA.has(event.key) && event.target.closest?.("[role], button, summary, dialog, input")) {
       event.stopImmediatePropagation(); // the key belongs to a slider or a tab
     }
   });

@@ -9,6 +9,7 @@ from sagline.viewer.feature import Feature
 from sagline.viewer.features.calibration import CalibrationFeature
 from sagline.viewer.features.cut import CutFeature
 from sagline.viewer.features.export import ExportFeature
+from sagline.viewer.features.history import HistoryFeature
 from sagline.viewer.features.keyboard import KeyboardFeature
 from sagline.viewer.features.missing import MissingFeature
 from sagline.viewer.features.modes import ModesFeature
@@ -20,7 +21,8 @@ from sagline.viewer.features.tensions import TensionsFeature
 from sagline.viewer.features.timeline import TimelineFeature
 from sagline.viewer.page import Page
 
-# the order is that of the controls on the page and of updates; `State` is last, because it requires all controls
+# the order is that of the controls on the page and of updates; `State` and `History` are last, because they
+# require all controls
 FEATURES: Final[tuple[Callable[[Page], Feature | None], ...]] = (
     CalibrationFeature.of_page,
     ModesFeature,
@@ -34,4 +36,5 @@ FEATURES: Final[tuple[Callable[[Page], Feature | None], ...]] = (
     MissingFeature,
     ProofFeature,
     StateFeature,
+    HistoryFeature,
 )

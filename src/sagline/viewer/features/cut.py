@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterator
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 import viser
@@ -34,6 +34,7 @@ MARK: Final = (200, 60, 130)  # color with a contrast of 3 : 1 on both backgroun
 _WIDTH: Final = 7.0  # width of the mark [px]
 _PLACE: Final = 0.4  # position of the name along the cable, from the frame end
 TOPIC: Final = "pick"  # topics of the messages of browser/hand.js
+Before: TypeAlias = tuple[Pose, PlayerState]
 NEAR: Final = 14.0  # largest distance of a click, or of a finger, from a cable [px]
 
 
@@ -86,7 +87,7 @@ class CutFeature(Feature):
         self._is_marked = False  # True if a cable is marked in the scene
         self._requested = self._playing = 0  # numbers of the last requested cut and of the played cut
         self._number = 0  # of the player, for the played cut
-        self._before: list[tuple[Pose, PlayerState]] = []  # states of the page before each of the successive cuts
+        self._before: tuple[Before, ...] = ()  # states of the page before each of the successive cuts
         gui = page.server.gui
         with gui.add_folder("Cut a cable", expand_by_default=False):
             self._cable: Any = gui.add_dropdown("Cable to cut", tuple(map(str, range(page.robot.cable_count))))
@@ -156,15 +157,24 @@ class CutFeature(Feature):
 
     def undo(self) -> None:
         """Restore the page as it was before the last cut."""
-        self._requested += 1  # the results of a simulation that is still running are ignored
         if not self._before:
+            self.put(())
             return
-        pose, state = self._before.pop()
+        pose, state = self._before[-1]
+        self.put(self._before[:-1])
         self._player.restore(state)
         if not state.following:
             self._page.go(pose)
-        self._undo.visible = bool(self._before)
-        self._text.content = HELP
+
+    @property
+    def before(self) -> tuple[Before, ...]:
+        """States of the page before each of the successive cuts."""
+        return self._before
+
+    def put(self, before: tuple[Before, ...]) -> None:
+        """Set the states before the cuts; the results of a simulation that is still running are ignored."""
+        self._requested += 1
+        self._before, self._undo.visible, self._text.content = before, bool(before), HELP
 
     @property
     def _chosen(self) -> int:
@@ -174,7 +184,7 @@ class CutFeature(Feature):
     def _refuse(self, message: str) -> None:
         self._text.content = refused(message)
 
-    def _play(self, number: int, simulation: Simulation, cable: int, before: tuple[Pose, PlayerState]) -> None:
+    def _play(self, number: int, simulation: Simulation, cable: int, before: Before) -> None:
         """Play a part of a simulation, which includes the previous parts."""
         if number != self._requested:
             return
@@ -184,7 +194,7 @@ class CutFeature(Feature):
             self._player.grow(PlayedSimulation(simulation))
         else:
             self._playing, self._is_marked = number, False
-            self._before.append(before)
+            self._before += (before,)
             self._player.play(PlayedSimulation(simulation), at_once=True)
             self._number = self._player.number
             self._undo.visible = True

@@ -131,6 +131,11 @@ class PushFeature(Feature):
         except SaglineError as error:
             self._show_none(refused(str(error)))
 
+    @property
+    def held(self) -> bool:
+        """True while a client drags the platform by a force."""
+        return self._hold is not None
+
     def release(self) -> None:
         """Remove the force."""
         self._hold = None

@@ -67,13 +67,17 @@ def _short(value: float, form: str) -> str:
 
 
 class StateFeature(Feature):
-    """Field of the pose, and the state as code or as a link."""
+    """Field of the pose, and the state as code or as a link.
+
+    Attributes:
+        controls: All controls of the page.
+    """
 
     def __init__(self, page: Page) -> None:
         """Build the panel after all other controls, because links contain their values."""
         page.server.gui.add_html(_CONTENT, order=FIRST)
         self._page, self._channel, self._robot = page, page.channel, page.robot
-        self._controls = LinkedControls(page.server.gui)
+        self.controls = LinkedControls(page.server.gui)
         self._view: View | None = None
         self._time = 0.0
         self._requests: deque[tuple[Any, int]] = deque()  # requests for texts, and their clients
@@ -149,7 +153,7 @@ class StateFeature(Feature):
         camera = self._page.framing.moved(client)
         if camera is not None:
             parts["camera"] = listed(camera)
-        controls = self._controls.changes()
+        controls = self.controls.changes()
         if MASS in controls or self._page.source.mass is not None:
             controls[MASS] = shortest(view.settings.mass)
         if isinstance(view.settings.tension, ByHand):
@@ -170,7 +174,7 @@ class StateFeature(Feature):
         method = None
         if hand is not None:
             method = ByHand(target=numbers_of(hand, HAND, "N", self._robot.cable_count, STRONGEST))
-        self._controls.read(parts)()
+        self.controls.read(parts)()
         self._page.wrench = wrench
         if method is not None:
             self._page.panel.choose_by_hand(method)
