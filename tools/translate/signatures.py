@@ -76,6 +76,9 @@ SIGNATURES: Final[dict[str, dict[str, tuple[Type, ...]]]] = {
         "": (FORWARD, BOOL, GIVEN, CHAIN, MEMORY, FOUND),
         "pulleys": (FORWARD_PULLEYS, BOOL, GIVEN, CHAIN, MEMORY, FOUND),
     },
+    "underconstrained_poses": {
+        "": (MODEL, LIMITS, ROBOTS, F2, F2, I1, FLOAT, BOOL, MEMORY, ANSWERS, F2, FLAGS2, INT, INT),
+    },
     "interpolate": {"": (F2, FLOAT, RULE, F3, F3)},
     "inverse_poses": {
         "": (*INVERSE, NONE, BOOL, ANSWERS, INT, INT),

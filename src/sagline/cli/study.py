@@ -149,7 +149,7 @@ def _summary_grid(runs: Sequence[ConfirmedRun]) -> TextTable:
     heads = [""]
     for run in runs:
         name = fill(run.plan.state.one_robot.name, WIDE, break_long_words=False, break_on_hyphens=False)
-        how = fill(run.plan.tension.title, NARROW, break_on_hyphens=False)
+        how = fill(run.plan.method, NARROW, break_on_hyphens=False)
         heads.append(f"{name}\n{type(run.plan.state.cables.model).__name__}\n{how}")
     numbers = [summary(run) for run in runs]
     rows = [

@@ -80,13 +80,13 @@ def tension(
     least = inverse(
         robot, place, model.build(), MinimumNorm(variable.value), wrench
     )  # raises an error if no method applies
-    plans = {
-        title: _plan(robot, place, model, method(variable.value), wrench)
-        for title, method in METHODS.items()
-        if title not in LEFT_OUT
-    }
+    fewer_cables = robot.cable_count < robot.degrees_of_freedom
+    plans: dict[str, Plan | None] = {"balance": least}
+    if not fewer_cables:
+        methods = {title: method for title, method in METHODS.items() if title not in LEFT_OUT}
+        plans = {title: _plan(robot, place, model, method(variable.value), wrench) for title, method in methods.items()}
     why = reason(robot, place, least)
-    margin = float(capacity_margin(least.state))
+    margin = None if fewer_cables else float(capacity_margin(least.state))
     shape = tension_polygon(robot, place, model.build(), wrench, variable.value) if drawn else None
     for text in least.warnings:
         show_note(f"{robot.name}: ", text)
@@ -104,12 +104,14 @@ def tension(
 
     def tell() -> None:
         show_table(_grid(robot, plans))
-        show_text(
-            f"Capacity margin, the additional force in any direction that the cables can balance: {n(margin, unit='N')}"
-        )
+        if margin is not None:
+            what = "Capacity margin, the additional force in any direction that the cables can balance"
+            show_text(f"{what}: {n(margin, unit='N')}")
 
     count = sum(plan is not None and plan.feasible for plan in plans.values())
     verdict = f"{robot.name}: {count} of {len(plans)} methods have tensions within the limits."
+    if fewer_cables:
+        verdict = f"{robot.name}: the balance of the underconstrained platform determines all tensions."
     output.report(lambda: {"capacity_margin": margin, "tensions": tensions}, verdict, tell, as_json=as_json)
     return 0
 

@@ -138,8 +138,17 @@ def view(
     return view_robot(machine, robot, address, None if payload is None else machine.mass, **start)
 
 
+def _check_cable_count(robot: Robot) -> None:
+    """Refuse an underconstrained platform, for which the page has no margin and no polygon."""
+    if robot.cable_count < robot.degrees_of_freedom:
+        allowed = f">= {robot.degrees_of_freedom} for {robot.motion_pattern}"
+        step = "Draw its motion with sagline track, or record a simulation."
+        raise InvalidValueError(f"{robot.name}: number of cables", robot.cable_count, allowed, step)
+
+
 def view_robot(robot: Robot, name: str | Path, address: ServerAddress, mass: float | None = None, **start: Any) -> int:
     """Serve a robot, with its mass if it has a payload [kg], until Ctrl-C; returns the exit code."""
+    _check_cable_count(robot)
     serve, Source = _viewer()
     if start.get("mode"):
         _check_mode(robot, **start)
@@ -152,6 +161,7 @@ def view_run(robot: Robot, file: Path, address: ServerAddress, beside: Path | No
     from sagline.files.simulation_file import FORMAT
 
     serve, Source = _viewer()
+    _check_cable_count(robot)
     played = played_in(robot, file)
     other = None if beside is None else played_beside(played.robot, file, beside)
     source = Source.of_file("simulation" if is_of(file, FORMAT) else "plan", file)

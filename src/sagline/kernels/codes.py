@@ -52,6 +52,7 @@ POSE_UNBOUNDED = 7  # the feasible set is unbounded, but the tension distributio
 POSE_BORDERLINE = 8  # too close to the border of the feasible set: neither tensions nor a proof were found
 POSE_UNSTABLE = 9  # solved, but the equilibrium is not stable
 UNPROVED_STABILITY = 10  # solved, and `stabilities_of_poses` decides whether it is stable
+POSE_NO_EQUILIBRIUM = 11  # fewer cables than degrees of freedom: no equilibrium with the given values was found
 
 # Status of the forward calculation of one sample.
 FORWARD_SOLVED = 0

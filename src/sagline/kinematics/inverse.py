@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary, model_of
 from sagline.core.arguments import brief, callback, choice, flag
-from sagline.core.arrays import Array, exactly, locked
+from sagline.core.arrays import Array, exactly, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_poses
 from sagline.core.numbers import n
@@ -21,6 +21,7 @@ from sagline.kernels import codes
 from sagline.kinematics.inverse_rows import decide_rows, decide_stability, solve_inverse_rows
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
+from sagline.kinematics.underconstrained import Given, given_codes, solve_underconstrained_rows
 from sagline.kinematics.winding import Winding, checked_winding
 from sagline.motion.path import Path
 from sagline.robot.batch import first_of, has_routing, one_a_pose
@@ -49,12 +50,15 @@ def inverse(
     *,
     winding: Winding | None = None,
     stability: bool = True,
+    given: Sequence[Given] | None = None,
+    level: float = 0.0,
     progress: Progress | None = None,
 ) -> Plan:
     """Tensions that balance the platform within their limits, and the corresponding unstrained lengths.
 
     Args:
-        robot: The robot, with m cables and n degrees of freedom, m >= n; or a sequence of N robots, one per pose. The
+        robot: The robot, with m cables and n degrees of freedom. With m < n the platform is underconstrained: m values
+            of the pose are given, and the others follow from the balance. Or a sequence of N robots, one per pose. The
             robots must have the same number of cables, motion pattern, plane normal, type of tension limits and
             gravity; all other data may differ.
         motion: A path of N samples, whose inertia is included; or a pose or batch of N poses at rest.
@@ -70,6 +74,11 @@ def inverse(
             the directions. Friction affects only wrapped and dead lengths. None: no friction.
         stability: True to check the stability of every equilibrium. False saves about a tenth of the time; the status
             UNSTABLE is then not used.
+        given: The m values of an underconstrained platform: names of "x", "y", "z" (position of the platform origin),
+            "yaw" (angle about z) and "level" (tension level). None: x, y, z with three cables, also level with four.
+            The other values of the pose are only the start. Along a path, each sample starts at the sample before.
+        level: Tension level of an underconstrained platform [N]: component of the chord tensions along the unit vector
+            of the tensions that have the least effect on the platform.
         progress: Function that is called several times per second with the number of finished poses and of all poses. A
             pose is finished if it is solved, or infeasible for a known reason.
 
@@ -79,10 +88,10 @@ def inverse(
         UNSTABLE.
 
     Raises:
-        InvalidValueError: If a robot has fewer cables than degrees of freedom, the tension distribution method does not
-            support its number of cables, several robots do not fit together (the message names the property), winding
-            is "path" for poses without times, an argument has the wrong type or shape, a pose is outside the motions of
-            the robot's pattern, or the poses need more memory than is free.
+        InvalidValueError: If `given` does not fit a robot with fewer cables than degrees of freedom, the tension
+            distribution method does not support the number of cables, several robots do not fit together (the message
+            names the property), winding is "path" for poses without times, an argument has the wrong type or shape, a
+            pose is outside the motions of the robot's pattern, or the poses need more memory than is free.
         CableGeometryError: If a cable has no chord at some pose, because its ends coincide or its platform end is
             inside its pulley.
 
@@ -98,6 +107,7 @@ def inverse(
     """
     motion, model, tension = _motion_of(motion), model_of(model), method_of(tension)
     callback(progress, "progress")
+    stability = flag(stability, "stability")
     turning = _given_winding(winding, motion)
     method = tension if isinstance(motion, Path) or previous is not None else tension.alone
     pose = motion.pose if isinstance(motion, Path) else motion
@@ -105,19 +115,27 @@ def inverse(
     shared = first_of(robots)
     check_reach(shared, pose, "pose")
     check_plane(shared, pose, "pose")
-    options = kernel_options(robots, model, method)
+    values = given_codes(shared, given)
+    options = None if values is not None else kernel_options(robots, model, method)
     rows = pose_rows(pose)
     count = len(rows)
     check_poses(count, shared.cable_count, has_routing(robots))
     load = external_wrench(wrench, count if pose.shape else None)
     if isinstance(motion, Path):
         load = locked(inertial_wrench(robots, pose, motion.twist, motion.twist_rate) + load)
-    reference = _reference(shared, previous, tension.variable)
     loads = np.atleast_2d(load)
-    found = solve_inverse_rows(robots, method, options, rows, loads, reference, flag(stability, "stability"), progress)
+    if options is None:
+        level, chained = number(level, "level", "N"), isinstance(motion, Path)
+        found, verdicts, rows = solve_underconstrained_rows(
+            robots, model, rows, loads, values, level, chained, progress
+        )
+        pose = Pose.from_quaternion(rows[:, :3].reshape(*pose.shape, 3), rows[:, 3:].reshape(*pose.shape, 4))
+    else:
+        reference = _reference(shared, previous, tension.variable)
+        found = solve_inverse_rows(robots, method, options, rows, loads, reference, stability, progress)
+        verdicts = decide_rows(robot_terms(robots), options, rows, loads, found, progress)
     if (found.pose_status == codes.POSE_NO_CHORD).any():
         refuse_missing_chords(robots, pose)
-    verdicts = decide_rows(robot_terms(robots), options, rows, loads, found, progress)
     whole = locked(np.ascontiguousarray(np.broadcast_to(load, (*pose.shape, 6))))
     direction = None if turning is None else checked_winding(turning, pose.shape, shared.cable_count)
 
@@ -129,7 +147,7 @@ def inverse(
     if found.reject_slack(verdicts, state.unstrained_length):
         state = equilibrium()
     if stability:
-        decide_stability(robots, options, rows, found, verdicts)
+        decide_stability(robots, (model.code, *model.parameters), rows, found, verdicts)
     plan = Plan(
         state=state,
         path=motion if isinstance(motion, Path) else None,

@@ -11,7 +11,7 @@ from sagline.core.progress import Progress, blocks
 from sagline.kernels import codes, tables
 from sagline.kernels.forward.stability import stabilities_of_poses
 from sagline.kernels.inverse.feasibility import ENOUGH, PROVED, decide_poses
-from sagline.kernels.inverse.poses import Answers, inverse_poses
+from sagline.kernels.inverse.poses import Answers, ModelTerms, inverse_poses
 from sagline.kernels.inverse.poses import Robots as RobotTerms
 from sagline.kernels.memory import memory_for
 from sagline.robot.batch import Robots, first_of, has_routing
@@ -164,15 +164,17 @@ def decide_rows(
     return verdicts
 
 
-def decide_stability(robot: Robots, options: Options, rows: Array, found: InverseRows, verdicts: Verdicts) -> None:
+def decide_stability(robot: Robots, model: ModelTerms, rows: Array, found: InverseRows, verdicts: Verdicts) -> None:
     """Decide the stability of solved poses without a proof; unstable poses get the status UNSTABLE.
 
-    rows: pose rows (N, POSE_COLUMNS).
+    model: code and constants of the cable model; rows: pose rows (N, POSE_COLUMNS).
     """
-    which = locked(np.flatnonzero((found.pose_status == codes.UNPROVED_STABILITY) | verdicts.at_border))
+    fewer_cables = found.cable_status.shape[1] < found.needed.shape[1]  # these solutions have no proof
+    open_ = np.isin(found.pose_status, SOLVED if fewer_cables else (codes.UNPROVED_STABILITY,))
+    which = locked(np.flatnonzero(open_ | verdicts.at_border))
     if not which.size:
         return
-    given = ((*options.model, has_routing(robot) or None), robot_terms(robot), rows)
+    given = ((*model, has_routing(robot) or None), robot_terms(robot), rows)
     memory = memory_for(found.cable_status.shape[1])
     for part in blocks(which.size, BLOCK):
         stabilities_of_poses(*given, which[part], memory, found.results, found.pose_status)

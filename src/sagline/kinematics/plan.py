@@ -111,6 +111,12 @@ class Plan(Result, Saved, Tabular):
         return np.asarray(self.status == PoseStatus.SOLVED)
 
     @property
+    def method(self) -> str:
+        """Name of the tension distribution method; "balance" for an underconstrained platform, which has no method."""
+        robot = first_of(self.state.robot)
+        return "balance" if robot.cable_count < robot.degrees_of_freedom else self.tension.title
+
+    @property
     def unstrained_length(self) -> Array:
         """Unstrained lengths L off the drums [m], including wrapped and dead lengths."""
         return self.state.unstrained_length

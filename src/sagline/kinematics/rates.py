@@ -269,14 +269,21 @@ def length_rate(state: Equilibrium, path: Path, tension: TensionMethod, feasible
     state: robot, poses, wrench and cables along the path; path: the path; if its jerk is unknown, a spline through its
     accelerations supplies the jerk; feasible: True for samples with a solution, shape (N,). Returns dL/dt [m/s], shape
     (N, m), accurate to 1e-8 of its largest value; NaN where the plan has no solution. At a discontinuity of the rate,
-    for example where a cable reaches a limit, the value belongs to one side of the discontinuity.
+    for example where a cable reaches a limit, the value belongs to one side of the discontinuity. The rates
+    of an underconstrained platform follow from a spline through its lengths.
 
     Source:
         docs/model.md, section 7.
     """
-    near = _instants(state.robot, path, state.wrench)
     kept = np.flatnonzero(feasible)
     rates = np.full(state.cables.shape, np.nan)
+    robot = first_of(state.robot)
+    if robot.cable_count < robot.degrees_of_freedom:  # the platform also turns, and the path does not contain this turn
+        for part in np.split(kept, np.flatnonzero(np.diff(kept) > 1) + 1):
+            if len(part) > 1:
+                rates[part] = spline_rates(path.time[part], state.unstrained_length[part])[0]
+        return locked(rates)
+    near = _instants(state.robot, path, state.wrench)
     if not isinstance(tension, Closest):
         rates[kept] = _resolved_rates(state, tension, near)[kept]
     elif state.contact is not None:

@@ -53,6 +53,11 @@ class PoseStatus(Status):
         "the tensions balance the platform, but the equilibrium is unstable, and the platform would leave it; raise "
         "tension_min, choose a method with higher tensions such as AnalyticCenter, or move the platform",
     )
+    NO_EQUILIBRIUM = (
+        codes.POSE_NO_EQUILIBRIUM,
+        "the robot has fewer cables than degrees of freedom, and no equilibrium with the given values was found; move "
+        "the platform to the middle, give the tension level instead of the yaw, or start at a closer rotation",
+    )
 
 
 class ForwardStatus(Status):

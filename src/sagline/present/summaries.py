@@ -167,7 +167,7 @@ def middle_plan(robot: Robot) -> Plan | None:
 def _(plan: Plan) -> Summary:
     feasible, name = np.atleast_1d(plan.feasible), plan.state.one_robot.name
     good, count = bool(plan.solved.all()), feasible.size
-    how = f"{plan.tension.title}, {word_of(type(plan.state.cables.model).__name__)}"
+    how = f"{plan.method}, {word_of(type(plan.state.cables.model).__name__)}"
     lines = [f"chord tensions {_range(plan.chord_tension)} ({how})" if feasible.any() else how]
     if np.isfinite(stiffness := plan.stiffness_min).any():
         lines.append(f"least stiffness {n(np.nanmin(stiffness), '.3g', 'N/m')}")

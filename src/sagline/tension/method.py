@@ -154,7 +154,7 @@ def check_sharing(robot: Robot, tension: TensionMethod, name: str | None = None)
     called = name or robot.name
     item = f"{called}: number of cables"
     if m < n:
-        step = "Add cables, or choose a motion pattern with fewer degrees of freedom."
+        step = "Add cables, or use inverse, forward and vibration, which allow fewer."
         raise InvalidValueError(item, m, f">= {n} for {robot.motion_pattern}", step)
     method = type(tension).__name__
     most = tension.most_redundant

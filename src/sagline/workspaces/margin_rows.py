@@ -162,5 +162,5 @@ def check_cable_count(robot: Robot) -> None:
     """Reject a robot with fewer cables than degrees of freedom."""
     n, m = robot.degrees_of_freedom, robot.cable_count
     if m < n:
-        step = "Add cables, or choose a motion pattern with fewer degrees of freedom."
+        step = "Add cables, or use inverse, forward and vibration, which allow fewer."
         raise InvalidValueError(f"{robot.name}: number of cables", m, f">= {n} for {robot.motion_pattern}", step)

@@ -70,7 +70,7 @@ def new_balance(memory: Memory, m: int, n: int) -> tuple[Balance, Memory]:
     diagonals, memory = block(memory, 2, n)
     q, memory = block(memory, m + 1, m)
     inverse, memory = block(memory, n, m)
-    null, memory = block(memory, m - n, m)
+    null, memory = block(memory, max(m - n, 0), m)
     needed, memory = vector(memory, 6)
     right, memory = vector(memory, n)
     bounds, memory = block(memory, STRIP_ROWS, m)

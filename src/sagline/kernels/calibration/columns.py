@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from sagline.core.arrays import Array
 from sagline.kernels.algebra.factors import solve_lower, solve_upper
+from sagline.kernels.balance.pose import Triple
 from sagline.kernels.balance.wrench import components_along, fill_motion_of_components, is_rotation
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.over_pulleys import material_at
@@ -14,7 +15,7 @@ from sagline.kernels.cable.terms import Model
 from sagline.kernels.calibration import kinds
 from sagline.kernels.calibration.tension_slopes import frame_end_slopes, in_world_axes
 from sagline.kernels.calibration.terms import CalibrationArrays, Sensing, Slopes, Unknowns
-from sagline.kernels.forward.platform import Triple, end_stiffness
+from sagline.kernels.forward.platform import end_stiffness
 from sagline.kernels.jit import formula, glue, kernel
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from sagline.core.arrays import Array
-from sagline.kernels.forward.platform import turned
+from sagline.kernels.balance.pose import turned
 from sagline.kernels.jit import entry, formula
 
 CENTER, TURN, VELOCITY, MOMENTUM = 0, 3, 7, 10

@@ -12,6 +12,7 @@ from sagline.core.arrays import Array, Indices
 from sagline.kernels import codes, tables
 from sagline.kernels.algebra.factors import factor_positive
 from sagline.kernels.algebra.functions import angle
+from sagline.kernels.balance.pose import step_pose
 from sagline.kernels.balance.wrench import components_along
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.geometry import cable_geometry
@@ -19,7 +20,7 @@ from sagline.kernels.cable.over_pulleys import chord_at, material_at
 from sagline.kernels.cable.pulley import Wrap, behind_cable, pulley_at, straight_behind
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.forward.newton import solve_step
-from sagline.kernels.forward.platform import add_force, step_pose
+from sagline.kernels.forward.platform import add_force
 from sagline.kernels.forward.problem import (
     ENERGY,
     ITERATIONS,

@@ -11,13 +11,14 @@ import math
 from sagline.core.arrays import Array
 from sagline.kernels import codes, tables
 from sagline.kernels.algebra.factors import factor_positive, solve_general, solve_lower, solve_upper
+from sagline.kernels.balance.pose import step_pose
 from sagline.kernels.balance.wrench import components_along, matrix_along, norm, symmetric_part
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.over_pulleys import end_motion_per_length, material_at
 from sagline.kernels.cable.slopes import PlaneVector, force_by_length, force_change
 from sagline.kernels.cable.stiffness import force_of, plane_of
 from sagline.kernels.cable.terms import Model
-from sagline.kernels.forward.platform import add_force, platform_energy, platform_stiffness, step_pose, unbalance
+from sagline.kernels.forward.platform import add_force, platform_energy, platform_stiffness, unbalance
 from sagline.kernels.forward.problem import LAST_WRENCH, ForwardArrays, PoseProblem, copy_pose
 from sagline.kernels.jit import glue, kernel
 

@@ -1,0 +1,429 @@
+"""Equilibria of platforms with fewer cables than degrees of freedom; docs/model.md, section 5.
+
+As many values as cables are given: coordinates of the platform, and possibly a tension level. The remaining motions and
+the chord tensions follow from the balance by Newton steps. The tensions, not the lengths, are the unknowns, because a
+length change of a millimeter can change a tension by more than the tension itself. The steps neglect the second-order
+terms of the sag in the derivatives, but not in the balance.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from sagline.core.arrays import Array, Codes, Flags, Indices
+from sagline.kernels import codes, tables
+from sagline.kernels.algebra.factors import solve_general
+from sagline.kernels.balance.pose import step_pose, turned
+from sagline.kernels.balance.setting import Balance, Platform, fill_needed_wrench, new_balance, place_cables
+from sagline.kernels.balance.wrench import fill_structure_matrix, is_rotation, rows_along_freedom
+from sagline.kernels.cable import geometry as g
+from sagline.kernels.cable.admissible import TensionLimits
+from sagline.kernels.cable.cables import Cables, new_cables
+from sagline.kernels.cable.geometry import cable_geometry
+from sagline.kernels.cable.pulley import robots_have_machine
+from sagline.kernels.cable.sag_forces import new_curves, sag_forces_at
+from sagline.kernels.cable.terms import Model
+from sagline.kernels.inverse.poses import (
+    FORCE,
+    MOMENT,
+    Answers,
+    LimitTerms,
+    ModelTerms,
+    Robots,
+    measure_balance,
+    model_at,
+    platform_at,
+    write_solution,
+)
+from sagline.kernels.jit import entry, glue
+from sagline.kernels.memory import Memory, block, counters, vector
+
+# Codes of the given values: 0, 1 and 2 are the coordinates of the platform origin.
+YAW, LEVEL = 3, 4
+
+STEPS = 60  # largest number of steps; taut cables need 4 to 10
+CONVERGED = 1e-10  # last step: turn [rad], displacement relative to the lever arm, and relative change of the tensions
+TURN = 0.3  # largest turn per step [rad]
+SHRINK = 0.2  # smallest ratio of a tension to its value before the step
+FLOOR = 0.02  # smallest initial tension, relative to the mean load of a cable
+RIDGE = 1e-6  # relative regularization of the initial tensions
+PATIENCE = 5  # consecutive steps at a smallest tension after which no equilibrium has a larger one
+ITERATIONS = 12  # inverse iterations for the tension level; each reduces the error by the ratio of two eigenvalues
+WITHIN = 1e-9  # relative violation of a limit that is rounding
+
+
+class UnderconstrainedArrays(NamedTuple):
+    """Work arrays for m cables and n free motions."""
+
+    jacobian: Array  # derivatives of balance and given values with respect to motion and tensions, (n + m, n + m)
+    step: Array  # residuals, then the step, (n + m,)
+    stiffness: Array  # derivative of the cables' wrench with respect to the motion, constant tensions, (6, 6)
+    along: Array  # unit vector of the tension level, (m,)
+    sag_force: Array  # sag forces [N], (m,)
+    gram: Array  # J^T J (m, m), then a work row
+    work: Array  # (m, m)
+    motion: Array  # (6,)
+    moved: Array  # (POSE_COLUMNS,)
+
+
+@glue
+def new_underconstrained_arrays(memory: Memory, m: int, n: int) -> tuple[UnderconstrainedArrays, Memory]:
+    """Work arrays, and the remaining memory."""
+    jacobian, memory = block(memory, n + m, n + m)
+    step, memory = vector(memory, n + m)
+    stiffness, memory = block(memory, 6, 6)
+    along, memory = vector(memory, m)
+    sag_force, memory = vector(memory, m)
+    gram, memory = block(memory, m, m)
+    work, memory = block(memory, m, m)
+    motion, memory = vector(memory, 6)
+    moved, memory = vector(memory, tables.POSE_COLUMNS)
+    return UnderconstrainedArrays(jacobian, step, stiffness, along, sag_force, gram, work, motion, moved), memory
+
+
+@glue
+def _place(
+    model: Model, limits: TensionLimits, platform: Platform, pose: Array, cables: Cables, balance: Balance
+) -> bool:
+    """Fill cables, geometry and structure matrix at a pose; False if a cable has no chord."""
+    cable_geometry(platform.robot, platform.body, pose, balance.rotation, balance.geometry)
+    if not place_cables(model, limits, platform.robot, balance.geometry, cables):
+        return False
+    fill_structure_matrix(balance.geometry, balance.full)
+    rows_along_freedom(platform.freedom, balance.full, balance.matrix)
+    return True
+
+
+@glue
+def _mean_lever(geometry: Array) -> float:
+    """Root mean square distance of the platform ends from the center of mass; 1 m if all ends are there."""
+    square = 0.0
+    for i in range(geometry.shape[1]):
+        x, y, z = geometry[g.LEVER_X, i], geometry[g.LEVER_Y, i], geometry[g.LEVER_Z, i]
+        square += x * x + y * y + z * z
+    return math.sqrt(square / geometry.shape[1]) if square > 0.0 else 1.0
+
+
+@glue
+def _fill_gram(freedom: Array, matrix: Array, lever: float, gram: Array) -> None:
+    """Fill J^T J (m, m), with moments divided by the lever arm and a ridge on the diagonal."""
+    m = gram.shape[0]
+    trace = 0.0
+    for i in range(m):
+        for j in range(m):
+            gram[i, j] = 0.0
+            for k in range(matrix.shape[0]):
+                unit = 1.0 / (lever * lever) if is_rotation(freedom, k) else 1.0
+                gram[i, j] += unit * matrix[k, i] * matrix[k, j]
+        trace += gram[i, i]
+    for i in range(m):
+        gram[i, i] += RIDGE * trace
+
+
+@glue
+def _fill_tension_level(gram: Array, work: Array, along: Array) -> None:
+    """Fill the unit vector of the tensions with the smallest wrench (m,); its first large entry is positive."""
+    m = along.size
+    for i in range(m):
+        along[i] = (1.0 + 0.1 * i) * (1.0 if i % 2 == 0 else -1.0)
+    for _ in range(ITERATIONS):
+        square = 0.0
+        for i in range(m):
+            square += along[i] * along[i]
+        size = 1.0 / math.sqrt(square)
+        for i in range(m):
+            along[i] *= size
+            for j in range(m):
+                work[i, j] = gram[i, j]
+        solve_general(work, along)
+    square = 0.0
+    for i in range(m):
+        square += along[i] * along[i]
+    size = math.nan
+    for i in range(m):
+        if math.isnan(size) and along[i] * along[i] > 0.1 * square / m:
+            size = math.copysign(1.0 / math.sqrt(square), along[i])
+    for i in range(m):
+        along[i] *= size
+
+
+@glue
+def _fill_first_tensions(freedom: Array, lever: float, balance: Balance, gram: Array, tau: Array) -> None:
+    """Fill tensions whose wrench is close to the needed wrench, at least a small part of the load each."""
+    m = tau.size
+    square = 0.0
+    for i in range(m):
+        tau[i] = 0.0
+        for k in range(balance.right.size):
+            unit = 1.0 / (lever * lever) if is_rotation(freedom, k) else 1.0
+            tau[i] += unit * balance.matrix[k, i] * balance.right[k]
+    for k in range(balance.right.size):
+        square += 0.0 if is_rotation(freedom, k) else balance.right[k] * balance.right[k]
+    solve_general(gram, tau)
+    for i in range(m):
+        tau[i] = max(tau[i], FLOOR * math.sqrt(square) / m)
+
+
+@glue
+def _fill_stiffness(cables: Cables, geometry: Array, stiffness: Array) -> None:
+    """Fill the derivative of the cables' wrench with respect to the motion at constant tensions, (6, 6).
+
+    The motion is the displacement of the center of mass, then the rotation about it. The sag force is proportional to
+    the chord.
+    """
+    for a in range(6):
+        for b in range(6):
+            stiffness[a, b] = 0.0
+    for i in range(cables.tau.size):
+        ux = -geometry[g.COSINE, i] * geometry[g.AZIMUTH_X, i]
+        uy = -geometry[g.COSINE, i] * geometry[g.AZIMUTH_Y, i]
+        uz = -geometry[g.SINE, i]
+        x, y, z = geometry[g.LEVER_X, i], geometry[g.LEVER_Y, i], geometry[g.LEVER_Z, i]
+        scale, weight = cables.tau[i] / cables.chord[i], cables.sag_force[i] / cables.chord[i]
+        fx, fy, fz = cables.tau[i] * ux, cables.tau[i] * uy, cables.tau[i] * uz - cables.sag_force[i]
+        for b in range(6):  # motion of the platform end
+            mx = 1.0 if b == 0 else z if b == 4 else -y if b == 5 else 0.0
+            my = 1.0 if b == 1 else x if b == 5 else -z if b == 3 else 0.0
+            mz = 1.0 if b == 2 else y if b == 3 else -x if b == 4 else 0.0
+            near = ux * mx + uy * my + uz * mz
+            dx, dy, dz = scale * (ux * near - mx), scale * (uy * near - my), scale * (uz * near - mz) + weight * near
+            turn = 1.0 if b >= 3 else 0.0  # the lever arm turns, too
+            stiffness[0, b] += dx
+            stiffness[1, b] += dy
+            stiffness[2, b] += dz
+            stiffness[3, b] += y * dz - z * dy + turn * (my * fz - mz * fy)
+            stiffness[4, b] += z * dx - x * dz + turn * (mz * fx - mx * fz)
+            stiffness[5, b] += x * dy - y * dx + turn * (mx * fy - my * fx)
+
+
+@glue
+def _fill_system(
+    platform: Platform, given: Indices, level: float, start: Array, pose: Array, cables: Cables, balance: Balance,
+    space: UnderconstrainedArrays,
+) -> None:  # fmt: skip
+    """Fill Jacobian and residuals of the balance and of the given values."""
+    freedom, jacobian, step = platform.freedom, space.jacobian, space.step
+    n, m = balance.matrix.shape
+    _fill_stiffness(cables, balance.geometry, space.stiffness)
+    for k in range(n):
+        step[k] = balance.right[k]
+        for i in range(m):
+            jacobian[k, n + i] = balance.matrix[k, i]
+            step[k] -= balance.matrix[k, i] * cables.tau[i]
+        for j in range(n):
+            if n == 6:  # every motion is free
+                jacobian[k, j] = space.stiffness[k, j]
+                continue
+            jacobian[k, j] = 0.0
+            for a in range(6):
+                for b in range(6):
+                    jacobian[k, j] += freedom[k, a] * space.stiffness[a, b] * freedom[j, b]
+    center = turned(
+        pose, platform.body[tables.CENTER_X], platform.body[tables.CENTER_Y], platform.body[tables.CENTER_Z]
+    )
+    forward = turned(pose, 1.0, 0.0, 0.0)
+    wanted = turned(start, 1.0, 0.0, 0.0)
+    for c in range(m):
+        for i in range(m):
+            jacobian[n + c, n + i] = space.along[i] if given[c] == LEVEL else 0.0
+        for b in range(6):
+            space.motion[b] = 0.0
+        if given[c] == LEVEL:
+            step[n + c] = level
+            for i in range(m):
+                step[n + c] -= space.along[i] * cables.tau[i]
+        elif given[c] == YAW:
+            level_square = forward[0] * forward[0] + forward[1] * forward[1]
+            space.motion[3] = -forward[0] * forward[2] / level_square
+            space.motion[4] = -forward[1] * forward[2] / level_square
+            space.motion[5] = 1.0
+            step[n + c] = math.atan2(
+                forward[0] * wanted[1] - forward[1] * wanted[0], forward[0] * wanted[0] + forward[1] * wanted[1]
+            )
+        else:  # displacement of the origin: displacement of the center of mass - rotation x center
+            space.motion[given[c]] = 1.0
+            if given[c] == 0:
+                space.motion[4], space.motion[5] = -center[2], center[1]
+            elif given[c] == 1:
+                space.motion[3], space.motion[5] = center[2], -center[0]
+            else:
+                space.motion[3], space.motion[4] = -center[1], center[0]
+            step[n + c] = start[given[c]] - pose[given[c]]
+        for j in range(n):
+            jacobian[n + c, j] = 0.0
+            for b in range(6):
+                jacobian[n + c, j] += space.motion[b] * freedom[j, b]
+
+
+@glue
+def _take_step(
+    platform: Platform,
+    lever: float,
+    cables: Cables,
+    pose: Array,
+    space: UnderconstrainedArrays,
+    tau: Array,
+    blocking: Flags,
+) -> tuple[float, bool]:
+    """Move pose and tensions by the shortened step; returns the size of the step, and True if a tension is too small.
+
+    blocking: filled; True for the cables that the step would take below their smallest admissible tension.
+    """
+    freedom, step, n = platform.freedom, space.step, platform.freedom.shape[0]
+    turn = 0.0
+    shift = 0.0
+    for k in range(n):
+        if is_rotation(freedom, k):
+            turn += step[k] * step[k]
+        else:
+            shift += step[k] * step[k]
+    turn = math.sqrt(turn)
+    size = max(turn, math.sqrt(shift) / lever)
+    share = TURN / turn if turn > TURN else 1.0
+    for k in range(step.size):
+        step[k] *= share
+    step_pose(freedom, platform.body, pose, step[:n], space.motion, space.moved)
+    for k in range(pose.size):
+        pose[k] = space.moved[k]
+    short = False
+    for i in range(tau.size):
+        size = max(size, abs(step[n + i]) / tau[i])
+        wanted = max(tau[i] + step[n + i], SHRINK * tau[i])
+        blocking[i] = wanted < cables.low[i] * (1.0 - WITHIN)
+        short = short or blocking[i]
+        tau[i] = max(wanted, cables.low[i])
+    return size, short
+
+
+@glue
+def _find_equilibrium(
+    model: Model, limits: TensionLimits, platform: Platform, given: Indices, level: float, lever: float, pose: Array,
+    cables: Cables, balance: Balance, space: UnderconstrainedArrays, tau: Array, blocking: Flags, statuses: Codes,
+    memory: Memory,
+) -> int:  # fmt: skip
+    """Take Newton steps until the balance holds; returns POSE_SOLVED or the failure.
+
+    pose: initial pose, replaced by the pose of the equilibrium; tau: initial tensions (m,), replaced by the last ones;
+    blocking: filled; True for cables whose limits the equilibrium violates, (m,).
+    """
+    curves, memory = new_curves(model, cables, statuses, memory)
+    status = codes.POSE_NO_EQUILIBRIUM
+    waited = 0
+    for step in range(STEPS):
+        if not _place(model, limits, platform, pose, cables, balance):
+            break
+        sag_forces_at(curves, tau, space.sag_force)
+        fill_needed_wrench(platform, cables, balance)
+        _fill_system(platform, given, level, platform.pose, pose, cables, balance, space)
+        if status == codes.POSE_SOLVED:  # the cables are those of the last step
+            break
+        if not solve_general(space.jacobian, space.step):
+            return codes.POSE_SINGULAR
+        size, short = _take_step(platform, lever, cables, pose, space, tau, blocking)
+        waited = waited + 1 if short else 0
+        if waited == PATIENCE:
+            return codes.POSE_INFEASIBLE
+        if size != size:
+            break
+        if size <= CONVERGED and step < STEPS - 1:
+            status = codes.POSE_SOLVED
+    for i in range(tau.size):
+        blocking[i] = status == codes.POSE_SOLVED and tau[i] > cables.high[i] * (1.0 + WITHIN)
+        if blocking[i]:
+            status = codes.POSE_INFEASIBLE
+    return status
+
+
+@entry
+def underconstrained_poses(
+    model_terms: ModelTerms,
+    limit_terms: LimitTerms,
+    robot_terms: Robots,
+    starts: Array,
+    wrenches: Array,
+    given: Indices,
+    level: float,
+    chained: bool,
+    memory: tuple[Array, Indices],
+    answers: Answers,
+    poses: Array,
+    blocking: Flags,
+    first: int,
+    last: int,
+) -> None:
+    """Solve part of a batch of platforms with fewer cables than degrees of freedom.
+
+    Args:
+        model_terms: As in `inverse_poses`.
+        limit_terms: As in `inverse_poses`.
+        robot_terms: As in `inverse_poses`, with m < n.
+        starts: Rows with the given coordinates, (N, POSE_COLUMNS); the others are initial values.
+        wrenches: External plus inertial wrenches about the center of mass, (1 or N, 6).
+        given: Codes of the given values, (m,): 0, 1 and 2 for coordinates of the origin, YAW, LEVEL.
+        level: Tension level [N]: component of the chord tensions along the unit vector of tensions whose wrench at the
+            initial pose is smallest.
+        chained: True to start each pose at the rotation and the tensions of the pose before.
+        memory: `memory_for` the number of cables.
+        answers: Filled as in `inverse_poses`.
+        poses: Filled with the poses, (N, POSE_COLUMNS); the given pose without a solution.
+        blocking: Filled: True for cables whose limits the equilibrium violates, (N, m).
+        first: Index of the first pose.
+        last: Index after the last pose.
+    """
+    limits = TensionLimits(*limit_terms)
+    freedom, _bodies, robots = robot_terms
+    results, statuses, residuals, needed, pose_statuses = answers
+    m, n = statuses.shape[1], freedom.shape[0]
+    cables, rest = new_cables(Memory(*memory), m, robots_have_machine(robots))
+    balance, rest = new_balance(rest, m, n)
+    space, rest = new_underconstrained_arrays(rest, m, n)
+    tau, rest = vector(rest, m)
+    held, rest = counters(rest, m)
+    # Without a level, the tensions must turn the platform to its yaw. The search starts at the answer for level 0.
+    turned_by_tensions = False
+    for i in range(m):
+        turned_by_tensions = turned_by_tensions or given[i] == YAW
+    for i in range(m):
+        turned_by_tensions = turned_by_tensions and given[i] != LEVEL
+    for p in range(first, last):
+        platform = platform_at(robot_terms, starts, wrenches, p)
+        model = model_at(model_terms, platform.body)
+        pose = poses[p]
+        for k in range(pose.size):
+            pose[k] = starts[p, k]
+        for i in range(m):
+            statuses[p, i] = codes.CABLE_SOLVED
+            blocking[p, i] = False
+        status = codes.POSE_NO_CHORD
+        if _place(model, limits, platform, pose, cables, balance):
+            lever = _mean_lever(balance.geometry)
+            _fill_gram(freedom, balance.matrix, lever, space.gram)
+            _fill_tension_level(space.gram, space.work, space.along)
+            fill_needed_wrench(platform, cables, balance)
+            follows = chained and p > 0 and pose_statuses[p - 1] == codes.POSE_SOLVED
+            _fill_first_tensions(freedom, lever, balance, space.gram, space.sag_force)
+            for i in range(m):
+                tau[i] = results[tables.TENSION, p - 1, i] if follows else space.sag_force[i]
+            for k in range(3 if follows else pose.size, pose.size):
+                pose[k] = poses[p - 1, k]
+            status = codes.POSE_SOLVED
+            for stage in range(0 if turned_by_tensions else 1, 2):
+                if status == codes.POSE_SOLVED:
+                    for i in range(m):
+                        held[i] = LEVEL if stage == 0 and given[i] == YAW else given[i]
+                    status = _find_equilibrium(
+                        model, limits, platform, held, level, lever, pose, cables, balance, space, tau, blocking[p],
+                        statuses[p], rest,
+                    )  # fmt: skip
+        solved = status == codes.POSE_SOLVED
+        if solved:
+            measure_balance(platform, cables, balance, residuals[p])
+        else:
+            residuals[p, FORCE] = residuals[p, MOMENT] = math.nan
+            for k in range(pose.size):
+                pose[k] = starts[p, k]
+        for k in range(n):
+            needed[p, k] = balance.right[k] if solved else math.nan
+        pose_statuses[p] = status
+        write_solution(solved, model, cables, balance, results, p)
