@@ -27,7 +27,7 @@ from sagline.kernels.dynamics.progress import COUNTERS, FAILED
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoadedPlatform:
-    """Whole body: the platform with point masses at its cable ends, in the principal axes of the whole body."""
+    """Platform together with point masses at its cable ends ("whole body"), in the principal axes of the whole body."""
 
     inertia: Array  # mass and principal moments of the whole body, (4,); infinite for a blocked rotation
     center: Array  # center of the whole body relative to the platform's center of mass, platform axes [m], (3,)
@@ -54,7 +54,7 @@ class LoadedPlatform:
         return levers
 
     def state(self, place: Array, turning: Array, velocity: Array, spin: Array) -> Array:
-        """State row of the whole body from the pose and velocity of the platform."""
+        """Compute the state row of the whole body from the pose and velocity of the platform."""
         # shapes: place (3,) [m]; turning (3, 3); velocity (3,) [m/s]; spin (3,) [rad/s]
         lever, axes = turning @ self.center, turning @ self.axes
         moments = np.where(np.isinf(self.inertia[1:]), 0.0, self.inertia[1:])
@@ -63,7 +63,7 @@ class LoadedPlatform:
         return np.concatenate((place + lever, quaternion, velocity + np.cross(spin, lever), momentum))
 
     def platform_states(self, states: Array) -> Array:
-        """Platform states from states of the whole body (N, 13); both contain angular velocity instead of momentum."""
+        """Convert states of the whole body (N, 13) to states of the platform, both with angular velocities."""
         turning = Rotation.from_quat(states[:, body.TURN : body.VELOCITY]).as_matrix() @ self.axes.T
         lever, spin = turning @ self.center, states[:, body.MOMENTUM :]
         place = states[:, : body.TURN] - lever
@@ -85,7 +85,7 @@ def _about(masses: Array, places: Array) -> Array:
 
 
 FEWEST, MOST = 4, 500  # elements per cable
-# stability limit of the step for an element of length 0.4 l at the frame, relative to l sqrt(rho/EA)
+# largest stable step divided by l sqrt(rho/EA), for an element of length 0.4 l at the frame
 SHORTEST: Final = 0.86
 SPARE: Final = 8  # spare nodes per cable
 TRAVELS: Final = 20.0  # time without tension after which a cable is slack, in travel times of a stretch wave
@@ -102,7 +102,7 @@ class _ChainRecords(Records):
 
     @property
     def arrays(self) -> tuple[Array, ...]:
-        """The arrays for the kernel."""
+        """Return the arrays for the kernel."""
         assert self.points is not None
         return *super().arrays, self.points
 
@@ -121,7 +121,7 @@ class ChainPlant(Plant):
     cable_mass: ClassVar[str] = "lumped"
 
     def __init__(self, given: InitialConditions, data: Array, nodes: int, losses: Damping) -> None:
-        """Chains of a robot at rest, or moving at the speed of its path; data (DATA_ROWS, m)."""
+        """Create the chains of a robot that rests or moves at the speed of its path; data (DATA_ROWS, m)."""
         state, robot = given.state, given.robot
         rest = chains_at_rest(state, nodes)
         super().__init__(robot, given.model, rest.pose, given.twist, state.unstrained_length, data)
@@ -151,14 +151,14 @@ class ChainPlant(Plant):
         self._set_node_speeds(velocity + np.cross(spin, self._ends @ turning.T), given.rate)
 
     def _set_node_speeds(self, at_platform: Array, rate: Array) -> None:
-        """Interpolate the node speeds between both cable ends, including the speed of cable paid out at the frame."""
+        """Interpolate the node speeds between both cable ends. The speed at the frame includes the paid-out cable."""
         table, place, speed, n = self._chains[0], self._chains[1], self._chains[2], self.nodes
         at_exit = (rate / table[:, c.ELEMENT])[:, None] * (place[:, :, n - 1] - place[:, :, n])
         share = np.linspace(0.0, 1.0, n + 1)
         speed[:, :, : n + 1] = at_platform[..., None] * (1.0 - share) + at_exit[..., None] * share
 
     def arguments(self, rules: Any, numbers: Any, inputs: Any) -> Any:
-        """Arguments as in `Plant`, for the kernel of chains."""
+        """Arguments of the kernel of chains, in the order of `Plant.arguments`."""
         lengths: TimeTable = inputs[0]
         if self._work.size != chain_run.ROOM + 2 * lengths.value.shape[1]:
             self._work = np.zeros(chain_run.ROOM + 2 * lengths.value.shape[1])
@@ -215,7 +215,7 @@ class ChainPlant(Plant):
             self.state[body.MOMENTUM :] = state[body.MOMENTUM :] + np.cross(arm, momentum)
 
     def failure(self, time: float, step: float) -> InvalidValueError:
-        """Error for a stopped kernel."""
+        """Create the error that explains why the kernel stopped."""
         cable, how = int(self.cables[int(self.counters[FAILED]) - 1]), self.counters[ends.ENDED]
         if how == ends.GROWN:
             return super().failure(time, step)
@@ -227,7 +227,7 @@ class ChainPlant(Plant):
 
 
 def _chain_table(given: InitialConditions, place: Array, nodes: int, losses: Damping, data: Array) -> Array:
-    """Data of chains at rest, (m, CHAIN_COLUMNS)."""
+    """Table of the data of chains at rest, (m, CHAIN_COLUMNS)."""
     state, material = given.state, given.robot.cables
     table = np.zeros((given.robot.cable_count, c.CHAIN_COLUMNS))
     table[:, c.EXIT_X : c.EXIT_Z + 1] = place[:, :, -1]
@@ -259,7 +259,7 @@ def check_lumped(given: InitialConditions) -> None:
 
 
 def wave_frequency(given: InitialConditions, nodes: int) -> float:
-    """Highest angular frequency of chains, including the shortest possible element [rad/s]."""
+    """Highest angular frequency of chains [rad/s], with the shortest element that can occur."""
     material = given.robot.cables
     element = given.state.free_length / nodes
     return float((2.0 / SHORTEST / element * np.sqrt(material.axial_stiffness / material.linear_density)).max())

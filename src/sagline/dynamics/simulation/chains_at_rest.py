@@ -14,9 +14,9 @@ from sagline.robot.pose import Pose
 from sagline.statics.slopes import platform_end_forces
 
 STEPS = 60
-NEAR = 1e-8  # relative error of a length or force; one more Newton step then reaches rounding error
-NEUTRAL = 1e-12  # relative to the largest stiffness; a smaller stiffness counts as zero
-# largest step relative to a force; after a longer step, a chain with a distant start could fold
+NEAR = 1e-8  # relative error of a length or force; from this error, one more Newton step reaches rounding error
+NEUTRAL = 1e-12  # a stiffness below this share of the largest stiffness counts as zero
+# largest step, as a share of the force; after a longer step, a chain far from its solution could fold
 LONGEST_STEP = 0.2
 
 
@@ -39,7 +39,7 @@ class _LumpedCables(NamedTuple):
     nodes: int  # elements per cable
 
     def elements(self, force: Array) -> tuple[Array, Array]:
-        """Element forces, starting at the platform: forces at the element centers, and their magnitudes."""
+        """Forces at the centers of the elements, platform end first, and their magnitudes."""
         # shapes: force (m, 3) [N]; returns (m, nodes, 3) [N]
         below = (np.arange(self.nodes) + 0.5) * (self.weight * self.element)[:, None]
         forces = np.repeat(force[:, None, :], self.nodes, axis=1)
@@ -47,7 +47,7 @@ class _LumpedCables(NamedTuple):
         return forces, np.linalg.norm(forces, axis=-1)
 
     def steps(self, force: Array) -> Array:
-        """The elements as vectors toward the platform [m], shape (m, nodes, 3); force (m, 3) [N]."""
+        """Vectors along the elements toward the platform [m], shape (m, nodes, 3), for end forces (m, 3) [N]."""
         forces, size = self.elements(force)
         return (self.element[:, None] * (1.0 / self.stiffness[:, None] + 1.0 / size))[..., None] * forces
 
@@ -62,7 +62,7 @@ class _LumpedCables(NamedTuple):
 
 
 def chains_at_rest(state: Equilibrium, nodes: int) -> _ChainsAtRest:
-    """Chains for the cables of an equilibrium, at rest with the same lengths."""
+    """Compute the chains at rest that have the cable lengths of an equilibrium."""
     # The force in an element is the force of the exact cable at the center of the element. The end of the chain
     # therefore follows from the midpoint rule, and pose and forces have errors of the order nodes^-2. The wrench is
     # balanced to rounding. Source: docs/model.md, section 11
@@ -127,7 +127,7 @@ def _size(levers: Array) -> float:
 
 
 def _balancing_motion(unbalance: Array, stiffness: Array, freedom: Array, size: float) -> Array:
-    """Motion that balances the wrench; zero in directions without stiffness."""
+    """Motion of the platform after which the wrench is balanced; zero in directions without stiffness."""
     # example: for the rotation of a pendulum about its cable, stiffness and unbalance are zero, except for rounding
     units = np.array([1.0, 1.0, 1.0, size, size, size])
     slope = freedom @ (stiffness / np.outer(units, units)) @ freedom.T
@@ -136,7 +136,7 @@ def _balancing_motion(unbalance: Array, stiffness: Array, freedom: Array, size: 
 
 
 def _platform_stiffness(blocks: Array, levers: Array, force: Array) -> Array:
-    """Derivative (6, 6) of the unbalance with respect to platform motion; forces act on the cable ends."""
+    """Derivative (6, 6) of the unbalance with respect to platform motion, from the forces on the cable ends."""
     turn = -_cross_matrix(levers)  # a rotation about an axis e moves the platform end by e x r
     across = _cross_matrix(levers)
     matrix = np.empty((6, 6))

@@ -30,7 +30,7 @@ TableInTime = ArrayLike | tuple[ArrayLike, ArrayLike]  # one row, or times and o
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TimeTable:
-    """Time table of n numbers, cubic between instants, with given values and rates; constant outside the table."""
+    """Time table of n numbers: cubic between instants with given values and rates, constant outside its range."""
 
     time: Array  # instants [s], shape (K,), increasing
     value: Array  # shape (K, n)
@@ -39,24 +39,24 @@ class TimeTable:
 
     @classmethod
     def constant(cls, value: Array) -> TimeTable:
-        """Constant numbers (n,)."""
+        """Time table of constant numbers (n,)."""
         none = np.empty((0, value.size))
         return cls(np.zeros(1), np.array(value[None]), none, none)
 
     @classmethod
     def linear(cls, time: Array, value: Array) -> TimeTable:
-        """Linear interpolation between rows (K, n)."""
+        """Time table with linear interpolation between rows (K, n)."""
         slope = np.diff(value, axis=0) / np.diff(time)[:, None]
         return cls(time, value, slope, slope)
 
     @classmethod
     def cubic(cls, time: Array, value: Array, rate: Array) -> TimeTable:
-        """Cubic interpolation between rows (K, n) with known rates."""
+        """Time table with cubic interpolation between rows (K, n) with known rates."""
         return cls(time, value, np.ascontiguousarray(rate[:-1]), np.ascontiguousarray(rate[1:]))
 
     @property
     def arrays(self) -> CubicTableArrays:
-        """Arrays for kernels: read-only, C-contiguous."""
+        """Read-only, C-contiguous arrays for kernels."""
         time, value, begin, end = (
             locked(np.ascontiguousarray(array, dtype=np.float64).view())
             for array in (self.time, self.value, self.begin, self.end)
@@ -64,16 +64,16 @@ class TimeTable:
         return time, value, begin, end
 
     def columns(self, columns: Any) -> TimeTable:
-        """Time table of some of the numbers."""
+        """Time table with a selection of the numbers."""
         return TimeTable(self.time, self.value[:, columns], self.begin[:, columns], self.end[:, columns])
 
     def joined_columns(self, other: TimeTable) -> TimeTable:
-        """Time table of these numbers, then of the numbers of another time table with the same instants."""
+        """Append the numbers of another time table that has the same instants."""
         pairs = ((self.value, other.value), (self.begin, other.begin), (self.end, other.end))
         return TimeTable(self.time, *(np.concatenate(pair, axis=1) for pair in pairs))
 
     def at(self, time: float | Array) -> tuple[Array, Array]:
-        """Values and rates (..., n) at times (...); at a discontinuity, the rate after the discontinuity."""
+        """Values and rates (..., n) at times (...). At a jump of the rate, the rate is the later one."""
         at = np.asarray(time)
         if len(self.time) == 1:
             value = np.zeros((*at.shape, 1)) + self.value[0]
@@ -91,7 +91,7 @@ class TimeTable:
         return value, np.where(within[..., None], rate, 0.0)
 
     def with_instant(self, time: float) -> TimeTable:
-        """Time table with one more instant."""
+        """Insert one instant into the time table."""
         if time in self.time:
             return self
         k = int(np.searchsorted(self.time, time))
@@ -108,7 +108,7 @@ class TimeTable:
         return TimeTable(times, values, begin, end)
 
     def with_stop(self, time: float, duration: float, columns: Any) -> TimeTable:
-        """Time table in which some rates decrease linearly to zero, from a given time on, during a duration [s]."""
+        """Reduce some rates linearly to zero, from a given time on, during a duration [s]."""
         table = self.with_instant(time).with_instant(time + duration)
         (start, rate), stop = table.at(time), time + duration
         later = np.flatnonzero(table.time >= time)
@@ -125,7 +125,7 @@ class TimeTable:
 
 
 def checked_time_table(given: Any, item: str, unit: str, columns: int, begin: float) -> TimeTable:
-    """Time table from a caller: one constant row, or times and rows with linear interpolation."""
+    """Convert the argument of a caller to a time table: one constant row, or times and rows (linear in between)."""
     # shapes: given (n,) [s]; begin [s]
     if not (isinstance(given, tuple | list) and len(given) == 2):
         return TimeTable.constant(exactly(given, item, unit, (columns,)))
@@ -145,7 +145,7 @@ def checked_time_table(given: Any, item: str, unit: str, columns: int, begin: fl
     return TimeTable.linear(time, rows) if time.size > 1 else TimeTable.constant(rows[0])
 
 
-ROUNDING = 1e-12  # relative to the largest force and moment; smaller values count as zero
+ROUNDING = 1e-12  # forces and moments below this share of the largest force and moment count as zero
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -168,7 +168,7 @@ class InitialConditions:
 def initial_conditions(
     start: Any, unstrained_length: Any, wrench: Any, duration: Any, pose: PoseLike | None = None
 ) -> InitialConditions:
-    """Checked initial conditions and inputs of `simulate`, with the duration in s."""
+    """Check the initial conditions and inputs of `simulate`; duration in s."""
     if isinstance(start, Plan) and (start.path is not None or start.state.pose.shape):
         if unstrained_length is not None:
             step = "Give plan.state[0] to simulate lengths that differ from the plan."
@@ -192,7 +192,7 @@ def initial_conditions(
 
 
 def _from_plan(plan: Plan) -> InitialConditions:
-    """Initial conditions of a plan along a path, with the initial speed of the path."""
+    """Initial conditions for a plan along a path: they include the initial speed of the path."""
     path, rate = plan.path, plan.length_rate
     if path is None or rate is None:
         step = "Plan along a Path, or give plan.state and a duration."
@@ -228,7 +228,7 @@ def _from_plan(plan: Plan) -> InitialConditions:
 
 
 def _from_equilibrium(state: Equilibrium, table: Any) -> InitialConditions:
-    """Initial conditions of a robot at rest."""
+    """Initial conditions for a robot at rest."""
     if state.pose.shape:
         item = f"a batch of {len(state)} equilibria"
         raise InvalidValueError("start", item, "a single equilibrium, or a plan", "Give a single one: state[0].")

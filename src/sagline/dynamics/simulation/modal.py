@@ -21,26 +21,26 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.statics.slopes import frame_end_forces, motions_of_ends
 from sagline.statics.stiffness import Stiffness, modes, stiffness
 
-UP_TO: Final = 1.5  # in units of the highest massless frequency; modes above it respond quasi-statically
+UP_TO: Final = 1.5  # highest frequency of dynamic modes / highest massless frequency; higher modes are quasi-static
 SHARE: Final = 0.1  # largest step times highest angular frequency [rad]
 LONGEST: Final = 1e-3  # s
 MOST_STEPS: Final = 10**9
 SHORTER: Final = "Simulate a shorter time, or record less often."
-SMALL: Final = 0.02  # largest change of a cable length, relative to the length
+SMALL: Final = 0.02  # largest change of a cable length, as a share of the length
 
 
 class _ModalModel(NamedTuple):
     """Response of the modes of a state to changes u = (dL, dw) of lengths and wrench, (m + 6,)."""
 
     found: Vibration  # the modes
-    drive: Array  # force of u on every mode, (K, m + 6)
+    drive: Array  # modal force per unit of u, (K, m + 6)
     motion: Array  # static platform motion due to u minus the static response of the modes, (6, m + 6)
     pulled: Array  # frame-end tensions per modal amplitude, (m, K) [N/(m sqrt(kg))]
     tension: Array  # static tensions due to u minus the static response of the modes, (m, m + 6)
 
 
 class _ModalMotion(NamedTuple):
-    """Modes at N instants: amplitudes and rates, (N, K); work done and energy lost since the start, (N,)."""
+    """Amplitudes and rates of the modes at N instants, (N, K), with work and lost energy since the start, (N,)."""
 
     amplitude: Array
     rate: Array
@@ -49,7 +49,7 @@ class _ModalMotion(NamedTuple):
 
 
 def modal_model(state: Equilibrium, damping: Damping) -> _ModalModel:
-    """Modal model of a state."""
+    """Compute the modal model of a state."""
     # source: docs/model.md, section 11
     found = vibration(state, up_to=UP_TO * float(np.nanmax(modes(state).frequency)), damping=damping)
     if found.status is not VibrationStatus.SOLVED:
@@ -73,7 +73,7 @@ def modal_model(state: Equilibrium, damping: Damping) -> _ModalModel:
 
 
 def _forces_at_frame(state: Equilibrium, found: Vibration, rest: Stiffness) -> Array:
-    """Changes of the frame-end forces in every mode, world axes, (K, m, 3) [N/(m sqrt(kg))]."""
+    """Changes of the frame-end forces per modal amplitude, world axes, (K, m, 3) [N/(m sqrt(kg))]."""
     # along a cable f = f_0 - g with g' = rho omega^2 u; the displacement of the cable end is the integral of C f
     material, length = state.cables.cable, state.free_length
     at_frame, points = frame_end_forces(state), found.cable_shape.shape[2]
@@ -96,7 +96,7 @@ def _forces_at_frame(state: Equilibrium, found: Vibration, rest: Stiffness) -> A
 
 
 def modal_response(frequency: Array, ratio: Array, force: Array, step: float) -> _ModalMotion:
-    """Response of modes to piecewise linear forces, from rest; exact except for rounding."""
+    """Exact response of modes at rest to piecewise linear forces."""
     # shapes: frequency (K,) [rad/s]; ratio (K,); force (N, K); step [s]
     ringing = frequency * np.sqrt(1.0 - ratio * ratio)
     root = -ratio * frequency + 1j * ringing
@@ -123,7 +123,7 @@ def modal_response(frequency: Array, ratio: Array, force: Array, step: float) ->
 
 
 def modal_simulation(given: InitialConditions, damping: Damping, step: Any, record: float) -> Simulation:
-    """Small motion of a robot about its initial equilibrium; step and record [s]."""
+    """Simulate the small motion of a robot about its initial equilibrium; step and record in s."""
     state = given.state
     _check(given)
     model = modal_model(state, damping)
@@ -173,14 +173,14 @@ def modal_simulation(given: InitialConditions, damping: Damping, step: Any, reco
 
 
 def check_modal_arguments(others: list[str]) -> None:
-    """Reject arguments that do not apply to the modal model."""
+    """Reject arguments that the modal model does not support."""
     if others:
         step = 'Omit it, or give cable_mass="lumped".'
         raise InvalidValueError(others[0], "given", 'not given for cable_mass="modal"', step)
 
 
 def _check(given: InitialConditions) -> None:
-    """Reject initial conditions without modes."""
+    """Reject initial conditions for which modes do not exist."""
     if given.state.contact is not None:
         step = 'Remove the winches of the robot, or give cable_mass="lumped".'
         raise InvalidValueError("start", "a robot with pulleys or dead length", 'none for cable_mass="modal"', step)
@@ -196,13 +196,13 @@ def _check_small_changes(most: Array, state: Equilibrium) -> None:
     share = most / state.free_length
     if (share > SMALL).any():
         i = int(np.argmax(share))
-        value, allowed = f"{most[i]:.3g} m from its own", f'<= {SMALL * state.free_length[i]:.3g} m for "modal"'
+        value, allowed = f"changed by {most[i]:.3g} m", f'<= {SMALL * state.free_length[i]:.3g} m for "modal"'
         step = 'Give cable_mass="lumped", which is valid for large motions.'
         raise InvalidValueError(f"unstrained_length: cable {i}", value, allowed, step)
 
 
 def _shapes(state: Equilibrium, found: Vibration, amplitude: Array) -> Array:
-    """Positions of the cables at equal material steps, (N, m, points, 3)."""
+    """Positions of points on the cables, at equal distances along the unstrained cable, (N, m, points, 3)."""
     count = found.cable_shape.shape[2]
     chord = state.pose.transform(state.one_robot.platform_anchors) - state.exit_point
     level = chord[:, :2] / np.maximum(np.hypot(chord[:, 0], chord[:, 1]), 1e-300)[:, None]

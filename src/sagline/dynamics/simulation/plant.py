@@ -1,4 +1,4 @@
-"""Simulated robot: its state, and its data as kernel arrays."""
+"""State and data of the simulated robot, as arrays for the kernels."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.tables import cable_table
 
-MARGIN: Final = 5.0  # length beyond the required one for which a drum stores strains [m]
-BROKEN: Final = 1e-12  # remaining share of stiffness and weight of a broken cable
+MARGIN: Final = 5.0  # additional length of cable for which a drum stores strains [m], beyond the required length
+BROKEN: Final = 1e-12  # factor of stiffness and weight of a broken cable
 NOTES: Final = 1000  # number of recorded unscheduled events after which a run pauses to store them
 
 
@@ -53,7 +53,7 @@ class Records:
 
     @property
     def arrays(self) -> tuple[Array, ...]:
-        """The arrays for the kernel."""
+        """Return the arrays for the kernel."""
         return self.states, self.tensions, self.lengths, self.energies, self.notes
 
 
@@ -75,7 +75,7 @@ class Plant:
         now: State of the drives, (DRIVE_ROWS, m).
         data: Parameters of the drives, (DATA_ROWS, m).
         audit: Sums over the run, (AUDIT_SIZE,).
-        counters: Counters of the kernel, (COUNTERS,).
+        counters: Counters of the kernel, see `sagline.kernels.dynamics.progress`, (COUNTERS,).
         layers: Strain of the cable on the drums, (m, B).
         kernel: Integrator; its arguments are `arguments`, arrays of records, number of steps, and steps per record.
         cable_mass: Cable mass option of `simulate`.
@@ -85,7 +85,7 @@ class Plant:
     cable_mass: ClassVar[str] = "none"
 
     def __init__(self, robot: Robot, model: CableModel, pose: Pose, twist: Array, length: Array, data: Array) -> None:
-        """Put a robot at a pose; twist (6,); length (m,) [m]; data (DATA_ROWS, m)."""
+        """Create the state of a robot at a pose; twist (6,); length (m,) [m]; data (DATA_ROWS, m)."""
         m = robot.cable_count
         self.robot, self.model, self.data = robot, model, data
         moments, self.axes = _principal_axes(robot, pose)
@@ -108,14 +108,14 @@ class Plant:
         self._work = np.zeros(0)
 
     def remember_winding(self, longest: float) -> None:
-        """Set up drums that store the strain of wound-in cable, up to a given length off the drum [m] plus MARGIN."""
+        """Set up drums that store the strain of their cable, for lengths off the drum up to longest + MARGIN [m]."""
         # cable deeper on the drum has the winding tension, also if it is paid out and wound in again
         self.layers = np.tile(self.data[d.WINDING_STRAIN][:, None], (1, int((longest + MARGIN) / BIN) + 1))
 
     def arguments(
         self, rules: tuple[int, int, int, int, int], numbers: tuple[float, float, float, float], inputs: Any
     ) -> Any:
-        """First arguments of the kernel (without records and step counts), until a cable breaks or the mass changes."""
+        """First arguments of the kernel, without records and step counts. They change with a break or a new mass."""
         lengths, wrenches, winds = inputs
         wide = lengths.value.shape[1]
         needed = 6 * 6 + 3 * body.STATE_COLUMNS + 4 * len(self.cables) + 2 * wide + 9
@@ -133,15 +133,15 @@ class Plant:
         return Records(count, len(self.cables))
 
     def platform_states(self, states: Array) -> Array:
-        """Platform states from recorded states of the simulated body, (N, 13)."""
+        """Convert recorded states of the simulated body to states of the platform, (N, 13)."""
         return states
 
     def failure(self, time: float, step: float) -> InvalidValueError:
-        """Error for a kernel that stopped, at a time [s], with a step [s]."""
+        """Create the error for a kernel that stopped at a time [s], with a step [s]."""
         return energy_error(step, time, int(self.cables[int(self.counters[k.FAILED]) - 1]))
 
     def remove_cable(self, cable: int) -> None:
-        """Remove a cable, by its index in the original robot."""
+        """Remove a cable; its index counts the cables of the original robot."""
         place = int(np.flatnonzero(self.cables == cable)[0])
         self.cables = np.delete(self.cables, place)
         self._table = np.delete(self._table, place, axis=0)
@@ -149,19 +149,19 @@ class Plant:
         self.rows, self.now, self.data = (np.delete(array, place, axis=1) for array in (self.rows, self.now, self.data))
 
     def cut(self, places: Any) -> None:
-        """Break cables during a run, by their present indices; the arrays of the kernel keep their size."""
+        """Break cables during a run; the indices count the present cables, and the arrays keep their size."""
         # one factor reduces stiffness and weight, so that the cable keeps its shape at nearly zero force
         for column in (tables.STIFFNESS, tables.DENSITY):
             self._table[places, column] *= BROKEN
         self.counters[k.READY] = 0  # compute all forces and energies again
 
     def lock_winches(self, places: Any) -> None:
-        """Lock winches, by their present indices; their kinetic energy is lost immediately."""
+        """Lock winches; the indices count the present cables. The kinetic energy of the winches is lost at once."""
         self.now[d.HELD, places] = 1.0
         self.now[d.RATE, places] = 0.0
 
     def with_mass(self, mass: float, *, at_rest: bool) -> None:
-        """Change the mass [kg], and the inertia in proportion; a picked-up mass at rest adds no momentum."""
+        """Change the mass [kg], and the inertia in proportion. The momentum is unchanged for a picked-up mass."""
         factor = mass / self.inertia[0]
         self.inertia = self.inertia * factor
         if at_rest:
@@ -182,14 +182,14 @@ class Plant:
         return state
 
     def poses(self, states: Array) -> Pose:
-        """Poses of the platform frame at recorded states (N, 13)."""
+        """Compute the poses of the platform frame from recorded states (N, 13)."""
         turned = Rotation.from_quat(states[:, body.TURN : body.VELOCITY]) * Rotation.from_quat(self.turn_back)
         position = states[:, body.CENTER : body.TURN] - turned.as_matrix() @ self.robot.center_of_mass
         return Pose.from_quaternion(position, turned.as_quat())
 
 
 def _principal_axes(robot: Robot, pose: Pose) -> tuple[Array, Array]:
-    """Principal moments (3,) of the platform [kg m^2], infinite for a blocked rotation, and axes as columns."""
+    """Principal moments of the platform (3,) [kg m^2], infinite for a blocked rotation; principal axes as columns."""
     if robot.motion_pattern == "3R3T":
         moments, axes = np.linalg.eigh(robot.inertia)
         if np.linalg.det(axes) < 0.0:
@@ -206,6 +206,6 @@ def _principal_axes(robot: Robot, pose: Pose) -> tuple[Array, Array]:
 
 
 def energy_error(step: float, time: float, cable: int) -> InvalidValueError:
-    """Error for a run with energy drift; step and time [s]."""
+    """Create the error for a run whose energy drifts; step and time in s."""
     value = f"{step:g} s, which changes the energy without a cause: at {time:.6g} s, mostly in cable {cable}"
     return InvalidValueError("step", value, "a step that conserves the energy", f"Give step={0.2 * step:.3g}.")

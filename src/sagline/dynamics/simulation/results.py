@@ -99,12 +99,12 @@ KINDS = {Break: "break", Stall: "stall", Brake: "brake", Drop: "drop", PickUp: "
 
 
 def event_cable(event: Event) -> int | None:
-    """Index of the cable or winch of an event; None for events of the platform or of all winches."""
+    """Index of the cable or winch to which an event applies; None for the platform or all winches."""
     return event.cable if isinstance(event, Break) else getattr(event, "winch", None)
 
 
 def checked_events(events: Any, robot: Robot, begin: float, end: float) -> tuple[Event, ...]:
-    """Checked events in order of time, between begin and end [s]."""
+    """Check events between begin and end [s], and sort them by time."""
     found: list[Event] = []
     for k, event in enumerate(elements(events, Event, "events", "Give sl.Break(cable=3, time=2.5), or several.")):
         if not isinstance(event, Event):
@@ -157,8 +157,8 @@ class EnergyBalance(Result):
         potential: Potential energy of the platform's weight, and of strain and height of the cables off the drums. The
             height of the platform counts from the origin, the heights of the cables from their frame ends.
         supplied: Work done on the robot since the start by winches, external forces and wind.
-        lost: Energy lost since the start due to damping, friction, averaged strains on drums, and new and merged chain
-            nodes.
+        lost: Energy lost since the start, due to damping and friction, and due to averaging of strains on drums and
+            creation and merging of chain nodes.
         removed: Energy of broken cables and dropped loads since the start, minus the energy of picked-up loads. Heights
             count as in `potential`, so that the value can have either sign.
         error: Energy error of the integrator: change of the sum kinetic + potential - supplied + lost + removed.
@@ -238,13 +238,13 @@ class Simulation(Result, Saved, Tabular):
 
 
 def energy_balance(kinetic: Array, potential: Array, supplied: Array, lost: Array, removed: Array) -> EnergyBalance:
-    """Energy balance from five energies [J], each of shape (N,)."""
+    """Compute the energy balance from five energies [J], each of shape (N,)."""
     total = kinetic + potential - supplied + lost + removed
     return EnergyBalance(*map(locked, (kinetic, potential, supplied, lost, removed, total - total[0])))
 
 
 def displaced_pose(pose: Pose, robot: Robot, motion: Array) -> Pose:
-    """Pose after a motion (..., 6) [m, rad]: displacement of the center of mass, then rotation about it."""
+    """Pose after a displacement of the center of mass and a rotation about it, (..., 6) [m, rad]."""
     center = pose.matrix @ robot.center_of_mass
     turned = Rotation.from_rotvec(motion[..., 3:])
     place = pose.position + center + motion[..., :3] - turned.as_matrix() @ center
@@ -252,7 +252,7 @@ def displaced_pose(pose: Pose, robot: Robot, motion: Array) -> Pose:
 
 
 def twist_of_origin(robot: Robot, pose: Pose, velocity: Array, spin: Array) -> Array:
-    """Twists of the origin of the platform frame, as in `Path`, from motions of the center of mass."""
+    """Convert motions of the center of mass to twists of the platform frame's origin, as in `Path`."""
     # shapes: velocity (N, 3) [m/s]; spin (N, 3) [rad/s]; returns (N, 6)
     lever = pose.matrix @ robot.center_of_mass
     return locked(np.concatenate((velocity - np.cross(spin, lever), spin), axis=1))

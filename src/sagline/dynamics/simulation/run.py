@@ -1,4 +1,4 @@
-"""Integration from event to event, and its records."""
+"""Integration of a simulation from event to event, with records."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class SimulationRun:
         self._events, self._settings = list(events), settings or {}
         self.plant, self.every, self.steps = plant, every, steps
         self._rules, self._numbers, self._inputs = rules, numbers, inputs
-        self._record = plant.records(-(-steps // every) + 1)  # includes the last step
+        self._record = plant.records(-(-steps // every) + 1)  # one more record for the last step
         self._record.tensions[:] = 0.0
         self._record.lengths[:] = np.nan
         self._removed = np.zeros(len(self._record.energies))  # removed energy; the kernel counts it as lost
@@ -70,7 +70,7 @@ class SimulationRun:
         return float(self.plant.audit[d.BEGIN] + step * self.step)
 
     def _advance(self, last: int) -> None:
-        """Integrate up to a step, with records."""
+        """Integrate up to a given step, and record the motion."""
         plant, first = self.plant, int(self.plant.counters[k.STEPS])
         row = first // self.every + 1 if plant.counters[k.READY] else 0
         records = plant.records(last // self.every + 1 - row)
@@ -115,7 +115,7 @@ class SimulationRun:
             self._occurrences.append(Occurrence(float(row[k.NOTE_TIME]), kind, cable, before, after))
 
     def _record_now(self) -> Records:
-        """Record of the current step."""
+        """Record the current step."""
         plant, here = self.plant, self.plant.records(1)
         plant.counters[k.RECORDS] = plant.counters[k.NOTES] = 0
         plant.kernel(*self._arguments, here.arrays, 0, self.every)
@@ -191,7 +191,7 @@ class SimulationRun:
         return math.ceil((event.time - float(self.plant.audit[d.BEGIN])) / self.step - 1e-9)
 
     def _result(self, count: int) -> Simulation:
-        """Result from the present records."""
+        """Create the result from the present records."""
         plant, states, removed = self.plant, self._record.states[:count], self._removed[:count]
         kinetic, potential, supplied, lost = (column.copy() for column in self._record.energies[:count].T)
         steps = np.minimum(self.every * np.arange(count), self.steps)

@@ -33,12 +33,12 @@ from sagline.robot.equilibrium import Equilibrium, HasState
 from sagline.robot.pose import PoseLike
 from sagline.robot.robot import Robot
 
-Integrator = Literal["splitting", "runge-kutta"]  # in the order of the kernel's codes
+Integrator = Literal["splitting", "runge-kutta"]  # in the order of the integrator codes of the kernel
 CableMass = Literal["none", "lumped", "modal"]
 RECORD: Final = 0.01  # s
 NODES: Final = 20  # elements of a cable with mass
 LOSS_TIME: Final = 1e-3  # loss time that is assumed after a break [s]
-MOST_STEPS: Final = 10**8  # some minutes
+MOST_STEPS: Final = 10**8  # steps that take some minutes
 
 
 def simulate(
@@ -64,18 +64,19 @@ def simulate(
     Without cable mass ("none"), cables are static catenaries at every instant, with the pulleys and dead lengths of the
     robot. They become slack if their lengths are too long.
 
-    The set points are the lengths of the plan at its samples. Between samples they are cubics with the derivatives
-    `length_rate` of the plan. With more samples the set points are closer to the exact lengths: give the path at 1 kHz.
+    The set points are the lengths of the plan at its samples. Between samples they are cubic functions of time; their
+    slopes at the samples are the `length_rate` of the plan. The set points are closer to the exact lengths if the path
+    has more samples. A sample rate of 1 kHz is recommended.
 
     Args:
-        start: A plan along a path, a single equilibrium, a plan of a single pose, or a robot, which rests at `pose`.
-            With a path, the simulation starts at the initial pose and speed of the plan. The external wrench of the
-            plan acts on the platform, without the inertial wrench of the path.
-        pose: Pose of a robot at rest, with the tensions of `inverse`.
+        start: A plan along a path, a single equilibrium, a plan of a single pose, or a robot, which rests at `pose`. A
+            plan along a path gives the initial pose and speed. The external wrench of the plan acts on the platform.
+            The inertial wrench of the path is not applied.
+        pose: Initial pose, only if `start` is a robot. The robot rests there with the tensions of `inverse`.
         duration: Duration [s]; lengths are constant after the end of the plan or table. None: duration of the plan or
             of the table of lengths.
-        step: Time step of the integrator [s]; None: 0.2 rad divided by the highest angular frequency (massless and taut
-            cables), at most 1 ms.
+        step: Time step of the integrator [s]. None: 0.2 rad divided by the highest angular frequency with taut,
+            massless cables, at most 1 ms.
         cable_mass: "none": cables are static catenaries at every instant. "lumped": each cable is a chain of nodes with
             its mass, at fixed material points; it swings and transmits waves. Nodes are created at the frame while
             cable is paid out, and merged while it is wound in. A chain keeps the initial exit point of its pulley.
@@ -86,18 +87,18 @@ def simulate(
             None: "runge-kutta", except for winches="robot", which requires "splitting".
         winches: "ideal": lengths equal their set points. SecondOrder(...): lengths lag behind their set points.
             "robot": the robot's winches with inertia, limits of torque and speed, friction, and position and speed
-            loops with a period of 1 ms. Their motors counteract the planned tensions from the start.
+            loops with a period of 1 ms. From the start, the motors hold the planned tensions.
         winding: Tension of the cable on the drums. "constant": the winding_tension of the winches. "remembered": cable
             keeps the tension of its winding until it is paid out. Only for winches="robot".
-        unstrained_length: Length set points for an equilibrium: times [s] (K,) and lengths [m] (K, m), linear in
-            between; or one row (m,), constant from the start.
+        unstrained_length: Set points of the lengths, if `start` is an equilibrium: times [s] (K,) and lengths [m] (K,
+            m) with linear interpolation; or one row (m,) of constant lengths.
         events: Events, each applied at the first step at or after its time: `Break`, `Stall`, `Brake`, `Drop`,
             `PickUp`.
-        wrench: Wrench on the platform, in place of the wrench of `start`: one row (6,) [N, N m], or times and rows (K,
-            6).
-        wind: Velocity of the air [m/s], (3,), or times and rows (K, 3); requires the cable diameters. Half of the wind
-            force on a cable, computed for a straight cable, acts on the platform. Give the wind force on the platform
-            as a wrench.
+        wrench: Wrench on the platform, one row (6,) [N, N m], or times and rows (K, 6). It replaces the wrench of
+            `start`.
+        wind: Velocity of the air [m/s], (3,), or times and rows (K, 3); requires the cable diameters. The wind force on
+            a cable is computed for a straight cable, and half of it acts on the platform. Give the wind force on the
+            platform as a wrench.
         damping: Energy losses of the cables; None: no losses.
         record: Interval of the records [s], rounded to whole steps; None: 0.01.
 
@@ -149,7 +150,7 @@ def simulate(
 
 
 def losses_after_break(given: InitialConditions, elements: int = 0) -> Damping:
-    """Energy losses of the cables that are assumed after a break, where none are known."""
+    """Energy losses of the cables after a break, assumed if no losses are given."""
     if elements:  # the damping of waves in stiff cables does not require smaller steps than the waves
         return Damping(loss_time=min(LOSS_TIME, 2.0 / wave_frequency(given, elements)))
     return Damping(loss_time=LOSS_TIME)
@@ -168,7 +169,7 @@ def started_run(
     damping: Damping | None = None,
     record: float | None = None,
 ) -> SimulationRun:
-    """Simulation at its first step, to be continued."""
+    """Prepare a simulation at its first step."""
     if elements:
         check_lumped(given)
     kind, losses = winch_kind(winches), checked_damping(damping)
@@ -193,7 +194,7 @@ def started_run(
 
 
 def _set_points(given: InitialConditions, plant: Plant, kind: int) -> TimeTable:
-    """Set points of the drives: lengths; for drums, lengths along the winding path, and tensions."""
+    """Set points of the drives: lengths, or, for drums, tensions and lengths along the winding path."""
     if kind != d.DRUMS:
         return given.lengths
     stretch, table = 1.0 + plant.data[d.WINDING_STRAIN], given.lengths
@@ -204,7 +205,7 @@ def _set_points(given: InitialConditions, plant: Plant, kind: int) -> TimeTable:
 def initial_plant(
     given: InitialConditions, winches: Winches, with_wind: bool, elements: int = 0, losses: Damping | None = None
 ) -> Plant:
-    """Plant at the start, with winches at their initial speeds."""
+    """Create the plant for the start of the run, with winches at their initial speeds."""
     length = given.state.unstrained_length
     data = drive_data(given.robot, winches, length, with_wind)
     if elements:
@@ -249,9 +250,9 @@ def time_step(
     events: Any,
     waves: float = 0.0,
 ) -> float:
-    """Checked step [s] for the lightest platform after all events; waves: highest frequency of the cables [rad/s].
+    """Check the step [s] for the smallest platform mass of the run; waves: highest cable frequency [rad/s].
 
-    Losses limit only the step of massless cables. The losses of cables with mass are implicit.
+    Losses limit the step only for massless cables. For cables with mass, losses are integrated implicitly.
     """
     robot, lengths = given.robot, given.lengths.value
     platform = platform_frequency(robot, given.poses, lengths) * _lightness(robot.mass, events)
@@ -269,14 +270,14 @@ def _lightness(mass: float, events: tuple[Event, ...]) -> float:
 
 
 def load_bits(losses: Damping, wrench: TimeTable, with_wind: bool) -> int:
-    """Bits for the kernel, for active damping and loads."""
+    """Bit mask for the kernel: one bit for each active damping or load."""
     damped = losses.loss_time > 0.0 or losses.air_damping > 0.0
     loaded = with_wind or bool(wrench.value.any())
     return k.DAMPED * damped + k.LOADED * loaded + k.BLOWN * with_wind
 
 
 def _every(record: Any, step: float) -> int:
-    """Number of steps between two records."""
+    """Convert the interval between records [s] to a number of steps."""
     given = RECORD if record is None else number(record, "record", "s", above=0.0)
     if record is not None and given < 0.999 * step:
         raise InvalidValueError("record", f"{given:g} s", f">= {step:g} s, the step", "Give a longer one, or a step.")
@@ -284,7 +285,7 @@ def _every(record: Any, step: float) -> int:
 
 
 def _count(given: InitialConditions, step: float) -> int:
-    """Number of steps."""
+    """Number of steps from begin to end."""
     count = np.ceil((given.end - given.begin) / step - 1e-9)
     if not count <= MOST_STEPS:
         longest, advice = f"<= {MOST_STEPS * step:g} s, {MOST_STEPS:.0e} steps", "Simulate a shorter time."

@@ -74,10 +74,10 @@ class Reading(NamedTuple):
 
 
 class Simulator:
-    """Simulated machine for a controller: winches, cables without mass, platform and sensors.
+    """Simulated machine for the test of a controller: winches, cables without mass, platform and sensors.
 
-    If the inputs of `simulate` are tabulated at the periods, both motions are bitwise equal. With other tables they
-    differ by rounding. Do not share a simulator between threads.
+    The motion is bitwise equal to that of `simulate` if its inputs are tabulated at the ends of the periods. With other
+    tables the two motions differ by rounding. Do not share a simulator between threads.
     """
 
     def __init__(
@@ -151,7 +151,7 @@ class Simulator:
         self._read()
 
     def _set_up_course(self, given: InitialConditions, m: int) -> None:
-        """Prepare the time table between the last and the next set points."""
+        """Create the time table that connects the last set points to the next."""
         drums = self._kind == d.DRUMS
         stretch = 1.0 + self._plant.data[d.WINDING_STRAIN] if drums else np.ones(m)
         lengths = np.repeat(given.lengths.value, 2, axis=0)
@@ -194,7 +194,7 @@ class Simulator:
         tension: ArrayLike | None = None,
         wrench: ArrayLike | None = None,
     ) -> Reading:
-        """Simulate one period, with set points that change linearly to the given set points.
+        """Simulate one period, during which the set points change linearly to the given values.
 
         Args:
             unstrained_length: Set points at the end of the period [m], shape (m,).
@@ -208,8 +208,8 @@ class Simulator:
 
         Raises:
             InvalidValueError: If the period is not a whole number of steps, a length is not longer than its dead
-                length, or an argument has the wrong type or shape (the state is then unchanged); or if the energy grows
-                without input.
+                length, or an argument has the wrong type or shape. In these cases the state is unchanged. Also if the
+                energy grows without input.
         """
         count = self._count(dt)
         copy_in(self._asked, unstrained_length, "unstrained_length", "m")
@@ -233,7 +233,7 @@ class Simulator:
         copy_in(self._expected, tension, "tension", "N")
 
     def _refuse(self, with_tension: bool) -> NoReturn:
-        """Raise the error of the first invalid set point."""
+        """Raise an error for the first invalid set point."""
         lengths, tension, wrench = self._given
         checked(lengths, "unstrained_length", "m", above=0.0)
         check_set_points(self._plant.robot, TimeTable.constant(lengths))
@@ -266,7 +266,8 @@ class Simulator:
     def release(self, *winches: int) -> None:
         """Release locked drums. Their set points change linearly to the next given values.
 
-        The integral part of a motor's controller starts at zero: at first the motor only holds the expected tension.
+        The integral part of a motor's controller starts at zero. The motor therefore holds only the expected tension at
+        first.
 
         Args:
             winches: Indices of the winches, from 0; none for all.
@@ -284,10 +285,11 @@ class Simulator:
             self._length_table.value[1, : len(freed)][freed] = stood[freed]
 
     def shift(self, length: float, *winches: int) -> None:
-        """Shift set points suddenly, as if an encoder lost counts. The drives follow according to their gains.
+        """Shift set points suddenly, as if an encoder lost counts. The drives move to the shifted set points.
 
         Args:
-            length: Shift of the present set points [m]. The next set points are approached from the shifted set points.
+            length: Shift of the present set points [m]. The motion to the next set points starts at the shifted set
+                points.
             winches: Indices of the winches, from 0; none for all.
 
         Raises:
@@ -340,7 +342,7 @@ class Simulator:
         return Reading(counts, *(locked(array.view()) for array in (self._cells.reading, *true)))
 
     def _read(self) -> None:
-        """Fill in the sensor values."""
+        """Fill the arrays of the sensor values."""
         self._look()
         self._cells.read()
         if self._encoders is not None:
@@ -348,7 +350,7 @@ class Simulator:
 
 
 def _at_rest(robot: Robot, start: Any) -> Equilibrium:
-    """Equilibrium of the robot at the start."""
+    """Compute the equilibrium of the robot at the start."""
     if isinstance(start, Pose | list | tuple | np.ndarray):
         return equilibrium_of(robot, start)
     state = equilibrium_of(start, item="start")

@@ -1,4 +1,4 @@
-"""Time step of a simulation, from the highest frequency of robot (with taut cables) and winches."""
+"""Time step of a simulation, from the highest frequency of winches and robot. All cables count as taut."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from sagline.kernels.dynamics.massless import RUNGE_KUTTA, SPLITTING
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
-LIMIT: Final = {SPLITTING: 2.0, RUNGE_KUTTA: 2.0 * math.sqrt(2.0)}  # limit of step times highest angular frequency
-SHARE: Final = 0.2  # default step times highest angular frequency [rad]
-# default step relative to the limit 0.4 l sqrt(rho/EA) of chains; small, because a break excites the shortest waves
+LIMIT: Final = {SPLITTING: 2.0, RUNGE_KUTTA: 2.0 * math.sqrt(2.0)}  # largest stable step times highest frequency
+SHARE: Final = 0.2  # default product of step and highest angular frequency [rad]
+# default step divided by the limit 0.4 l sqrt(rho/EA) of chains; small, because a break excites the shortest waves
 WAVE_SHARE: Final = 0.465
 LONGEST: Final = 1e-3  # s
 
@@ -49,7 +49,7 @@ def platform_frequency(robot: Robot, poses: Pose, lengths: Array) -> float:
 def checked_step(
     step: float | None, integrator: int, highest: float, damping: Damping, stride: bool, waves: float = 0.0
 ) -> float:
-    """Checked step of a run [s]; highest and waves are angular frequencies [rad/s]."""
+    """Check the step of a run [s]; highest and waves are angular frequencies [rad/s]."""
     limit = _limit(integrator, max(highest, waves), damping)
     if step is None:
         usual = min(SHARE / LIMIT[integrator] * _limit(integrator, highest, damping), LONGEST)
@@ -76,11 +76,11 @@ def _limit(integrator: int, highest: float, damping: Damping) -> float:
 
 
 def frequency_with_winches(platform: float, kind: int, data: Array, lengths: Array, stiffness: Array) -> float:
-    """Highest angular frequency of the system of platform and winches [rad/s]."""
+    """Highest angular frequency of platform and winches as a coupled system [rad/s]."""
     # shapes: platform [rad/s]; data (DATA_ROWS, m); lengths (K, m) [m]; stiffness (m,) [N]
     if kind == d.SECOND_ORDER:
         return max(platform, float(data[d.BANDWIDTH].max() * max(1.0, 2.0 * data[d.RATIO].max())))
-    if kind == d.DRUMS:  # the largest eigenvalue is at most the sum of the eigenvalues with only one mass
+    if kind == d.DRUMS:  # the largest eigenvalue is at most the sum of those with one mass only
         drums = stiffness / (lengths.min(axis=0) * data[d.INERTIA])
         return math.hypot(platform, math.sqrt(float(drums.max())))
     return platform

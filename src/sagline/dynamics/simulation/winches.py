@@ -24,9 +24,9 @@ NEEDED: Final = ("drum_radius", "inertia", "position_gain", "speed_gain", "integ
 
 @dataclass(frozen=True, slots=True)
 class SecondOrder(NumberFields):
-    """Winches as damped second-order systems, whose lengths follow their set points.
+    """Winches whose lengths follow their set points as damped second-order systems.
 
-    For a set point with constant rate, the lag is the rate times 2 damping_ratio / (2 pi bandwidth).
+    If the set point changes at a constant rate, the length lags by this rate times 2 damping_ratio / (2 pi bandwidth).
 
     Attributes:
         bandwidth: Natural frequency [Hz], > 0.
@@ -55,16 +55,16 @@ def winch_kind(winches: Any) -> int:
 
 
 def checked_winding(winding: Any, kind: int) -> Winding:
-    """Checked winding; remembered winding is rejected for winches without drums."""
+    """Check the option winding; "remembered" is rejected for winches without drums."""
     found: Winding = choice(winding, "winding", get_args(Winding))
     if found == "remembered" and kind != d.DRUMS:
-        step = 'Also give winches="robot", or omit winding.'
+        step = 'Add winches="robot", or omit winding.'
         raise InvalidValueError("winding", '"remembered"', '"constant" for winches without drums', step)
     return found
 
 
 def drive_data(robot: Robot, winches: Winches, length: Array, with_wind: bool) -> Array:
-    """Data of the drives for kernels, (DATA_ROWS, m); length (m,) [m]."""
+    """Data of the drives for the kernels, (DATA_ROWS, m), at lengths (m,) [m]."""
     data = np.zeros((d.DATA_ROWS, robot.cable_count))
     if isinstance(winches, SecondOrder):
         data[d.BANDWIDTH] = 2.0 * np.pi * winches.bandwidth
@@ -83,7 +83,7 @@ def drive_data(robot: Robot, winches: Winches, length: Array, with_wind: bool) -
 
 
 def _fill_drums(data: Array, robot: Robot, length: Array) -> None:
-    """Inertia, limits and gains, referred to the cable on the initial layer of each drum."""
+    """Inertia, limits and gains of the drives, converted to the motion of the cable at the initial drum radius."""
     winch = robot.winches
     missing = [f"winches: {name}" for name in NEEDED if winch is None or getattr(winch, name) is None]
     if winch is None or missing:
@@ -116,7 +116,7 @@ class Encoders:
     """
 
     def __init__(self, robot: Robot, wound: Array, stretch: Array) -> None:
-        """Encoders of a robot with complete drum data; wound (m,) [m]; stretch (m,)."""
+        """Create the encoders of a robot with complete drum data; wound (m,) [m]; stretch (m,)."""
         drums, m = drums_of(robot), robot.cable_count
         zero, rate = drums.zero_and_rate()
         self.counts = np.empty(m)
@@ -126,13 +126,13 @@ class Encoders:
 
     @staticmethod
     def are_on(robot: Robot) -> bool:
-        """True if a robot's winches and cables have all data for counts."""
+        """True if a robot has all data for the computation of encoder counts."""
         winch = robot.winches
         known = winch is not None and all(getattr(winch, name) is not None for name in COUNTED)
         return known and robot.cables.diameter is not None
 
     def read(self) -> None:
-        """Fill in the counts."""
+        """Fill the array of the counts."""
         self._read()
 
 
@@ -145,7 +145,7 @@ class LoadCells:
     """
 
     def __init__(self, robot: Robot, seed: int, tension: Array) -> None:
-        """Make the load cells of a robot; without winches their readings are the true tensions."""
+        """Create the load cells of a robot. If the robot has no winches, they measure the true tensions."""
         # shapes: tension (m,) [N]
         m, winch = robot.cable_count, robot.winches
         cells = np.array([np.ones(m), np.zeros(m), np.zeros(m), np.full(m, np.inf)])
@@ -158,6 +158,6 @@ class LoadCells:
         self._read = bound(read_cells, tension, locked(cells), self._noise, self.reading)
 
     def read(self) -> None:
-        """Fill in the measured tensions."""
+        """Fill the array of the measured tensions."""
         self.generator.standard_normal(out=self._noise)
         self._read()

@@ -26,18 +26,18 @@ from sagline.statics.balance import inertial_wrench, structure_matrix
 
 _PLACES: Final = 201  # number of positions along a segment at which limits are evaluated
 _ITERATIONS: Final = 8  # largest number of iterations for the sag forces
-_CONVERGED: Final = 1e-7  # relative change of the time in an iteration
+_CONVERGED: Final = 1e-7  # the iterations stop at a smaller relative change of the time
 _INSTANTS: Final = 4001  # number of instants of a segment for the final check of the limits
 # relative increase of the time after the first violation of a limit; each further violation multiplies it by four
 _SLOWER: Final = 1e-6
 _TRIES: Final = 12
-_GENTLE: Final = 8  # number of first attempts that increase the time by the cube root of the excess speed
+_GENTLE: Final = 8  # number of initial attempts; each multiplies the time by the cube root of the excess speed
 _ROUNDING: Final = 1e-12
 
 
 @dataclass(frozen=True, slots=True)
 class _TimedSegment:
-    """A segment with its new motion, which is slightly slower than the computed optimum."""
+    """Segment with its new motion, which is slightly slower than the computed optimum."""
 
     curve: Curve
     motion: SpeedProfile | JerkProfile
@@ -66,21 +66,22 @@ def fastest(
 ) -> Path:
     """Fastest motion along the curve of a path within the tension limits; each segment is from rest to rest.
 
-    The limits are satisfied exactly, with sagging cables. At each sample and at 4,000 instants of each segment,
-    `inverse` finds tensions with the given margin to the limits. Without a jerk bound the acceleration is
-    discontinuous, and winches cannot follow it. With a jerk bound, each segment has 100 pieces with constant jerk of
-    the curve parameter. The time of the segment is within about 0.1 % of the optimum.
+    The sagging cables satisfy the limits exactly: at each sample and at 4,000 instants of each segment, `inverse` finds
+    tensions with the given margin to the limits. Without a jerk bound the acceleration is discontinuous, and winches
+    cannot follow it. With a jerk bound, the curve parameter of each segment has 100 pieces with constant jerk. The
+    duration of the segment is then about 0.1 % longer than the optimum, or less.
 
-    Speed limits of the robot's winches apply to the platform motion. With a jerk bound they also apply to the elastic
-    length changes, for the tension distribution of `Closest`.
+    Speed limits of the winches apply to the length changes due to the platform motion. With a jerk bound they also
+    apply to the elastic length changes, which are computed with the method `Closest`.
 
     Args:
         robot: The robot. Its tension_min and tension_max apply to the tension named in tension_limits_of.
-        path: Path with the curve. Its times have no effect. The new path is at rest at the same poses as this path.
+        path: Path that defines the curve and the poses at rest. Its times have no effect.
         margin: Distance from both limits [N], >= 0.
         jerk: Largest jerk of the platform's origin [m/s^3], > 0; None for no bound.
         angular_jerk: Largest second derivative of the angular velocity [rad/s^3], > 0; None for no bound.
-        progress: Called after each segment: number done, total number.
+        progress: Function that is called after each segment with the number of finished segments and their total
+            number.
 
     Returns:
         Path at the sample rate of the given path. Its jerk is None without a jerk bound.
@@ -168,7 +169,7 @@ def _fastest_segment(
 
 
 def _checked(robot: Robot, timed: _TimedSegment, limits: tuple[float, float]) -> _TimedSegment:
-    """Segment that also satisfies its limits between the positions, slowed down slightly if necessary."""
+    """Slow the segment down slightly if it violates a limit between the positions."""
     for again in range(_TRIES):
         pose, twists = timed.at(np.linspace(0.0, timed.duration, _INSTANTS))
         plan = inverse(robot, pose, wrench=inertial_wrench(robot, pose, twists[0], twists[1]))
@@ -200,7 +201,7 @@ def _has_speed_limits(robot: Robot) -> bool:
 
 
 def _winch_speed_bounds(robot: Robot, curve: Curve, place: Array, rest: Plan) -> Bounds:
-    """Bounds on the squared speed from the speed limits of winches and the rates of the chords."""
+    """Bounds on the squared speed of the parameter, from the speed limits of the winches."""
     if not _has_speed_limits(robot):
         return lambda parameter: HalfPlanes(np.zeros((parameter.size, 0, 2)), np.zeros((parameter.size, 0)))
     fastest_cable = _fastest_rates(robot, rest.unstrained_length)
@@ -238,7 +239,7 @@ def _speed_excess(plan: Plan) -> float:
 def _joined(
     path: Path, segments: Sequence[RestToRestSegment], timed: Sequence[_TimedSegment | None], bounded: bool
 ) -> Path:
-    """Path of the timed segments."""
+    """Create the path from the segments with their new motions."""
 
     def motion(k: int, time: Array) -> tuple[Pose, Array]:
         one = timed[k]

@@ -16,7 +16,7 @@ from sagline.kinematics.plan import Plan
 from sagline.robot.robot import Robot
 from sagline.statics.balance import inertial_wrench, structure_matrix
 
-_NOTHING: Final = 1e-11  # relative to the largest component of a direction; smaller values count as zero
+_NOTHING: Final = 1e-11  # components below this share of the largest component of a direction count as zero
 _BLOCK: Final = 40_000  # matrices per block
 _WIDER: Final = (1.0, 0.03)  # [N], trial extensions of the limits for poses on the border of feasibility
 
@@ -29,7 +29,7 @@ class HalfPlanes:
     bound: Array  # shape (K, R); infinite for a row without effect
 
     def joined(self, other: HalfPlanes) -> HalfPlanes:
-        """All half planes of two sets."""
+        """Combine two sets of half planes."""
         return HalfPlanes(np.hstack((self.rates, other.rates)), np.hstack((self.bound, other.bound)))
 
 
@@ -52,7 +52,7 @@ class ForceBalance:
 
     @classmethod
     def at(cls, robot: Robot, jet: Jet, plan: Plan) -> ForceBalance:
-        """The force balance at positions with a known plan at rest."""
+        """Force balance at positions, from a plan that is at rest at these positions."""
         nothing = np.zeros(plan.chord_tension.shape)
         freedoms = robot.degrees_of_freedom
         one = np.zeros((len(nothing), 1, freedoms))
@@ -60,7 +60,7 @@ class ForceBalance:
         return new.at_poses(jet).with_sag_of(plan, np.zeros((len(jet.pose), 2)))
 
     def at_poses(self, jet: Jet) -> ForceBalance:
-        """Force balance at neighboring poses, with the same sag forces."""
+        """Force balance at other poses close to these, with unchanged sag forces."""
         robot, (first, second, _) = self.robot, jet.rates
         by_rate = inertial_wrench(robot, jet.pose, np.zeros_like(first), first)
         by_speed = inertial_wrench(robot, jet.pose, first, second)
@@ -78,7 +78,7 @@ class ForceBalance:
         return total
 
     def with_sag_of(self, plan: Plan, motion: Array) -> ForceBalance:
-        """Force balance with the sag forces of a plan for motions (K, 2); infeasible poses keep their sag forces."""
+        """Update the sag forces with a plan for the motions (K, 2). Sag forces of infeasible poses are unchanged."""
         assert plan.needed is not None
         found, freedom = plan.feasible[:, None], self.robot.freedom.T
         # a frame-end limit becomes a chord limit with the present difference of the two tensions
@@ -92,7 +92,7 @@ class ForceBalance:
         )
 
     def near_motion(self, motion: Array) -> ForceBalance:
-        """Force balance with the sag forces at motions (K, 2), on the border of the limits or slightly outside."""
+        """Update the sag forces for motions (K, 2) that are on the border of the tension limits or slightly outside."""
         # on the border the tensions are nearly unique, and rounding may make the pose infeasible; the smallest
         # extension of the limits with a solution is therefore used
         found, wrench = self, self.wrench(motion)
@@ -103,7 +103,7 @@ class ForceBalance:
         return found
 
     def half_planes(self) -> HalfPlanes:
-        """Polygons of feasible motions, in which the needed wrench is within the cables' range along every normal."""
+        """Half planes of the feasible motions: along every normal, the cables can supply the needed wrench."""
         with np.errstate(invalid="ignore"):  # zero component times an infinite limit
             ends = [np.where(self.gains == 0.0, 0.0, self.gains * limit[:, None]) for limit in (self.low, self.high)]
         most = np.maximum(*ends).sum(axis=-1)
@@ -112,7 +112,7 @@ class ForceBalance:
 
 
 def _normals(matrix: Array) -> Iterator[Array]:
-    """Both normals of all planes spanned by n - 1 columns of matrices (K, n, m), shape (K, 2 S, n), in blocks."""
+    """Both normals of every plane that n - 1 columns of a matrix (n, m) span; input (K, n, m), result (K, 2 S, n)."""
     # these include the normals of all facets of the zonotope; for dependent columns any normal gives a valid bound
     n, m = matrix.shape[1:]
     sets = np.array(list(combinations(range(m), n - 1)), dtype=np.intp).reshape(-1, n - 1)
@@ -123,12 +123,12 @@ def _normals(matrix: Array) -> Iterator[Array]:
         yield np.concatenate((normal, -normal), axis=1)
 
 
-_FLAT = 1e-12  # relative to the largest rate; smaller rates count as zero
+_FLAT = 1e-12  # rates below this share of the largest rate count as zero
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SpeedProfile:
-    """Constant acceleration of the parameter between neighboring positions."""
+    """Motion with constant acceleration of the parameter between neighboring positions."""
 
     place: Array  # parameters, shape (K,)
     square: Array  # squared speeds at the parameters, shape (K,)
@@ -136,7 +136,7 @@ class SpeedProfile:
 
     @classmethod
     def of(cls, place: Array, square: Array) -> SpeedProfile:
-        """The profile, with the times computed from the squared speeds."""
+        """Create a profile; its times follow from the squared speeds."""
         speed = np.sqrt(square)
         return cls(place, square, np.append(0.0, np.cumsum(2.0 * np.diff(place) / (speed[1:] + speed[:-1]))))
 
@@ -166,7 +166,7 @@ class SpeedProfile:
 
 
 def fastest_speed_profile(place: Array, planes: HalfPlanes) -> SpeedProfile | None:
-    """Rest-to-rest profile with the largest speed within the bounds at each position; place (K,)."""
+    """Rest-to-rest profile with the largest feasible speed at each position; place (K,)."""
     # The backward pass computes the squared speeds from which the end can be reached. The forward pass uses the largest
     # acceleration within these speeds. A bound that is satisfied at both ends of a step is also satisfied within the
     # step, except for a small error due to the curvature of the bound. Source: Pham & Pham, A new approach to
@@ -190,7 +190,7 @@ def fastest_speed_profile(place: Array, planes: HalfPlanes) -> SpeedProfile | No
 
 
 def _rows(planes: HalfPlanes, i: int, step: float, reach: Array) -> tuple[Array, Array]:
-    """Bounds on (acceleration, squared speed) at position i, due to i, to the next position, and to reachability."""
+    """Bounds on (acceleration, squared speed) at position i, from positions i and i + 1 and from reachability."""
     sheared = planes.rates[i + 1].copy()
     sheared[:, 0] += 2.0 * step * sheared[:, 1]  # the squared speed grows by 2 step times the acceleration
     ahead = np.array([[2.0 * step, 1.0], [-2.0 * step, -1.0], [0.0, -1.0]])
@@ -201,7 +201,7 @@ def _rows(planes: HalfPlanes, i: int, step: float, reach: Array) -> tuple[Array,
 
 
 def _range(rates: Array, bound: Array) -> tuple[float, float]:
-    """Smallest and largest value of the second variable with a feasible value of the first variable.
+    """Smallest and largest value of the second variable for which the first variable has a feasible value.
 
     If the bounds have no solution, the first result is larger than the second.
     """

@@ -18,17 +18,17 @@ Bounds: TypeAlias = Callable[[Array], HalfPlanes]  # additional half planes at g
 
 PIECES: Final = 100  # number of pieces of constant jerk
 _ITERATIONS: Final = 40
-_CONVERGED: Final = 1e-6  # relative change of the time in an iteration
-_SLOWER: Final = 1.2  # initial time of the iterations, relative to the time without jerk bound
+_CONVERGED: Final = 1e-6  # the iterations stop at a smaller relative change of the time
+_SLOWER: Final = 1.2  # initial time of the iterations, divided by the time without jerk bound
 _NOTHING: Final = 1e-30
 _SIDES: Final = 32  # number of directions in which a polygon's border is sampled
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JerkProfile:
-    """Piecewise constant jerk of the parameter, on equal pieces of the time."""
+    """Motion with constant jerk of the parameter on each of P equally long pieces."""
 
-    jerk: Array  # third derivative of the parameter with respect to time over duration, shape (P,)
+    jerk: Array  # third derivative of the parameter with respect to normalized time, shape (P,)
     duration: float  # the time [s]
 
     def at(self, time: Array) -> Array:
@@ -56,7 +56,7 @@ def _integration_matrices(pieces: int) -> Array:
     h = 1.0 / pieces
     # time since the start of each piece
     since = np.maximum(np.arange(pieces + 1)[:, None] - np.arange(pieces), 0.0) * h
-    left = np.maximum(since - h, 0.0)  # time since its end
+    left = np.maximum(since - h, 0.0)  # time from the knot to the end of each piece
     return np.stack([(since**k - left**k) / f for k, f in ((3, 6.0), (2, 2.0), (1, 1.0))])
 
 
@@ -114,7 +114,7 @@ def _first(curve: Curve, limits: tuple[float, float], least: float) -> JerkProfi
 
 
 def _within(planes: HalfPlanes, state: Array, speed: Array) -> tuple[Array, Array]:
-    """Rows of a linear program in (jerk, squared time) for the half planes at each knot, shape (K r, P + 1)."""
+    """Rows of the linear program for the half planes at each knot; unknowns: jerks, squared time; (K r, P + 1)."""
     by_rate, by_square = (planes.rates[..., k, None] for k in range(2))
     left = by_rate * state[2][:, None] + by_square * 2.0 * speed[:, None, None] * state[1][:, None]
     rows = np.concatenate((left, -planes.bound[..., None]), axis=-1).reshape(-1, PIECES + 1)
@@ -125,7 +125,7 @@ def _within(planes: HalfPlanes, state: Array, speed: Array) -> tuple[Array, Arra
 
 
 def _jerk_rows(rates: Array, state: Array, course: JerkProfile, limit: float) -> tuple[Array, Array]:
-    """Rows that limit the jerk R1 s''' + 3 R2 s' s'' + R3 s'^3 in some directions at all knots."""
+    """Rows of the linear program that limit the jerk R1 s''' + 3 R2 s' s'' + R3 s'^3 in some directions at knots."""
     # directions along the curve, across the curve and along the present jerk limit the magnitude of the final jerk;
     # shapes: rates (3, P + 1, 3)
     _, speed, rate = (values[:, None] for values in state @ course.jerk)
@@ -153,7 +153,7 @@ def _unit(vectors: Array) -> Array:
 
 
 def _without_redundant(planes: HalfPlanes) -> HalfPlanes:
-    """Half planes that contain the origin and bound the polygon in some sampled direction."""
+    """Select the half planes that bound the polygon in a sampled direction; all contain the origin."""
     normed = planes.rates / np.maximum(planes.bound, _NOTHING)[..., None]  # 0 for an infinite bound
     scale = np.maximum(np.abs(normed).max(axis=1, keepdims=True), _NOTHING)
     angle = np.linspace(-0.5 * np.pi, 0.5 * np.pi, _SIDES)

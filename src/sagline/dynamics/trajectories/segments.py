@@ -17,13 +17,13 @@ from sagline.motion.rest_to_rest import time_grid
 from sagline.motion.segments import QUINTIC, Segments
 from sagline.robot.pose import Pose
 
-_STOPPED: Final = 1e-6  # relative to the largest speed
-# smallest distance of spline knots, for example at the start of a motion, relative to the mean step
+_STOPPED: Final = 1e-6  # largest speed at a stop, as a share of the path's largest speed
+# smallest distance of spline knots divided by the mean step; knots are close at the start of a motion
 _NARROW: Final = 0.2
 
 
 class Jet(NamedTuple):
-    """Poses of a curve, and their derivatives with respect to its parameter."""
+    """Poses on a curve, and their derivatives with respect to the curve parameter."""
 
     pose: Pose  # poses, a batch of N
     # twist at unit parameter rate, and its first two derivatives with respect to the parameter, shape (3, N, 6)
@@ -37,7 +37,7 @@ class Jet(NamedTuple):
 
 
 class Curve(Protocol):
-    """A curve in the space of poses."""
+    """Curve in the space of poses."""
 
     def at(self, parameter: Array) -> Jet:
         """Poses and their derivatives at parameters of shape (N,)."""
@@ -46,7 +46,7 @@ class Curve(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _LineCurve:
-    """Straight line with a rotation about a fixed axis. The parameter is the covered share of length and angle."""
+    """Straight line with a rotation about a fixed axis. The parameter is 0 at the start and 1 at the end."""
 
     ends: Segments  # a single segment
 
@@ -97,7 +97,7 @@ class SplineCurve:
 
     @classmethod
     def through(cls, pose: Pose, parameter: Array) -> SplineCurve:
-        """Splines through poses at ascending parameters, without poses whose parameters are too close."""
+        """Splines through poses at ascending parameters. Poses with nearly the same parameter are left out."""
         from scipy.interpolate import make_interp_spline  # this import takes longer than the rest of motion
 
         least, knots = _NARROW * parameter[-1] / len(parameter), [0]
@@ -154,7 +154,7 @@ def _vector(a: Array, b: Array) -> Array:
 
 
 def piecewise(knots: Array, values: Array, at_end: int) -> Any:
-    """Piecewise polynomial with given derivatives at both ends of each piece; four per end give degree 7."""
+    """Piecewise polynomial from derivatives at both ends of each piece; four derivatives per end give degree 7."""
     # shapes: knots (n,); values (K, n)
     from scipy.interpolate import PPoly  # this import takes longer than the rest of motion
 
@@ -181,13 +181,13 @@ def _pieces(left: Array, right: Array) -> Array:
     return np.concatenate((left, rest))
 
 
-# tolerance for rest in splines through samples, relative to the path's largest speed or acceleration
+# in a spline through samples, a speed or acceleration below this share of its largest value counts as rest
 RESTING: Final = 1e-3
-# stricter tolerance between the ends, relative to the largest speed of the path; the platform may only reverse there
+# stricter share between the ends of the path, because the platform may only reverse there
 _STANDING: Final = 1e-9
-_ON_A_LINE: Final = 1e-7  # largest distance of samples from a line, relative to its length
+_ON_A_LINE: Final = 1e-7  # largest distance of samples from a line, divided by its length
 TINY: Final = 1e-300
-_SAME_TIME: Final = 1e-9  # relative to the path's duration
+_SAME_TIME: Final = 1e-9  # tolerance of times, as a share of the path's duration
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -254,7 +254,7 @@ def _standing(path: Path) -> Array:
 
 
 def _segment(path: Path, begin: float, end: float) -> RestToRestSegment:
-    """Segment between two rests; adjacent polynomials are extended to a rest that is between samples."""
+    """Segment between two rests. If a rest is between samples, the adjacent polynomial is extended to it."""
     near = _SAME_TIME * max(path.duration, abs(begin))
     first, last = np.searchsorted(path.time, (begin - near, end + near))
     part = slice(int(first), int(last))
@@ -285,7 +285,7 @@ def _segment(path: Path, begin: float, end: float) -> RestToRestSegment:
 
 
 def _parametrized(time: Array, pose: Pose, rates: list[Array]) -> tuple[Curve, Array]:
-    """A curve through samples, and its parameter with derivatives at each sample, shape (K, n)."""
+    """Curve through samples; parameter at each sample with its derivatives, shape (K, n)."""
     line = _LineCurve.between(pose)
     if line.moves:
         parameter, square = line.parameter(pose), float(line.direction @ line.direction)
@@ -304,7 +304,7 @@ def _parametrized(time: Array, pose: Pose, rates: list[Array]) -> tuple[Curve, A
 
 
 def sample_time(path: Path) -> float:
-    """Typical time between samples [s]; a sample rate close to a whole number is rounded."""
+    """Typical time between samples [s]. If the sample rate is nearly a whole number, it is rounded."""
     if len(path) < 2:
         raise InvalidValueError("path", "of one sample", "two or more, from rest to rest", "Give a longer path.")
     rate = 1.0 / float(np.median(np.diff(path.time)))

@@ -1,4 +1,4 @@
-"""Input shapers, and paths convolved with them."""
+"""Input shapers, and convolution of paths with input shapers."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from sagline.motion.path import Path, checked_time
 from sagline.robot.pose import Pose
 
 MOST_IMPULSES: Final = 10_000  # largest number of impulses; three impulses for each of eight frequencies give 6,561
-_SAME: Final = 1e-12  # smallest distance of impulses, relative to a shaper's duration; closer impulses are merged
+_SAME: Final = 1e-12  # impulses with a smaller distance, as a share of a shaper's duration, are merged
 _ROUNDING: Final = 1e-9  # tolerance of the sum of the amplitudes
 
 
@@ -79,7 +79,8 @@ class Shaper(Result):
             other: A shaper.
 
         Returns:
-            Shaper with one impulse per pair of impulses; impulses at the same time are merged.
+            Shaper of both. It has one impulse for every impulse of this shaper combined with every impulse of the other
+            shaper; impulses at the same time are merged.
 
         Raises:
             InvalidValueError: If other is not a shaper, or the product would have more than 10,000 impulses.
@@ -104,7 +105,7 @@ class Shaper(Result):
 
         Returns:
             |sum A_j exp((zeta w + i w_d) t_j)| exp(-zeta w t_K) with w = 2 pi frequency and w_d = w sqrt(1 - zeta^2),
-            of the shape of the frequency. The value 1 means no effect.
+            same shape as the frequency. The value 1 means no effect.
 
         Raises:
             InvalidValueError: If an argument is out of its range.
@@ -121,11 +122,11 @@ class Shaper(Result):
 
 
 def ZV(frequency: ArrayLike, damping_ratio: ArrayLike = 0.0) -> Shaper:  # noqa: N802
-    """Zero vibration: two impulses, half a period apart, cancel the vibration at the frequency.
+    """Zero-vibration (ZV) shaper: two impulses with a distance of half a period cancel a vibration.
 
     Args:
-        frequency: Natural frequency [Hz], > 0; for several, shape (F,), the product of their shapers.
-        damping_ratio: Damping ratio of the vibration, >= 0, < 1, one for all or one per frequency.
+        frequency: Natural frequencies of the vibrations [Hz], > 0, one or shape (F,). Several shapers are multiplied.
+        damping_ratio: Damping ratio of the vibrations, >= 0, < 1, one for all or one per frequency.
 
     Returns:
         Shaper that extends a motion by half a period of the vibration.
@@ -146,11 +147,11 @@ def ZV(frequency: ArrayLike, damping_ratio: ArrayLike = 0.0) -> Shaper:  # noqa:
 
 
 def ZVD(frequency: ArrayLike, damping_ratio: ArrayLike = 0.0) -> Shaper:  # noqa: N802
-    """Zero vibration and derivative: as `ZV`, with little vibration also for small frequency errors.
+    """Zero-vibration-and-derivative (ZVD) shaper: small errors of the frequency leave less vibration than with `ZV`.
 
     Args:
-        frequency: Natural frequency [Hz], > 0; for several, shape (F,), the product of their shapers.
-        damping_ratio: Damping ratio of the vibration, >= 0, < 1, one for all or one per frequency.
+        frequency: Natural frequencies of the vibrations [Hz], > 0, one or shape (F,). Several shapers are multiplied.
+        damping_ratio: Damping ratio of the vibrations, >= 0, < 1, one for all or one per frequency.
 
     Returns:
         Shaper of three impulses that extends a motion by a period of the vibration.
@@ -171,12 +172,13 @@ def ZVD(frequency: ArrayLike, damping_ratio: ArrayLike = 0.0) -> Shaper:  # noqa
 
 
 def EI(frequency: ArrayLike, tolerance: ArrayLike = 0.05) -> Shaper:  # noqa: N802
-    """Extra insensitive: residual vibration `tolerance` at the frequency, zero slightly above and below the frequency.
+    """Extra-insensitive (EI) shaper: allows the share `tolerance` of the vibration, in a wider range of frequencies.
 
     Args:
-        frequency: Natural frequency [Hz], > 0, of a vibration with very low damping; for several, shape (F,), the
-            product of their shapers.
-        tolerance: Allowed share of residual vibration, >= 0, < 1, one for all or one per frequency.
+        frequency: Natural frequencies of vibrations with very low damping [Hz], > 0, one or shape (F,). Several shapers
+            are multiplied.
+        tolerance: Residual vibration at the natural frequency, as a share of the unshaped vibration, >= 0, < 1, one for
+            all or one per frequency.
 
     Returns:
         Shaper of three impulses that extends a motion by a period of the vibration.
@@ -197,7 +199,7 @@ def EI(frequency: ArrayLike, tolerance: ArrayLike = 0.05) -> Shaper:  # noqa: N8
 
 
 def _several(frequency: ArrayLike, option: ArrayLike, name: str, make: Callable[[float, float], Shaper]) -> Shaper:
-    """Product of one shaper per frequency; each option is a number >= 0 and < 1."""
+    """Multiply one shaper per frequency; each option is a number >= 0 and < 1."""
     frequencies, options = checked(frequency, "frequency", "Hz", above=0.0), checked(option, name, "", low=0.0)
     if (options >= 1.0).any():
         raise InvalidValueError(name, f"{options.max():g}", ">= 0, < 1", "Give a share, 0.05 for 5 %.")
@@ -221,7 +223,7 @@ def _zero_vibration_and_derivative(frequency: float, damping_ratio: float) -> Sh
 
 
 def _half_period(frequency: float, damping_ratio: float) -> tuple[float, float]:
-    """Half a period of the damped vibration [s], and the remaining amplitude ratio after it."""
+    """Half a period of the damped vibration [s], and the ratio by which the amplitude decreases in it."""
     root = np.sqrt(1.0 - damping_ratio**2)
     return 0.5 / (frequency * root), float(np.exp(-np.pi * damping_ratio / root))
 
@@ -251,10 +253,10 @@ _BYTES: Final = 300.0  # bytes of memory per sample and impulse during shaping
 def shaped(path: Path, shaper: Shaper) -> Path:
     """Path along the same curve that does not excite the frequencies of a shaper.
 
-    The curve parameter over time is convolved with the shaper's impulses, separately for each rest-to-rest segment.
-    Each segment starts at the delayed end of the previous segment. Along a straight line with a rotation about a fixed
-    axis, this also convolves the acceleration, and a linear vibration cancels exactly. Along a curve the platform stays
-    on the curve, and most of the vibration cancels.
+    In each rest-to-rest segment, the curve parameter over time is convolved with the shaper's impulses. Each segment
+    starts at the delayed end of the previous segment. The platform stays on the curve. Along a straight line with a
+    rotation about a fixed axis, the acceleration is convolved like the parameter, and a linear vibration cancels
+    exactly. Along other curves, most of the vibration cancels.
 
     Paths of `quintic_path` and `septic_path` are represented exactly, except for rounding. For other paths, splines of
     5th or 7th degree connect the samples. Along a curve, the pose error is proportional to the sixth power of the

@@ -40,7 +40,7 @@ def _lobatto() -> Lobatto:
 
 
 def _slopes(nodes: Array, last: Array) -> Array:
-    """Derivatives of the Lagrange polynomials at the nodes; last: values of the highest Legendre polynomial."""
+    """Derivatives of the Lagrange polynomials at the nodes, from the highest Legendre polynomial there (`last`)."""
     apart = nodes[:, None] - nodes
     np.fill_diagonal(apart, 1.0)
     slopes = last[:, None] / last / apart
@@ -50,7 +50,7 @@ def _slopes(nodes: Array, last: Array) -> Array:
 
 
 def _integrals(weights: Array, values: Array) -> Array:
-    """Integrals of the Lagrange polynomials from -1 to the nodes; values: Legendre polynomials, up to degree p + 1."""
+    """Integrals of the Lagrange polynomials from -1 to the nodes, from Legendre polynomials up to degree p + 1."""
     p = weights.size - 1
     scale = np.arange(p + 1) + 0.5
     scale[p] = 0.5 * p  # the quadrature rule overestimates the square of the last polynomial
@@ -86,14 +86,15 @@ class CableComponents(NamedTuple):
     mesh: StringMesh
 
     def planes(self, ends: Array, amplitudes: Array) -> tuple[tuple[PlaneModes, Array, Array], ...]:
-        """In-plane modes and normal modes, each with its excitation.
+        """In-plane modes and normal modes, each with the part of K motions that belongs to it.
 
         Args:
             ends: Displacements of all platform ends in K modes, world axes, shape (m, 3, K).
             amplitudes: Amplitudes of the components, shape (T, K).
 
         Returns:
-            Modes; displacements of the platform ends along their directions, (t, d, K); amplitudes, (t, k, K).
+            For each of the two: the modes, the displacements of the platform ends along their directions, (t, d, K),
+            and the amplitudes, (t, k, K).
         """
         own, inside = self.mesh.axes @ ends[self.mesh.taut], self.plane.square.size
         swing = amplitudes[:inside].reshape(*self.plane.square.shape, ends.shape[2])
@@ -125,7 +126,7 @@ class StringMesh(NamedTuple):
 
 
 class PlaneModes(NamedTuple):
-    """Modes of the taut cables in one plane, k modes per cable.
+    """Modes of the taut cables, either in the plane or normal to the plane, k modes per cable.
 
     The u unknowns of a cable are displacements times the root of the node's mass.
     """
@@ -133,11 +134,11 @@ class PlaneModes(NamedTuple):
     rest: Array  # quasi-static shape of the nodes for a displaced platform end, shape (t, u, d)
     square: Array  # angular frequencies squared, ascending [1/s^2], shape (t, k)
     shape: Array  # mode shapes at the nodes, shape (t, u, k)
-    drive: Array  # excitation by the platform end, shape (t, k, d)
+    drive: Array  # modal force per acceleration of the platform end, shape (t, k, d)
 
 
 def component_modes(strings: Strings, row: int, up_to: float) -> CableComponents:
-    """Modes of the cables of one state. They are accurate up to a frequency; higher modes complete the basis."""
+    """Cable modes of one state. Modes up to a frequency are accurate; higher modes only complete the basis."""
     # units: up_to [Hz]
     omega = 2.0 * np.pi * up_to
     taut = np.flatnonzero(strings.taut[row])
@@ -187,7 +188,7 @@ def _still(mass: Array, axes: Array, taut: Indices, count: int) -> Array:
 
 
 def _node_motion(components: CableComponents, ends: Array, amplitudes: Array) -> tuple[Array, Array]:
-    """Displacements of the nodes times the root of the node's mass, in the planes and normal to the planes."""
+    """Displacements of the nodes in the cables' planes and normal to them, times the root of the node's mass."""
     # shapes: ends (m, 3, K); amplitudes (T, K); returns (t, 2 nodes, K)
     plane, normal = (
         motions.rest @ end + motions.shape @ given for motions, end, given in components.planes(ends, amplitudes)
@@ -216,7 +217,7 @@ def cable_shapes(components: CableComponents, ends: Array, amplitudes: Array, co
 
 
 def stretch_energy(components: CableComponents, ends: Array, amplitudes: Array) -> Array:
-    """Twice the stretch energy in each mode of unit modal mass, (t, K) [1/s^2]."""
+    """Twice the stretch energy of each cable in each mode of unit modal mass, (t, K) [1/s^2]."""
     plane, _ = _node_motion(components, ends, amplitudes)
     return np.asarray(np.einsum("tik,tik->tk", plane, _stretch_matrices(components.mesh) @ plane))
 

@@ -25,8 +25,8 @@ class Damping(NumberFields):
     """Damping of a vibration; none by default.
 
     Attributes:
-        loss_time: Loss time eta of the cables' stretch [s], >= 0. At the angular frequency omega, EA is replaced by EA
-            (1 + i omega eta) (Kelvin-Voigt).
+        loss_time: Loss time eta of the cables' stretch [s], >= 0 (Kelvin-Voigt model). At the angular frequency omega,
+            EA is replaced by EA (1 + i omega eta).
         air_damping: Drag force per length and velocity of a cable [N s/m^2], >= 0.
         modal_damping: Additional damping ratio of every mode, >= 0, < 1.
 
@@ -58,13 +58,13 @@ _BYTES = 400.0  # largest number of elements per cable and frequency
 def dynamic_stiffness(state: Equilibrium, frequency: ArrayLike, damping: Damping | None = None) -> Complex:
     """Dynamic stiffness of every cable at its platform end, for vibration about an equilibrium.
 
-    The result is exact for vibrations about the elastic catenary, in its plane and normal to it, with any sag. The
-    frame end is fixed, or elastic due to the cable on the pulley and the dead length. At frequency zero the result is
-    the cable stiffness of `stiffness`.
+    The result is exact for vibrations in the plane of the elastic catenary and normal to it, with any sag. The frame
+    end is fixed. With a pulley or dead length, it is elastic, because the cable behind it stretches. At frequency zero
+    the result is the cable stiffness of `stiffness`.
 
     Args:
         state: A single equilibrium; a plan or a solution of one; or a robot and a pose.
-        frequency: Frequencies [Hz], >= 0, shape (F,) or a single one.
+        frequency: Frequencies [Hz], >= 0, shape (F,), or a single number.
         damping: Energy losses of the vibration; None: no losses. A modal_damping zeta acts as the loss factor 2 zeta of
             the whole stiffness. Every mode then has the damping ratio zeta.
 
@@ -74,7 +74,7 @@ def dynamic_stiffness(state: Equilibrium, frequency: ArrayLike, damping: Damping
 
     Raises:
         InvalidValueError: If the state is not a single Equilibrium with lengths and with exact or elastic cables; if a
-            frequency is negative, or so high that a cable would have more than a hundred thousand waves.
+            frequency is negative, or so high that a cable would have more than 100,000 waves.
 
     Examples:
         >>> import numpy as np
@@ -126,7 +126,7 @@ def check_model(state: Equilibrium) -> None:
 
 
 def moving_stiffness(strings: Strings, frequency: Array, damping: Damping | None) -> Complex:
-    """Dynamic stiffness of the cables of one state, minus their static stiffness."""
+    """Difference between dynamic and static stiffness of the cables of one state."""
     # shapes: frequency (F,) [Hz]; returns (F, m, 3, 3) [N/m]
     waves = waves_of(frequency, damping)
     kind = np.float64 if damping is None else np.complex128
@@ -148,8 +148,8 @@ def check_counts(counts: NDArray[np.int64], frequency: Array) -> None:
     # shapes: counts (1, F, m, 2); frequency (F,) [Hz]
     high = np.flatnonzero((counts == collocation.TOO_MANY).any(axis=(0, 2, 3)))
     if high.size:
-        value = f"{frequency[high[0]]:g} Hz, which would cut a cable into more than {collocation.MOST_ELEMENTS:,} waves"
-        raise InvalidValueError("frequency", value, "a lower one", "Give one nearer to the robot's own.")
+        value = f"{frequency[high[0]]:g} Hz, at which a cable would have more than {collocation.MOST_ELEMENTS:,} waves"
+        raise InvalidValueError("frequency", value, "a lower one", "Give one near the robot's natural frequencies.")
     if (lost := np.flatnonzero((counts < 0).any(axis=(0, 2, 3)))).size:
         text = f"at {frequency[lost[0]]:g} Hz a cable cannot be divided into elements with joints away from its nodes"
         raise SaglineError(f"{text}. Use another frequency, and report the robot and its pose.")
@@ -171,7 +171,7 @@ def in_world(found: NDArray[np.float64] | Complex, axes: Array) -> Complex:
 
 
 def waves_of(frequency: Array, damping: Damping | None) -> Complex:
-    """Frequencies and damping as arrays for kernels."""
+    """Array of frequencies and damping for the kernels."""
     # shapes: frequency (F,) [Hz]; returns (1, F, WAVE_COLUMNS)
     omega = 2.0 * np.pi * frequency
     waves = np.zeros((1, frequency.size, collocation.WAVE_COLUMNS), dtype=np.complex128)

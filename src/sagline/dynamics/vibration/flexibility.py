@@ -10,7 +10,7 @@ import numpy as np
 from sagline.core.arrays import Array, Flags
 from sagline.robot.equilibrium import Equilibrium
 
-_SMOOTH = 0.1  # largest u = w L/(N_A + N_B) at which twelve integration points are exact except for rounding
+_SMOOTH = 0.1  # up to this value of w L/(N_A + N_B), twelve integration points are exact except for rounding
 _POINTS, _SHARES = (0.5 * np.array(values) for values in np.polynomial.legendre.leggauss(12))
 _ALONG, _ACROSS, _UP = 0, 1, 2  # axes of a cable
 
@@ -48,12 +48,12 @@ class _CatenaryState(NamedTuple):
 
     @property
     def smooth(self) -> Flags:
-        """True for cables with a nearly constant force along their length."""
+        """True for cables whose force is nearly constant along their length."""
         return self.weight * self.length <= _SMOOTH * (self.size_a + self.size_b)
 
 
 def flexibility(state: Equilibrium, force: Array) -> Flexibility:
-    """Derivatives of the flexibility of the free spans."""
+    """Compute the derivatives of the flexibility of the free spans."""
     # shapes: force (..., m, 3) [N]
     cables = state.cables
     length = cables.unstrained_length
@@ -180,7 +180,7 @@ def _chosen(hung: _CatenaryState, even: Array, steep: Array) -> Array:
 
 
 def _plane_of(along: Array, across: Array, mixed: Array, up: Array) -> Array:
-    """Matrices (..., 3, 3) without coupling between in-plane directions and the normal direction."""
+    """Matrices (..., 3, 3) from their in-plane elements and their normal element, without coupling terms."""
     whole = np.zeros((*along.shape, 3, 3))
     whole[..., _ALONG, _ALONG], whole[..., _ACROSS, _ACROSS], whole[..., _UP, _UP] = along, across, up
     whole[..., _ALONG, _UP] = whole[..., _UP, _ALONG] = mixed

@@ -1,4 +1,4 @@
-"""Lowest frequency and peak receptance of a robot over many poses."""
+"""Lowest natural frequency and peak receptance of a robot at many poses."""
 
 from __future__ import annotations
 
@@ -42,7 +42,8 @@ _ONE_PERCENT: Final = Damping(modal_damping=0.01)
 class FrequencyMap(Result, Saved, Tabular):
     """Result of `frequency_map` at N poses.
 
-    Values are NaN except for the statuses SOLVED and FOLDED. Frequencies are also NaN if no mode is below up_to.
+    Values are numbers for the statuses SOLVED and FOLDED, otherwise NaN. Frequencies are also NaN if no mode is below
+    up_to.
 
     Attributes:
         robot: The robot.
@@ -53,9 +54,9 @@ class FrequencyMap(Result, Saved, Tabular):
         frequency: Lowest natural frequency with cable mass [Hz], shape (N,).
         massless_frequency: Lowest natural frequency of the platform with massless cables [Hz], shape (N,).
         platform_share: Platform share of the kinetic energy in the lowest mode with cable mass, shape (N,).
-        peak: Largest receptance, static or near a mode below up_to: displacement of the center of mass per force at the
-            center of mass, in the direction of the largest response, as in `frequency_response` [m/N], shape (N,);
-            infinite without damping.
+        peak: Largest receptance [m/N], static or near a mode below up_to, shape (N,). The receptance is the
+            displacement of the center of mass per force at this point, in the direction of the largest response (see
+            `frequency_response`). It is infinite without damping.
         peak_frequency: Frequency of the peak [Hz], shape (N,).
     """
 
@@ -92,15 +93,16 @@ def frequency_map(
 ) -> FrequencyMap:
     """Lowest frequency and largest receptance of a robot at many poses, with cable mass.
 
-    At each pose, all modes below up_to are computed as in `vibration`, and the exact count confirms their number.
+    At each pose, all modes below up_to are computed as in `vibration`. An exact count confirms the number of modes.
 
     Args:
         robot: The robot.
         poses: A batch of N.
         up_to: Upper limit of the mode frequencies [Hz], > 0; by default 20 Hz.
         tension: Tension distribution method, as in `inverse`.
-        damping: Energy losses for the largest response, by default a modal damping of 1 %; None: no losses.
-        progress: Called after every few poses: number done, total number.
+        damping: Energy losses, which limit the largest receptance; by default a modal damping of 1 %. None: no losses.
+        progress: Function that is called after every few poses with the number of finished poses and their total
+            number.
 
     Returns:
         FrequencyMap.
@@ -162,7 +164,7 @@ def _status(model: VibrationModel, row: int) -> tuple[VibrationStatus, float]:
 def _numbers_of_pose(
     state: Equilibrium, model: VibrationModel, row: int, up_to: float, damping: Damping, lowest: float
 ) -> tuple[float, ...]:
-    """Values of one pose, in the order of `FrequencyMap`; lowest: lowest massless frequency [Hz]."""
+    """Compute the values of one pose, in the order of `FrequencyMap`; lowest: lowest massless frequency [Hz]."""
     freedom = model.freedom
     rest = compliance_of(freedom, model.stiffness[row])[:3, :3]
     found = state_modes(model, row, up_to)

@@ -29,10 +29,10 @@ from sagline.statics.stiffness import modes
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class FrequencySlopes(Result):
-    """Result of `frequency_slopes`: derivatives of K frequencies, including the motion to the new equilibrium.
+    """Result of `frequency_slopes`: derivatives of K natural frequencies. They include the change of the equilibrium.
 
-    For each derivative all other data are constant, for example lengths off the drums and wrench. If a tension
-    distribution method determines the lengths for a pose, add length_sensitivity times the length changes.
+    For each derivative all other data are constant, for example the lengths off the drums and the wrench. If a tension
+    distribution method changes the lengths, add length_sensitivity times the length changes.
 
     Equal frequencies have no separate derivatives, because they split when a parameter changes. Their rows contain the
     derivatives for an increasing parameter, in ascending order. For a decreasing parameter the values have the opposite
@@ -49,8 +49,9 @@ class FrequencySlopes(Result):
         stiffness_sensitivity: Derivative with respect to the axial stiffness of each cable, shape (K, m) [Hz/N].
         mass_sensitivity: Derivative with respect to the mass, including its weight, at constant inertia, shape (K,)
             [Hz/kg].
-        inertia_sensitivity: Derivative with respect to the inertia, platform frame, shape (K, 3, 3) [Hz/(kg m^2)]. For
-            a symmetric change of the inertia, multiply both matrices element by element and sum.
+        inertia_sensitivity: Derivative with respect to the inertia, platform frame, shape (K, 3, 3) [Hz/(kg m^2)]. The
+            change of a frequency is the sum of the elementwise product of this matrix and a symmetric change of the
+            inertia.
         pose_sensitivity: Derivative with respect to (displacement of the center of mass, rotation vector), world axes,
             at fixed lengths; the wrench changes to keep equilibrium, shape (K, 6) [Hz/m, Hz/rad].
         wrench_sensitivity: Derivative with respect to the wrench about the center of mass, world axes, shape (K, 6)
@@ -72,12 +73,12 @@ class FrequencySlopes(Result):
 
 @of_result
 def frequency_slopes(state: Equilibrium | HasState, together: float = 1e-6) -> FrequencySlopes:
-    """Sensitivities of every natural frequency to the robot's data, pose and wrench, from analytic derivatives.
+    """Analytic derivatives of every natural frequency with respect to the robot's data, pose and wrench.
 
     Args:
-        state: A single equilibrium, a plan of one, or a robot and then a pose, for the massless frequencies of `modes`;
-            or a vibration, for frequencies with cable mass. Cables are exact or weightless, without pulleys and dead
-            lengths.
+        state: For the massless frequencies of `modes`: a single equilibrium, a plan of a single pose, or a robot and
+            then a pose. For frequencies with cable mass: a vibration. Cables are exact or weightless, without pulleys
+            and dead lengths.
         together: Largest relative difference of adjacent frequencies that count as equal.
 
     Returns:
@@ -88,7 +89,8 @@ def frequency_slopes(state: Equilibrium | HasState, together: float = 1e-6) -> F
             lengths; if the vibration was not solved.
 
     Examples:
-        The cable whose stiffness increases the first massless frequency most, and the effect of a heavier platform:
+        The cable whose axial stiffness has the largest effect on the first massless frequency, and the effect of the
+        mass:
 
         >>> import numpy as np
         >>> import sagline as sl
@@ -127,7 +129,7 @@ def _with_cable_mass(vibration: Vibration, together: float) -> FrequencySlopes:
 def _rest(state: Equilibrium) -> StateSlopes:
     check_model(single_state(state))
     if state.contact is not None:
-        value, allowed = "one with pulleys or dead length", "cables that start at their frame anchors"
+        value, allowed = "one with pulleys or dead length", "cables from frame anchors"
         raise InvalidValueError("state", value, allowed, "Use the robot without winches: robot.replace(winches=None).")
     check_solved(state)
     return state_slopes(state)
@@ -143,7 +145,7 @@ def _groups(frequency: Array, together: float) -> Iterator[Indices]:
 
 
 def _massless(rest: StateSlopes, flexible: Flexibility, motion: Array, square: float) -> ModeGroup:
-    """Modes with constant force change along each cable."""
+    """Massless modes: the change of the force is constant along each cable."""
     ends = motion[:3].T + np.cross(motion[3:].T, rest.slopes.levers[:, None])
     force = ends @ np.swapaxes(rest.slopes.blocks, -1, -2)
     data = np.stack((flexible.by_length, flexible.by_density, flexible.by_stiffness))
@@ -180,7 +182,7 @@ def _result(
 
 
 def _parting(form: Array, frequency: Array) -> Array:
-    """Derivatives (g, ...) of the frequencies of a group, from derivatives (..., g, g) of the squared frequency."""
+    """Derivatives of a group's frequencies (g, ...), from those of the squared angular frequency (..., g, g)."""
     known: Flags = np.asarray(np.isfinite(form).all(axis=(-1, -2)))
     squares = np.linalg.eigvalsh(np.where(known[..., None, None], form, 0.0))
     squares = np.where(known[..., None], squares, np.nan)

@@ -1,4 +1,4 @@
-"""Linear system of a robot about a state, for control design: A, B, C, D with names and units."""
+"""Linear model of a robot about a state, for control design: matrices A, B, C, D with names and units."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Linearized(Result):
     Attributes:
         state: The state.
         damping: Energy losses.
-        A: System matrix, shape (X, X); X = 2 n, or 2 n + m with winch speeds as inputs.
+        A: System matrix, shape (X, X). X = 2 n with lengths as inputs, X = 2 n + m with winch speeds as inputs.
         B: Input matrix, shape (X, m + 6).
         C: Output matrix, shape (6 + 2 m, X).
         D: Feedthrough matrix, shape (6 + 2 m, m + 6).
@@ -72,7 +72,7 @@ class Linearized(Result):
 
     @property
     def poles(self) -> Any:
-        """Eigenvalues of A [rad/s], complex, shape (X,). Without damping they are i omega of the massless modes."""
+        """Eigenvalues of A [1/s], complex, shape (X,). Without damping they are +-i omega of the massless modes."""
         return locked(np.linalg.eigvals(self.A).astype(complex))
 
     def state_space(self) -> StateSpace:
@@ -81,7 +81,7 @@ class Linearized(Result):
         Returns:
             A `scipy.signal.StateSpace`.
         """
-        from scipy.signal import StateSpace  # a slow import
+        from scipy.signal import StateSpace  # this import is slow
 
         return StateSpace(self.A, self.B, self.C, self.D)
 
@@ -96,7 +96,7 @@ def linearized(state: Equilibrium, damping: Damping | None = None, inputs: Input
     Args:
         state: A single equilibrium; a plan or a solution of one; or a robot and a pose.
             An unstable equilibrium has unstable poles.
-        damping: `loss_time` of the cables' stretch (to first order) and `modal_damping`; by default no damping.
+        damping: Damping with `loss_time` (to first order) or `modal_damping`; by default no damping.
         inputs: Inputs of the winches: "lengths" (off the drums), or "speeds" (rates of these lengths, with the lengths
             as states).
 
@@ -109,7 +109,7 @@ def linearized(state: Equilibrium, damping: Damping | None = None, inputs: Input
             winch speeds.
 
     Examples:
-        Final displacement of the platform after 1 mm of cable 0 is wound in:
+        Static displacement of the platform due to 1 mm of cable 0 that is wound in:
 
         >>> import numpy as np
         >>> import sagline as sl
@@ -173,7 +173,7 @@ def _driven_by_speeds(state: Equilibrium, damping: Damping) -> _Matrices:
     """System with the free motions, their rates, and the lengths as states."""
     robot, slopes = state.one_robot, _solved_slopes(state)
     freedom, n, m = robot.freedom, len(robot.freedom), robot.cable_count
-    freed = np.linalg.inv(freedom @ mass_matrix(state) @ freedom.T) @ freedom  # from wrench to acceleration
+    freed = np.linalg.inv(freedom @ mass_matrix(state) @ freedom.T) @ freedom  # maps a wrench to the acceleration
     tension, loss = tension_slopes(state, slopes), _stretch_loss(state, slopes, damping.loss_time)
     by_motion, by_speed, tension_by_motion, tension_by_speed = loss
     drag = by_motion + _modal_drag(state, damping.modal_damping)
@@ -197,7 +197,7 @@ def _driven_by_speeds(state: Equilibrium, damping: Damping) -> _Matrices:
 
 
 def _driven_by_lengths(found: _Matrices, size: int) -> _Matrices:
-    """System with lengths as inputs, without dependence on length rates."""
+    """System with lengths as inputs, for tensions that do not depend on length rates."""
     A, B, C, D = found
     m = len(A) - size
     B, D = (np.concatenate(pair, axis=1) for pair in ((A[:size, size:], B[:size, m:]), (C[:, size:], D[:, m:])))
@@ -213,7 +213,7 @@ def _solved_slopes(state: Equilibrium) -> CableSlopes:
 
 
 def _stretch_loss(state: Equilibrium, slopes: CableSlopes, loss_time: float) -> tuple[Array, Array, Array, Array]:
-    """Stretch loss to first order: K(omega) = K + i omega eta K S K, with the stretch part S of the flexibility."""
+    """Stretch loss to first order: K(omega) = K + i omega eta K S K. S is the stretch part of the flexibility."""
     # matrices: damping wrench per platform velocity (6, 6) and per length rates (6, m); frame-end tension per platform
     # velocity (m, 6) and per rate of the length of the same cable (m,)
     m = state.one_robot.cable_count

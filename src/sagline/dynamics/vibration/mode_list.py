@@ -1,4 +1,4 @@
-"""List of modes for display, and displacements of cables without inertia."""
+"""List of modes for display, and quasi-static displacements of cables."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from sagline.statics.slopes import cable_slopes, motions_of_ends
 from sagline.statics.stiffness import Modes, modes
 from sagline.statics.strings import Strings, strings_of
 
-EQUAL: Final = 1e-6  # largest relative difference of energy shares that count as equal
+EQUAL: Final = 1e-6  # energy shares with a smaller relative difference count as equal
 
 _TINY = np.finfo(float).tiny
 
@@ -60,13 +60,13 @@ def quasi_static_displacements(state: Equilibrium, ends: Array, count: int) -> A
 
 
 def _behind(strings: Strings) -> Array:
-    """Root compliance of each exit point due to the routing, in its direction, world axes, (m, 3) [sqrt(m/N)]."""
+    """Motion of each exit point that the routing allows: its direction times the root of the compliance, (m, 3)."""
     table, axes = strings.table[0], strings.axes[0]
     return np.asarray(table[:, columns.BEHIND_X, None] * axes[:, 0] + table[:, columns.BEHIND_Z, None] * axes[:, 2])
 
 
 def _along(state: Equilibrium, place: Array) -> tuple[Array, Array, Array]:
-    """Unit tangents (m, s, 3) at shares of the length (s,), and flexibilities across and along them."""
+    """Unit tangents (m, s, 3) at shares of the length (s,), and flexibilities across and along the cable."""
     # The flexibility of a cable is L (1/N + 1/EA) across its tangent and L/EA along it [m/N]
     cables, robot = state.cables, state.one_robot
     length = cables.unstrained_length[:, None]
@@ -135,7 +135,7 @@ def listed_modes(vibration: Vibration) -> list[ListedMode]:
 
 
 def mode_correlation(vibration: Vibration) -> Array:
-    """Share of each massless mode's motion in each mode with cable mass, shape (n, K)."""
+    """Similarity of each massless mode to each mode with cable mass (a share from 0 to 1), shape (n, K)."""
     # A share is the squared mass-weighted product of the platform motions of both modes. The sum of the shares of a
     # massless mode over all modes, including modes above `up_to`, is less than 1 because of the motion of the cables
     massless = modes(vibration.state).shape

@@ -15,7 +15,7 @@ from sagline.statics.stiffness import mass_matrix, stiffness
 
 
 class StateSlopes(NamedTuple):
-    """A state, and derivatives of its equilibrium."""
+    """State, and derivatives of its equilibrium."""
 
     state: Equilibrium  # the state, a single one
     slopes: CableSlopes  # derivatives of cable forces
@@ -27,7 +27,7 @@ class StateSlopes(NamedTuple):
 
 
 class ModeGroup(NamedTuple):
-    """The g modes of one frequency, and bilinear forms of each pair of modes for changes of cable data."""
+    """The g modes of one frequency, and the effect of changes of cable data on each pair of modes."""
 
     motion: Array  # platform motion, unit modal mass, shape (6, g)
     square: float  # squared angular frequency [1/s^2]
@@ -48,7 +48,7 @@ class SquareDerivatives(NamedTuple):
 
 
 def state_slopes(state: Equilibrium) -> StateSlopes:
-    """Force derivatives, compliance and mass of a state."""
+    """Compute force derivatives, compliance and mass of a state."""
     slopes, known = cable_slopes(state), stiffness(state)
     return StateSlopes(
         state,
@@ -61,7 +61,7 @@ def state_slopes(state: Equilibrium) -> StateSlopes:
 
 
 def square_derivatives(rest: StateSlopes, swings: ModeGroup) -> SquareDerivatives:
-    """Derivatives of a squared frequency, including the motion of the platform to its new equilibrium."""
+    """Derivatives of a squared angular frequency, including the motion of the platform to its new equilibrium."""
     robot, pose = rest.state.one_robot, _by_pose(rest, swings)
     turns = rest.state.pose.matrix.T @ swings.motion[3:]
     spins = np.einsum("ia,jb->ijab", turns, turns)
@@ -100,7 +100,7 @@ def _by_pose(rest: StateSlopes, swings: ModeGroup) -> Array:
 
 
 def _lever_form(turns: Array, levers: Array, force: Array) -> Array:
-    """Geometric stiffness of forces T on levers r for rotations: symmetric part of r T^T - r.T."""
+    """Geometric stiffness due to rotations of levers r with constant forces T: symmetric part of r T^T - r.T."""
     # shapes: turns (3, g); levers (..., 3); force (..., 3); returns (..., g, g)
     along, pulled = levers @ turns, force @ turns
     mixed = along[..., :, None] * pulled[..., None, :]
@@ -115,13 +115,13 @@ def _cross_matrices() -> Array:
 
 
 PHASE = 0.45 * np.pi  # largest phase of a transverse wave in an element [rad]
-HALVINGS = 40  # largest number of bisections of a cable; at a fold, elements could become arbitrarily short
+HALVINGS = 40  # largest number of bisections of a cable; it limits the number of very short elements at a fold
 CLOSE = 1e-5  # relative step of the frequency for the numerical derivative of the equations
 _UP = np.array([0.0, 0.0, 1.0])
 
 
 class StringData(NamedTuple):
-    """A cable at rest: force on its platform end (3,) [N], weight per length, length, EA and density."""
+    """Cable at rest: force on its platform end (3,) [N], weight per length, length, EA and density."""
 
     force: Array
     weight: float
@@ -157,7 +157,7 @@ def string_data(rest: StateSlopes) -> tuple[StringData, ...]:
 def mode_group(rest: StateSlopes, cables: tuple[StringData, ...], frequency: Array) -> ModeGroup:
     """Modes of adjacent frequencies [Hz], which count as equal."""
     omega, group = 2.0 * np.pi * float(frequency.mean()), len(frequency)
-    omega *= 1.0 + _correction(rest, cables, omega, group)  # this step reduces the error by the factor CLOSE
+    omega *= 1.0 + _correction(rest, cables, omega, group)  # this step multiplies the error by the factor CLOSE
     waves = [_waves(cable, omega) for cable in cables]
     matrix, scale = _equations(rest, waves, omega)
     vectors = scale[:, None] * np.linalg.svd(matrix)[2][-group:].T
@@ -173,7 +173,7 @@ def mode_group(rest: StateSlopes, cables: tuple[StringData, ...], frequency: Arr
 
 
 def _correction(rest: StateSlopes, cables: tuple[StringData, ...], omega: float, group: int) -> float:
-    """Relative frequency error, to first order, from the singular values of the equations."""
+    """Relative error of a frequency, to first order, from the singular values of the equations."""
     matrix, scale = _equations(rest, [_waves(cable, omega) for cable in cables], omega)
     near = omega * (1.0 + CLOSE)
     other, _ = _equations(rest, [_waves(cable, near) for cable in cables], near, scale)
@@ -228,7 +228,7 @@ def _waves(cable: StringData, omega: float) -> _Waves:
 
 
 def _flexible(force: Array, stiffness: float) -> Array:
-    """Matrix C at points with a given force in the cable, (..., 3, 3)."""
+    """Flexibility per length C at points of the cable with given forces (..., 3), shape (..., 3, 3)."""
     size = np.linalg.norm(force, axis=-1)[..., None, None]
     tangent = force[..., :, None] * force[..., None, :] / size**2
     found: Array = np.eye(3) / stiffness + (np.eye(3) - tangent) / size
@@ -236,7 +236,7 @@ def _flexible(force: Array, stiffness: float) -> Array:
 
 
 def _edges(cable: StringData, omega: float) -> Array:
-    """Borders of the elements of a cable. Elements are short relative to N/w and to a transverse wave."""
+    """Borders of the elements of a cable. Each element is short compared with N/w and with a transverse wave."""
     edges = np.array([0.0, cable.length])
     for _ in range(HALVINGS):
         size = np.diff(edges)

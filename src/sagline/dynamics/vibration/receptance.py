@@ -1,4 +1,4 @@
-"""Receptance of the platform, from component modes and exactly, and its peak."""
+"""Receptance of the platform, from component modes or exact, and its peak."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from sagline.dynamics.vibration.dynamic_stiffness import Complex, Damping, movin
 from sagline.dynamics.vibration.robot_modes import StateModes, VibrationModel
 
 LOWEST: Final = 1.0  # [Hz], modes up to this frequency are always included
-TAKEN: Final = 1.6  # relative to the highest frequency; modes up to this limit are included
-# relative to the highest frequency; losses couple modes up to this limit, and damp each higher mode separately
+TAKEN: Final = 1.6  # modes up to this factor times the highest frequency are included
+# losses couple modes up to this factor times the highest frequency; they damp each higher mode separately
 COUPLED: Final = 1.5
 BLOCK: Final = 128  # frequencies per block
 
 
-# components of one state, and loss matrices of their stretch, if any
+# component modes of one state, and loss matrices of their stretch (None without loss)
 FixedEndModes: TypeAlias = tuple[CableComponents, Array | None]
 
 
 class Receptance(NamedTuple):
-    """Receptance of the platform."""
+    """Model of the platform's receptance."""
 
     model: VibrationModel  # model of one state, with a leading axis 1
     matrix: Array  # stiffness of the platform, not symmetric with an external moment, shape (6, 6)
@@ -56,7 +56,7 @@ class Receptance(NamedTuple):
         return self._compliance(frequency, moving)
 
     def _compliance(self, frequency: Array, moving: Complex) -> Complex:
-        """Inverse of the dynamic stiffness; moving: dynamic part of the cables' stiffness, (F, m, 3, 3)."""
+        """Compliance: inverse of the dynamic stiffness. moving: dynamic part of the cables' stiffness, (F, m, 3, 3)."""
         model, omega = self.model, 2.0 * np.pi * frequency[:, None, None]
         ends, freedom = model.ends[0], model.freedom
         on_platform = np.einsum("mai,fmab,mbj->fij", ends, moving, ends, optimize=True)
@@ -65,7 +65,7 @@ class Receptance(NamedTuple):
             return np.asarray(freedom.T @ np.linalg.inv(freedom @ whole @ freedom.T) @ freedom)
 
     def _moving(self, components: CableComponents, lost: Array | None, omega: Array) -> tuple[Complex, Complex]:
-        """Dynamic part of the cables' stiffness with cable mass, and without cable mass, (F, m, 3, 3) each."""
+        """Dynamic part of the cables' stiffness: first with cable mass, then without, (F, m, 3, 3) each."""
         mesh, model = components.mesh, self.model
         density = mesh.density[:, None, None]
         square = omega**2 - 1j * omega * self.damping.air_damping / density[:, 0]  # (t, F)
@@ -91,7 +91,7 @@ def _in_world(own: Complex, axes: Array) -> Complex:
 
 
 def _driven_stiffness(motions: PlaneModes, square: Complex, loss: complex) -> Complex:
-    """Stiffness due to fixed-end modes at the platform end, undamped or with equal damping, (t, F, d, d)."""
+    """Part of the fixed-end modes in the platform-end stiffness, for equal or no damping, (t, F, d, d)."""
     with np.errstate(all="ignore"):
         shares = square[..., None] ** 2 / (loss * motions.square[:, None] - square[..., None])
     return np.asarray(-np.einsum("tka,tfk,tkb->tfab", motions.drive, shares, motions.drive, optimize=True))
@@ -100,7 +100,7 @@ def _driven_stiffness(motions: PlaneModes, square: Complex, loss: complex) -> Co
 def _driven_stiffness_with_loss(
     motions: PlaneModes, square: Complex, loss: complex, lost: Array, scaled: Complex
 ) -> tuple[Complex, Complex]:
-    """Driven stiffness with stretch loss, and the static loss; lost: loss matrix (t, d + k, d + k)."""
+    """Part of the fixed-end modes in the platform-end stiffness, with stretch loss; lost: (t, d + k, d + k)."""
     d, factor = motions.drive.shape[2], scaled[None, :, None, None]
     by_end = -square[..., None, None] * motions.drive[:, None] + factor * lost[:, None, d:, :d]
     alone = loss * motions.square[:, None] - square[..., None]
@@ -116,7 +116,7 @@ def _driven_stiffness_with_loss(
 
 ForceReceptance: TypeAlias = Callable[[Array], Complex]  # displacements per force (F, 3, 3) at frequencies (F,)
 
-# the search covers modes with at least this response, relative to the largest response at a mode
+# the search omits modes whose response is below this share of the largest response at a mode
 LIKELY: Final = 0.4
 REFINEMENTS: Final = 2  # number of refinements of the search
 CLOSER: Final = 5  # number of new frequencies between two adjacent frequencies
@@ -124,7 +124,7 @@ WIDTHS: Final = np.linspace(-3.0, 3.0, 7)  # search points about a mode, in unit
 
 
 def modal_receptance(found: StateModes, rest: Array, ratio: float) -> ForceReceptance:
-    """Receptance from the modes of a robot; a common loss factor of the whole stiffness does not couple the modes."""
+    """Receptance from the modes of a robot, which a common loss factor of the whole stiffness does not couple."""
     # shapes: rest (3, 3)
     natural = (2.0 * np.pi * found.frequency) ** 2
     products = (found.platform[:3, None] * found.platform[None, :3]).reshape(9, -1)
@@ -139,7 +139,7 @@ def modal_receptance(found: StateModes, rest: Array, ratio: float) -> ForceRecep
 
 
 def coupled_receptance(receptance: Receptance, up_to: float) -> ForceReceptance:
-    """Receptance with losses that couple the modes, up to a frequency [Hz]."""
+    """Function that computes the receptance up to a frequency [Hz], with losses that couple the modes."""
     held = receptance.fixed_end_modes(up_to)
     return lambda frequency: receptance.by_modes(frequency, held)[0][:, :3, :3]
 
@@ -168,7 +168,7 @@ def peak_receptance(
 
 
 def _parabola_peak(frequency: Array, norms: Array) -> tuple[float, float]:
-    """Maximum of a peak through three values, with a parabola for the inverse square."""
+    """Height and place of a peak from three values, by a parabola through their inverse squares."""
     (before, after), flat = np.diff(frequency), norms**-2.0
     left, right = np.diff(flat) / (before, after)
     bend = (right - left) / (before + after)

@@ -1,4 +1,4 @@
-"""Frequency response of a platform on cables with mass, and curves of the response."""
+"""Frequency response of a platform on cables with mass, and response curves for diagrams."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from sagline.robot.equilibrium import Equilibrium, of_equilibrium
 from sagline.statics.slopes import cable_slopes
 from sagline.statics.stiffness import modes, stiffness
 
-CHECKS: Final = 8  # number of frequencies at which the response is compared with the exact response
+CHECKS: Final = 8  # number of frequencies for the comparison with the exact response
 _BYTES: Final = 20_000.0  # bytes per frequency
 
 
@@ -61,7 +61,7 @@ def frequency_response(state: Equilibrium, frequency: ArrayLike, damping: Dampin
     """Motion of the platform due to a harmonic wrench, with cable mass, and with massless cables for comparison.
 
     The response is computed from the fixed-end modes of every cable. At some of the frequencies it is compared with the
-    response for the exact stiffness of the cables.
+    response that follows from the exact dynamic stiffness of the cables.
 
     Args:
         state: A single equilibrium; a plan or a solution of one; or a robot and a pose.
@@ -115,18 +115,18 @@ def frequency_response(state: Equilibrium, frequency: ArrayLike, damping: Dampin
 MOTIONS = ("x", "y", "z", "about x", "about y", "about z")
 UNITS = {(False, False): "m/N", (False, True): "1/N", (True, False): "1/N", (True, True): "rad/(N m)"}
 SAMPLES = 900  # number of logarithmically spaced frequencies
-NEAR = np.sinh(np.linspace(-8.0, 8.0, 33)) / np.sinh(8.0)  # relative frequencies about a peak, denser close to the peak
-BESIDE = 0.03  # range of these frequencies, relative to the frequency of the peak
+NEAR = np.sinh(np.linspace(-8.0, 8.0, 33)) / np.sinh(8.0)  # frequencies about a peak, denser close to it
+BESIDE = 0.03  # range of these frequencies, divided by the frequency of the peak
 BELOW = 6.0  # ratio of the lowest mode frequency to the start of the curves
 
 
 class ResponseCurves(NamedTuple):
-    """Two responses to the same force."""
+    """Response curves with and without cable mass, for the same force."""
 
     frequency: Array  # [Hz], ascending, shape (F,)
     with_mass: Array  # amplitude of motion per force, with cable mass, in `unit`, shape (F,)
-    massless: Array  # the same with massless cables, shape (F,)
-    static: float  # the same for a static force and massless cables
+    massless: Array  # amplitude with massless cables, shape (F,)
+    static: float  # motion per static force
     unit: str  # unit of all responses
 
 
@@ -147,21 +147,21 @@ def response_curves(vibration: Vibration, force: str = "x", motion: str | None =
 
 
 def curves_of_response(response: FrequencyResponse, force: str = "x", motion: str | None = None) -> ResponseCurves:
-    """One element of the result of `frequency_response`, within the range of logarithmic axes."""
+    """Curves of one element of a `FrequencyResponse`, within the range of logarithmic axes."""
     row, column = _places(force, motion)
     answers = np.abs([one[:, row, column] for one in (response.compliance, response.massless_compliance)])
     kept = np.flatnonzero((response.frequency > 0.0) & np.isfinite(answers).all(axis=0))
     kept = kept[np.argsort(response.frequency[kept], kind="stable")]
     if len(kept) < 2:
-        step = "Give more, np.geomspace(0.5, 20.0, 500) for instance."
-        raise InvalidValueError("frequency", f"{len(kept)} of them above 0 Hz", "two at least", step)
+        step = "Give more frequencies, for instance np.geomspace(0.5, 20.0, 500)."
+        raise InvalidValueError("frequency", f"{len(kept)} of them above 0 Hz", "at least two", step)
     static = abs(float(stiffness(response.state).compliance[row, column]))
     with_mass, massless = (locked(receptance[kept]) for receptance in answers)
     return ResponseCurves(locked(response.frequency[kept]), with_mass, massless, static, UNITS[row > 2, column > 2])
 
 
 def _places(force: str, motion: str | None) -> tuple[int, int]:
-    """Row and column of the compliance for a motion and a force."""
+    """Row and column of the compliance matrix for a motion and a force."""
     column = MOTIONS.index(choice(force, "force", MOTIONS))
     return column if motion is None else MOTIONS.index(choice(motion, "motion", MOTIONS)), column
 

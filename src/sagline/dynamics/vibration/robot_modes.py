@@ -1,4 +1,4 @@
-"""Modes of a robot with cable mass, by component mode synthesis; an exact count checks their number."""
+"""Modes of a robot with cable mass, by component mode synthesis. An exact count checks the number of modes."""
 
 from __future__ import annotations
 
@@ -21,35 +21,35 @@ from sagline.statics.slopes import cable_slopes, motions_of_ends
 from sagline.statics.stiffness import UNSTABLE, mass_matrix, natural_frequency
 from sagline.statics.strings import COUNTING, Strings, strings_of, undamped
 
-KEPT = 1.05  # relative to the requested frequency; fixed-end modes up to this limit are unknowns
+KEPT = 1.05  # fixed-end modes up to this factor times the requested frequency are unknowns
 LEVELS = 4  # number of matched pairs of moments (Krylov) of the higher modes
 _TINY = 1e-300
 
 
 class VibrationModel(NamedTuple):
-    """Stiffness, mass and cables of N states, for their vibrations."""
+    """Stiffness, mass and cables of N states, for the computation of vibrations."""
 
-    strings: Strings  # their cables
-    ends: Array  # matrices from platform motion to platform-end motion, shape (N, m, 3, 6)
+    strings: Strings  # data of the cables
+    ends: Array  # matrices that map the platform motion to the motion of the platform ends, shape (N, m, 3, 6)
     stiffness: Array  # stiffness of the platform, symmetric, shape (N, 6, 6)
     mass: Array  # mass matrix of the platform, shape (N, 6, 6)
     freedom: Array  # matrix that selects the free motions, shape (n, 6)
 
     def at(self, row: int) -> VibrationModel:
-        """Model of one state, with a leading axis 1."""
+        """Select the model of one state, with a leading axis of length 1."""
         part = slice(row, row + 1)
         strings = Strings(self.strings.table[part], self.strings.axes[part], self.strings.taut[part])
         return VibrationModel(strings, self.ends[part], self.stiffness[part], self.mass[part], self.freedom)
 
 
 class _ReducedModel(NamedTuple):
-    """The eigenproblem of one state."""
+    """Eigenproblem of one state."""
 
     matrix: Array  # symmetric, shape (n + k, n + k): first the platform, then the cable modes [1/s^2]
-    platform: Array  # matrix from the first unknowns to platform motions, shape (6, n)
-    driven: Array  # matrix from the first unknowns to the excitation of the cable modes, shape (k, n)
-    kept: Flags  # mask of the components that are unknowns (the first of the k unknowns), shape (T,)
-    beyond: Array  # other components, as combinations of the last of the k unknowns, shape (T - kept, b)
+    platform: Array  # matrix that maps the first n unknowns to platform motions, shape (6, n)
+    driven: Array  # matrix that maps the first n unknowns to the excitation of the cable modes, shape (k, n)
+    kept: Flags  # mask of the components that are unknowns themselves, shape (T,)
+    beyond: Array  # other components as combinations of the last b unknowns, shape (T - kept, b)
     components: CableComponents  # fixed-end modes of the cables
 
     def amplitudes(self, vectors: Array) -> Array:
@@ -106,7 +106,7 @@ def reduced_model(model: VibrationModel, row: int, up_to: float) -> _ReducedMode
 
 
 def _slow_motions(square: Array, drives: Array) -> tuple[Array, Array]:
-    """A few motions that represent many modes: orthonormal columns of amplitudes, and their stiffness matrix."""
+    """A few joint motions that represent many modes: orthonormal columns of amplitudes, and stiffness matrix."""
     chain = [drives / square[:, None]]
     for _ in range(LEVELS - 1):
         chain.append(chain[-1] / square[:, None])
@@ -131,7 +131,7 @@ def dynamic_matrix(model: VibrationModel, row: int, moving: Array, omega: float)
 
 
 def _on_platform(of_cables: Array, ends: Array) -> Array:
-    """Sum of matrices (m, 3, 3) of the platform ends as a matrix of the platform, (6, 6)."""
+    """Combine the matrices of all platform ends (m, 3, 3) into a matrix of the platform, (6, 6)."""
     return np.asarray((np.swapaxes(ends, -1, -2) @ of_cables @ ends).sum(axis=0))
 
 
@@ -157,11 +157,11 @@ def _negatives(matrix: Array) -> int:
 
 
 MOST_MODES: Final = 2_000
-_CERTAIN: Final = 1.5  # estimate relative to MOST_MODES that is certainly too large, in spite of its error
+_CERTAIN: Final = 1.5  # an estimate above this factor times MOST_MODES is certainly too large, in spite of its error
 _STEEP: Final = 1e-6  # horizontal tension of a vertical cable, relative to the vertical force
 _EVEN: Final = 1e-9  # range of q below which the tension of a cable counts as constant
 _POINTS: Final = 201
-SLOW: Final = 1e-2  # smallest frequency relative to up_to; a lower frequency may belong to a motion without stiffness
+SLOW: Final = 1e-2  # smallest ratio of a frequency to up_to; a lower frequency may belong to a motion without stiffness
 BORDER: Final = 1e-6  # relative accuracy of a frequency in the count
 
 
@@ -188,7 +188,7 @@ class StateModes:
 
 
 def state_modes(model: VibrationModel, row: int, up_to: float) -> StateModes:
-    """Modes of one state below a frequency [Hz]; the exact count checks their number."""
+    """Compute the modes of one state below a frequency [Hz]. The exact count checks the number of modes."""
     check_string_count(model.strings, row, up_to, "up_to")
     count = modes_below(model, row, up_to)
     check_mode_count(count, up_to, "up_to")
@@ -210,8 +210,8 @@ def state_modes(model: VibrationModel, row: int, up_to: float) -> StateModes:
 def check_string_count(strings: Strings, row: int, frequency: float, item: str) -> None:
     """Reject a frequency [Hz] below which the cables have far too many modes, before the exact count.
 
-    N half waves of a cable, in each of two directions, have the phase pi N, which is the integral of omega sqrt(rho/T)
-    along the cable. The tension is T_x cosh(q) at the point with the vertical force T_x sinh(q).
+    In each of two directions, N half waves of a cable have the phase pi N. This phase is the integral of omega
+    sqrt(rho/T) along the cable. The tension is T_x cosh(q) at the point with the vertical force T_x sinh(q).
     """
     table = strings.table[row, strings.taut[row]]
     level = np.maximum(table[:, columns.HORIZONTAL], _STEEP * np.abs(table[:, columns.VERTICAL]))
@@ -245,7 +245,7 @@ def cable_shares(model: VibrationModel, row: int, found: StateModes) -> Array:
 
 
 def damping_ratios(density: Array, found: StateModes, shares: Array, damping: Damping) -> Array:
-    """Damping ratio of each mode, to first order: lost power relative to the power lost with critical damping."""
+    """Damping ratio of each mode, to first order: lost power divided by the lost power of critical damping."""
     # shapes: density (m,) [kg/m]; returns (K,)
     omega = 2.0 * np.pi * found.frequency
     lost = np.zeros(omega.size)

@@ -1,4 +1,4 @@
-"""All modes of a robot with cable mass below a frequency, and the excitation of modes by a path."""
+"""All modes of a robot with cable mass below a frequency, and natural frequencies that a path excites most."""
 
 from __future__ import annotations
 
@@ -53,12 +53,12 @@ _TEXTS = {
 }
 
 
-_NEAR: Final = 3.0  # a second excitation is reported if the first one is less than this factor larger
+_NEAR: Final = 3.0  # a second frequency is reported if its excitation times this factor exceeds the largest
 _INSTANTS: Final = 2000  # number of instants of a segment for its inertial wrench
 
 
 def _most_excited(state: Equilibrium, frequency: Array, shape: Array, path: Path) -> Array:
-    """Frequencies with the largest excitation by a path: one, or two if the second excitation is at least a third."""
+    """Natural frequencies that a path excites most: one or two, as `to_shape`."""
     # shapes: frequency (K,) [Hz]; shape (6, K); returns (1,) or (2,) [Hz]
     segments = [segment for segment in segments_of(instance(path, Path, "path")) if segment.curve is not None]
     known = np.flatnonzero(frequency > 0.0)
@@ -75,7 +75,7 @@ def _most_excited(state: Equilibrium, frequency: Array, shape: Array, path: Path
 
 
 def excitation(robot: Robot, segment: RestToRestSegment, frequency: Array, shape: Array) -> Array:
-    """Excitation of each mode by a segment, times the platform motion in the mode."""
+    """Excitation of each mode by a segment of a path, times the size of the platform motion in the mode."""
     # shapes: frequency (K,) [Hz]; shape (6, K); returns (K,)
     time = np.linspace(0.0, segment.duration, _INSTANTS + 1)
     assert segment.curve is not None
@@ -104,13 +104,13 @@ class Vibration(Result, Tabular):
         shape: Motion of the platform (displacement of the center of mass, rotation vector, world axes), one mode per
             column, shape (6, K) [m/sqrt(kg), rad/(sqrt(kg) m)].
         platform_share: Platform share of the kinetic energy, shape (K,).
-        cable_share: Share of each cable in the kinetic energy, shape (m, K). The sum with platform_share is 1.
+        cable_share: Share of each cable in the kinetic energy, shape (m, K). In each mode, all shares add up to 1.
         cable_shape: Displacement of the cables at equally spaced material points, frame end first, world axes, shape
             (K, m, P, 3) [m/sqrt(kg)].
         loss: Damping ratio of each mode, to first order in the damping, shape (K,).
         massless_frequency: Natural frequencies of the platform with massless cables [Hz], as in `modes`, shape (n,).
-        count: Number of modes below up_to, from the exact count, which is independent of the modes; K if all modes are
-            found.
+        count: Number of modes below up_to, from the exact count. It does not use the computed modes, and is K if all
+            modes are found.
         negative_directions: Unstable motions of the platform, one per column, shape (6, d); d = 0 at a stable
             equilibrium.
         slack_cables: Indices of the cables without linear vibrations.
@@ -139,10 +139,10 @@ class Vibration(Result, Tabular):
         return self.status is VibrationStatus.SOLVED and self.count == self.frequency.size
 
     def to_shape(self, path: Path) -> Array:
-        """Frequencies with the largest excitation by a path, for a shaper; see `sagline.to_shape`.
+        """Natural frequencies that a path excites most, as input for a shaper; see `sagline.to_shape`.
 
         Args:
-            path: A path from rest to rest that ends, if possible, at the pose of the modes.
+            path: Path from rest to rest. It preferably ends at the pose at which the modes were computed.
 
         Returns:
             Frequencies [Hz], shape (1,) or (2,), in order of decreasing excitation.
@@ -170,8 +170,8 @@ def vibration(state: Equilibrium, *, up_to: float = UP_TO, damping: Damping | No
         damping: Energy losses of the vibration, for `loss`; None: no losses.
 
     Returns:
-        Vibration. Its status reports an unstable equilibrium, and folded or slack cables. Such cables have no linear
-        vibrations; the modes do not include them.
+        Vibration. Its status reports an unstable equilibrium, and folded or slack cables. Folded and slack cables have
+        no linear vibrations; the modes do not include them.
 
     Raises:
         InvalidValueError: If the state is not a single Equilibrium with exact or elastic cables; if up_to is not
@@ -227,7 +227,7 @@ def vibration(state: Equilibrium, *, up_to: float = UP_TO, damping: Damping | No
 
 
 def to_shape(modes: Modes | Vibration, path: Path) -> Array:
-    """Frequencies with the largest excitation by a path: one, or two if the second excitation is at least a third.
+    """Natural frequencies that a path excites most: one, or two if the second excitation is at least 1/3 of the first.
 
     The measure of the excitation is |phi . M d| |phi| |A(w)|/w. phi is the shape of the mode, d the direction of the
     motion, and A the Fourier transform of the acceleration along d. The measure combines the force on the mode at its
@@ -235,9 +235,9 @@ def to_shape(modes: Modes | Vibration, path: Path) -> Array:
     shaper, not to estimate the residual vibration.
 
     Args:
-        modes: Modes of the robot at a single state, preferably at the end of the path: `modes(plan.state[-1])` without
-            cable mass, or `vibration(plan.state[-1])` with cable mass.
-        path: A path from rest to rest; for each mode, the segment with the largest excitation counts.
+        modes: Modes at a single state, preferably the end of the path: `modes(plan.state[-1])` for massless cables, or
+            `vibration(plan.state[-1])` for cables with mass.
+        path: Path from rest to rest. The excitation of a mode is the largest excitation by any segment of the path.
 
     Returns:
         Frequencies [Hz], shape (1,) or (2,), in order of decreasing excitation.
