@@ -1,4 +1,4 @@
-"""One class for each kind of state: it prepares the next command and returns the next state."""
+"""States of the controller as classes. Each prepares the next command and returns the next state."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ from sagline.control.states import RefusedError, State
 from sagline.core.arrays import Array
 from sagline.kinematics.status import ForwardStatus
 
-LEAVING: Final = 0.3  # longest time until the ownership of all groups is given up [s]
+LEAVING: Final = 0.3  # longest time for giving up the ownership of all groups [s]
 LOOP_ON: Final = frozenset({State.IDLE, State.MOVING, State.PAUSING})
 POSE_LOST: Final = "the pose of the platform is not known; home again"
 
 
 class ActiveState(ABC):
-    """State of a controller as an object; `context.state` is the name of the state.
+    """Base class of the states of a controller; `context.state` is the name of the state.
 
     Attributes:
-        context: Shared by all states.
-        point: Set point of the next command; None if the drives rest.
-        source: Source of the set points; None if there is none.
+        context: Data and services that all states share.
+        point: Last set point that was sent; None if the drives rest.
+        source: Source of the set points; None in a state without set points.
     """
 
     def __init__(self, context: Context, point: SetPoint | None = None, source: SetPointSource | None = None) -> None:
-        """Begin with the set point of the previous state."""
+        """Enter the state with the set point of the previous state."""
         self.context, self.point, self.source = context, point, source
 
     @abstractmethod
@@ -42,11 +42,11 @@ class ActiveState(ABC):
         """Prepare the command of the next cycle; return the next state."""
 
     def stop(self) -> ActiveState:
-        """State after a stop by the operator."""
+        """Return the next state after a stop by the operator."""
         return self
 
     def fail(self, line: str) -> ActiveState:
-        """State after a fault that stops the motion."""
+        """Return the next state after a fault that stops the motion."""
         return Stopping(self, State.FAULT, ExecutionStatus.FAULT, line)
 
     def rest(self, mode: Mode, *, enabled: bool) -> None:
@@ -61,7 +61,7 @@ class ActiveState(ABC):
         row, sample = point.row, c.sample
         if c.tension_loop is not None and row is not None and sample is not None and c.state in LOOP_ON:
             planned = point.tension if due is None else due.tension
-            leads = point.leading or (due is not None and due.leading)  # the tensions are intentionally different
+            leads = point.leading or (due is not None and due.leading)  # the tensions differ from the plan on purpose
             c.correction = c.tension_loop.step(sample.tension, planned, row, frozen=c.degraded or leads)
         length = point.length + c.correction
         length -= c.zero
@@ -69,7 +69,7 @@ class ActiveState(ABC):
         c.sender.follow(length, point.rate, point.drum_tension, point.enable)
 
     def settle(self, length: Array, status: ExecutionStatus, reason: str) -> ActiveState | None:
-        """IDLE at the equilibrium of lengths [m]; None if no pose is found."""
+        """Enter IDLE at the equilibrium for these lengths [m]; return None if no pose is found."""
         self.context.end_run(status, reason)
         return idle_at(self.context, self.context.find_equilibrium(length), reason)
 
@@ -78,7 +78,7 @@ class Off(ActiveState):
     """OFF: the controller gives up the ownership of all groups, and then sends no commands."""
 
     def __init__(self, context: Context, reason: str = "", point: SetPoint | None = None) -> None:
-        """Begin to give up the ownership of all groups; an empty reason means that no group is owned yet."""
+        """Begin to give up all groups. If the reason is empty, the controller owns no group yet."""
         super().__init__(context, point)
         self._cycles = 0
         if reason:
@@ -89,12 +89,12 @@ class Off(ActiveState):
             context.enter(State.OFF, reason)
 
     def next(self, answer: Sample | Missing) -> ActiveState:
-        """Command LEAVE, or nothing."""
+        """Send the command LEAVE, or nothing."""
         self.leave(self.context.sample)
         return self
 
     def leave(self, sample: Sample | None) -> None:
-        """Command LEAVE as long as the controller owns a group."""
+        """Send the command LEAVE as long as the controller owns a group."""
         self._cycles = max(self._cycles - 1, 0)
         if self._cycles and (sample is None or bool((sample.owner == self.context.owner).any())):
             self.rest(Mode.LEAVE, enabled=False)
@@ -117,7 +117,7 @@ class Connecting(ActiveState):
         self.claim = Claim(context.owner, context.link.groups, context.period, context.random)
 
     def next(self, answer: Sample | Missing) -> ActiveState:
-        """READY if all groups agree, OFF if the claim fails."""
+        """Change to READY if all groups agree, or to OFF if the claim fails."""
         c, claim = self.context, self.claim
         claim.look(answer, c.sender.counter)
         c.sender.stand_at(c.sample)
@@ -133,7 +133,7 @@ class Connecting(ActiveState):
         return self
 
     def stop(self) -> ActiveState:
-        """OFF."""
+        """Change to OFF."""
         return Off(self.context, "the operator stopped")
 
 
@@ -146,17 +146,17 @@ class Holding(ActiveState):
         super().__init__(context)
 
     def next(self, answer: Sample | Missing) -> ActiveState:
-        """Command HOLD."""
+        """Send the command HOLD."""
         self.rest(Mode.HOLD, enabled=True)
         return self
 
     def fail(self, line: str) -> ActiveState:
-        """STOPPING, then FAULT."""
+        """Change to STOPPING, which ends in FAULT."""
         return self if self.context.state is State.FAULT else super().fail(line)
 
 
 class Emergency(ActiveState):
-    """EMERGENCY: drums locked."""
+    """EMERGENCY: the drums are locked."""
 
     def __init__(self, before: ActiveState, line: str) -> None:
         """Lock the drums; the pose is no longer known."""
@@ -167,12 +167,12 @@ class Emergency(ActiveState):
         super().__init__(c, source=before.source)
 
     def next(self, answer: Sample | Missing) -> ActiveState:
-        """Command LOCK."""
+        """Send the command LOCK."""
         self.rest(Mode.LOCK, enabled=False)
         return self
 
     def fail(self, line: str) -> ActiveState:
-        """No change."""
+        """Stay in this state."""
         return self
 
 
@@ -180,18 +180,18 @@ class HomingState(ActiveState):
     """HOMING: the operator jogs single winches until the tensions agree with the plan.
 
     Attributes:
-        homing: The pose named by the operator, and its comparison with samples.
+        homing: Plan at the pose that the operator named, and comparison of samples with this plan.
     """
 
     def __init__(self, context: Context, homing: Homing) -> None:
-        """Begin at rest."""
+        """Enter the state at rest."""
         context.enter(State.HOMING, "the operator named the pose")
         super().__init__(context)
         self.homing = homing
         self._largest_tension = np.full(len(context.zero), np.inf)  # upper limits of the tensions during a jog [N]
 
     def jog(self, winch: int, by: float) -> None:
-        """Begin to jog one winch by a length [m]; the other winches have no power. Only the tensions are monitored."""
+        """Begin to jog one winch by a length [m]. The other winches have no power. Only tensions are monitored."""
         c = self.context
         if c.sample is None or self.source is not None:
             raise RefusedError("the jog", "another winch is being jogged", "Wait until it stops.")
@@ -202,7 +202,7 @@ class HomingState(ActiveState):
         c.say(EventKind.NOTE, "jog", f"winch {winch} by {1e3 * by:+g} mm")
 
     def next(self, answer: Sample | Missing) -> ActiveState:
-        """Continue the jog, or compare tensions at rest; IDLE if the tensions agree with the plan."""
+        """Continue the jog, or compare tensions at rest. Change to IDLE if the tensions agree with the plan."""
         c, sample, homing = self.context, self.context.sample, self.homing
         if sample is None:
             pass
@@ -227,7 +227,7 @@ class HomingState(ActiveState):
         return self
 
     def _reason_to_end(self, sample: Sample) -> str:
-        """Reason to end a jog; "" to continue."""
+        """Return the reason to end a jog, or "" if it continues."""
         c = self.context
         stale = ~(sample.age <= FRESH * c.period)
         if stale.any():
@@ -244,12 +244,12 @@ class HomingState(ActiveState):
         return f"cable {i} has {sample.tension[i]:.1f} N; allowed: {limit[i]:.1f} N"
 
     def stop(self) -> ActiveState:
-        """STOPPING, then READY."""
+        """Change to STOPPING, which ends in READY."""
         return Stopping(self, State.READY, ExecutionStatus.STOPPED, "the operator stopped")
 
 
 class Following(ActiveState):
-    """IDLE, MOVING, JOGGING or PAUSING: a source gives the set point of each cycle."""
+    """IDLE, MOVING, JOGGING and PAUSING: a source gives the set point of each cycle."""
 
     def __init__(
         self, context: Context, state: State, text: str, point: SetPoint | None, source: SetPointSource
@@ -260,7 +260,7 @@ class Following(ActiveState):
         self._followed = source
 
     def next(self, answer: Sample | Missing) -> ActiveState:
-        """Command the next set point; IDLE at the end of the source."""
+        """Command the next set point. Change to IDLE at the end of the source."""
         point = self.point
         if self.context.state is not State.IDLE and point is not None and point.done:
             return self._finish(point).next(answer)
@@ -268,13 +268,13 @@ class Following(ActiveState):
         return self
 
     def stop(self) -> ActiveState:
-        """STOPPING, then IDLE."""
+        """Change to STOPPING, which ends in IDLE."""
         if self.context.state is State.IDLE:
             return self
         return Stopping(self, State.IDLE, ExecutionStatus.STOPPED, "the operator stopped")
 
     def _finish(self, point: SetPoint) -> ActiveState:
-        """State after the last set point was sent."""
+        """Return the next state after the last set point was sent."""
         c, source = self.context, self.source
         if isinstance(source, PlatformJog) and source.failed and source.stops_hard:
             return Stopping(self, State.IDLE, ExecutionStatus.STOPPED, source.failed)
@@ -298,7 +298,7 @@ class Stopping(ActiveState):
     """
 
     def __init__(self, before: ActiveState, after: State, status: ExecutionStatus, reason: str) -> None:
-        """Begin the ramp; status and reason describe the end of the motion."""
+        """Begin the ramp; status and reason are for the record of the motion."""
         c, point, source = before.context, before.point, before.source
         if point is not None:
             point = point._replace(done=False)
@@ -309,7 +309,7 @@ class Stopping(ActiveState):
         self.after = after
 
     def next(self, answer: Sample | Missing) -> ActiveState:
-        """Command the next set point of the ramp; IDLE, READY or FAULT at its end."""
+        """Command the next set point of the ramp. Change to IDLE, READY or FAULT at its end."""
         if self.point is None or self.point.done:
             return self._finish().next(answer)
         if self.source is not None:
@@ -317,7 +317,7 @@ class Stopping(ActiveState):
         return self
 
     def fail(self, line: str) -> ActiveState:
-        """FAULT after the ramp."""
+        """Change the state after the ramp to FAULT."""
         self._end_in_fault(line)
         return self
 
@@ -326,7 +326,7 @@ class Stopping(ActiveState):
         self.after, run.status, run.reason = State.FAULT, ExecutionStatus.FAULT, line
 
     def _finish(self) -> ActiveState:
-        """State after the ramp."""
+        """Return the state after the ramp."""
         c, point = self.context, self.point
         if self.after is State.IDLE and point is not None:
             after = self.settle(point.length, c.run.status, c.run.reason)
@@ -339,7 +339,7 @@ class Stopping(ActiveState):
 
 
 def idle_at(context: Context, found: Standing | ForwardStatus, reason: str) -> Following | None:
-    """IDLE at an equilibrium; if there is no equilibrium, None, and the pose becomes unknown."""
+    """Enter IDLE at an equilibrium. Without an equilibrium, forget the pose and return None."""
     context.previous_plan = None
     if isinstance(found, Standing):
         return Following(context, State.IDLE, reason, found.step(), found)

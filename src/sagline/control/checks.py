@@ -1,4 +1,4 @@
-"""Planned motions, and the checks before their first set point is sent."""
+"""Planned motions, and checks of a motion before its first set point is sent."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ from sagline.tension.method import TensionMethod
 
 START: Final = 2e-3  # [m], largest distance of the first pose of a path from the platform
 ON_TICK: Final = 1e-6  # largest distance of a sample from a tick, as a share of a period
-LARGEST_LEAD: Final = 5e-3  # [m], the same as the largest correction of the tension loop
-ROUNDING: Final = 5e-6  # [m], allowed difference between a plan's lengths and rates, without accelerations
+LARGEST_LEAD: Final = 5e-3  # [m], largest distance of a plan's first lengths from the lengths at rest
+ROUNDING: Final = 5e-6  # [m], allowed difference between lengths and integrated rates, without accelerations
 LARGEST_STEP: Final = 1e-3  # [m], larger steps count as a jump of an encoder
-AT_REST: Final = 1e-3  # [m/s] and [rad/s], largest speed at both ends of a path, without a shock for the winches
+AT_REST: Final = 1e-3  # [m/s] and [rad/s], largest speed at both ends of a path that causes no shock in the winches
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,11 +34,12 @@ class Motion:
     """Checked plan, with one row of set points for each cycle.
 
     Attributes:
-        period: Period of a cycle, and between two rows [s].
-        plan: Plan at the ticks; the last tick is at the end of the path or after it. None for a jog.
+        period: Period of a cycle and time between two rows [s].
+        plan: Plan at the ticks of the clock. The last tick is at the end of the path or shortly after it. None for a
+            jog.
         state: Robot, poses and cables at the rows.
         length: Unstrained lengths off the drums [m], shape (N, m).
-        rate: Their rates [m/s], shape (N, m); zero in the last row.
+        rate: Rates of these lengths [m/s], shape (N, m); zero in the last row.
         tension: T_A, tension at the frame ends [N], shape (N, m).
         drum_tension: Tension at the drums [N], shape (N, m).
         wrench: External plus inertial wrench on the platform [N, N m], shape (N, 6).
@@ -73,7 +74,7 @@ def plan_motion(
     method: TensionMethod,
     previous: Plan | Array | None = None,
 ) -> Motion:
-    """Plan a path and check the plan completely; period: [s]; previous: as in `inverse`."""
+    """Plan a path for cycles of a period [s] and make all checks of the plan; previous: as in `inverse`."""
     _check_rest(path)
     ticked = _at_ticks(path, period)
     plan = inverse(robot, ticked, model, method, previous=previous)
@@ -99,7 +100,7 @@ def plan_motion(
 
 
 def check_motion(motion: Motion, robot: Robot, period: float) -> None:
-    """Reject a motion that was planned for another robot or another period [s]."""
+    """Reject a motion whose plan is for another robot or another period [s]."""
     step = "Plan the path with this controller: control.plan(path)."
     if abs(motion.period - period) > ON_TICK * period:
         reason = f"its plan is for cycles of {1e3 * motion.period:g} ms; they take {1e3 * period:g} ms"
@@ -109,7 +110,7 @@ def check_motion(motion: Motion, robot: Robot, period: float) -> None:
 
 
 def check_lead(what: str, lead: Array) -> None:
-    """Reject a plan with first lengths that are too far from the lengths at rest; lead: difference [m], (m,)."""
+    """Reject a plan that begins too far from the lengths at rest; lead: difference of the lengths [m], (m,)."""
     i = int(np.argmax(np.abs(lead)))
     if not abs(lead[i]) <= LARGEST_LEAD:
         away, allowed = f"{1e3 * lead[i]:+.3g} mm", f"{1e3 * LARGEST_LEAD:g} mm"
@@ -128,7 +129,7 @@ def check_start(robot: Robot, here: Pose, start: Pose) -> None:
 
 
 def _at_ticks(path: Path, period: float) -> Path:
-    """Samples of a path at the ticks; the end pose continues until the next tick."""
+    """Samples of a path at the ticks. The end pose is held until the next tick."""
     time = path.time - path.time[0]
     count = int(np.floor(time[-1] / period + ON_TICK)) + 1
     ticks = np.asarray(period * np.arange(count), dtype=np.float64)
@@ -187,12 +188,12 @@ def _check_winches(robot: Robot, path: Path, length: Array, rate: Array, drum: A
 
 
 def _check_steps(time: Array, length: Array, rate: Array) -> None:
-    """Reject a path with twists that contradict its poses, so that lengths jump relative to their rates.
+    """Reject a path whose twists contradict its poses. The lengths would jump against their rates.
 
-    If the rate within a step h is between the rates at both ends, the step of the length differs from h times the mean
-    rate by at most h/2 times the difference of the rates. The largest difference among the adjacent steps is used. A
-    deviation above the allowed jump of an encoder is never accepted. The times of the path are used, because the path
-    may end before a tick.
+    Within a step h, the rate is assumed to be between the rates at both ends. The change of length then differs from h
+    times the mean rate by at most h/2 times the difference of the rates. The largest difference of the step and its
+    neighbors is used. A deviation above the allowed jump of an encoder is never accepted. The steps are those of the
+    path, because the path may end before a tick.
     """
     h = np.diff(time)[:, None]
     off = np.abs(np.diff(length, axis=0) - 0.5 * h * (rate[1:] + rate[:-1]))

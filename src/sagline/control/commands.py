@@ -39,7 +39,7 @@ class Sender:
     """
 
     def __init__(self, cable_count: int, random: np.random.Generator) -> None:
-        """Begin without a command."""
+        """Create the sender; nothing is sent yet."""
         self.owner = int(random.integers(1, MOST_OWNER))
         self.counter = int(random.integers(1, MOST_OWNER))
         self.command: Command | None = None
@@ -48,7 +48,7 @@ class Sender:
         self._disabled: Flags = ~self._enabled
 
     def follow(self, length: Array, rate: Array, tension: Array, enable: Flags | None) -> None:
-        """Command set points; length [m], rate [m/s], tension [N] at the drums, enable (None: all), each (m,)."""
+        """Command set points (m,): length [m], rate [m/s], tension at the drums [N], enable (None: all drives)."""
         self._send(Mode.FOLLOW, length, rate, tension, self._enabled if enable is None else enable, claims=False)
 
     def rest(self, mode: Mode, *, enabled: bool, claims: bool = False) -> None:
@@ -61,7 +61,7 @@ class Sender:
         self.command = None
 
     def stand_at(self, sample: Sample | None, tension: Array | None = None) -> None:
-        """Set the lengths at rest from a sample, and the tensions to given or measured values [N], (m,)."""
+        """Set the lengths at rest to those of a sample, and the tensions to given or measured values [N], (m,)."""
         if sample is not None:
             self.length, self.tension = sample.length, sample.filtered if tension is None else tension
 
@@ -72,14 +72,14 @@ class Sender:
 
 
 CLAIMING: Final = OWNER_TIMEOUT + 0.7  # longest time until the controller owns all groups [s]
-SILENT: Final = 7.0  # longest time until every group has answered once [s]
-GIVING_BACK: Final = 0.05  # longest time with the ownership of some groups only [s]
+SILENT: Final = 7.0  # longest wait for the first answers of all groups [s]
+GIVING_BACK: Final = 0.05  # longest time in which the controller owns only some of the groups [s]
 LONGEST_WAIT: Final = 0.6  # upper limit of the random wait before the next claim [s]
 TRIES: Final = 4
 FRESH: Final = 3  # largest age of a sample [cycles]
 AGREEING: Final = 5  # consecutive cycles in which all groups must agree
-SURE: Final = 20  # [cycles], a cause that persists longer is not from the time before the claim
-BEHIND: Final = 10  # largest lag of an echo [commands]
+SURE: Final = 20  # [cycles], a cause that lasts longer did not arise before the claim
+BEHIND: Final = 10  # largest number of commands by which an echo may lag
 _LOCKED, _PRESSED, _READY = int(GroupStatus.LOCKED), int(GroupStatus.EMERGENCY), int(GroupStatus.READY)
 _AGAIN: Final = "Try again; if this continues, check the program of the PLC."
 
@@ -98,14 +98,14 @@ class Disagreement(NamedTuple):
     lasting: bool = False
 
     def refusal(self, what: str) -> RefusedError:
-        """Error for a rejected request."""
+        """Convert the reason to an error for a rejected request."""
         return RefusedError(what, self.reason, self.next_step)
 
 
 def disagreement(
     sample: Sample, owner: int, counter: int, groups: tuple[tuple[int, ...], ...], period: float = PERIOD
 ) -> Disagreement | None:
-    """First reason why a group does not agree, from the most general reason on; None if all groups agree.
+    """First reason why a group does not agree, with general reasons before special ones; None if all agree.
 
     A group agrees if its sample is fresh, this controller owns it, its drives are ready, without fault and not locked,
     and it has accepted one of the last commands.
@@ -126,7 +126,7 @@ def disagreement(
             True,
         ),
         ((status & _LOCKED) != 0, "the drums are locked", "Unlock the drums at the machine, then connect again.", True),
-        (stranger, f"belongs to another controller, {foreign}", "Stop the other one, then connect again.", False),
+        (stranger, f"belongs to another controller, {foreign}", "Stop that controller, then connect again.", False),
         (other != owner, "no controller owns it", "Connect again.", False),
         (tripped, "a drive has tripped", "Repair and reset it at the machine.", False),
         ((status & _READY) == 0, "a drive is not ready", "Repair and reset it at the machine.", False),
@@ -152,7 +152,7 @@ class Claim:
     def __init__(
         self, owner: int, groups: tuple[tuple[int, ...], ...], period: float, random: np.random.Generator
     ) -> None:
-        """Begin the claim; period [s]."""
+        """Begin the claim for cycles of a period [s]."""
         self._owner, self._groups, self._period, self._random = owner, groups, period, random
         self._silent = self._cycles = self._agreed = 0
         self._waiting = 0
@@ -162,7 +162,7 @@ class Claim:
         self.refused: Disagreement | None = None
 
     def look(self, answer: Sample | Missing, counter: int) -> None:
-        """Evaluate an answer of the machine, and set the next command."""
+        """Evaluate an answer of the machine, and choose the mode of the next command."""
         if isinstance(answer, Missing):
             self._silent += 1
             if self._silent * self._period >= SILENT:
@@ -187,7 +187,7 @@ class Claim:
         return self._cycles * self._period >= CLAIMING
 
     def _give_back(self) -> None:
-        """Leave for a random time, because another controller may own the other groups and wait for these groups."""
+        """Give the groups up for a random time, because another controller may own the rest and wait for them."""
         self._tries += 1
         self.mode = Mode.LEAVE
         longest = LONGEST_WAIT / self._period

@@ -34,17 +34,17 @@ from sagline.tension.method import TensionMethod
 from sagline.tension.methods import DEFAULT, method_of
 
 MOST_SEED: Final = 2**128
-SAME: Final = 1e-9  # tolerance of the period, as a share of it
-MARGIN: Final = 500  # number of cycles in the table in addition to the plan, for ramps and pauses
+SAME: Final = 1e-9  # largest deviation of the period, as a share of the period
+MARGIN: Final = 500  # number of cycles in the table beyond the plan, for ramps and pauses
 
 
 class Estimator:
-    """Forward kinematics of each sample, with the previous pose as start.
+    """Forward kinematics of each sample. The search starts at the previous pose.
 
     Attributes:
         position: Position of the platform's origin [m], shape (3,); NaN if it was never known.
         quaternion: Rotation platform -> world, scalar last, shape (4,).
-        status: Code of the `ForwardStatus`; -1 if there is none.
+        status: Code of the `ForwardStatus`; -1 without an estimate.
     """
 
     def __init__(self, robot: Robot, model: CableModel) -> None:
@@ -62,12 +62,12 @@ class Estimator:
         self.position, self.quaternion, self.status = np.full(3, np.nan), np.full(4, np.nan), -1
 
     def begin_at(self, pose: Pose) -> None:
-        """Start at a known pose."""
+        """Set the pose to a known pose."""
         self._solver.reset(pose)
         self.position, self.quaternion, self.status = pose.position, pose.quaternion, int(ForwardStatus.SOLVED)
 
     def locate(self, length: Array, wrench: Array | None) -> ForwardStatus | None:
-        """Solve for the pose; return the status if the pose is newly lost. length: [m], (m,); wrench: (6,) or None."""
+        """Estimate the pose from lengths [m] (m,) and a wrench (6,) or None; return the status if it is newly lost."""
         position, quaternion = np.empty(3), np.empty(4)
         status = self._solver.step_into(length, position, quaternion, wrench)
         lost = status not in STABLE and self.status in STABLE
@@ -83,14 +83,14 @@ class _Run:
         paused: Path that can be resumed.
         status: Final status; RUNNING before its end.
         reason: Reason of the status in one line.
-        first_event: Number of events before the motion.
+        first_event: Index of the first event of the motion.
         table: Table of the cycles.
         recording: True if cycles are added to the table.
         announced: True if the recorder has received the plan, and has not received its end.
     """
 
     def __init__(self) -> None:
-        """No motion yet."""
+        """Begin without a motion."""
         self.motion: Motion | None = None
         self.paused: Along | None = None
         self.status, self.reason = ExecutionStatus.RUNNING, ""
@@ -174,7 +174,7 @@ class Context:
             self.say(EventKind.FAULT, "recording stopped", line)
 
     def enter(self, state: State, text: str) -> None:
-        """Change the state if the table of transitions allows it."""
+        """Change the state; raise an error if the table of transitions does not allow it."""
         check_transition(self.state, state, state.name)
         self.state = state
         self.say(EventKind.STATE, state.name, text)
@@ -182,7 +182,7 @@ class Context:
     # samples, faults and estimate
 
     def check_agreement(self, what: str) -> Sample:
-        """Newest sample, for a request to all groups; raises an error if a group does not agree."""
+        """Return the newest sample; raise an error if a group does not agree to a request."""
         if self.sample is None:
             raise RefusedError(what, "no group has answered", "Connect first.")
         why = disagreement(self.sample, self.owner, self.sender.counter, self.link.groups, self.period)
@@ -191,7 +191,7 @@ class Context:
         return self.sample
 
     def locate(self, sample: Sample, wrench: Array | None) -> str:
-        """Estimate the pose from lengths minus the tension loop's correction; returns a message if it is lost."""
+        """Estimate the pose from the lengths without the tension loop's correction; return a message if it is lost."""
         length = sample.length + self.zero
         length -= self.correction
         lost = self.estimator.locate(length, wrench)
@@ -202,7 +202,7 @@ class Context:
         return line
 
     def find_faults(self, cycle: Cycle) -> tuple[Reaction, str]:
-        """Strongest reaction among the faults of a cycle, and the message of the first fault with this reaction."""
+        """Check all faults; return the strongest reaction, and the message of the first fault with this reaction."""
         reaction, first, homing = Reaction.EVENT, "", False
         for fault in self.faults:
             line = fault.look(cycle)
@@ -226,13 +226,13 @@ class Context:
         self.degrading: list[Fault] = [fault for fault in self.faults if fault.reaction is Reaction.DEGRADED]
 
     def reset_tension_loop(self) -> None:
-        """Start a tension loop without correction; None for a robot without redundancy."""
+        """Create a tension loop with zero correction; None for a robot without redundancy."""
         m, n = self.robot.cable_count, self.robot.degrees_of_freedom
         self.tension_loop = TensionLoop(m, self.settings, self.period) if m > n else None
         self.correction = np.zeros(m)
 
     def find_equilibrium(self, length: Array) -> Standing | ForwardStatus:
-        """Equilibrium at these lengths [m], shape (m,); takes 1 ms, or up to 10 ms if the pose is unknown."""
+        """Equilibrium at these lengths [m], (m,). The computation takes 1 ms, up to 10 ms if the pose is unknown."""
         return standing_at(self.robot, length, self.estimator.pose, self.model)
 
     # the running motion
@@ -245,20 +245,20 @@ class Context:
         run.table = CycleTable(self.robot.cable_count, len(self.link.groups), count)
         run.first_event = len(self.journal.events)
         if run.announced:
-            self._announce_end()  # this ends the record of a paused plan
+            self._announce_end()  # end of the record of a paused plan
         plan = None if motion is None else motion.plan
         if self.journal.watched and plan is not None:
             run.announced = True
             self.tell(lambda record: record.begins(plan))
 
     def continue_run(self) -> None:
-        """Start recording at this cycle, without garbage collection."""
+        """Start recording at this cycle, and disable garbage collection."""
         run = self.run
         run.recording, run.status, run.reason = True, ExecutionStatus.RUNNING, ExecutionStatus.RUNNING.text
         self.garbage.stop()
 
     def end_run(self, status: ExecutionStatus, reason: str) -> None:
-        """Store the end of the motion; enable garbage collection again."""
+        """Store the final status of the motion, and enable garbage collection again."""
         self.run.status, self.run.reason = status, reason
         self.garbage.go_on()
 

@@ -31,15 +31,15 @@ from sagline.tension.method import TensionMethod
 
 SPEED: Final = 0.1  # default speed of go_to [m/s]
 TURNING: Final = 0.2  # default angular speed of go_to [rad/s]
-SPEEDING_UP: Final = 0.5  # shortest time to full speed [s]; it makes short paths slow
+SPEEDING_UP: Final = 0.5  # shortest time to full speed [s]; short paths are slow because of it
 
 
 class Controller(Preparation):
     """Controller of a robot through a `Link`.
 
-    All data are from samples, and each `cycle` sends one checked command. The methods that begin an action (`start`,
-    `begin_homing`, `start_jog`, `claim`) return immediately. The caller must then call `cycle` every period. The
-    methods that wait (`execute`, `go_to`, `home`, `jog`, `connect`) call `cycle` themselves until the motion ends.
+    Each `cycle` reads one sample and sends one checked command. The methods that begin an action (`start`,
+    `begin_homing`, `start_jog`, `claim`) return immediately, and the caller must then call `cycle` every period. The
+    methods that wait (`execute`, `go_to`, `home`, `jog`, `connect`) call `cycle` themselves until the action ends.
     """
 
     def __init__(
@@ -62,17 +62,17 @@ class Controller(Preparation):
             link: Connection to the machine.
             pace: Pace of cycles in real time. None for lockstep: a cycle begins when the previous cycle ends, and the
                 machine with its clock waits for the controller.
-            model: Cable model; the default is exact.
+            model: Cable model; by default the elastic catenary.
             tension: Tension distribution method; the default is `Closest`.
             loop: Settings of the tension loop. A robot without redundancy has no tension loop.
             record: Recorder of all cycles and events.
-            shadow: True for read-only operation: nothing is ever sent, and the state remains OFF.
-            seed: Seed of the id and of random waiting times; None for a seed of the system, which is different for
+            shadow: True for a controller that only reads. It never sends anything, and its state remains OFF.
+            seed: Seed of the controller's id and of random waiting times. None: the system chooses another seed for
                 every controller.
 
         Raises:
             InvalidValueError: If data of the winches are missing, the link is for another number of winches, or an
-                argument is of the wrong kind.
+                argument has the wrong type.
 
         Examples:
             >>> import sagline as sl
@@ -100,7 +100,7 @@ class Controller(Preparation):
             A motion for `start` and `execute`.
 
         Raises:
-            RefusedError: If a check fails; the message names the check, the location and the next step.
+            RefusedError: If a check fails; the message names the check, the place on the path and the next step.
         """
         c, given = self._context, instance(path, Path, "path")
         return self._result_of(partial(plan_motion, c.robot, given, c.period, c.model, c.method, c.previous_plan))
@@ -109,8 +109,8 @@ class Controller(Preparation):
         """Begin to follow a path.
 
         Args:
-            path: Path from rest to rest that begins at the pose of the platform, with a sample at every tick; or a
-                planned motion.
+            path: Path from rest to rest with a sample at every tick. It begins at the pose of the platform. Or a motion
+                of `plan`.
 
         Raises:
             RefusedError: If the robot is not idle, a check fails, or the path begins at another pose.
@@ -146,7 +146,7 @@ class Controller(Preparation):
         return self.wait()
 
     def path_to(self, pose: PoseLike, speed: float = SPEED, angular_speed: float = TURNING) -> Path:
-        """Straight path from the pose of the platform.
+        """Create a straight path from the present pose of the platform to another pose.
 
         Args:
             pose: Pose at the end of the path, a single pose.
@@ -191,7 +191,7 @@ class Controller(Preparation):
         return self.execute(self.path_to(pose, speed, angular_speed))
 
     def start_jog(self, winch: int, by: float) -> None:
-        """Begin to jog one winch.
+        """Begin to jog one winch: a short motion of one cable.
 
         Args:
             winch: Index of the winch, from 0.
@@ -214,7 +214,7 @@ class Controller(Preparation):
         self._begin(State.JOGGING, source, motion, f"winch {chosen} by {1e3 * far:+g} mm")
 
     def jog(self, winch: int, by: float) -> None:
-        """Jog one winch, and wait for its end.
+        """Jog one winch, and wait for the end of the jog.
 
         Args:
             winch: Index of the winch, from 0.
@@ -230,7 +230,7 @@ class Controller(Preparation):
         """Begin to jog the platform along a straight line; each cycle computes the next pose.
 
         Args:
-            by: Displacement [m], and optionally a rotation vector [rad], world axes, shape (3,) or (6,).
+            by: Displacement [m], shape (3,), or displacement and rotation vector [m, rad], shape (6,), world axes.
 
         Raises:
             RefusedError: If the robot is not idle, or the pose at the end has no tensions within the limits.
@@ -302,7 +302,7 @@ class Controller(Preparation):
     # shared by the methods above
 
     def _begin(self, state: State, source: SetPointSource, motion: Motion | None, text: str) -> None:
-        """Begin to follow a source, and start its record."""
+        """Begin to follow a source of set points, and start the record of the motion."""
         self._context.begin_run(motion)
         self._follow(state, source, text)
 
@@ -319,7 +319,7 @@ class Controller(Preparation):
         return point
 
     def _here(self) -> Pose:
-        """Planned pose of the platform at rest; the estimated pose differs only by noise."""
+        """Planned pose of the platform at rest. The estimated pose has additional noise."""
         source = self._loop.active.source
         pose = source.pose if isinstance(source, Standing) else None
         return self.estimate if pose is None else pose

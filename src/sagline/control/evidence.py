@@ -15,11 +15,11 @@ from sagline.control.null_space import SIGMAS, NullSpace
 from sagline.core.arrays import Array, Flags
 from sagline.robot.robot import Robot
 
-MOVING: Final = 1e-3  # [m/s], a faster change of a set point is a motion
+MOVING: Final = 1e-3  # [m/s], a set point that changes faster counts as a motion
 
 
 class Cycle(NamedTuple):
-    """Data of one cycle, between the sample and the next command.
+    """Data of one cycle for the fault rules. They are known after the sample, before the next command.
 
     Attributes:
         sample: The newest sample.
@@ -53,24 +53,24 @@ PLANNED_SHARE: Final = 0.9  # a cable is taut in the plan if the planned tension
 PULLING: Final = 0.5  # a cable is taut if the motor torque is above this share of the planned tension
 STEADY_TIME: Final = 0.5  # time constant of the filter for the constant part of the tension errors [s]
 QUICK_TIME: Final = 0.1  # time constant of the filter for the comparison with the platform's force balance [s]
-MOST_CHANGE: Final = 6.0  # limit of the quick filter's change [N per cycle]; it suppresses single outliers
+MOST_CHANGE: Final = 6.0  # largest change of the quick filter [N per cycle]; this limit suppresses single outliers
 _TRIPPED: Final = int(WinchState.FAULT)
 
 
 class Evidence:
-    """Tensions of this cycle and data of the machine, which all rules of a set use.
+    """Tensions of this cycle and data of the machine, used by all rules of a set.
 
     Attributes:
         group_of: Index of the group of each winch, shape (m,).
         period: Period of a cycle [s].
-        largest: Correction of a length above which there is a fault [m].
+        largest: Largest correction of a length without a fault [m].
         noise: Standard deviation of a reading [N].
-        sigma: Standard deviation of a reading, including the bias of a good cell [N].
+        sigma: Standard deviation of a reading, increased by the bias of a good cell [N].
         limit: Upper limits of T_A [N], shape (m,).
         full_scale: Full scale of the cells [N], infinite if unknown, shape (m,).
-        believed: True for cells that are not ignored, shape (m,).
-        tension: T_A [N], shape (m,): the reading if it is finite and the cell is not ignored; otherwise the planned
-            tension. Without a plan, a value between the limits for slack and tight cables.
+        believed: True for cells whose readings are used, shape (m,).
+        tension: T_A [N], shape (m,): the reading if it is finite and the cell is not ignored, otherwise the planned
+            tension. If there is no plan either, a value between the limits for slack and tight cables.
         plain: True if no cell is ignored and all readings are finite.
         stopped: True while a reported fault stops the motion and the winches still move.
         broken: True for broken cables, shape (m,).
@@ -123,7 +123,7 @@ class Evidence:
         self.compared = self.any_low = self.stopped = False
         self.plain, self._all_believed = True, True
         self._still, self._settled = 0, round(RAMP / period)
-        # full-size arrays, because numpy is three times slower with a number or a column
+        # full-size arrays, because numpy is three times slower with scalars or columns
         self._shares = np.array([[period / (time + period)] * m for time in (STEADY_TIME, QUICK_TIME)])
         self.cycle: Cycle | None = None
         self.tension = np.full(m, math.nan)
@@ -163,11 +163,11 @@ class Evidence:
         self._all_believed = False
 
     def stop(self) -> None:
-        """Store that a fault stops the motion; until the winches stop, later faults are mostly its consequences."""
+        """Store that a fault stops the motion. Faults before the winches stop are mostly consequences of it."""
         self.stopped, self._still = True, 0
 
     def _wait(self, cycle: Cycle) -> None:
-        """Check if the winches have stopped: from the set points, or without set points, from new rates."""
+        """Check if the winches have stopped, from the set points, or from new rates if there are no set points."""
         moves = cycle.moving if cycle.command is not None else largest(cycle.sample.rate * self.fresh) > MOVING
         self._still = 0 if moves else self._still + 1
         self.stopped = self._still <= self._settled
@@ -184,7 +184,7 @@ class Evidence:
 
     @property
     def fresh(self) -> Flags:
-        """Flags of winches with new data in this cycle, shape (m,)."""
+        """Flags of the winches that have new data in this cycle, shape (m,)."""
         before = None if self.cycle is None else self.cycle.before
         if self.cycle is None or before is None:
             return np.ones(len(self.group_of), dtype=bool)
@@ -216,14 +216,14 @@ class Evidence:
         change[:] = error
         change -= self._filtered
         change *= self._shares
-        if (most := largest(change[1])) > MOST_CHANGE:  # one factor for all errors keeps their direction
+        if (most := largest(change[1])) > MOST_CHANGE:  # a common factor for all errors does not change their direction
             change[1] *= MOST_CHANGE / most
         if self.any_low:
             change[0] = 0.0
         self._filtered += change
 
     def pull(self, cycle: Cycle) -> Array:
-        """Cable tension from the motor torque [N], shape (m,); it includes friction, and is NaN for unknown drums."""
+        """Cable tension from the motor torque, with friction [N], shape (m,); NaN for unknown drums."""
         torque = cycle.sample.torque
         return np.full(torque.shape, np.nan) if self._pull_of_torque is None else self._pull_of_torque * torque
 
@@ -234,27 +234,26 @@ class Evidence:
 
 
 class Reaction(IntEnum):
-    """Reaction to a fault; the largest reaction among several faults is executed."""
+    """Reaction to a fault. If there are several faults, the strongest reaction is executed."""
 
     EVENT = 0  # reported and recorded
     DEGRADED = 1  # the tension loop keeps its correction; the motion continues
-    STOPPING = 2  # the ramp, then FAULT
+    STOPPING = 2  # ramp of all rates to zero, then FAULT
     EMERGENCY = 3  # drums locked, no motion possible
 
 
 class Fault(ABC):
-    """One fault rule. `faults_of` makes a set of new rules, for example after the operator has acknowledged a fault.
+    """Base class of a fault rule. `faults_of` creates a set of rules, again after each acknowledged fault.
 
     Attributes:
         name: Name of its events.
-        rule: Its condition as text.
+        rule: Condition of the fault as text.
         reaction: Reaction of the controller.
-        within: Time until detection, as text.
-        homing: True if the robot must be homed again, because a length is unreliable.
-        lasting: True if the fault remains until the next set of rules; each item is reported once.
-        quiet: Time after a report in which repeats are counted, but not reported [s].
-        present: True if the condition holds; during a stop by another fault, it is updated after the winches have
-            stopped.
+        within: Longest time until the fault is detected, as text.
+        homing: True if the robot must be homed again after the fault, because a length is unreliable.
+        lasting: True if the fault remains until a new set of rules is created; each faulty item is reported once.
+        quiet: Time after a report in which repeated faults are only counted [s].
+        present: True if the condition holds. While another fault stops the winches, the value does not change.
         seen: Evidence that all rules of the set use.
     """
 
@@ -273,20 +272,21 @@ class Fault(ABC):
             seen: Evidence that all rules of the set use.
         """
         self.seen, self.present = seen, False
-        self._for = np.zeros(len(seen.group_of), dtype=np.int64)  # consecutive samples, for rules that count them
+        self._for = np.zeros(len(seen.group_of), dtype=np.int64)  # consecutive samples with the condition
         self._since_report, self._suppressed = 10**9, 0  # cycles since the last report, and suppressed repeats
 
     def look(self, cycle: Cycle) -> str | None:
-        """Check a cycle; to be called once for every cycle, in order.
+        """Check one cycle. Call this method once for every cycle, in order.
 
         Args:
             cycle: The cycle.
 
         Returns:
-            Message for the operator when the fault begins: fault, item, value, limit, next step. None in all other
-            cycles, and while another fault stops the motion. A fault that persists after the stop is then reported.
+            Message for the operator in the cycle in which the fault begins: fault, item, value, limit, next step. None
+            in all other cycles. A fault that begins while another fault stops the motion is reported after the stop, if
+            it persists.
         """
-        if cycle is not self.seen.cycle:  # the first rule computes it for all others
+        if cycle is not self.seen.cycle:  # the first rule updates the evidence for all rules
             self.seen.at(cycle)
         # a fault during a stop is mostly a consequence of the stop, but a fault with an unreliable length is reported
         waits = False
@@ -321,7 +321,7 @@ class Fault(ABC):
 
     @abstractmethod
     def found(self, cycle: Cycle) -> str | None:
-        """Message for the operator in every cycle in which the rule holds; for a lasting fault, only for a new item.
+        """Message for the operator in every cycle in which the condition holds; lasting faults: only for new items.
 
         Args:
             cycle: Readings and set points of the cycle.

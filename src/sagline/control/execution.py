@@ -1,4 +1,4 @@
-"""Executions on a machine: set points, samples, estimates and events of all cycles; position and tension errors."""
+"""Executions on a machine: data and events of all cycles; position and tension errors."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class ExecutionStatus(Status):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Samples(Result):
-    """N samples of a machine; the fields have the meanings and units of `Sample`.
+    """N samples of a machine. The fields have the meanings and units of the fields of `Sample`.
 
     In cycles without a sample, floats are NaN, and integers are 0.
 
@@ -59,7 +59,7 @@ class Samples(Result):
         echo: Shape (N, G).
         status: Shape (N, G).
         fault: Shape (N, G).
-        length: Measured length, without the zero of homing, shape (N, m).
+        length: Measured length, without the offset from homing, shape (N, m).
         rate: Shape (N, m).
         torque: Shape (N, m).
         tension: Shape (N, m).
@@ -93,7 +93,7 @@ class Samples(Result):
         return len(self.time)
 
     def at(self, index: int) -> Sample:
-        """One sample, with its own arrays and without the reasons of discarded blocks.
+        """One sample, with copied arrays and without the reasons of discarded blocks.
 
         Args:
             index: Index of the sample, from 0.
@@ -110,8 +110,8 @@ class Samples(Result):
 class Execution(Result, Saved, Tabular):
     """Execution of a plan on a machine, in N cycles of m winches.
 
-    The command and the sample of a cycle are exchanged at the same time. The sample therefore does not include the
-    effect of the command.
+    In each cycle, a command is sent and a sample is received at the same time. The sample therefore does not show the
+    effect of this command.
 
     Attributes:
         robot: Robot of the controller.
@@ -125,14 +125,14 @@ class Execution(Result, Saved, Tabular):
         answered: True for cycles with a sample, shape (N,).
         state: Codes of `State` at the end of each cycle, shape (N,).
         late: Delay of the start of each cycle [s], shape (N,).
-        clock: Time on the plan from its start [s], shape (N,); NaN outside the plan.
+        clock: Time since the start of the plan [s], shape (N,); NaN in cycles outside the plan.
         samples: Samples of the machine.
         position: Position of the platform's origin, estimated from the encoders [m], shape (N, 3).
         quaternion: Rotation platform -> world, estimated from the encoders, scalar last, shape (N, 4).
         estimate: Codes of `ForwardStatus` of the estimates, -1 without an estimate, shape (N,).
         mode: Codes of `Mode` of the commands, -1 without a command, shape (N,).
-        set_length: Set points of the unstrained lengths, with the zero of homing [m], shape (N, m).
-        set_rate: Set points of their rates [m/s], shape (N, m).
+        set_length: Set points of the unstrained lengths, including the offset from homing [m], shape (N, m).
+        set_rate: Set points of the length rates [m/s], shape (N, m).
         set_tension: Set points of the tensions at the drums [N], shape (N, m).
         planned_tension: Planned T_A at the time of each sample [N], shape (N, m); NaN without a plan.
         correction: Correction by the tension loop, included in the set points [m], shape (N, m).
@@ -177,7 +177,7 @@ class Execution(Result, Saved, Tabular):
 
     @property
     def length(self) -> Array:
-        """Unstrained lengths off the drums from the encoders, with the zero of homing [m], shape (N, m)."""
+        """Unstrained lengths off the drums [m], shape (N, m), from the encoders and the offset from homing."""
         return locked(self.samples.length + self.zero)
 
     @property
@@ -191,7 +191,7 @@ class Execution(Result, Saved, Tabular):
         return Pose._adopt(self.position, self.quaternion)
 
 
-_COLUMNS: Final = (*REAL_OWN, *(name for name, _ in PLACE), *ASKED)  # same names in `CycleTable` and `Execution`
+_COLUMNS: Final = (*REAL_OWN, *(name for name, _ in PLACE), *ASKED)  # in `CycleTable` and `Execution`
 
 
 def execution_of(
@@ -204,7 +204,7 @@ def execution_of(
     zero: Array,
     events: tuple[Event, ...],
 ) -> Execution:
-    """Execution from a table of cycles; period [s], zero [m] (m,)."""
+    """Create an execution from a table of cycles; period [s], zero [m] (m,)."""
     arrays: dict[str, Any] = {name: locked(table.column(name)) for name in _COLUMNS}
     arrays |= {name: locked(table.column(name).astype(np.int8)) for name in ("state", "estimate", "mode")}
     return Execution(

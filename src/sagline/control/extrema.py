@@ -1,4 +1,4 @@
-"""Minimum and maximum of short arrays; lists take a quarter of the time of numpy."""
+"""Minimum and maximum of short arrays. Lists are used, because they are four times faster than numpy here."""
 
 from __future__ import annotations
 

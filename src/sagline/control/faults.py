@@ -1,4 +1,4 @@
-"""Table of all faults, and a new set of rules for a robot."""
+"""Table of all faults, and creation of the fault rules for a robot."""
 
 from __future__ import annotations
 
@@ -60,8 +60,8 @@ class FaultRow(NamedTuple):
     Attributes:
         name: Name of its events.
         rule: Condition of the fault.
-        to: Reaction of the controller.
-        within: Time until detection.
+        to: Name of the controller's reaction.
+        within: Longest time until detection.
         by: Part that detects it.
     """
 
@@ -99,22 +99,22 @@ def faults_of(
     cell_bias: float | None = None,
     largest_correction: float = LARGEST_CORRECTION,
 ) -> tuple[Fault, ...]:
-    """New set of fault rules. A controller creates a new set each time that it leaves OFF, FAULT or homing.
+    """Create a set of fault rules. A controller creates a new set each time it leaves OFF, FAULT or homing.
 
     Args:
         robot: Robot for planning.
         period: Period of a cycle [s], > 0.
-        groups: Winches of each group, as in the link; None for groups of two neighbors.
+        groups: Winches of each group, as in the link; None for groups of two neighboring winches.
         cell_deviation: Standard deviation of a good load cell [N], > 0; None for the value of the robot's winches, or 1
             N without such a value.
-        cell_bias: Largest bias of a good load cell [N], >= 0; None for the value of the winches, at least 2 N.
+        cell_bias: Largest bias of a good load cell [N], >= 0; None for the value of the winches, but at least 2 N.
         largest_correction: Largest correction of a length by the tension loop [m], > 0.
 
     Returns:
         The rules. Evaluate all of them in every cycle, in this order.
 
     Raises:
-        InvalidValueError: If an argument is of the wrong kind or out of its range.
+        InvalidValueError: If an argument has the wrong type or is out of its range.
 
     Examples:
         >>> import sagline as sl

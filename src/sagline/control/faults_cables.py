@@ -13,9 +13,9 @@ from sagline.control.link import Mode
 from sagline.control.null_space import SIGMAS
 from sagline.core.arrays import Array
 
-NEAR: Final = 0.9  # share of the upper limit; the motion stops if the tension is larger for some samples
+NEAR: Final = 0.9  # share of the upper limit; the motion stops if the tension is above it for some samples
 NEAR_SAMPLES, SLACK_SAMPLES = 5, 3
-SUDDEN: Final = 0.5  # share of the planned tension; a broken cable had at least this tension one sample before
+SUDDEN: Final = 0.5  # share of the planned tension that a broken cable had at least, one sample before the break
 
 
 class OverTension(Fault):
@@ -27,13 +27,13 @@ class OverTension(Fault):
     within = "10 to 50 ms"
 
     def __init__(self, seen: Evidence) -> None:
-        """Begin without a tight cable."""
+        """Create the rule without findings."""
         super().__init__(seen)
         self._near = NEAR * seen.limit
         self._least = float(self._near.min())
 
     def found(self, cycle: Cycle) -> str | None:
-        """Cable with the largest tension relative to its limit."""
+        """Message for the cable whose tension is largest in relation to its limit."""
         seen, tension = self.seen, self.seen.tension
         if not seen.most > self._least:
             self._for.fill(0)
@@ -65,7 +65,7 @@ class CableBroken(Fault):
     lasting = True
 
     def found(self, cycle: Cycle) -> str | None:
-        """First cable that is newly broken."""
+        """Message for the first cable that is newly broken."""
         seen = self.seen
         if not (seen.any_low and seen.compared):
             return None
@@ -87,7 +87,7 @@ class CableBroken(Fault):
 
 
 class Slack(Fault):
-    """Slack cable that is taut in the plan."""
+    """Cable that is slack, but taut in the plan."""
 
     name = "slack"
     rule = (
@@ -99,7 +99,7 @@ class Slack(Fault):
     within = "30 ms"
 
     def found(self, cycle: Cycle) -> str | None:
-        """First slack cable."""
+        """Message for the first slack cable."""
         seen = self.seen
         if not seen.any_low:
             return None
@@ -115,7 +115,7 @@ class Slack(Fault):
 
 STUCK_SAMPLES: Final = 50
 ODD_TIME: Final = 0.35  # duration of the contradiction [s]; ramps and oscillations of the platform are shorter
-DISPROVED: Final = 0.5  # share of full scale; a full-scale reading is wrong if the motor torque gives less tension
+DISPROVED: Final = 0.5  # share of full scale; a full-scale reading is wrong if the motor holds less tension
 _STEP: Final = "The tension loop is off. Check cell, plug and amplifier when the platform is at rest, then acknowledge."
 
 
@@ -129,7 +129,7 @@ class CellLost(Fault):
     lasting = True
 
     def found(self, cycle: Cycle) -> str | None:
-        """First cell that has lost its reading since the motion began."""
+        """Message for the first cell that has lost its reading since the motion began."""
         seen = self.seen
         command = cycle.command
         if seen.plain or command is None or command.mode != Mode.FOLLOW or not command.rate.any():
@@ -158,12 +158,12 @@ class CellDead(Fault):
     lasting = True
 
     def __init__(self, seen: Evidence) -> None:
-        """Begin without dead cells."""
+        """Create the rule without findings."""
         super().__init__(seen)
         self._least, self._most = -SIGMAS * seen.sigma, float(seen.full_scale.min())
 
     def found(self, cycle: Cycle) -> str | None:
-        """First cell with a new impossible reading."""
+        """Message for the first cell with a new impossible reading."""
         seen, tension = self.seen, cycle.sample.tension
         if seen.plain and seen.least >= self._least and seen.most < self._most and not seen.any_low:
             return None
@@ -192,7 +192,7 @@ class CellStuck(Fault):
     lasting = True
 
     def found(self, cycle: Cycle) -> str | None:
-        """First cell that is newly stuck."""
+        """Message for the first cell that is newly stuck."""
         seen = self.seen
         if cycle.before is None:
             return None
@@ -204,7 +204,7 @@ class CellStuck(Fault):
             return None
         same = tension == before
         self._for = np.where(same, self._for + seen.fresh, 0)
-        stuck = (self._for >= STUCK_SAMPLES - 1) & seen.believed  # number of samples after the first one
+        stuck = (self._for >= STUCK_SAMPLES - 1) & seen.believed  # number of samples that repeat the first one
         if not stuck.any():
             return None
         seen.ignore_cells(stuck)
@@ -223,14 +223,14 @@ class CellOff(Fault):
     lasting = True
 
     def __init__(self, seen: Evidence) -> None:
-        """Begin without suspected cells."""
+        """Create the rule without findings."""
         super().__init__(seen)
         self._samples = round(ODD_TIME / seen.period)
         self._side = np.zeros(len(seen.group_of))  # sign of each error above the limit in the previous cycle, or 0
         self._quiet = True
 
     def found(self, cycle: Cycle) -> str | None:
-        """Wrong cell, reported once. While one cell is wrong, the other cells cannot be compared."""
+        """Message for a wrong cell. While one cell is wrong, the other cells cannot be compared."""
         seen = self.seen
         error = self._error(cycle)
         limit = SIGMAS * seen.sigma
@@ -257,7 +257,7 @@ class CellOff(Fault):
         )
 
     def _error(self, cycle: Cycle) -> Array | None:
-        """Error of each cell from the parity matrix [N], (m,); None if parity is not available."""
+        """Error of each cell from the parity matrix [N], (m,); None without a parity matrix."""
         seen = self.seen
         if cycle.gains is None or not seen.compared or seen.any_low or not all(seen.believed.tolist()):
             return None

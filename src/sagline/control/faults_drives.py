@@ -1,4 +1,4 @@
-"""Faults of encoders, drives, and the correction of the tension loop."""
+"""Faults of encoders and drives, and faults found by the tension loop."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from sagline.control.link import CHECK, COUNTERS, Command, GroupStatus, Mode, Sa
 from sagline.core.arrays import Array
 
 JUMP: Final = 1e-3  # largest jump [m per cycle]
-OFF_BEAT: Final = 1.5  # allowed difference of elapsed cycles and accepted commands of a PLC
+OFF_BEAT: Final = 1.5  # allowed difference between the numbers of elapsed cycles and of commands that a PLC accepted
 CATCHING_UP: Final = 10  # wait after a larger difference [cycles]
 FOLLOWING: Final = 5e-3  # largest distance from a set point [m]
 SATURATED: Final = 0.2  # duration of the fault [s]
-IDLE: Final = 3  # largest number of samples until a group begins to follow
+IDLE: Final = 3  # number of samples in which a group must begin to follow
 _AT_LIMIT, _ENABLED = int(WinchState.SATURATED), int(WinchState.ENABLED)
 _FOLLOWING, _FOLLOW = int(GroupStatus.FOLLOWING), int(Mode.FOLLOW)
 REMEMBERED: Final = 32  # [commands], more commands than can be in transit
@@ -39,13 +39,13 @@ class EncoderJump(Fault):
     homing = True
 
     def __init__(self, seen: Evidence) -> None:
-        """Begin without a sample."""
+        """Create the rule without a sample."""
         super().__init__(seen)
-        self._numbers = False  # True if the previous sample had finite values
-        self._regular = np.full(seen.group_of.max() + 1, CATCHING_UP)  # number of cycles of each group's commands
+        self._numbers = False  # False for encoders whose previous reading was not finite
+        self._regular = np.full(seen.group_of.max() + 1, CATCHING_UP)  # cycles with commands, for each group
 
     def found(self, cycle: Cycle) -> str | None:
-        """Largest jump, or a reading that is not finite."""
+        """Message for the largest jump, or for a reading that is not finite."""
         sample, before = cycle.sample, cycle.before
         known, self._numbers = self._numbers, finite(sample.length) and finite(sample.rate)
         if before is not None:
@@ -60,7 +60,7 @@ class EncoderJump(Fault):
         return self._jump(cycle, sample, before) if known and before is not None else None
 
     def _jump(self, cycle: Cycle, sample: Sample, before: Sample) -> str | None:
-        """Message if a length jumps relative to the previous rate; the rate after a jump may be wrong."""
+        """Message if the change of a length contradicts the previous rate. The rate after a jump may be wrong."""
         passed = (sample.plc_time - before.plc_time)[self.seen.group_of]
         change = sample.length - before.length
         jump = change - before.rate * passed
@@ -69,12 +69,12 @@ class EncoderJump(Fault):
         jump = np.abs(jump)
         if cycle.command is not None:
             jump = np.minimum(jump, np.abs(change - cycle.command.rate * passed))
-        # only drives that can follow: a locked drum stops immediately, a drive at its force limit moves with the cable
+        # only drives that follow: a locked drum stops immediately, and the cable moves a drive at its force limit
         free = (sample.state == _ENABLED) & (before.state == _ENABLED)
         free &= (passed >= 0.0) & (passed < LONGEST)
         # a drive without commands for some cycles moves to the next set point at its largest speed
         free &= (self._regular >= CATCHING_UP)[self.seen.group_of]
-        allowed = JUMP * np.maximum(1.0, passed / self.seen.period)  # rates may have changed more during a gap
+        allowed = JUMP * np.maximum(1.0, passed / self.seen.period)  # rates change more during a gap
         jumped = free & ~(jump <= allowed)
         if not jumped.any():
             return None
@@ -88,7 +88,7 @@ class EncoderJump(Fault):
 
 
 class FollowingError(Fault):
-    """Fault: a drum is too far from its set point."""
+    """Drum that is too far from its set point."""
 
     name = "following error"
     rule = f"|set point - length| > {1e3 * FOLLOWING:g} mm, for set points that the PLC has accepted"
@@ -102,7 +102,7 @@ class FollowingError(Fault):
         self._sent: deque[Command] = deque(maxlen=REMEMBERED)
 
     def found(self, cycle: Cycle) -> str | None:
-        """Drum with the largest distance from its set point."""
+        """Message for the drum with the largest distance from its set point."""
         command, length = cycle.command, cycle.sample.length
         if command is None or command.mode != _FOLLOW:
             self._sent.clear()
@@ -111,7 +111,7 @@ class FollowingError(Fault):
         if largest(command.length - length) <= FOLLOWING:
             return None
         away = self._away(cycle)
-        far = ~(away <= FOLLOWING) & ~self.seen.jumped  # jumps are already reported
+        far = ~(away <= FOLLOWING) & ~self.seen.jumped  # another rule reports jumps
         if not far.any():
             return None
         winch = int(np.argmax(np.where(far, away, 0.0)))
@@ -123,14 +123,14 @@ class FollowingError(Fault):
     def _away(self, cycle: Cycle) -> Array:
         """Distance of each drum from the interval between the last two commands accepted by its PLC [m], (m,).
 
-        Commands in transit and drives that are not enabled are excluded.
+        Groups with commands in transit and drives that are not enabled are excluded.
         """
         sent = {command.counter: k for k, command in enumerate(self._sent)}
         length = cycle.sample.length
         away = np.zeros(length.size)
         for g, echo in enumerate(cycle.sample.echo.tolist()):
             k = sent.get(echo, 0)
-            if k == 0 or not cycle.sample.status[g] & _FOLLOWING:  # unknown: no previous command, or not in follow mode
+            if k == 0 or not cycle.sample.status[g] & _FOLLOWING:  # no previous command, or not in follow mode
                 continue
             mine = self.seen.group_of == g
             last, first = self._sent[k], self._sent[k - 1]
@@ -156,10 +156,10 @@ class NotFollowing(Fault):
         """Begin without a command."""
         super().__init__(seen)
         self._first: int | None = None  # counter of the first command to follow
-        self._idle: dict[int, int] = {}  # consecutive samples of a group that accepted a command but does not follow
+        self._idle: dict[int, int] = {}  # consecutive samples in which a group does not follow an accepted command
 
     def found(self, cycle: Cycle) -> str | None:
-        """First group that does not accept or follow commands."""
+        """Message for the first group that does not accept or follow commands."""
         command, sample = cycle.command, cycle.sample
         if command is None or command.mode != _FOLLOW:
             self._first = None
@@ -206,7 +206,7 @@ class ServoSaturated(Fault):
     within = "0.2 s"
 
     def found(self, cycle: Cycle) -> str | None:
-        """Drive that has been at its limit for the longest time."""
+        """Message for the drive that has been at its limit for the longest time."""
         if _AT_LIMIT not in self.seen.states:
             self._for.fill(0)
             return None
@@ -222,7 +222,7 @@ class ServoSaturated(Fault):
 
 
 class CorrectionAtLimit(Fault):
-    """Fault: a correction of the tension loop is so large that no good encoder can have this error."""
+    """Correction of a length by the tension loop that is larger than the error of any good encoder."""
 
     name = "correction at its limit"
     rule = "the tension loop has changed a length by the allowed maximum, 5 mm by default"
@@ -231,7 +231,7 @@ class CorrectionAtLimit(Fault):
     homing = True
 
     def found(self, cycle: Cycle) -> str | None:
-        """Length with the largest correction."""
+        """Message for the length with the largest correction."""
         if largest(cycle.correction) < self.seen.largest * (1.0 - 1e-9):
             return None
         winch = int(np.argmax(np.abs(cycle.correction)))

@@ -1,4 +1,4 @@
-"""Faults between controller and machine: blocks, ownership, PLCs, clock, recording."""
+"""Faults of the exchange between controller and machine: blocks, ownership, PLCs, clock, recording."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from sagline.control.evidence import Cycle, Evidence, Fault, Reaction
 from sagline.control.link import CHECK, GroupFault, GroupStatus, Mode, WinchState, fault_text
 from sagline.core.arrays import Flags
 
-STALE, SILENT = 3, 10  # largest age [cycles]
-WINDOW: Final = 100  # length of the evaluated window [cycles]
+STALE, SILENT = 3, 10  # largest age of a sample [cycles]
+WINDOW: Final = 100  # length of the window in which late cycles are counted [cycles]
 LATE, LATE_OFTEN, LOST = 0.02, 0.005, 0.1  # delay of a late cycle [s]
 OFTEN: Final = 3  # largest number of late cycles per window
-ROUNDING: Final = 1e-6  # relative tolerance of an age
+ROUNDING: Final = 1e-6  # tolerance of an age, as a share of it
 
 # plain integers, because array operations with members of an enumeration are four times slower
 _LOCKED, _EMERGENCY, _PRESSED = int(GroupStatus.LOCKED), int(GroupStatus.EMERGENCY), int(GroupFault.EMERGENCY_STOP)
@@ -25,13 +25,13 @@ _FREE: Final = "Stop other programs on this computer."
 
 
 class _Old(Fault):
-    """Group with a newest sample that is too many cycles old."""
+    """Group whose newest sample is too many cycles old."""
 
     cycles: int
     step: str
 
     def found(self, cycle: Cycle) -> str | None:
-        """Group with the oldest sample, and its age."""
+        """Message for the group with the oldest sample."""
         worst, limit = self.seen.oldest, self.cycles * self.seen.period
         if worst < limit * (1.0 - ROUNDING):
             return None
@@ -41,7 +41,7 @@ class _Old(Fault):
 
 
 class GroupStale(_Old):
-    """Fault: a group is late; the tension loop is off until the group answers again."""
+    """Late group: the tension loop is off until the group answers again."""
 
     name = "group stale"
     rule = f"the newest sample of a group is {STALE} cycles old, as blocks are missing, repeated, late or invalid"
@@ -53,7 +53,7 @@ class GroupStale(_Old):
 
 
 class GroupSilent(_Old):
-    """Silent group."""
+    """Group that does not answer."""
 
     name = "group silent"
     rule = f"the newest sample of a group is {SILENT} cycles old"
@@ -64,7 +64,7 @@ class GroupSilent(_Old):
 
 
 class BlockDiscarded(Fault):
-    """Fault: a group sends invalid blocks; a group without valid blocks becomes stale."""
+    """Group that sends invalid blocks. If it sends no valid block, it becomes late and then silent."""
 
     name = "block discarded"
     rule = "incomplete or foreign (by its counters, magic, version or size), repeated, or older than an earlier block"
@@ -72,12 +72,12 @@ class BlockDiscarded(Fault):
     within = "1 cycle"
 
     def __init__(self, seen: Evidence) -> None:
-        """Begin without findings."""
+        """Create the rule without findings."""
         super().__init__(seen)
         self._quiet, self._line = WINDOW, ""
 
     def found(self, cycle: Cycle) -> str | None:
-        """Group and number of its discarded blocks; the fault ends after one second without a discarded block."""
+        """Message for the first group with discarded blocks. The fault ends after one second without such blocks."""
         sample, before = cycle.sample, cycle.before
         self._quiet += 1
         if before is not None and sample.discarded.tolist() != before.discarded.tolist():
@@ -91,7 +91,7 @@ class BlockDiscarded(Fault):
 
 
 class OwnerLost(Fault):
-    """Ownership lost."""
+    """Group that the controller no longer owns."""
 
     name = "owner lost"
     rule = "the owner of a group changes after the controller owned all groups"
@@ -99,7 +99,7 @@ class OwnerLost(Fault):
     within = "1 cycle"
 
     def found(self, cycle: Cycle) -> str | None:
-        """First group that another controller or no controller owns."""
+        """Message for the first group that another controller or no controller owns."""
         command = cycle.command
         if command is None or command.mode == _LEAVE:
             return None
@@ -112,7 +112,7 @@ class OwnerLost(Fault):
 
 
 class GroupActs(Fault):
-    """Fault: a group that was stopped by its PLC or a drive."""
+    """Group that its PLC or a drive has stopped."""
 
     name = "group acts by itself"
     rule = "a PLC reports a fault or locked drums, or a drive reports a fault"
@@ -121,12 +121,12 @@ class GroupActs(Fault):
     lasting = True
 
     def __init__(self, seen: Evidence) -> None:
-        """Begin without reported groups."""
+        """Create the rule without findings."""
         super().__init__(seen)
         self._reported: Flags = np.zeros(int(seen.group_of.max()) + 1, dtype=bool)
 
     def found(self, cycle: Cycle) -> str | None:
-        """Groups that have newly stopped, and the reason of the first group."""
+        """Message for the groups that have newly stopped, with the reason of the first group."""
         seen, sample = self.seen, cycle.sample
         if not (seen.faulted or seen.tripped or seen.bits & _LOCKED):
             return None
@@ -163,7 +163,7 @@ class EmergencyStop(Fault):
     homing = True
 
     def found(self, cycle: Cycle) -> str | None:
-        """Groups that report an emergency stop."""
+        """Message for the groups that report an emergency stop."""
         if not (self.seen.faulted or self.seen.bits & _EMERGENCY):
             return None
         sample = cycle.sample
@@ -175,7 +175,7 @@ class EmergencyStop(Fault):
 
 
 class CycleLate(Fault):
-    """Fault: late cycles, because the computer is too busy."""
+    """Cycles that are late because the computer is too busy."""
 
     name = "cycle late"
     rule = f"> {1e3 * LATE:g} ms late, or {OFTEN} of {WINDOW} cycles > {1e3 * LATE_OFTEN:g} ms late"
@@ -183,13 +183,13 @@ class CycleLate(Fault):
     within = "1 cycle"
 
     def __init__(self, seen: Evidence) -> None:
-        """Begin without late cycles."""
+        """Create the rule without late cycles."""
         super().__init__(seen)
         self._cycle = 0
         self._late: deque[tuple[int, float]] = deque()  # times and delays in the window
 
     def found(self, cycle: Cycle) -> str | None:
-        """Text of the latest cycle of the last second, or of the number of late cycles."""
+        """Message for the longest delay of the last second, or for the number of late cycles."""
         self._cycle += 1
         late = self._late
         if LATE_OFTEN < cycle.late <= LOST:
@@ -210,7 +210,7 @@ class CycleLate(Fault):
 
 
 class CycleLost(Fault):
-    """Fault: a cycle is so late that the PLCs have stopped the winches."""
+    """Cycle that is so late that the PLCs have stopped the winches."""
 
     name = "cycle lost"
     rule = f"> {1e3 * LOST:g} ms late"
@@ -218,7 +218,7 @@ class CycleLost(Fault):
     within = "1 cycle"
 
     def found(self, cycle: Cycle) -> str | None:
-        """Text of the cycle's delay."""
+        """Message for the delay of the cycle."""
         if cycle.late <= LOST:
             return None
         return (
@@ -228,7 +228,7 @@ class CycleLost(Fault):
 
 
 class RecordingStopped(Fault):
-    """Fault: recording has stopped; the motion continues."""
+    """Recording that has stopped; the motion continues."""
 
     name = "recording stopped"
     rule = "a write fails, for instance because the disk is full, or the queue to the writer is full"
@@ -236,7 +236,7 @@ class RecordingStopped(Fault):
     within = "1 s"
 
     def found(self, cycle: Cycle) -> str | None:
-        """Reason why recording stopped."""
+        """Message with the reason why recording stopped."""
         if not cycle.recording:
             return None
         why = cycle.recording if len(cycle.recording) <= 120 else cycle.recording[:117] + "..."

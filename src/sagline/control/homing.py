@@ -20,32 +20,32 @@ from sagline.robot.robot import Robot
 from sagline.statics.stiffness import stiffness
 from sagline.tension.method import TensionMethod
 
-WINDOW: Final = 50  # number of samples in a mean at rest
-MOST: Final = 1.2  # ratio to the planned tension; a jog ends at a larger tension
+WINDOW: Final = 50  # number of samples at rest whose mean is compared
+MOST: Final = 1.2  # a jog ends if a tension exceeds the planned tension times this factor
 
 
 class Homing:
     """Plan at the stated pose, and comparison of tensions and lengths with the plan.
 
     Attributes:
-        plan: Plan of the robot at that pose.
+        plan: Plan of the robot at the stated pose.
         state: Equilibrium of the plan.
         standing: Constant set point at the pose.
-        tension: T_A at the pose [N], shape (m,).
+        tension: Planned T_A at the pose [N], shape (m,).
         sigma: Standard deviation of the load cells [N], shape (m,).
         off: Mean of the measured minus the planned tensions [N], shape (m,).
-        tolerance: Largest difference of a length that needs no confirmation [m], shape (m,); infinite if the machine
-            has no valid lengths.
+        tolerance: Largest difference of a length that the operator need not confirm [m], shape (m,); infinite if the
+            machine has no valid lengths.
         apart: Lengths of the machine minus lengths of the plan [m], shape (m,).
         zero: Offset added to the lengths of samples after homing [m], shape (m,).
         agrees: True if every tension is within 5 sigma.
-        confirmed: True if the operator has confirmed the pose, although lengths of the machine differ.
+        confirmed: True if the operator has confirmed the pose in spite of different lengths of the machine.
     """
 
     def __init__(
         self, robot: Robot, pose: Pose, model: CableModel, method: TensionMethod, zero: Array | float = 0.0
     ) -> None:
-        """Plan the stated pose; zero: present offset of the lengths from an earlier homing [m], (m,)."""
+        """Plan the stated pose; zero: offset of the lengths from an earlier homing [m], (m,)."""
         self.plan = inverse(robot, pose, model, method)
         if not self.plan.solved:
             gap = self.plan.gaps[0]
@@ -68,7 +68,7 @@ class Homing:
 
     @property
     def conflicts(self) -> bool:
-        """True if the tensions agree, but a length does not agree and the operator has not confirmed the pose."""
+        """True if the tensions agree, a length differs, and the operator has not yet confirmed the pose."""
         return self.agrees and not self._accepted
 
     @property
@@ -77,12 +77,12 @@ class Homing:
         return self.agrees and (known or bool((np.abs(self.apart) <= self.tolerance).all()))
 
     def moved(self) -> None:
-        """Discard samples and findings after a winch has moved."""
+        """Discard samples and results after a winch has moved."""
         self._rest()
         self.agrees = self.confirmed = False
 
     def _rest(self) -> None:
-        """Begin a new mean."""
+        """Begin a new mean of samples."""
         self._count = 0
         self._lengths[:] = self._tensions[:] = 0.0
 
@@ -104,7 +104,7 @@ class Homing:
         return self._accepted
 
     def refusal(self) -> RefusedError:
-        """Error with the deviating lengths or tensions, and the next step."""
+        """Create the error that names the deviating lengths or tensions, and the next step."""
         if self.conflicts:
             return self._conflict()
         if not (read := np.isfinite(self.off)).all():
@@ -125,11 +125,11 @@ class Homing:
 
     @property
     def _place(self) -> str:
-        """Text of the platform's pose from the lengths of the machine."""
+        """Describe the pose of the platform that follows from the lengths of the machine."""
         return place_of(self._robot, self.state.unstrained_length + self.apart, self._pose, self._model)
 
     def _conflict(self) -> RefusedError:
-        """Error with both values of the length that differs most, and the pose from the lengths of the machine."""
+        """Create the error for the length that differs most, with the pose from the lengths of the machine."""
         ratio = np.abs(self.apart) / self.tolerance
         i = int(np.argmax(np.where(np.isfinite(self.apart), ratio, np.inf)))
         there, planned = self.state.unstrained_length + self.apart, self.state.unstrained_length
@@ -143,7 +143,7 @@ class Homing:
         return RefusedError("homing", reason, step)
 
     def _jog(self, off: Array) -> tuple[int, float]:
-        """Winch and length [m] of the jog that reduces the error most."""
+        """Winch and length [m] of the jog that reduces the tension errors most."""
         slope = stiffness(self.state).tension_sensitivity
         by = -(slope.T @ off) / (slope**2).sum(axis=0)
         left = np.linalg.norm(off[:, None] + slope * by, axis=0)
@@ -152,10 +152,10 @@ class Homing:
 
 
 class HomingJog:
-    """Set points for a jog of one winch at an unknown pose of the platform."""
+    """Set points for a jog of one winch, while the pose of the platform is unknown."""
 
     def __init__(self, point: SetPoint, winch: int, by: float, period: float) -> None:
-        """Begin at the lengths of the winches; by: change [m]; period [s]."""
+        """Begin at the present lengths of the winches; by: change of length [m]; period [s]."""
         self._lengths, self._rates = winch_lengths(point.length, winch, by, period)
         self._row, self._point = 0, point
         self._enable = np.zeros(len(point.length), dtype=np.bool_)
@@ -174,5 +174,5 @@ class HomingJog:
 
 
 def jog_tension_limits(homing: Homing, sample: Sample) -> Array:
-    """Tension limits of a jog [N], (m,): 1.2 times the planned tension, or the present tension if it is larger."""
+    """Tension limits of a jog [N], (m,): the larger of 1.2 times the planned tension and the present tension."""
     return np.maximum(MOST * homing.tension, sample.tension + 3.0 * homing.sigma)

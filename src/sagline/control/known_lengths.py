@@ -1,4 +1,4 @@
-"""Lengths of a machine as evidence in homing: tolerance of the lengths, and pose from the lengths."""
+"""Comparison of a machine's lengths with the lengths from homing: tolerance, and pose from the lengths."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from sagline.robot.robot import Robot
 from sagline.robot.tolerances import UNCERTAIN
 from sagline.robot.winch import Winch
 
-_SHARE: Final = 1e-3  # step of the derivatives, in standard deviations
+_SHARE: Final = 1e-3  # step of the numerical derivatives, in standard deviations
 _READING: Final = ("length_zero", "drum_radius")  # quantities that convert counts to lengths
 
 
 def length_tolerance(robot: Robot, state: Equilibrium, model: CableModel) -> Array:
-    """Largest difference between lengths of a machine and lengths from homing, 5 sigma [m], shape (m,).
+    """Allowed difference between lengths of a machine and lengths from homing, 5 sigma [m], shape (m,).
 
-    The sources of the difference are the load cells, the resolution of the encoders, and the tolerances of the robot,
-    or the standard errors of its calibration if they are smaller. Each error changes the length at the pose and the
-    tensions of the state.
+    A difference is due to errors of the load cells, the resolution of the encoders, and errors of the robot's data. The
+    latter are the tolerances, or the standard errors of the calibration if they are smaller. Each error changes the
+    computed length at the pose of the state.
     """
     winches = robot.winches
     assert winches is not None  # a controller needs the drums
@@ -53,7 +53,7 @@ def _at_pose(robot: Robot, state: Equilibrium, model: CableModel) -> Iterator[Ar
     stretch = 1.0 + winches.winding_tension / robot.cables.axial_stiffness
 
     def change(other: Robot, more: Array | float = 0.0) -> Array:
-        """Change of the lengths from homing with another robot or larger readings [N], divided by `_SHARE`."""
+        """Derivatives of the lengths from homing, for a changed robot or changed readings [N] (divided by `_SHARE`)."""
         there, here = (
             _zeros(home(some, state.pose, read, model=model).winches)
             for some, read in ((other, reading + more), (robot, reading))
@@ -72,14 +72,14 @@ def _at_pose(robot: Robot, state: Equilibrium, model: CableModel) -> Iterator[Ar
 
 
 def _zeros(winches: Winch | None) -> Array:
-    """Length zeros of winches after homing."""
+    """Zeros of the lengths of the winches after homing."""
     assert winches is not None
     assert winches.length_zero is not None
     return winches.length_zero
 
 
 def _standard_errors(robot: Robot) -> dict[str, Array]:
-    """Standard errors by name: the tolerances, or the errors of the calibration if they are finite and smaller."""
+    """Standard errors by name: the tolerances, or the errors of the calibration where they are smaller."""
     errors = dict(robot.tolerances)
     for name, error in {} if robot.calibration is None else robot.calibration.standard_error.items():
         errors[name] = np.minimum(error, errors.get(name, np.where(np.isfinite(error), error, 0.0)))
@@ -87,7 +87,7 @@ def _standard_errors(robot: Robot) -> dict[str, Array]:
 
 
 def _varied(robot: Robot, name: str, change: Array) -> Robot:
-    """Robot with a changed quantity."""
+    """Copy of the robot with one changed quantity."""
     owner, _, field = UNCERTAIN[name].place.rpartition(".")
     part: Any = getattr(robot, owner) if owner else robot
     if getattr(part, field) is None:
@@ -97,7 +97,7 @@ def _varied(robot: Robot, name: str, change: Array) -> Robot:
 
 
 def place_of(robot: Robot, length: Array, stated: Pose, model: CableModel) -> str:
-    """Text of the pose for given lengths [m] (m,), and of the distance from the stated pose."""
+    """Describe the pose for given lengths [m] (m,), and its distance from the stated pose."""
     found = forward(robot, length, start=stated, model=model)
     if not found.stable:
         return "at its lengths, the platform has no equilibrium near the stated pose"

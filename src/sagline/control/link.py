@@ -1,4 +1,4 @@
-"""Messages between controller and machine: one command and one sample in each cycle, over any connection."""
+"""Messages between controller and machine over any connection: one command and one sample in each cycle."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ COUNTERS: Final = 2**31 - 1  # largest counter of commands and blocks; counters 
 HEARTBEAT: Final = 0.1  # [s], a PLC stops its winches with a ramp if the command counter does not change for this time
 OWNER_TIMEOUT: Final = 0.5  # [s], another controller may become the owner if the counter does not change for this time
 CHECK: Final = "Check that its PLC or the twin runs and is connected"  # next step for a silent group
-RAMP: Final = 0.2  # duration of the ramp of rates to zero, in the controller and in a PLC [s]
+RAMP: Final = 0.2  # duration of the ramp that reduces all rates to zero, in the controller and in a PLC [s]
 
 
 class Mode(IntEnum):
-    """Task of the drives in a command."""
+    """Mode of a command: the task of the drives."""
 
-    LEAVE = 0  # brakes on; the controller gives up the ownership
+    LEAVE = 0  # engage the brakes; the controller gives up the ownership
     HOLD = 1  # hold the present position
     FOLLOW = 2  # follow the set points
     LOCK = 3  # stop the drums immediately; they stay locked until the operator of the machine releases them
@@ -47,11 +47,11 @@ class GroupFault(Status):
     """Reason why a PLC has stopped its winches; `text` describes it."""
 
     NONE = 0, "no fault"
-    HEARTBEAT = 1, "no command came for 100 ms"  # the counter did not change, or a command was no longer valid
+    HEARTBEAT = 1, "no command came for 100 ms"  # the counter did not change, or the last command expired
     OVER_TENSION = (
         2,
         "a tension was too large, or a load cell had no finite reading, while the cable was wound in",
-    )  # the winch can then only pay out cable
+    )  # afterwards the winch can only pay out cable
     FOLLOWING_ERROR = 3, "a drive was too far from its set points"
     SET_POINT = 4, "a set point or a tension of a command was out of range"
     EMERGENCY_STOP = 5, "the emergency stop is pressed"
@@ -59,7 +59,7 @@ class GroupFault(Status):
 
 
 def fault_text(code: int) -> str:
-    """Meaning of a PLC's fault code, with a text for unknown codes."""
+    """Meaning of a fault code of a PLC, also of an unknown code."""
     return GroupFault(code).text if code in set(GroupFault) else f"unknown code {code}"
 
 
@@ -82,8 +82,8 @@ class Command(NamedTuple):
         mode: Task of the drives.
         valid_for: Time for which a PLC may use the command [s].
         length: Set points of the unstrained lengths off the drums at the end of the cycle [m], shape (m,).
-        rate: Their rates [m/s], shape (m,).
-        tension: Expected tensions at the drums, for the feedforward of the motors [N], shape (m,).
+        rate: Rates of these lengths [m/s], shape (m,). tension: Expected tensions at the drums, for the feedforward of
+            the motors [N], shape (m,).
         enable: Drives that may move, shape (m,).
         claims: True if the command claims groups of other owners; a command to leave claims no group.
     """
@@ -112,7 +112,7 @@ class Refusal(NamedTuple):
 
 
 class Sample(NamedTuple):
-    """Newest data of the machine, in the caller's own arrays. G groups, m winches.
+    """Newest data of the machine for G groups and m winches. The arrays belong to the caller.
 
     Attributes:
         time: Time of the request, on the link's clock [s].
@@ -125,7 +125,7 @@ class Sample(NamedTuple):
         fault: Codes of `GroupFault`, shape (G,).
         length: Unstrained lengths off the drums, from the encoders [m], shape (m,).
         rate: Their rates [m/s], shape (m,).
-        torque: Torque of the motors at their shafts [N m], shape (m,); positive in the direction that pays out cable.
+        torque: Torque of the motors at their shafts [N m], shape (m,); positive torque pays out cable.
         tension: T_A, tension at the frame ends measured by the load cells [N], shape (m,).
         filtered: T_A after the PLC's filter [N], shape (m,).
         counts: Encoder counts, shape (m,).
@@ -157,7 +157,7 @@ class Sample(NamedTuple):
 
 
 class Missing(NamedTuple):
-    """No sample, because some groups have never answered.
+    """Answer of a link without a sample, because some groups have never answered.
 
     Attributes:
         time: Time of the request, on the link's clock [s].
@@ -174,7 +174,7 @@ class Link(Protocol):
     """Connection to a machine.
 
     A sample is never older than the previous sample. Incomplete, foreign, repeated and out-of-order blocks are
-    discarded, and the age of their group increases.
+    discarded; the age of the group then increases.
     """
 
     @property
@@ -188,8 +188,7 @@ class Link(Protocol):
     def exchange(self, command: Command | None) -> Sample | Missing:
         """Send a command and return the newest sample, without waiting for an answer.
 
-        `sent_to` returns the message for each group. A group receives the command only if the sender of the command
-        owns the group.
+        `sent_to` returns the message for each group. A group receives the command only if the command's sender owns it.
 
         Args:
             command: Command to send; None to read only.
@@ -200,7 +199,7 @@ class Link(Protocol):
 
 
 class Sent(Enum):
-    """Message to a group in a cycle."""
+    """Message to one group in a cycle."""
 
     COMMAND = "the command"
     CLAIM = "the claim of its owner"
@@ -208,19 +207,19 @@ class Sent(Enum):
 
 
 def sent_to(owner: int, command: Command) -> Sent:
-    """Message to a group with this owner (0 for no owner) in a cycle; None for no message."""
+    """Message to a group that has this owner (0: none); None if nothing is sent to the group."""
     if owner == command.owner:
         return Sent.COMMAND
     return Sent.CLAIM if command.claims and command.mode != Mode.LEAVE else Sent.NOTHING
 
 
 def newer(counter: int, known: int) -> bool:
-    """True if a counter is ahead of another one by less than half of the range."""
+    """True if a counter is ahead of another counter, by less than half of the range."""
     return 0 < (counter - known) % COUNTERS < COUNTERS // 2
 
 
 def no_news(counter: int, known: int) -> Refusal:
-    """Reason to discard a block, because its counter is not ahead of the newest counter."""
+    """Reason to discard a block whose counter is not ahead of the newest counter."""
     if counter == known:
         step = "Check that its PLC runs, and that a scan takes less than a cycle"
         return Refusal(f"its counter {counter} is repeated", step)
@@ -229,6 +228,6 @@ def no_news(counter: int, known: int) -> Refusal:
 
 
 def groups_of(cable_count: int) -> tuple[tuple[int, ...], ...]:
-    """Winches of each group: two neighbors have the same PLC, and the last winch may be alone."""
+    """Winches of each group: two neighboring winches have one PLC, and the last winch may be alone."""
     winches = range(cable_count)
     return tuple(tuple(winches[i : i + GROUP_SIZE]) for i in range(0, cable_count, GROUP_SIZE))

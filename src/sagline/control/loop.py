@@ -19,21 +19,21 @@ UNWATCHED = frozenset({State.OFF, State.CONNECTING})
 
 
 class Loop:
-    """Control loop: the cycles of a controller.
+    """Control loop of a controller, cycle by cycle.
 
     Attributes:
-        context: Shared by all states.
+        context: Data and services that all states share.
         active: Active state.
         stop_requested: True if the next cycle begins to stop the motion.
     """
 
     def __init__(self, context: Context) -> None:
-        """Begin in OFF."""
+        """Begin in the state OFF."""
         self.context, self.stop_requested = context, False
         self.active: ActiveState = Off(context)
 
     def cycle(self) -> None:
-        """Run one cycle; after any exception, the drives hold and the exception is raised again."""
+        """Run one cycle. After any exception, let the drives hold, and raise the exception again."""
         try:
             self._cycle()
         except BaseException as error:
@@ -111,13 +111,13 @@ class Loop:
             self.active = Emergency(self.active, line)
 
     def _recording_stopped(self) -> str:
-        """Reason why the recorder has stopped, "" while it runs."""
+        """Reason why the recorder has stopped; "" while it runs."""
         found: list[str] = []
         self.context.tell(lambda record: found.append(record.stopped))
         return found[0] if found else ""
 
     def _break_off(self, error: BaseException) -> None:
-        """Command the PLCs to ramp the rates to zero, because there may be no next cycle."""
+        """Command the PLCs to reduce the rates to zero themselves, because there may be no next cycle."""
         c = self.context
         c.garbage.go_on()
         line = f"a cycle ended with {type(error).__name__}: {' '.join(str(error).split())[:160]}. The drives hold."
@@ -140,7 +140,7 @@ class Loop:
 
 
 def _aged(known: Sample | None, missing: Missing) -> Sample | None:
-    """Previous sample with a larger age, if the link has no new sample; None without a previous sample."""
+    """Previous sample with its increased age, in a cycle without a new sample; None without a previous sample."""
     if known is None:
         return None
     return known._replace(time=missing.time, age=known.age + (missing.time - known.time))

@@ -20,7 +20,7 @@ class Monitor:
     """State, samples, events, estimate and execution of a controller; base class of `Controller`."""
 
     def __init__(self, context: Context) -> None:
-        """Begin with a loop in OFF."""
+        """Begin with a control loop in the state OFF."""
         self._context, self._loop = context, Loop(context)
 
     @property
@@ -60,7 +60,7 @@ class Monitor:
 
     @property
     def degraded(self) -> bool:
-        """True if tensions are not reliable: the tension loop keeps its correction."""
+        """True if tensions are not reliable. The tension loop then keeps its correction."""
         return self._context.degraded
 
     @property
@@ -69,7 +69,7 @@ class Monitor:
         return tuple(self._context.journal.events)
 
     def events_from(self, first: int) -> list[Event]:
-        """Events from a given index on.
+        """Events that are newer than the known events.
 
         Args:
             first: Number of events that are already known.
@@ -82,7 +82,7 @@ class Monitor:
 
     @property
     def pace(self) -> Pace | None:
-        """Real time; None on a lockstep clock."""
+        """Pace of the cycles in real time; None in lockstep."""
         return self._context.pace
 
     @property
@@ -95,7 +95,7 @@ class Monitor:
 
     @property
     def execution(self) -> Execution | None:
-        """Last motion, or the cycles of a running motion until now; None before the first motion."""
+        """Execution of the last motion, or of a running motion until now; None before the first motion."""
         return self._context.execution()
 
     @property

@@ -22,7 +22,7 @@ SIGMAS: Final = 5.0  # tolerance of a reading, in standard deviations
 OWN_DEVIATION: Final = 1.0  # deviation of a load cell without data [N]
 BIAS: Final = 2.0  # bias of a load cell without data [N], 0.1 % of 2 kN
 _LIFT: Final = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-_HIDDEN: Final = 1e-6  # an error is not visible if its visible part is below this share
+_HIDDEN: Final = 1e-6  # an error counts as not visible if its visible part is below this share
 
 
 def cell_sigma(robot: Robot) -> Array:
@@ -38,27 +38,25 @@ def cell_errors(robot: Robot) -> tuple[Array, Array]:
 
 
 def balance_slope(state: Equilibrium) -> Array:
-    """Derivatives (..., n, m) [1, m] of the wrench by the tensions at the frame ends, with a fixed platform."""
+    """Derivatives of the wrench with respect to frame-end tensions, at a fixed platform, (..., n, m) [1, m]."""
     slopes = cable_slopes(state)
     wrench = on_platform(slopes.by_length, slopes.levers) / tension_slopes(state, slopes).by_length[..., None, :]
-    found: Array = -first_of(state.robot).freedom @ wrench  # minus, because the slopes are of the force on the cable
+    found: Array = -first_of(state.robot).freedom @ wrench  # minus, because these are forces on the cable
     return found
 
 
 @of_equilibrium
 def parity(state: Equilibrium) -> Array:
-    """Parity matrix for fault detection of load cells, independent of the weight of the load.
+    """Parity matrix for the detection of load cell faults. It does not depend on the weight of the load.
 
     At rest, the measured tensions must give the planned wrench. Only the vertical force may differ, because the weight
-    of the load may be unknown. V is the projection onto all other changes of the wrench. Row i of the matrix is
-    V_i/sqrt(V_ii). The product of row i with the measured minus the planned tensions is the visible part of the
-    best-fitting error of cell i. The cell with the largest product is reported.
+    of the load may be unknown. V is the projection of tension errors onto all other changes of the wrench. Row i of the
+    matrix is V_i/sqrt(V_ii). The product of row i and the tension errors (measured minus planned) is the visible part
+    of the best-fitting error of cell i. The cell with the largest product is reported.
 
     Args:
-        state: An equilibrium, single or N of them; a plan or a solution; or a robot and its poses.
-
-    Returns:
-        Shape (..., m, m); zero rows for cells whose errors are not visible, NaN if the state has no lengths.
+        state: One equilibrium or N equilibria; a plan or a solution; or a robot and its poses. Returns: Shape (..., m,
+            m); zero rows for cells whose errors are not visible, NaN if the state has no lengths.
 
     Raises:
         InvalidValueError: If the state is not one of these.
@@ -107,17 +105,17 @@ class NullSpace(NamedTuple):
 
 @of_equilibrium
 def null_space(state: Equilibrium) -> NullSpace:
-    """Changes of length that do not move the platform, to first order, and their effect on the tensions.
+    """Changes of length that do not move the platform (to first order), and their effect on the tensions.
 
-    With eight cables, six of the eight directions of a tension error correspond to a wrench that is not in the plan,
-    for example of a payload. A correction of such an error would move the platform. Such corrections are excluded.
+    With eight cables, a tension error has eight components. Six of them correspond to an unplanned wrench, for example
+    due to a payload. Their correction would move the platform and is therefore excluded.
 
     Args:
         state: An equilibrium, single or N of them; a plan or a solution; or a robot and its poses.
             The robot has more cables than free motions.
 
     Returns:
-        Matrices, single or N of them; NaN if the state has no lengths or its stiffness is singular.
+        Matrices for each equilibrium; NaN if the state has no lengths or its stiffness is singular.
 
     Raises:
         InvalidValueError: If the state is not one of these.
@@ -155,13 +153,13 @@ class Gains:
 
     time: Array
     rows: tuple[NullSpace, ...]
-    _changes: tuple[float, ...]  # R - 1 middles between the times of the rows
+    _changes: tuple[float, ...]  # R - 1 mean values of consecutive times
 
     def at(self, time: float) -> NullSpace:
-        """Matrices of the nearest pose in time.
+        """Matrices of the pose whose time is nearest.
 
         Args:
-            time: On the path's clock [s].
+            time: Time since the start of the path [s].
         """
         return self.rows[bisect_right(self._changes, time)]
 
@@ -215,7 +213,7 @@ def gains_along(plan: Plan, every: float = EVERY) -> Gains | None:
 
 
 def _nearest(time: Array, step: float) -> np.ndarray:
-    """Indices of the samples nearest to the first time and to every later step, and of the last sample."""
+    """Indices of the samples that are nearest to equally spaced times, and of the last sample."""
     wanted = time[0] + step * np.arange(int((time[-1] - time[0]) / step) + 1)
     after = np.clip(np.searchsorted(time, wanted), 1, max(time.size - 1, 1))
     if time.size == 1:

@@ -1,4 +1,4 @@
-"""Requests for connecting, homing, stopping, acknowledging faults, and switching off."""
+"""Requests to connect, home, stop, acknowledge faults, and switch off."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from sagline.control.states import RefusedError, State, check_transition
 from sagline.robot.pose import PoseLike, pose_of
 
 T = TypeVar("T")
-SETTLING: Final = 3.0  # longest time for the comparison of tensions in homing [s]
+SETTLING: Final = 3.0  # longest time for the comparison of tensions during homing [s]
 
 
 class Preparation(Monitor):
-    """Connecting, homing, stopping, acknowledging and switching off; base class of `Controller`."""
+    """Requests to connect, home, stop, acknowledge faults and switch off; base class of `Controller`."""
 
     def cycle(self) -> None:
         """Run one cycle: exchange data, estimate the pose, check for faults, and prepare the next command.
@@ -37,7 +37,7 @@ class Preparation(Monitor):
             RefusedError: If the controller is already connected, or is read-only.
         """
         if self._context.shadow:
-            raise RefusedError("connecting", "this controller only reads", "Make a controller without shadow.")
+            raise RefusedError("connecting", "this controller only reads", "Make a controller with shadow=False.")
         check_transition(self.state, State.CONNECTING, "connecting")
         self._loop.active = Connecting(self._context)
 
@@ -70,7 +70,7 @@ class Preparation(Monitor):
         elif active.source is not None:
             raise RefusedError("homing", "a winch is being jogged", "Wait until it stops.")
         place = pose_of(pose)
-        present = c.zero - c.correction  # the tension loop has also corrected the lengths
+        present = c.zero - c.correction  # the lengths include the correction of the tension loop
         homing = self._result_of(partial(Homing, c.robot, place, c.model, c.method, present))
         c.zero, c.homed = present, False
         c.reset_tension_loop()
@@ -89,7 +89,7 @@ class Preparation(Monitor):
             pose: A single pose.
 
         Raises:
-            RefusedError: If the tensions do not agree; the message recommends a jog. Also if only the lengths of the
+            RefusedError: If the tensions do not agree (the message recommends a jog), or if only the lengths of the
                 machine do not agree. The state remains HOMING, and no length changes.
         """
         self.begin_homing(pose)
@@ -126,13 +126,13 @@ class Preparation(Monitor):
             raise RefusedError("homing", reason, "Read the events.")
 
     def stop(self) -> None:
-        """Ramp all rates to zero from the next cycle on, if the robot moves."""
+        """Stop: if the robot moves, reduce all rates to zero from the next cycle on."""
         self._loop.request_stop()
 
     def acknowledge(self) -> None:
-        """Confirm that a fault is repaired: from FAULT to READY, and to IDLE if the pose is still known.
+        """Confirm that a fault is repaired. The state changes from FAULT to READY, and to IDLE if the pose is known.
 
-        If the robot is idle and degraded, the load cells are used again.
+        If load cells are ignored while the robot is idle, they are used again.
 
         Raises:
             RefusedError: In any other state, or if a group does not agree yet; the message contains the reason.
@@ -152,7 +152,7 @@ class Preparation(Monitor):
             self._loop.active = idle_at(c, found, "the pose is still known") or self._loop.active
 
     def off(self) -> None:
-        """Give up the ownership of all groups, and wait until this is done; the brakes engage.
+        """Give up the ownership of all groups, and wait until this is done. The brakes then engage.
 
         Raises:
             RefusedError: If the robot moves.
@@ -166,7 +166,7 @@ class Preparation(Monitor):
 
     @property
     def _leaving(self) -> bool:
-        """True in OFF until the ownership of all groups is given up."""
+        """True in the state OFF until the ownership of all groups is given up."""
         return self.state is State.OFF and self._context.sender.command is not None
 
     def _run_while(self, condition: Callable[[], bool]) -> None:
@@ -179,7 +179,7 @@ class Preparation(Monitor):
             self._context.garbage.go_on()
 
     def _result_of(self, work: Callable[[], T]) -> T:
-        """Result of long work; in real time, cycles continue during the work, because otherwise the PLCs would hold."""
+        """Do long work. In real time, cycles continue meanwhile, because otherwise the PLCs would hold."""
         if self._context.pace is None or self.state is State.OFF:
             return work()
         result = result_in_thread(work)

@@ -1,4 +1,4 @@
-"""Real time: ticks, garbage collection, Ctrl-C, and loading of kernels in advance."""
+"""Real time: ticks, garbage collection, Ctrl-C, and early loading of kernels."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ from sagline.tension.method import TensionMethod
 
 T = TypeVar("T")
 BIN: Final = 1e-4  # width of a bin [s]
-BINS: Final = 1000  # number of bins, in addition to one for all longer durations
+BINS: Final = 1000  # number of bins; one more bin counts all longer durations
 
 
 class Histogram:
-    """Histogram of durations, in bins of 0.1 ms up to 100 ms."""
+    """Histogram of durations up to 100 ms, in bins of 0.1 ms."""
 
     def __init__(self) -> None:
-        """Begin empty."""
+        """Create an empty histogram."""
         self._counts = [0] * (BINS + 1)  # a list is faster than an array
         self.longest = 0.0
 
@@ -58,7 +58,7 @@ class Histogram:
         return locked(np.array(self._counts))
 
     def quantile(self, share: float) -> float:
-        """Quantile of the durations [s], rounded up to the end of a bin; 0 without durations.
+        """Quantile of the durations [s], rounded up to the end of its bin; 0 for an empty histogram.
 
         Args:
             share: Share of all durations, 0 to 1.
@@ -76,14 +76,14 @@ class Histogram:
 
 
 class Pace:
-    """Wait for the next tick of a clock without drift; the duration of a cycle has no effect on the ticks.
+    """Clock without drift: `wait` returns at the next tick. The duration of a cycle has no effect on the ticks.
 
     The thread sleeps during the wait, because threads of the link need the processor. If a cycle is late by more than a
-    period, the ticks start again at that time, so that missed set points are not sent all at once.
+    period, the ticks restart at the late cycle. Missed set points are then not sent all at once.
     """
 
     def __init__(self, period: float = PERIOD) -> None:
-        """Begin at the first wait.
+        """Prepare the clock; the ticks begin with the first wait.
 
         Args:
             period: Time between two ticks [s], > 0.
@@ -118,7 +118,7 @@ class Pace:
 
 
 def set_priority(priority: int) -> None:
-    """Schedule this thread, and the threads and processes that it starts, in real time (SCHED_FIFO of Linux).
+    """Give this thread a real-time priority (SCHED_FIFO of Linux), and all threads and processes that it starts.
 
     Args:
         priority: 1 to 99; the kernel's own threads have 50.
@@ -139,10 +139,10 @@ def set_priority(priority: int) -> None:
 
 
 class Garbage:
-    """Switch of the garbage collection. It is off during motion, because it can take longer than a cycle."""
+    """Switch for the garbage collection, which is off during motion, because it can take longer than a cycle."""
 
     def __init__(self) -> None:
-        """Begin without a change."""
+        """Create the switch; nothing changes yet."""
         self._stopped = False
 
     def stop(self) -> None:
@@ -183,10 +183,10 @@ def interrupt_calls(stop: Callable[[], object]) -> Iterator[None]:
 
 
 def result_in_thread(work: Callable[[], T]) -> Future[T]:
-    """Future result of work in another thread of ordinary priority; canceling the future does not stop the work.
+    """Run work in another thread of ordinary priority. Canceling the returned future does not stop the work.
 
-    Cycles continue during the work, because compiled kernels release Python's lock. Another process would be worse,
-    because cycles are late when a long plan arrives from it.
+    Cycles continue during the work, because compiled kernels release Python's lock. A process in place of the thread
+    would make cycles late when it returns a long plan.
     """
     result: Future[T] = Future()
 
@@ -202,17 +202,17 @@ def result_in_thread(work: Callable[[], T]) -> Future[T]:
         if result.set_running_or_notify_cancel():
             result.set_result(value)
 
-    # a daemon, so that Python ends without the result
+    # a daemon thread, so that Python can end before the work
     threading.Thread(target=run, name="sagline planning", daemon=True).start()
     return result
 
 
 MOVE = 0.01  # length of the path [m]
-HEIGHTS = (0.25, 0.5, 0.1, 0.75)  # depths below the frame anchors, as shares of the frame width
+HEIGHTS = (0.25, 0.5, 0.1, 0.75)  # depths of the poses below the frame anchors, as shares of the frame width
 
 
 def load_kernels(robot: Robot, period: float, model: CableModel, method: TensionMethod) -> None:
-    """Run homing, a path and jogs once near the middle of a robot, to load the kernels; rejections are ignored."""
+    """Load the kernels by homing, a path and jogs near the middle of a robot; refused requests are ignored."""
     middle, homing = _first_feasible(robot, model, method)
     beside = Pose.from_euler(middle.position + np.array([MOVE, 0.0, 0.0]), 0.0, 0.0, 0.0)
     path, by = septic_path([middle, beside], speed=0.1), np.full(6, 1e-3)
@@ -231,7 +231,7 @@ def load_kernels(robot: Robot, period: float, model: CableModel, method: Tension
 
 
 def _first_feasible(robot: Robot, model: CableModel, method: TensionMethod) -> tuple[Pose, Homing | None]:
-    """First position with tensions within the limits, and its plan; without such a position, the middle and None."""
+    """First position with feasible tensions, and its plan; without such a position, the middle and None."""
     for place in _probable_positions(robot):
         pose = Pose.from_euler(place, 0.0, 0.0, 0.0)
         with suppress(SaglineError):
@@ -242,14 +242,14 @@ def _first_feasible(robot: Robot, model: CableModel, method: TensionMethod) -> t
 
 
 def _straight_set_point(robot: Robot, pose: Pose) -> SetPoint:
-    """Set point with straight cables."""
+    """Set point for a robot with straight cables."""
     length = np.linalg.norm(pose.transform(robot.platform_anchors) - robot.frame_anchors, axis=1)
     none, unknown = np.zeros(len(length)), np.full(len(length), np.nan)
     return SetPoint(length, none, unknown, unknown, None, None, np.nan, True)
 
 
 def _probable_positions(robot: Robot) -> list[Array]:
-    """Probable positions: middle of the test box, and points below the middle of the frame anchors."""
+    """Positions to try: middle of the test box, and points below the middle of the frame anchors."""
     low, high = robot.frame_anchors.min(axis=0), robot.frame_anchors.max(axis=0)
     width = float(np.linalg.norm((high - low)[:2]))
     below = [np.asarray(0.5 * (low + high) - [0.0, 0.0, height * width]) for height in HEIGHTS]

@@ -1,4 +1,4 @@
-"""Events, and the record of each cycle for executions and recorders."""
+"""Events, and records of cycles for executions and recorders."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Event(NamedTuple):
     text: str
 
 
-# record of a cycle with m winches and G groups: names of real numbers, then of whole numbers
+# names in the record of a cycle with m winches and G groups: first real numbers, then whole numbers
 REAL_OWN: Final = ("time", "late", "clock")
 PLACE: Final = (("position", 3), ("quaternion", 4))
 REAL_OF_GROUPS: Final = ("age", "plc_time")
@@ -64,9 +64,9 @@ class Recorded(NamedTuple):
     Attributes:
         number: Index of the cycle, from 0.
         state: State of the controller at the end of the cycle.
-        degraded: True if a cell is ignored, and the tension loop keeps its correction.
+        degraded: True if a load cell is ignored. The tension loop then keeps its correction.
         late: Delay of the start of the cycle [s]; 0 on a lockstep clock.
-        clock: Time on the plan from its start [s]; NaN without a plan.
+        clock: Time since the start of the plan [s]; NaN without a plan.
         command: Command sent in the cycle; None if nothing was sent.
         answer: Answer of the link.
         position: Position of the platform's origin, from the encoders [m], shape (3,); NaN before homing.
@@ -94,7 +94,7 @@ class Recorded(NamedTuple):
 
 @runtime_checkable
 class Recorder(Protocol):
-    """Receiver of cycles and events, for example a log. It must never block, because the loop waits for it."""
+    """Receiver of cycles and events, for example a log. Its methods must return at once: the loop waits for them."""
 
     @property
     def stopped(self) -> str:
@@ -131,7 +131,7 @@ class Recorder(Protocol):
 
 
 class CycleTable:
-    """Table of cycles, in preallocated memory."""
+    """Table of cycles in preallocated memory."""
 
     def __init__(self, cable_count: int, group_count: int, expected: int) -> None:
         """Allocate memory."""
@@ -183,7 +183,7 @@ class CycleTable:
         return self._numbers, self._codes
 
     def column(self, name: str) -> NDArray[Any]:
-        """One quantity over the cycles, (N,) or (N, width), without a copy."""
+        """Values of one quantity over the cycles, (N,) or (N, width), not copied."""
         rows = slice(self._count)
         whole = name in self._whole
         found: NDArray[Any] = self._codes[rows, self._whole[name]] if whole else self._numbers[rows, self._real[name]]
@@ -209,7 +209,7 @@ class Journal:
 
     def __init__(self, record: Recorder | None) -> None:
         """Begin without events."""
-        given: object = record  # for callers without type checks
+        given: object = record  # this check is for callers without a type checker
         if given is not None and not isinstance(given, Recorder):
             step = "Give an object with the methods of control.Recorder, or None."
             raise InvalidValueError("record", brief(given), "a receiver of cycles and events", step)
@@ -227,7 +227,7 @@ class Journal:
         return self.tell(lambda record: record.event(event))
 
     def tell(self, what: Callable[[Recorder], object]) -> str:
-        """Call a method of the recorder; after an exception, remove the recorder and return a message, otherwise ""."""
+        """Call a method of the recorder. After an exception, remove the recorder and return a message; else ""."""
         if self._record is None:
             return ""
         try:

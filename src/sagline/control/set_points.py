@@ -1,4 +1,4 @@
-"""Sources of set points: constant, along a plan, and slowing down."""
+"""Sources of set points: constant, along a plan, and along a ramp to rest."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
-LEAD_SPEED: Final = 0.01  # [m/s], largest rate of the transition from lengths at rest to the first lengths of a plan
-WHOLE: Final = 1e-9  # tolerance, in rows
+LEAD_SPEED: Final = 0.01  # [m/s], largest rate of the transition from lengths at rest to the lengths of a plan
+WHOLE: Final = 1e-9  # tolerance of the time, in rows
 
 
 class SetPoint(NamedTuple):
@@ -28,12 +28,12 @@ class SetPoint(NamedTuple):
 
     Attributes:
         length: Unstrained lengths off the drums, of the model [m], shape (m,).
-        rate: Their rates [m/s], shape (m,).
+        rate: Rates of these lengths [m/s], shape (m,).
         tension: T_A planned for the set point [N], shape (m,); NaN if unknown.
         drum_tension: Expected tension at the drums [N], shape (m,).
         wrench: External plus inertial wrench on the platform [N, N m], shape (6,); None for zero.
         row: Matrices of the tension loop at the set point; None without matrices.
-        clock: Time on the plan [s]; NaN outside a plan.
+        clock: Time since the start of the plan [s]; NaN outside a plan.
         done: True if the source ends here.
         enable: Drives that may move, shape (m,); None for all.
         leading: True during the transition from the lengths at rest to the lengths of a plan. The tensions then differ
@@ -69,7 +69,7 @@ class Standing:
 
     @classmethod
     def at(cls, state: Equilibrium) -> Standing:
-        """Constant set point in a single equilibrium."""
+        """Constant set point for a single equilibrium."""
         robot = state.one_robot
         redundant = robot.cable_count > robot.degrees_of_freedom
         length = state.unstrained_length
@@ -89,12 +89,12 @@ class Standing:
         )
 
     def step(self) -> SetPoint:
-        """The same set point."""
+        """Return the constant set point."""
         return self._point
 
 
 def standing_at(robot: Robot, length: Array, start: Pose | None, model: CableModel) -> Standing | ForwardStatus:
-    """Constant set point at lengths (m,) [m] with the pose from forward kinematics; the status if no pose is found."""
+    """Constant set point for lengths (m,) [m] and their pose; the status of forward kinematics without a pose."""
     found = forward(robot, length, start, model)
     return Standing.at(found.state) if found.status in STABLE else ForwardStatus(int(found.status))
 
@@ -103,7 +103,7 @@ class Fade:
     """Smooth transition from the lengths at rest to the lengths of a plan."""
 
     def __init__(self, lead: Array, period: float) -> None:
-        """Begin with the whole difference; lead: [m], (m,); period [s]."""
+        """Begin with the whole difference lead [m], (m,); period [s]."""
         largest = float(np.abs(lead).max())
         self._lead, self._period = lead, period
         self._cycle, self._cycles = 0, ceil(max(RAMP, 1.5 * largest / LEAD_SPEED) / period) if largest > 0.0 else 0
@@ -127,7 +127,7 @@ class Along:
     """Set points along a motion, on a clock that can slow down and continue."""
 
     def __init__(self, motion: Motion, period: float, lead: Array) -> None:
-        """Begin at the first row with an offset lead [m] (m,), which decreases to zero; period [s]."""
+        """Begin at the first row. The offset lead [m], (m,), decreases to zero. Period in s."""
         self.motion = motion
         self._period, self._last = period, len(motion) - 1
         self._row = 0.0
@@ -137,7 +137,7 @@ class Along:
 
     @property
     def clock(self) -> float:
-        """Time on the plan [s]."""
+        """Time since the start of the plan [s]."""
         return self._row * self._period
 
     @property
@@ -151,11 +151,11 @@ class Along:
         return self._row >= self._last and self._fade.done
 
     def pause(self) -> None:
-        """Slow the clock down within the time of a ramp."""
+        """Slow the clock down to zero within the time of a ramp."""
         self._wanted = 0.0
 
     def resume(self) -> None:
-        """Let the clock continue, within the time of a ramp."""
+        """Accelerate the clock to its full speed within the time of a ramp."""
         self._wanted = 1.0
 
     def step(self) -> SetPoint:
@@ -197,7 +197,7 @@ class Along:
 
 
 class Ramp:
-    """Ramp of all rates to zero in the same time, which preserves the direction: l' = l'_0 (1 - t/t_s)."""
+    """Ramp that reduces all rates to zero in the same time: l' = l'_0 (1 - t/t_s). The direction is preserved."""
 
     def __init__(self, point: SetPoint, period: float) -> None:
         """Begin at the last set point; period [s]."""
@@ -219,7 +219,7 @@ _Real = TypeVar("_Real", float, Array)
 
 
 def smooth(share: _Real) -> _Real:
-    """Cubic from 0 to 1 with zero slopes at both ends, largest slope 1.5."""
+    """Cubic from 0 to 1. Its slope is zero at both ends and at most 1.5."""
     return share * share * (3.0 - 2.0 * share)
 
 

@@ -29,7 +29,7 @@ _FAULT: Final = {State.STOPPING: "a fault"}
 _STOP: Final = {State.STOPPING: "stop, or a fault"}
 _EMERGENCY: Final = {State.EMERGENCY: "emergency stop, or a broken cable"}
 
-# for each state: the action of the winches, and for each possible next state the condition of the transition
+# action of the winches in each state, and condition of the transition to each possible next state
 TABLE: Final[dict[State, tuple[str, dict[State, str]]]] = {
     State.OFF: ("brakes", {State.CONNECTING: "the operator"}),
     State.CONNECTING: (
@@ -92,7 +92,7 @@ class RefusedError(SaglineError):
         what: Rejected request.
         reason: Reason of the rejection.
         next_step: Next step for the reader.
-        item: The same as `what`, because all errors have this attribute.
+        item: Same text as `what`; all errors have this attribute.
     """
 
     def __init__(self, what: str, reason: str, next_step: str) -> None:

@@ -21,7 +21,7 @@ MOST_GAIN: Final = 0.1  # largest gain per cycle; a loop with a delay of five cy
 
 @dataclass(frozen=True, slots=True)
 class TensionSettings(NumberFields):
-    """Settings of the tension loop; the defaults have margins of 24 dB and 62 degrees for five cycles of delay.
+    """Settings of the tension loop. The defaults give stability margins of 24 dB and 62° for a delay of 5 cycles.
 
     Attributes:
         filter_time: Time constant of the input filter [s], > 0.
@@ -55,8 +55,8 @@ class TensionSettings(NumberFields):
 class TensionLoop:
     """Correction of lengths that reduces the tension errors.
 
-    It is kept for a session, because the length errors remain. In each cycle, f <- f + h/(tau + h) (T - T_plan - f).
-    While the loop acts, delta <- delta - k N_L G f. See docs/model.md, section 12.
+    The correction is kept for a session, because the errors of the lengths remain. In each cycle, f <- f + h/(tau + h)
+    (T - T_plan - f). While the loop acts, delta <- delta - k N_L G f. See docs/model.md, section 12.
 
     Attributes:
         settings: Gain, filter and limits.
@@ -72,7 +72,7 @@ class TensionLoop:
             period: Period of a cycle [s], > 0.
 
         Raises:
-            InvalidValueError: If an argument is of the wrong kind or out of its range.
+            InvalidValueError: If an argument has the wrong type or is out of its range.
         """
         m = whole_number(cable_count, "cable_count", 1, MOST_CABLES)
         self.settings = TensionSettings() if settings is None else instance(settings, TensionSettings, "settings")
@@ -99,9 +99,9 @@ class TensionLoop:
         Args:
             tension: T_A, tension measured by the load cells [N], shape (m,).
             planned: Planned tension at the same time [N], shape (m,).
-            row: Row of the plan's gains at this time.
-            frozen: True if the tensions are old or doubtful. The correction is then only adapted to the pose, without
-                the tensions.
+            row: Matrices of the tension loop at this time of the plan.
+            frozen: True if the tensions are old or doubtful. The correction is then adapted to the pose only; tensions
+                have no effect.
 
         Returns:
             Correction of the lengths of the plan [m], shape (m,), an array owned by the caller.
@@ -112,7 +112,7 @@ class TensionLoop:
                 self._correction[:] = self._change
             self._row = row
         np.subtract(tension, planned, out=self._error)
-        if not frozen and finite(self._error):  # a NaN would stay in the filter
+        if not frozen and finite(self._error):  # a NaN would remain in the filter forever
             self._learn(row)
         return self._correction.copy()
 
@@ -129,5 +129,5 @@ class TensionLoop:
         row.correction.dot(self._filtered, change)
         change *= settings.gain
         self._correction -= change
-        if (most := largest(self._correction)) > settings.largest:  # a fault reports the limit
-            self._correction *= settings.largest / most  # separate limits would move the platform
+        if (most := largest(self._correction)) > settings.largest:  # a fault rule reports a correction at its limit
+            self._correction *= settings.largest / most  # a separate limit for each length would move the platform
