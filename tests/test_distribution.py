@@ -129,7 +129,7 @@ def test_the_wheel_has_the_package_its_data_and_examples_and_nothing_else(built:
 
 def test_the_source_distribution_has_all_that_the_work_needs(unpacked: Path) -> None:
     top = {path.name for path in unpacked.iterdir()}
-    folders = {"src", "tests", "docs", "examples", "benchmarks", "tools"}
+    folders = {"src", "tests", "docs", "examples", "benchmarks", "tools", "paper", "recipe"}
     files = {"CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "Makefile", "README.md", "mkdocs.yml"}
     files |= {"SECURITY.md", "constraints.txt"}
     assert top == folders | files | {"pyproject.toml", "PKG-INFO", ".gitignore"}

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 ROOT: Final = Path(__file__).parents[1]
-PLACES: Final = ("README.md", "CONTRIBUTING.md", "docs", "src", "examples", "benchmarks", "tools")
+PLACES: Final = ("README.md", "CONTRIBUTING.md", "docs", "src", "examples", "benchmarks", "tools", "paper")
 KINDS: Final = (".md", ".py", ".ipynb", ".toml")
 OPENINGS: Final = {  # first words of a docstring -> suggestion
     r"What|How|Whether|Where|Which|Who|Whose|Whatever|When|Why": "a noun phrase or an imperative verb",
