@@ -219,7 +219,7 @@ def callback(value: Any, item: str) -> Any:
 def file_path(file: Any, item: str = "file", *, folder: bool = False) -> Path:
     """Check the path of a file or folder.
 
-    file: a text or a path object.
+    file: the path, as a text or a path object.
     """
     given = os.fspath(file) if isinstance(file, os.PathLike) and not isinstance(file, type) else file
     if not isinstance(given, str):

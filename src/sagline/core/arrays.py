@@ -29,7 +29,7 @@ _KINDS = {"c": "complex", "M": "dates", "m": "durations of a calendar", "V": "re
 
 
 def locked(array: NDArray[Any]) -> NDArray[Any]:
-    """Write-lock, without a copy, an array that sagline created."""
+    """Write-lock an array that sagline created; the array is not copied."""
     array.flags.writeable = False
     return array
 
@@ -63,7 +63,7 @@ def checked(
 def numbers(value: ArrayLike, item: str, unit: str) -> Array:
     """Float64 copy of a caller's numbers in C order, of any shape and range; NaN is allowed.
 
-    value: real number or array of real numbers, without unit object and mask; unit: its unit, for the message.
+    value: real number or array of real numbers, neither masked nor with a unit object; unit: its unit, for the message.
     """
     if type(value) in (float, np.float64):
         return np.array(value)
@@ -94,7 +94,7 @@ def number(value: Any, item: str, unit: str, *, low: float = -np.inf, above: flo
 
 
 def exactly(value: ArrayLike, item: str, unit: str, shape: tuple[int, ...], **limits: Any) -> Array:
-    """Check an array of exactly the given shape, without batch axes."""
+    """Check that an array has exactly the given shape; batch axes are not allowed."""
     array = checked(value, item, unit, **limits)
     if array.shape != shape:
         raise InvalidValueError(

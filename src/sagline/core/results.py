@@ -22,7 +22,7 @@ _FORMATS: Final = "sagline.files.format"
 
 
 def formats() -> Any:
-    """The module that finds the format of a result by its type."""
+    """The module that selects the file format of a result by the type of the result."""
     return import_module(_FORMATS)
 
 
@@ -51,13 +51,13 @@ class Shown:
     __slots__ = ()
 
     def __repr__(self) -> str:
-        """Summary in at most 12 lines, the verdict first."""
+        """Summary in at most 12 lines; the first line is the verdict."""
         text: str = import_module(_SUMMARIES).text_of(self)
         return text
 
     def _repr_html_(self) -> str | None:
         """Summary and figure as HTML; with None, Jupyter displays the plain text instead."""
-        with suppress(Exception):  # an error of the display must not turn a finished cell into a failed cell
+        with suppress(Exception):  # an error in the display must not make a successful cell of the notebook fail
             shown: str | None = import_module(_PAGES).html_of(self)
             return shown
         return None
@@ -103,7 +103,8 @@ class Saved:
         executions.
 
         Args:
-            file: The file; an existing regular file is replaced. A folder or device of this name is refused.
+            file: The file; an existing regular file is replaced. If the name belongs to a folder or a device, an error
+                is raised.
 
         Raises:
             InvalidValueError: If the result cannot be read back: a plan of several robots, or a cable model, tension

@@ -7,10 +7,10 @@ from typing import Self
 
 
 class Status(IntEnum):
-    """Outcome of a calculation, with a code and a sentence for each member.
+    """Outcome of a calculation. Each member has a code and an explanatory sentence.
 
     Attributes:
-        text: Meaning and next step, one sentence.
+        text: Meaning of the outcome, and next step, in one sentence.
     """
 
     text: str

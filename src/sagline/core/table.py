@@ -69,7 +69,7 @@ class Table:
         return [[*self.head], *(["" if cell != cell else cell for cell in row] for row in body)]
 
     def __repr__(self) -> str:
-        """First and last rows, and the columns that fit into a terminal."""
+        """Text with the first and last rows, and with the columns that fit into a terminal."""
         count = len(self)
         some = [*range(_ENDS), *range(count - _ENDS, count)] if count > 2 * _ENDS else list(range(count))
         texts: list[list[str]] = []

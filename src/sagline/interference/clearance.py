@@ -46,7 +46,7 @@ class _Distances(NamedTuple):
 
 
 class ClearanceRows:
-    """Distances at batches of poses; all data that do not depend on the pose are prepared once.
+    """Measurement of distances at batches of poses; data that do not depend on the pose are prepared only once.
 
     Attributes:
         pairs: Names and indices of the measured pairs, and the omitted pairs.
@@ -128,7 +128,7 @@ class ClearanceRows:
         return np.asarray(out[0].min(axis=1) + beyond)
 
     def _moving(self, state: Equilibrium) -> Array:
-        """Rows of the moving bodies: parts of cables, and the platform or a placeholder."""
+        """Rows of the moving bodies: parts of cables, and the platform; a mesh or no platform gets a placeholder."""
         diameter = state.cables.cable.diameter
         known = np.zeros(1) if diameter is None else 0.5 * diameter
         cables = cable_rows(state, known if self._radius is None else self._radius)
@@ -140,7 +140,7 @@ class ClearanceRows:
 
 
 def _box_row(one: Box | Mesh) -> Array:
-    """Row of a box; a placeholder for a mesh, so that obstacles keep their indices."""
+    """Row of a box. A mesh gets a placeholder row, so that the indices of the obstacles do not change."""
     return box_rows(one if isinstance(one, Box) else Box(np.ones(3)))
 
 
@@ -175,8 +175,8 @@ class Clearances(Result, Tabular):
 
     Attributes:
         pairs: P pairs of names of measured bodies.
-        pair_distance: Least distance of each pair [m], minus known cable radii, shape (P,) or (N, P). Values <= 0 mean
-            contact; the depth is not measured. NaN if a pose has no tensions.
+        pair_distance: Least distance of each pair [m], minus known cable radii, shape (P,) or (N, P). A value <= 0
+            means contact; the depth of penetration is not measured. NaN if a pose has no tensions.
         pair_low: Proved lower bound of each distance [m], of the same shape.
         nearest: Nearest points of each pair, on the center lines of cables and rods [m], shape (P, 2, 3) or (N, P, 2,
             3).

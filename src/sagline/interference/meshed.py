@@ -63,7 +63,7 @@ class _Nearest(NamedTuple):
 
 
 class Meshed:
-    """Pairs with at least one mesh, prepared once."""
+    """Pairs of bodies with at least one mesh; the bodies are prepared only once."""
 
     def __init__(self, pairs: Pairs, forms: tuple[Form | None, ...], precision: float) -> None:
         """Prepare the bodies: the platform, or None, and the obstacles in the order of their indices."""

@@ -102,7 +102,7 @@ Obstacle = Box | Capsule | Sphere | Mesh
 
 PLATFORM: Final = "platform"
 _SAME = 1e-9  # relative to the robot's extent; anchors with a smaller distance count as one anchor
-_NO_LENGTH = "cables and platform: give from_anchor, the length of cable at its anchor to exclude"
+_NO_LENGTH = "cables and platform: give from_anchor, the length of cable at the anchor that is not measured"
 
 
 class Pairs(NamedTuple):

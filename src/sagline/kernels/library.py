@@ -80,7 +80,7 @@ class Entry:
     """A compiled kernel that Python calls, with one version per set of argument types."""
 
     def __init__(self, function: Callable[..., object], rows: list[_Row], library: ctypes.PyDLL, python: Any) -> None:
-        """Store the rows of the function; `library` and `python` as in `Library`."""
+        """Store the rows of the function; for `library` and `python` see `Library`."""
         self.__wrapped__, self.__name__, self.__doc__ = function, function.__name__, function.__doc__
         self.__module__ = function.__module__
         self._rows = [(row, ctypes.addressof(row)) for row in rows]

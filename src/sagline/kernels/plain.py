@@ -53,7 +53,7 @@ def plain(function: F) -> F:
 
 
 class _Compiled(ast.NodeTransformer):
-    """Replacement of the operations in which Python and compiled code differ."""
+    """Transformer that replaces the operations in which Python and compiled code differ."""
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
         """Remove the decorator; an entry also accepts numbers of NumPy."""
@@ -111,7 +111,7 @@ def _number(value: Any) -> Any:
 
 
 def _numbers(values: Iterable[Any]) -> Iterable[Any]:
-    """Values one after the other, as numbers of Python."""
+    """Iterate over values, and convert each value to a number of Python."""
     return map(_number, values)
 
 

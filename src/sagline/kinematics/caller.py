@@ -32,7 +32,8 @@ def copy_in(memory: Any, given: Any, item: str, unit: str) -> None:
             memory[WHOLE] = array("d", given)
             return
     except (TypeError, ValueError, NotImplementedError, OverflowError):
-        pass  # other type or shape: integers and similar types are converted; any other type is refused with a reason
+        # the numbers have another type or shape: integers and similar types are converted; other values raise an error
+        pass
     memory[WHOLE] = exactly(given, item, unit, (len(memory),))
 
 
@@ -45,7 +46,8 @@ def copy_out(values: Array, out: Any, item: str) -> None:
         if out.dtype is FLOAT or out.dtype == FLOAT:
             out[WHOLE] = values
             return
-    except (AttributeError, IndexError, TypeError, ValueError):  # not an array, another shape, or write-locked
+    # the target is not an array, has another shape, or is write-locked
+    except (AttributeError, IndexError, TypeError, ValueError):
         pass
     allowed = f"a writable array of float64 of shape ({values.size},)"
     raise InvalidValueError(item, brief(out), allowed, f"Give np.empty({values.size}).")

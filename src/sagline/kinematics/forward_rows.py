@@ -51,7 +51,7 @@ class ForwardSolution(Result, Tabular):
             shape (2,) or (N, 2).
         iterations: Number of Newton steps, shape () or (N,).
         covariance: Covariance of a pose from measured tensions: displacement of the center of mass [m] and rotation
-            vector [rad], world axes, shape (6, 6) or (N, 6, 6). None without measured tensions.
+            vector [rad], world axes, shape (6, 6) or (N, 6, 6). None if no tensions were measured.
     """
 
     _columns: ClassVar[Columns] = (
@@ -101,7 +101,7 @@ BLOCK = 1 << 13  # cables per block; a block takes at most 130 ms, and interrupt
 
 
 class ForwardRows(NamedTuple):
-    """Results of the kernel, in its order."""
+    """Results of the kernel, in the order of the kernel's arguments."""
 
     poses: Array
     results: Array

@@ -43,7 +43,7 @@ def home(
 
     Args:
         robot: A robot with winches.
-        pose: Pose of the platform, a single one.
+        pose: A single pose of the platform.
         frame_end_tension: Load cell values at this pose [N], a number or shape (m,). The frame-end tension is (value -
             load_cell_bias) / load_cell_gain. The tensions need not balance the platform exactly, because each cable is
             evaluated separately.

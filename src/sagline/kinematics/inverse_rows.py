@@ -25,7 +25,7 @@ DECIDED = 1 << 10  # poses per block of the feasibility decision, which takes lo
 
 
 class InverseRows(NamedTuple):
-    """Results of the kernel, in its order. The first axis is the N poses, except in results (RESULT_ROWS, N, m)."""
+    """Results of the kernel, in its order. The first axis has the length N, except in results (RESULT_ROWS, N, m)."""
 
     results: Array
     cable_status: Codes
@@ -96,7 +96,7 @@ def solve_inverse_rows(
 
 
 class Verdicts(NamedTuple):
-    """Proofs for infeasible poses. The first axis of all arrays is the N poses."""
+    """Proofs for infeasible poses. The first axis of all arrays has the length N, one entry per pose."""
 
     # Smallest change of the force that makes the pose feasible [N]: lower bound and sufficient value, (N, 2). The
     # values are 0 at a solved pose, and NaN if the load is not the cause of the failure.

@@ -173,7 +173,7 @@ class InverseSolver:
         Args:
             position: Position of the platform origin [m], shape (3,).
             quaternion: Rotation platform -> world, scalar last, of length 1 within 1e-6 (then normalized), shape (4,).
-            out: Filled with the unstrained lengths [m], shape (m,); NaN without a solution.
+            out: Filled with the unstrained lengths [m], shape (m,), or with NaN at a pose without a solution.
             wrench: External plus inertial wrench about the center of mass, world axes [N, N m], shape (6,); None for
                 zero.
 
@@ -228,7 +228,7 @@ class InverseSolver:
                 raise TypeError
             out[WHOLE] = self._lengths
         except (AttributeError, IndexError, TypeError, ValueError):
-            copy_out(self._lengths, out, "out")  # this converts, or raises an error with a reason
+            copy_out(self._lengths, out, "out")  # this converts the numbers, or raises an error with the reason
         status: PoseStatus = _STATUSES[code]
         return status
 
@@ -240,7 +240,7 @@ class InverseSolver:
         return True
 
     def _no_pose(self) -> InvalidValueError:
-        """The error for arguments that are not a pose."""
+        """The error for a position and a quaternion that do not describe a pose."""
         exactly(self._pose[0, :3], "position", "m", (3,))
         length = float(np.linalg.norm(exactly(self._pose[0, 3:], "quaternion", "", (4,))))
         step = "Normalize it; scalar last: (x, y, z, w)."

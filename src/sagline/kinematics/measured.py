@@ -60,7 +60,7 @@ def fit_measurements(
 
     found: equilibria at the measured lengths (N samples), where the search starts; the fits overwrite them; loads:
     external plus inertial wrenches (1 or N, 6). Returns the covariances of (displacement of the center of mass,
-    rotation vector), (N, 6, 6); NaN without a solution.
+    rotation vector), (N, 6, 6); they are NaN for a sample without a solution.
     """
     if model.code == codes.STRAIGHT:
         raise InvalidValueError(

@@ -64,9 +64,9 @@ class Plan(Result, Saved, Tabular):
             matrix, s_i(tau_i) the sag force of cable i, and G_i s_i its wrench. Along y, the cables supply the sum of y
             . (J_i tau_i - G_i s_i(tau_i)). For all chord tensions within their limits, this sum is less than y .
             (needed without its sag forces). The proof uses exact catenaries. It excludes tensions below a tenth of the
-            cable's weight and, without an upper limit, tensions that stretch a cable to more than twice its length. The
-            force part of y has length 1, so that the difference is in newtons. NaN if one direction is not sufficient
-            for the proof. None for a plan from an old file.
+            cable's weight, and, for a cable without an upper limit, tensions that stretch it to more than twice its
+            length. The force part of y has length 1, so that the difference is in newtons. NaN if one direction is not
+            sufficient for the proof. None for a plan from an old file.
         needed: The wrench J tau that the chord tensions must supply, shape (6,) or (N, 6), due to weight, given wrench,
             and the sag forces T_z - tau sin phi. Without a solution, the sag forces belong to the tensions with the
             smallest unbalanced wrench. None for a plan from an old file.
@@ -165,8 +165,8 @@ class Plan(Result, Saved, Tabular):
         """Smallest stiffness of the platform against its free motions [N/m], shape () or (N,).
 
         A rotation is measured by its arc at the root mean square distance of the platform ends from the center of mass,
-        as in `ForwardSolution`. The value is zero or negative for an unstable equilibrium, NaN without a solution and
-        for straight cables. It is computed at each call.
+        as in `ForwardSolution`. The value is zero or negative for an unstable equilibrium, NaN for a pose without a
+        solution and for straight cables. It is computed at each call.
         """
         return smallest_stiffness(self.state)
 

@@ -39,7 +39,7 @@ class _Instant(NamedTuple):
 
 
 class _Instants(NamedTuple):
-    """States of motion one step [s] before, one step after and two steps after every sample."""
+    """States of motion near every sample: one step [s] before it, one step after it, and two steps after it."""
 
     before: _Instant
     after: _Instant
@@ -199,7 +199,7 @@ class _RateConditions(NamedTuple):
 
 
 def _smallest_rates(conditions: _RateConditions, at_limit: Flags) -> Array:
-    """Smallest rates that do not cross a limit; cables are held one by one, starting with the largest outward rate."""
+    """Smallest rates that cross no limit; cables that would cross a limit are held one by one, the fastest first."""
     _, n, m = conditions.matrix.shape
     held = np.zeros_like(at_limit)
     rates = conditions.solved(held)

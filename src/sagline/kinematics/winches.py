@@ -102,8 +102,8 @@ def lengths_from_counts(
         temperature: Temperature of the cables minus the temperature for which the winch lengths are valid [K].
 
     Returns:
-        L [m], of the shape of counts. For cables with creep, multiply by 1 + `Creep.strain` of the plan's times and
-        `chord_tension`.
+        Unstrained lengths off the drums [m], with the shape of counts. For cables with creep, multiply by 1 +
+        `Creep.strain` of the plan's times and `chord_tension`.
 
     Raises:
         InvalidValueError: If required data of winches or cables are missing (the message names them), counts are beyond
@@ -134,7 +134,9 @@ def lengths_from_counts(
         tension = _rows(robot, drum_tension, "drum_tension", "N")
         if tension.shape != rows.shape:
             shapes = f"of shape {tension.shape}"
-            raise InvalidValueError("drum_tension", shapes, f"shape {rows.shape}, as counts", "Give one per count.")
+            raise InvalidValueError(
+                "drum_tension", shapes, f"shape {rows.shape}, as counts", "Give one tension per count."
+            )
         length = _remembered_lengths(drums, robot, path, tension, unstrained=False)
     return locked((length * longer).reshape(rows.shape))
 

@@ -35,7 +35,7 @@ def checked_winding(winding: ArrayLike, shape: tuple[int, ...], cables: int) -> 
     array = checked(winding, "winding", "")
     shapes = [(cables,)] + [(*shape, cables)] * bool(shape)
     if array.shape not in shapes:
-        step = "Give one for each cable, or None for no friction."
+        step = "Give one direction for each cable, or None for no friction."
         raise InvalidValueError("winding", f"of shape {array.shape}", f"shape {' or '.join(map(str, shapes))}", step)
     wrong = ~np.isin(array, (-1.0, 0.0, 1.0))
     if wrong.any():

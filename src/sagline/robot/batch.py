@@ -183,7 +183,7 @@ def outward(robot: Robots, pose: Pose) -> Array:
 
 
 def points_on_pulleys(robot: Robots, pose: Pose, angle: Array) -> Array:
-    """Points on the pulleys, measured along the cables from the entry points.
+    """Points on the pulleys at given angles from the entry points of the cables.
 
     pose: one pose, or a batch of N, which defines the swivel angles of the pulleys; angle: angle along the pulley
     [rad], 0 at the frame anchor and the wrap angle at the exit point, shape (..., m). Returns points in the world [m],

@@ -199,20 +199,20 @@ def _at(plane: Array, height: float) -> Array:
 
 
 def _crossed() -> tuple[Array, Array]:
-    """Two cables from each top corner, to the next upper and to the previous lower corner of the platform."""
+    """Two cables from each top corner of the frame: to the next upper and the previous lower corner of the platform."""
     frame = np.repeat(_at(_CORNERS, 0.5), 2, axis=0)
     upper, lower = _at(np.roll(_CORNERS, -1, axis=0), 0.5), _at(np.roll(_CORNERS, 1, axis=0), -0.5)
     return frame, np.stack((upper, lower), axis=1).reshape(-1, 3)
 
 
 def _octahedron() -> tuple[Array, Array]:
-    """Two cables from each of three posts, to the two nearest corners of a triangle rotated by 180 degrees."""
+    """Two cables from each of three posts: to the two nearest corners of a platform triangle, turned by 180 degrees."""
     frame = np.repeat(_at(_POSTS, 0.5), 2, axis=0)
     triangle = _at(-_POSTS, 0.5)  # corner k lies opposite post k
     return frame, triangle[[1, 2, 2, 0, 0, 1]]
 
 
 def _mixed(below: Array) -> tuple[Array, Array]:
-    """Cables from top corners to adjacent lower platform corners, and from floor points to upper platform corners."""
+    """Cables from the top corners to adjacent lower platform corners, and from the floor to upper platform corners."""
     frame = np.concatenate((_at(_CORNERS, 0.5), _at(below, -0.5)))
     return frame, np.concatenate((_at(_CORNERS, -0.5), _at(below, 0.5)))

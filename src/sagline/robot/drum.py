@@ -158,7 +158,7 @@ def drums_of(robot: Robot) -> Drums:
 def not_given(names: Sequence[str]) -> tuple[str, str]:
     """Item and value of a message about missing fields.
 
-    names: names of the missing fields, such as "winches: drum_radius", grouped by type. Each type is named once.
+    names: missing fields, such as "winches: drum_radius", grouped by type. The item names each type only once.
     """
     if len(names) == 1:
         return names[0], "not given"
@@ -190,7 +190,8 @@ def _layer_starts(winches: Winch, table: Array) -> Array:
     """
     count = np.arange(int(winches.layers.max()) + 1)
     known = winches.cable_length if winches.cable_length is not None else winches.length_zero
-    whole = np.zeros(len(table)) if known is None else known  # without cable_length, turns are counted from length_zero
+    # if cable_length is unknown, turns are counted from length_zero
+    whole = np.zeros(len(table)) if known is None else known
     circle = 2.0 * np.pi * (table[:, drum.PITCH_RADIUS] + count[:, None] * table[:, drum.LAYER_RISE])
     layer = np.hypot(circle, table[:, drum.GROOVE_PITCH]) * table[:, drum.LAYER_TURNS]
     below = np.concatenate((np.zeros((1, len(table))), np.cumsum(layer[:-1], axis=0)))

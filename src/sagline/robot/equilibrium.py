@@ -49,7 +49,8 @@ class Contact(Result):
             limits apply to this tension. The chord of the free span is another line, which starts at the actual exit
             point.
         chord_sine: sin phi of this tangent.
-        winding: The direction of friction: +1 winding in, -1 paying out, 0 at rest; None: no friction.
+        winding: Direction of each drum, which determines the friction: +1 winding in, -1 paying out, 0 at rest. None:
+            no friction.
     """
 
     wrap_angle: Array
@@ -187,7 +188,7 @@ class OfEquilibrium(Protocol[_P, _R_co]):
 
 
 def equilibrium_of(start: Any, pose: PoseLike | None = None, item: str = "state") -> Equilibrium:
-    """The given equilibrium, the equilibrium of a result such as a plan, or the equilibrium of a robot at its poses."""
+    """The given equilibrium, the equilibrium in a given result, or the equilibrium of a given robot at given poses."""
     if isinstance(start, Robot) and pose is not None:
         found: Equilibrium = import_module(_INVERSE).equilibrium_at(start, pose)
         return found

@@ -32,7 +32,8 @@ def freedom_matrix(pattern: MotionPattern, plane_normal: Array | None) -> Array:
 
 
 def _plane_axes(normal: Array) -> Array:
-    horizontal = np.cross((0.0, 0.0, 1.0), normal)  # its length is the sine of the angle between normal and vertical
+    # the length of this vector is the sine of the angle between normal and vertical
+    horizontal = np.cross((0.0, 0.0, 1.0), normal)
     length = float(np.linalg.norm(horizontal))
     if length < 1e-12:  # in a horizontal plane (except for rounding) every direction is horizontal; x is chosen
         horizontal = np.array([1.0, 0.0, 0.0]) - normal[0] * normal

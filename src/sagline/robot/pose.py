@@ -179,7 +179,7 @@ class Pose:
 
     @classmethod
     def _adopt(cls, position: Array, quaternion: Array) -> Pose:
-        """Pose from arrays that sagline created, without a copy; only the counts are checked."""
+        """Pose from arrays that sagline created; they are not copied, and only their lengths are checked."""
         pose = object.__new__(cls)
         pose._fill(position, quaternion)
         return pose
@@ -273,7 +273,7 @@ class Pose:
         return (self[i] for i in range(len(self)))
 
     def __reduce__(self) -> tuple[Any, tuple[Array, Array]]:
-        """Pickle through a constructor, which checks and locks a loaded pose."""
+        """Pickle the pose through a constructor, which checks and locks a loaded pose."""
         return Pose.from_quaternion, (self.position, self.quaternion)
 
 

@@ -38,8 +38,8 @@ class Robot(Shown):
             None if the robot has no winches, and the cables start at the frame anchors.
         mass: Mass of the platform [kg], > 0.
         inertia: Inertia about the center of mass in the platform frame [kg m^2], shape (3, 3). It is positive definite,
-            and no principal moment is larger than the sum of the other two. A planar pattern requires only a positive
-            moment about plane_normal. The inertia may be omitted for a pattern without rotation.
+            and no principal moment is larger than the sum of the other two. For a planar pattern, only the moment about
+            plane_normal must be positive. The inertia may be omitted for a pattern without rotation.
         center_of_mass: Center of mass in the platform frame [m], shape (3,).
         gravity: Gravitational acceleration along -z [m/s^2], >= 0.
         motion_pattern: "3R3T", "3T" (point mass), "1R2T" (planar) or "2T" (planar without rotation).

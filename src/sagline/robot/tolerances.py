@@ -79,7 +79,7 @@ def deviations(
 def value_of(robot: object, name: str) -> Array | None:
     """Value of the robot's quantity to which a tolerance applies.
 
-    Returns the value in SI, with the shape of the field or (); None if the robot has no such value.
+    Returns the value in SI units, with the shape of the field or (); None if the robot does not have this value.
     """
     found: Any = robot
     for part in UNCERTAIN[name].place.split("."):
@@ -107,7 +107,7 @@ class Provenance:
 
     Attributes:
         log: The winch log that it used.
-        date: Date of the calibration, ISO 8601.
+        date: Date of the calibration as an ISO 8601 text, such as "2026-03-01".
         standard_error: Standard errors of the identified quantities, by name (as in `Robot.tolerances`), in the shape
             and SI unit of the field; infinite without observations and prior.
         note: Further remarks for users.

@@ -218,7 +218,7 @@ class Winch:
         return evolve(self, **changes)
 
     def _run_to(self, frame_anchors: Array) -> Winch:
-        """Copy of these winches with the dead length computed from their guides.
+        """Copy of these winches with dead lengths that are computed from their guides.
 
         Args:
             frame_anchors: Points where the cables end after their last guides, world axes [m], shape (m, 3).
@@ -272,7 +272,7 @@ _FIELDS: Final = dict(sorted(fields_dict(Winch).items(), key=lambda each: each[0
 
 
 def _checked(value: ArrayLike, about: Attribute[Any]) -> Array:
-    """The values of one field."""
+    """Checked values of one field."""
     item = f"winches: {about.name}"
     array = checked(value, item, **about.metadata)
     match about.name:

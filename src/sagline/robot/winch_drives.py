@@ -22,7 +22,7 @@ class WinchDrive:
 
     Attributes:
         name: Name for `winch_drive`.
-        gear: Motor turns per turn of the output.
+        gear: Turns of the motor per turn of the gear's output shaft.
         inertia: Moment of inertia of motor and gear at the motor's shaft [kg m^2].
         rated_torque: Continuous torque at the motor's shaft [N m].
         torque_limit: Peak torque at the motor's shaft [N m].

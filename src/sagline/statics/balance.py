@@ -46,7 +46,7 @@ def inertial_wrench(robot: Robot | Sequence[Robot], pose: PoseLike, twist: Array
     """
     pose = pose_of(pose)
     if not pose.shape:
-        raise InvalidValueError("pose", "a single one", "a batch of N poses", "Take Pose(position[None], rotation).")
+        raise InvalidValueError("pose", "a single pose", "a batch of N poses", "Take Pose(position[None], rotation).")
     body = bodies_of(one_a_pose(robot, len(pose)))
     twist = exactly(twist, "twist", "m/s or rad/s", (len(pose), 6))
     twist_rate = exactly(twist_rate, "twist_rate", "m/s^2 or rad/s^2", (len(pose), 6))
@@ -96,7 +96,7 @@ def _geometry(robot: Robots, pose: Pose) -> Array:
 
 
 def structure_matrix(robot: Robot | Sequence[Robot], pose: PoseLike) -> Array:
-    """Structure matrix J: the wrenches of unit chord tensions about the center of mass, in world axes.
+    """Structure matrix J. Its columns are wrenches of unit chord tensions about the center of mass, in world axes.
 
     Args:
         robot: The robot; or a sequence of N robots that fit together (see `inverse`), one per pose.
@@ -107,8 +107,8 @@ def structure_matrix(robot: Robot | Sequence[Robot], pose: PoseLike) -> Array:
 
     Raises:
         InvalidValueError: If robot is a sequence whose length is not N, or whose robots do not fit together.
-        CableGeometryError: If both ends of a cable coincide, or one is inside its pulley; the message names pose and
-            cable.
+        CableGeometryError: If both ends of a cable coincide, or its platform end is inside its pulley; the message
+            names pose and cable.
 
     Examples:
         >>> import sagline as sl

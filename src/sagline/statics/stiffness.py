@@ -31,7 +31,7 @@ class Stiffness(Result):
     pattern, and NaN if the stiffness is singular.
 
     Attributes:
-        state: The equilibrium of the calculation.
+        state: Equilibrium to which the stiffness belongs.
         matrix: -d(wrench of the cables)/d(motion) at fixed lengths, shape (..., 6, 6): elastic, sag and geometric
             stiffness. Its skew part is half the given moment, because this moment does not rotate with the platform.
         compliance: d(motion)/d(wrench on the platform), shape (..., 6, 6).
@@ -74,7 +74,7 @@ class Modes(Result, Tabular):
     """Result of `modes`, single or with a leading axis N; n is the number of free motions.
 
     Attributes:
-        state: The equilibrium of the calculation.
+        state: Equilibrium to which the modes belong.
         frequency: Natural frequencies [Hz], ascending, shape (..., n); 0 for motions without stiffness, NaN for
             unstable motions.
         shape: Mode shapes, scaled to a modal mass of 1, as columns (displacement of the center of mass, rotation

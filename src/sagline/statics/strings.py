@@ -26,7 +26,7 @@ _TINY = 1e-300
 
 
 class Strings(NamedTuple):
-    """String data of the cables of N states."""
+    """Data of the cables as strings, for N equilibria."""
 
     table: Array  # columns as in `sagline.kernels.dynamics.string`, shape (N, m, STRING_COLUMNS)
     axes: Array  # world axes of each cable: horizontal in its plane, normal to the plane, upward, shape (N, m, 3, 3)
@@ -34,7 +34,7 @@ class Strings(NamedTuple):
 
 
 def strings_of(state: Equilibrium) -> Strings:
-    """String data of the cables of an equilibrium."""
+    """Data of the cables of an equilibrium as strings."""
     cables = state.cables
     m = cables.shape[-1]
     material = cables_of(state.robot)

@@ -32,11 +32,11 @@ class MinimumNorm(TensionMethod):
 
 @dataclass(frozen=True, slots=True)
 class Closest(TensionMethod):
-    """Tensions nearest to the previous tensions, by projection onto the feasible set: (55) of the article.
+    """Feasible tensions nearest to the previous tensions: projection onto the feasible set, (55) of the article.
 
-    The tensions change smoothly along a path, but depend on the path. The first pose has the minimum norm. After a gap
-    of infeasible poses, the last feasible tensions are the reference. In a batch of poses, each pose is solved
-    independently. Choose this method for the smoothest tensions along one path.
+    The tensions change smoothly along a path, but at a pose they depend on the path before it. The first pose has the
+    minimum norm. After a gap of infeasible poses, the last feasible tensions are the reference. In a batch of poses,
+    each pose is solved independently. Choose this method for the smoothest tensions along one path.
 
     Source:
         Gia Luan & Truong Thinh 2020, (55); the projection is derived in docs/model.md, section 5.
@@ -230,8 +230,8 @@ class ImprovedClosedForm(TensionMethod):
     """Closed form with iterations; each iteration fixes the cable with the largest violation at its limit.
 
     The number of iterations is at most the number of redundant cables. Nearly all feasible poses get a result; the
-    others get the status NOT_COVERED. The tensions are continuous except where the fixed cable changes. Choose this
-    method if ClosedForm gives no result at too many feasible poses.
+    others get the status NOT_COVERED. The tensions are continuous except at poses where another cable is fixed. Choose
+    this method if ClosedForm gives no result at too many feasible poses.
 
     Source:
         Pott 2014, "An improved force distribution algorithm for over-constrained cable-driven parallel robots".

@@ -129,8 +129,8 @@ RANK = 1e-9  # relative to its row of the matrix; a matrix with a smaller diagon
 def factorize(reduced: Array, diagonals: Array) -> bool:
     """QR factorization in place; returns True if the matrix (n, m) has full rank.
 
-    Afterwards row k of reduced contains column k of R above the diagonal, then the vector v of reflection k. In
-    diagonals (2, n), row HEADS is the diagonal of R, and row FACTORS contains 2/|v|^2 of the reflections.
+    On return, row k of reduced contains the part of column k of R above the diagonal, then the vector v of reflection
+    k. In diagonals (2, n), row HEADS is the diagonal of R, and row FACTORS contains 2/|v|^2 of the reflections.
     """
     n, m = reduced.shape
     for k in range(n):

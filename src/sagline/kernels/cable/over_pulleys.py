@@ -45,7 +45,7 @@ def material_at(cables: Array, i: int) -> Material:
 
 @formula
 def chord_at(rows: Array, i: int) -> Chord:
-    """The chord of one cable of a pose."""
+    """Chord of a cable at a pose."""
     return Chord(rows[g.CHORD, i], rows[g.SINE, i], rows[g.COSINE, i])
 
 

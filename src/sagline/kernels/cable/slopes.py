@@ -113,7 +113,7 @@ def _shallow_force_slopes(
 def force_slopes(
     model: Model, span: float, rise: float, material: Material, length: float, force: Force, plane: PlaneStiffness
 ) -> _ForceSlopes:
-    """Derivatives of the force with respect to L, rho and EA, for any cable model except the straight one."""
+    """Derivatives of the force with respect to L, rho and EA, for any model except the straight cable."""
     horizontal, vertical, tension = force
     stiffness = material.stiffness
     weight = material.density * model.gravity

@@ -179,7 +179,7 @@ def taut_at_frame_end(
     tension, with a slope of at most 1 + wD/EA. Secant steps from the taut side therefore go down to the root, or to the
     least value.
 
-    tension: frame-end tension [N]; otherwise: result if all frame-end tensions are larger.
+    tension: frame-end tension [N]; otherwise: value to return if every frame-end tension is larger.
     """
     weight = material.density * model.gravity
     if model.code == codes.STRAIGHT or model.code == codes.ELASTIC or weight == 0.0 or tension == math.inf:
@@ -240,7 +240,7 @@ def lengths_at_frame_ends(
     rotation: Array,
     geometry: Array,
 ) -> None:
-    """Unstrained lengths off the drums [m] of cables at a pose, each cable independent of the others.
+    """Unstrained lengths off the drums [m] of cables at a pose; each cable is computed separately.
 
     Args:
         terms: Terms of the cable model.

@@ -170,12 +170,12 @@ def observe(
     """Residuals and derivatives at N equilibria; NaN at unstable equilibria.
 
     Args:
-        model: Cable model as in `forward_poses`: the exact or the weightless one.
+        model: Cable model as in `forward_poses`: the exact or the weightless model.
         given: `ForwardSamples`, whose initial poses are equilibria at the lengths.
         sensing: `Sensing`.
         reading_arrays: `PoseReadings`.
         unknown_arrays: `Unknowns`.
-        memory: `memory_for` the number of cables.
+        memory: Work arrays from `memory_for`, for the number of cables.
         found: `Linearization`, which is filled.
     """
     batch, sensors, readings = ForwardSamples(*given), Sensing(*sensing), PoseReadings(*reading_arrays)

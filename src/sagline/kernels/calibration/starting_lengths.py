@@ -33,7 +33,7 @@ def starting_lengths(
 ) -> None:
     """Fill the unstrained lengths off the drums [m] of cables that balance the platform near the given tensions.
 
-    The change of the chord tensions is the smallest one that balances the platform.
+    The change of the chord tensions is the smallest change that balances the platform.
 
     Args:
         terms: Terms of the cable model.
@@ -42,7 +42,7 @@ def starting_lengths(
         body: Row of the body_table.
         poses: Pose rows (N, POSE_COLUMNS).
         tension: Tensions at the frame ends [N], (N, m).
-        memory: `memory_for` the number of cables.
+        memory: Work arrays from `memory_for`, for the number of cables.
         length_out: Filled, (N, m).
     """
     model = model_of(terms)

@@ -48,7 +48,7 @@ from sagline.kernels.dynamics.rigid_body import (
 )
 from sagline.kernels.jit import entry, glue, kernel
 
-ENDED = progress.COUNTERS  # additional counter of cables with mass; FAILED: cable that ended the run
+ENDED = progress.COUNTERS  # additional counter of cables with mass; FAILED: index of the cable that ended the run
 DONE, LONG, SHORT, GROWN = range(4)
 FEWEST = 2  # smallest number of free nodes of a chain
 # largest energy error, relative to the energy that can become motion; phase errors cause smaller energy errors
@@ -103,7 +103,7 @@ def _sample_points(place: Array, count: int, row: Array, points: Array) -> None:
 
 @kernel
 def record_chain_step(run: ChainRun, records: Records, stock: Array) -> None:
-    """Record a step, and check that the energy increases only by the supplied energy."""
+    """Record a step, and check that the energy does not increase by more than the supplied energy."""
     states, tensions, lengths, energies, _notes, points = records
     state, drives, chains, at, r = run.state, run.drives, run.chains, run.at, run.at[progress.RECORDS]
     audit = drives.audit
@@ -201,9 +201,9 @@ def run_chains(
             the mass of the chains at node 0); row of inertia; projection (6, 6) onto the free motions; and reference
             point of the given wrench in these axes, (3,).
         data: Data of the drives, (DATA_ROWS, m).
-        courses: Time tables of lengths, wrenches and wind velocity, as in `motion.run_massless`.
-        kept: As in `motion.run_massless`, with one more counter. The work array has ROOM numbers plus two for each
-            column of the table of lengths.
+        courses: Time tables of lengths, wrenches and wind velocity; see `motion.run_massless`.
+        kept: Same as in `motion.run_massless`, but with one more counter. The length of the work array is ROOM plus two
+            times the number of columns of the table of lengths.
         chain_arrays: `Chains`, with the state before the steps; overwritten with the state after them.
         stock: Initial energies that can become motion, (2,); NaN before the first call, which fills them.
         records: Filled as in `motion.run_massless`, and with points of the cables (R, m, points, 3) at equal material

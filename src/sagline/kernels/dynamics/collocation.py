@@ -304,9 +304,9 @@ def dynamic_stiffnesses(
         waves: (1 or N, F, WAVE_COLUMNS), with the data type of room and found.
         phase: Phase of a transverse wave in an element [rad], < pi.
         room: Work array of shape ROOM.
-        found: Filled: K(omega) - K(0), (N, F, m, FOUND) [N/m]; NaN without horizontal and vertical force.
-        counts: Filled: numbers of held frequencies below omega in the plane and normal to it, (N, F, m, 2); negative if
-            the cable has too many elements.
+        found: Filled with K(omega) - K(0), (N, F, m, FOUND) [N/m]; NaN for a cable without force.
+        counts: Filled with the numbers of held frequencies below omega, in the plane and normal to it, (N, F, m, 2);
+            negative if the cable has too many elements.
     """
     give, block = room[4 * STAGES : 4 * STAGES + 2, :2], room[4 * STAGES : 4 * STAGES + 2, 2:4]
     for p in range(strings.shape[0]):

@@ -60,7 +60,7 @@ GROWTH = 0.1
 
 @kernel
 def record_step(run: MasslessRun, records: Records) -> None:
-    """Record a step, and check that the energy increases only by the supplied energy."""
+    """Record a step, and check that the energy does not increase by more than the supplied energy."""
     states, tensions, lengths, energies, _notes = records
     state, drives, rows, at = run.state, run.drives, run.rows, run.at
     audit, row = drives.audit, at[progress.RECORDS]
@@ -97,7 +97,7 @@ def record_step(run: MasslessRun, records: Records) -> None:
 
 @glue
 def runge_kutta_step(run: MasslessRun, now: float) -> None:
-    """One step of the classical Runge-Kutta method; the stored forces belong to the state before it, then after it."""
+    """One step of the classical Runge-Kutta method; it replaces the forces at its start by the forces at its end."""
     h, drives, rows, state = run.step, run.drives, run.rows, run.state
     m, lagging = rows.shape[1], drives.kind == d.SECOND_ORDER
     supplied, lost = 0.0, 0.0
@@ -147,7 +147,7 @@ def runge_kutta_step(run: MasslessRun, now: float) -> None:
 
 @glue
 def splitting_step(run: MasslessRun, now: float) -> None:
-    """One step of the splitting from a given time; the stored forces belong to the state before, then after it."""
+    """One step of the splitting from a given time; it replaces the forces at its start by the forces at its end."""
     h, half, drives, rows = run.step, 0.5 * run.step, run.drives, run.rows
     fill_damping(run)
     add_powers(drives, half)
@@ -218,7 +218,7 @@ def run_massless(
         courses: Time tables of lengths, wrenches and wind velocity. Lengths (K, m) are unstrained. For drums, each row
             of the table contains lengths s along the path of winding, then expected tensions, (K, 2 m).
         kept: State of a run before the steps, which is overwritten with the state after them; and work arrays.
-        records: Filled: states with angular velocity instead of angular momentum, frame-end tensions, lengths,
+        records: Filled with states with angular velocity instead of angular momentum, frame-end tensions, lengths,
             energies, notes.
         steps: Largest number of steps; the run ends earlier if the records are full. With 0, only the initial state is
             evaluated.

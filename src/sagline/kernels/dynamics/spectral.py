@@ -238,12 +238,12 @@ def spectral_matrices(
         strings: (m, STRING_COLUMNS).
         omega: Largest angular frequency whose waves the elements resolve [rad/s].
         rule: `Lobatto`.
-        points: Filled: s, mass and integrals of C of every node, (m, nodes, 6); s is NaN for unused nodes.
-        plane: Filled: scaled stiffness in the plane, (m, 2 nodes, 2 nodes), node by node [1/s^2].
-        normal: Filled: scaled stiffness normal to the plane [1/s^2], (m, nodes, nodes).
-        carried: Filled: static motion of each node per motion of the platform end, times the root of the node's mass,
-            (m, nodes, 5).
-        still: Filled: effective masses of the cable in this static motion, xx, xz, zz, yy, (m, 4) [kg].
+        points: Filled with s, mass and integrals of C of every node, (m, nodes, 6); s is NaN for unused nodes.
+        plane: Filled with scaled stiffness in the plane, (m, 2 nodes, 2 nodes), node by node [1/s^2].
+        normal: Filled with scaled stiffness normal to the plane [1/s^2], (m, nodes, nodes).
+        carried: Filled with the static motion of each node per motion of the platform end, times the root of the node's
+            mass, (m, nodes, 5).
+        still: Filled with effective masses of the cable in this static motion, xx, xz, zz, yy, (m, 4) [kg].
     """
     lobatto = Lobatto(*rule)
     stiff = 1e6 * omega * omega

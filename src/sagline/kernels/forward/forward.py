@@ -197,7 +197,7 @@ def forward_poses(
         chained: True if each sample starts at the previous result, and the first sample at starts[0].
         given: `ForwardSamples`.
         chain: `LastEquilibrium`. A chain of samples that starts at this pose also uses the stored stiffness.
-        memory: `memory_for` the number of cables.
+        memory: Work arrays from `memory_for`, for the number of cables.
         found: `Solutions`, which is filled.
     """
     batch, answer, kept = ForwardSamples(*given), Solutions(*found), LastEquilibrium(*chain)

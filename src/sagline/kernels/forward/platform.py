@@ -62,7 +62,7 @@ def platform_energy(
     """Energy [J] after `unbalance` at the pose, and the sum of the magnitudes of its terms (a measure of rounding).
 
     The terms are the energies of cables, weight and given force. The result is NaN if the cable model has no energy. A
-    given moment, constant in world axes, has no potential energy and is not included.
+    given moment, which is constant in world axes, has no potential energy; it is therefore not included.
     """
     energy, size = energy_of_cables(model, cables, rows, model.behind)
     for k in range(3):

@@ -65,17 +65,17 @@ def describe_states(
     slopes: Array,
     levers: Array,
 ) -> None:
-    """Stiffness and sensitivities of N samples; NaN without lengths and for straight cables.
+    """Stiffness and sensitivities of N samples; NaN for straight cables and if lengths are NaN.
 
     Args:
         model: Cable model, the empirical model's constants, and True if cables may have pulleys or dead lengths, else
             None.
         given: `ForwardSamples`, whose initial poses are the equilibria.
-        memory: `memory_for` the number of cables.
-        matrices: Filled: stiffness of the platform, (N, 6, 6).
-        blocks: Filled: stiffness of every cable's platform end in world axes, (N, m, 3, 3).
-        slopes: Filled: derivatives of the force T of every cable with respect to its data, (N, DATA, m, 3).
-        levers: Filled: vectors from the center of mass to the platform ends, (N, m, 3).
+        memory: Work arrays from `memory_for`, for the number of cables.
+        matrices: Filled with stiffness of the platform, (N, 6, 6).
+        blocks: Filled with stiffness of every cable's platform end in world axes, (N, m, 3, 3).
+        slopes: Filled with derivatives of the force T of every cable with respect to its data, (N, DATA, m, 3).
+        levers: Filled with vectors from the center of mass to the platform ends, (N, m, 3).
     """
     batch = ForwardSamples(*given)
     code, k_h, k_p, behind = model

@@ -60,11 +60,11 @@ def stabilities_of_poses(
     Args:
         terms: Cable model, the empirical model's constants, and True if cables may have pulleys or dead lengths, else
             None. The stiffness of straight cables is undefined, and their poses count as solved.
-        robots: As in `inverse_poses`.
+        robots: Same as in `inverse_poses`.
         poses: Rows (N, POSE_COLUMNS).
         which: Indices of the poses, (K,).
-        memory: `memory_for` the number of cables.
-        results: As in `inverse_poses`, (RESULT_ROWS, N, m).
+        memory: Work arrays from `memory_for`, for the number of cables.
+        results: Same as in `inverse_poses`, (RESULT_ROWS, N, m).
         pose_statuses: Statuses (N,), filled for these poses: POSE_UNSTABLE if some free motion does not have a positive
             stiffness, else POSE_SOLVED.
     """

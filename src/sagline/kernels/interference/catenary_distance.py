@@ -3,8 +3,8 @@
 A cable is divided into pieces. The bulge of a piece is an upper bound of the distance between piece and chord. The
 distance of two chords minus both bulges is a lower bound of the distance of the pieces. Points of the cables give an
 upper bound, which Newton's method improves to full precision. A pair of pieces is finished when the two bounds differ
-by less than the precision. Otherwise one piece is split. All pairs with the same cable use the same pieces.
-docs/model.md, section 13.
+by less than the precision. Otherwise one piece is split. If a cable occurs in several pairs, these pairs use the same
+pieces. docs/model.md, section 13.
 """
 
 from __future__ import annotations

@@ -66,16 +66,16 @@ def decide_poses(
     The tensions of feasible poses are filled.
 
     Args:
-        model_terms: As in `inverse_poses`.
-        limit_terms: As in `inverse_poses`.
-        robot_terms: As in `inverse_poses`.
+        model_terms: Same as in `inverse_poses`.
+        limit_terms: Same as in `inverse_poses`.
+        robot_terms: Same as in `inverse_poses`.
         poses: Rows (N, POSE_COLUMNS).
         wrenches: External plus inertial wrenches about the center of mass, (1 or N, 6).
         which: Indices of the poses, (K,).
         covers: True if the method finds a distribution at every feasible pose. If False, a feasible pose gets
             POSE_NOT_COVERED.
-        memory: `memory_for` the number of cables.
-        answers: As in `inverse_poses`; overwritten for these poses.
+        memory: Work arrays from `memory_for`, for the number of cables.
+        answers: Same as in `inverse_poses`; overwritten for these poses.
         verdicts: Filled for these poses: lower and upper bound of the smallest sufficient change of the force [N],
             (N, 2); this change along the free motions, (N, n), and Farkas vectors, (N, n), both NaN if not found;
             True for each cable whose limit opposes the needed wrench, (N, m).
@@ -208,7 +208,7 @@ def demand_of_pose(platform: Platform, cables: Cables, balance: Balance, work: D
 
 @glue
 def _write_proof(demand: Demand, change: TensionChange, lever: float, farkas: Array) -> None:
-    """Fill the direction of the proof; its force part has length 1, or, without a force part, its moment part."""
+    """Fill the direction of the proof. Its force part, or its moment part if there is no force, has length 1."""
     n = farkas.size
     for k in range(n):
         farkas[k] = change.direction[k] if k < demand.soft else change.direction[k] / lever
@@ -245,18 +245,18 @@ def polygon_of_pose(
     """Fill the set of feasible tensions of one pose at fixed sag forces; returns the number of its corners.
 
     Args:
-        model_terms: As in `inverse_poses`.
-        distribution_terms: As in `inverse_poses`; only its variable is used.
-        limit_terms: As in `inverse_poses`.
-        robot_terms: As in `inverse_poses`, of one robot.
+        model_terms: Same as in `inverse_poses`.
+        distribution_terms: Same as in `inverse_poses`; only its variable is used.
+        limit_terms: Same as in `inverse_poses`.
+        robot_terms: Same as in `inverse_poses`, of one robot.
         pose: Row (POSE_COLUMNS,).
         wrench: External plus inertial wrench about the center of mass, (6,).
         carried: Chord tensions and sag forces of the cables, (m,) each; if they are NaN, first-order sag forces are
             used.
-        memory: `memory_for` the number of cables.
-        polygon: Filled: scale and offset of the variable, (m,) each; minimum norm and limits, (3, m); null space (r,
-            m); for r = 2 corners and labels as in `feasible_polygon`; for r = 1 the ends of the interval, corners[0, 0]
-            and corners[1, 0], which may be infinite.
+        memory: Work arrays from `memory_for`, for the number of cables.
+        polygon: Filled with scale and offset of the variable, (m,) each; minimum-norm tensions and limits, (3, m); null
+            space (r, m); for r = 2 corners and labels as in `feasible_polygon`; for r = 1 the ends of the interval,
+            corners[0, 0] and corners[1, 0], which may be infinite.
     """
     distribution = Distribution(*distribution_terms)
     freedom, bodies, robots = robot_terms

@@ -77,15 +77,15 @@ def inverse_poses(
         wrenches: External plus inertial wrenches about the center of mass, (1 or N, 6).
         previous: Reference tensions in the distribution's variable (m,), NaN for the minimum norm. CLOSEST overwrites
             them with the tensions of the last feasible pose.
-        memory: `memory_for` the number of cables.
+        memory: Work arrays from `memory_for`, for the number of cables.
         otherwise: True for any method. None if the method is a projection onto a reference in chord or horizontal
             tensions; the code of all other methods is then not compiled.
         stability: True to prove the stability of each equilibrium. A solved pose without a proof then gets
             UNPROVED_STABILITY. With None, the proof is not compiled.
-        answers: Filled: span and rise of the free spans, unstrained length off the drum, T_x, T_z, tau, then the rows
-            for pulleys and dead lengths, if any, (RESULT_ROWS, N, m); status of each cable, (N, m); norms of the
-            unbalanced force [N] and moment [N m] along the free motions, (N, 2); wrench that J tau must supply along
-            the free motions, (N, n); status of each pose, (N,).
+        answers: Filled with span and rise of the free spans, unstrained length off the drum, T_x, T_z, tau, and then
+            the rows for pulleys and dead lengths, if any, (RESULT_ROWS, N, m); status of each cable, (N, m); norms of
+            the unbalanced force [N] and moment [N m] along the free motions, (N, 2); wrench that J tau must supply
+            along the free motions, (N, n); status of each pose, (N,).
         first: Index of the first pose.
         last: Index after the last pose.
     """
@@ -148,7 +148,7 @@ def measure_balance(platform: Platform, cables: Cables, balance: Balance, residu
 
 @glue
 def write_solution(solved: bool, model: Model, cables: Cables, balance: Balance, results: Array, p: int) -> None:
-    """Write the results of one pose; without a solution, all rows except span and rise become NaN."""
+    """Write the results of one pose; if it has no solution, all rows except span and rise become NaN."""
     for i in range(cables.tau.size):
         tension = cables.tau[i] if solved else math.nan
         results[tables.SPAN, p, i] = balance.geometry[g.SPAN, i]

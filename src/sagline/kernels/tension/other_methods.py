@@ -1,6 +1,6 @@
 """Tension distribution methods that are not projections: selection of the method, and the closed forms.
 
-The closed forms give tensions near the middle of the limits without a search. They do not find every feasible
+The closed forms give tensions near the middle of the limits without a search. At some feasible poses they find no
 distribution.
 """
 

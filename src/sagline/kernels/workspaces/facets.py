@@ -2,10 +2,10 @@
 
 Elimination with complete pivoting turns n columns, the basis, into unit vectors. Each row is then a normal to all
 columns of the basis except one. The other r = m - n columns are not in the basis. A facet contains k of the other
-columns and all columns of the basis except k + 1. Its normal is a combination of k + 1 rows. The coefficients are the k
-x k minors of the k columns in these rows. Laplace's expansion computes them from the minors of k - 1 columns. The
-subsets of the other columns are visited depth first. A loop without branches computes all normals of a subset. A normal
-with rounding errors is still a valid direction for the margin.
+columns. It also contains all columns of the basis except k + 1 of them. Its normal is a combination of k + 1 rows. The
+coefficients are the k x k minors of the k columns in these rows. Laplace's expansion computes them from the minors of k
+- 1 columns. The subsets of the other columns are visited depth first. A loop without branches computes all normals of a
+subset. A normal with rounding errors is still a valid direction for the margin.
 """
 
 from __future__ import annotations

@@ -64,12 +64,12 @@ def prove_boxes(
         model_terms: Cable model: code, k_h, k_p.
         limit_terms: Limits of the tensions: `TensionLimits`.
         robot_terms: Rows that select the free motions, (n, 6); body_table (1, BODY_COLUMNS); cable_table, (1, m,
-            CABLE_COLUMNS), without pulleys.
+            CABLE_COLUMNS), of a robot without pulleys.
         load_terms: The wrenches to balance: `Loads`.
         boxes: Rows: pose at the middle, half edges [m], largest rotation from the middle [rad], (N, BOX_COLUMNS).
         precision_terms: `Precision`.
         memory: `proof_memory` for the number of cables.
-        answers: Filled: OPEN, INSIDE or OUTSIDE, (N,); and a work array of statuses, (m,).
+        answers: Filled with OPEN, INSIDE or OUTSIDE, (N,); and a work array of statuses, (m,).
     """
     limits = TensionLimits(*limit_terms)
     loads = Loads(*load_terms)

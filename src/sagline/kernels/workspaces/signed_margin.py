@@ -132,10 +132,10 @@ def signed_margins(
         set_terms: The set of loads.
         arms: Lever arm of the norm, and mean lever arm [m], (1 or R,) each.
         poses: Rows (N, POSE_COLUMNS).
-        memory: two times `memory_for` the number of cables, FACET_SIZE numbers, and codes of the cables (m,).
-        margins: Filled: value, lower and upper bound [N], (3, N); normal of the facet with the least distance, in world
-            axes, of length 1 with moments divided by the lever arm, (N, 6); index of the cable whose limit has the
-            largest effect on the value, or -1, (N,); status from the two bounds, (N,).
+        memory: Two times the work arrays from `memory_for`, FACET_SIZE numbers, and codes of the cables (m,).
+        margins: Filled with value, lower and upper bound [N], (3, N); normal of the facet with the least distance, in
+            world axes, of length 1 with moments divided by the lever arm, (N, 6); index of the cable whose limit has
+            the largest effect on the value, or -1, (N,); status from the two bounds, (N,).
         first: Index of the first pose.
         last: Index after the last pose.
     """
