@@ -78,7 +78,7 @@ def test_a_winch_has_the_drive_and_its_drum() -> None:
 def test_what_is_refused() -> None:
     drive = sl.winch_drive("yaskawa-sgmsh-10aa")
     known = "one of the 19 drives of the catalogue"
-    others = "a field of Winch in addition to gear, inertia, torque_limit, speed_limit"
+    others = "a field of Winch other than gear, inertia, torque_limit, speed_limit"
     cases: tuple[tuple[Callable[[], object], tuple[str, ...], str], ...] = (
         (lambda: sl.winch_drive("yaskawa-sgmsh-10a"), ("name", "'yaskawa-sgmsh-10a'", known), "yaskawa-sgmsh-10aa?"),
         (lambda: sl.winch_drive("x"), ("name", "'x'", known), "winch_drive_names()"),

@@ -1,4 +1,4 @@
-"""Interface of all cable models, cable states, and cable status."""
+"""Common interface of the cable models; states and statuses of cables."""
 
 from __future__ import annotations
 
@@ -192,7 +192,7 @@ class CableModel:
         )
 
     def profile(self, cable: Cable, state: CableState, points: int = 50) -> Array:
-        """Points of a cable in its vertical plane, according to this model.
+        """Points along a cable of this model, in the vertical plane of the cable.
 
         Args:
             cable: Material.
@@ -251,7 +251,7 @@ class CableState(Result):
         return batch_length(self.shape, "state of a single cable")
 
     def __getitem__(self, index: int | slice | NDArray[Any]) -> CableState:
-        """State of some of the cables, selected along the first axis.
+        """State of the cables that an index along the first axis selects.
 
         Args:
             index: A number (negative: from the end), a slice, or an array of numbers or booleans.

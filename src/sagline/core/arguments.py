@@ -189,7 +189,7 @@ def elements(
 ) -> tuple[Any, ...]:
     """Elements of an iterable; one object of the type `single` counts as one element.
 
-    Texts, mappings and arrays without axes are not iterables here.
+    A text, a mapping or an array without axes is one object, although Python can iterate over a text and a mapping.
     """
     if isinstance(value, single):
         return (value,)
@@ -212,7 +212,7 @@ def callback(value: Any, item: str) -> Any:
     if value is None or (callable(value) and not isinstance(value, type)):
         return value
     raise InvalidValueError(
-        item, brief(value), "a function of two numbers: completed steps and all steps", "Give one, or None."
+        item, brief(value), "a function of two numbers: completed steps and all steps", "Give such a function, or None."
     )
 
 

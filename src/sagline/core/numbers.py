@@ -80,7 +80,7 @@ def plus_minus(value: SupportsFloat, error: SupportsFloat, unit: str = "", *, pr
 def counted(count: int, noun: str) -> str:
     """Count with its noun, "1 pose" or "1,200 poses".
 
-    noun: noun in the singular; the plural adds s or es.
+    noun: noun in the singular; its plural is formed with s or es.
     """
     return f"{count:,} {noun}{'' if count == 1 else 'es' if noun.endswith(('ch', 'x')) else 's'}"
 

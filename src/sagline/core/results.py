@@ -66,7 +66,7 @@ class Shown:
 class ByFields:
     """Frozen dataclass that is pickled by its fields; its arrays are write-locked after loading or copying.
 
-    Loading restores the fields without the constructor, because its arguments may differ from the fields.
+    Loading restores the fields without a call of the constructor, whose arguments may differ from the fields.
     """
 
     __slots__ = ()

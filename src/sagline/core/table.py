@@ -99,7 +99,7 @@ class Table:
         try:
             pandas = import_module("pandas")
         except ModuleNotFoundError:
-            raise FileError("package pandas", "is not installed", "Data frames need it: pip install pandas") from None
+            raise FileError("package pandas", "is not installed", "A DataFrame needs it: pip install pandas") from None
         frame = pandas.DataFrame(dict(self.columns))
         frame.attrs["units"] = dict(self.units)
         return frame

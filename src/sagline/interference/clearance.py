@@ -110,8 +110,8 @@ class ClearanceRows:
     def of_platform(self, pose: Pose, half: Array) -> Array:
         """Upper bound (N,) [m] of the platform's distance from obstacles at all positions up to `half` (3,) [m] away.
 
-        The platform is replaced by a box that is smaller by `half`. This box is a part of the platform at each of these
-        positions. Meshes are omitted.
+        The platform is replaced by a box that is smaller by `half`. At each of these positions, this box is inside the
+        platform. Meshes are omitted.
         """
         first = len(self.pairs.parts)
         pairs = self.pairs.by_kernel

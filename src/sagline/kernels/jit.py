@@ -85,7 +85,7 @@ def entry(function: F) -> F:
 
 
 def kernel(function: F) -> F:
-    """A kernel that only kernels call. If numba compiles it, Python cannot call it."""
+    """A kernel that only kernels call. Python cannot call a kernel of this kind if numba compiles it."""
     return _compiled(function, "kernel")
 
 

@@ -74,7 +74,7 @@ class KernelCache:
         return _result._rebuild(target_context, *pickle.loads(content[DIGEST:]))
 
     def save_overload(self, signature: object, compiled: Any) -> None:
-        """Write machine code for argument types, if it can be written."""
+        """Write the machine code for argument types; if this is not possible, report the cause."""
         if not self._enabled or compiled.lifted or compiled.library.has_dynamic_globals:
             return
         payload = _dumps(compiled._reduce())
@@ -112,8 +112,8 @@ OPTIONS: Final[dict[str, dict[str, Any]]] = {
 def compiled(function: F, kind: str) -> F:
     """A kernel whose machine code is kept on disk; a division by zero gives inf or NaN, as in NumPy.
 
-    Kernels allocate no memory (`sagline.kernels.memory`). They need no reference counting (_nrt), which would take a
-    quarter of their time for arrays in NamedTuples.
+    Kernels allocate no memory (`sagline.kernels.memory`). Reference counting (_nrt) is therefore off; for arrays in
+    NamedTuples it would take a quarter of the time.
     """
     every: dict[str, Any] = {"error_model": "numpy", "_nrt": False, **OPTIONS[kind]}
     return kept(cast("F", numba.njit(**every)(function)), folder_of(function.__module__), announced=kind == "entry")

@@ -105,7 +105,10 @@ def equilibria(
     lengths = checked_lengths(instance(robot, Robot, "robot"), unstrained_length)
     if lengths.ndim != 1 or np.isnan(lengths).any():
         raise InvalidValueError(
-            "unstrained_length", f"of shape {lengths.shape}", f"({robot.cable_count},), no NaN", "Give one sample."
+            "unstrained_length",
+            f"of shape {lengths.shape}",
+            f"({robot.cable_count},), no NaN",
+            "Give the lengths of one sample.",
         )
     starts, seed = whole_number(starts, "starts", 1), whole_number(seed, "seed", 0)
     check_memory("starts", START_BYTES * starts * robot.cable_count, "Choose fewer starts.")

@@ -58,8 +58,8 @@ def search(
     results are compared first by status, then by the number of cables outside their limits, then by energy; the best
     result is kept.
 
-    lengths: unstrained lengths (N, m), rows of NaN are skipped; wrenches: external plus inertial (1 or N, 6); progress:
-    called after each block with the number of finished samples and the total number.
+    lengths: unstrained lengths (N, m), rows of NaN are skipped; wrenches: external plus inertial wrenches (1 or N, 6);
+    progress: called after each block with the number of finished samples and the total number.
     """
     count, m = lengths.shape
     found = ForwardRows.empty(count, m, has_routing(robot))
@@ -92,8 +92,8 @@ def from_orientations(
 ) -> ForwardRows:
     """Solve from the middle of the frame: first only the position, then all motions.
 
-    lengths: unstrained lengths (N, m); wrenches: external plus inertial (1 or N, 6); quaternion: initial orientation
-    (x, y, z, w), shape (4,), or one per sample (N, 4).
+    lengths: unstrained lengths (N, m); wrenches: external plus inertial wrenches (1 or N, 6); quaternion: initial
+    orientation (x, y, z, w), shape (4,), or one per sample (N, 4).
     """
     shared = first_of(robot)
     freedom = shared.freedom

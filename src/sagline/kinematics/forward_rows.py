@@ -165,7 +165,7 @@ class ForwardRows(NamedTuple):
         """Result of `forward` in the shape of the arguments, () or (N,).
 
         load: external plus inertial wrench, shape (6,) or (N, 6); shape: () for a single sample, (N,) for a batch;
-        covariance: of the poses, shape (N, 6, 6), or None.
+        covariance: covariances of the poses, shape (N, 6, 6), or None.
         """
         pose = Pose._adopt(self.poses[:, :3].reshape(*shape, 3), self.poses[:, 3:].reshape(*shape, 4))
         whole = locked(np.ascontiguousarray(np.broadcast_to(load, (*shape, 6))))
@@ -195,10 +195,10 @@ def solve_forward_rows(
 ) -> ForwardRows:
     """Run the kernel over samples, in blocks.
 
-    lengths: unstrained lengths (N, m); starts: pose rows (1 or N, POSE_COLUMNS); wrenches: external plus inertial (1 or
-    N, 6); chained: True if each sample starts at the result of the previous one; freedom: free motions (n, 6); None for
-    the free motions of the robot; progress: called after each block with the number of finished samples and the total
-    number.
+    lengths: unstrained lengths (N, m); starts: pose rows (1 or N, POSE_COLUMNS); wrenches: external plus inertial
+    wrenches (1 or N, 6); chained: True if each sample starts at the result of the previous one; freedom: free motions
+    (n, 6); None for the free motions of the robot; progress: called after each block with the number of finished
+    samples and the total number.
     """
     count, m = lengths.shape
     allowed = first_of(robot).freedom if freedom is None else freedom

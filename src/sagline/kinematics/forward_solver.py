@@ -161,7 +161,7 @@ class ForwardSolver:
         lengths = checked(unstrained_length, "unstrained_length", "m", shape=shape, above=0.0)
         if lengths.ndim != 1:
             raise InvalidValueError(
-                "unstrained_length", f"of shape {lengths.shape}", f"shape {shape}", "Give one sample."
+                "unstrained_length", f"of shape {lengths.shape}", f"shape {shape}", "Give the lengths of one sample."
             )
         return lengths
 

@@ -186,7 +186,7 @@ def _given_winding(winding: Winding | None, motion: Path | Pose) -> ArrayLike | 
 
 
 def _with_path_friction(plan: Plan) -> Plan:
-    """The plan with friction in the direction of its length changes."""
+    """The plan with friction; its length changes determine the directions of winding."""
     if plan.state.contact is None or plan.length_rate is None:
         return plan
     rate = np.nan_to_num(plan.length_rate)

@@ -65,8 +65,8 @@ class Plan(Result, Saved, Tabular):
             . (J_i tau_i - G_i s_i(tau_i)). For all chord tensions within their limits, this sum is less than y .
             (needed without its sag forces). The proof uses exact catenaries. It excludes tensions below a tenth of the
             cable's weight, and, for a cable without an upper limit, tensions that stretch it to more than twice its
-            length. The force part of y has length 1, so that the difference is in newtons. NaN if one direction is not
-            sufficient for the proof. None for a plan from an old file.
+            length. The force part of y has length 1, so that the difference is in newtons. NaN if the proof needs more
+            than one direction. None for a plan from an old file.
         needed: The wrench J tau that the chord tensions must supply, shape (6,) or (N, 6), due to weight, given wrench,
             and the sag forces T_z - tau sin phi. Without a solution, the sag forces belong to the tensions with the
             smallest unbalanced wrench. None for a plan from an old file.

@@ -99,7 +99,7 @@ OUTWARD = 1e-9
 
 
 class _PlacedCables(NamedTuple):
-    """Cables at given chord tensions and poses, and matrices of their forces."""
+    """Cables at given chord tensions and poses, and matrices that convert their forces to wrenches."""
 
     cables: CableState  # their state, fields of shape (N, m)
     pull: Array  # T_z - tau sin phi [N], shape (N, m)
@@ -263,8 +263,8 @@ def length_rate(state: Equilibrium, path: Path, tension: TensionMethod, feasible
     Geometry and tensions both change: L(t) = L(pose(t), tau(t)). The tensions of most methods depend only on the pose.
     They are computed again shortly before and after each sample, at poses that the path's twist, twist rate and jerk
     determine. `Closest` depends on its previous tensions. Its rates are the smallest rates of the tensions that keep
-    the balance. Cables that would cross a limit are held at the limit. With pulleys, `Closest` is solved again for two
-    steps after each sample.
+    the balance. Cables that would cross a limit are held at the limit. If the robot has pulleys, `Closest` is solved
+    again one and two steps after each sample.
 
     state: robot, poses, wrench and cables along the path; path: the path; if its jerk is unknown, a spline through its
     accelerations supplies the jerk; feasible: True for samples with a solution, shape (N,). Returns dL/dt [m/s], shape
@@ -294,7 +294,7 @@ def length_rate(state: Equilibrium, path: Path, tension: TensionMethod, feasible
 
 
 def _resolved_rates(state: Equilibrium, tension: TensionMethod, near: _Instants) -> Array:
-    """Rates from solutions shortly before and after each sample; one-sided at the border of feasibility."""
+    """Rates from solutions shortly before and after each sample; at the border of feasibility, from one side only."""
     options, lengths = kernel_options(state.robot, state.cables.model, tension), state.unstrained_length
     none = np.full(first_of(state.robot).cable_count, np.nan)
     before, after = (

@@ -173,7 +173,7 @@ def _rows(robot: Robot, value: ArrayLike, item: str, unit: str) -> Array:
     """Numbers of shape (m,) or (N, m); NaN is allowed."""
     array, m = numbers(value, item, unit), robot.cable_count
     if array.ndim not in (1, 2) or array.shape[-1] != m:
-        step = f"Give one for each of the {m} cables of {robot.name}."
+        step = f"Give one value for each of the {m} cables of {robot.name}."
         raise InvalidValueError(item, f"of shape {array.shape}", f"shape ({m},) or (N, {m})", step)
     wrong = np.abs(array) > LARGEST
     if wrong.any():
@@ -242,8 +242,9 @@ def winch_rates(plan: Plan) -> WinchRates:
     diameter of the cables is known, the lever is drum_radius, as in `fastest`.
 
     Args:
-        plan: A plan along a path, of a robot whose winches have drum_radius. If groove_pitch or the diameter of the
-            cables is known, both are necessary. Several layers or a moving exit also need drum_width and cable_length.
+        plan: A plan along a path, of a robot whose winches have drum_radius. If groove_pitch is known, the diameter of
+            the cables must also be known, and vice versa. Several layers or a moving exit also need drum_width and
+            cable_length.
 
     Returns:
         Speeds and torques of the winches at every sample.

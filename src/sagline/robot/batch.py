@@ -28,7 +28,7 @@ def together(robot: Robot | Sequence[Robot]) -> Robots:
     Several robots must have the same number of cables, motion pattern, plane normal, type of tension limits, and
     gravity. All other properties may differ.
 
-    robot: a robot, or a sequence of them.
+    robot: a robot, or a sequence of robots.
     """
     if isinstance(robot, Robot):
         return robot

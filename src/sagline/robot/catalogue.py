@@ -113,7 +113,10 @@ class Design:
         if (inner >= outer).any():
             axis = int(np.argmax(inner >= outer))
             raise InvalidValueError(
-                f"platform[{axis}]", f"{inner[axis]:g} m", f"< frame[{axis}], {outer[axis]:g} m", "Take a smaller one."
+                f"platform[{axis}]",
+                f"{inner[axis]:g} m",
+                f"< frame[{axis}], {outer[axis]:g} m",
+                "Take a smaller platform.",
             )
         if choice(layout, "layout", LAYOUTS) == "bottom":
             raise InvalidValueError(

@@ -33,7 +33,7 @@ def anchors(frame: ArrayLike, platform: ArrayLike) -> tuple[Array, Array]:
             "platform_anchors",
             f"{len(pair[1])} points",
             f"as many as frame_anchors, {len(pair[0])}",
-            "Give each cable a point on the frame and one on the platform.",
+            "Give each cable a point on the frame and a point on the platform.",
         )
     _refuse_twins(np.hstack(pair))
     return pair[0], pair[1]
@@ -133,7 +133,7 @@ def _check_moments(moments: Array, *, everywhere: bool) -> None:
 
 
 def plane_normal(given: ArrayLike | None, pattern: str) -> Array | None:
-    """Unit normal of the plane of motion, from any nonzero vector; None if the motion pattern is not planar."""
+    """Unit normal of the plane of motion, from a nonzero vector; None if the motion pattern is not planar."""
     if (given is None) == (pattern in PLANAR):
         has = "not given" if given is None else "given"
         allowed = "a vector of three numbers" if given is None else "nothing"
@@ -165,7 +165,7 @@ def limits_of_each_cable(low: ArrayLike, high: ArrayLike, count: int) -> tuple[A
 
 
 def per_cable(array: Array, item: str, count: int) -> Array:
-    """Values (m,), one per cable, from one value per cable or one value for all."""
+    """Values (m,), one per cable; the argument is one value per cable, or a single value for all cables."""
     if array.shape not in ((), (1,), (count,)):
         raise InvalidValueError(item, f"of shape {array.shape}", f"shape () or ({count},)", "Give one value per cable.")
     return array if array.shape == (count,) else locked(np.full(count, array))

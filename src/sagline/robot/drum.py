@@ -260,7 +260,10 @@ def warmth(robot: Robot, temperature: Any) -> Array | float:
     if not (factor > 0.0).all():
         shown = f"{np.ravel(difference)[0]:g} K"
         raise InvalidValueError(
-            "temperature", shown, "a temperature at which cables have a positive length", "Correct it or expansion."
+            "temperature",
+            shown,
+            "a temperature at which cables have a positive length",
+            "Correct the temperature, or expansion.",
         )
     return factor
 

@@ -1,4 +1,4 @@
-"""Inertia of simple bodies; variants of a robot with another mass or fewer cables."""
+"""Inertia of simple bodies, and copies of a robot with another mass or with fewer cables."""
 
 from __future__ import annotations
 

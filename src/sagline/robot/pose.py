@@ -326,4 +326,6 @@ def _refuse(wrong: NDArray[np.bool_], item: str, measure: str, values: Array, al
 
 def _counts_differ(item: str, shapes: list[tuple[int, ...]]) -> InvalidValueError:
     counts = " and ".join(str(shape) for shape in shapes)
-    return InvalidValueError(item, f"of batch shapes {counts}", "equal counts, or a single pose", "Give one for each.")
+    return InvalidValueError(
+        item, f"of batch shapes {counts}", "equal counts, or a single pose", "Give one value for each pose."
+    )

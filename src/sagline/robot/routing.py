@@ -277,7 +277,7 @@ def _span(model: CableModel, cable: Cable, step: Array, tension: Array, gravity:
 
 
 def _tangents(span: CableState, step: Array) -> tuple[Array, Array]:
-    """Unit tangents of catenaries at the start and the end of a step, both toward the platform."""
+    """Unit tangents of catenaries at both ends of a step, in the direction of the platform."""
     level = np.hypot(step[:, 0], step[:, 1])[:, None]
     outward = step[:, :2] / np.maximum(level, _TINY)
 

@@ -97,13 +97,15 @@ def of_share(share: ArrayLike, value: Array | None, item: str) -> Array:
         raise InvalidValueError(item, "in percent", "a field that is given", f"Give {item} in its unit, or the field.")
     array = checked(share, item, "%")
     if array.shape not in ((), value.shape):
-        raise InvalidValueError(item, f"of shape {array.shape}", f"shape () or {value.shape}", "Give one for all.")
+        raise InvalidValueError(
+            item, f"of shape {array.shape}", f"shape () or {value.shape}", "Give one value for all."
+        )
     return np.asarray(array * np.abs(value))
 
 
 @frozen(eq=False, weakref_slot=False)
 class Provenance:
-    """The calibration that identified some values of a robot.
+    """Calibration by which some values of a robot were identified.
 
     Attributes:
         log: The winch log that it used.

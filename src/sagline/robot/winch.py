@@ -31,7 +31,8 @@ class Winch:
 
     None means that a value is unknown. A function that needs an unknown value raises an error that names the field.
 
-    A cable ends at its platform anchor. Cables that run over a platform pulley back to the frame are not modeled.
+    A cable ends at its platform anchor. A cable that runs over a pulley on the platform and back to the frame is not
+    modeled.
 
     Attributes:
         pulley_radius: Radius of the pulley at the frame, to the centerline of the cable [m], 0 to 10; 0 for an eyelet.
@@ -182,7 +183,7 @@ class Winch:
     def _long(self) -> str:
         """Names of the fields that differ among the cables, for a message.
 
-        All fields are expanded to one shape, so that their original shapes are not known here.
+        Fields with one value for all cables count as equal, because all fields are already expanded to one shape.
         """
         differ = [name for name, field in self.known().items() if (field != field[0]).any()]
         if not differ:
@@ -218,7 +219,7 @@ class Winch:
         return evolve(self, **changes)
 
     def _run_to(self, frame_anchors: Array) -> Winch:
-        """Copy of these winches with dead lengths that are computed from their guides.
+        """Copy of these winches whose dead lengths are computed from the guides.
 
         Args:
             frame_anchors: Points where the cables end after their last guides, world axes [m], shape (m, 3).

@@ -1,4 +1,4 @@
-"""Drives of winches, motor and gear, from the data sheets of the manufacturers."""
+"""Drives of winches (motors with their gears), from data sheets of the manufacturers."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class WinchDrive:
         }
         for field in fields:
             if field in given or field not in Winch.__slots__:
-                allowed = f"a field of Winch in addition to {', '.join(given)}"
+                allowed = f"a field of Winch other than {', '.join(given)}"
                 step = "For another drive, use Winch(...)."
                 raise InvalidValueError("field", brief(field), allowed, step)
         radius = number(drum_radius, "drum_radius", "m", above=0.0)

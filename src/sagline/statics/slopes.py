@@ -78,7 +78,7 @@ def cable_slopes(state: Equilibrium) -> CableSlopes:
 
 
 def _turned(state: Equilibrium, vectors: Array) -> Array:
-    """Vectors of the platform frame (1 or N, 3) in world axes, (N, 3)."""
+    """Convert vectors (1 or N, 3) from the platform frame to world axes, (N, 3)."""
     turned: Array = (state.pose.matrix.reshape(-1, 3, 3) @ vectors[..., None])[..., 0]
     return turned
 
@@ -92,7 +92,7 @@ def on_platform(forces: Array, levers: Array) -> Array:
 
 
 def motions_of_ends(levers: Array) -> Array:
-    """Matrices (..., m, 3, 6): displacements of the platform ends per platform motion (..., 6) [m, rad]."""
+    """Matrices (..., m, 3, 6) that convert a platform motion (6,) [m, rad] to displacements of the platform ends."""
     motion = np.eye(6)
     ends = np.swapaxes(motion[:, :3] + np.cross(motion[:, 3:], levers[..., None, :]), -1, -2)
     return np.ascontiguousarray(ends)

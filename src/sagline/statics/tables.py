@@ -91,7 +91,7 @@ def refuse_missing_chords(robot: Robots, pose: Pose, geometry: Array | None = No
         f"{item}: distance between its ends",
         f"{round(float(chord[row, cable]), 12):g} m",
         f">= {SHORTEST_CHORD:g} m",
-        "Move the platform or the anchor, so that they are apart.",
+        "Move the platform or the anchor, so that the two ends are apart.",
     )
 
 

@@ -53,8 +53,8 @@ def capacity_margin(state: Equilibrium) -> Array:
     """Largest additional force in any direction that tensions within the limits can balance at each pose.
 
     The moment on the platform does not change. The result is exact for weightless cables. For sagging cables, the sag
-    forces of the state are kept constant. The computing time is proportional to the number of faces, the binomial
-    coefficient of m over n - 1. For eight cables, 56 faces take about twenty microseconds per pose.
+    forces of the state are kept constant. The computing time is proportional to the number of faces, which is the
+    binomial coefficient of m over n - 1. For eight cables, 56 faces take about twenty microseconds per pose.
 
     Args:
         state: An equilibrium, single or N of them; a plan or a solution; or a robot and its poses.

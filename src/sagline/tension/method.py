@@ -31,7 +31,7 @@ PREFERENCE_ROWS = 2
 
 @dataclass(frozen=True, slots=True)
 class TensionMethod:
-    """Rule that selects one feasible set of tensions: a code for the kernels, and options.
+    """Rule that selects one tension per cable among all feasible tensions. It has a code for the kernels, and options.
 
     Attributes:
         code: Code of the method in the kernels (`sagline.kernels.codes`).

@@ -95,7 +95,9 @@ class QuadraticProgram(TensionMethod):
             (GOAL, "target", np.asarray(self.target)),
         ):
             if values.shape not in ((), (cables,)):
-                raise InvalidValueError(name, f"of shape {values.shape}", f"() or ({cables},)", "Give one per cable.")
+                raise InvalidValueError(
+                    name, f"of shape {values.shape}", f"() or ({cables},)", "Give one value per cable."
+                )
             rows[row] = values
         return locked(rows)
 

@@ -21,7 +21,7 @@ class UnresistedMotion(NamedTuple):
             1; if the platform does not rotate, its linear part has length 1.
         resistance: Largest rate of a cable length in this motion, divided by the rate in the most constrained motion; 0
             at a singular pose, except for rounding.
-        text: Description of the motion.
+        text: Description of the motion in words.
     """
 
     twist: Array
@@ -37,7 +37,7 @@ def unresisted_motion(robot: Robot, pose: PoseLike) -> UnresistedMotion:
         pose: One pose.
 
     Returns:
-        UnresistedMotion: the twist, its resistance by the cables, and a description of the motion.
+        UnresistedMotion: the twist, the resistance of the cables to it, and a description in words.
 
     Raises:
         InvalidValueError: If pose is not a single pose.

@@ -158,7 +158,7 @@ def scale_limits(cables: Cables, balance: Balance, i: int) -> None:
 
 @glue
 def factor_balance(balance: Balance) -> bool:
-    """Fill pseudo-inverse and null space in the distribution's variable; False if rank is lost."""
+    """Fill pseudo-inverse and null space for the distribution's variable; False if the rank is not full."""
     n, m = balance.matrix.shape
     matrix, reduced, q = balance.matrix, balance.reduced, balance.q
     for i in range(m):

@@ -277,7 +277,7 @@ def creep_strains(
         stiffness: Stiffness of each element [N], (k,).
         delay: Delay time of each element [s], (k,).
         settled: True if the first tension has acted for a long time, (1,); if False, the initial strain is zero.
-        strain_out: (N, m).
+        strain_out: Filled with the strains, (N, m).
     """
     for i in range(tension.shape[1]):
         for p in range(tension.shape[0]):

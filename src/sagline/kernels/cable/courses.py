@@ -31,7 +31,7 @@ def cable_courses(
         wraps: Number of points on each pulley, 0 or at least 2; if a cable has no pulley, all are at its frame anchor.
         rotation: Work array, (3, 3).
         geometry: Work array, (GEOMETRY_ROWS, m).
-        points: Filled, world axes [m], (m, points, 3).
+        points: Filled with the points in world axes [m], (m, points, 3).
     """
     gravity = body[tables.GRAVITY]
     model = Model(codes.CATENARY, 0.0, 0.0, gravity, None)

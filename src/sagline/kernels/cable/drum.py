@@ -64,8 +64,8 @@ def turns_of_lengths(drums: Array, starts: Array, length: Array, turns_out: Arra
         drums: Table, (m, DRUM_COLUMNS).
         starts: Length off the drum at which each layer begins, in decreasing order, (m, layers + 1).
         length: Lengths at the winding tension [m], (N, m).
-        turns_out: (N, m).
-        travel_out: [m], (N, m).
+        turns_out: Filled with the turns, (N, m).
+        travel_out: Filled with the changes of length per turn [m], (N, m).
     """
     for p in range(length.shape[0]):
         for i in range(length.shape[1]):
@@ -115,7 +115,7 @@ def follow_memory(
     that was never off the drum has the initial strain. Samples with NaN are omitted.
 
     Args:
-        given: Lengths off the drum [m], (N, m): unstrained, or along the path of winding.
+        given: Lengths off the drum [m], (N, m), either unstrained or along the path of winding.
         strain: Strain of the cable at the drum for each sample, (N, m).
         rest_strain: Initial strain of the cable on the drum, (m,).
         unstrained: True if the given lengths are unstrained.

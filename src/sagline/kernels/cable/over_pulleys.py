@@ -2,9 +2,9 @@
 
 Each cable is replaced by an equivalent cable without a pulley, which starts where the chord touches the pulley. The
 equivalent cable is shorter by the length between this point and the drum. It is softer, because it also includes the
-stretch of this length. The error of the platform end corrects span and rise in the next pass. The next pose starts with
-these corrections, so that a nearby pose needs only one or two passes. Each loop has one result and no branches, so that
-it vectorizes.
+stretch of this length. In the next pass, span and rise are corrected by the error of the platform end. The next pose
+starts with these corrections, so that a nearby pose needs only one or two passes. Each loop has one result and no
+branches, so that it vectorizes.
 """
 
 from __future__ import annotations

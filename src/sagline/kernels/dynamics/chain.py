@@ -163,7 +163,7 @@ def fill_frame_node_velocity(place: Array, speed: Array, count: int, row: Array)
 
 @formula
 def kick_nodes(place: Array, speed: Array, count: int, row: Array, pulls: Array, h: float) -> None:
-    """Update the nodes' velocities from element forces, gravity and entering momentum during h [s]."""
+    """Update the nodes' velocities from element forces, gravity, and the momentum of entering cable, during h [s]."""
     share = h / (row[DENSITY] * row[ELEMENT])
     last = h / (0.5 * row[DENSITY] * (row[ELEMENT] + row[REST]))
     for c in range(3):
@@ -249,7 +249,7 @@ def potential(place: Array, count: int, row: Array) -> tuple[float, float]:
 def whole_force(place: Array, speed: Array, count: int, row: Array, pulls: Array) -> float:
     """Energy per length paid out [N] that the winch loses: H = T + T^2/(2 EA) - w z minus kinetic energy per length.
 
-    The energies of `kinetic` and `potential` change by -H times the rate.
+    While cable is paid out, the sum of `kinetic` and `potential` changes at the rate -H times the rate of the length.
     """
     distance = _element_distance(place, count)
     strain = max(_strain_at_exit(row, distance), 0.0)

@@ -206,8 +206,8 @@ def run_chains(
             times the number of columns of the table of lengths.
         chain_arrays: `Chains`, with the state before the steps; overwritten with the state after them.
         stock: Initial energies that can become motion, (2,); NaN before the first call, which fills them.
-        records: Filled as in `motion.run_massless`, and with points of the cables (R, m, points, 3) at equal material
-            steps, starting at the exit point.
+        records: Filled as in `motion.run_massless`; also filled with points of the cables (R, m, points, 3) at equal
+            material steps, starting at the exit point.
         steps: Largest number of steps; the run ends earlier if the records are full. With 0, only the present state is
             recorded.
         every: Number of steps between records; the first record is the initial state.

@@ -1,4 +1,4 @@
-"""Progress of simulations: time tables, counters, columns of records, and notes of events."""
+"""Simulations over time: time tables, counters, columns of records, and notes of events."""
 
 from __future__ import annotations
 

@@ -219,8 +219,8 @@ def _newton_steps(
 def polish(problem: PoseProblem, pose: Array, space: ForwardArrays, good: float) -> int:
     """Newton steps for the force balance until the unbalance no longer decreases; returns the number of steps.
 
-    good: an unbalance below this counts as zero. The work arrays belong to the pose before and after the steps. The
-    stiffness may belong to a pose that differs by rounding errors.
+    good: an unbalance below this counts as zero. The work arrays belong to the initial pose before the steps, and to
+    the final pose after the steps. The stiffness may belong to a pose that differs by rounding errors.
     """
     best = components_along(problem.free, space.gradient, space.part)
     before = 0.0

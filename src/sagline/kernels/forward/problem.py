@@ -85,7 +85,7 @@ class ForwardArrays(NamedTuple):
 
 @glue
 def new_forward_arrays(memory: Memory, rows: Array, factor: Array) -> tuple[ForwardArrays, Memory]:
-    """Working memory with the given rows and factor, which are kept between calls, and the remaining memory."""
+    """Work arrays, and the remaining memory; the given rows and factor keep their content between calls."""
     n = factor.shape[0]
     rotation, memory = block(memory, 3, 3)
     gradient, memory = vector(memory, 6)

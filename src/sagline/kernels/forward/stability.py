@@ -59,7 +59,7 @@ def stabilities_of_poses(
 
     Args:
         terms: Cable model, the empirical model's constants, and True if cables may have pulleys or dead lengths, else
-            None. The stiffness of straight cables is undefined, and their poses count as solved.
+            None. The stiffness of straight cables is undefined; poses with straight cables therefore count as solved.
         robots: Same as in `inverse_poses`.
         poses: Rows (N, POSE_COLUMNS).
         which: Indices of the poses, (K,).

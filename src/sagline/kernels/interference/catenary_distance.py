@@ -68,7 +68,7 @@ def _set_piece(piece: Array, row: Array, first: float, last: float) -> None:
 
 @kernel
 def _whole_piece(piece: Array, row: Array) -> None:
-    """Set the first piece to the whole measured part of a cable."""
+    """Store the whole measured part of a cable as the first piece."""
     piece[0], piece[1], piece[2] = point(row, row[FIRST])
     piece[3], piece[4], piece[5] = point(row, row[LAST])
     _set_piece(piece, row, row[FIRST], row[LAST])
@@ -203,7 +203,7 @@ def _edge_of(box: Array, axis: int, corner: int, edge: Array) -> None:
 
 @kernel
 def _edges_to_box(box: Array, other: Array, edge: Array, nearest: Array, best: float) -> float:
-    """Least distance of the edges of a box from another box [m], and its points, if it is below a known distance."""
+    """Least of a known distance [m] and the distances of a box's edges from another box; fills the nearest points."""
     for axis in range(3):
         for corner in range(4):
             _edge_of(box, axis, corner, edge)
@@ -264,9 +264,9 @@ def least_distances(
         together: True if only the least distance of a pose is required. The other distances then get only bounds.
         pieces: Work array from `work_arrays_for_pieces`.
         waiting: Work array from `work_arrays_for_pieces`.
-        distance_out: [m], shape (N, P).
-        low_out: Proved lower bounds [m], shape (N, P).
-        nearest_out: Nearest points on the center lines or boxes [m], shape (N, P, 2, 3).
+        distance_out: Filled with the distances [m], shape (N, P).
+        low_out: Filled with the proved lower bounds [m], shape (N, P).
+        nearest_out: Filled with the nearest points on the center lines or boxes [m], shape (N, P, 2, 3).
     """
     poses, several = moving.shape[0], moving.shape[1]
     count = several + still.shape[0]
@@ -308,7 +308,7 @@ def cut_piece(row: Array, ranges: Array, pieces_out: Array) -> None:
     Args:
         row: The cable, shape (COLUMNS,).
         ranges: First and last shares of the pieces, shape (K, 2).
-        pieces_out: Chords and bulges, shape (K, PIECE_COLUMNS).
+        pieces_out: Filled with chords and bulges, shape (K, PIECE_COLUMNS).
     """
     for k in range(ranges.shape[0]):
         piece, first, last = pieces_out[k], ranges[k, 0], ranges[k, 1]

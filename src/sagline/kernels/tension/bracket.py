@@ -172,7 +172,7 @@ def _split_range(curves: Curves, waiting: Array, top: int, i: int, tau: float) -
 
 @glue
 def _first_range(curves: Curves, size: float, range_: Array) -> None:
-    """Fill the range of the admissible tensions. The upper end is finite, even for a straight cable without limit."""
+    """Fill the first range: all admissible tensions. Its upper end is always finite, also without a limit."""
     cables = curves.cables
     for i in range(cables.low.size):
         low, high = cables.low[i], cables.high[i]

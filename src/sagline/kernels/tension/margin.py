@@ -97,14 +97,14 @@ def zonotope_reach(matrix: Array, low: Array, high: Array, normal: Array) -> tup
 
 @kernel
 def zonotope_margin(matrix: Array, needed: Array, low: Array, high: Array, translations: int, memory: Memory) -> float:
-    """Largest force [N] that can be added to the needed wrench in all directions; negative if the wrench is infeasible.
+    """Largest force [N] that can be added to the needed wrench in any direction; negative if the wrench is infeasible.
 
     Args:
         matrix: Structure matrix along the free motions, translations first, (n, m).
         needed: Wrench to supply, in the same rows, (n,).
         low: Smallest allowed tensions (m,).
         high: Largest allowed tensions (m,), may be infinite.
-        translations: Number of rows that are forces.
+        translations: Number of rows of the matrix that are force components.
         memory: Work memory.
     """
     n, m = matrix.shape

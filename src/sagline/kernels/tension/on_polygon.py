@@ -1,9 +1,9 @@
 """Methods on the corners of the feasible polygon or interval: its centroid, and the polygon walk.
 
 The limits of two cables form a parallelogram. The walk starts at a corner of this parallelogram and follows the border
-of the included limits. At the line of a violated limit, the walk turns into this line and includes the limit. After a
-full turn without violated limits, the walk has visited all corners. If a limit is still violated after a full turn, the
-polygon is empty.
+of the included limits. When the walk meets the line of a violated limit, it continues along this line and includes the
+limit. After a full turn without violated limits, the walk has visited all corners. If a limit is still violated after a
+full turn, the polygon is empty.
 
 Source:
     Gouttefarde, Lamaury, Reichert & Bruckmann 2015, "A versatile tension distribution algorithm for n-DOF parallel

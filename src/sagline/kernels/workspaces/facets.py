@@ -62,7 +62,7 @@ def new_facets(memory: Memory, n: int, m: int) -> tuple[Facets, Memory]:
 
 @glue
 def choose_basis(facets: Facets, n: int, m: int, lever: float) -> bool:
-    """Eliminate in place, and fill the fields `basis` and `others`; False if rank is lost."""
+    """Eliminate in place, and fill the fields `basis` and `others`; False if the rank is not full."""
     table, basis = facets.table, facets.basis
     first = 0.0
     for k in range(n):

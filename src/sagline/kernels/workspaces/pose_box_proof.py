@@ -43,7 +43,7 @@ PrecisionTerms = tuple[float, float]  # Precision
 
 
 def memory_for_proofs(cables: int) -> tuple[Array, Indices]:
-    """Work memory of the proofs for a number of cables."""
+    """Work arrays of the proofs, for a number of cables."""
     return np.empty(14 * cables * cables + 500 * cables + 800), np.empty(10 * cables + 40, dtype=np.int64)
 
 
