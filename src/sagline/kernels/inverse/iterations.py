@@ -30,7 +30,7 @@ SLOPE_STEP = 1e-4  # relative step of the central difference of the frame-end te
 
 @kernel
 def linearize_ends(model: Model, distribution: Distribution, cables: Cables, balance: Balance) -> bool:
-    """Linearize the frame-end tensions at the present chord tensions and factor the balance; False if it is singular."""
+    """Linearize the frame-end tensions at the present chord tensions and factor the balance; False if singular."""
     for i in range(cables.tau.size):
         tau = cables.tau[i]
         chord, material, pulley = chord_of(cables, i), material_of(cables, i), pulley_of(cables, i)
