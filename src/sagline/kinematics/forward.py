@@ -120,7 +120,7 @@ def starting_positions(robot: Robots, lengths: Array, quaternion: Array) -> Arra
 
 
 def centered_positions(robot: Robots, quaternion: Array) -> Array:
-    """Position at which the center of the platform ends is at the center of the frame ends.
+    """Position of the platform at which the centroid of the platform ends is the centroid of the frame ends.
 
     quaternion: orientation of the platform, shape (4,) or (N, 4). Returns position of the platform origin [m], shape
     (3,) or (N, 3).

@@ -44,9 +44,10 @@ class ForwardSolution(Result, Tabular):
         status: Codes of `ForwardStatus`, shape () or (N,).
         stiffness_min: Smallest stiffness of the platform against its free motions [N/m], shape () or (N,). A rotation
             is measured by its arc length at the root mean square distance of the platform ends from the center of mass.
-        energy: Potential energy of cables, weight and given force [J], shape () or (N,). Heights of cables count from
-            the frame ends; all other heights count from the world origin. NaN for the shallow models, which have no
-            energy. For straight cables, the objective of the fit: half the sum of squared length errors [m^2].
+        energy: Potential energy of cables, weight and given force [J], shape () or (N,). Heights of cables are measured
+            from their frame ends; all other heights are measured from the world origin. NaN for the shallow models,
+            which have no energy. For straight cables, the objective of the fit: half the sum of squared length errors
+            [m^2].
         wrench_residual: Norms of the unbalanced force [N] and moment [N m] in the platform's free motions,
             shape (2,) or (N, 2).
         iterations: Number of Newton steps, shape () or (N,).

@@ -1,4 +1,4 @@
-"""Rates of lengths and tensions of a plan, from the motion shortly before and after each sample."""
+"""Rates of lengths and tensions along a plan, computed from the motion shortly before and after each sample."""
 
 from __future__ import annotations
 

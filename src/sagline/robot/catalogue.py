@@ -197,7 +197,7 @@ class Design:
 
 
 def _at(plane: Array, height: float) -> Array:
-    """Points of a horizontal plane at a given height."""
+    """Points at a given height, from their horizontal coordinates."""
     return np.column_stack((plane, np.full(len(plane), height)))
 
 

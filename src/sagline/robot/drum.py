@@ -185,8 +185,8 @@ def _tables(winches: Winch, diameter: Array) -> tuple[Array, Array]:
 def _layer_starts(winches: Winch, table: Array) -> Array:
     """Lengths off the drum at which the layers begin.
 
-    Such a length is the cable length, minus the length on the layers below, minus the extra length of the slanted cable
-    between drum and pulley.
+    Such a length is the cable length, minus the length on the layers below, minus the extra length that the cable
+    between drum and pulley has because it is slanted.
     """
     count = np.arange(int(winches.layers.max()) + 1)
     known = winches.cable_length if winches.cable_length is not None else winches.length_zero

@@ -266,7 +266,7 @@ def cables_of_results(
 
 
 def _free_chord_tension(span: Array, rise: Array, horizontal: Array, tension: Array) -> Array:
-    """Chord tensions of the free spans; a vertical free span keeps the given chord tension."""
+    """Chord tensions of the free spans; for a vertical free span, the given chord tension is returned."""
     level = np.where(span > 0.0, span, 1.0)
     own: Array = np.where(span > 0.0, horizontal * (np.hypot(span, rise) / level), tension)
     return own

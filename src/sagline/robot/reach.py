@@ -23,7 +23,7 @@ def check_reach(robot: Robot, pose: Pose, item: str) -> None:
     """Refuse poses with differences that the motion pattern of the robot does not allow.
 
     The orientation of a platform without rotations is arbitrary but constant. A planar platform rotates only about the
-    normal of its plane, and remains in one of the parallel planes.
+    normal of its plane, and its distance from this plane is constant.
 
     robot: the robot, or the first of several robots with the same pattern; pose: a batch, or one pose. A single pose
     and NaN are always accepted.

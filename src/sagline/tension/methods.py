@@ -110,7 +110,7 @@ class QuadraticProgram(TensionMethod):
 class LowestSum(TensionMethod):
     """The feasible tensions with the smallest 1-norm: a corner of the feasible set.
 
-    The method minimizes the total motor torque. The number of cables at their limits is at least the redundancy. The
+    The method minimizes the total motor torque. At least m - n cables are at their limits. The
     tensions are not continuous: along a path the optimum can jump to another corner. If all points of a side are
     optimal, the point with the smallest norm is selected; with more than two redundant cables, this point is a corner.
     Choose this method for static loads.

@@ -68,7 +68,7 @@ class TensionPolygon(Result, Tabular):
             chord_tension: Chord tensions that balance the pose [N], shape (..., m), as in `Plan.chord_tension`.
 
         Returns:
-            Coordinates in the null space [N], shape (..., r); NaN for tensions that are NaN.
+            Coordinates in the null space [N], shape (..., r); NaN where the tensions are NaN.
 
         Raises:
             InvalidValueError: If the tensions are not numbers, or not one number per cable.

@@ -111,8 +111,8 @@ def follow_memory(
 ) -> None:
     """Conversion between unstrained lengths off the drum and lengths along the path of winding.
 
-    On the drum the cable keeps the strain with which it was wound. This strain is linear between two samples. Cable
-    that was never off the drum has the initial strain. Samples with NaN are omitted.
+    On the drum the cable keeps the strain with which it was wound. The strain at the drum is linear in length between
+    two samples. Cable that was never off the drum has the initial strain. Samples with NaN are omitted.
 
     Args:
         given: Lengths off the drum [m], (N, m), either unstrained or along the path of winding.

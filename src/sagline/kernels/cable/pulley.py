@@ -75,7 +75,7 @@ def pulley_at(cables: Array, i: int) -> Pulley:
 
 @kernel
 def _robot_has_machine(cables: Array) -> bool:
-    """True if a cable of a robot's cable_table (m, CABLE_COLUMNS) has a pulley or dead length."""
+    """True if any cable in a robot's cable_table (m, CABLE_COLUMNS) has a pulley or dead length."""
     total = 0.0
     for i in range(cables.shape[0]):
         total += cables[i, tables.PULLEY_RADIUS] + cables[i, tables.DEAD_CABLE]

@@ -269,8 +269,8 @@ def _find_extremum(curves: Curves, rising: bool, work: Array, tensions: Array, s
     The steps start at TENSION and stay within the remaining range from A to B. The first step uses the first-order
     slope. Each later step uses the slope between the last two points.
 
-    rising: True if the sag forces rise at A and fall at B, False for the opposite; tensions: filled, (m,), but NaN
-    stays for cables to skip; sag forces: filled, (m,).
+    rising: True if the sag forces rise at A and fall at B, False for the opposite; tensions: filled, (m,), except for
+    cables that have NaN and are skipped; sag forces: filled, (m,).
     """
     m = tensions.size
     for step in range(STEPS):

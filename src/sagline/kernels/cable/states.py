@@ -151,7 +151,7 @@ def solve_cable_state(
 
 @kernel
 def frame_end_tension(model: Model, chord: Chord, material: Material, pulley: Pulley, tau: float) -> float:
-    """Tension at the frame end of the free span of a cable, from its chord tension [N]."""
+    """Tension [N] at the frame end of the free span of a cable, from its chord tension."""
     if model.code == codes.STRAIGHT or model.code == codes.ELASTIC:
         return tau
     length, sag_force, _status = solve_cable_state(model, chord, material, pulley, tau)

@@ -1,4 +1,4 @@
-"""Initial lengths from a pose and measured tensions, which are first corrected to balance the platform."""
+"""Initial lengths from a pose and measured tensions; the tensions are first corrected to balance the platform."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from sagline.kernels.jit import formula
 
 
 class _FrameEndSlopes(NamedTuple):
-    """Frame-end tension and its derivatives, at constant force on the platform end except for `along` and `up`."""
+    """Frame-end tension and its derivatives. Except for `along` and `up`, the force on the platform end is constant."""
 
     tension: float  # T_A [N]
     along: float  # derivative with respect to the horizontal part of the platform-end force, in the cable's plane

@@ -1,1 +1,1 @@
-"""Kernels of cables with mass and of motion in time."""
+"""Kernels for cables with mass, and for the motion of platform and cables over time."""

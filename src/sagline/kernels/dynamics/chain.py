@@ -92,7 +92,7 @@ def _element_direction(place: Array, j: int) -> tuple[float, float, float, float
 
 @formula
 def _opening_speed(speed: Array, j: int, x: float, y: float, z: float) -> float:
-    """Speed of the next node toward the frame relative to node j, along a unit vector [m/s]."""
+    """Speed [m/s], along a unit vector, of the next node toward the frame relative to node j."""
     vx, vy, vz = speed[0, j + 1] - speed[0, j], speed[1, j + 1] - speed[1, j], speed[2, j + 1] - speed[2, j]
     return x * vx + y * vy + z * vz
 

@@ -32,7 +32,7 @@ STAGES = 8
 
 
 def _gauss() -> tuple[Array, Array, Array]:
-    """Gauss collocation on [0, 1]: nodes, weights, and integrals from 0 to the nodes."""
+    """Nodes and weights of Gauss collocation on [0, 1], and integrals from 0 to the nodes."""
     nodes, weights = np.polynomial.legendre.leggauss(STAGES)
     basis = [np.polynomial.legendre.Legendre.basis(k) for k in range(STAGES)]
     values = np.array([one(nodes) for one in basis])
@@ -210,8 +210,8 @@ def _stiffness_from_transfer(moved: Numbers, d: int, k: Numbers) -> None:
 def _negative_pivots(phi: Numbers, d: int, clear: float, moved: Numbers) -> int:
     """Number of negative eigenvalues of the pivot, the symmetric matrix Phi_uf^-1 moved; SINGULAR if almost singular.
 
-    The determinant of moved is at least one at zero frequency. It is zero if the joint is at a vibration node of the
-    cable between frame end and joint.
+    At zero frequency, the determinant of the matrix `moved` is at least one. It is zero if the joint is at a vibration
+    node of the cable between frame end and joint.
     """
     if d == 1:
         pivot = moved[0, 0].real * phi[0, 1].real

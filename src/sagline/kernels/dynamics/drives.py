@@ -264,7 +264,7 @@ def turn_winches(drives: Drives, cables: Array, rows: Array, gravity: float, tim
 
 @glue
 def add_winch_energy(drives: Drives, cables: Array, rows: Array, time: float) -> None:
-    """Add the work of the winches during a step to the audit."""
+    """Add to the energy audit the work of the winches during a step."""
     if drives.kind == DRUMS:
         _add_slip_energy(drives, cables, time)
     else:

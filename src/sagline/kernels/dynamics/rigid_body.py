@@ -51,9 +51,8 @@ def _into_body(state: Array, x: float, y: float, z: float) -> Triple:
 def _turn_about(a: float, b: float, c: float, w: float, pa: float, pb: float, pc: float, share: float) -> Six:
     """Rotate by the angle share * pa [rad] about the first axis; the three axes are in cyclic order.
 
-    The arguments are the quaternion's components along the axes and its scalar, and the components of the angular
-    momentum along the axes. The results are the new quaternion, and the angular momentum along the second and third
-    axis.
+    The arguments are the vector part of the quaternion, its scalar part, and the angular momentum, each along these
+    axes. The results are the new quaternion, and the angular momentum along the second and third axis.
     """
     angle = 0.5 * share * pa
     sine, cosine = math.sin(angle), math.cos(angle)

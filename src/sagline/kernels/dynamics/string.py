@@ -1,4 +1,4 @@
-"""One cable as a string vibrating about its catenary, and the compliance of its frame end over a pulley."""
+"""One cable as a string that vibrates about its catenary, and the compliance of the cable on and beyond its pulley."""
 
 from __future__ import annotations
 

@@ -77,7 +77,7 @@ def platform_energy(
 
 @formula
 def end_stiffness(rows: Array, i: int) -> tuple[Triple, Triple, Triple]:
-    """Stiffness of cable i against displacements of its platform end, world axes [N/m], as nine numbers row by row."""
+    """Stiffness of cable i against displacements of its platform end in world axes [N/m]: nine numbers, row by row."""
     xx, xz, zx, zz = plane_of(rows, i)
     across = rows[g.ACROSS, i]
     c, s = rows[g.AZIMUTH_X, i], rows[g.AZIMUTH_Y, i]

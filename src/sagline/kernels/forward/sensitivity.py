@@ -1,4 +1,4 @@
-"""Stiffness of a platform in equilibrium, and sensitivities of the cable forces to the data of the cables."""
+"""Stiffness of a platform in equilibrium, and derivatives of the cable forces with respect to cable data."""
 
 from __future__ import annotations
 

@@ -115,7 +115,7 @@ def _chord_distance(pieces: Array, i: int, j: int, box: Array, to_a_box: bool) -
 
 @kernel
 def _refined_distance(one: Array, other: Array, to_a_box: bool, s: float, t: float) -> tuple[float, float, float]:
-    """Local minimum of the distance near two points of a pair [m], and the points of the minimum."""
+    """Local minimum of the distance of a pair [m], searched from two points, and the points of the minimum."""
     if to_a_box:
         square, s = nearest_to_box(one, other, s)
     else:
@@ -258,10 +258,11 @@ def least_distances(
     Args:
         moving: Shapes that move with the pose, shape (N, K, COLUMNS).
         still: Fixed shapes, shape (S, COLUMNS).
-        pairs: Indices of two shapes, shape (P, 2). Fixed shapes are counted after moving shapes. A box is the second
-            shape of a pair.
+        pairs: Indices of two shapes, shape (P, 2). The indices of fixed shapes follow the indices of moving shapes. A
+            box is the second shape of a pair.
         precision: Largest difference of the lower bound from the distance [m].
-        together: True if only the least distance of a pose is required. The other distances then get only bounds.
+        together: True if only the least distance of all pairs of a pose is required. The other distances then get only
+            bounds.
         pieces: Work array from `work_arrays_for_pieces`.
         waiting: Work array from `work_arrays_for_pieces`.
         distance_out: Filled with the distances [m], shape (N, P).

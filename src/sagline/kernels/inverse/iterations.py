@@ -55,7 +55,7 @@ def distribute_and_solve_cables(
     model: Model, distribution: Distribution, platform: Platform, cables: Cables, balance: Balance,
     near: ReferencePoint, work: WorkArrays | None, statuses: Codes,
 ) -> int:  # fmt: skip
-    """Distribute the tensions and solve the cables until their sag forces converge; returns the pose's status.
+    """Distribute tensions and solve the cables, repeatedly, until the sag forces converge; returns the pose's status.
 
     cables: the cables from `set_pose`, with tensions, ratios and sag forces to be filled; work: work arrays for
     frame-end tensions and for methods that are not projections, or None so that both are not compiled; statuses: filled

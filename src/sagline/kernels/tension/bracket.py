@@ -156,7 +156,7 @@ def _least_certain(curves: Curves, range_: Array) -> tuple[int, float]:
 
 @glue
 def _split_range(curves: Curves, waiting: Array, top: int, i: int, tau: float) -> None:
-    """Split the tensions of one cable in two; the half with its present tension is the last range, examined next."""
+    """Split the tension range of a cable in two; the half with its present tension is examined next."""
     for row in range(RANGE_ROWS):
         for j in range(waiting.shape[2]):
             waiting[top + 1, row, j] = waiting[top, row, j]

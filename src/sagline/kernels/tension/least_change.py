@@ -124,8 +124,8 @@ def norm_of_part(vector: Array, first: int, last: int) -> float:
 def _set_tangents(curves: Curves, demand: Demand, tau: Array, multipliers: Array, step: _Tangents) -> bool:
     """Fill the tangents at given tensions, and the normal matrix; False if the hard rows are linearly dependent.
 
-    The normal matrix includes the curvature of the curves, times the multipliers (n,) of the previous step, if its sign
-    is stabilizing. Without the curvature, the steps oscillate across a valley.
+    The normal matrix includes the second derivatives of the curves, times the multipliers (n,) of the previous step, if
+    they make the matrix more positive definite. Steps without the curvature would oscillate about the minimum.
     """
     n, m = step.matrix.shape
     soft = demand.soft

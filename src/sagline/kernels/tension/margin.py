@@ -42,7 +42,7 @@ def next_choice(chosen: Indices, m: int) -> int:
 
 @glue
 def extend_frame(matrix: Array, chosen: Indices, first: int, frame: Array, triangle: Array) -> int:
-    """Add the chosen columns, from a position on, to the orthonormal frame (n, n); returns the number of its rows.
+    """Add the chosen columns from a given position on to the orthonormal frame (n, n); returns its number of rows.
 
     The number is smaller than the number of columns if a column depends on the columns before it.
     """

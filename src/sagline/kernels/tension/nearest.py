@@ -1,6 +1,6 @@
 """Distributions nearest to a reference: minimum norm, closest to the previous tensions, quadratic program.
 
-docs/model.md, section 5. The objective (55) of the article asks for the tensions closest to given tensions t_ref. In
+docs/model.md, section 5. Objective (55) of the article selects the tensions closest to given tensions t_ref. In
 coordinates of an orthonormal null-space basis N, these tensions are the projection of lambda_ref = N^T (t_ref - t0)
 onto the feasible set. The distribution of minimum norm is the projection of 0.
 """

@@ -188,7 +188,7 @@ class Ranges(NamedTuple):
 def set_ranges(quantity: int, place: CablesInBox, curves: Curves, ranges: Ranges) -> None:
     """Fill the admissible tensions of all poses of a box from the admissible tensions at its middle.
 
-    The smallest tension due to the limit of the sag grows with the chord.
+    The longer the chord, the larger is the smallest tension that the limit of the sag admits.
     """
     cables = curves.cables
     for i in range(place.way.size):

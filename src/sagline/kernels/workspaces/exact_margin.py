@@ -111,7 +111,7 @@ def settle_margin(
 def _write_value(margin: Array, exact: float, error: float) -> None:
     """Fill value and bounds from a margin with exact sag forces [N].
 
-    The value has the sign of the exact margin. It is continuous where the bounds begin to decide the sign.
+    The value has the sign of the exact margin. The value is continuous where the bounds begin to decide the sign.
     """
     share = 0.0
     if exact > 0.0:
