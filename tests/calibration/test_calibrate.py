@@ -224,7 +224,6 @@ def test_too_few_readings_are_refused() -> None:
     ("changes", "unknown", "parts", "step"),
     [
         ({}, "frame_anchor", ("unknown", "'frame_anchor'"), "frame_anchors?"),
-        ({}, "load_cell_gain", ("unknown: load_cell_gain", "no number of cogiro"), "winches: {load_cell_gain: 1}"),
         ({}, "pulley_radius", ("unknown: pulley_radius", "no number of cogiro"), "winches: {pulley_radius: 0 m}"),
         ({}, "drum_radius", ("unknown: drum_radius", "observed by no reading", "counts in the log"), "counts"),
         (

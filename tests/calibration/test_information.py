@@ -77,21 +77,23 @@ def test_candidates_that_tell_nothing_are_taken_once_each() -> None:
 
 def test_deviations_of_what_is_open() -> None:
     rows = np.diag([2.0, 1e8, 0.0, 5.0])
-    np.testing.assert_allclose(deviations_of(rows, np.zeros(4)), [0.5, 1e-8, np.inf, 0.2])
-    np.testing.assert_allclose(deviations_of(rows, np.array([0.0, 0.0, 4.0, 12.0])), [0.5, 1e-8, 0.25, 1.0 / 13.0])
+    np.testing.assert_allclose(deviations_of(rows, np.zeros(4), np.eye(4)), [0.5, 1e-8, np.inf, 0.2])
+    np.testing.assert_allclose(
+        deviations_of(rows, np.array([0.0, 0.0, 4.0, 12.0]), np.eye(4)), [0.5, 1e-8, 0.25, 1.0 / 13.0]
+    )
     # of two numbers the sum is read, their difference is open, or known beforehand of one of them
     both = np.array([[[1.0, 1.0, 0.0]], [[0.0, 0.0, 2.0]]])
-    np.testing.assert_array_equal(deviations_of(both, np.zeros(3)), [np.inf, np.inf, 0.5])
-    np.testing.assert_allclose(deviations_of(both, np.array([0.5, 0.0, 0.0])), [2.0, np.sqrt(5.0), 0.5])
+    np.testing.assert_array_equal(deviations_of(both, np.zeros(3), np.eye(3)), [np.inf, np.inf, 0.5])
+    np.testing.assert_allclose(deviations_of(both, np.array([0.5, 0.0, 0.0]), np.eye(3)), [2.0, np.sqrt(5.0), 0.5])
 
 
 @pytest.mark.parametrize("precision", [1.0, 1e4, 1e8])
 def test_readings_of_any_precision(precision: float) -> None:
     rows = rows_of(7, candidates=12, numbers=6) * precision
     rows[..., 5] = rows[..., 4]  # never told apart
-    choice = choose_informative(rows, prior_information(rows), 8)
+    choice = choose_informative(rows, prior_information(rows, np.eye(6)), 8)
     assert len(set(choice.order)) == 8
-    found = deviations_of(rows[choice.order], np.ones(6))
+    found = deviations_of(rows[choice.order], np.ones(6), np.eye(6))
     told = rows.reshape(-1, 6)[:, :5] / precision
     # of the two that are told together half the difference remains of what was known
     np.testing.assert_allclose(found[4:], np.sqrt(0.5), rtol=1e-3 if precision == 1.0 else 1e-9)

@@ -94,8 +94,9 @@ def test_every_error_is_that_of_slopes_by_differences() -> None:
     lengths = reference.by_lengths(machine, plan.poses, plan.unstrained_length, model)
     deviations = np.repeat([4.0, 2e-3, 1e-3], [8, 3, 3])
     scatter = np.diag(deviations**2) + 5e-4**2 * lengths @ np.swapaxes(lengths, -1, -2)
-    prior = np.repeat([0.05, 0.02, 0.05, 0.05], [24, 1, 8, 1])
-    known = np.diag(prior**-2.0) + (np.swapaxes(slopes, -1, -2) @ np.linalg.solve(scatter, slopes)).sum(axis=0)
+    prior = np.diag(np.repeat([0.05, 0.02, 0.07, 0.05], [24, 1, 8, 1]) ** 2)
+    prior[25:33, 25:33] += 0.5 * 0.07**2 * (1.0 - np.eye(8))  # half of the variance is common to all load cells
+    known = np.linalg.inv(prior) + (np.swapaxes(slopes, -1, -2) @ np.linalg.solve(scatter, slopes)).sum(axis=0)
     errors = np.sqrt(np.diag(np.linalg.inv(known)))
     assert robot.winches is not None
     assert robot.winches.drum_radius is not None

@@ -21,7 +21,14 @@ from sagline.calibration.evaluation import calibration_of
 from sagline.calibration.findings import Omission
 from sagline.calibration.least_squares import misfit
 from sagline.calibration.log import Sensors, WinchLog
-from sagline.calibration.parameters import Parameters, Unknown, checked_unknowns, parameters_of
+from sagline.calibration.parameters import (
+    OF_CELLS,
+    Parameters,
+    Unknown,
+    checked_unknowns,
+    default_unknowns,
+    parameters_of,
+)
 from sagline.calibration.problem import FitProblem, readings_table
 from sagline.calibration.result import Calibration
 from sagline.calibration.screening import reading_count, screen
@@ -36,13 +43,12 @@ from sagline.robot.robot import Robot
 
 _CATENARY = Catenary()
 MOST_FOLDS: Final = 1000  # parts of the cross-validation; each part takes the time of one calibration
-UNKNOWNS: Final = ("frame_anchors", "length_zero", "axial_stiffness", "mass", "center_of_mass")
 
 
 def calibrate(
     robot: Robot,
     log: WinchLog,
-    unknowns: Sequence[str | Unknown] = UNKNOWNS,
+    unknowns: Sequence[str | Unknown] | None = None,
     *,
     model: CableModel | str = _CATENARY,
     robust: bool = True,
@@ -60,7 +66,9 @@ def calibrate(
             deviation of a prior is the first available value of these: `Unknown(name, deviation=...)`, the robot's
             tolerance, a typical value of the kind.
         log: Readings at poses at rest.
-        unknowns: Parameters to estimate: names of `KINDS` in `sagline.calibration.parameters`, or `Unknown`s.
+        unknowns: Parameters to estimate: names of `KINDS` in `sagline.calibration.parameters`, or `Unknown`s. None for
+            frame anchors, length zeros, axial stiffness, mass and center of mass; and, if load cells are read, their
+            gains and biases.
         model: Cable model, exact or without weight.
         robust: True to reduce the weight of poses that do not fit the other poses.
         folds: Number of parts of the poses for the cross-validation, at most one per pose; each part takes the time of
@@ -101,12 +109,13 @@ def calibrate(
     robust = flag(robust, "robust")
     if (folds := whole_number(folds, "folds", 0, MOST_FOLDS)) == 1:
         raise InvalidValueError("folds", "1", "0 for none, or >= 2", "Give 5, say.")
-    checked = checked_unknowns(unknowns)  # before any other work
+    checked = None if unknowns is None else checked_unknowns(unknowns)  # before any other work
     _refuse(wrong_units(robot, log))
     fit_log, rows, left_out = screen(robot, log)
     sensors = active_sensors(fit_log)
-    parameters = parameters_of(robot, checked, sensors, counted=log.counts is not None)
-    _check_count(fit_log, parameters, left_out)
+    asked = checked_unknowns(default_unknowns(sensors)) if checked is None else checked
+    parameters = parameters_of(robot, asked, sensors, counted=log.counts is not None)
+    _check_count(fit_log, parameters, left_out, freely=checked is not None)
     problem = FitProblem(robot, model, sensors, parameters, readings_table(fit_log))
     try:
         found = search_from_priors(problem, fit_log.commanded, robust=robust, progress=progress)
@@ -119,7 +128,7 @@ def calibrate(
     elif Omission.OTHER_EQUILIBRIUM in found.left_out:
         _refuse(frame_mismatch(fit_log, found.left_out[Omission.OTHER_EQUILIBRIUM], parameters.names))
     validation = cross_validate(problem, found, folds, robust=robust, progress=progress) if folds else None
-    return calibration_of(problem, checked, found, rows, left_out, log.source, validation)
+    return calibration_of(problem, asked, found, rows, left_out, log.source, validation)
 
 
 def active_sensors(log: WinchLog) -> Sensors:
@@ -164,8 +173,10 @@ def _refuse(sentences: Iterable[str]) -> None:
         )
 
 
-def _check_count(log: WinchLog, parameters: Parameters, left_out: Mapping[Omission, Indices]) -> None:
-    readings, wanted = reading_count(log), len(parameters.names)
+def _check_count(log: WinchLog, parameters: Parameters, left_out: Mapping[Omission, Indices], *, freely: bool) -> None:
+    """Reject a log with fewer readings than unknowns; gains and biases count only if the caller chose them freely."""
+    wanted = len([name for name in parameters.names if freely or name not in OF_CELLS])
+    readings = reading_count(log)
     if readings >= wanted:
         return
     gone = "".join(f"; {counted(len(rows), 'row')} left out: {reason.text}" for reason, rows in left_out.items())

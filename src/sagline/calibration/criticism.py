@@ -15,7 +15,7 @@ from sagline.calibration.findings import Criticism
 from sagline.calibration.identifiability import OPEN, append_rows
 from sagline.calibration.least_squares import whitened_at
 from sagline.calibration.observations import BLOCK
-from sagline.calibration.parameters import KINDS, Parameters, Unknown, parameters_of
+from sagline.calibration.parameters import KINDS, OF_CELLS, Parameters, Unknown, parameters_of
 from sagline.calibration.problem import Fit, FitProblem, SearchState, machine_at, reported_lengths
 from sagline.core.arrays import Array, Indices
 from sagline.core.errors import InvalidValueError
@@ -24,7 +24,6 @@ from sagline.robot.robot import Robot
 from sagline.robot.winch import Winch
 
 CHANCE: Final = 0.01  # probability that a log without errors fails a test
-BY_CABLE: Final = ("load_cell_gain", "load_cell_bias")  # kinds that are also tested for single cables
 
 
 class FixedTerms(NamedTuple):
@@ -63,10 +62,9 @@ def fixed_terms(problem: FitProblem, unknowns: Sequence[Unknown], fit: Fit) -> F
         rows = whitened_at(wider, state, reported_lengths(wider, state.machine, part), part, free_of_noise=True)
         columns = np.concatenate((rows.matrix, rows.misfit[..., None]), axis=-1)
         triangle = append_rows(triangle, columns * np.sqrt(fit.normal.weights[part])[:, None, None])
-    known = np.where(np.isfinite(problem.prior_deviation), 1.0 / problem.prior_deviation, 0.0)
     priors = np.zeros((count, numbers.size + 1))
-    priors[:, :count] = np.diag(known)
-    priors[:, -1] = np.where(known > 0.0, -problem.missed(fit.state.numbers), 0.0)
+    priors[:, :count] = problem.prior_root
+    priors[:, -1] = -problem.missed(fit.state.numbers)
     whole, scale = np.vstack((triangle, priors)), problem.scale
     left, sizes, right = np.linalg.svd(whole[:, :count] * scale, full_matrices=False)
     seen = sizes > OPEN * sizes[0]
@@ -144,6 +142,6 @@ def _groups(parameters: Parameters, first: int) -> Iterator[tuple[str, str, Indi
         yield name, name, which, False
         if KINDS[name].each and len(KINDS[name].axes) == 1:
             yield name, f"{name} common to all cables", which, True
-        if name in BY_CABLE:
+        if name in OF_CELLS:  # also tested for single cables
             for k in which:
                 yield name, f"{name}[{cables[k]}]", np.array([k]), False

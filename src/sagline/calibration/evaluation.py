@@ -124,9 +124,8 @@ def _final_readings(problem: FitProblem, fit: Fit) -> tuple[Array, Array]:
 
 def covariance_of(problem: FitProblem, triangle: Array, slopes: Array) -> tuple[Array, int]:
     """Covariance of the values (P, P) and its rank; infinite on the diagonal without observations and prior."""
-    scale, deviation = problem.scale, problem.prior_deviation
-    known = np.where(np.isfinite(deviation), scale / deviation, 0.0)
-    _, sizes, rows = np.linalg.svd(append_rows(triangle * scale, np.diag(known)))
+    scale = problem.scale
+    _, sizes, rows = np.linalg.svd(append_rows(triangle * scale, problem.prior_root * scale))
     observable = sizes > OPEN * sizes[0]
     unit = rows[: len(observable)][observable].T / sizes[observable] * (scale * slopes)[:, None]
     covariance: Array = unit @ unit.T

@@ -74,9 +74,9 @@ class Information:
         return root.T @ root, shares @ shares.transpose(0, 2, 1)
 
 
-def prior_information(rows: Array) -> Array:
-    """Prior information (P, P) in units of the priors: identity, or the rounding error of the rows if it is larger."""
-    return np.eye(rows.shape[-1]) * max(1.0, CONDITION * float((rows**2).sum()))
+def prior_information(rows: Array, root: Array) -> Array:
+    """Prior information (P, P) in units of the priors: R^T R, or the rounding error of the rows if it is larger."""
+    return np.asarray(root.T @ root * max(1.0, CONDITION * float((rows**2).sum())))
 
 
 class Choice(NamedTuple):
@@ -123,9 +123,12 @@ def _exchange(found: Information) -> None:
         found.take(best if gains[best] > gains[candidate] + _WORTH else candidate)
 
 
-def deviations_of(rows: Array, held: Array) -> Array:
-    """Standard deviations (P,) from whitened slopes and inverse prior deviations (P,); infinite if unobserved."""
-    whole = np.concatenate((rows.reshape(-1, len(held)), np.diag(held)))
+def deviations_of(rows: Array, held: Array, root: Array) -> Array:
+    """Standard deviations (P,); infinite if unobserved.
+
+    rows: whitened slopes; held: inverse prior deviations (P,); root: `prior_root` (P, P).
+    """
+    whole = np.concatenate((rows.reshape(-1, len(held)), root * held))
     _, size, vectors = np.linalg.svd(np.linalg.qr(whole, mode="r"))  # J^T J would square the condition number
     there = size > OPEN * size[0]
     variance = ((vectors[there] / size[there, None]) ** 2).sum(axis=0)

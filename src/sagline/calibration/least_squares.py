@@ -250,12 +250,11 @@ def best_step(problem: FitProblem, state: SearchState, normal: Normal) -> tuple[
 
     The step is zero along directions with neither observations nor a prior.
     """
-    scale, deviation = problem.scale, problem.prior_deviation
-    known = np.where(np.isfinite(deviation), scale / deviation, 0.0) ** 2
-    missed = (state.numbers - problem.prior) / scale
-    downhill = scale * normal.gradient - known * missed
-    matrix = scale[:, None] * normal.matrix * scale + np.diag(known)
-    step = _lowest(matrix, downhill, positive=bool(known.all()))
+    scale = problem.scale
+    root = problem.prior_root * scale
+    downhill = scale * normal.gradient - root.T @ problem.missed(state.numbers)
+    matrix = scale[:, None] * normal.matrix * scale + root.T @ root
+    step = _lowest(matrix, downhill, positive=bool(np.isfinite(problem.prior_deviation).all()))
     lower = (problem.least - state.numbers) / scale
     if (step < lower).any():
         step = _lowest_within(matrix, downhill, lower)

@@ -16,6 +16,7 @@ from sagline.core.results import Result
 from sagline.kernels.calibration import kinds
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
+from sagline.robot.winch import Winch
 
 
 class Kind(NamedTuple):
@@ -32,6 +33,7 @@ class Kind(NamedTuple):
         deviation: Standard deviation of a value from a drawing or data sheet, relative if logarithmic.
         assumed: Standard deviation of a value that is missing in the robot's source.
         needs: The readings that observe the kind: "counts", "load cells", "positions"; "" for any readings.
+        common: Share of the prior variance that the values of all cables have in common, 0 to 1.
     """
 
     owner: str
@@ -44,6 +46,7 @@ class Kind(NamedTuple):
     deviation: float
     assumed: float
     needs: str = ""
+    common: float = 0.0
 
 
 _XYZ: Final = ("x", "y", "z")
@@ -58,7 +61,7 @@ KINDS: Final[dict[str, Kind]] = {
     "axial_stiffness": Kind("cables", "N", kinds.STIFFNESS, _ONE, True, True, True, 0.3, 1.0),
     "pulley_radius": Kind("winches", "m", kinds.RADIUS, _ONE, True, True, False, 0.002, 0.02),
     "dead_cable": Kind("winches", "m", kinds.DEAD, _ONE, True, False, False, 0.1, 1.0),
-    "load_cell_gain": Kind("winches", "", kinds.GAIN, _ONE, True, False, False, 0.05, 0.2, "load cells"),
+    "load_cell_gain": Kind("winches", "", kinds.GAIN, _ONE, True, False, False, 0.07, 0.3, "load cells", 0.5),
     "load_cell_bias": Kind("winches", "N", kinds.BIAS, _ONE, True, False, False, 20.0, 100.0, "load cells"),
     "mass": Kind("robot", "kg", kinds.MASS, _ONE, False, False, True, 0.05, 0.2),
     "center_of_mass": Kind("robot", "m", kinds.CENTER, _XYZ, False, False, False, 0.05, 0.2),
@@ -130,7 +133,16 @@ class Parameters(Result):
     counted: bool
 
 
-_NOTHING: Final = {"load_cell_gain": "1", "load_cell_bias": "0 N", "dead_cable": "0 m", "pulley_radius": "0 m"}
+UNKNOWNS: Final = ("frame_anchors", "length_zero", "axial_stiffness", "mass", "center_of_mass")
+OF_CELLS: Final = ("load_cell_gain", "load_cell_bias")
+
+
+def default_unknowns(sensors: Sensors) -> tuple[str, ...]:
+    """Unknowns if the caller names none: with gains and biases of the load cells as soon as these are read."""
+    return UNKNOWNS if sensors.tension_deviation is None else (*UNKNOWNS, *OF_CELLS)
+
+
+_NOTHING: Final = {"dead_cable": "0 m", "pulley_radius": "0 m"}
 
 
 def parameters_of(robot: Robot, unknowns: Sequence[str | Unknown], sensors: Sensors, *, counted: bool) -> Parameters:
@@ -196,6 +208,8 @@ def _field(robot: Robot, name: str) -> Array | None:
     """Values of a kind in a robot; None if the robot does not have them."""
     owner = KINDS[name].owner
     part = robot if owner == "robot" else getattr(robot, owner)
+    if part is None and name in OF_CELLS:  # load cells without winches read the tension
+        part = Winch()
     value: Array | None = None if part is None else getattr(part, name)
     return value
 
@@ -265,6 +279,18 @@ def external(parameters: Parameters, numbers: Array) -> Array:
         return np.where(parameters.logarithmic, np.exp(numbers), numbers)
 
 
+def prior_root(parameters: Parameters) -> Array:
+    """Symmetric root of the inverse prior correlation, (P, P): the identity, except for kinds with a common share."""
+    root = np.eye(len(parameters.names))
+    for kind in KINDS.values():
+        which = parameters.where[kind.first]
+        if kind.common and which[0] >= 0 and (m := len(np.unique(which))) > 1:
+            mean = np.full((m, m), 1.0 / m)
+            alone, shared = (1.0 - kind.common) ** -0.5, (1.0 + (m - 1) * kind.common) ** -0.5
+            root[np.ix_(which, which)] = alone * (np.eye(m) - mean) + shared * mean
+    return root
+
+
 def slopes_of_values(robot: Robot, parameters: Parameters) -> Array:
     """Derivatives of the values by the internal parameters (P,): the value for a logarithm, otherwise 1."""
     slopes = np.ones(len(parameters.names))
@@ -288,7 +314,9 @@ def with_values(robot: Robot, parameters: Parameters, values: Array) -> Robot:
         value = value if len(kind.axes) > 1 else value[:, 0]
         changes[kind.owner][name] = value if kind.each else value[0]
     parts = {
-        owner: getattr(robot, owner).replace(**changes[owner]) for owner in ("cables", "winches") if changes[owner]
+        owner: (getattr(robot, owner) or Winch()).replace(**changes[owner])
+        for owner in ("cables", "winches")
+        if changes[owner]
     }
     return robot.replace(**parts, **changes["robot"])
 

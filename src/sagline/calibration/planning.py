@@ -10,7 +10,6 @@ from typing import Final
 import numpy as np
 
 from sagline.cables.models import Catenary
-from sagline.calibration.calibrate import UNKNOWNS
 from sagline.calibration.candidates import CandidatePoses, candidates_of, shortest_tour, tour_length
 from sagline.calibration.information import (
     Choice,
@@ -25,7 +24,15 @@ from sagline.calibration.information import (
 )
 from sagline.calibration.log import Sensors
 from sagline.calibration.observations import has_drum_data, predicted_rows
-from sagline.calibration.parameters import KINDS, Parameters, Unknown, parameters_of, slopes_of_values
+from sagline.calibration.parameters import (
+    KINDS,
+    Parameters,
+    Unknown,
+    default_unknowns,
+    parameters_of,
+    prior_root,
+    slopes_of_values,
+)
 from sagline.core.arguments import callback, instance, optional, whole_number
 from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.core.errors import InvalidValueError
@@ -198,7 +205,7 @@ _CATENARY: Final = Catenary()
 def calibration_poses(
     robot: Robot,
     count: int,
-    unknowns: Sequence[str | Unknown] = UNKNOWNS,
+    unknowns: Sequence[str | Unknown] | None = None,
     sensors: Sensors | None = None,
     *,
     box: PoseBox | None = None,
@@ -251,7 +258,8 @@ def calibration_poses(
     if read.tension_deviation is None and read.position_deviation is None and read.rotation_deviation is None:
         step = "Give Sensors(tension_deviation=...), or leave sensors out."
         raise InvalidValueError("sensors", "lengths alone", "load cells, positions or rotations in addition", step)
-    parameters = parameters_of(robot, unknowns, read, counted=has_drum_data(robot))
+    asked = default_unknowns(read) if unknowns is None else unknowns
+    parameters = parameters_of(robot, asked, read, counted=has_drum_data(robot))
     check_memory(
         f"{tried:,} candidates",
         8.0 * 3.0 * tried * (robot.cable_count + 6) * len(parameters.names),
@@ -263,7 +271,8 @@ def calibration_poses(
     stable = np.flatnonzero(np.isfinite(rows).all(axis=(1, 2)))
     standing, rows = standing.part(stable), _read(rows[stable])
     _refuse(robot, parameters, size, tried, rows)
-    known, unit = prior_information(rows), scale * np.abs(slopes)
+    root, unit = prior_root(parameters), scale * np.abs(slopes)
+    known = prior_information(rows, root)
     choice = choose_informative(rows, known, size)
     order = choice.order[_driving_order(standing.part(choice.order))]
     poses, own, random = standing.part(order), rows[order], _random(rows, standing.usual, size, drawn)
@@ -274,8 +283,8 @@ def calibration_poses(
         poses=Pose.from_quaternion(poses.poses[:, :3], poses.poses[:, 3:]),
         frame_end_tension=poses.tensions,
         unstrained_length=poses.lengths,
-        expected_error=locked(deviations_of(own, held) * unit),
-        random_error=locked(np.median([deviations_of(other, held) for other in random], axis=0) * unit),
+        expected_error=locked(deviations_of(own, held, root) * unit),
+        random_error=locked(np.median([deviations_of(other, held, root) for other in random], axis=0) * unit),
         share_of_random=_share(known, own, random),
         gain=locked(choice.gain),
         enough=_sufficient_count(choice),

@@ -10,7 +10,16 @@ from scipy.spatial.transform import Rotation
 from sagline.cables.model import CableModel
 from sagline.calibration.log import Sensors, WinchLog, load_cells_of
 from sagline.calibration.observations import NO_LOAD, MachineTerms, WhitenedRows, lengths_at_counts, machine_of
-from sagline.calibration.parameters import KINDS, Parameters, external, internal, offset_with, sensors_with, with_values
+from sagline.calibration.parameters import (
+    KINDS,
+    Parameters,
+    external,
+    internal,
+    offset_with,
+    prior_root,
+    sensors_with,
+    with_values,
+)
 from sagline.core.arrays import Array, Indices, locked
 from sagline.kernels.calibration import kinds
 from sagline.kernels.calibration.starting_lengths import starting_lengths
@@ -81,7 +90,12 @@ class FitProblem(NamedTuple):
 
     def missed(self, numbers: Array) -> Array:
         """Internal parameters minus their prior, in prior standard deviations, (P,)."""
-        return np.asarray((numbers - self.prior) / self.prior_deviation)
+        return np.asarray(self.prior_root @ (numbers - self.prior))
+
+    @property
+    def prior_root(self) -> Array:
+        """Root of the prior information: a matrix W, (P, P); W^T W is the inverse of the prior covariance."""
+        return np.asarray(prior_root(self.parameters) / self.prior_deviation)
 
     @property
     def scale(self) -> Array:

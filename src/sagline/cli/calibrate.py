@@ -47,7 +47,7 @@ class _Request(NamedTuple):
     """Options for the fit and for the choice of poses; the deviations are those of sensors given by options."""
 
     robot: str
-    unknowns: tuple[str, ...]
+    unknowns: tuple[str, ...] | None
     deviations: dict[str, Any]
     files: tuple[Path, ...]
     plot: Path | None
@@ -87,7 +87,8 @@ def calibrate(
         option(
             "NAMES",
             "Unknown parameters, with commas between. Default: "
-            "frame_anchors,length_zero,axial_stiffness,mass,center_of_mass.",
+            "frame_anchors,length_zero,axial_stiffness,mass,center_of_mass, and with load cells "
+            "load_cell_gain,load_cell_bias.",
         ),
     ] = None,
     length_deviation: Annotated[float | None, _deviation_option("a length or counted length, '0.5 mm'", "m")] = None,
@@ -120,9 +121,7 @@ def calibrate(
         sagline calibrate winches_robot.yaml winches.csv --folds 10 --out found.nc
         sagline calibrate winches_robot.yaml --plan 40 --out poses.yaml
     """
-    from sagline.calibration.calibrate import UNKNOWNS
-
-    names = UNKNOWNS if unknowns is None else tuple(name.strip() for name in unknowns.split(","))
+    names = None if unknowns is None else tuple(name.strip() for name in unknowns.split(","))
     deviations = {
         "length_deviation": length_deviation,
         "tension_deviation": tension_deviation,

@@ -1,0 +1,170 @@
+"""A platform on four cables with two freedoms left to gravity, and its log: a twin by code that shares nothing with
+the fit.
+
+The cables are Irvine's elastic catenaries in closed form. Pose and cable forces are found together, by Newton's method
+with differences.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+import sagline as sl
+from sagline.core.arrays import Array
+
+FRAME: Final = np.array([[-1.4, -1.1, 2.6], [1.4, -1.1, 2.6], [1.4, 1.1, 2.6], [-1.4, 1.1, 2.6]])  # m
+PLATFORM: Final = np.array([[-0.2, -0.15, 0.12], [0.2, -0.15, 0.12], [0.2, 0.15, 0.12], [-0.2, 0.15, 0.12]])  # m
+MASS: Final = 12.992  # kg
+CENTER: Final = np.array([0.0, 0.0, 0.02])  # m
+STIFFNESS: Final = 6e4  # N
+DENSITY: Final = 0.006  # kg/m
+GRAVITY: Final = 9.81  # m/s^2
+POSES: Final = 27
+LENGTH_NOISE: Final = 2e-3  # m
+CELL_NOISE: Final = 2.0  # N
+TOLERANCES: Final = {"frame_anchors": 0.01, "length_zero": 0.02, "axial_stiffness": 0.2, "center_of_mass": 0.01}
+MASS_OFF: Final = 0.05  # share of the mass by which the file is wrong
+LEAST: Final = 10.0  # N
+DEFECTS: Final = ("gains of the same sign", "gains of any sign", "one gain", "biases", "gains and biases")
+
+
+class Twin(NamedTuple):
+    """What the machine is: anchors [m], mass [kg], center of mass [m], stiffness [N], length zeros [m], cells."""
+
+    frame: Array
+    mass: float
+    center: Array
+    stiffness: float
+    zeros: Array
+    gain: Array
+    bias: Array
+
+
+def drawn_robot(**changes: Any) -> sl.Robot:
+    """The robot as its file has it: without a tolerance of the mass."""
+    return sl.Robot(
+        "four cables",
+        frame_anchors=FRAME,
+        platform_anchors=PLATFORM,
+        cables=sl.Cable(linear_density=DENSITY, axial_stiffness=STIFFNESS),
+        mass=MASS,
+        inertia=np.diag([0.2, 0.3, 0.4]),
+        center_of_mass=CENTER,
+        gravity=GRAVITY,
+        tolerances={"axial_stiffness": 0.2 * STIFFNESS, **{k: v for k, v in TOLERANCES.items() if "stiff" not in k}},
+        **changes,
+    )
+
+
+def twin_of(seed: int, defect: str | None = None) -> Twin:
+    """A machine with errors of its drawing, and with a defect of its load cells."""
+    rng = np.random.default_rng(seed)
+    normal = rng.normal
+    gain, bias = np.ones(4), np.zeros(4)
+    off, sign = rng.uniform(0.05, 0.10, 4), rng.choice([-1.0, 1.0], 4)
+    if defect in ("gains of the same sign", "gains and biases"):
+        gain += sign[0] * off
+    elif defect == "gains of any sign":
+        gain += sign * off
+    elif defect == "one gain":
+        gain[seed % 4] += 2.0 * sign[0] * off[0]
+    if defect in ("biases", "gains and biases"):
+        bias += rng.uniform(-20.0, 20.0, 4)
+    return Twin(
+        FRAME + TOLERANCES["frame_anchors"] * normal(size=(4, 3)),
+        MASS * np.exp(MASS_OFF * normal()),
+        CENTER + TOLERANCES["center_of_mass"] * normal(size=3),
+        STIFFNESS * np.exp(TOLERANCES["axial_stiffness"] * normal()),
+        TOLERANCES["length_zero"] * normal(size=4),
+        gain,
+        bias,
+    )
+
+
+def cable_vectors(force: Array, length: Array, stiffness: float) -> tuple[Array, Array]:
+    """From the platform end to the frame end [m] (4, 3), and the tension there [N], by the force on the platform."""
+    weight = DENSITY * GRAVITY
+    flat = np.hypot(force[:, 0], force[:, 1])
+    below, above = force[:, 2], force[:, 2] + weight * length
+    along = (np.arcsinh(above / flat) - np.arcsinh(below / flat)) / weight + length / stiffness
+    tension = np.hypot(flat, above)
+    rise = (tension - np.hypot(flat, below)) / weight + length * (below + above) / (2.0 * stiffness)
+    return np.column_stack((force[:, :2] * along[:, None], rise)), tension
+
+
+def misses(unknown: Array, twin: Twin, place: Array) -> Array:
+    """Gaps of the cables [m], and force and moment about the center of mass in weights, (18,).
+
+    unknown: roll, pitch [rad], lengths [m], forces [N]; place: x, y, z [m] and yaw [rad].
+    """
+    turn = turn_of(unknown, place)
+    force = unknown[6:].reshape(4, 3)
+    ends = place[:3] + PLATFORM @ turn.T
+    gaps = ends + cable_vectors(force, unknown[2:6], twin.stiffness)[0] - twin.frame
+    arms = ends - place[:3] - turn @ twin.center
+    weight = twin.mass * GRAVITY
+    balance = np.concatenate((force.sum(axis=0) - [0.0, 0.0, weight], np.cross(arms, force).sum(axis=0)))
+    return np.concatenate((gaps.ravel(), balance / weight))
+
+
+def turn_of(unknown: Array, place: Array) -> Array:
+    """Rotation matrix of yaw, pitch and roll."""
+    (a, b, c), (p, q, r) = np.cos([place[3], *unknown[1::-1]]), np.sin([place[3], *unknown[1::-1]])
+    return np.array(
+        [
+            [a * b, a * q * r - p * c, a * q * c + p * r],
+            [p * b, p * q * r + a * c, p * q * c - a * r],
+            [-q, b * r, b * c],
+        ]
+    )
+
+
+def at_rest(twin: Twin, place: Array) -> Array | None:
+    """Roll, pitch, lengths and forces at x, y, z and yaw; None if a cable would pull less than `LEAST`."""
+    ends = place[:3] + PLATFORM @ turn_of(np.zeros(2), place).T
+    reach = twin.frame - ends
+    length = np.linalg.norm(reach, axis=1)
+    lines = np.vstack((reach.T, np.cross(ends - place[:3], reach)[:, 2])) / length
+    pull = np.linalg.solve(lines, [0.0, 0.0, twin.mass * GRAVITY, 0.0])
+    if pull.min() < LEAST:
+        return None
+    found = np.concatenate((np.zeros(2), length, (reach * (pull / length)[:, None]).ravel()))
+    for _ in range(20):
+        miss = misses(found, twin, place)
+        steps = 1e-6 * np.maximum(1.0, np.abs(found))
+        slopes = [(misses(found + way, twin, place) - miss) / way.sum() for way in np.diag(steps)]
+        change = np.linalg.solve(np.transpose(slopes), miss)
+        found = found - change * min(1.0, 0.2 / np.abs(change[:6]).max())
+        if np.abs(change[:6]).max() < 1e-9:
+            return np.asarray(found)
+    return None
+
+
+def log_of_twin(twin: Twin, seed: int, poses: int = POSES) -> sl.WinchLog:
+    """Lengths and load cells at places over the workspace, with noise, and the poses that were commanded."""
+    rng = np.random.default_rng((seed, 1))
+    lengths: list[Array] = []
+    cells: list[Array] = []
+    stood: list[Array] = []
+    while len(stood) < poses:
+        place = rng.uniform([-0.7, -0.5, 0.4, -0.04], [0.7, 0.5, 1.7, 0.04])
+        found = at_rest(twin, place)
+        if found is None or np.abs(found[:2]).max() > 0.5:
+            continue
+        tension = cable_vectors(found[6:].reshape(4, 3), found[2:6], twin.stiffness)[1]
+        if tension.min() < LEAST:
+            continue
+        lengths.append(found[2:6] - twin.zeros + LENGTH_NOISE * rng.normal(size=4))
+        cells.append(twin.gain * tension + twin.bias + CELL_NOISE * rng.normal(size=4))
+        angles = np.array([place[3], found[1], found[0]])
+        stood.append(np.concatenate((place[:3] + 0.02 * rng.normal(size=3), angles + 0.01 * rng.normal(size=3))))
+    placed = np.array(stood)
+    return sl.WinchLog(
+        unstrained_length=np.array(lengths),
+        load_cells=np.array(cells),
+        commanded=sl.Pose(placed[:, :3], Rotation.from_euler("ZYX", placed[:, 3:])),
+        sensors=sl.Sensors(LENGTH_NOISE, CELL_NOISE),
+    )
