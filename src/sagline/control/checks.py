@@ -35,8 +35,7 @@ class Motion:
 
     Attributes:
         period: Period of a cycle and time between two rows [s].
-        plan: Plan at the ticks of the clock. The last tick is at the end of the path or shortly after it. None for a
-            jog.
+        plan: Plan at the ticks. The last tick is at the end of the path or shortly after it. None for a jog.
         state: Robot, poses and cables at the rows.
         length: Unstrained lengths off the drums [m], shape (N, m).
         rate: Rates of these lengths [m/s], shape (N, m); zero in the last row.

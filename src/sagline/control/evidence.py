@@ -283,8 +283,8 @@ class Fault(ABC):
 
         Returns:
             Message for the operator in the cycle in which the fault begins: fault, item, value, limit, next step. None
-            in all other cycles. A fault that begins while another fault stops the motion is reported after the stop, if
-            it persists.
+            in all other cycles. A fault that begins during the stop by another fault is reported after the stop, if it
+            persists.
         """
         if cycle is not self.seen.cycle:  # the first rule updates the evidence for all rules
             self.seen.at(cycle)

@@ -1,4 +1,4 @@
-"""C99 source of a robot's inverse and forward kinematics for microcontrollers, from translated kernels of this package.
+"""C99 source of a robot's inverse and forward kinematics for microcontrollers, translated from the kernels.
 
 `tools/translate/portable.py` translates the kernels in parts when the package is built. The source of a robot contains
 the necessary parts, the data of the robot, and functions to call.
@@ -39,7 +39,7 @@ from sagline.tension.methods import DEFAULT, method_of
 
 KERNELS: Final = "c/kernels.json"
 BAD_INPUT: Final = 9
-FORWARD_STATUS: Final = 10  # number that is added to the status codes of the forward kernel
+FORWARD_STATUS: Final = 10  # offset that is added to the status codes of the forward kernel
 COMMENT: Final = re.compile(r"/\*.*?\*/", re.DOTALL)
 
 
@@ -51,12 +51,12 @@ def export_c(
     forward: bool = False,
     single_precision: bool = False,
 ) -> tuple[Path, Path, Path]:
-    """Write C99 for a robot's kinematics on a microcontroller, and SCL of one function for a PLC.
+    """Write C99 source of a robot's kinematics for a microcontroller, and SCL source of one function for a PLC.
 
-    NAME.c contains the translated kernels of `inverse` and, on request, of `forward`, and the data of the robot. The
-    source has no heap and no recursion, all loops are bounded, and each function returns a status. NAME.h declares the
-    functions and states their bounds. NAME.scl is the function P3 of "The model" in SCL for a Siemens PLC; it has not
-    been compiled yet.
+    NAME.c contains the data of the robot, the translated kernels of `inverse` and, on request, those of `forward`. The
+    source uses no heap and no recursion, all loops are bounded, and each function returns a status. NAME.h declares the
+    functions and states their bounds. NAME.scl contains the function P3 of docs/model.md in SCL for a Siemens PLC. It
+    has not been compiled yet.
 
     Args:
         robot: The robot; its winches may have pulleys and dead lengths, but no guides.
@@ -98,7 +98,7 @@ def export_c(
 def source_of(
     robot: Robot, methods: Sequence[TensionMethod], forward: bool, real: type[np.floating], stem: str
 ) -> tuple[str, str]:
-    """Source and header in C99 of a robot, with numbers of float64 or float32."""
+    """Compose the C99 source and header of a robot, with numbers of type float64 or float32."""
     options = [kernel_options(robot, Catenary(), method) for method in methods]
     kernels = _kernels()
     words = _words(robot, methods, options, real, stem)
@@ -123,7 +123,7 @@ def source_of(
 
 
 def _kernels() -> dict[str, Any]:
-    """Translated kernels in both precisions, and their bounds."""
+    """Read the translated kernels in both precisions, and their bounds."""
     place = files("sagline.files").joinpath(KERNELS)
     try:
         found: dict[str, Any] = json.loads(place.read_text(encoding="utf-8"))
@@ -134,13 +134,13 @@ def _kernels() -> dict[str, Any]:
 
 
 def _evaluated(bounds: dict[str, list[tuple[int, int, int]]], robot: Robot) -> dict[str, int]:
-    """Bounds of a kernel for a robot, from polynomials in the degrees of freedom and the number of redundant cables."""
+    """Bounds of a kernel for a robot, from polynomials in the degrees of freedom and in the redundancy."""
     n, r = robot.degrees_of_freedom, robot.cable_count - robot.degrees_of_freedom
     return {name: sum(value * n**i * r**j for i, j, value in terms) for name, terms in bounds.items()}
 
 
 def _reached(parts: list[tuple[list[str], str]], asked: Sequence[str]) -> str:
-    """The parts that some entries need, in the order of the source."""
+    """Select the parts that some entries need, in the order of the source."""
     owner = {name: index for index, (names, _) in enumerate(parts) for name in names}
     waiting, reached = [owner[name] for name in asked], {index for index, (names, _) in enumerate(parts) if not names}
     while waiting:
@@ -155,7 +155,7 @@ def _reached(parts: list[tuple[list[str], str]], asked: Sequence[str]) -> str:
 def _words(
     robot: Robot, methods: Sequence[TensionMethod], options: Sequence[Options], real: type[np.floating], stem: str
 ) -> dict[str, str]:
-    """Replacements in the text of the robot's functions: data and sizes."""
+    """Data and sizes that replace the placeholders in the text of the robot's functions."""
     freedom, m, n = robot.freedom, robot.cable_count, robot.degrees_of_freedom
     turning = freedom[:, 3:].any(axis=1) if robot.motion_pattern in ROTATING else np.zeros(n, dtype=bool)
     rows = tables.RESULT_ROWS if has_routing(robot) else tables.BARE_ROWS
@@ -189,7 +189,7 @@ def _words(
 
 
 def _method_names(methods: Sequence[TensionMethod]) -> list[str]:
-    """Name in C of each method: name of its class, with a number if the class is repeated."""
+    """C name of each method: the name of its class, with a number if several methods have this class."""
     found: list[str] = []
     for method in methods:
         name = "SAGLINE" + re.sub(r"(?=[A-Z])", "_", type(method).__name__).upper()
@@ -198,7 +198,7 @@ def _method_names(methods: Sequence[TensionMethod]) -> list[str]:
 
 
 def _rule(options: Options, real: type[np.floating]) -> str:
-    """Data of a method in C."""
+    """Data of a method as C text."""
     code, parameter, variable, weights, targets = options.sharing
     numbers = (_constant(np.asarray(value), "tension", real) for value in (parameter, options.limits[1]))
     lists = (_constant(np.asarray(value), "tension", real) for value in (weights, targets))
@@ -215,7 +215,7 @@ def _statuses() -> str:
 
 
 def _constant(values: Array, name: str, real: type[np.floating]) -> str:
-    """A constant in C, or a list in braces; C reads each text as exactly the same number."""
+    """Constant or list in braces as C text, from which C reads exactly the same numbers."""
     if values.ndim:
         separator = ", " if values.ndim == 1 else ",\n    "
         return f"{{{separator.join(_constant(value, name, real).strip('{}') for value in values)}}}"

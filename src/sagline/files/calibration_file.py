@@ -135,13 +135,13 @@ DIRECTIONS: Final = {  # unobservable or weakly observable directions in paramet
 
 
 def _check_calibration(data: Dataset, robot: Robot, before: Robot, sensors: Sequence[Quantity]) -> None:
-    """Refuse a data set that is not a calibration; arguments: the two robots and the quantities of the sensors."""
+    """Refuse a data set that is not a calibration of these robots with these sensor quantities."""
     m = robot.cable_count
     if before.cable_count != m:
         raise InvalidValueError("robot_before", f"of {before.cable_count} cables", f"of {m}, as robot", STEP)
     directions = [one for columns in DIRECTIONS.values() for one in columns]
     quantities = [*FOUND, *PARAMETERS, *PLACED, *sensors, *OUTLIERS, *LEFT_OUT, *directions]
-    for group in (CROSS_VALIDATION, CRITICISMS):  # the second is missing in older files
+    for group in (CROSS_VALIDATION, CRITICISMS):  # older files do not have the second
         if any(one.name in data.variables for one in group):
             quantities += group
     sizes = {str(name): size for name, size in data.sizes.items()}
@@ -201,7 +201,7 @@ def load_calibration(file: os.PathLike[str] | str) -> Calibration:
 
 
 def _pack(found: Calibration) -> Dataset:
-    """Data set of a calibration."""
+    """Create the data set of a calibration."""
     variables = variables_of_result(found, FOUND) | variables_of_result(found.parameters, PARAMETERS)
     dimensions, units, attributes = variables["parameter_unit"]
     variables["parameter_unit"] = dimensions, np.where(units == "", "1", units).astype(object), attributes
@@ -219,7 +219,7 @@ def _pack(found: Calibration) -> Dataset:
 
 
 def _sensor(name: str, axes: int) -> Quantity:
-    """Standard deviation of a sensor: one number, or one per cable or axis."""
+    """Read the standard deviation of a sensor: one number, or one per cable or axis."""
     part, unit = SENSORS[name]
     long_name = f"standard deviation of a {name.removesuffix('_deviation')} that is read"
     return Quantity(name, (part,) if axes else (), unit, long_name, low=0.0)
@@ -239,10 +239,10 @@ def _attributes(found: Calibration) -> dict[str, Any]:
 
 
 def _unpack(path: Path, data: Dataset) -> Calibration:
-    """Calibration of a data set; the path is used in messages."""
+    """Create the calibration from a data set; the path is used in messages."""
     robot = parse_robot(str(data.attrs["robot"]), f"{path}, robot")
     before = parse_robot(str(data.attrs["robot_before"]), f"{path}, robot_before")
-    measured = ["length_deviation", *(name for name in SENSORS if name in data.variables)]  # the first always exists
+    measured = ["length_deviation", *(name for name in SENSORS if name in data.variables)]  # this group always exists
     sensors = [_sensor(name, data.variables[name].ndim) for name in dict.fromkeys(measured)]
     _check_calibration(data, robot, before, sensors)
     found, numbers, placed = (fields_of(data, each) for each in (FOUND, PARAMETERS, (*PLACED, *sensors)))

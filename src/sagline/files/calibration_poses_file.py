@@ -1,4 +1,4 @@
-"""Files of calibration poses: a path with a stop at each pose, and the tensions and lengths at each stop."""
+"""Files of calibration poses: a path with a stop at each pose, and tensions and lengths for each stop."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ HEAD: Final = """\
 """
 SPEED: Final = 0.2  # largest speed between two poses [m/s]
 ANGULAR_SPEED: Final = 0.1  # largest angular speed between two poses [rad/s]
-DWELL: Final = 2.0  # shortest time between two poses, or between two sets of tensions at one pose [s]
+DWELL: Final = 2.0  # shortest time from one pose, or one set of tensions at a pose, to the next [s]
 RATE: Final = 10.0  # sample rate of the path [1/s]
-_PEAK: Final = 15.0 / 8.0  # ratio of peak speed to mean speed of a quintic
+_PEAK: Final = 15.0 / 8.0  # ratio of peak speed to mean speed of a quintic segment
 _DECIMALS: Final = {"position": 4, "quaternion": 6, "frame_end_tension": 1, "unstrained_length": 5, "counts": 0}
 _DIGITS: Final = 4  # significant digits of an expected error
 
@@ -56,7 +56,7 @@ def save(plan: CalibrationPoses, file: os.PathLike[str] | str) -> None:
 
 
 def _durations(poses: Pose) -> list[float]:
-    """Duration of each motion [s], at least DWELL, and long enough for any machine."""
+    """Duration of each motion [s]: at least DWELL, and sufficient for any machine."""
     way = np.linalg.norm(np.diff(poses.position, axis=0), axis=1)
     turn = (poses.rotation[1:] * poses.rotation[:-1].inv()).magnitude()
     times = np.maximum(_PEAK * np.maximum(way / SPEED, turn / ANGULAR_SPEED), DWELL)
@@ -64,7 +64,7 @@ def _durations(poses: Pose) -> list[float]:
 
 
 def _about(plan: CalibrationPoses) -> dict[str, Any]:
-    """Entry that states the robot, the version of sagline and the purpose of the poses."""
+    """Header entry of the file: robot, version of sagline, and purpose of the poses."""
     numbers = plan.parameters
     names = ("length_deviation", "tension_deviation", "position_deviation", "rotation_deviation")
     given = {name: getattr(plan.sensors, name) for name in names}
@@ -87,5 +87,5 @@ def _round(row: Array, decimals: int) -> list[Any]:
 
 
 def _plain(error: float) -> float | None:
-    """Error rounded to few digits; None for an unknown error."""
+    """Expected error, rounded to few digits; None if it is unknown."""
     return float(f"{error:.{_DIGITS}g}") if np.isfinite(error) else None

@@ -1,4 +1,4 @@
-"""Robots of CASPR, a MATLAB program for cable robots: one XML file of bodies, and one XML file of cables."""
+"""Robots of CASPR, a MATLAB program for cable robots. A robot has an XML file of bodies and an XML file of cables."""
 
 from __future__ import annotations
 
@@ -57,15 +57,15 @@ def load_caspr(source: str | os.PathLike[str], cables: Cable | None = None, cabl
     Args:
         source: The robot's folder, or its file of bodies or of cables; the other file is then searched in the same
             folder.
-        cables: The cables' material; None for the values of the file, with assumed values where they are missing.
+        cables: Material of the cables. None: values of the file, and assumed values for missing values.
         cable_set: Name of the set of cables; None for the default of the file.
 
     Returns:
         Imported: the robot, and the lost data.
 
     Raises:
-        FileError: If a file cannot be read or is missing, or if the files do not describe a robot with one platform and
-            straight cables that are not routed.
+        FileError: If a file cannot be read or is missing, or if the robot does not have a single platform and cables
+            that go straight from the base to the platform.
 
     Examples:
         >>> import sagline as sl
@@ -100,7 +100,7 @@ def load_caspr(source: str | os.PathLike[str], cables: Cable | None = None, cabl
 
 
 def _files(source: Path) -> tuple[Path, Path]:
-    """Paths of the files of bodies and of cables; a file named by the caller has priority over others in the folder."""
+    """Paths of the files of bodies and of cables. A file that the caller names has priority over other files."""
     if not exists(source):
         raise FileError(source, "does not exist", "Check its name.")
     folder = source if source.is_dir() else source.parent
@@ -149,7 +149,7 @@ def _platform(root: Element) -> tuple[dict[str, Any], list[str]]:
 
 
 def _inertia(element: Element, mass: float, center: Array) -> Array:
-    """Inertia about the center of mass; CASPR gives it about this center, or about the joint (platform origin)."""
+    """Inertia about the center of mass. CASPR gives it about this center or about the joint (platform origin)."""
     xx, yy, zz, xy, xz, yz = (
         number_of_text(element.findtext(key), key, "kg m^2") for key in ("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
     )
@@ -193,7 +193,7 @@ def _select_set(root: Element, wanted: str | None, lost: list[str]) -> Element:
 
 
 def _columns(chosen: Element, center: Array, lost: list[str]) -> dict[str, Any]:
-    """Values of the cables of a set, by name."""
+    """Values of all cables of a set, by the name of the quantity."""
     rows = []
     for k, element in enumerate(chosen):
         item = f"{element.tag} {element.get('name') or k}"
@@ -234,7 +234,7 @@ def _row(element: Element, item: str, center: Array, lost: list[str]) -> tuple[A
 
 
 def _pulley(end: Element, link: str, item: str, lost: list[str]) -> tuple[float, _Vector]:
-    """Pulley radius and swivel axis at a cable end; along the swivel axis, the cable enters the pulley."""
+    """Pulley radius and swivel axis at a cable end. The cable enters the pulley along the swivel axis."""
     if end.tag != "attachment_base_pulley" or link != "0":
         unlike = f"of a kind unknown here, <{end.tag}>"
     elif end.find("pulley_radius") is None or end.find("cable_entry_vector") is None:

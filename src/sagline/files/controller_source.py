@@ -43,10 +43,10 @@ STOP: Final = """\
 
 
 def export_scl(robot: Robot, file: str | os.PathLike[str]) -> Path:
-    """Write the SCL source for the PLCs of a robot (TIA Portal): data blocks, limits and program.
+    """Write the SCL source for the PLCs of a robot, for TIA Portal: data blocks, limits and program.
 
-    The program accepts commands of the controller that owns the group, and enforces the limits. Without commands, it
-    slows the winches down by itself. Its header lists the settings of the CPU. It has not been compiled yet.
+    The program accepts commands only from the controller that owns the group, and enforces the limits. Without
+    commands, it slows the winches down. Its header lists the settings of the CPU. It has not been compiled yet.
 
     Args:
         robot: The robot used for planning; its winches need drum_radius and counts_per_turn.
@@ -72,7 +72,7 @@ def export_scl(robot: Robot, file: str | os.PathLike[str]) -> Path:
 
 
 def source_text(robot: Robot) -> str:
-    """SCL source of a robot; InvalidValueError if data of the winches are missing."""
+    """Compose the SCL source of a robot; raise InvalidValueError if data of the winches are missing."""
     return filled("scl/sagline_plc.scl", {"stop": STOP, **_words(robot)})
 
 
@@ -110,7 +110,7 @@ def _words(robot: Robot) -> dict[str, str]:
 
 
 def _block(block: Block) -> str:
-    """Text of a data block; the rows are in the order of the block, for access without optimization in TIA Portal."""
+    """SCL text of a data block. The rows have the order of the block, for non-optimized access in TIA Portal."""
     start = [f"   magic := 16#{block.magic:08X};"]
     if any(field.name == "version" for field in block.fields):
         start.append(f"   version := {LAYOUT};")
@@ -134,13 +134,13 @@ def _row(name: str, values: list[float]) -> str:
 
 
 def _scl_number(value: float) -> str:
-    """A number in SCL syntax; a large number replaces an infinite one."""
+    """Number in SCL syntax; a large finite number replaces infinity."""
     text = repr(min(value, 1e300)).upper()
     return text if "." in text else text.replace("E", ".0E")
 
 
 def checked_name(file: str | os.PathLike[str], ending: str, what: str, usual: str) -> Path:
-    """Path of a source file; raises FileError if the suffix is wrong."""
+    """Check the path of a source file; raise FileError if the suffix is wrong."""
     path = file_path(file)
     if path.suffix != ending:
         raise FileError(
@@ -150,7 +150,7 @@ def checked_name(file: str | os.PathLike[str], ending: str, what: str, usual: st
 
 
 def filled(source: str, words: dict[str, str]) -> str:
-    """Text of a file of this package; each @word@ is replaced, in the given order."""
+    """Read a text file of this package, and replace each @word@ in the given order."""
     text = files("sagline.files").joinpath(source).read_text(encoding="utf-8")
     for word, value in words.items():
         text = text.replace(f"@{word}@", value)
@@ -158,6 +158,6 @@ def filled(source: str, words: dict[str, str]) -> str:
 
 
 def origin(robot: Robot) -> dict[str, str]:
-    """Replacements for the robot's name and the version of sagline; the name becomes ASCII and cannot end a comment."""
+    """Replacements for the robot's name and the version of sagline. The name is made ASCII and cannot end a comment."""
     name = "".join(x if x.isascii() and (x.isalnum() or x in " -_.,()") else "_" for x in robot.name)
     return {"name": name, "version": version("sagline")}

@@ -1,4 +1,4 @@
-"""Executions: reading from logs in MCAP, and writing to MCAP or NetCDF with the plan inside."""
+"""Executions: reading from MCAP logs, and writing with the plan to MCAP or NetCDF."""
 
 from __future__ import annotations
 
@@ -36,17 +36,17 @@ PLAN_GROUP: Final = "plan"
 
 
 def load_execution(file: os.PathLike[str] | str, plan: int | None = None) -> Execution:
-    """Read an execution from a log in MCAP. The log may contain a whole session, or may end early (killed process).
+    """Read an execution from an MCAP log. The log may contain a whole session, or end early (killed process).
 
-    Numbers of a file of `Execution.save` are restored exactly.
+    All numbers of a file that `Execution.save` wrote are restored exactly.
 
     Args:
         file: The log.
-        plan: Index of the plan, from 0; -1 is the last plan. None: all cycles, with the plan if the log has only one
-            plan.
+        plan: Index of the plan, from 0; -1 is the last plan. None: all cycles of the log; the execution then has a plan
+            only if the log has exactly one.
 
     Returns:
-        The execution; its status is UNKNOWN if the log does not contain the end.
+        The execution. Its status is UNKNOWN if the log does not contain the end of the plan.
 
     Raises:
         FileError: If the file is missing, not a log, of a newer format, damaged or cut off before its first cycle, or
@@ -68,7 +68,7 @@ def load_execution(file: os.PathLike[str] | str, plan: int | None = None) -> Exe
 
 
 def execution_of_log(log: RecordedLog, plan: int | None = None) -> Execution:
-    """Execution of a log."""
+    """Create the execution from the content of a log."""
     count = len(log.plans)
     chosen = None if plan is None else integer(plan)
     if plan is not None and (chosen is None or not -count <= chosen < count):
@@ -111,7 +111,7 @@ def _execution(log: RecordedLog, robot: Robot, blocks: list[dict[str, NDArray[An
 
 
 def plan_of_log(log: RecordedLog, number: int) -> Plan:
-    """A plan of a log."""
+    """Read a plan of a log."""
     data = unpack_dataset(log.plans[number])
     return plan_of_dataset(log.path, data, f"robot of plan {number}")
 
@@ -138,7 +138,7 @@ def _check_shapes(columns: dict[str, NDArray[Any]], robot: Robot) -> None:
 
 
 def to_dataset(execution: Execution) -> Dataset:
-    """Data set of an execution: every quantity over time, with its unit."""
+    """Create the data set of an execution: every quantity over time, with its unit."""
     done = instance(execution, Execution, "execution")
     variables: dict[str, Any] = {
         quantity.name: ((ROWS, *quantity.parts), quantity.of(done), quantity.attributes) for quantity in CYCLES
@@ -161,7 +161,7 @@ def to_dataset(execution: Execution) -> Dataset:
 
 
 def save(execution: Execution, file: os.PathLike[str] | str) -> None:
-    """Write an execution to a log or to NetCDF, depending on the suffix of the file."""
+    """Write an execution to an MCAP log or to NetCDF, depending on the suffix of the file."""
     path = file_path(file)
     ways = {".mcap": save_execution, ".nc": save_dataset}
     if path.suffix.lower() not in ways:
@@ -195,7 +195,7 @@ def save_dataset(execution: Execution, file: os.PathLike[str] | str) -> None:
 
 
 def _plain(value: Any) -> Any:
-    """A number or a text without change; the name of a state."""
+    """Value for the table of events: a number or a text without change; a state as its name."""
     return value.name if isinstance(value, State) else str(value) if isinstance(value, str) else value
 
 

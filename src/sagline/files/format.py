@@ -23,8 +23,8 @@ class Format(Content, Generic[T]):
     """The NetCDF format of one kind of result."""
 
     kind: type[T]  # type of the result
-    pack: Callable[[T], Dataset]  # data set of a result
-    # result from a data set and a path for messages; None for results that are only written
+    pack: Callable[[T], Dataset]  # function that creates the data set of a result
+    # function that creates a result from a data set and a path for messages; None if results are only written
     unpack: Callable[[Path, Dataset], T] | None = None
 
     def save(self, result: T, file: os.PathLike[str] | str) -> None:
@@ -56,13 +56,13 @@ MODULES: Final = {
 
 
 def module_of(result: object) -> Any:
-    """The module that writes results of this type or of one of its base classes; raises KeyError if there is none."""
+    """Find the module that writes results of this type or of a base class; raise KeyError if there is none."""
     names = [kind.__name__ for kind in type(result).__mro__]
     return import_module(f"sagline.files.{MODULES[next((name for name in names if name in MODULES), names[0])]}")
 
 
 def dataset_of(result: Any) -> Dataset:
-    """Data set of the NetCDF format of a result; without such a format, its table over the dimension row."""
+    """Data set of a result in its NetCDF format. A result without a format has a table with the dimension row."""
     named = any(kind.__name__ in MODULES for kind in type(result).__mro__)
     form = getattr(module_of(result), "FORMAT", None) if named else None
     if isinstance(form, Format):

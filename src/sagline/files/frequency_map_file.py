@@ -27,7 +27,7 @@ QUANTITIES: Final = (
 
 
 def _pack(found: FrequencyMap) -> Dataset:
-    """Data set of a frequency map."""
+    """Create the data set of a frequency map."""
     variables = variables_of_result(found, QUANTITIES, ("pose",))
     attributes = {
         **FORMAT.attributes(f"Frequencies of {found.robot.name} over poses"),

@@ -1,4 +1,4 @@
-"""Logs of winches in CSV: one row per pose; comments above the columns give the deviations of the sensors."""
+"""Logs of winches in CSV: one row per pose. Comments above the header give the standard deviations of the sensors."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ DEVIATIONS: Final = {
 }
 _KEYS: Final = (*DEVIATIONS, "frame", "target")
 _COMMENT = re.compile(r"\s*#\s*([A-Za-z_ ]+?)\s*:(.*)")
-_NEAR: Final = 0.7  # smallest similarity of a misspelt key; "name" and "frame" are less similar
+_NEAR: Final = 0.7  # words with this similarity to a key are misspelt keys; "name" and "frame" are less similar
 XYZ: Final = ("x", "y", "z")
 COMMANDED: Final = "_commanded"
 _MOST: Final = 1000  # largest number of cables
@@ -53,7 +53,7 @@ class _Sensors(YamlEntry):
 
 
 def sensors_of_comments(text: str, path: Path) -> tuple[Sensors, str]:
-    """Sensors from the comments above the columns of a log, and the rest of the text."""
+    """Separate the comments above the header: sensors, and the rest of the text."""
     lines = text.split("\n")
     count = next((k for k, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")), len(lines))
     said = [_key_line(line.rstrip("\r")) for line in lines[:count]]
@@ -68,7 +68,7 @@ def sensors_of_comments(text: str, path: Path) -> tuple[Sensors, str]:
 
 
 def _key_line(line: str) -> str:
-    """Line of YAML from a comment with a sensor key, or with a similar word; an empty line from any other comment."""
+    """YAML line of a comment whose first word is or resembles a sensor key; an empty line for any other comment."""
     found = _COMMENT.fullmatch(line)
     if found is None:
         return ""
@@ -91,7 +91,7 @@ def _sensors(entry: _Sensors) -> Sensors:
 
 
 def _comments_of_sensors(sensors: Sensors) -> Iterator[str]:
-    """Comments for sensors; `sensors_of_comments` restores the same sensors."""
+    """Comments that describe sensors; `sensors_of_comments` restores the same sensors."""
     for name, unit in DEVIATIONS.items():
         value: Array | None = getattr(sensors, name)
         if value is not None:
@@ -106,7 +106,7 @@ def _comments_of_sensors(sensors: Sensors) -> Iterator[str]:
 
 
 def _read(path: Path, text: str) -> tuple[CsvTable, int]:
-    """The table, and its number of cables."""
+    """Read the table and the number of its cables."""
     header = next((line for line in text.split("\n") if line.strip()), "")
     cells = [cell.partition("[")[0].strip() for cell in header.replace('"', "").split(separator_of(text))]
     found = [_NUMBERED.fullmatch(column_of_cable(cell)) for cell in cells]
@@ -133,7 +133,7 @@ def _names(kind: str, cables: int) -> list[str]:
 
 
 def _fields(table: CsvTable, cables: int) -> dict[str, Any]:
-    """Fields of the log except for its sensors."""
+    """Fields of the log, without its sensors."""
     columns = table.columns
     for name in _names("length", cables):
         if name in columns:
@@ -151,7 +151,7 @@ def _fields(table: CsvTable, cables: int) -> dict[str, Any]:
 
 
 def _stack_columns(table: CsvTable, names: Iterable[str], *, all_of_them: bool = True) -> Array | None:
-    """Matrix of some columns, with NaN for missing columns; None if all columns are missing."""
+    """Matrix of the columns with given names. A missing column is NaN; None if all columns are missing."""
     names = list(names)
     found = [name for name in names if name in table.columns]
     if not found:
@@ -201,7 +201,7 @@ def _commanded(table: CsvTable) -> Pose | None:
 
 
 def load_log(file: os.PathLike[str] | str, sensors: Sensors | None = None) -> WinchLog:
-    """Read readings of a robot's encoders, load cells and (optional) measuring system at poses at rest.
+    """Read a log: readings of encoders, load cells and, optionally, a measuring system, with the robot at rest.
 
     The CSV file has a header with the names of the columns, in any order, and one row per pose:
 
@@ -215,18 +215,18 @@ def load_log(file: os.PathLike[str] | str, sensors: Sensors | None = None) -> Wi
     - `count_0`, `count_1`, ...: encoder counts; or `length_0`, ...: cable lengths off the drums from the
       controller. `C0` and `L0` are other names of `count_0` and `length_0`.
     - `load_cell_0`, ...: tensions at the frame ends; cables without a load cell have no column.
-    - `x`, `y`, `z`, or some of the three: position of the target in the axes of the measuring system.
+    - `x`, `y`, `z`, all or some: position of the target in the axes of the measuring system.
     - `qx`, `qy`, `qz`, `qw`, or `alpha`, `beta`, `gamma` (about z, then the new y, then the new x): rotation of the
       platform in these axes.
     - `x_commanded`, `y_commanded`, `z_commanded`, and optionally `qx_commanded`, ... or `alpha_commanded`, ...: the
       commanded pose; without a rotation the platform is level.
     - `time`: time of the row.
 
-    Columns are separated by commas, or by semicolons or tabs; with these, numbers may have a decimal comma. Units are
-    in brackets; the defaults are s, m, N and rad. A cell is blank if the value was not measured. Times and
+    Columns are separated by commas, semicolons or tabs. With semicolons or tabs, numbers may have a decimal comma.
+    Units are in brackets; the defaults are s, m, N and rad. A cell is blank if the value was not measured. Times and
     commanded poses must not be blank. Comments above the header give the standard deviations of the sensors (one
-    number, or one per cable or axis). They also give the pose of the measuring system, `# frame: {position: [1, 0,
-    0.5], euler: {alpha: 90 deg}}`, and the target, `# target: [0, 0, 0.1]`. The keys are fields of `Sensors`.
+    number, or one per cable or axis), the pose of the measuring system, `# frame: {position: [1, 0, 0.5], euler:
+    {alpha: 90 deg}}`, and the target, `# target: [0, 0, 0.1]`. The keys are fields of `Sensors`.
     Quaternions have length 1 within 1e-3 (rounding of printed decimals), and are normalized.
 
     Args:

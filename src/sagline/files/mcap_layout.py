@@ -1,4 +1,4 @@
-"""Contents of a log in MCAP: quantities of a cycle, topics with their schemas, attachments, and scenes."""
+"""Contents of an MCAP log: quantities of a cycle, topics with their schemas, attachments, and scenes."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 ROWS: Final = "time"
 GROUP, CABLE, AXIS, TURN = ("group",), ("cable",), ("axis",), ("quaternion_part",)
 WORLD, PLATFORM = "world", "platform"
-FINE, COARSE = 2.0**20, 2.0**10  # [1/m], rounding of drawn coordinates, so that most of their bytes are zero
+FINE, COARSE = 2.0**20, 2.0**10  # [1/m], steps of drawn coordinates, whose bytes are then mostly zero
 POINTS: Final = 7  # number of points per cable
 _THICKNESS: Final = 3.0  # line width [px]
 _STEEL, _BLUE, _CABLE = (0.47, 0.5, 0.54), (0.23, 0.53, 0.79), (0.55, 0.36, 0.17)  # color: red, green, blue, 0 to 1
@@ -100,12 +100,12 @@ EVENTS: Final = {  # variables of events
 
 
 def columns_of(execution: Execution) -> dict[str, NDArray[Any]]:
-    """Columns of N cycles, by the name of the quantity; the first axis has length N."""
+    """Columns of N cycles, by the name of the quantity. The first axis of each column has the length N."""
     return {quantity.name: quantity.of(execution) for quantity in EVERY}
 
 
 NANO: Final = 1e9  # ticks of the log's clock per second [1/s]
-FORMAT: Final = 1  # incremented whenever an older sagline could misread a log
+FORMAT: Final = 1  # incremented with every change that an older sagline could misread
 SOURCE: Final = f"sagline {version('sagline')}"
 CYCLE, RECORD, EVENT, TF, SCENE, TRUTH = "/cycle", "/record", "/event", "/tf", "/scene", "/truth"
 HEAD: Final = "sagline.json"  # attachment: format, period, robot
@@ -118,7 +118,7 @@ PER_METER: Final = 1e3  # [mm/m]
 
 
 class _CycleField(NamedTuple):
-    """A quantity of `/cycle`, rounded for human readers; the topic `/record` contains all digits."""
+    """Quantity of the topic `/cycle`, rounded for human readers. The topic `/record` contains all digits."""
 
     digits: int  # number of decimals
     unit: str
@@ -143,7 +143,7 @@ def _schema(title: str, properties: dict[str, Any]) -> bytes:
 
 
 def _number(shown: _CycleField) -> dict[str, Any]:
-    """Schema of a quantity of a cycle."""
+    """JSON schema of a quantity of a cycle."""
     said = {"description": f"{shown.what} [{shown.unit}]"}
     return {"type": "array", "items": {"type": "number"}, **said} if shown.several else {"type": "number", **said}
 
@@ -185,12 +185,12 @@ SCHEMAS: Final = {
 
 
 def head_of(robot: str, period: float) -> bytes:
-    """Attachment with the robot (text of its file) and the cycle period [s] of a log."""
+    """Attachment of a log with the cycle period [s] and the robot, as the text of its file."""
     return json.dumps({"sagline_log_format": FORMAT, "source": SOURCE, "period": period, "robot": robot}).encode()
 
 
 def cycle_texts(columns: dict[str, NDArray[Any]]) -> Iterator[bytes]:
-    """Messages of N cycles for other programs, rounded."""
+    """Messages of N cycles for other programs, with rounded numbers."""
     away = PER_METER * (columns["set_length"] - columns["length"] - columns["zero"])
     there = {**columns, "length_error": away, "correction": PER_METER * columns["correction"]}
     kept = {name: _json_values(np.round(there[name], shown.digits)) for name, shown in CYCLE_FIELDS.items()}
@@ -212,7 +212,7 @@ def event_message(event: Event) -> bytes:
 
 
 def event_of(text: bytes) -> Event:
-    """Event of a message; ValueError if the message is not an event."""
+    """Read the event of a message; raise ValueError if the message is not an event."""
     try:
         said = json.loads(text)
         kind, state = EventKind(said["kind"]), State[said["state"]]
@@ -227,7 +227,7 @@ def truth_text(time: float, position: Any, quaternion: Any) -> bytes:
 
 
 def _json_values(values: NDArray[Any]) -> list[Any]:
-    """Values for JSON: None for numbers that are not finite, and for rows without finite numbers."""
+    """Convert values for JSON. Numbers that are not finite, and rows without finite numbers, become None."""
     known = np.isfinite(values)
     if known.all():
         return list(values.tolist())
@@ -252,7 +252,7 @@ def transform(stamp: int, position: Array, quaternion: Array) -> FrameTransform:
 
 
 class Scene:
-    """Scene of a robot as lines; the constant parts are created once."""
+    """Scene of a robot, drawn as lines. The constant parts are created once."""
 
     def __init__(self, robot: Robot) -> None:
         """Draw frame and platform."""
@@ -261,7 +261,7 @@ class Scene:
         self._body = _corners(robot.platform_anchors)
 
     def at(self, stamp: int, position: Array, quaternion: Array, tension: Array) -> SceneUpdate:
-        """Whole scene at a time [ns]; position [m], quaternion (scalar last), tensions at the frame ends [N]."""
+        """Scene at a time [ns], from position [m], quaternion (scalar last) and tensions at the frame ends [N]."""
         from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
         scene = SceneUpdate()
@@ -272,7 +272,7 @@ class Scene:
         return scene
 
     def _cables(self, ends: Array, tension: Array) -> Array:
-        """Points along the cables (m, POINTS, 3), on parabolas that look the same as the cables."""
+        """Points along the cables (m, POINTS, 3), on parabolas that look like the exact cables."""
         robot, share = self._robot, np.linspace(0.0, 1.0, POINTS)[:, None]
         start = robot.frame_anchors[:, None]
         run = ends[:, None] - start
@@ -286,7 +286,7 @@ class Scene:
 
 
 def _lines(entity: SceneEntity, stamp: int, name: str, frame: str, color: tuple[float, ...], courses: Array) -> None:
-    """Polylines (k, P, 3)."""
+    """Draw polylines (k, P, 3)."""
     entity.id, entity.frame_id = name, frame
     entity.timestamp.FromNanoseconds(stamp)
     for course in np.rint(courses * COARSE) / COARSE:
@@ -299,7 +299,7 @@ def _lines(entity: SceneEntity, stamp: int, name: str, frame: str, color: tuple[
 
 
 def _corners(points: Array) -> Array:
-    """Lines between pairs of points, (e, 2, 3). A pair has a line if no third point is closer to both points."""
+    """Lines between pairs of neighboring points, (e, 2, 3): no third point is closer to both points of a pair."""
     distance = np.linalg.norm(points[:, None] - points[None], axis=2)
     near = [
         (i, j)

@@ -1,4 +1,4 @@
-"""Reading of logs in MCAP: complete logs, logs cut off by a killed process, and logs that still grow."""
+"""Reading of MCAP logs: complete logs, logs that a killed process left incomplete, and logs that still grow."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ from sagline.robot.robot import Robot
 
 MAGIC: Final = bytes((137, 77, 67, 65, 80, 48, 13, 10))
 AGAIN: Final = "Get the original file."
-_HEAD: Final = 9  # number of bytes of a record before its content: type and length
+_HEAD: Final = 9  # number of bytes in front of the content of a record, for its type and length
 _CHUNK, _ATTACHMENT, _DATA_END = 0x06, 0x09, 0x0F
 _NEEDED: Final = {quantity.name for quantity in EVERY} | {"plan", "zero", "epoch"}  # columns required in every chunk
-_INFLATION: Final = 100  # largest ratio of a chunk to its compressed bytes; usual ratios are 1.5 to 10
+_INFLATION: Final = 100  # largest ratio of uncompressed to compressed size of a chunk; usual ratios are 1.5 to 10
 _SMALL: Final = 1 << 16  # a chunk of this size [bytes] is always allowed
 _LARGEST: Final = 1 << 24  # largest size of the packed cycles of a chunk [bytes]; a usual size is a hundredth of it
 _SCHEMA, _CHANNEL, _MESSAGE = 0x03, 0x04, 0x05
@@ -58,13 +58,13 @@ class Truth(NamedTuple):
 
 @dataclass(slots=True)
 class RecordedLog:
-    """Content of the part of a log that has been read."""
+    """Content of a log, as far as it has been read."""
 
     path: Path  # the file
     robot: Robot | None = None  # the robot; None until it has been read
     period: float = 0.0  # period of a cycle [s]
     plans: list[bytes] = field(default_factory=list)  # the plans, packed
-    endings: dict[int, Ending] = field(default_factory=dict)  # end of each plan, by the index of the plan; -1: no plan
+    endings: dict[int, Ending] = field(default_factory=dict)  # end of each plan, by its index; -1: no plan
     blocks: list[dict[str, NDArray[Any]]] = field(default_factory=list)  # columns of cycles, for each chunk
     events: list[Event] = field(default_factory=list)  # events in order
     truth: list[Truth] = field(default_factory=list)  # true poses of the platform, in the log of a twin
@@ -80,7 +80,7 @@ class LogReader:
     """
 
     def __init__(self, file: os.PathLike[str] | str) -> None:
-        """Store the path of the file; `more` reads it."""
+        """Store the path of the file; the method `more` reads the file."""
         self.log = RecordedLog(file_path(file))
         check_packages()
         self._offset = self._digest = 0
@@ -96,7 +96,7 @@ class LogReader:
                 self._take(code, record)
         except (FileError, MemoryError):
             raise
-        except Exception as error:  # any error is caught, because the libraries have no common error for a damaged file
+        except Exception as error:  # any error, because the libraries have no common error for damaged files
             raise self._damaged() from error
         torn = self._offset - before < len(data) and not self.log.complete
         if torn and data.endswith(MAGIC) and len(data) > len(MAGIC):
@@ -130,7 +130,7 @@ class LogReader:
         raise FileError(self.log.path, "is not a log in MCAP", step)
 
     def _records(self, data: bytes) -> Iterator[tuple[int, bytes]]:
-        """Complete records; an incomplete last record is left for the next call."""
+        """Read all complete records; an incomplete last record is left for the next call."""
         place = 0 if self._offset else len(MAGIC)
         start = self._offset
         if not start:
@@ -225,7 +225,7 @@ class LogReader:
 
 
 def _content_of(chunk: Any) -> bytes:
-    """Uncompressed records of a chunk; raises ValueError if they are larger than the compressed size allows."""
+    """Uncompress the records of a chunk; raise ValueError if they are too large for the compressed size."""
     from lz4.frame import LZ4FrameDecompressor
     from zstandard import ZstdDecompressor, get_frame_parameters
 
@@ -246,7 +246,7 @@ def _content_of(chunk: Any) -> bytes:
 
 
 def read_log(file: os.PathLike[str] | str) -> RecordedLog:
-    """Content of a complete log, or of a log that was cut off."""
+    """Read the content of a complete log, or of a log that was cut off."""
     reader = LogReader(file)
     reader.more()
     log = reader.log
@@ -258,7 +258,7 @@ def read_log(file: os.PathLike[str] | str) -> RecordedLog:
 
 
 def has_begun(file: os.PathLike[str] | str) -> bool:
-    """True if a log of another process can be read; False as long as the file or its first bytes are missing."""
+    """True if the log of another process can be read, which requires the file and its first bytes."""
     try:
         path = file_path(file)
         check_regular(path, path.stat().st_mode)

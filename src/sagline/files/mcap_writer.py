@@ -1,4 +1,4 @@
-"""Writing of logs in MCAP, chunk by chunk: complete chunks remain readable if the process is killed.
+"""Writing of MCAP logs, chunk by chunk. If the process is killed, all complete chunks can be read.
 
 The topic `/record` contains all numbers; it has one message per chunk with the packed values of its cycles. Attachments
 contain the robot and the plans. The other topics are for other programs: `/cycle` and `/event` in JSON, `/tf` and
@@ -38,15 +38,15 @@ from sagline.kinematics.plan import Plan
 from sagline.robot.robot import Robot
 
 PACKAGES: Final = ("mcap", "mcap_protobuf", "foxglove_schemas_protobuf", "zstandard")
-_UNLIMITED: Final = 1 << 40  # [bytes], so large that the size never ends a chunk
+_UNLIMITED: Final = 1 << 40  # [bytes], so large that a chunk never ends because of its size
 CHUNK: Final = 0.9  # time between chunks [s]; a killed process loses less than one second
 BLOCK: Final = 100  # largest number of cycles per chunk; in lockstep, cycles are faster than in real time
-ROOM: Final = 4096  # capacity of the queue: cycles of 41 s
+ROOM: Final = 4096  # capacity of the queue, sufficient for the cycles of 41 s
 PATIENCE: Final = 0.1  # time between two checks that the writer thread is alive [s]
 
 
 class _Unbuffered:
-    """Unbuffered output; it replaces the buffered writer of the library."""
+    """Unbuffered output, in place of the buffered writer of the library."""
 
     def __init__(self, file: RawIOBase) -> None:
         self._file = file
@@ -111,7 +111,7 @@ class McapFile:
         self._attach(name, mcap_layout.JSON, json.dumps({"status": status, "reason": reason}).encode())
 
     def block(self, columns: Mapping[str, NDArray[Any]], plan: int, zero: Array, rest: Callable[[], Any] = int) -> None:
-        """Write cycles of a plan (`NONE`: no plan) and the homing offset [m]; rest: called between messages."""
+        """Write cycles of a plan (`NONE`: no plan) and the offset from homing [m]; call `rest` between messages."""
         stamps = [self.stamp(value) for value in columns["time"].tolist()]
         kept = {**columns, "plan": np.array(plan), "zero": zero, "epoch": np.array(self.epoch)}
         for stamp, text in zip(stamps, mcap_layout.cycle_texts(kept), strict=True):
@@ -158,25 +158,25 @@ class McapFile:
     def _known(
         columns: Mapping[str, NDArray[Any]], stamps: list[int], share: int
     ) -> list[tuple[int, dict[str, Array]]]:
-        """Time stamp, pose and tensions of every `share`-th cycle that has an estimate of the pose."""
+        """Time stamp, pose and tensions of every `share`-th cycle. Cycles without an estimated pose are left out."""
         names = ("position", "quaternion", "tension")
         known = np.flatnonzero(np.isfinite(columns["position"]).all(axis=1))
         return [(stamps[k], {name: columns[name][k] for name in names}) for k in known[::share].tolist()]
 
 
 def check_packages() -> None:
-    """Check that the packages of the logs are installed."""
+    """Check that the packages for logs are installed."""
     for name in PACKAGES:
         if find_spec(name) is None:
             raise FileError.not_installed(name, "Logs need it", "log")
 
 
 class Recorder:
-    """A log that a separate thread writes while a controller or a twin runs.
+    """Log that a separate thread writes while a controller or a twin runs.
 
     Data are put into a queue, so that the caller never waits for a disk. If the queue or the disk is full, recording
-    stops permanently. The attribute `stopped` then gives the reason, and the data in the file remain. Numbers are
-    rounded to the decimals of `DECIMALS`.
+    stops permanently. The attribute `stopped` then gives the reason, and the file keeps its data. Numbers are rounded
+    to the numbers of decimals in `DECIMALS`.
     """
 
     def __init__(
@@ -196,9 +196,8 @@ class Recorder:
             robot: The robot used by the controller.
             period: Period of a cycle [s].
             group_count: Number of groups G; None: two winches per group.
-            epoch: Offset from times of the link's clock to times of the log [ns]; None: the log starts at the present
-                time of day.
-            stream: Output instead of the file, unbuffered.
+            epoch: Time of the log minus time of the link's clock [ns]. None: the log starts at the present time of day.
+            stream: Unbuffered output that is used instead of the file.
         """
         self.file = check_file(file_path(file))
         check_packages()
@@ -237,7 +236,7 @@ class Recorder:
         self._put(partial(self._add, cycle))
 
     def event(self, event: Event) -> None:
-        """Record an event; an event before the first cycle is written after the start time of the log is known."""
+        """Record an event. Events before the first cycle are written later, when the start time of the log is known."""
         if self._epoch is None:
             self._early.append(event)
         else:
@@ -261,11 +260,11 @@ class Recorder:
         self._why = self._why or "it is closed"
 
     def __enter__(self) -> Recorder:
-        """Record inside the block; the log is closed at the end of the block."""
+        """Enter the block of a `with` statement; the log is closed at the end of the block."""
         return self
 
     def __exit__(self, *failure: object) -> None:
-        """Close."""
+        """Close the log."""
         self.close()
 
     def _put(self, task: Callable[[], None]) -> None:
@@ -277,14 +276,14 @@ class Recorder:
             self._why = f"{self.file}: {ROOM} entries wait to be written, and the queue is full; the disk is too slow"
 
     def _date(self, time_of_link: float) -> None:
-        """Set the start time of the log, so that times of the log are times of day."""
+        """Set the start time of the log, so that the log has times of day."""
         if self._epoch is None:
             self._epoch = self._mcap.epoch = time.time_ns() - round(time_of_link * mcap_layout.NANO)
             for event in self._early:
                 self._put(partial(self._mcap.event, event))
 
     def _run(self) -> None:
-        """Run the thread."""
+        """Write queued data until the end; the function of the thread."""
         try:
             with self._stream:
                 self._write()
@@ -305,7 +304,7 @@ class Recorder:
                 if task is None:
                     break
                 task()
-            late = time.monotonic() >= due and self._queue.empty()  # otherwise queued data are added to the chunk
+            late = time.monotonic() >= due and self._queue.empty()  # queued data are added to the chunk first
             if late or len(self._tape) >= BLOCK:
                 self._close_block()
                 self._mcap.close_chunk()

@@ -1,4 +1,4 @@
-"""Measurements in CSV: lengths or counts of all cables, or ends, length and tension of one cable."""
+"""Measurements in CSV: lengths or counts of all cables; or span, rise, length and tension of one cable."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from sagline.core.arrays import Array, locked
 from sagline.files.reading import read_text
 from sagline.files.table import TABLE_LIMIT, CsvTable
 
-# for each kind of column: name of the other kind, and the next step if the file has the other kind
+# for each kind of column: name of the other kind, and the next step if the file has that kind
 _OTHERS: Final = {
     "length": ("count", "these are counts: add --counts"),
     "count": ("length", "these are lengths: omit --counts"),
@@ -54,7 +54,7 @@ def load_counts(file: os.PathLike[str] | str, cable_count: int) -> CountSamples:
 
 
 def _read(file: os.PathLike[str] | str, kind: str, unit: str, cable_count: int) -> tuple[CsvTable, list[str]]:
-    """Table with one column per cable, and names of these columns."""
+    """Read a table with one column per cable; return it with the names of these columns."""
     path = Path(file)
     names = _columns(kind, cable_count)
     other, hint = _OTHERS[kind]
@@ -70,7 +70,7 @@ def _columns(kind: str, cable_count: int) -> list[str]:
 
 
 def _samples(table: CsvTable, names: list[str]) -> tuple[Array | None, Array]:
-    """Times, and values with one row per sample."""
+    """Times, and values with one row for each sample."""
     time = table.columns.get("time")
     if time is not None:
         late = np.diff(time, prepend=-np.inf) <= 0.0
@@ -96,7 +96,7 @@ def load_measurements(file: os.PathLike[str] | str) -> Measurements:
         file: The file.
 
     Returns:
-        The four columns in SI.
+        The four columns in SI units.
 
     Raises:
         FileError: If the file cannot be read, or a column or number is wrong; the message names the line.

@@ -1,4 +1,4 @@
-"""Triangle meshes in files of other programs: reading of closed solids, writing of surfaces."""
+"""Triangle meshes in the file formats of other programs: reading of closed solids, writing of surfaces."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ CHECKED: Final = 20_000  # largest number of triangles for which self-intersecti
 _MEANT: Final = "Check that it is the file you mean."
 _CORNER_ZERO: Final = re.compile(rb"^[ \t]*f[ \t](?:.*[ \t])?[+-]?0+(?=[/\s]|\Z)", re.MULTILINE)
 KINDS: Final = (".stl", ".ply", ".obj", ".glb")
-_CONTACTS: Final = 40  # number of contacts per triangle; most contacts are with neighbors
+_CONTACTS: Final = 40  # number of contacts that are searched per triangle; most contacts are with neighbors
 _UPRIGHT: Final = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])  # from z up to y up, as in glTF
 ENDINGS: Final = (".stl", ".glb", ".ply", ".vtk", ".vtu")
 _VTK: Final = (".vtk", ".vtu")
@@ -36,8 +36,8 @@ def load_mesh(file: str | os.PathLike[str], unit: str = "m", name: str | None = 
     """Read a solid from a file: an obstacle around a robot, or a platform.
 
     Args:
-        file: STL, PLY, OBJ or GLB, at most 200 MB and a million triangles. z points up; a GLB has y up by its standard,
-            and is rotated.
+        file: STL, PLY, OBJ or GLB file with at most 200 MB and a million triangles. z points up. In a GLB file y points
+            up by its standard; it is rotated.
         unit: Unit of the coordinates, for example "mm"; files of these formats do not contain the unit.
         name: Name; None: the name of the file.
 
@@ -87,7 +87,7 @@ def meters(unit: str, item: str) -> float:
 
 
 def _triangles(path: Path, data: bytes, unit: float) -> tuple[Array, Indices]:
-    """Distinct vertices [m] and non-degenerate triangles of a file; unit: length of the unit of coordinates [m]."""
+    """Distinct vertices [m] and non-degenerate triangles of a file; unit: length of the file's unit [m]."""
     try:
         import trimesh
     except ImportError:
@@ -97,14 +97,14 @@ def _triangles(path: Path, data: bytes, unit: float) -> tuple[Array, Indices]:
         line = data.count(b"\n", 0, zero.end()) + 1
         raise FileError(path, f"has a face with corner 0 in line {line}; allowed: from 1, or from -1 back", _MEANT)
     try:
-        with np.errstate(all="ignore"):  # later code refuses coordinates that are not numbers
+        with np.errstate(all="ignore"):  # coordinates that are not numbers are refused below
             read: Any = trimesh.load(BytesIO(data), file_type=kind, force="mesh", process=False, skip_materials=True)
             _check_vertices(path, np.asarray(read.vertices, dtype=np.float64) * unit)
             read.merge_vertices(merge_tex=True, merge_norm=True)
         vertices, faces = unit * np.array(read.vertices, dtype=np.float64), np.array(read.faces, dtype=np.int64)
     except SaglineError:
         raise
-    except Exception as error:  # any error, because the readers raise many kinds of errors for a wrong file
+    except Exception as error:  # all errors, because the readers raise many kinds of errors for a wrong file
         reason = " ".join(str(error).split())[:80] or type(error).__name__
         raise FileError(path, f"cannot be read as {kind.upper()} ({reason})", _MEANT) from None
     if not len(faces):
@@ -124,7 +124,7 @@ def _check_vertices(path: Path, vertices: Array) -> None:
 
 
 def first_crossing(mesh: Mesh) -> Array | None:
-    """Point [m] at which a surface crosses itself, except at common edges and corners; None without a crossing."""
+    """Point [m] at which a surface crosses itself; None without a crossing. Common edges and corners are allowed."""
     from sagline.interference.meshed import package
 
     fcl = package()
@@ -142,7 +142,7 @@ def first_crossing(mesh: Mesh) -> Array | None:
 
 
 def _without_common_vertex(faces: Indices, pairs: Indices) -> NDArray[np.bool_]:
-    """Flags of pairs of triangles without a common corner."""
+    """True for pairs of triangles without a common corner."""
     one, other = faces[pairs[:, 0]], faces[pairs[:, 1]]
     return np.asarray(~(one[:, :, None] == other[:, None, :]).any(axis=(1, 2)))
 

@@ -1,11 +1,11 @@
 """MJCF, the model format of MuJoCo: straight elastic cables as spatial tendons, pulleys as cylinders.
 
-The cylinders do not swivel. The platform end of a cable moves by a small distance u in the vertical plane of the cable,
-perpendicular to the chord, and by v out of this plane. Over a swiveling pulley, the cable becomes longer by u^2/(2 l) +
-v^2 cos phi/(2 s); l is the free length, and s is the distance of the end from the swivel axis. On a fixed cylinder, the
-cable unrolls to a straight line and becomes longer by v^2/(2 a); a is the length from the first point to the end. The
-tendon therefore starts at the point with a = s/cos phi. This point is R tan(psi/2) before the point at which the tendon
-leaves the cylinder. Force and stiffness are then the same as with a swiveling pulley.
+The cylinders do not swivel. The platform end of a cable moves perpendicular to the chord by small distances: by u in
+the vertical plane of the cable, and by v out of this plane. If the pulley swivels, the cable becomes longer by u^2/(2
+l) + v^2 cos phi/(2 s); l is the free length, and s is the distance of the end from the swivel axis. On a fixed
+cylinder, the cable unrolls to a straight line and becomes longer by v^2/(2 a); a is the length from the first point to
+the end. The tendon therefore starts at the point with a = s/cos phi. This point is R tan(psi/2) before the point at
+which the tendon leaves the cylinder. Force and stiffness are then the same as with a swiveling pulley.
 """
 
 from __future__ import annotations
@@ -49,18 +49,18 @@ _NOTE = (
 )
 _RADIUS = 0.002  # ratio of the radius of drawn cable ends to the size of the robot
 _DRAWN = {"contype": "0", "conaffinity": "0"}  # geometry without contacts
-_THINNEST = 0.02  # ratio of the shortest to the longest edge of a box for display
+_THINNEST = 0.02  # ratio of the shortest to the longest edge of a displayed box
 _STEPS = 20.0  # time steps per period of the fastest motion
 _LONGEST_STEP = 0.002  # default time step of MuJoCo [s]
 _DOWN = Context(prec=2, rounding=ROUND_DOWN)  # rounds the time step down to two digits
-_STRETCH_DAMPING = 4.0  # critical damping at half the frequency bound, which is about the highest frequency
-_SWING_DAMPING = 0.4  # a fifth of critical damping
+_STRETCH_DAMPING = 4.0  # cable damping: critical at half the frequency bound, which is about the highest frequency
+_SWING_DAMPING = 0.4  # joint damping: a fifth of critical damping
 _ROUNDING = 1e-12
 _SHORTEST = 1e-6  # shortest cable [m]
 
 
 class _Lead(NamedTuple):
-    """First points of the tendons, and points beside the pulleys, in the world [m], (m, 3)."""
+    """First points of the tendons, and points beside the pulleys, world axes [m], (m, 3)."""
 
     start: Array
     side: Array  # a point beside each pulley, on the side of the cable
@@ -111,14 +111,14 @@ def _add(parent: Element, tag: str, **attributes: str | ArrayLike) -> Element:
 
 
 def dump_mjcf(robot: Robot, pose: PoseLike, unstrained_length: ArrayLike | None = None) -> str:
-    """Text of a MuJoCo model of the robot, with the platform at a pose.
+    """Create a MuJoCo model of the robot as text, with the platform at a pose.
 
-    A cable of unstrained length L becomes a spatial tendon with the stiffness EA/L; the tendon is slack if it is
-    shorter than L (the model `Elastic`). A pulley becomes a cylinder that does not swivel. Forces, lengths and
+    A cable of unstrained length L becomes a spatial tendon with the stiffness EA/L. The tendon is slack if it is
+    shorter than L, as in the model `Elastic`. A pulley becomes a cylinder that does not swivel. Forces, lengths and
     stiffness agree with the robot at the given pose, and comments in the file state the deviations at other poses. The
-    time step is short enough for the fastest vibration of the platform on its cables at any pose. Damping brings the
-    platform to rest. The damping of a cable is proportional to its stiffness. The platform's joints also have damping
-    if the cables do not resist all motions.
+    time step is sufficient for the fastest vibration of the platform at any pose. Damping brings the platform to rest.
+    The damping of a cable is proportional to its stiffness. If the cables do not resist all motions, the platform's
+    joints also have damping.
 
     Args:
         robot: The robot.
@@ -180,7 +180,7 @@ def dump_mjcf(robot: Robot, pose: PoseLike, unstrained_length: ArrayLike | None 
 
 
 def _step_and_damping(robot: Robot, pose: Pose, stiffness: Array) -> tuple[float, float, float]:
-    """Time step [s], damping of a cable over its stiffness [s], and damping of each joint [N s/m, N m s/rad]."""
+    """Time step [s], ratio of a cable's damping to its stiffness [s], damping of each joint [N s/m, N m s/rad]."""
     # The joint damping is zero if the cables resist every motion. At every pose, the squared angular frequency has a
     # bound: the sum over the cables of stiffness times the largest mobility of the platform end. Forces that rotate
     # with the platform increase the frequency; the large number of steps per period is a margin for these forces.
@@ -253,7 +253,7 @@ def _add_platform(world: Element, robot: Robot, pose: Pose, radius: float, drag:
 
 
 def _inertia(robot: Robot, pose: Pose) -> Array:
-    """The robot's inertia, or, if MuJoCo would refuse it, an inertia with the same effect on the free motions."""
+    """Inertia for MuJoCo. If it would refuse the robot's inertia: an inertia with equal effect on the free motions."""
     least, middle, most = np.linalg.eigvalsh(robot.inertia)
     missing = most - (least + middle) + _ROUNDING * most  # zero or less for a body, except for rounding
     if least > 0.0 and missing <= 0.0:
@@ -266,7 +266,7 @@ def _inertia(robot: Robot, pose: Pose) -> Array:
 
 
 def _add_joints(body: Element, robot: Robot, pose: Pose, drag: float) -> None:
-    """A free joint, or one slide or hinge for each free motion, with axes in the frame of the body."""
+    """Add a free joint, or one slide or hinge for each free motion, with axes in the frame of the body."""
     damping = {"damping": drag} if drag > 0.0 else {}
     if robot.motion_pattern == "3R3T":
         _add(body, "joint", name="pose", type="free", **damping)

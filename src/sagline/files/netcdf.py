@@ -1,8 +1,8 @@
-"""NetCDF files: atomic writing with a digest at the end, and reading of undamaged files only.
+"""NetCDF files: atomic writing with a digest at the end. Damaged files are not read.
 
-An HDF5 file contains its own length, and HDF5 ignores additional bytes. The digest is therefore appended to the file.
-It is checked before anything else is read, because reading a damaged file may take any amount of memory and time. A
-file without a digest is not read.
+An HDF5 file states its own length, and HDF5 ignores all bytes after it. The digest is therefore appended to the file.
+It is checked first, because reading a damaged file may take any amount of memory and time. A file without a digest is
+not read.
 """
 
 from __future__ import annotations
@@ -42,15 +42,15 @@ _KINDS: Final = {
     **dict.fromkeys((".xml", ".wcrfx"), "an XML file"),
     **{f".{kind}": f"a {kind.upper()} file" for kind in ("csv", "json", "png", "svg")},
 }
-INFLATION = 1000  # largest ratio of memory to file size; files of sagline have smaller ratios
-HEADERS: Final = 1 << 18  # [bytes], larger than all names and attributes, except for long texts such as the robot
+INFLATION = 1000  # largest ratio of the size in memory to the file size; files of sagline have smaller ratios
+HEADERS: Final = 1 << 18  # [bytes], sufficient for all names and attributes, except for long texts such as the robot
 _HEAD, _TAIL = b"\nsagline sha256 ", b"\n"
 _LENGTH = len(_HEAD) + sha256().digest_size * 2 + len(_TAIL)
 _BLOCK = 1 << 20  # bytes per read
 
 
 def seal(file: Path) -> None:
-    """Append the digest of a file at its end."""
+    """Append the digest of a file to the file."""
     with file.open("rb+") as handle:
         handle.write(_line(handle, file.stat().st_size))
 
@@ -68,7 +68,7 @@ def _digest_is_right(file: Path) -> bool | None:
 
 
 def _line(handle: BinaryIO, size: int) -> bytes:
-    """Digest line of the next `size` bytes of a file; the file position is then after these bytes."""
+    """Digest line of the next `size` bytes of a file. The file position moves behind these bytes."""
     found = sha256()
     while size > 0 and (block := handle.read(min(_BLOCK, size))):
         found.update(block)
@@ -78,17 +78,17 @@ def _line(handle: BinaryIO, size: int) -> bytes:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Content:
-    """One kind of content, with texts for messages."""
+    """Kind of content of a file, with texts for messages."""
 
     name: str  # name of the content: "plan"
     made: str  # description of such a file: "run of sagline track"
     give: str  # next step for the user: "Give the .nc file that sagline track wrote."
     again: str  # next step for a damaged file
     key: str  # attribute that holds the version of the format
-    version: int  # newest version of the format; incremented whenever an older sagline could misread the file
+    version: int  # newest version of the format; incremented with every change that an older sagline could misread
 
     def format_of(self, path: Path, attributes: Mapping[str, Any]) -> int:
-        """Format version of a file; raises FileError if the file has other content or a newer version."""
+        """Read the format version of a file; raise FileError for other content or a newer version."""
         found = attributes.get(self.key)
         if found is None:
             raise FileError(path, *self._instead(attributes))
@@ -106,7 +106,7 @@ class Content:
         return int(found)
 
     def _instead(self, attributes: Mapping[str, Any]) -> tuple[str, str]:
-        """Description of the other content of a file, and the next step."""
+        """Describe the content of a file of another kind, and give the next step."""
         for key, (what, step) in OTHERS.items():
             if key in attributes:
                 return f"is {what} of sagline, not a {self.name}", step
@@ -120,7 +120,7 @@ class Content:
 def labeled_dataset(
     variables: Mapping[str, Any], attributes: Mapping[str, Any], coordinates: Mapping[str, Any] | None = None
 ) -> Dataset:
-    """Make a data set without indexes for the labels of its dimensions; the reader makes the necessary indexes."""
+    """Make a data set without indexes for its dimensions; the reader makes the necessary indexes."""
     from xarray import Coordinates, Dataset
 
     parts = {dimension for dimensions, *_ in variables.values() for dimension in dimensions} & PARTS.keys()
@@ -129,12 +129,12 @@ def labeled_dataset(
 
 
 def index_coordinate(dimension: str, count: int) -> tuple[str, Any, dict[str, str]]:
-    """Coordinate with the numbers of cables, or similar items, from 0."""
+    """Coordinate with the numbers of cables or similar items, from 0."""
     return dimension, np.arange(count), {"long_name": f"{dimension}, counted from 0"}
 
 
 def write_dataset(data: Dataset, file: Path, groups: Mapping[str, Dataset] | None = None) -> None:
-    """Write a data set, and after it a digest over all values and attributes."""
+    """Write a data set, then a digest over all its values and attributes."""
     parts: list[tuple[str | None, Dataset]] = [(None, data), *(groups or {}).items()]
     texts = [value for _, part in parts for value in part.attrs.values() if isinstance(value, str)]
     size = sum(part.nbytes + HEADERS for _, part in parts) + sum(len(text.encode()) for text in texts)
@@ -152,9 +152,9 @@ def write_dataset(data: Dataset, file: Path, groups: Mapping[str, Dataset] | Non
 
 
 def read_dataset(path: Path, content: Content) -> Dataset:
-    """Data set of an undamaged file; the digest is checked before reading."""
+    """Read the data set of an undamaged file. The digest is checked before the content is read."""
     try:
-        check_regular(path, path.stat().st_mode)  # a pipe is not opened, because this would wait for its writer
+        check_regular(path, path.stat().st_mode)  # a pipe is not opened, because opening would wait for its writer
         right = _digest_is_right(path)
     except FileNotFoundError:
         raise FileError(path, "does not exist", "Check its name.") from None
@@ -216,7 +216,7 @@ def _load(path: Path, content: Content) -> Dataset:
 
 
 def _cause(path: Path, content: Content) -> tuple[str, str]:
-    """Reason why a file cannot be read, and the next step, in place of the technical messages of the libraries."""
+    """Reason why a file cannot be read, and the next step. They replace technical messages of the libraries."""
     with path.open("rb") as file:
         begin = file.read(len(_BEGIN))
     if begin == _BEGIN:
@@ -227,7 +227,7 @@ def _cause(path: Path, content: Content) -> tuple[str, str]:
 
 
 def attributes_with_units(source: Any, units: Mapping[str, str | None]) -> dict[str, Any]:
-    """Numeric attributes of an object, each with its unit in the next attribute, except for a unit of None."""
+    """Numeric attributes of an object. Each is followed by an attribute with its unit, unless the unit is None."""
     found: dict[str, Any] = {}
     for name, unit in units.items():
         found |= {name: float(getattr(source, name)), **({} if unit is None else {f"{name}_units": unit})}
@@ -235,7 +235,7 @@ def attributes_with_units(source: Any, units: Mapping[str, str | None]) -> dict[
 
 
 def choice_attributes(key: str, choice: Any, choices: Mapping[str, type[Any]]) -> dict[str, Any]:
-    """Attributes with the type and the options of a model, method or similar object."""
+    """Attributes that store the type and the options of a model, a method or a similar object."""
     if choices.get(type(choice).__name__) is not type(choice):
         raise InvalidValueError(key, type(choice).__name__, ", ".join(choices), "Only these can be read back.")
     options = {f"{key}_{field.name}": getattr(choice, field.name) for field in fields(choice)}
@@ -245,7 +245,7 @@ def choice_attributes(key: str, choice: Any, choices: Mapping[str, type[Any]]) -
 def choice_of(
     path: Path, attributes: Mapping[str, Any], key: str, choices: Mapping[str, type[Choice]], **known: Any
 ) -> Choice:
-    """Object from attributes of `choice_attributes`; raises FileError if its type or an option is unknown."""
+    """Restore an object from `choice_attributes`; raise FileError if its type or an option is unknown."""
     name = attributes[key]
     if name not in choices:
         refused = InvalidValueError(key, repr(name), ", ".join(choices), "Read it with a newer sagline.")
@@ -265,7 +265,7 @@ def _plain(value: Any) -> Any:
 
 
 def robot_of(path: Path, data: Dataset, item: str = "robot") -> Robot:
-    """Robot of a data set; raises FileError for an invalid robot, or another number of cables."""
+    """Read the robot of a data set; raise FileError if it is invalid or has another number of cables."""
     robot = parse_robot(str(data.attrs["robot"]), f"{path}, {item}")
     if data.sizes["cable"] != robot.cable_count:
         reason = f"has {data.sizes['cable']} cables, its robot {robot.cable_count}"

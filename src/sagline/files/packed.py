@@ -1,10 +1,10 @@
 """Lossless compression of columns of numbers, and of data sets inside other files.
 
-Measured and planned values are smooth in time. A column is converted to integers. If all values have few decimals, the
-integers are scaled decimals. Otherwise they are the bits of the floats, in a form with the same order as the numbers.
-Differences of order 0 to 5 of the integers are stored; the order with the fewest bits is chosen. The upper bytes of
-these differences are nearly all zero. Bytes of equal weight are stored together, so that zstandard compresses them
-strongly.
+Measured and planned values are smooth in time. Each column is converted to integers. If all values have few decimals,
+the integers are the decimals times a power of ten. Otherwise they are the bits of the floats, changed so that they have
+the order of the numbers. Differences of order 0 to 5 of the integers are stored, in the order that needs the fewest
+bits. The upper bytes of these differences are nearly all zero. Bytes of equal weight are stored together, so that
+zstandard compresses them strongly.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
 MOST_ORDER: Final = 5
-LEVEL: Final = 9  # compression level of zstandard; higher levels take much longer, with little effect
+LEVEL: Final = 9  # compression level of zstandard; higher levels take much longer and save little
 TYPES: Final = ("float64", "int64", "int8", "bool")
-_EXACT: Final = 2.0**53  # all integers below this are exact floats
+_EXACT: Final = 2.0**53  # all integers below this number are exact as floats
 _GAPS: Final = np.iinfo(np.int64).min + np.arange(3)  # codes of NaN, infinity and -infinity in a column of decimals
 _GAP_VALUES: Final = np.array([np.nan, np.inf, -np.inf])
 
@@ -43,7 +43,7 @@ class _Column:
 
 
 def round_decimals(values: NDArray[np.float64], decimals: int) -> NDArray[np.float64]:
-    """Numbers rounded to `decimals`: each is the float nearest to the decimal, and never -0.0."""
+    """Round numbers to `decimals`. Each result is the float that is nearest to the decimal, and never -0.0."""
     scale = 10.0**decimals
     whole = np.abs(values) < _EXACT / scale  # larger floats do not have so many decimals
     return np.asarray(np.where(whole, np.rint(np.where(whole, values, 0.0) * scale) / scale, values) + 0.0)  # no -0.0
@@ -54,7 +54,7 @@ def pack(
     decimals: Mapping[str, int] | None = None,
     rest: Callable[[], Any] = int,
 ) -> bytes:
-    """Pack columns without loss; the first axis is packed as the time."""
+    """Pack columns without loss. The first axis of each column is time."""
     # columns: floats, integers or flags of any shape; the first axis is time
     # decimals: expected number of decimals of each column; a column with more decimals is stored as bits
     # rest: function to call between two columns, so that other threads can run
@@ -73,7 +73,7 @@ def pack(
 
 
 def unpack(data: bytes, most: int = 1 << 62) -> dict[str, NDArray[Any]]:
-    """Columns from data of `pack`, exactly restored; most: largest size of the columns [bytes]."""
+    """Restore columns from data of `pack` exactly; most: largest allowed size of the columns [bytes]."""
     from zstandard import ZstdDecompressor, ZstdError, get_frame_parameters
 
     try:
@@ -103,7 +103,7 @@ def unpack(data: bytes, most: int = 1 << 62) -> dict[str, NDArray[Any]]:
 
 
 def _count(column: _Column) -> int:
-    """Number of values of a column; raises ValueError for a head that `pack` never writes."""
+    """Number of values of a column; raise ValueError for a head that `pack` never writes."""
     sizes = all(0 <= size < 1 << 40 for size in column.shape)
     if not (
         column.type in TYPES and sizes and column.order in range(MOST_ORDER + 1) and column.decimals in range(-1, 16)
@@ -113,7 +113,7 @@ def _count(column: _Column) -> int:
 
 
 def _whole(values: NDArray[Any], decimals: int) -> tuple[NDArray[np.int64], int]:
-    """Values as integers, and the number of decimals of their scale; -1 for integers, and for bits of floats."""
+    """Values as integers, with the number of decimals of their scale (-1: integers, or bits of floats)."""
     if values.dtype.name not in TYPES:
         raise TypeError(f"columns of {values.dtype} are not packed")
     if values.dtype != np.float64:
@@ -142,7 +142,7 @@ def _decimal(whole: NDArray[np.int64], decimals: int) -> NDArray[np.float64]:
 
 
 def _smallest(whole: NDArray[np.int64]) -> tuple[int, NDArray[np.uint64]]:
-    """Order of the differences with the fewest bits, and these differences, with the sign in the lowest bit."""
+    """Order of differences that needs the fewest bits, and the differences, with the sign in the lowest bit."""
     best: tuple[float, int, NDArray[np.uint64]] | None = None
     for order in range(MOST_ORDER + 1):
         small = ((whole << 1) ^ (whole >> 63)).view(np.uint64)
@@ -190,7 +190,7 @@ def pack_dataset(data: Dataset) -> bytes:
 
 
 def unpack_dataset(data: bytes) -> Dataset:
-    """Data set packed by `pack_dataset`."""
+    """Restore a data set that `pack_dataset` packed."""
     from xarray import Coordinates, Dataset
 
     end = 4 + int.from_bytes(data[:4], "little")

@@ -25,7 +25,7 @@ PLACE = ("time", "x", "y", "z")
 EULER = ("alpha", "beta", "gamma")
 QUATERNION = ("qx", "qy", "qz", "qw")
 UNITS = dict(zip(PLACE + EULER + QUATERNION, ("s", "m", "m", "m", "rad", "rad", "rad", "", "", "", ""), strict=True))
-_LEAST_STEP = 1e-12  # shortest time step [s]; differences over a shorter step do not give a velocity
+_LEAST_STEP = 1e-12  # shortest time step [s]; differences over shorter steps are too inexact for a velocity
 TIMING_UNITS = {
     "rate": "1/s",
     "durations": "s",
@@ -38,7 +38,7 @@ PROFILES = {"quintic": quintic_path, "septic": septic_path}
 
 
 def _path_from_table(path: FilePath, text: str) -> Path:
-    """The path of a CSV text."""
+    """Read the path of a CSV text."""
     table = CsvTable.read(path, text, UNITS)
     _check_columns(table)
     time, *place = (table.columns[name] for name in PLACE)
@@ -64,7 +64,7 @@ def _path_from_table(path: FilePath, text: str) -> Path:
 
 
 def _check_columns(table: CsvTable) -> None:
-    """Refuse a table without a position, with an incomplete orientation, or with two forms of orientation."""
+    """Refuse a table without position columns, with an incomplete orientation, or with two forms of orientation."""
     orientation = table.columns.keys() & set(EULER + QUATERNION)
     wanted = PLACE + next((way for way in (EULER, QUATERNION) if orientation & set(way)), ())
     table.check_columns(wanted, f"; found: {', '.join(table.columns)}")
@@ -79,8 +79,8 @@ def _check_columns(table: CsvTable) -> None:
 def load_path(file: str | os.PathLike[str]) -> Path:
     """Read a path from a file of waypoints (.yaml, .yml) or of sampled poses (.csv).
 
-    The path of a YAML file is from rest to rest between waypoints (see `quintic_path`). A quantity is a number in SI
-    (lengths in m, angles in rad) or a text with its unit:
+    A YAML file contains waypoints. The platform moves from rest to rest between them (see `quintic_path`). A quantity
+    is a number in SI (lengths in m, angles in rad) or a text with its unit:
 
         rate: 100                             # samples per second, 100 if left out
         profile: septic                       # continuous jerk (see `septic_path`); quintic if left out
@@ -91,7 +91,7 @@ def load_path(file: str | os.PathLike[str]) -> Path:
           - {position: [2 m, 1500 mm, 1.5], euler: {alpha: 20 deg}}        # alpha about z, beta about y, gamma about x
           - {position: [2, 1, 1.5], quaternion: [0, 0, 0.6, 0.8]}          # x, y, z, w
 
-    Files of `CalibrationPoses.save` have this format, with the tensions and lengths of each waypoint.
+    Files of `CalibrationPoses.save` have this format; each waypoint also has tensions and lengths.
 
     A CSV file has a header and one row for each sample. The header is `time,x,y,z`, then `alpha,beta,gamma` or
     `qx,qy,qz,qw`, or nothing for a constant orientation. Units are in brackets, `time [s],x [mm],...,alpha [deg]`; the
@@ -127,7 +127,7 @@ def load_path(file: str | os.PathLike[str]) -> Path:
 
 
 class _Waypoint(PoseEntry):
-    """A pose, and the tensions and lengths of `CalibrationPoses.save`; a path does not use tensions and lengths."""
+    """Waypoint: a pose, and the tensions and lengths of `CalibrationPoses.save`, which a path does not use."""
 
     frame_end_tension: Any = None
     unstrained_length: Any = None

@@ -1,4 +1,4 @@
-"""Plans in NetCDF: every quantity with its unit, and the robot, the model and the version."""
+"""Plans in NetCDF: every quantity with its unit, the robot, the cable model and the version of sagline."""
 
 from __future__ import annotations
 
@@ -191,10 +191,10 @@ def save_plan(plan: Plan, file: os.PathLike[str] | str) -> None:
 
     The dimensions are pose (absent for a single pose) and cable. The times of a path are a coordinate of pose.
     Infeasible poses are included, with status, shortfall, blocking cables and proof; their lengths and forces are NaN.
-    A digest over all values and attributes follows the NetCDF data and detects changes.
+    A digest over all values and attributes follows the NetCDF data; it detects later changes.
 
     Args:
-        plan: The plan, of one robot.
+        plan: A plan of one robot.
         file: The file, for example "run.nc". An existing regular file is replaced; any other target is refused.
 
     Raises:
@@ -238,7 +238,7 @@ def load_plan(file: os.PathLike[str] | str) -> Plan:
 
 
 def plan_dataset(plan: Plan) -> Dataset:
-    """Data set of a plan of one robot, with the robot among its attributes."""
+    """Create the data set of a plan of one robot. An attribute contains the robot."""
     rows = ("pose",) * len(plan.state.pose.shape)
     cables = plan.state.one_robot.cable_count
     machine = () if plan.state.contact is None else MACHINE
@@ -261,7 +261,7 @@ def _attributes(plan: Plan) -> dict[str, Any]:
 
 
 def plan_of_dataset(path: FilePath, data: Dataset, item: str = "robot") -> Plan:
-    """Plan from a data set of `plan_dataset`; path and item are used in messages."""
+    """Create a plan from a data set of `plan_dataset`; path and item are used in messages."""
     robot = robot_of(path, data, item)
     _check_plan(data, robot.cable_count)
     behind = MACHINE[0].name in data.variables

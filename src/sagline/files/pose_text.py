@@ -13,7 +13,7 @@ from sagline.files.quantity import in_si, plain_number
 from sagline.files.yaml_text import YamlEntry
 from sagline.robot.pose import Pose
 
-STRONGEST: Final = 1e12  # [N, N m], larger than on any machine, far below overflow
+STRONGEST: Final = 1e12  # [N, N m], larger than on any machine, and far below overflow
 QUATERNION_TOLERANCE: Final = 1e-3  # largest deviation of a quaternion's length from 1, for three decimals
 POSE_STEP: Final = "Give meters, and degrees about z, y and x: --pose 1,0,1.5 or --pose 1,0,1.5,10,0,0."
 WRENCH_STEP: Final = (
@@ -23,7 +23,7 @@ UNITS_STEP: Final = "Check its unit: numbers are meters, millimeters are written
 
 
 def decimal_numbers(parts: Sequence[str], item: str, unit: str, largest: float) -> list[float]:
-    """Plain decimal numbers."""
+    """Read plain decimal numbers from texts."""
     found = []
     for part in parts:
         number = plain_number(part)
@@ -34,18 +34,18 @@ def decimal_numbers(parts: Sequence[str], item: str, unit: str, largest: float) 
 
 
 def pose_of_text(text: str, item: str = "--pose", step: str = POSE_STEP) -> Pose:
-    """A pose from X,Y,Z in meters, or X,Y,Z,A,B,C with the angles about z, y and x in degrees."""
+    """Read a pose from "X,Y,Z" in meters, or "X,Y,Z,A,B,C" with angles about z, y and x in degrees."""
     place = _three_or_six(text, item, "m or degrees", FARTHEST, step)
     return Pose.from_euler(place[:3], *np.radians(place[3:]))
 
 
 def wrench_of_text(text: str | None, item: str = "--wrench", step: str = WRENCH_STEP) -> Array | None:
-    """A wrench from "fx,fy,fz" in N, or "fx,fy,fz,mx,my,mz" with moments in N m; None if the text is None."""
+    """Read a wrench from "fx,fy,fz" in N or "fx,fy,fz,mx,my,mz" in N and N m; None if the text is None."""
     return None if text is None else np.array(_three_or_six(text, item, "N or N m", STRONGEST, step))
 
 
 def _three_or_six(text: str, item: str, unit: str, largest: float, step: str) -> list[float]:
-    """Six numbers from a text with three or six numbers between commas; three zeros are added to three numbers."""
+    """Read three or six numbers between commas. If there are three numbers, three zeros are added."""
     parts = text.split(",", maxsplit=6)
     if len(parts) not in (3, 6):
         raise InvalidValueError(item, repr(text), "three or six numbers", step)
@@ -60,7 +60,7 @@ class _Euler(YamlEntry):
 
 
 class PoseEntry(YamlEntry):
-    """Pose in a file."""
+    """Schema of a pose in a file."""
 
     position: Any
     euler: _Euler | None = None
@@ -68,7 +68,7 @@ class PoseEntry(YamlEntry):
 
 
 def pose_of_entry(entry: PoseEntry, item: str) -> Pose:
-    """Pose of an entry of a file; raises InvalidValueError if it is wrong, or too far away for any machine."""
+    """Convert an entry to a pose; raise InvalidValueError if it is wrong, or too far away for any machine."""
     position = si_numbers(entry.position, 3, "m", f"{item}.position")
     if (far := float(np.abs(position).max())) > FARTHEST:
         raise InvalidValueError(f"{item}.position", f"{far:g} m away", f"up to {FARTHEST:g} m", UNITS_STEP)
@@ -90,7 +90,7 @@ def pose_of_entry(entry: PoseEntry, item: str) -> Pose:
 
 
 def si_numbers(value: Any, count: int, unit: str, item: str) -> Array:
-    """Numbers in SI, shape (count,), from a value in a file."""
+    """Convert a value of a file to numbers in SI, shape (count,)."""
     numbers = checked(in_si(value, unit, item), item, unit)
     if numbers.shape != (count,):
         raise InvalidValueError(item, f"of shape {numbers.shape}", f"a list of {count} numbers", f"Correct {item}.")

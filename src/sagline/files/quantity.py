@@ -1,4 +1,4 @@
-"""Numbers in files: plain numbers in SI, or texts with a unit."""
+"""Quantities in files: plain numbers in SI, or texts with a unit."""
 
 from __future__ import annotations
 
@@ -31,13 +31,12 @@ _WITH_UNIT = re.compile(rf"[ \t]*({_DECIMAL})([ \t]+1[ \t]?/[ \t]?{_UNIT}|[ \t]*
 
 
 def plain_number(text: str) -> float | None:
-    """Number from a decimal text: digits 0 to 9, with optional point, sign and exponent; or inf, or nan.
+    """Read a number from a decimal text: digits 0 to 9 with optional point, sign and exponent, or inf or nan.
 
     Other notations of YAML, Python or C are not accepted, for example 1:30, 0x10, 1_000 and digits of other alphabets.
 
     Returns:
-        The number; None if the text is not a number. Only the word inf gives an infinite number; 1e999 gives the
-        largest float64.
+        The number; None if the text is not a number. Only the word inf gives infinity; 1e999 gives the largest float64.
 
     Examples:
         >>> from sagline.files.quantity import plain_number
@@ -58,7 +57,7 @@ def within_reach(number: float) -> bool:
 
 
 def in_si(value: object, unit: str, item: str) -> Nested:
-    """Numbers in an SI unit, from a quantity or from nested lists of quantities."""
+    """Convert a quantity, or nested lists of quantities, to numbers in an SI unit."""
     if isinstance(value, list | tuple):
         return [in_si(element, unit, f"{item}[{i}]") for i, element in enumerate(value)]
     number = _from_text(value, unit) if isinstance(value, str) else _from_number(value)
@@ -89,7 +88,7 @@ def _from_text(text: str, unit: str) -> float | None:
 
 
 def _limit(number: float) -> float:
-    """Number limited to the range of float64, so that a number that is too large does not become infinite."""
+    """Convert to float64. A number beyond the range becomes the largest float64, not infinity."""
     return max(-float_info.max, min(number, float_info.max))
 
 
@@ -102,7 +101,7 @@ def _factor(given: str, wanted: str) -> float | None:
     try:
         texts = (_TORQUE.sub(r"(\1*m)", given), wanted)
         one, wish = (units.Quantity(1.0, units.parse_units(text)) for text in texts)
-        # root units are compared, because pint would convert 5 Hz to 5 rad/s: angles are dimensionless in pint
+        # root units are compared, because pint would convert 5 Hz to 5 rad/s; its angles are dimensionless
         same = one.to_root_units().units == wish.to_root_units().units
         return float(one.to(wish.units).magnitude) if same else None
     except (PintError, ValueError, TypeError, AttributeError, SyntaxError, ArithmeticError):
@@ -111,7 +110,7 @@ def _factor(given: str, wanted: str) -> float | None:
 
 @cache
 def _registry() -> UnitRegistry[Any]:
-    # built once, and only if a file has units, because it takes as long as a run of `sagline track`
+    # built only once and only for a file with units, because this takes as long as a run of `sagline track`
     from pint import UnitRegistry
 
     return UnitRegistry(autoconvert_offset_to_baseunit=False)

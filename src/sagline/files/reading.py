@@ -22,14 +22,14 @@ _OTHER_TEXT: Final = {codecs.BOM_UTF16_LE: "UTF-16", codecs.BOM_UTF16_BE: "UTF-1
 
 
 def check_regular(path: Path, mode: int) -> None:
-    """Refuse a path that is not a regular file, by its mode (from `os.stat`)."""
+    """Refuse a path whose mode (from `os.stat`) is not that of a regular file."""
     if not stat.S_ISREG(mode):
         kind, step = _IRREGULAR.get(stat.S_IFMT(mode), ("no file", "Name a file."))
         raise FileError(path, f"is {kind}", step)
 
 
 def unreadable(path: Path, error: Exception) -> FileError:
-    """FileError for a file that the system cannot read."""
+    """Create the FileError for a file that the system cannot read."""
     reason = getattr(error, "strerror", None) or error
     return FileError(path, f"cannot be read ({reason})", "Check its name and its permissions.")
 
@@ -44,7 +44,7 @@ def exists(path: Path) -> bool:
 
 
 def read_bytes(path: Path, limit: float) -> bytes:
-    """Bytes of a regular file of at most `limit` MB; pipes and devices are not opened, because they may never end."""
+    """Read a regular file of at most `limit` MB. Pipes and devices are not opened, because they may never end."""
     most = int(limit * MEGABYTE)
     try:
         check_regular(path, path.stat().st_mode)
@@ -59,7 +59,7 @@ def read_bytes(path: Path, limit: float) -> bytes:
 
 
 def read_text(path: Path, limit: float) -> str:
-    """Text of a UTF-8 file of at most `limit` MB, without the byte order mark."""
+    """Read the text of a UTF-8 file of at most `limit` MB, without its byte order mark."""
     data = read_bytes(path, limit)
     if other := _OTHER_TEXT.get(data[:2]):
         raise FileError(path, f"is {other} text, not UTF-8 text", "Save it again as UTF-8.")
@@ -75,6 +75,6 @@ def read_text(path: Path, limit: float) -> str:
 
 
 def error_at_line(path: Path | str, reason: str, next_step: str) -> FileError:
-    """FileError; if the reason contains a line number, the item of the error is the line."""
+    """Create a FileError. If the reason contains a line number, the item of the error is this line."""
     line = re.search(r"\bline \d+", reason)
     return FileError(path, reason, next_step, item=line and line[0])

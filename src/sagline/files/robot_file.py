@@ -46,15 +46,15 @@ def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
             # origin and standard errors of estimated values, written by `calibrate`
         scene: [{name: pole, capsule: [[1, 0, 0], [1, 0, 3]], radius: 5 cm}]      # obstacles: `load_scene`
 
-    A file may be based on a preset (`base: cogiro` in addition to its own name). It then contains only values that are
-    different. All other values, and the notes on assumed values, come from the preset.
+    A file may be based on a preset: it contains `base: cogiro`, for example, and its own name. It then contains only
+    values that differ from the preset. All other values, and the notes on assumed values, are those of the preset.
 
     Args:
         name_or_path: One of `robot_names()`, or the path of a file. A text is a path if it ends with .yaml or .yml,
             contains a folder, or is the name of an existing file.
 
     Returns:
-        The robot, checked.
+        The robot. Its values are checked.
 
     Raises:
         FileError: If the file cannot be read, or a value is wrong; the message names the key and the value.
@@ -73,7 +73,7 @@ def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
 
 
 def parse_robot(text: str, origin: Path | str) -> Robot:
-    """Robot from the text of a robot file."""
+    """Read the robot from the text of a robot file."""
     entry = _robot_entry(text, origin)
     try:
         return entry.robot()
@@ -82,12 +82,12 @@ def parse_robot(text: str, origin: Path | str) -> Robot:
 
 
 def _robot_entry(text: str, origin: Path | str) -> RobotEntry:
-    """Schema entry of a robot file: keys and types are checked, values are not checked."""
+    """Read the schema entry of a robot file. Keys and types are checked, but not values."""
     return validate(_on_base(parse_mapping(text, origin), origin), RobotEntry, origin)
 
 
 def dump_robot(robot: Robot) -> str:
-    """Text of a robot file for a robot, in SI.
+    """Write a robot as the text of a robot file, in SI.
 
     Args:
         robot: The robot.
@@ -124,12 +124,12 @@ def dump_robot(robot: Robot) -> str:
 
 
 def _deviations(found: Mapping[str, Array]) -> dict[str, Any]:
-    """Standard deviations; a single number for a field with equal values."""
+    """Standard deviations for the file. A field with equal values becomes a single number."""
     return {name: (one.flat[0].item() if (one == one.flat[0]).all() else one.tolist()) for name, one in found.items()}
 
 
 def _on_base(data: dict[Any, Any], origin: Path | str) -> dict[Any, Any]:
-    """Keys of a file, with the missing keys of its base preset, if the file has one."""
+    """Keys of a file. If the file has a base preset, missing keys are added from the preset."""
     if "base" not in data:
         return data
     name = data.pop("base")
@@ -145,7 +145,7 @@ def _on_base(data: dict[Any, Any], origin: Path | str) -> dict[Any, Any]:
 
 
 def _winches(winches: Winch) -> dict[str, Any]:
-    """Keys of winches with values that differ from a winch with pulleys only."""
+    """Keys of the winches' values, without the values of a winch that has only a pulley."""
     plain = Winch().per_cable(len(winches.pulley_radius)).known()
     data = {
         key: field.tolist()
@@ -177,8 +177,8 @@ def load_scene(file: str | os.PathLike[str]) -> tuple[Obstacle, ...]:
           - {name: lamp, sphere: [0, 0, 2.8], radius: 20 cm}
           - {name: hall, mesh: hall.stl, unit: mm, position: [0, 0, -1], turned: 90 deg}
 
-    `turned` is a rotation about z; `mesh` is a file in the folder of the robot file, read by `load_mesh`. Only the file
-    contains the scene. A `Robot` has no scene, and `dump_robot` does not write one.
+    `turned` is a rotation about z; `mesh` is a file in the folder of the robot file, read by `load_mesh`. The scene
+    exists only in the file. A `Robot` has no scene, and `dump_robot` does not write one.
 
     Args:
         file: The robot file.
@@ -200,7 +200,7 @@ def load_scene(file: str | os.PathLike[str]) -> tuple[Obstacle, ...]:
 
 
 def _obstacle(place: ObstacleEntry, item: str, path: Path) -> Obstacle:
-    """Obstacle of an entry in the scene of a robot file; a mesh is loaded from the folder of this file."""
+    """Convert an entry of a scene to an obstacle. A mesh is loaded from the folder of the robot file."""
     try:
         solid = place.solid(item)
     except InvalidValueError as error:

@@ -25,7 +25,7 @@ from sagline.robot.winch import Winch
 if TYPE_CHECKING:
     from sagline.interference.obstacles import Box, Capsule, Sphere
 
-_KINDS: Final = {  # kinds of obstacles, and further keys that are allowed for each kind
+_KINDS: Final = {  # kinds of obstacles, and the further keys that each kind allows
     "box": ("center", "turned"),
     "capsule": ("radius",),
     "sphere": ("radius",),
@@ -57,7 +57,7 @@ _UNITS: Final = {
     "test_box.tilt": "rad",
     **{f"cables.{name}": unit for name, unit in units(Cable).items()},
     **{f"winches.{name}": unit for name, unit in units(Winch).items()},
-}  # every other key of inertia is in kg m^2
+}  # the unit of all other keys of inertia is kg m^2
 SWIVEL_AXES: Final = {"up": [0.0, 0.0, 1.0], "down": [0.0, 0.0, -1.0]}  # words for vertical directions
 
 
@@ -76,7 +76,7 @@ class ObstacleEntry(YamlEntry):
     turned: Any = 0.0  # angle of a box or mesh about z
 
     def _kind(self, item: str) -> str:
-        """Kind of the obstacle; raises InvalidValueError for a combination of keys that is not allowed."""
+        """Kind of the obstacle; raise InvalidValueError for a combination of keys that is not allowed."""
         label(self.name, f"{item}.name")
         given = self.model_fields_set - {"name"}
         found = [kind for kind in _KINDS if kind in given]
@@ -92,7 +92,7 @@ class ObstacleEntry(YamlEntry):
         return kind
 
     def solid(self, item: str) -> Box | Capsule | Sphere | None:
-        """Box, capsule or sphere of the entry; None for a mesh (the values are checked, but not the file)."""
+        """Box, capsule or sphere of the entry. For a mesh: None, after a check of the values, but not of the file."""
         from sagline.files.mesh_file import meters  # imported here because most robot files have no scene
         from sagline.interference.obstacles import Box, Capsule, Sphere
 
@@ -122,15 +122,15 @@ class ObstacleEntry(YamlEntry):
 
 
 class _RobotPart(YamlEntry):
-    """A mapping in a robot file."""
+    """Schema of a mapping in a robot file."""
 
     def given(self, key: str, within: str = "") -> Any:
-        """Quantity of a key in SI."""
+        """Value of a key in SI."""
         item = within + key
         return in_si(getattr(self, key), _UNITS.get(item, "kg*m^2"), item)
 
     def only_way(self, item: str, ways: tuple[tuple[str, ...], ...], beside: tuple[str, ...]) -> tuple[str, ...]:
-        """Set of all given keys except the keys in `beside`; raises an error if `ways` does not contain this set."""
+        """Set of the given keys without the keys in `beside`; raise an error if it is not one of the `ways`."""
         found = self.model_fields_set.difference(beside)
         for way in ways:
             if found == set(way):
@@ -144,13 +144,13 @@ class _RobotPart(YamlEntry):
 
 
 def _with_keys(names: Iterable[str]) -> Any:
-    """A mapping in a robot file with optional keys of these names."""
+    """Create the schema of a mapping with optional keys of these names."""
     keys: dict[str, Any] = dict.fromkeys(names, (Any, None))
     return create_model("_Keys", __base__=_RobotPart, **keys)
 
 
 class _Cables(_RobotPart):
-    """Material of the cables; each value is a number for all cables, or a list."""
+    """Schema of the cables. Each value is one number for all cables, or a list."""
 
     linear_density: Any
     axial_stiffness: Any = None
@@ -161,7 +161,7 @@ class _Cables(_RobotPart):
     expansion: Any = None
 
     def cable(self) -> Cable:
-        """The cables; the stiffness follows from the given keys, and the section by default from the diameter."""
+        """Create the cables. Their stiffness follows from the given keys; the default section, from the diameter."""
         ways = (("axial_stiffness",), *(("youngs_modulus", key) for key in ("section_area", "radius", "diameter")))
         beside = ["linear_density", "expansion"]
         if self.model_fields_set & {"axial_stiffness", "section_area"}:
@@ -180,12 +180,12 @@ class _Cables(_RobotPart):
 
 
 class _Winches(_with_keys(units(Winch))):  # type: ignore[misc]
-    """Winches and pulleys; each value is one number for all cables, or a list."""
+    """Schema of the winches and pulleys. Each value is one number for all cables, or a list."""
 
     swivel_axis: Any = None  # a vector or a word
 
     def winches(self) -> Winch:
-        """The winches; missing values are the defaults of `Winch`."""
+        """Create the winches. Missing values are the defaults of `Winch`."""
         if "swivel_axis" in self.model_fields_set:
             self.swivel_axis = _vectors(self.swivel_axis)
         keys = [key for key in _Winches.model_fields if key in self.model_fields_set]
@@ -193,7 +193,7 @@ class _Winches(_with_keys(units(Winch))):  # type: ignore[misc]
 
 
 def _vectors(value: object) -> object:
-    """Swivel axes with words replaced by vectors; one for all cables, or a list."""
+    """Swivel axis for all cables, or a list of axes; words are replaced by vectors."""
     if isinstance(value, list):
         return [_vectors(entry) for entry in value]
     if not isinstance(value, str) or plain_number(value) is not None:
@@ -210,14 +210,14 @@ def _vectors(value: object) -> object:
 
 
 class _Inertia(_RobotPart):
-    """Inertia about the center of mass: a matrix, its diagonal, its elements, or a solid body of the robot's mass."""
+    """Schema of the inertia about the center of mass: matrix, diagonal, elements, or solid body of the robot's mass."""
 
     matrix: Any = None
     diagonal: Any = None
     Ixx: Any = None
     Iyy: Any = None
     Izz: Any = None
-    Ixy: Any = 0.0  # element of the matrix, as the next two: the negative product of inertia
+    Ixy: Any = 0.0  # this and the next two are elements of the matrix: negative products of inertia
     Ixz: Any = 0.0
     Iyz: Any = 0.0
     box: Any = None
@@ -227,13 +227,13 @@ class _Inertia(_RobotPart):
     @model_validator(mode="before")
     @classmethod
     def _accept_list(cls, data: object) -> object:
-        """Matrix from a list of lists, or its diagonal from a list of numbers."""
+        """Read the matrix from a list of lists, or its diagonal from a list of numbers."""
         if not isinstance(data, list):
             return data
         return {"matrix" if any(isinstance(row, list) for row in data) else "diagonal": data}
 
     def about_center(self, mass: float) -> Array:
-        """The matrix for a platform of this mass [kg], shape (3, 3)."""
+        """Inertia matrix for a platform of this mass [kg], shape (3, 3)."""
         ways = (("matrix",), ("diagonal",), ("Ixx", "Iyy", "Izz"), ("box",), ("cylinder_radius", "cylinder_height"))
         mixed = ("Ixy", "Ixz", "Iyz") if "Ixx" in self.model_fields_set else ()
         way = self.only_way("inertia", ways, beside=mixed)
@@ -254,7 +254,7 @@ class _Inertia(_RobotPart):
 
 
 class _TestBox(_RobotPart):
-    """Box of poses for tests of the robot."""
+    """Schema of the test box: poses for tests of the robot."""
 
     low: Any
     high: Any
@@ -262,10 +262,10 @@ class _TestBox(_RobotPart):
 
 
 class _Deviations(_with_keys(UNCERTAIN)):  # type: ignore[misc]
-    """Standard deviations of a robot's values: for each field one number, one per axis, or one per value."""
+    """Schema of standard deviations of a robot's values: one number per field, per axis, or per value."""
 
     def of(self, robot: Robot, within: str) -> dict[str, Any]:
-        """Standard deviations in SI; a percentage is relative to the robot's value."""
+        """Standard deviations in SI. A percentage is a share of the robot's value."""
         found = {}
         for key in (key for key in _Deviations.model_fields if key in self.model_fields_set):
             item, value = within + key, getattr(self, key)
@@ -277,14 +277,14 @@ class _Deviations(_with_keys(UNCERTAIN)):  # type: ignore[misc]
 
 
 def _in_percent(value: object) -> bool:
-    """True if a text, or the first element of a list, is in percent."""
+    """True if a value is a text in percent, or a list whose first element is one."""
     if isinstance(value, list):
         return bool(value) and _in_percent(value[0])
     return isinstance(value, str) and value.rstrip().endswith("%")
 
 
 def _share(value: Any, item: str) -> Any:
-    """Percentages as fractions."""
+    """Convert percentages to fractions."""
     if isinstance(value, list):
         return [_share(element, f"{item}[{i}]") for i, element in enumerate(value)]
     number = plain_number(value.strip().removesuffix("%")) if _in_percent(value) else None
@@ -294,7 +294,7 @@ def _share(value: Any, item: str) -> Any:
 
 
 class _Calibration(_RobotPart):
-    """Calibration that has determined some of the values."""
+    """Schema of the calibration that has determined some of the values."""
 
     log: str
     date: str
@@ -302,12 +302,12 @@ class _Calibration(_RobotPart):
     standard_error: _Deviations = Field(default_factory=_Deviations)
 
     def provenance(self, robot: Robot) -> Provenance:
-        """Provenance of the robot's numbers."""
+        """Create the provenance of the robot's numbers."""
         return Provenance(self.log, self.date, self.standard_error.of(robot, _ERROR), self.note)
 
 
 class RobotEntry(_RobotPart):
-    """A whole robot file. The keys are the fields of `Robot`; missing values are the defaults of `Robot`."""
+    """Schema of a whole robot file. The keys are the fields of `Robot`, and so are the defaults."""
 
     name: str
     frame_anchors: Any
@@ -334,7 +334,7 @@ class RobotEntry(_RobotPart):
     scene: list[ObstacleEntry] = Field(default_factory=list)  # not a field of Robot; see sagline.files.robot_file
 
     def robot(self) -> Robot:
-        """The robot the file describes."""
+        """Create the robot that the file describes."""
         keys = self.model_fields_set - {"scene", "tolerances", "calibration"}
         fields = {key: self.given(key) if key in _UNITS else getattr(self, key) for key in keys}
         for k, place in enumerate(self.scene):
@@ -350,7 +350,7 @@ class RobotEntry(_RobotPart):
         return self._with_tolerances(Robot(**fields))
 
     def _with_tolerances(self, robot: Robot) -> Robot:
-        """The robot with tolerances, which the file may give in percent."""
+        """Add the tolerances to the robot; the file may give them in percent."""
         about: dict[str, Any] = {}
         if self.tolerances is not None:
             about["tolerances"] = self.tolerances.of(robot, "tolerances.")

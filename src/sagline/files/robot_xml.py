@@ -1,4 +1,4 @@
-"""XML robot files of other programs: safe reading, checked numbers, and a record of lost data."""
+"""Robot files of other programs in XML: safe reading, checked numbers, and a record of lost data."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _STEEL_ROPE: Final = {"linear density": 0.065, "axial stiffness": 700e3}  # [kg/
 
 
 def read_xml(path: Path) -> Element:
-    """The root element of an XML file."""
+    """Read the root element of an XML file."""
     # Files that declare entities are refused, because an entity can grow without bound or refer to another file. A
     # document type is skipped; its file is never opened
     data = read_bytes(path, _LIMIT)
@@ -52,7 +52,7 @@ def read_xml(path: Path) -> Element:
 
 
 def numbers_of_text(text: str | None, count: int, item: str, unit: str) -> Array:
-    """Numbers separated by blanks, shape (count,); InvalidValueError names the item and the unit."""
+    """Read numbers between blanks, shape (count,); raise InvalidValueError with item and unit."""
     found = [plain_number(word) for word in (text or "").split()[: count + 1]]
     values = [number for number in found if number is not None and within_reach(number)]
     if len(found) != count or len(values) != count:
@@ -63,12 +63,12 @@ def numbers_of_text(text: str | None, count: int, item: str, unit: str) -> Array
 
 
 def number_of_text(text: str | None, item: str, unit: str) -> float:
-    """One finite number; InvalidValueError names the item and the unit."""
+    """Read one finite number; raise InvalidValueError with item and unit."""
     return float(numbers_of_text(text, 1, item, unit)[0])
 
 
 def only_child(parent: Element, tag: str, item: str) -> Element:
-    """The element with this tag inside another element."""
+    """Find the element with this tag inside another element."""
     found = parent.findall(tag)
     if len(found) != 1:
         raise InvalidValueError(
@@ -80,7 +80,7 @@ def only_child(parent: Element, tag: str, item: str) -> Element:
 def cables_of_file(
     density: Column, stiffness: Column, tool: str, assumed: dict[str, str], diameter: Sequence[float] | None = None
 ) -> Cable:
-    """Cables of a file; None is replaced by the value of a 4 mm steel rope, and this is noted in `assumed`."""
+    """Cables of a file. A value None is replaced by that of a 4 mm steel rope and noted in `assumed`."""
     given = dict(zip(_STEEL_ROPE, (density, stiffness), strict=True))
     if missing := [name for name, values in given.items() if None in values]:
         assumed["cables"] = f"{' and '.join(missing)} of a 4 mm steel rope; the {tool} file gives none"
@@ -89,7 +89,7 @@ def cables_of_file(
 
 
 def vertical_axis(sideways: float, up: float) -> tuple[float, float, float] | None:
-    """Swivel axis (up or down) from the horizontal and vertical parts of a direction; None if it is inclined."""
+    """Swivel axis, up or down, from the horizontal and vertical parts of its direction; None if it is inclined."""
     return None if not up or sideways > UPRIGHT * abs(up) else (0.0, 0.0, float(np.sign(up)))
 
 
@@ -134,11 +134,11 @@ def _check_encoding(version: str, encoding: str | None, standalone: int) -> None
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Imported:
-    """A robot from a file of another program, and the lost data.
+    """Robot from a file of another program, and the data of the file that the robot cannot contain.
 
     Attributes:
-        robot: The robot; `robot.assumed` lists the fields that the file does not give, with the reason, and
-            `robot.notes` the lost data.
+        robot: The robot. `robot.assumed` lists the fields that the file does not give, with the reason. `robot.notes`
+            lists the lost data.
         lost: Data of the file that the robot does not contain, one sentence each.
     """
 
@@ -147,5 +147,5 @@ class Imported:
 
 
 def with_losses(robot: Robot, lost: tuple[str, ...]) -> Imported:
-    """Robot and its lost data; the data are added to the notes of the robot, so that its file contains them."""
+    """Combine a robot and its lost data. The data are added to the notes of the robot, and thus to its file."""
     return Imported(robot.replace(notes=" ".join(("Not taken over:", *lost))) if lost else robot, lost)

@@ -81,7 +81,7 @@ OF_EITHER: Final = ("brake",)
 
 
 ROWS: Final = "time"
-ROUNDING: Final = 1e-12  # tolerance, relative to the largest energy
+ROUNDING: Final = 1e-12  # tolerance of energies, as a share of the largest energy
 
 
 def _check_simulation(data: Dataset, cables: int) -> None:
@@ -155,7 +155,7 @@ def _check_events(data: Dataset, time: Array, cables: int) -> Array:
 
 
 def _check_gaps(name: str, values: Array, gone: Any) -> None:
-    """Refuse values of broken cables and missing values of intact cables; gone: flags, shape (samples, cables)."""
+    """Refuse values of broken cables, and missing values of intact cables; gone: flags (samples, cables)."""
     missing = np.isnan(values)
     gone = gone.reshape(gone.shape + (1,) * (values.ndim - 2))
     for index in np.argwhere(missing != gone)[:1].tolist():
@@ -201,7 +201,7 @@ def load_simulation(file: os.PathLike[str] | str) -> Simulation:
 
 
 def _pack(simulation: Simulation) -> Dataset:
-    """Data set of a simulation, with the dimensions time, cable, node (cables with mass) and event."""
+    """Create the data set of a simulation, with the dimensions time, cable, event, and node for cables with mass."""
     variables = variables_of_result(simulation, (*SAMPLES, NODES), (ROWS,)) | variables_of_result(
         simulation, (LARGEST,)
     )
@@ -230,7 +230,7 @@ def _attributes(simulation: Simulation) -> dict[str, Any]:
 
 
 def _unpack(path: FilePath, data: Dataset) -> Simulation:
-    """Simulation of a data set; the path is used in messages."""
+    """Create a simulation from a data set; the path is used in messages."""
     robot = robot_of(path, data)
     _check_simulation(data, robot.cable_count)
     attributes, found = data.attrs, fields_of(data, (TIME, *SAMPLES, NODES, LARGEST))

@@ -1,4 +1,4 @@
-"""Tables of numbers in CSV, with units in the header."""
+"""CSV tables of numbers with units in the header."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from sagline.core.errors import FileError, InvalidValueError, nearest
 from sagline.files.quantity import LARGEST, REACH, in_si, plain_number
 
 TABLE_LIMIT: Final = 64.0  # largest size [MB], about half a million rows
-_TOO_LONG: Final = 100.0  # ratio to the size of the object; a larger length must be in mm
+_TOO_LONG: Final = 100.0  # a length above this factor times the size of the object must be in mm
 _NONE: Final[Mapping[str, str]] = MappingProxyType({})
 _COLUMN = re.compile(r"\s*(\w+)\s*(?:\[(.*)\])?\s*")  # name, or name [unit]
 _SHORT, _OF_CABLE = re.compile(r"([LC])([0-9]+)"), {"L": "length", "C": "count"}
 _PLAIN_ROW = re.compile(
     r"(?:[-+.0-9eE \t]*,|nan,)*"
-)  # a text of these characters only is converted by `float`, which is much faster
+)  # a text with no other characters is converted by `float`, which is much faster
 _DECIMAL_COMMA = re.compile(r"\s*[-+]?[0-9]+,[0-9]+(?:[eE][-+]?[0-9]+)?\s*")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CsvTable:
-    """Columns of numbers in SI."""
+    """Table with columns of numbers in SI."""
 
     path: FilePath  # the file, for messages
     columns: dict[str, Array]  # name and numbers of each column, shape (rows,)
@@ -52,7 +52,7 @@ class CsvTable:
     ) -> CsvTable:
         """Read a CSV text; the first row contains the names of the columns, `name` or `name [unit]`.
 
-        Columns are separated by commas, or by semicolons or tabs, and then numbers may have a decimal comma.
+        Columns are separated by commas, semicolons or tabs. With the latter two, numbers may have a decimal comma.
         """
         mark = separator_of(text)
         reader = csv.reader(io.StringIO(text), strict=True, delimiter=mark)
@@ -87,7 +87,7 @@ class CsvTable:
         return table
 
     def check_columns(self, names: Iterable[str], hint: str) -> None:
-        """Refuse a table without one of the columns; hint: end of the message."""
+        """Refuse a table in which one of the columns is missing; hint: end of the message."""
         if missing := [name for name in names if name not in self.columns]:
             raise line_error(self.path, self.header, f"missing column {', '.join(missing)}{hint}")
 
@@ -97,14 +97,14 @@ class CsvTable:
             raise line_error(self.path, self.header, "no rows below the names of the columns; allowed: at least one")
 
     def refuse(self, wrong: NDArray[np.bool_], item: str, values: Array, unit: str, allowed: str) -> None:
-        """Refuse a table with a wrong row; the message gives line, value, unit, allowed values of the first one."""
+        """Refuse a table with wrong rows. The message gives line, value, unit and allowed values of the first one."""
         if wrong.any():
             k = int(np.argmax(wrong))
             value = f"{values[k]:.12g} {unit}".rstrip()
             raise line_error(self.path, self.lines[k], f"{item} is {value}; allowed: {allowed}")
 
     def refuse_millimeters(self, name: str, size: Array | float, whole: str) -> None:
-        """Refuse lengths without a unit above a hundred times the size of the object [m], shape () or (rows,)."""
+        """Refuse lengths without a unit that exceed 100 times the size of the object [m], shape () or (rows,)."""
         if name in self.plain:
             far = self.columns[name] > _TOO_LONG * size
             allowed = f"lengths like {whole}; if these are millimeters, call the column {name} [mm]"
@@ -112,13 +112,13 @@ class CsvTable:
 
 
 def separator_of(text: str) -> str:
-    """Character between the columns of a CSV text: a comma, or a semicolon or a tab if its first row has no comma."""
+    """Separator of the columns of a CSV text: comma, or semicolon or tab if the first row has no comma."""
     header = re.sub(r"\[.*?\]", "", next((line for line in text.split("\n") if line.strip()), "")).strip()
     return next((mark for mark in ",;\t" if mark in header), ",")
 
 
 def column_of_cable(name: str) -> str:
-    """Name of a column; `L0` and `C0` are other names of `length_0` and `count_0`."""
+    """Standard name of a column: `L0` becomes `length_0`, and `C0` becomes `count_0`."""
     found = _SHORT.fullmatch(name)
     return name if found is None else f"{_OF_CABLE[found[1]]}_{found[2]}"
 
@@ -126,7 +126,7 @@ def column_of_cable(name: str) -> str:
 def _factors(
     path: FilePath, line: int, header: list[str], units: Mapping[str, str], strangers: Mapping[str, str]
 ) -> dict[str, float | None]:
-    """Factor to SI of each column, by the name of the column; None without a unit."""
+    """Factor that converts each column to SI, by the name of the column; None without a unit."""
     factors: dict[str, float | None] = {}
     for cell in header:
         found = _COLUMN.fullmatch(cell)
@@ -162,7 +162,7 @@ def _numbers(path: FilePath, line: int, row: list[str], names: tuple[str, ...], 
     if gaps:
         row = [cell if name not in gaps or cell.strip() else "nan" for name, cell in zip(names, row, strict=True)]
     if _PLAIN_ROW.fullmatch(",".join(row) + ","):
-        with contextlib.suppress(ValueError):  # after an error, the slower code finds the cell
+        with contextlib.suppress(ValueError):  # after an error, slower code finds the wrong cell
             return [float(cell) for cell in row]
     numbers = [plain_number(cell) for cell in row]
     if None in numbers:
@@ -173,7 +173,7 @@ def _numbers(path: FilePath, line: int, row: list[str], names: tuple[str, ...], 
 
 
 def line_error(path: FilePath, line: int, reason: str) -> FileError:
-    """FileError with the number of the line."""
+    """Create the FileError with the number of the line."""
     found = FileError(path, f"line {line}: {reason}", f"Correct line {line}.", item=f"line {line}")
     found.value, _, found.allowed = reason.partition("; allowed: ")
     return found

@@ -1,4 +1,4 @@
-"""Variables of NetCDF files: declaration of a quantity, and checks of shape, type, unit, codes, signs and NaN."""
+"""Variables of NetCDF files: declarations of quantities, and checks of shape, type, unit, codes, signs and NaN."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 STEP = "Write the file again, because it was edited or damaged."
 NEWER = "Read it with a newer sagline."
-NONE: Final = -1  # missing index or code
-# labels along the dimensions other than rows and cable
+NONE: Final = -1  # value of a missing index or code
+# labels along all dimensions except rows and cable
 PARTS = {
     "axis": ("x", "y", "z"),
     "quaternion_part": ("x", "y", "z", "w"),
@@ -48,7 +48,7 @@ class Quantity(NamedTuple):
     unit: str  # unit in the file; "" for a plain number
     long_name: str  # description
     source: str = ""  # attribute of the result, with dots for nested attributes; "" if the attribute is `name`
-    # poses with values; in records, an integer with values SOMEWHERE is `NONE` at all other places
+    # poses with values; in records, an integer with values SOMEWHERE is `NONE` elsewhere
     known: Known = EVERYWHERE
     low: float = -np.inf  # lowest value
     infinite: bool = False  # True if values may be infinite
@@ -58,7 +58,7 @@ class Quantity(NamedTuple):
 
     @property
     def place(self) -> str:
-        """Attribute of the result with the values, with dots for nested attributes."""
+        """Name of the result's attribute that has the values, with dots for nested attributes."""
         return self.source or self.name
 
     @property
@@ -67,7 +67,7 @@ class Quantity(NamedTuple):
         return np.dtype(np.int8 if self.codes is not None else object if self.values is str else self.values)
 
     def of(self, result: Any) -> Any:
-        """Values of a result; None if the result has no values, for example a plan without a proof."""
+        """Values of the quantity in a result; None if the result has none, for example a plan without a proof."""
         for name in self.place.split("."):
             result = None if result is None else getattr(result, name)
         return result
@@ -85,7 +85,7 @@ class Quantity(NamedTuple):
 
 
 def variables_of_result(result: Any, quantities: Iterable[Quantity], rows: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Dimensions, values and attributes by name, for each quantity of a result."""
+    """Dimensions, values and attributes of the quantities of a result, by name."""
     found: dict[str, Any] = {}
     for one in quantities:
         if (values := one.of(result)) is not None:
@@ -94,7 +94,7 @@ def variables_of_result(result: Any, quantities: Iterable[Quantity], rows: tuple
 
 
 def record_variables(records: Sequence[Any], quantities: Iterable[Quantity], width: int = 0) -> dict[str, Any]:
-    """Variables with one row per record. Lists have a second dimension of this width. None is stored as `NONE`."""
+    """Variables with one row per record. For lists, `width` is the second dimension. None is stored as `NONE`."""
     found: dict[str, Any] = {}
     for one in quantities:
         values = [NONE if (value := one.of(record)) is None else value for record in records]
@@ -104,12 +104,12 @@ def record_variables(records: Sequence[Any], quantities: Iterable[Quantity], wid
 
 
 def values_of(data: Dataset, name: str) -> Any:
-    """Values of a variable, in C order and write-locked."""
+    """Values of a variable as a write-locked array in C order."""
     return locked(np.asarray(data[name].values, order="C"))
 
 
 def fields_of(data: Dataset, quantities: Iterable[Quantity]) -> dict[str, Any]:
-    """Values of the quantities of a data set, by attribute of the result; nested attributes give nested mappings."""
+    """Values of a data set, by attribute of the result. Nested attributes give nested mappings."""
     found: dict[str, Any] = {}
     for one in quantities:
         if one.name in data.variables:
@@ -122,7 +122,7 @@ def fields_of(data: Dataset, quantities: Iterable[Quantity]) -> dict[str, Any]:
 
 
 def records_of(data: Dataset, quantities: Iterable[Quantity]) -> list[dict[str, Any]]:
-    """Records from variables of `record_variables`, by attribute; integers with values SOMEWHERE may be None."""
+    """Restore records from variables of `record_variables`; integers with values SOMEWHERE may be None."""
     columns: dict[str, list[Any]] = {}
     for one in quantities:
         values = data[one.name].values
@@ -162,7 +162,7 @@ def check_variables(
 
 
 def check_indices(data: Dataset, ranges: Mapping[str, tuple[int, int]]) -> None:
-    """Refuse indices out of range; a range includes its first number and excludes its second number."""
+    """Refuse indices out of range. A range includes its first number, but not its second."""
     for name, (low, high) in ranges.items():
         values = data.variables[name].values
         wrong = (values < low) | (values >= high)
@@ -175,7 +175,7 @@ def _check_form(quantity: Quantity, variable: Variable, wanted: Mapping[str, int
     found = dict(zip(map(str, variable.dims), variable.shape, strict=True))
     if list(found.items()) != list(wanted.items()):
         raise InvalidValueError(f"{quantity.name}: shape", _shape(found), _shape(wanted), STEP)
-    # the type of texts may differ, so each text is checked later
+    # texts may have different types; each text is checked later
     if quantity.values is not str and variable.dtype.newbyteorder("=") != quantity.type:
         raise InvalidValueError(f"{quantity.name}: type", variable.dtype, str(quantity.type), STEP)
     unit = variable.attrs.get("units", "")

@@ -1,4 +1,4 @@
-"""Robots of WireX and WireCenter: one XML file, `.wcrfx`, with geometry, platform, cables and winches."""
+"""Robots of WireX and WireCenter: an XML file `.wcrfx` with geometry, platform, cables and winches."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from sagline.robot.robot import Robot
 from sagline.robot.winch import Winch
 
 _AXES: Final = ("x", "y", "z")
-_FLATTEST: Final = 0.1  # smallest ratio of edges of the assumed box, because the anchors may be in a plane
+_FLATTEST: Final = 0.1  # smallest ratio of two edges of the assumed box; needed because all anchors may be in a plane
 _VERSIONS: Final = ("0.31", "0.32")
 _INFINITE: Final = re.compile(r"\+?(inf|infinity|1\.#inf0*)", re.IGNORECASE)  # Windows writes 1.#INF
 
@@ -39,8 +39,8 @@ def load_wirex(source: str | os.PathLike[str], cables: Cable | None = None) -> I
 
     WireX does not require material, inertia or limits. Missing values are assumed and listed in the robot's `assumed`.
     Missing moments of inertia are set to the largest given moment, missing products of inertia to zero. If no inertia
-    is given, the platform is a box around its anchors. Only pulleys with a vertical swivel axis are read. The data of a
-    winch that are read are the largest force, the drum and the inertia of the motor.
+    is given, the platform is a box around its anchors. Only pulleys with a vertical swivel axis are read. Of a winch,
+    the largest force, the drum and the motor's inertia are read.
 
     Args:
         source: The `.wcrfx` file.
@@ -118,7 +118,7 @@ def _robot(root: Element, name: str, cables: Cable | None) -> Imported:
 
 
 def _optional(element: Element | None, key: str, item: str, unit: str) -> float | None:
-    """Number in an attribute; None if it is missing, empty, or infinite, which some programs write for unknown."""
+    """Number in an attribute; None if it is missing, empty or infinite. Some programs write infinity for unknown."""
     text = "" if element is None else element.get(key, "").strip()
     if not text or _INFINITE.fullmatch(text):
         return None
@@ -136,7 +136,7 @@ def _point(chain: Element, tag: str, k: int) -> list[float]:
 
 
 def _material(root: Element, chain: Element, k: int) -> Element:
-    """The <cable> with the cable_id of a chain, from 1; without an id, the first <cable>; empty if there is none."""
+    """The <cable> whose number, from 1, is the cable_id of a chain; the first without an id; empty if none exists."""
     known = root.findall("cable")
     text = chain.get("cable_id", "1")
     if not known:
@@ -163,7 +163,7 @@ def _cables(materials: list[Element], assumed: dict[str, str]) -> Cable:
 
 
 def _winches(root: Element, chains: list[Element]) -> tuple[Winch | None, tuple[str, ...]]:
-    """Pulleys and drums, and the lost data about them."""
+    """Pulleys and drums, and their data that are lost."""
     lost, radii, axes = [], [], []
     for k, chain in enumerate(chains):
         item = f"chain {k + 1}: base"
@@ -189,7 +189,7 @@ def _winches(root: Element, chains: list[Element]) -> tuple[Winch | None, tuple[
 
 
 def _axis(base: Element, item: str) -> tuple[float, float, float] | None:
-    """Direction in which the cable enters its pulley: z axis of the matrix a11 to a33; default up; None if inclined."""
+    """Direction in which a cable enters its pulley: z axis of a11 to a33, by default up; None if it is inclined."""
     if base.get("a33") is None:
         return (0.0, 0.0, 1.0)
     upright = _required(base, "a33", item, "")
@@ -199,7 +199,7 @@ def _axis(base: Element, item: str) -> tuple[float, float, float] | None:
 
 
 def _drive(winch: Element) -> dict[str, float]:
-    """Drum and motor; zero in a file means unknown."""
+    """Data of drum and motor; a zero in the file means unknown."""
     drum, motor = winch.find("drum"), winch.find("motor")
     width, grooves = (_optional(drum, key, "winch: drum", unit) for key, unit in (("l_drum", "m"), ("nr_groove", "")))
     fields = {
@@ -222,7 +222,7 @@ def _pattern(robot: Element, assumed: dict[str, str]) -> MotionPattern:
 
 
 def _limits(root: Element, materials: list[Element], assumed: dict[str, str]) -> tuple[list[float], list[float]]:
-    """Lower tension limit from the cable; upper limit from the winch, or otherwise from the cable's breaking load."""
+    """Tension limits: lower from the cable; upper from the winch, otherwise from the cable's breaking load."""
     low = [_optional(element, "minimum_load", "cable", "N") for element in materials]
     break_at = [_optional(element, "breaking_load", "cable", "N") or None for element in materials]
     winch = _optional(root.find("winch/cable"), "f_max", "winch: cable", "N") or None

@@ -112,7 +112,7 @@ def _criteria_attributes(criteria: Sequence[Criterion]) -> tuple[dict[str, Any],
             del attributes[f"{key}_model"]
             attributes |= choice_attributes(f"{key}_of_model", one.model, MODELS)
         if isinstance(one, Clearance):
-            obstacles: Any = one.obstacles  # a tuple after the check
+            obstacles: Any = one.obstacles  # after the check, this is a tuple
             attributes[f"{key}_obstacles"] = len(obstacles)
             for j, obstacle in enumerate(obstacles):
                 own, parts = _obstacle(f"{key}_obstacle_{j}", obstacle)
@@ -122,7 +122,7 @@ def _criteria_attributes(criteria: Sequence[Criterion]) -> tuple[dict[str, Any],
 
 
 def _criteria_of(path: Path, data: Dataset) -> tuple[Criterion, ...]:
-    """Criteria from attributes of `_criteria_attributes`, in their order; the path is used in messages."""
+    """Restore criteria from `_criteria_attributes`, in the same order; the path is used in messages."""
     found: list[Criterion] = []
     while (key := f"criterion_{len(found)}") in data.attrs:
         known: dict[str, Any] = {}
@@ -136,7 +136,7 @@ def _criteria_of(path: Path, data: Dataset) -> tuple[Criterion, ...]:
 
 
 def _obstacle(key: str, obstacle: Any) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Attributes and variables of an obstacle; texts and numbers are attributes, arrays are variables."""
+    """Texts and numbers of an obstacle as attributes, and its arrays as variables."""
     attributes: dict[str, Any] = {key: type(obstacle).__name__}
     variables: dict[str, Any] = {}
     for field in fields(type(obstacle)):
@@ -181,7 +181,7 @@ def load_workspace(file: os.PathLike[str] | str) -> Workspace:
 
 
 def _pack(space: Workspace) -> Dataset:
-    """Data set of a workspace."""
+    """Create the data set of a workspace."""
     attributes, obstacles = _criteria_attributes(space.criteria)
     return labeled_dataset(variables_of_result(space, QUANTITIES) | obstacles, _attributes(space) | attributes)
 
@@ -211,7 +211,7 @@ def _attributes(space: Workspace) -> dict[str, Any]:
 
 
 def _unpack(path: FilePath, data: Dataset) -> Workspace:
-    """Workspace of a data set; the path is used in messages."""
+    """Create a workspace from a data set; the path is used in messages."""
     robot = parse_robot(str(data.attrs["robot"]), f"{path}, robot")
     if "component_separate" not in data.variables:  # a file of an older sagline, without proofs
         data = data.assign(component_separate=("component", np.zeros(data.sizes["component"], dtype=np.bool_)))

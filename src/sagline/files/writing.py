@@ -1,8 +1,8 @@
 """Atomic file writing, names of files, and JSON text.
 
-A file is written next to its target and then renamed in one step, so that the target is never incomplete. Folders,
-devices, pipes, sockets and links are refused as targets. Links among the parent folders are followed. The permissions
-of a replaced file are kept; other hard links to it keep the old content.
+A new file is written next to its target and then renamed in one step, so that the target is always complete. Folders,
+devices, pipes, sockets and links are refused as targets. Links among the parent folders are followed. The new file has
+the permissions of the replaced file. Other hard links to the replaced file keep the old content.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _DEVICES = re.compile(r"(con|prn|aux|nul|com[\d¹²³]|lpt[\d¹²³])(\..*)?", r
 
 
 def file_stem(name: str, *words: str) -> str:
-    """Name for files of a robot, without a suffix. It is never a path, empty, hidden, too long, or a device.
+    """File name for a robot, without a suffix. It is never empty, hidden, too long, a path, or a device.
 
     Letters and digits of all scripts, dots, hyphens and underscores are kept; spaces become hyphens. If the name has
     other characters or is too long, eight digits of its digest are added, so that two robots never have the same files.
@@ -64,7 +64,7 @@ def file_stem(name: str, *words: str) -> str:
 
 @contextmanager
 def staging(folder: Path) -> Iterator[Path]:
-    """New temporary folder inside a folder; it is removed when the block ends."""
+    """Create a temporary folder inside a folder, and remove it at the end of the block."""
     # Folders left by killed processes are removed first
     for left in folder.glob(f"{PREFIX}*{SUFFIX}"):
         _remove_if_left(left)
@@ -77,7 +77,7 @@ def staging(folder: Path) -> Iterator[Path]:
 
 
 def _new_place(folder: Path) -> tuple[Path, int]:
-    """New folder and its lock; if another process has removed the folder as abandoned, another folder is made."""
+    """Create a locked folder. If another process removes it before it is locked, create another one."""
     for _ in range(TRIES):
         place = Path(tempfile.mkdtemp(prefix=PREFIX, suffix=SUFFIX, dir=folder))
         try:
@@ -109,7 +109,7 @@ def _open_lock(place: Path) -> int:
 
 
 def try_lock(lock: int, *, if_unknown: bool) -> bool:
-    """True if an open file could be locked; `if_unknown` on systems without locks."""
+    """True if an open file could be locked. On systems without locks, the value `if_unknown`."""
     if sys.platform == "win32":
         return if_unknown
     import fcntl
@@ -125,7 +125,7 @@ def try_lock(lock: int, *, if_unknown: bool) -> bool:
 
 @contextmanager
 def atomic_file(file: os.PathLike[str] | str, size: int = 0) -> Iterator[Path]:
-    """Temporary file that replaces a file when the block ends without an error."""
+    """Provide a temporary file that replaces a file when the block ends without an error."""
     # The block writes to a new file in the folder of the target. At its end the new file is flushed to the disk and
     # renamed in one step. If the block fails or is interrupted, the new file is removed and the target is unchanged.
     target = check_file(file)
@@ -135,7 +135,7 @@ def atomic_file(file: os.PathLike[str] | str, size: int = 0) -> Iterator[Path]:
 
 @contextmanager
 def atomic_files(folder: os.PathLike[str] | str, names: Sequence[str], size: int = 0) -> Iterator[tuple[Path, ...]]:
-    """Temporary files that replace files of a folder, all together, when the block ends without an error."""
+    """Provide temporary files that together replace files of a folder when the block ends without an error."""
     targets = [check_file(Path(folder) / name) for name in names]
     try:
         with staging(Path(folder)) as place:
@@ -147,7 +147,7 @@ def atomic_files(folder: os.PathLike[str] | str, names: Sequence[str], size: int
             for part, target in zip(parts, targets, strict=True):
                 _finish(part, target)
             old, new = [str(part) for part in parts], [str(target) for target in targets]
-            list(map(os.replace, old, new))  # this runs in C, so that Ctrl-C cannot interrupt it between two names
+            list(map(os.replace, old, new))  # this loop runs in C, so that Ctrl-C cannot interrupt it between two names
     except OSError as error:
         target = _target_of(error, targets)
         raise FileError(target, f"cannot be written ({_reason(error)})", _next_step(target)) from error
@@ -172,7 +172,7 @@ def write_text(file: os.PathLike[str] | str, text: str) -> None:
 
 @contextmanager
 def finished_files() -> Iterator[list[Path]]:
-    """List of the files that are completed inside the block, in order."""
+    """Collect the paths of all files that are completed inside the block, in order."""
     files: list[Path] = []
     token = _finished.set(files)
     try:
@@ -182,7 +182,7 @@ def finished_files() -> Iterator[list[Path]]:
 
 
 def check_file(file: os.PathLike[str] | str) -> Path:
-    """Refuse a path to which no file can be written; nothing is changed."""
+    """Refuse a path at which no file can be written; nothing is changed."""
     target = Path(file)
     try:
         mode = target.lstat().st_mode
@@ -207,7 +207,7 @@ def check_files(folder: os.PathLike[str] | str, names: Iterable[str]) -> None:
 
 
 def check_folder(folder: os.PathLike[str] | str) -> None:
-    """Refuse a folder to which no files can be written; it is not created."""
+    """Refuse a folder in which no files can be written; it is not created."""
     path = Path(folder).absolute()
     nearest = next(place for place in (path, *path.parents) if os.path.lexists(place))
     if not nearest.is_dir():
@@ -224,7 +224,7 @@ def check_folder(folder: os.PathLike[str] | str) -> None:
 
 
 def create_folder(folder: os.PathLike[str] | str, *, parents: bool = True) -> Path:
-    """The folder, created if missing; raises an error if parent folders are missing, except with `parents`."""
+    """Create the folder if it is missing; raise an error if parent folders are missing, except with `parents`."""
     path = Path(folder)
     try:
         path.mkdir(parents=parents, exist_ok=True)
@@ -235,7 +235,7 @@ def create_folder(folder: os.PathLike[str] | str, *, parents: bool = True) -> Pa
 
 
 def _check_space(file: Path, size: int) -> None:
-    """Check that the disk has `size` bytes free, because HDF5 crashes on a full disk."""
+    """Check that `size` bytes are free on the disk, because HDF5 crashes on a full disk."""
     if size and hasattr(os, "posix_fallocate"):
         with file.open("wb") as handle:
             os.posix_fallocate(handle.fileno(), 0, size)
@@ -251,7 +251,7 @@ def _finish(part: Path, target: Path) -> None:
 
 
 def _target_of(error: OSError, targets: Sequence[Path]) -> Path:
-    """Target of an error, from the name of its temporary file; the first target if unknown."""
+    """Find the target to which an error belongs, from the temporary file in it; the first target if unknown."""
     name = Path(str(error.filename)).name.removesuffix(SUFFIX)
     return targets[int(name)] if name.isdecimal() and int(name) < len(targets) else targets[0]
 
@@ -268,7 +268,7 @@ def _next_step(target: Path) -> str:
 
 
 def plain(what: Any) -> Any:
-    """Data for JSON: lists from arrays, texts from keys and paths, None from numbers that are not finite."""
+    """Convert data for JSON: arrays to lists, keys and paths to texts, numbers that are not finite to None."""
     match what:
         case dict():
             return {str(key): plain(value) for key, value in what.items()}
@@ -285,6 +285,6 @@ def plain(what: Any) -> Any:
 
 
 def json_text(what: Any) -> str:
-    """JSON document from data that `plain` accepts; control characters are escaped for safety in a terminal."""
+    """JSON document of data that `plain` accepts. Control characters are escaped, to be safe in a terminal."""
     text = json.dumps(plain(what), indent=2, ensure_ascii=False, allow_nan=False)
     return _OTHERS.sub(lambda found: "".join(c if is_seen(c) else json.dumps(c)[1:-1] for c in found[0]), text)

@@ -1,4 +1,4 @@
-"""YAML files: plain values, limited size, and the schema of each mapping."""
+"""YAML files of limited size with plain values; each mapping has a schema."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from sagline.files.reading import error_at_line
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
-YAML_LIMIT: Final = 1.0  # largest size [MB], sufficient for thousands of waypoints or cables
+YAML_LIMIT: Final = 1.0  # largest size of a file [MB], sufficient for thousands of waypoints or cables
 _DEEPEST: Final = 20  # largest number of nesting levels
 _MOST: Final = 25_000  # largest number of values; reading them takes a second
 _TAG: Final = "tag:yaml.org,2002:"
@@ -31,7 +31,7 @@ _WORDS: Final = {
 
 
 class YamlEntry(BaseModel):
-    """A mapping in a file; only the declared keys are allowed, and types are not converted."""
+    """Base class of the schemas: only declared keys are allowed, and types are not converted."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
 
@@ -40,12 +40,12 @@ Schema = TypeVar("Schema", bound=YamlEntry)
 
 
 def validate(data: Mapping[Any, Any], schema: type[Schema], origin: Path | str) -> Schema:
-    """Entry of a schema from a mapping; raises FileError for an unknown or missing key, or a wrong type."""
+    """Check a mapping against a schema; raise FileError for an unknown or missing key, or a wrong type."""
     try:
         return schema.model_validate(data)
     except ValidationError as error:
         mistakes = error.errors(include_url=False)
-    # misspelt keys are reported first, because they also cause missing keys
+    # misspelt keys are reported first, because each also causes a missing key
     first = next((mistake for mistake in mistakes if mistake["type"] == "extra_forbidden"), mistakes[0])
     key, found, allowed, next_step = _explain(first, schema)
     refused = FileError(origin, f"{key} is {found}{allowed and f'; allowed: {allowed}'}", next_step, item=key)
@@ -54,7 +54,7 @@ def validate(data: Mapping[Any, Any], schema: type[Schema], origin: Path | str) 
 
 
 def _explain(mistake: ErrorDetails, schema: type[YamlEntry]) -> tuple[str, str, str, str]:
-    """Key, value, allowed values and next step of an error."""
+    """Key, value, allowed values and next step of a schema error."""
     where = mistake["loc"]
     key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in where).removeprefix(".")
     found = reprlib.repr(mistake["input"])
@@ -77,7 +77,7 @@ def _explain(mistake: ErrorDetails, schema: type[YamlEntry]) -> tuple[str, str, 
 
 
 def _at(schema: type[YamlEntry], where: tuple[int | str, ...]) -> type[YamlEntry]:
-    """Schema of a mapping inside the file; list indices in the path are ignored."""
+    """Find the schema of a mapping inside the file, from its path; list indices have no effect."""
     for part in (part for part in where if isinstance(part, str)):
         kind = schema.model_fields[part].annotation
         schema = next(k for k in (kind, *get_args(kind)) if isinstance(k, type) and issubclass(k, YamlEntry))
@@ -85,7 +85,7 @@ def _at(schema: type[YamlEntry], where: tuple[int | str, ...]) -> type[YamlEntry
 
 
 def parse_mapping(text: str, origin: Path | str) -> dict[Any, Any]:
-    """Mapping at the top level of a YAML text; duplicate keys are refused."""
+    """Read the top-level mapping of a YAML text; duplicate keys are refused."""
     # Only plain decimal numbers, true, false and null are converted. Everything else remains text: yes is not true,
     # 1:30 is not 90, and there are no dates and no tags. Aliases are allowed if their expansion is not too large.
     try:
@@ -103,7 +103,7 @@ def parse_mapping(text: str, origin: Path | str) -> dict[Any, Any]:
 
 
 def dump_mapping(data: Mapping[str, Any]) -> str:
-    """YAML text of a mapping, which `parse_mapping` restores; texts that look like numbers are in quotes.
+    """Write a mapping as YAML that `parse_mapping` restores. Texts that look like numbers are in quotes.
 
     Examples:
         >>> from sagline.files.yaml_text import dump_mapping
@@ -116,7 +116,7 @@ def dump_mapping(data: Mapping[str, Any]) -> str:
 
 
 def _cause(error: yaml.MarkedYAMLError, text: str) -> tuple[str, str]:
-    """Reason why a text is not YAML, and the next step; a clear message of PyYAML is used."""
+    """Reason why a text is not YAML, from a message of PyYAML if it is clear, and the next step."""
     mark, problem = error.problem_mark or error.context_mark, str(error.problem or error.context)
     index, place = (len(text), "") if mark is None else (mark.index, f"line {mark.line + 1}: ")
     if isinstance(error, yaml.scanner.ScannerError | yaml.parser.ParserError):
@@ -144,7 +144,7 @@ def _reason(error: Exception, text: str) -> str:
 
 
 class _PlainLoader(yaml.SafeLoader):
-    """Text, plain numbers, null, lists and mappings, with unique keys and a bounded number of levels and values."""
+    """Reader of texts, plain numbers, null, lists and mappings, with unique keys and limited levels and values."""
 
     yaml_constructors: ClassVar[dict[Any, Any]] = {}
 
@@ -171,7 +171,7 @@ class _PlainLoader(yaml.SafeLoader):
         return _tag_of(kind, value, implicit)
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
-        # equal keys are checked here, because PyYAML silently keeps the last of them; PyYAML refuses a wrong !!map
+        # duplicate keys are refused here, because PyYAML silently keeps the last of them; it refuses a wrong !!map
         keys = [key for key, _ in node.value] if node.id == "mapping" else []
         seen = set()
         for key in (key for key in keys if isinstance(key, yaml.ScalarNode)):
@@ -183,13 +183,13 @@ class _PlainLoader(yaml.SafeLoader):
     def construct_number(self, node: yaml.ScalarNode) -> object:
         text = self.construct_scalar(node)
         number = plain_number(text)
-        if number is None:  # later code that uses the text reports the error
+        if number is None:  # code that uses the text later reports the error
             return text
         return int(text) if text.lstrip("+-").isdecimal() else number
 
 
 class _PlainDumper(yaml.SafeDumper):
-    """Writer with quotes around texts that one of two readers (`_PlainLoader`, PyYAML) would not read as text."""
+    """Writer with quotes around every text that `_PlainLoader` or PyYAML would not read as a text."""
 
     def resolve(self, kind: type[yaml.Node], value: str | None, implicit: Any) -> str:
         ours = _tag_of(kind, value, implicit)
@@ -197,7 +197,7 @@ class _PlainDumper(yaml.SafeDumper):
 
 
 def _tag_of(kind: type[yaml.Node], value: str | None, implicit: Any) -> str:
-    """Tag of a value without an explicit tag."""
+    """Choose the tag of a value without an explicit tag."""
     if kind is yaml.ScalarNode and value is not None and implicit[0]:  # a value without quotes and without a tag
         if value in _WORDS:
             return _WORDS[value]
@@ -208,7 +208,7 @@ def _tag_of(kind: type[yaml.Node], value: str | None, implicit: Any) -> str:
 
 
 def _extent(node: yaml.Node, known: dict[int, tuple[int, int] | None]) -> tuple[int, int]:
-    """Numbers of values and of levels of a node with all aliases expanded; known: cache of these numbers."""
+    """Numbers of values and levels of a node whose aliases are expanded; known: cache of these numbers."""
     if id(node) in known:
         found = known[id(node)]
         if found is None:

@@ -1,4 +1,4 @@
-"""A path: poses, velocities and accelerations of the platform at each sample."""
+"""Path: poses, velocities and accelerations of the platform at each sample."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ class Path(Shown, Tabular):
         twist_rate: Acceleration of the platform's origin [m/s^2] and angular acceleration [rad/s^2], in world axes,
             shape (N, 6).
         jerk: d(twist_rate)/dt [m/s^3, rad/s^3], shape (N, 6); None if unknown, for example for sampled poses.
-        rests: Times of rest between two segments [s], including first and last time, shape (R,); not necessarily sample
-            times. None if unknown, for example for sampled poses.
+        rests: Times at which the platform rests between two segments, including the first and last time [s], shape
+            (R,). They can be between samples. None if unknown, for example for sampled poses.
     """
 
     _columns: ClassVar[Columns] = (
@@ -52,7 +52,7 @@ class Path(Shown, Tabular):
         jerk: ArrayLike | None = None,
         rests: ArrayLike | None = None,
     ) -> None:
-        """Path from its fields.
+        """Create a path from its fields.
 
         Args:
             time: Time of each sample [s], shape (N,), strictly increasing.
@@ -60,7 +60,7 @@ class Path(Shown, Tabular):
             twist: Velocity [m/s] and angular velocity [rad/s], shape (N, 6).
             twist_rate: First time derivatives of the twist [m/s^2, rad/s^2], shape (N, 6).
             jerk: Second time derivatives of the twist [m/s^3, rad/s^3], shape (N, 6), or None.
-            rests: Times of rest between segments [s], from the first to the last sample, strictly increasing; or None.
+            rests: Times of rest between segments [s], strictly increasing, from first to last sample time; or None.
 
         Raises:
             InvalidValueError: If the times do not increase, a number is not finite, or the lengths differ.
@@ -90,12 +90,12 @@ class Path(Shown, Tabular):
         return float(self.time[-1] - self.time[0])
 
     def __reduce__(self) -> tuple[type[Path], tuple[Array, Pose, Array, Array, Array | None, Array | None]]:
-        """Pickle through the constructor, which checks and locks a loaded path."""
+        """Pickle through the constructor, so that a loaded path is checked and write-locked."""
         return Path, (self.time, self.pose, self.twist, self.twist_rate, self.jerk, self.rests)
 
 
 def checked_time(time: ArrayLike, item: str = "time") -> Array:
-    """A locked copy of the sample times [s], strictly increasing, shape (N,) with N >= 1."""
+    """Check the sample times [s], strictly increasing, shape (N,) with N >= 1; return a locked copy."""
     clock = checked(time, item, "s", shape=(None,))
     if clock.ndim != 1 or clock.size == 0:
         raise InvalidValueError(item, f"of shape {clock.shape}", "shape (N,), N >= 1", "Give one time for each sample.")

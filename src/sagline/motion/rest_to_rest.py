@@ -1,4 +1,4 @@
-"""Rest-to-rest motion through waypoints by polynomials of 5th or 7th order."""
+"""Rest-to-rest motion through waypoints with polynomials of 5th or 7th degree."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from sagline.motion.segments import QUINTIC, SEPTIC, RestProfile, Segments
 from sagline.robot.pose import Pose, PoseLike, pose_of
 
 LIMITS = ("speed", "acceleration", "angular_speed", "angular_acceleration")
-MOST_SAMPLES = 100_000_000  # 21 GB; more samples are probably due to a wrong unit of a duration or of the rate
+MOST_SAMPLES = 100_000_000  # 21 GB; a larger number probably comes from a wrong unit of a duration or of the rate
 SAMPLE_BYTES = 300.0  # peak memory per sample during construction of the path
 
 
@@ -30,9 +30,9 @@ def quintic_path(
     """Path through waypoints, with rest at each waypoint.
 
     In a segment of duration T, the platform has covered the share 10 s^3 - 15 s^4 + 6 s^5 of the segment at the time s
-    T. The position moves along a straight line, and the orientation rotates about one fixed axis. Velocity and
-    acceleration vanish at both ends; the jerk does not (see `septic_path`). For a rotation of exactly 180 degrees, both
-    directions are equally short. The path uses the direction of scipy's `Rotation.as_rotvec`.
+    T. It moves along a straight line and rotates about a fixed axis. Velocity and acceleration vanish at both ends; the
+    jerk does not (see `septic_path`). For a rotation of exactly 180 degrees, both directions are equally short. The
+    path uses the direction of scipy's `Rotation.as_rotvec`.
 
     Give either `durations` or limits. With limits, each segment has the shortest duration that satisfies all limits of
     translation and rotation.
@@ -50,13 +50,13 @@ def quintic_path(
         rate: Samples per second [1/s], > 0.
 
     Returns:
-        Path that starts at time 0. Its jerk is discontinuous at every waypoint; the jerk at a waypoint is the value of
-        the next segment.
+        Path that starts at time 0. Its jerk is discontinuous at every waypoint. The jerk of a sample at a waypoint is
+        that of the next segment.
 
     Raises:
-        InvalidValueError: If a value is out of range, both or neither of durations and limits are given, a limit is
+        InvalidValueError: If a value is out of range, durations and limits are both given or both missing, a limit is
             missing for the translation or rotation of a segment, a segment has no sample between its ends, or two
-            consecutive waypoints are equal while limits are given.
+            consecutive waypoints are equal in a path with limits.
 
     Source:
         docs/model.md, section 7.
@@ -84,9 +84,10 @@ def septic_path(
 ) -> Path:
     """Path through waypoints, with rest at each waypoint and continuous jerk.
 
-    The function is `quintic_path` with the share 35 s^4 - 84 s^5 + 70 s^6 - 20 s^7. Velocity, acceleration and jerk are
-    zero at both ends of each segment, so that cables and winches have no sudden changes. For the same duration, the
-    peak speed is 7/6 of the quintic's peak speed, and the peak acceleration is 1.30 of the quintic's.
+    The function is the same as `quintic_path`, but the share is 35 s^4 - 84 s^5 + 70 s^6 - 20 s^7. Velocity,
+    acceleration and jerk are zero at both ends of each segment, so that cables and winches have no sudden changes. For
+    the same duration, the peak speed is 7/6 of the peak speed of `quintic_path`, and the peak acceleration is 1.30
+    times as large.
 
     Args:
         waypoints: At least two poses, as a batch or a sequence; or positions [m] of shape (N, 3), orientation identity.
@@ -125,7 +126,7 @@ def _rest_to_rest(
     limits: tuple[float | None, float | None, float | None, float | None],
     rate: float,
 ) -> Path:
-    """Path of segments with one profile, and with given durations or limits (in the order of `LIMITS`)."""
+    """Path of segments with one profile and with given durations or limits, which have the order of `LIMITS`."""
     segments = Segments.between(_as_pose(waypoints), profile)
     given = [name for name, value in zip(LIMITS, limits, strict=True) if value is not None]
     if (durations is None) == (not given):
@@ -164,7 +165,7 @@ def _checked_durations(durations: ArrayLike, segments: int) -> Array:
 
 
 def _check_sampled(grid: Array, ends: Array, times: Array, moves: Flags) -> None:
-    """Refuse a moving segment without a sample between its ends; its motion would be missing in all results."""
+    """Refuse a moving segment without a sample between its ends, because all results would lack its motion."""
     rounding = 1e-9 * ends[-1]
     inside = np.searchsorted(grid, ends - rounding) - np.searchsorted(grid, ends - times + rounding)
     if (unseen := np.flatnonzero((inside < 1) & moves)).size:
@@ -178,7 +179,7 @@ def _check_sampled(grid: Array, ends: Array, times: Array, moves: Flags) -> None
 
 
 def time_grid(total: float, rate: float) -> Array:
-    """Times k/rate, starting at 0, then the total time [s].
+    """Sample times [s]: k/rate from 0 on, and the total time as the last.
 
     Shapes: total [s]; rate [1/s]; returns (N,).
     """
@@ -194,7 +195,7 @@ def time_grid(total: float, rate: float) -> Array:
     check_memory(
         f"a path of {steps:.4g} samples", SAMPLE_BYTES * steps, "Check the units of durations, limits and rate."
     )
-    # a total that is a multiple of 1/rate, except for rounding, gets no extra sample
+    # no additional last sample, if the total is a multiple of 1/rate except for rounding
     last = round(steps) if abs(steps - round(steps)) <= 1e-9 * steps else int(np.ceil(steps))
     return np.append(np.arange(last) / rate, total)
 
@@ -205,7 +206,7 @@ DURATIONS = (9.0, 11.0, 10.0, 11.0, 10.0, 9.0)  # durations [s]
 
 
 def article_path(rate: float = 100.0) -> Path:
-    """Planar motion of the article: at z = 1.5 m, without rotation, from rest to rest.
+    """Planar motion of the article, at z = 1.5 m and without rotation, from rest to rest.
 
     The article gives only the height and the zero angles (its Figure 18). All other values are assumed. The path starts
     at the center, goes to the corner (+5, +3.5) m, counter-clockwise around the rectangle x = +-5 m, y = +-3.5 m, and

@@ -1,4 +1,4 @@
-"""A path from timed poses, with velocities and accelerations from splines."""
+"""Path from timed poses, with velocities and accelerations from splines."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from sagline.robot.pose import PoseLike, pose_of
 def path_from_samples(time: ArrayLike, pose: PoseLike) -> Path:
     """Path from timed poses.
 
-    Cubic splines with continuous second derivatives interpolate position and quaternion. The path has the given poses,
-    and velocities and accelerations from the splines. At both ends the spline is the cubic through the first (last)
-    four samples (not-a-knot). The path therefore need not start or end at rest. Two samples give a constant velocity,
-    and three samples give a parabola.
+    Cubic splines with continuous second derivatives interpolate position and quaternion. They give the velocities and
+    accelerations; the poses are unchanged. At each end, a single cubic goes through the outermost four samples
+    (not-a-knot). The path can therefore start and end in motion. Two samples give a constant velocity, and three
+    samples give a parabola.
 
     Errors of the samples reduce the accuracy of the acceleration. Position errors up to d [m] at time steps of h [s]
     cause acceleration errors up to 12 d/h^2. For positions rounded to micrometers (d = 0.5e-6 m) and 100 samples/s,
@@ -31,8 +31,8 @@ def path_from_samples(time: ArrayLike, pose: PoseLike) -> Path:
         Path with the given times and poses; its jerk is None, because a cubic spline does not define it.
 
     Raises:
-        InvalidValueError: If the times do not increase, the number of times is below two, or the number of poses
-            differs.
+        InvalidValueError: If the times do not increase, there are less than two times, or the number of poses is
+            different.
 
     Examples:
         >>> import numpy as np
@@ -69,7 +69,7 @@ def spline_rates(time: Array, values: Array) -> tuple[Array, Array]:
 
 
 def _without_sign_changes(quaternion: Array) -> Array:
-    """Continuous quaternions. Each gets the sign that is closer to its predecessor (q and -q are the same rotation)."""
+    """Make quaternions continuous: each gets the sign closer to its predecessor (q and -q are the same rotation)."""
     aligned = np.sum(quaternion[1:] * quaternion[:-1], axis=1) >= 0.0
     sign = np.cumprod(np.concatenate(([1.0], np.where(aligned, 1.0, -1.0))))
     continuous: Array = quaternion * sign[:, None]
@@ -82,12 +82,12 @@ def _angular_rates(time: Array, quaternion: Array) -> tuple[Array, Array]:
     The normalized quaternion has q' = (omega, 0) q / 2, and |q| = 1 at the samples. The derivatives of the spline
     therefore give omega = 2 vec(q' q*) and omega' = 2 vec(q'' q*) - 2 omega (q . q').
 
-    scipy's RotationSpline is not used. Its first and last velocities are means over the outermost steps, which causes
-    an error of the acceleration at both ends. Smaller steps do not decrease this error.
+    scipy's RotationSpline is not used, because its first and last velocities are means over the outermost steps. The
+    acceleration at both ends is therefore wrong, even with small steps.
     """
     rate, curvature = spline_rates(time, quaternion)
     velocity = 2.0 * _vector_of_product_with_conjugate(rate, quaternion)
-    growth = np.sum(quaternion * rate, axis=1, keepdims=True)  # rate of the norm, which is not constant along a spline
+    growth = np.sum(quaternion * rate, axis=1, keepdims=True)  # rate of the norm, which varies along a spline
     return velocity, 2.0 * _vector_of_product_with_conjugate(curvature, quaternion) - 2.0 * growth * velocity
 
 

@@ -16,15 +16,13 @@ from sagline.robot.pose import Pose
 
 @dataclass(frozen=True, slots=True)
 class RestProfile:
-    """Polynomial from 0 to 1 for s from 0 to 1; k derivatives vanish at both ends.
+    """Polynomial that increases from 0 to 1 for s from 0 to 1. Its first k derivatives vanish at both ends.
 
-    The derivative of the polynomial is c u^k with u = s (1 - s). The first k derivatives therefore vanish at both ends.
-    The degree is 2 k + 1.
+    The derivative of the polynomial is c u^k with u = s (1 - s). The degree of the polynomial is 2 k + 1.
 
     Attributes:
-        order: k, >= 2: 2 for the quintic (acceleration vanishes at the ends), 3 for the septic (acceleration and jerk
-            vanish).
-        tail: Coefficients of the polynomial without its factor s^(k + 1), constant first.
+        order: k, >= 2. It is 2 for the quintic (no acceleration at the ends) and 3 for the septic (also no jerk).
+        tail: Coefficients of the polynomial divided by s^(k + 1), constant first.
 
     Source:
         c u^k integrated by the binomial theorem; docs/model.md, section 7.
@@ -35,7 +33,7 @@ class RestProfile:
 
     @classmethod
     def of_order(cls, order: int) -> RestProfile:
-        """Profile with `order` vanishing derivatives at both ends."""
+        """Create the profile whose first `order` derivatives vanish at both ends."""
         k = order
         scale = factorial(2 * k + 1) // factorial(k) ** 2
         binomials = (factorial(k) // factorial(i) // factorial(k - i) for i in range(k + 1))
@@ -66,7 +64,7 @@ class RestProfile:
         return s ** (self.order + 1) * total
 
     def rates(self, s: Array) -> tuple[Array, Array, Array]:
-        """First to third derivatives of the share with respect to s; exactly 0 at both ends up to derivative k."""
+        """First to third derivatives of the share with respect to s. The first k are exactly 0 at both ends."""
         k = self.order
         u, bend = s * (1.0 - s), 1.0 - 2.0 * s
         second = self.slope * k * u ** (k - 1) * bend
@@ -78,13 +76,13 @@ QUINTIC: Final = RestProfile.of_order(2)  # 10 s^3 - 15 s^4 + 6 s^5
 SEPTIC: Final = RestProfile.of_order(3)  # 35 s^4 - 84 s^5 + 70 s^6 - 20 s^7
 
 
-STILL = 1e-9  # [m] and [rad]; a smaller motion is a rounding error of a waypoint
-BLOCK = 1 << 16  # samples per block; limits the temporary arrays to a few MB
+STILL = 1e-9  # [m] and [rad]; a smaller motion counts as a rounding error of a waypoint
+BLOCK = 1 << 16  # samples per block, so that temporary arrays have only a few MB
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Segments:
-    """S straight segments with a rotation about a fixed axis.
+    """S straight segments, each with a rotation about a fixed axis.
 
     Attributes:
         profile: Profile from rest to rest.
@@ -105,9 +103,9 @@ class Segments:
 
     @classmethod
     def between(cls, stops: Pose, profile: RestProfile) -> Segments:
-        """Segments between consecutive poses of a batch."""
+        """Create the segments between consecutive poses of a batch."""
         move, kept = np.diff(stops.position, axis=0), stops.quaternion[:-1]
-        if np.array_equal(kept, stops.quaternion[1:]):  # no rotation: the axis is not needed
+        if np.array_equal(kept, stops.quaternion[1:]):  # without a rotation, the axis is not needed
             return cls(profile, stops.position[:-1], move, np.zeros_like(move), kept, np.zeros_like(kept))
         from scipy.spatial.transform import Rotation  # this import takes a third of the load time of sagline
 
@@ -137,7 +135,7 @@ class Segments:
         angular_speed: float | None,
         angular_acceleration: float | None,
     ) -> Array:
-        """Shortest times that satisfy all limits.
+        """Shortest times of the segments that satisfy all limits.
 
         Shapes: speed [m/s]; acceleration [m/s^2]; angular_speed [rad/s]; angular_acceleration [rad/s^2]; returns
         (S,) [s].
@@ -158,7 +156,7 @@ class Segments:
         return slower
 
     def sampled(self, time: Array, ends: Array, durations: Array) -> Path:
-        """The path at given times.
+        """Compute the path at given times.
 
         Shapes: time (N,) [s]; ends (S,) [s]; durations (S,) [s].
         """
@@ -170,7 +168,7 @@ class Segments:
             block = slice(low, low + BLOCK)
             k = np.minimum(np.searchsorted(ends, time[block], side="right"), len(self) - 1)
             T = durations[k][:, None]
-            s = np.minimum((time[block] - starts[k])[:, None] / T, 1.0)  # rounding of starts may give more than 1
+            s = np.minimum((time[block] - starts[k])[:, None] / T, 1.0)  # the rounded start times may give more than 1
             share = self.profile.share(s)
             move, turn, turned = self.move[k], self.turn[k], share * half_angle[k]
             position[block] = self.start[k] + share * move
@@ -187,7 +185,7 @@ class Segments:
     def _least_time(
         self, extent: Array, verb: str, name: str, unit: str, speed: float | None, acceleration: float | None
     ) -> Array:
-        """Shortest times [s] for motions of the given extent [m or rad] under two limits; None: no limit."""
+        """Shortest times [s] for motions of given extent [m or rad] with two limits (None: no limit)."""
         if speed is None and acceleration is None and (extent > STILL).any():
             k = int(np.argmax(extent > STILL))
             raise InvalidValueError(

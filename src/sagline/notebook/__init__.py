@@ -1,1 +1,1 @@
-"""Representation of robots, plans and results in Jupyter: the summary and a small figure."""
+"""Representation of robots, plans and results in Jupyter: a summary and a small figure."""

@@ -1,4 +1,4 @@
-"""Small figures for notebooks; drawing takes at most a second for results of any size."""
+"""Small figures for notebooks. Drawing takes at most a second for results of any size."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ MOST_CABLES: Final = 16
 LEVELS: Final = 4  # number of drawn slices of a workspace
 
 LARGEST: Final = 200_000  # largest size of a figure [bytes]
-MOST_MARKS: Final = 1500  # largest number of points that are drawn as vectors; more points are drawn as a bitmap
+MOST_MARKS: Final = 1500  # largest number of points in a vector drawing; more points are drawn as a bitmap
 DOTS: Final = 110  # dots per inch of the bitmap
 FONT: Final = "'DejaVu Sans', Verdana, sans-serif"
 _remarks = re.compile(r"<metadata>.*?</metadata>|<!--.*?-->|<defs>\s*<style.*?</style>\s*</defs>", flags=re.DOTALL)
@@ -61,7 +61,7 @@ _family = re.compile(r"font-family: 'DejaVu Sans'(?:, 'DejaVu Sans')?;? ?")
 
 
 def drawing_of(thing: object, description: str) -> str:
-    """HTML of the figure in the style and colors of the notebook; "" without a figure."""
+    """HTML of the figure of an object, in the style and colors of the notebook; "" without a figure."""
     with Using(STYLE):
         figure = figure_of(thing)
         return "" if figure is None else _html(figure, description)
@@ -69,7 +69,7 @@ def drawing_of(thing: object, description: str) -> str:
 
 @singledispatch
 def figure_of(thing: object) -> Figure | None:
-    """A small figure of an object; None for an object without a figure."""
+    """Draw a small figure of an object; None for an object without a figure."""
     return None
 
 
@@ -115,7 +115,7 @@ def _(path: Path) -> Figure | None:
 
 @figure_of.register
 def _(space: Workspace) -> Figure | None:
-    """Boundary at some heights, seen from above; a flat workspace is drawn in its own plane."""
+    """Draw the boundary of a workspace at some heights, seen from above; a flat workspace, in its own plane."""
     sides = [k for k, axis in enumerate(space.axes) if axis.size > 1]
     if space.volume <= 0.0 or len(sides) < 2:
         return None
@@ -143,7 +143,7 @@ def _(found: Calibration) -> Figure | None:
 def _time_lines(
     clock: Array, axis: str, values: Array, label: str, gaps: Flags, names: tuple[str, ...] | None = None
 ) -> Figure:
-    """Lines over time, with at most as many samples as are visible."""
+    """Draw lines over time, with at most as many samples as a reader can see."""
     figure = sheet(3.2)
     ax = figure.add_subplot()
     chosen = _chosen(values)
@@ -161,7 +161,7 @@ def _time_lines(
 
 
 def _chosen(values: Array) -> Indices:
-    """Evenly spaced samples (N, c), and the samples with the largest and the smallest value of each column."""
+    """Select equally spaced samples (N, c), and the samples with the largest and smallest value of each column."""
     count = len(values)
     if count <= MOST_SAMPLES:
         return np.arange(count, dtype=np.int64)
@@ -199,9 +199,9 @@ def _ink(gray: re.Match[str]) -> str:
 
 
 def _themed(svg: str, description: str) -> str:
-    """Drawing in the colors of the page: black becomes the text color, gray becomes a transparent text color.
+    """Convert a drawing to the colors of the page: black to the text color, gray to a transparent text color.
 
-    Its identifiers become unique, so that one page can contain several drawings.
+    The identifiers are made unique, so that one page can contain several drawings.
     """
     svg = _family.sub("", _remarks.sub("", svg)).strip()
     svg = _gray.sub(_ink, svg)

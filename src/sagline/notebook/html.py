@@ -1,4 +1,4 @@
-"""HTML representation in notebooks: the verdict and a figure, in the light or dark colors of the notebook."""
+"""HTML representation in notebooks: summary and figure, in the light or dark colors of the notebook."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ def html_of(thing: object) -> str | None:
 
 
 def _figure_of(thing: object, description: str) -> str:
-    """HTML of the figure; "" without a figure, or if it cannot be drawn."""
-    with suppress(Exception):  # for example without Matplotlib; the summary is then shown alone
+    """HTML of the figure; "" if there is no figure or it cannot be drawn."""
+    with suppress(Exception):  # for example without Matplotlib; then only the summary is shown
         from sagline.notebook.figures import drawing_of
 
         return drawing_of(thing, description)

@@ -1,4 +1,4 @@
-"""Link to PLCs by data blocks; each group has a thread that waits for the PLC's socket."""
+"""Link to PLCs by data blocks. Each group has a thread that waits for the socket of its PLC."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ class _Newest(NamedTuple):
 
     Attributes:
         values: Values of the rows, by name.
-        arrived: Time of arrival, on the link's clock [s].
-        round_trip: Time since the request or the command [s].
+        arrived: Time of arrival on the link's clock [s].
+        round_trip: Time from the request or the command to the arrival [s].
     """
 
     values: dict[str, Any]
@@ -61,14 +61,14 @@ class _Outgoing(NamedTuple):
 
 
 class GroupThread(Thread):
-    """Data exchange with one PLC.
+    """Thread that exchanges data with one PLC.
 
     Attributes:
         number: Index of the group, from 0.
         newest: Newest valid block of the group; None before the first.
         discarded: Number of invalid blocks.
         reason: Reason of the last invalid block; None before the first.
-        trouble: Last error; None without an error.
+        trouble: Last error of the connection; None without an error.
         settled: Event that is set after the first answer of the PLC, valid or not.
     """
 
@@ -85,11 +85,11 @@ class GroupThread(Thread):
         self._wire = wire
         self._clock = clock
         self._kick = Event()
-        self._outgoing: deque[_Outgoing] = deque(maxlen=1)  # a new block replaces a block that is not yet written
+        self._outgoing: deque[_Outgoing] = deque(maxlen=1)  # a new block replaces a queued block
         self._ending = Event()
 
     def hand_over(self, block: Block, data: bytes) -> None:
-        """Queue a block for writing, in place of a queued block, and read the PLC's block."""
+        """Queue a block for writing, and read the PLC's block afterwards. A block already in the queue is replaced."""
         self._outgoing.append(_Outgoing(block, data, self._clock()))
         self._kick.set()
 
@@ -108,7 +108,7 @@ class GroupThread(Thread):
         self._wire.abort()
 
     def silence(self, waited: float) -> Refusal:
-        """Reason and next step for a PLC that has not answered for a time [s]."""
+        """Reason, and next step, why a PLC has not answered for a time [s]."""
         if self._wire.reached():
             return Refusal(f"the port is open, but there was no response for {waited:g} s", "Check the port")
         return Refusal(f"no response for {waited:g} s", "Check address and cables, and that the PLC or the twin runs")
@@ -119,7 +119,7 @@ class GroupThread(Thread):
             try:
                 self._wire.open()
                 self._serve()
-            except Exception as error:  # any exception, because only this thread can reconnect
+            except Exception as error:  # all exceptions are caught, because only this thread can reconnect
                 self.trouble = error.refusal if isinstance(error, WireError) else _unexpected(error)
                 self.settled.set()
             finally:
@@ -132,7 +132,7 @@ class GroupThread(Thread):
             asked = self._clock()
             if self._outgoing:
                 outgoing = self._outgoing.popleft()
-                if asked - outgoing.since < HEARTBEAT:  # an older command is obsolete after a connection
+                if asked - outgoing.since < HEARTBEAT:  # after a new connection, older commands are obsolete
                     asked = outgoing.since
                     self._wire.write(outgoing.block, outgoing.data)
             if self._ending.is_set():
@@ -155,7 +155,7 @@ class GroupThread(Thread):
         self.settled.set()
 
     def _mismatch(self, values: dict[str, Any]) -> Refusal | None:
-        """Reason why a valid block is not from the expected PLC; None if it is from this PLC."""
+        """Reason why a valid block is from another PLC; None if it is from the expected PLC."""
         group = values["group"] - 1  # counters of blocks start at 1
         if group != self.number:
             who = f"is group {group}" if group >= 0 else "has no group number"
@@ -169,7 +169,7 @@ class GroupThread(Thread):
         return None
 
     def _no_news(self, counter: int, arrived: float, connected: float) -> Refusal | None:
-        """Reason to discard a block that is not new, or None; after a long silence, the PLC may have restarted."""
+        """Reason to discard a block, or None if it is new. After a long silence, the PLC may have restarted."""
         newest = self.newest
         if newest is None:
             return None
@@ -183,14 +183,14 @@ def _unexpected(error: Exception) -> Refusal:
     return Refusal(f"the exchange failed with {type(error).__name__} ({text})", "Report it, if it happens again")
 
 
-LONGEST: Final = 3600.0  # largest timeout for the first answers [s]
+LONGEST: Final = 3600.0  # largest value of timeout, the wait for the first answers [s]
 
 
 class BlockLink:
     """Link (`sagline.control.link.Link`) with one connection per group; base class of `S7Link` and `ModbusLink`."""
 
     def __init__(self, addresses: Sequence[Address], robot: Robot | int, wires: Sequence[Wire], timeout: float) -> None:
-        """Connect to all groups together; timeout: of the first answers [s]."""
+        """Connect to all groups at the same time; timeout: longest wait for the first answers [s]."""
         patience = number(timeout, "timeout", "s", above=0.0)
         if patience > LONGEST:
             raise InvalidValueError(
@@ -209,7 +209,7 @@ class BlockLink:
 
     @property
     def groups(self) -> tuple[tuple[int, ...], ...]:
-        """The winches of each group, from 0."""
+        """Indices of the winches of each group, from 0."""
         return self._groups
 
     @property
@@ -219,14 +219,13 @@ class BlockLink:
 
     @property
     def round_trip(self) -> Array:
-        """Time from command to answer for the newest sample of each group [s], shape (G,); NaN without a sample."""
+        """Time from the command to the answer in the newest sample of each group [s], (G,); NaN without a sample."""
         return np.array([np.nan if g.newest is None else g.newest.round_trip for g in self._exchanges])
 
     def exchange(self, command: Command | None) -> Sample | Missing:
-        """Pass a command to the groups' threads and return the newest data, without waiting.
+        """Pass a command to the threads of the groups and return the newest data, without waiting.
 
-        A group that another controller owns does not receive the command. It receives the claim, if `command.claims` is
-        True.
+        A group that another controller owns receives the claim instead of the command, if `command.claims` is True.
 
         Args:
             command: Set points of all winches; None to read only.
@@ -257,7 +256,7 @@ class BlockLink:
         """Write the last command, and disconnect."""
         for group in self._exchanges:
             group.finish()
-        for patience in (0.5, 0.2):  # time until the last block is written and the threads end [s]
+        for patience in (0.5, 0.2):  # longest time until the last block is written and the threads end [s]
             until = perf_counter() + patience
             for group in self._exchanges:
                 group.join(max(0.0, until - perf_counter()))
@@ -287,7 +286,7 @@ class BlockLink:
         return group.trouble or group.silence(waited)
 
     def _wait(self, timeout: float) -> None:
-        """Wait until every group has answered; close the link if a group does not answer."""
+        """Wait for the first answers; close the link if a group does not answer."""
         for group in self._exchanges:
             group.settled.wait(max(0.0, timeout - self._clock()))
         silent = [i for i, group in enumerate(self._exchanges) if group.newest is None]

@@ -1,4 +1,4 @@
-"""Data blocks between a PLC and a controller: one table for packing, servers and SCL."""
+"""Data blocks between a PLC and a controller: one table defines them for packing, servers and SCL."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ class Field(NamedTuple):
 
     Attributes:
         name: Name in packing and SCL.
-        type: One of `TYPES`. Or the rows of a structure; the value is then an array of such structures, one per winch,
-            from 1.
+        type: One of `TYPES`, or the rows of a structure. With a structure, the value is an array of structures, one per
+            winch, with indices from 1.
         offset: Offset from the start of the block, or of the structure [bytes].
         meaning: Meaning and unit.
     """
@@ -50,7 +50,7 @@ class Block:
         number: Number of the data block in the PLC.
         name: Name of the block in SCL.
         magic: Value of its row `magic`.
-        register: First Modbus holding register of its copy.
+        register: First Modbus holding register of the block.
         size: Size of the whole block [bytes].
         fields: Rows of the block.
     """
@@ -64,7 +64,7 @@ class Block:
 
     @cached_property
     def rows(self) -> tuple[tuple[str, str, int], ...]:
-        """Name, type and offset of every plain value; `winch_row` gives the names of winch values."""
+        """Name, type and offset of every plain value. `winch_row` composes the names of the values of a winch."""
         rows: list[tuple[str, str, int]] = []
         for name, kind, offset, _ in self.fields:
             if isinstance(kind, str):
@@ -90,12 +90,12 @@ class Block:
         return struct.Struct(text + "x" * (self.size - at))
 
     def pack(self, values: Mapping[str, Any]) -> bytes:
-        """Bytes of the block."""
+        """Pack values into the bytes of the block."""
         known = {"magic": self.magic, "version": LAYOUT, AGAIN: values.get("counter", 0), **values}
         return self.packer.pack(*[known.get(name, 0) for name in self.names])
 
     def read(self, data: bytes) -> dict[str, Any] | Refusal:
-        """Values of the rows by name, or the reason why the bytes are not this block."""
+        """Unpack the values of the rows, by name; or return the reason why the bytes are not this block."""
         block = f"DB{self.number}"
         if len(data) != self.size:
             return Refusal(f"{block} has {len(data)} bytes instead of {self.size}", LOAD)
@@ -117,7 +117,7 @@ def winch_row(index: int, name: str) -> str:
 
 
 def _bytes(kind: str | tuple[Field, ...]) -> int:
-    assert isinstance(kind, str)  # structures are not nested
+    assert isinstance(kind, str)  # a structure contains no other structure
     return struct.calcsize(f">{TYPES[kind]}")
 
 
@@ -205,12 +205,12 @@ BLOCKS: Final = (FROM_PLC, TO_PLC, CLAIM)
 
 
 def claim_block(owner: int) -> bytes:
-    """Block of a controller that claims the ownership of a group."""
+    """Create the block with which a controller claims the ownership of a group."""
     return CLAIM.pack({"owner": owner})
 
 
 def command_blocks(command: Command) -> list[bytes]:
-    """Blocks of a command, one per group; zeros for missing winches of the last group."""
+    """Create the blocks of a command, one per group. If the last group has fewer winches, its last values are zero."""
     head = {
         "counter": command.counter,
         "mode": int(command.mode),
@@ -234,7 +234,7 @@ def sample_of(
     discarded: Whole,
     reasons: tuple[Refusal | None, ...] = (),
 ) -> Sample:
-    """Sample from valid blocks of all groups; time: [s]; age: [s], (G,); discarded and reasons: (G,)."""
+    """Create a sample from valid blocks of all groups; time [s], age [s] (G,), discarded and reasons (G,)."""
     heads = ("counter", "owner", "echo", "status", "fault")
     columns: dict[str, Any] = {name: np.array([group[name] for group in groups], dtype=np.int64) for name in heads}
     for name in ("length", "rate", "torque", "tension", "filtered", "counts", "state", "winch_fault"):
@@ -246,7 +246,7 @@ def sample_of(
 
 
 def winch_rows(names: Sequence[str], columns: Sequence[Sequence[Any]]) -> dict[str, Any]:
-    """Values of a group's winches, by name of the row."""
+    """Values of the winches of a group, by the name of the row."""
     return {
         winch_row(i, name): value for name, column in zip(names, columns, strict=True) for i, value in enumerate(column)
     }

@@ -1,4 +1,4 @@
-"""Link to PLCs by the same blocks in Modbus holding registers; the only file that uses pymodbus."""
+"""Link to PLCs over Modbus; holding registers contain the data blocks. Only this file uses pymodbus."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 PORT: Final = 502
 MOST_DEVICE: Final = 255
 
-logging.getLogger("pymodbus").addHandler(logging.NullHandler())  # the link reports errors
+logging.getLogger("pymodbus").addHandler(logging.NullHandler())  # the link itself reports errors
 
 
 class ModbusLink(BlockLink):
@@ -51,7 +51,7 @@ class ModbusLink(BlockLink):
             addresses: "host", "host:port" or "[IPv6]:port" of each group's PLC, in the order of the groups,
                 or one text with commas between them.
             robot: The robot, or its number of winches.
-            device: Id of the device behind each address.
+            device: Modbus device id, the same for each address.
             timeout: Longest time to the first answers [s].
 
         Raises:
@@ -65,10 +65,10 @@ class ModbusLink(BlockLink):
 
 
 class ModbusWire:
-    """A connection to one PLC; the holding registers contain its blocks, two bytes each, the same bytes as over S7."""
+    """Connection to one PLC. A holding register contains two bytes of a block; the bytes are the same as over S7."""
 
     def __init__(self, host: str, port: int, device: int) -> None:
-        """Keep the address; `open` connects."""
+        """Store the address; `open` connects."""
         with plc_packages():
             from pymodbus.client import ModbusTcpClient
         self._client = ModbusTcpClient(host, port=port, timeout=ANSWER, retries=0)
@@ -76,7 +76,7 @@ class ModbusWire:
         self._device = device
 
     def open(self) -> None:
-        """Connect; waits at most ANSWER."""
+        """Connect within the time ANSWER."""
         try:
             connected = self._client.connect()  # type: ignore[no-untyped-call]
         except Exception as error:
@@ -89,17 +89,17 @@ class ModbusWire:
             raise WireError(Refusal("the connection was closed", "Check that no other client is connected to it"))
 
     def read(self, block: Block) -> bytes:
-        """The bytes of a block."""
+        """Read the bytes of a block."""
         count = block.size // 2
         try:
             answer = self._client.read_holding_registers(block.register, count=count, device_id=self._device)
             registers = _good(answer, block).registers
             return struct.pack(f">{len(registers)}H", *registers)
-        except Exception as error:  # the library may raise any exception for a foreign answer
+        except Exception as error:  # the library may raise any exception for an unknown answer
             raise _failed(error) from error
 
     def write(self, block: Block, data: bytes) -> None:
-        """Replace the bytes of a block."""
+        """Write the bytes of a block."""
         registers = list(struct.unpack(f">{len(data) // 2}H", data))
         try:
             _good(self._client.write_registers(block.register, registers, device_id=self._device), block)
@@ -108,11 +108,11 @@ class ModbusWire:
 
     def close(self) -> None:
         """Disconnect."""
-        with suppress(Exception):  # errors are irrelevant now
+        with suppress(Exception):  # errors are of no interest now
             self._client.close()  # type: ignore[no-untyped-call]
 
     def abort(self) -> None:
-        """End all waiting; for a call from another thread."""
+        """End all waits of the connection; called from another thread."""
         connection = self._client.socket
         with suppress(OSError):
             if connection is not None:

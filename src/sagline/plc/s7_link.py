@@ -1,4 +1,4 @@
-"""Link to Siemens PLCs: data blocks by PUT and GET of the S7 protocol; the only file that uses snap7."""
+"""Link to Siemens PLCs: data blocks by PUT and GET of the S7 protocol. Only this file uses snap7."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _NAME: Final = "Connection"  # names of the class with IPv6
 _CLOSED: Final = Refusal("the connection was closed", "Connect again")
 SLOT: Final = 1  # rack and slot of every S7-1200 and S7-1500
 
-logging.getLogger("snap7").addHandler(logging.NullHandler())  # the link reports errors
+logging.getLogger("snap7").addHandler(logging.NullHandler())  # the link itself reports errors
 
 
 class S7Link(BlockLink):
@@ -62,10 +62,10 @@ class S7Link(BlockLink):
 
 
 class S7Wire:
-    """A connection to one PLC over S7."""
+    """Connection to one PLC over S7."""
 
     def __init__(self, host: str, port: int) -> None:
-        """Keep the address; `open` connects."""
+        """Store the address; `open` connects."""
         with plc_packages():
             import snap7
             import snap7.client
@@ -78,24 +78,24 @@ class S7Wire:
         self._client: Client | None = None
 
     def open(self) -> None:
-        """Connect; the library waits up to 5 s."""
+        """Connect. The library waits up to 5 s."""
         try:
             self._client = client = self._library.Client()
             client.set_param(self._library.type.Parameter.PDURequest, PDU)
             client.connect(self._host, RACK, SLOT, tcp_port=self._port)
             _socket(client).settimeout(ANSWER)
-        except Exception as error:  # the library may raise any exception for a foreign answer
+        except Exception as error:  # the library may raise any exception for an unknown answer
             raise WireError(refusal_of(error, "S7")) from error
 
     def read(self, block: Block) -> bytes:
-        """The bytes of a block."""
+        """Read the bytes of a block."""
         try:
             return bytes(self._open.db_read(block.number, 0, block.size))
         except Exception as error:
             raise WireError(_no_access(error, block)) from error
 
     def write(self, block: Block, data: bytes) -> None:
-        """Replace the bytes of a block."""
+        """Write the bytes of a block."""
         try:
             self._open.db_write(block.number, 0, bytearray(data))
         except Exception as error:
@@ -104,7 +104,7 @@ class S7Wire:
     def close(self) -> None:
         """Disconnect."""
         client, self._client = self._client, None
-        with suppress(Exception):  # errors are irrelevant now
+        with suppress(Exception):  # errors are of no interest now
             if client is not None:
                 client.disconnect()
 
@@ -115,7 +115,7 @@ class S7Wire:
         return self._client
 
     def abort(self) -> None:
-        """End all waiting; for a call from another thread."""
+        """End all waits of the connection; called from another thread."""
         client = self._client
         with suppress(OSError, WireError):
             if client is not None:
@@ -132,7 +132,7 @@ class S7Wire:
 
 
 def _with_ipv6(library: Any) -> Any:
-    """Connection of the library, with support for IPv6."""
+    """The library's connection with support for IPv6."""
 
     def connect(self: Any) -> None:
         self.socket = socket.create_connection((self.host, self.port), self.timeout)
@@ -142,7 +142,7 @@ def _with_ipv6(library: Any) -> Any:
 
 
 def _socket(client: Client) -> socket.socket:
-    """Socket of the library; a timeout is set here, because the library has no setting for it."""
+    """The library's socket with a timeout, because the library has no setting for it."""
     connection = client.connection
     if connection is None or connection.socket is None:
         raise WireError(_CLOSED)

@@ -30,12 +30,12 @@ class Address(NamedTuple):
     port: int
 
     def __str__(self) -> str:
-        """Text host:port, or [host]:port for an IPv6 address."""
+        """Address as host:port, or as [host]:port for IPv6."""
         return f"[{self.host}]:{self.port}" if ":" in self.host else f"{self.host}:{self.port}"
 
 
 def addresses_of(given: str | Sequence[str], port: int) -> tuple[Address, ...]:
-    """Addresses of the groups, in their order."""
+    """Read the addresses of the groups, in their order."""
     items: Any = given
     if not isinstance(items, Sequence) or isinstance(items, bytes) or not 0 < len(items) <= MOST_ADDRESSES:
         step = "Give a list of addresses, or one text with commas between them."
@@ -56,7 +56,7 @@ def addresses_of(given: str | Sequence[str], port: int) -> tuple[Address, ...]:
 
 
 def groups_at(addresses: Sequence[Address], robot: Robot | int) -> tuple[tuple[int, ...], ...]:
-    """The winches of each group; raises an error if the number of addresses is not the number of groups."""
+    """Winches of each group; raise an error if the number of addresses is not the number of groups."""
     known: Any = robot
     winches = known.cable_count if isinstance(known, Robot) else whole_number(known, "robot", 1, MOST_ADDRESSES)
     groups = groups_of(winches)
@@ -103,11 +103,11 @@ def _is_ipv6(host: str) -> bool:
     return True
 
 
-ANSWER: Final = 0.5  # the connection is opened again after this time without an answer [s]
+ANSWER: Final = 0.5  # longest wait for an answer, before the connection is opened again [s]
 
 
 class LinkError(SaglineError):
-    """A PLC cannot be used.
+    """Error of a PLC that cannot be used.
 
     Attributes:
         item: Group and address ("group 2 at 192.168.0.12:102").
@@ -129,7 +129,7 @@ class LinkError(SaglineError):
 
 
 class WireError(Exception):
-    """Failed connection.
+    """Error of a failed connection.
 
     Attributes:
         refusal: Reason and next step.
@@ -142,22 +142,22 @@ class WireError(Exception):
 
 
 class Wire(Protocol):
-    """A connection to one PLC. One thread calls all methods except `abort` and `reached`; they raise `WireError`."""
+    """Connection to one PLC. Its methods raise `WireError`. One thread calls all of them except `abort`, `reached`."""
 
     def open(self) -> None:
-        """Connect; waits as long as the protocol permits."""
+        """Connect. The longest wait depends on the protocol."""
 
     def read(self, block: Block) -> bytes:
-        """The bytes of a block."""
+        """Read the bytes of a block."""
 
     def write(self, block: Block, data: bytes) -> None:
-        """Replace the bytes of a block."""
+        """Write the bytes of a block."""
 
     def close(self) -> None:
-        """Disconnect without errors."""
+        """Disconnect; raise no error."""
 
     def abort(self) -> None:
-        """End all waiting; for a call from another thread."""
+        """End all waits of the connection; called from another thread."""
 
     def reached(self) -> bool:
         """True if the connection is open."""
@@ -165,7 +165,7 @@ class Wire(Protocol):
 
 @contextmanager
 def plc_packages() -> Iterator[None]:
-    """Context manager for imports of the packages for PLCs."""
+    """Context manager for the import of a package for PLCs; a missing package is reported."""
     try:
         yield
     except ModuleNotFoundError as error:

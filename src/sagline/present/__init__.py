@@ -1,1 +1,1 @@
-"""Presentation of results: summaries for each type of result, and HTML pages of findings."""
+"""Presentation of results: a summary for each type of result, and HTML pages of findings."""

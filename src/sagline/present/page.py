@@ -1,4 +1,4 @@
-"""A self-contained HTML page of findings: chapters, verdicts, tables and drawings."""
+"""HTML page of findings in a single file: chapters, verdicts, tables and drawings."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from sagline.core.numbers import n
 from sagline.files.writing import atomic_files, create_folder, json_text
 
-SENTENCE = 40  # a table cell counts as text if it has at least this number of characters
+SENTENCE = 40  # a table cell with at least this number of characters counts as text
 NARROW = 3  # largest number of columns of a table that is placed beside the text
 _subscript = re.compile(r"(?<=[A-Za-zα-ωΑ-Ω])_([A-Za-zα-ω0-9]{1,3}(?:,min)?)(?![A-Za-zα-ω0-9_])")
 
@@ -32,7 +32,7 @@ class Verdict(StrEnum):
 
 
 class Panel(NamedTuple):
-    """One drawing.
+    """Drawing with a caption.
 
     Attributes:
         svg: The drawing as text.
@@ -44,7 +44,7 @@ class Panel(NamedTuple):
 
 
 class Table(NamedTuple):
-    """A table of texts.
+    """Table of texts.
 
     Attributes:
         caption: Content of the table.
@@ -58,7 +58,7 @@ class Table(NamedTuple):
 
 
 def table_of(caption: str, *columns: tuple[str, Iterable[Any], str]) -> Table:
-    """Table from columns; a column is a head, its values, and their format for `n`; texts are not formatted."""
+    """Create a table from columns. A column is (head, values, format for `n`); texts are not formatted."""
     cells = [[each if isinstance(each, str) else n(each, form) for each in values] for _, values, form in columns]
     return Table(caption, [head for head, _, _ in columns], list(zip(*cells, strict=True)))
 
@@ -69,10 +69,10 @@ class Finding:
 
     Attributes:
         key: HTML id of the finding, and key of its numbers in the results: letters, digits and hyphens.
-        figures: Numbers of the article's figures that the finding repeats.
-        tables: Numbers of the article's tables that the finding repeats.
+        figures: Numbers of the figures of the article that the finding reproduces.
+        tables: Numbers of the tables of the article that the finding reproduces.
         title: A few words.
-        statement: Statement of the article, with figure or equation; empty without a statement.
+        statement: Statement of the article, with its figure or equation; empty if the article has none.
         measured: The computed result.
         verdict: Verdict on the statement.
         panels: Drawings.
@@ -94,7 +94,7 @@ class Finding:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Chapter:
-    """A part of the report.
+    """Chapter of the report.
 
     Attributes:
         key: Name of the chapter.
@@ -109,7 +109,7 @@ class Chapter:
     findings: tuple[Finding, ...]
 
 
-MANY = {  # texts of verdicts in the plural
+MANY = {  # texts of the verdicts for several statements
     Verdict.HOLDS: "hold",
     Verdict.HOLDS_WITHIN: "hold within limits",
     Verdict.FAILS: "do not hold",
@@ -137,7 +137,7 @@ def page(
     *,
     summary: bool = True,
 ) -> str:
-    """The whole page: a summary on one screen, then all findings."""
+    """Compose the whole page: a summary on one screen, then all findings."""
     style = files("sagline.present").joinpath("page.css").read_text(encoding="utf-8")
     before = f"{_result(chapters, picture)}\n{_contents(chapters)}\n" if summary else ""
     body = "\n".join(_chapter(number, chapter) for number, chapter in enumerate(chapters, start=1))
@@ -153,7 +153,7 @@ def page(
 
 
 def write_page(folder: Path | str, names: tuple[str, str], text: str, numbers: dict[str, Any]) -> tuple[Path, Path]:
-    """Write a page, and its numbers as JSON, to a folder, which is created if missing; both files or none are written.
+    """Write a page, and its numbers as JSON, to a folder (created if missing). Either both files are written or none.
 
     Raises:
         FileError: If the folder cannot be written.
@@ -216,7 +216,7 @@ def _chapter(number: int, chapter: Chapter) -> str:
 
 
 def _finding(finding: Finding) -> str:
-    """HTML of a finding; a single drawing or a narrow table is beside the text."""
+    """HTML of a finding. A single drawing or a narrow table is placed beside the text."""
     said = f'<div class="said"><h4>The article</h4><p>{_text(finding.statement)}</p></div>' if finding.statement else ""
     paragraphs = "".join(f"<p>{_text(part)}</p>" for part in finding.measured.split("\n\n"))
     pair = f'<div class="pair">{said}<div class="found"><h4>Computed</h4>{paragraphs}</div></div>'
@@ -240,7 +240,7 @@ def _figure(panel: Panel) -> str:
 
 
 def _headline(finding: Finding) -> str:
-    """Number and title: "Figures 6, 7: ..."."""
+    """Heading of a finding: numbers and title, as in "Figures 6, 7: ..."."""
     labels = [
         f"{word}{'s' * (len(numbers) > 1)} {', '.join(map(str, numbers))}"
         for word, numbers in (("Table", finding.tables), ("Figure", finding.figures))
@@ -259,7 +259,7 @@ def _badge(finding: Finding) -> str:
 
 
 def _cell(text: str) -> str:
-    """Table cell: a number does not wrap, a sentence may wrap."""
+    """HTML of a table cell. A sentence may wrap, a number does not."""
     return f'<td class="words">{_text(text)}</td>' if len(text) > SENTENCE else f"<td>{_text(text)}</td>"
 
 

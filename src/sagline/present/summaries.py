@@ -1,4 +1,4 @@
-"""Summaries of results: title, verdict, rows with values, and further lines, as text and as JSON."""
+"""Summaries of results as text and as JSON: title, verdict, rows with values, and notes."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ if TYPE_CHECKING:
     from sagline.core.arrays import Array
 
 MOST_LINES: Final = 12  # largest number of lines of the text of a result
-WIDTH: Final = 80  # largest number of columns of its lines
+WIDTH: Final = 80  # largest number of characters in a line
 MOST_GAPS = 5  # largest number of listed items
 MOST_MODES = 8
-LAST = 1.0  # duration at the end of a simulation for the residual vibration [s]
+LAST = 1.0  # length of the interval at the end of a simulation that shows the residual vibration [s]
 
 
 class Row(NamedTuple):
-    """A value of a summary.
+    """Value of a summary.
 
     Attributes:
         key: Name in JSON, with the unit.
@@ -62,7 +62,7 @@ class Summary(NamedTuple):
     Attributes:
         title: Type and name of the object.
         verdict: Verdict in one line.
-        good: True for a good verdict, False for a bad one; None for a neutral one.
+        good: True for a good verdict, False for a bad verdict, None for a neutral verdict.
         notes: Further lines.
         rows: Values.
     """
@@ -75,12 +75,12 @@ class Summary(NamedTuple):
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """The rows and the further lines as text."""
+        """Rows and notes as text."""
         return (*(f"{row.label}: {row.text}" for row in self.rows if row.text), *self.notes)
 
     @property
     def json(self) -> dict[str, Any]:
-        """The values, by key."""
+        """Values by key."""
         return {row.key: row.value for row in self.rows}
 
 
@@ -111,7 +111,7 @@ def _summary_of_fields(thing: Any) -> Summary:
 
 
 def _extent(values: NDArray[Any], units: list[str]) -> str:
-    """Smallest and largest of some numbers, with their unit, or with the units of their parts in brackets."""
+    """Range of numbers as text, with their unit, or with the units of their parts in brackets."""
     if values.dtype.kind == "b":
         return f"{np.count_nonzero(values)} of {values.size} true"
     unit = ", ".join(units)
@@ -121,7 +121,7 @@ def _extent(values: NDArray[Any], units: list[str]) -> str:
 
 
 def _place(pose: Pose) -> str:
-    """Position of a single pose."""
+    """Position of a single pose as text."""
     return f"({', '.join(n(each, '.4f') for each in pose.position.reshape(-1))})"
 
 
@@ -156,7 +156,7 @@ def _(robot: Robot) -> Summary:
 
 
 def middle_plan(robot: Robot) -> Plan | None:
-    """Plan at the middle of a robot's test box; None without a test box."""
+    """Plan the pose at the middle of a robot's test box; None without a test box."""
     box = robot.test_box
     if box is None or robot.cable_count < robot.degrees_of_freedom:
         return None
@@ -268,7 +268,7 @@ def _largest_tensions(simulation: Simulation) -> Array:
 
 
 def cable_mass_text(cable_mass: str) -> str:
-    """Text of the model of the cable mass."""
+    """Describe the model of the cable mass in a text."""
     return "massless" if cable_mass == "none" else f"with cable mass ({cable_mass})"
 
 

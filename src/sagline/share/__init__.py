@@ -1,1 +1,1 @@
-"""A robot or a run as one HTML page, without server, network and installation."""
+"""A robot or a run as one HTML page that needs no server, no network and no installation."""

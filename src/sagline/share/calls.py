@@ -1,4 +1,4 @@
-"""Calls of kernels in a page: layout of the arguments in the memory of a WebAssembly module, for page/kernels.js."""
+"""Calls of kernels from page/kernels.js: layout of the arguments in the memory of a WebAssembly module."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from sagline.core.errors import FileError
 
-Call = tuple[str, tuple[Any, ...]]  # name of the entry in C without prefix, and arguments as in Python
+Call = tuple[str, tuple[Any, ...]]  # name of the C entry without prefix, and arguments as in Python
 AnyArray = NDArray[Any]
 
 MODULE: Final = files("sagline.share").joinpath("page").joinpath("kernels.wasm")
@@ -22,23 +22,23 @@ _ALIGNED: Final = 16  # bytes
 
 
 def check_module() -> None:
-    """FileError for a missing WebAssembly module, with the command that makes it."""
+    """Create the FileError for a missing WebAssembly module, with the command that makes the module."""
     if not MODULE.is_file():
         step = "Run python -m tools.build in the source checkout, or install a wheel of sagline."
         raise FileError(str(MODULE), "is missing, but shared pages need it", step)
 
 
 def module_text() -> str:
-    """The WebAssembly module, deflated, in base64."""
+    """Read the WebAssembly module, deflated and in base64."""
     check_module()
     return b64encode(zlib.compress(MODULE.read_bytes(), 9)).decode("ascii")
 
 
 def described_calls(calls: Mapping[str, Call], names: Mapping[str, AnyArray]) -> dict[str, Any]:
-    """Description of calls: addresses of all arrays, contents of write-protected arrays, and arguments in C.
+    """Describe calls: addresses of all arrays, contents of write-protected arrays, and arguments in C.
 
-    calls: by the name of the function in the page. names: arrays, or contiguous views, that the page reads or writes.
-    Arrays without write protection begin with zeros.
+    calls: calls by the name of the function in the page. names: arrays or contiguous views that the page reads or
+        writes. Arrays that are not write-protected contain zeros at the start.
     """
     places: dict[int, int] = {}  # addresses of the arrays that own memory, by identity
     filled: dict[int, str] = {}
@@ -74,7 +74,7 @@ def described_calls(calls: Mapping[str, Call], names: Mapping[str, AnyArray]) ->
 
 
 def _leaves(value: Any) -> Iterator[Any]:
-    """Arrays and numbers of nested tuples, in order; None is omitted, because it is not an argument in C."""
+    """Arrays and numbers of nested tuples, in order. None is omitted, because it is not an argument in C."""
     if isinstance(value, tuple):
         for each in value:
             yield from _leaves(each)

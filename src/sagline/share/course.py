@@ -1,4 +1,4 @@
-"""Samples for playback in a shared page: poses, tensions and lengths over time, and a verdict for each sample."""
+"""Samples for playback in a shared page: pose, tensions, lengths and verdict at each time."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from sagline.statics.tables import chord_geometry
 if TYPE_CHECKING:
     from sagline.viewer.session import PlayedLog
 
-MOST_RATE: Final = 100.0  # samples per second; samples are omitted from twice this rate on, because screens show 60
+MOST_RATE: Final = 100.0  # samples per second of a screen; samples are omitted if a run has twice as many or more
 
 
 class _SampleVerdict(NamedTuple):
@@ -36,14 +36,14 @@ class _SampleVerdict(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SharedMotion:
-    """N samples of a robot in motion."""
+    """N samples of the motion of a robot."""
 
     robot: Robot
     kind: str  # "run", "simulation" or "log"
     time: Array  # times from 0 [s], shape (N,)
     position: Array  # position of the platform's origin [m], shape (N, 3); NaN if it is not known
     quaternion: Array  # rotation of the platform, scalar last, shape (N, 4)
-    tension: Array  # tension for numbers and colors [N], shape (N, m)
+    tension: Array  # tension that the page shows as numbers and colors [N], shape (N, m)
     quantity: str  # description of this tension
     chord_tension: Array  # chord tensions of the drawn catenaries [N], shape (N, m); NaN for a straight line
     length: Array  # unstrained length off the drum [m], shape (N, m)
@@ -58,7 +58,7 @@ class SharedMotion:
         return Pose.from_quaternion(self.position[index], self.quaternion[index])
 
     def thinned(self) -> SharedMotion:
-        """Every n-th sample and the last one, if the rate exceeds that of screens, and a note about omitted samples."""
+        """Keep every n-th sample and the last one, if the rate exceeds that of screens; note how many are omitted."""
         count, duration = len(self.time), float(self.time[-1])
         every = int((count - 1) / (MOST_RATE * duration)) if duration > 0.0 else 1
         if every <= 1:
@@ -73,7 +73,7 @@ class SharedMotion:
 
 
 def of_plan(plan: Plan) -> SharedMotion:
-    """Samples of a plan of N poses; poses without times have intervals of one second."""
+    """Samples of a plan of N poses. Poses without times get intervals of one second."""
     count = len(plan.state.pose)
     time = np.arange(count, dtype=np.float64) if plan.path is None else plan.path.time
     verdicts = [_SampleVerdict(True, "Feasible")]
@@ -106,7 +106,7 @@ def _why(gap: Gap) -> str:
 
 
 def of_simulation(simulation: Simulation) -> SharedMotion:
-    """Samples of a simulation; cables with mass are drawn as massless catenaries of the same lengths."""
+    """Samples of a simulation. Cables with mass are drawn as catenaries at rest with the same lengths."""
     robot, time = simulation.robot, simulation.time
     broken = np.zeros_like(simulation.tensions, dtype=bool)
     verdicts = [_SampleVerdict(None, "Simulated")]
@@ -128,7 +128,7 @@ def of_simulation(simulation: Simulation) -> SharedMotion:
 
 
 def chord_tension(robot: Robot, pose: Pose, length: Array) -> Array:
-    """Chord tensions (N, m) of massless cables with these lengths off the drum; NaN for NaN, and for too short lengths.
+    """Chord tensions (N, m) of catenaries at rest with these lengths off the drum; NaN for NaN or too short lengths.
 
     Cables leave their pulleys along the chord.
     """
@@ -143,7 +143,7 @@ def chord_tension(robot: Robot, pose: Pose, length: Array) -> Array:
 
 
 def of_session(session: PlayedLog) -> SharedMotion:
-    """Samples of a log of the controller, at planned poses, or without a plan at estimated poses."""
+    """Samples of a log of the controller: at planned poses, or at estimated poses if there is no plan."""
     from sagline.viewer.session import WRONG
 
     planned = np.isfinite(session.planned).all(axis=1, keepdims=True)
@@ -154,7 +154,7 @@ def of_session(session: PlayedLog) -> SharedMotion:
     states = [State(int(code)) for code in codes]
     verdicts = tuple(_SampleVerdict(False if state in WRONG else None, f"Controller: {state.name}") for state in states)
     unknown = ~np.isfinite(position).all(axis=1)
-    if unknown.any():  # without an earlier pose
+    if unknown.any():  # no earlier pose is known
         somewhere = session.pose_at(int(np.argmax(unknown)))
         position[unknown], quaternion[unknown] = somewhere.position, somewhere.quaternion
     drawn = chord_tension(session.robot, Pose.from_quaternion(position, quaternion), session.length)

@@ -1,4 +1,4 @@
-"""Data and solids of a robot for a shared page, and a drawing for pages without JavaScript."""
+"""Data and solids of a robot for a shared page, and its drawing for browsers without JavaScript."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from sagline.viewer import shapes
 from sagline.viewer.tension_scale import ForceUnit, TensionScale
 
 DIGITS: Final = 12  # significant digits of the numbers in a page
-FINEST: Final = 1e-5  # resolution of the solids, relative to the robot's size
+FINEST: Final = 1e-5  # resolution of the solids, as a share of the robot's size
 WIDE: Final = 640.0  # px
 EDGE: Final = 12.0  # px, margin
 _RIGHT: Final = np.array([0.9, 0.436, 0.0])
@@ -39,14 +39,14 @@ _EDGES: Final = [(a, b) for a in range(8) for b in range(a) if (a ^ b) in (1, 2,
 
 
 def drawing_data(robot: Robot) -> dict[str, Any]:
-    """Kernel for the drawing of the cables of a run, for page/robot.js, with the data of the robot."""
+    """Calls for page/robot.js: the kernel that draws the cables of a run, with the data of the robot."""
     pose, tension = np.zeros((1, tables.POSE_COLUMNS)), np.zeros(robot.cable_count)
     arguments = _draw_arguments(robot, robot_terms(robot), pose[0], tension)
     return _described(robot, {"draw": ("cable_courses", arguments)}, pose, arguments)
 
 
 def model_data(robot: Robot) -> dict[str, Any]:
-    """Kernels of inverse and forward kinematics and of the drawing, for page/robot.js, with the data of the robot."""
+    """Calls for page/robot.js: kernels of kinematics and of the drawing, with the data of the robot."""
     behind, m, n = has_routing(robot) or None, robot.cable_count, robot.degrees_of_freedom
     model, method = Catenary(), DEFAULT.alone
     terms, options, memory = robot_terms(robot), kernel_options(robot, model, method), memory_for(m)
@@ -93,7 +93,7 @@ def model_data(robot: Robot) -> dict[str, Any]:
 def _described(
     robot: Robot, calls: dict[str, Call], pose: Array, draw: tuple[Any, ...], arrays: dict[str, AnyArray] | None = None
 ) -> dict[str, Any]:
-    """Calls and arrays, including the drawing, and the anchors and pulley radii [m]."""
+    """Calls and arrays with the kernel of the drawing, the anchors [m] and the pulley radii [m]."""
     drawn = {"pose": pose, "drawn": draw[3], "points": draw[-1]}
     return {
         "kernels": described_calls(calls, drawn | (arrays or {})),
@@ -118,7 +118,7 @@ def solids_data(robot: Robot) -> dict[str, Any]:
 
 
 def colors(robot: Robot) -> dict[str, Any]:
-    """Color scale of tensions, with numbers."""
+    """Color scale of the tensions, with numbers."""
     scale, unit = TensionScale.of(robot), ForceUnit.up_to(float(_highest(robot)))
     shares = np.linspace(0.0, 1.0, 24)
     steps = scale.low * (scale.high / scale.low) ** shares
@@ -135,7 +135,7 @@ def colors(robot: Robot) -> dict[str, Any]:
 
 
 def json_numbers(values: Any) -> Any:
-    """Numbers for JSON, rounded to `DIGITS`; None for infinite ones."""
+    """Round numbers to `DIGITS` for JSON; infinite numbers become None."""
     if np.ndim(values):
         return [json_numbers(each) for each in values]
     value = float(values)
@@ -162,14 +162,14 @@ def courses_at(robot: Robot, pose: Pose, tension: Array) -> Array:
 
 
 def _draw_arguments(robot: Robot, terms: tuple[Array, Array, Array], pose: Array, tension: Array) -> tuple[Any, ...]:
-    """Arguments of `cable_courses`; the points are the last argument; pose: a pose row."""
+    """Arguments of `cable_courses`, with the points as the last argument; pose: a pose row."""
     m, points = robot.cable_count, shapes.points_per_cable(robot)
     work = np.empty((3, 3)), np.empty((GEOMETRY_ROWS, m)), np.empty((m, points, 3))
     return terms[2][0], terms[1][0], pose, tension, points - shapes.POINTS, *work
 
 
 def robot_drawing(robot: Robot, pose: Pose, tension: Array) -> str:
-    """SVG of frame, platform and cables at chord tensions."""
+    """SVG drawing of frame, platform and cables, for given chord tensions."""
     courses = courses_at(robot, pose, tension)
     low, high = bounds(robot)
     frame = np.array(np.meshgrid(*zip(low, high, strict=True), indexing="ij")).reshape(3, -1).T

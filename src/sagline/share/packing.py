@@ -1,4 +1,4 @@
-"""Encoding of samples in a page, for page/states.js: as whole numbers, differences in time, and deflate."""
+"""Encoding of samples for page/states.js: whole numbers, their differences in time, and deflate."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sagline.core.arrays import Array
 
 Codes = NDArray[np.int64]
 
-_ORDERS: Final = (0, 1, 2, 3)  # possible orders of differences; the order with the smallest data is used
+_ORDERS: Final = (0, 1, 2, 3)  # possible orders of differences; the order that gives the smallest data is used
 _LEVEL: Final = 9
 
 
@@ -23,7 +23,7 @@ class PackedColumn(NamedTuple):
 
     name: str
     values: Array  # shape (N,) or (N, k); NaN for a missing value
-    step: float  # resolution, in the unit of the values, or relative to the value
+    step: float  # resolution, in the unit of the values ("linear") or as a share of the value ("relative")
     scale: Literal["linear", "relative"] = "linear"  # "linear", or "relative" for values above zero
 
 
@@ -44,7 +44,7 @@ def encode_columns(channels: Sequence[PackedColumn]) -> tuple[dict[str, object],
 
 
 def _codes(channel: PackedColumn, values: Array) -> tuple[Codes, int | None]:
-    """Nearest whole numbers of steps, and the code of a missing value, or None if no value is missing."""
+    """Round values to whole numbers of steps; also return the code of a missing value (None if not needed)."""
     known = np.isfinite(values)
     if channel.scale == "relative":
         known &= values > 0.0
@@ -59,7 +59,7 @@ def _codes(channel: PackedColumn, values: Array) -> tuple[Codes, int | None]:
 
 
 def _least(column: Codes) -> tuple[int, int, Codes]:
-    """Order with the smallest differences, their size [bytes], and the differences, with the sign in the lowest bit."""
+    """Order with the smallest differences, their size [bytes], and the differences with the sign in the lowest bit."""
     found = []
     for order in _ORDERS:
         rest = column

@@ -28,9 +28,9 @@ SCRIPTS: Final = (  # in the order of their dependencies
     "renderer.js", "camera.js", "scene.js", "panel.js",
     "pointers.js", "player.js", "share.js",
 )  # fmt: skip
-MADE: Final = '<meta name="generator" content="sagline'  # mark of pages of sagline
+MADE: Final = '<meta name="generator" content="sagline'  # mark by which pages of sagline are recognized
 POSITION, TURN, LENGTH, TENSION, TIME = 1e-5, 1e-6, 1e-5, 1e-4, 1e-6  # resolutions [m, -, m, relative, s]
-WOUND: Final = 0.002  # largest change of a length with the slider, relative to the robot's size
+WOUND: Final = 0.002  # largest change of a length with the slider, as a share of the robot's size
 SPEEDS: Final = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)
 RING: Final = '<div class="ring" data-part="ring" aria-hidden="true"></div>'
 HOME: Final = '<button type="button" class="home" data-part="home">Home</button>'
@@ -38,7 +38,7 @@ AROUND: Final = "Drag, or press the arrow keys, to look around; pinch, scroll, o
 
 
 def robot_page(robot: Robot) -> str:
-    """Page of a robot with a platform that can be dragged; scripts of the page compute the tensions."""
+    """Page of a robot whose platform can be dragged. Scripts of the page compute the tensions."""
     at = home_pose(robot)
     plan = inverse(robot, at)
     facts = {**_facts(robot, model_data(robot)), "home": {"position": json_numbers(at.position)}}
@@ -127,7 +127,7 @@ def _facts(robot: Robot, machine: dict[str, Any]) -> dict[str, Any]:
 
 
 def _about(robot: Robot) -> str:
-    """Number of cables, degrees of freedom and mass, in a line."""
+    """Line with the number of cables, the degrees of freedom and the mass."""
     mass = n(robot.mass, ".4g", "kg")
     return f"{robot.cable_count} cables, {robot.degrees_of_freedom} degrees of freedom, a platform of {mass}"
 
@@ -135,7 +135,7 @@ def _about(robot: Robot) -> str:
 def _sliders(robot: Robot) -> str:
     """Sliders of the free translations, and of the rotation about the vertical."""
     (low, high), at, freedom = bounds(robot), home_pose(robot).position, robot.freedom
-    free = np.linalg.norm(freedom.T @ freedom, axis=1) > 1.0 - 1e-9  # only motions along single axes
+    free = np.linalg.norm(freedom.T @ freedom, axis=1) > 1.0 - 1e-9  # only free motions along a single axis
     found = [
         _slider(f"<i>{name}</i>", axis, min(low[axis], at[axis]), max(high[axis], at[axis]), 1e-3)
         for axis, name in enumerate("xyz")
@@ -147,13 +147,13 @@ def _sliders(robot: Robot) -> str:
 
 
 def _guides(robot: Robot) -> tuple[str, ...]:
-    """Note on guides; the kernels have no catenaries between them."""
+    """Note about guides, because the kernels compute no catenaries between guides."""
     given = robot.winches is not None and robot.winches.guides is not None
     return ("Cables between guides count as straight.",) * given
 
 
 def _winch(robot: Robot) -> str:
-    """Choice of a cable, and a slider for the change of its length [mm]."""
+    """HTML for the choice of a cable, and a slider for the change of its length [mm]."""
     names = "".join(f'<option value="{i}">{i}</option>' for i in range(robot.cable_count))
     most = 1e3 * round_below(WOUND * size_of(robot))
     return (
@@ -184,7 +184,7 @@ def _clock() -> str:
 
 
 def _table(robot: Robot, tension: Array, length: Array) -> str:
-    """Table of the cables at the start, for pages without JavaScript."""
+    """Table of the cables at the start, for browsers without JavaScript."""
     rows = "".join(
         f"<tr><td>{i}</td><td>{number_text(tension[i], ',.1f')}</td><td>{number_text(length[i], '.4f')}</td></tr>"
         for i in range(robot.cable_count)

@@ -1,4 +1,4 @@
-"""Servers of the data blocks of a twin, one server per group; base class of all protocols."""
+"""Servers of the data blocks of a twin, one server per group: base class for all protocols."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LOOPBACK: Final = "127.0.0.1"
 
 
 class BlockServers(ABC):
-    """Servers of the data blocks of all PLCs; any client may read and write the blocks.
+    """Servers of the data blocks of all PLCs. Any client may read and write the blocks.
 
     Attributes:
         addresses: "host:port" of each group.
@@ -36,14 +36,14 @@ class BlockServers(ABC):
             raise
 
     def publish(self, blocks: Sequence[bytes | None]) -> None:
-        """Replace DB101 of each group in one step; None does not change it."""
+        """Replace DB101 of each group in one step. None leaves the block of a group unchanged."""
         for group, block in enumerate(blocks):
             if block is not None:
                 with self._locked(group, FROM_PLC):
                     self._memory[group][FROM_PLC][:] = block
 
     def written(self) -> list[tuple[bytes, bytes]]:
-        """Contents of DB102 and DB103 of each group; reading erases the claims, as in a PLC."""
+        """Read DB102 and DB103 of each group. As in a PLC, reading erases the claims."""
         found = []
         for group, memory in enumerate(self._memory):
             with self._locked(group, TO_PLC):
@@ -60,20 +60,20 @@ class BlockServers(ABC):
 
     @abstractmethod
     def _listen(self, group: int, host: str, port: int) -> int:
-        """Start the server of a group; returns its port."""
+        """Start the server of a group; return its port."""
 
     @abstractmethod
     def _locked(self, group: int, block: Block) -> AbstractContextManager[object]:
-        """Exclusive access to a block."""
+        """Context manager for exclusive access to a block."""
 
 
 def _check_free(host: str, port: int) -> str:
-    """Address of a host with a free port; checked here, because python-snap7 lets two twins share a port."""
+    """Address with a free port. It is checked here, because python-snap7 lets two twins use the same port."""
     try:
         number = host.strip("[]") if ":" in host else socket.gethostbyname(host)
         with socket.create_server((number, port), family=socket.AF_INET6 if ":" in number else socket.AF_INET):
             return number
-    except (OSError, OverflowError, ValueError, TypeError) as error:  # the last two exceptions are for invalid names
+    except (OSError, OverflowError, ValueError, TypeError) as error:  # the last two exceptions occur for invalid names
         reason = getattr(error, "strerror", None) or str(error)
         raise InvalidValueError(
             "address of the twin",

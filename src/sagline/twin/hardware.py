@@ -21,15 +21,15 @@ class Hardware:
     """Drives, sensors and plant.
 
     Attributes:
-        read: Readings at the end of a period, shape (5, m). The rows are LENGTH: unstrained lengths off the nominal
-            drums from the encoder counts [m]; RATE: mean rates of the lengths over the period [m/s]; TORQUE: torques of
-            the motors at their shafts [N m], positive in the direction that pays out cable; CELL: readings of the load
-            cells [N]; FILTERED: filtered readings [N].
+        read: Readings at the end of a period, shape (5, m). The rows are LENGTH: unstrained lengths off the drums, from
+            the encoder counts and the nominal drums [m]; RATE: mean rates of the lengths over the period [m/s]; TORQUE:
+            torques of the motors at their shafts, positive torque pays out cable [N m]; CELL: readings
+            of the load cells [N]; FILTERED: filtered readings [N].
         counts: Encoder counts, whole numbers as floats, shape (m,).
     """
 
     def __init__(self, robot: Robot, begin: Start, damping: Damping, step: float, period: float, seed: int) -> None:
-        """Begin with brakes on; step of the plant [s], period of the PLCs [s]."""
+        """Begin with brakes on; step: step of the plant [s]; period: period of the PLCs [s]."""
         self._simulator = Simulator(robot, begin.state, winches="robot", step=step, damping=damping, seed=seed)
         self._simulator.hold()
         self._nominal, self._true, self._period = begin.nominal, begin.true, period
@@ -41,7 +41,7 @@ class Hardware:
         self._wrong: dict[int, tuple[float, float]] = {}  # factor and offset [N] of the readings of faulty load cells
         self._powered, self._torque_of_force = [False] * m, np.zeros(m)
         self._periods, self._shares = np.full(m, period), np.full(m, period / (FILTER + period))
-        self._load_changed = True  # True if the simulator does not have the new load yet
+        self._load_changed = True  # True until the simulator has the new load
         self.read = np.zeros((5, m))
         self._rows = tuple(self.read)
         self.read[FILTERED] = reading.load_cell
@@ -54,7 +54,7 @@ class Hardware:
         return self._simulator.reading
 
     def simulate_period(self, length: list[float], tension: list[float], powered: list[bool]) -> None:
-        """Simulate a period with a linear change of the set points to new values: length [m], tension [N]."""
+        """Simulate a period in which the set points change linearly to new values: length [m], tension [N]."""
         if powered != self._powered:
             self._switch(powered)
         counts = np.rint(self._nominal.counts(np.array(length)))
@@ -87,14 +87,14 @@ class Hardware:
 
     @property
     def saturated(self) -> Array:
-        """Flags (m,), nonzero for drives at a limit of torque or speed."""
+        """Flags (m,) that are nonzero for drives at a limit of torque or speed."""
         return self._simulator.reading.saturated
 
     def spoil_cell(self, cell: int, words: str | None, value: float) -> None:
-        """Give a load cell one of the faults of `KINDS`, or remove it."""
+        """Give a load cell one of the faults of `KINDS`, or remove its fault."""
         if words is None:
             self._wrong.pop(cell, None)
-            self.read[FILTERED, cell] = self.reading.load_cell[cell]  # the filter begins again
+            self.read[FILTERED, cell] = self.reading.load_cell[cell]  # the filter starts again
         elif words == "is wrong by #":
             self._wrong[cell] = (1.0, value)
         else:
@@ -106,7 +106,7 @@ class Hardware:
         self._simulator.cut(cable)
 
     def shift_encoder(self, winch: int, length: float) -> None:
-        """Shift the count of an encoder by a length of cable [m]; the drive then moves the cable by this length."""
+        """Shift the count of an encoder by a length of cable [m]. The drive then moves the cable by this length."""
         slip = np.rint(length * self._nominal.per_meter[winch])
         self._slip[winch] += slip
         self._simulator.shift(-slip / self._true.per_meter[winch], winch)

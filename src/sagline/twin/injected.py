@@ -1,4 +1,4 @@
-"""Injected faults of a machine, each as one line of text."""
+"""Faults that are injected into a machine; each can be written as one line of text."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class _FaultKind(NamedTuple):
 
     @property
     def numbered(self) -> bool:
-        """True if a machine has several parts of this kind, with numbers."""
+        """True if a machine has several, numbered parts of this kind."""
         return self.item in ("cell", "cable", "encoder", "servo", "group")
 
 
@@ -71,9 +71,9 @@ class Injected:
 
     Attributes:
         kind: One of `KINDS`, for example "cell sticks".
-        which: Index of the cell, cable, encoder, servo or group, from 0; 0 for a single part.
-        value: Value in SI units; 0 for a kind without a value.
-        time: Time of the beginning of the fault, since the start of the machine [s].
+        which: Index of the cell, cable, encoder, servo or group, from 0; 0 for a part without a number.
+        value: Value in SI units; 0 for a kind of fault without a value.
+        time: Time from the start of the machine to the beginning of the fault [s].
         duration: Duration [s]; infinite by default.
     """
 
@@ -84,7 +84,7 @@ class Injected:
     duration: float = math.inf
 
     def __str__(self) -> str:
-        """Text in the form of `fault`."""
+        """Text from which `fault` creates the same fault."""
         kind = KINDS[self.kind]
         item = f"{kind.item} {self.which}" if kind.numbered else kind.item
         words = kind.words.replace("#", f"{self.value / kind.scale:.12g} {kind.unit}")
@@ -93,12 +93,12 @@ class Injected:
 
 
 def fault(text: str) -> Injected:
-    """A fault from its text.
+    """Create a fault from its text.
 
     Args:
         text: Part with its number (from 0), fault and time, for example "cell 3 sticks at 40 s" or "group 2 is silent
-            at 12.5 s for 0.2 s". Without a time, the fault begins at the start. Without a duration, it does not end.
-            `sl.twin.KINDS` lists all kinds.
+            at 12.5 s for 0.2 s". A fault without a time begins at the start of the machine. A fault without a duration
+            does not end. `sl.twin.KINDS` lists all kinds of faults.
 
     Returns:
         The fault.
@@ -134,7 +134,7 @@ def fault(text: str) -> Injected:
 
 
 def _unknown(text: str, what: str) -> InvalidValueError:
-    """Error for unknown words, with a list of the known faults of the part, or of the parts."""
+    """Create the error for unknown words; it lists the known faults of the part, or the known parts."""
     items = sorted({kind.item for kind in KINDS.values()})
     first = what.split(" ")[0] if what else ""
     item = next((item for item in items if item.split(" ")[0] == first), None)
@@ -196,7 +196,7 @@ class Schedule:
         heappush(self._due, (time, self._planned, begins, what))
 
     def due(self, now: float) -> list[tuple[bool, Injected]]:
-        """Faults that start (True) or end by a time [s], in order."""
+        """Faults that start (True) or end (False) up to a time [s], in order of time."""
         found = []
         while self._due and self._due[0][0] <= now + TINY:
             _, _, begins, what = heappop(self._due)

@@ -1,4 +1,4 @@
-"""In-process link in lockstep with the machine, with delay, jitter and losses of commands and samples."""
+"""Link in the process of the machine and in lockstep with it, with delay, jitter and losses of messages."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Network:
     """
 
     def __init__(self, delay: float, jitter: float, loss: float, seed: int) -> None:
-        """Check delay [s], jitter [s] and share of losses."""
+        """Check the arguments delay [s], jitter [s] and loss (a share)."""
         self._delay = number(delay, "delay", "s", low=0.0)
         self._jitter = number(jitter, "jitter", "s", low=0.0)
         self._loss = number(loss, "loss", "", low=0.0)
@@ -43,7 +43,7 @@ class Network:
 
 
 class DelayLine:
-    """Messages in one direction that have been sent but have not arrived."""
+    """Queue of the messages in one direction that have been sent, but have not arrived."""
 
     def __init__(self, network: Network) -> None:
         """Begin without messages."""
@@ -57,7 +57,7 @@ class DelayLine:
             heappush(self._messages, (arrival, self._sent, message))
 
     def arrived(self, now: float) -> list[tuple[float, Any]]:
-        """Arrival times [s] and messages up to now, the earliest first."""
+        """Messages that have arrived up to now, each with its arrival time [s], the earliest first."""
         found = []
         while self._messages and self._messages[0][0] <= now + TINY:
             arrival, _, message = heappop(self._messages)
@@ -77,7 +77,7 @@ class PlcBlocks:
     Attributes:
         arrays: Length, rate, torque, tension, filtered (5, m); counts, state, winch fault (3, m); counter, owner,
             echo, status, fault (5, G); the PLCs' clocks [s] (G,).
-        owners: Ids of the owners of the groups, as plain numbers.
+        owners: Ids of the controllers that own the groups, as plain numbers.
     """
 
     __slots__ = ("arrays", "owners")
@@ -100,7 +100,7 @@ class PlcBlocks:
 
 
 class Report(NamedTuple):
-    """Content of the block of one group, in the form for a server.
+    """Content of the block of one group, in the form that a server needs.
 
     Attributes:
         counter: Block counter, at the beginning of the block.
@@ -139,15 +139,15 @@ class Report(NamedTuple):
     winch_fault: list[int]
 
 
-INVALID: Final = {  # reasons to discard the blocks of two injected faults
+INVALID: Final = {  # reasons to discard the blocks of two of the injected faults
     "is torn": Refusal("it is incomplete, because its two counters differ", TORN),
     "is foreign": Refusal("it is of another program", f"Check the address. {LOAD}"),
 }
-HISTORY: Final = 100  # number of earlier blocks for the fault "goes back"
+HISTORY: Final = 100  # number of earlier blocks that the fault "goes back" needs
 
 
 class _Driven(Protocol):
-    """Interface of a machine that a link needs."""
+    """Interface of a machine, as far as a link needs it."""
 
     @property
     def groups(self) -> tuple[tuple[int, ...], ...]:
@@ -172,7 +172,7 @@ class MachineLink:
     """`Link` to a machine in the same process, without a thread."""
 
     def __init__(self, machine: _Driven, network: Network, moves: bool) -> None:
-        """Begin without data of any group; use `Machine.link`."""
+        """Begin without data of any group. Callers create the link with `Machine.link`."""
         self._machine, self._network, self._moves = machine, network, moves
         self._groups = machine.groups
         count = len(self._groups)
@@ -191,7 +191,7 @@ class MachineLink:
 
     @property
     def groups(self) -> tuple[tuple[int, ...], ...]:
-        """The winches of each group, from 0."""
+        """Indices of the winches of each group, from 0."""
         return self._groups
 
     @property
@@ -209,7 +209,7 @@ class MachineLink:
         return self._look(machine.time)
 
     def close(self) -> None:
-        """Stop sending; the machine continues to exist."""
+        """Stop sending. The machine is not affected."""
         self._closed = True
 
     def _send(self, command: Command, now: float) -> None:
@@ -251,7 +251,7 @@ class MachineLink:
         self._past.append(snapshot)
 
     def _blocks(self, group: int, snapshot: PlcBlocks, how: str | None) -> list[PlcBlocks | Refusal]:
-        """Blocks that a group sends in a scan, and the reason why one of them is invalid."""
+        """Blocks that a group sends in a scan, and the reason if one of them is invalid."""
         held, self._held[group] = self._held[group], None
         if how == "goes back":
             self._steps_back[group] += 1

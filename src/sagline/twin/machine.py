@@ -34,32 +34,32 @@ from sagline.twin.link import (
 from sagline.twin.plc_program import Order, PlcLimits, Program
 from sagline.twin.start import check_step, initial_state, winch_limits
 
-LOSSES: Final = Damping(loss_time=1e-3, air_damping=0.2)  # assumed damping; 2 N s/m of air damping on the prototype
+LOSSES: Final = Damping(loss_time=1e-3, air_damping=0.2)  # assumed; about 2 N s/m of air damping on the prototype
 MOST_SEED: Final = 2**63 - 1
 LARGEST_ID: Final = 2**32 - 1
-RIVAL: Final = 2**31 - 2  # id of a controller that becomes an owner without permission
+RIVAL: Final = 2**31 - 2  # id of the controller that owns a group because of an injected fault
 TRIPPED: Final = 1  # fault code of a tripped drive
 
 
 class Machine:
     """Simulated machine in steps of one period, for a controller in this process or for a server.
 
-    A controller in the same process uses `link`; each exchange advances the machine by a period. A server for other
-    processes makes these calls in every period:
+    A controller in the same process uses `link`. Each exchange advances the machine by a period. A server for
+    controllers in other processes makes these calls in every period:
 
         machine.claim(group, owner)      # if a claim was written
         machine.take(group, command)     # command in the group's block, for its own winches only
         machine.advance()
         machine.report(group)            # present block of the group; None: leave the block unchanged
 
-    Each PLC runs its program at the beginning of a period, and converts set points to counts with the nominal drums.
-    The drives move linearly until the end of the period, and the true drums convert counts to cable length. The inner
-    control loops use the exact drum angles every millisecond. Only the readings have the resolution of the encoders
-    (nanometers).
+    At the beginning of a period, each PLC runs its program and converts set points to counts, with the data of the
+    nominal drums. The drives then move linearly until the end of the period. The true drums convert counts to cable
+    length. The inner control loops use the exact drum angles every millisecond; only the readings are rounded to the
+    resolution of the encoders (nanometers).
 
     Attributes:
         robot: The true robot.
-        nominal: The planned robot.
+        nominal: The robot whose data planning and PLCs use.
         groups: The winches of each group, from 0.
         period: Period of controller and PLCs [s].
     """
@@ -84,24 +84,24 @@ class Machine:
 
         Args:
             robot: The true robot, with all data of its winches and encoders.
-            nominal: The planned robot; the PLCs use its data for counts and limits. None for the true robot. The zero
-                error of an encoder is the difference of `length_zero` of the two robots, or zero if a value is missing.
+            nominal: The robot used for planning; the PLCs use its data for counts and limits. None: the true robot. The
+                zero error of an encoder is the difference between the `length_zero` of both robots, or zero if a value
+                is missing.
             start: Pose at which the encoders were set; None for the middle of the nominal robot's test_box. The
-                platform is at the equilibrium for the nominal lengths at this pose. The nominal lengths do not include
-                differences of the true robot in dead lengths and lengths on pulleys.
-            surveyed: True if the true platform was exactly at this pose when the encoders were set.
-            seed: Seed of noise, clocks and the network.
+                platform is at the equilibrium for the free lengths that the nominal robot has at this pose.
+            surveyed: True if the true platform was exactly at the pose `start` when the encoders were set.
+            seed: Seed for the noise of sensors, the clocks and the network.
             period: Period of controller and PLCs [s], a whole multiple of the step.
             step: Step of the simulation of the plant [s].
             delay: Delay of every message over `link`, in each direction [s].
             jitter: Largest additional delay, uniformly distributed [s].
             loss: Share of the messages that are lost.
             damping: Damping of the cables; None for a loss time of 1 ms and air damping.
-            faults: One or several faults, as texts for `fault` or as results of `fault`.
+            faults: One or several faults, each as a text (see `fault`) or as a result of `fault`.
 
         Raises:
-            InvalidValueError: If data are missing, the step is too coarse for the robot's modes, the robot has no
-                equilibrium there, or an argument is of the wrong kind.
+            InvalidValueError: If data are missing, the step is too long for the robot's modes, the robot has no
+                equilibrium near the start, or an argument has the wrong type.
 
         Examples:
             >>> import sagline as sl
@@ -128,7 +128,7 @@ class Machine:
         self._clocks = np.random.default_rng((noise, 2)).uniform(0.0, 1e3, len(self.groups))
         self._group_rows = np.zeros((5, len(self.groups)), dtype=np.int64)
         self._whole = np.zeros((3, robot.cable_count), dtype=np.int64)
-        self._reported: Any = None  # last reports, without counters
+        self._reported: Any = None  # last reported blocks, without counters
         self._cycles = self._counter = 0
         self._links: list[MachineLink] = []
         self._schedule, self._commands = Schedule(), ""
@@ -155,15 +155,15 @@ class Machine:
 
     @property
     def reading(self) -> Reading:
-        """True state of the plant; overwritten in every period."""
+        """True state of the plant. Every period overwrites it."""
         return self._hardware.reading
 
     def link(self, *, moves: bool = True) -> MachineLink:
         """Link to the machine for a controller in this process.
 
         Args:
-            moves: True if each exchange of the link advances the machine by a period. Among several links, only one
-                should do so.
+            moves: True if each exchange of the link advances the machine by a period. If there are several links, use
+                True for only one of them.
 
         Returns:
             The link: a `sagline.control.link.Link`.
@@ -185,7 +185,7 @@ class Machine:
         self.deliver(self._group(group), whole_number(owner, "owner", 0, LARGEST_ID))
 
     def take(self, group: int, command: Command) -> None:
-        """Send a command to a PLC, which checks the counter and the owner of the command.
+        """Send a command to a PLC. The PLC checks the counter and the owner of the command.
 
         Args:
             group: Index of the group, from 0.
@@ -225,7 +225,7 @@ class Machine:
             self._programs[group].take(message)
 
     def advance(self) -> None:
-        """Simulate one period: due faults, scans of the PLCs, drives and plant, and the readings at the end."""
+        """Simulate one period: due faults, scans of the PLCs, motion of drives and plant, and readings at the end."""
         now = self.time
         if self._schedule.waiting:
             self._apply_due_faults()
@@ -255,7 +255,7 @@ class Machine:
         hardware.simulate_period(length, tension, powered)
 
     def _written(self, before: PlcBlocks | None) -> PlcBlocks:
-        """Blocks of all groups; the block of a stopped PLC does not change."""
+        """Blocks of all groups. The block of a stopped PLC does not change."""
         hardware, programs, groups = self._hardware, self._programs, self._group_rows
         self._counter = self._counter % COUNTERS + 1
         groups[COUNTER] = self._counter
@@ -301,7 +301,7 @@ class Machine:
         """Inject a fault.
 
         Args:
-            what: Text for `fault`, or a result of `fault`. A fault with a time in the past begins immediately.
+            what: Text of a fault, or a result of `fault`. A fault with a time in the past begins immediately.
 
         Raises:
             InvalidValueError: If the fault does not exist, or the machine has no such part.
@@ -356,19 +356,19 @@ class Machine:
     def emergency_stop(self) -> None:
         """Press the emergency stop.
 
-        Hardware locks the drums and cuts the power, and the PLCs only report the stop. The PLCs read a normally closed
-        contact, so that a broken wire has the same effect.
+        Hardware locks the drums and cuts the power; the PLCs only report the stop. They read a normally closed contact.
+        A broken wire therefore has the same effect as the stop.
         """
         for program in self._programs:
             program.contact = False
 
     def reset(self) -> None:
-        """Release the emergency stop and the drums, and clear the faults of the drives, as by the operator."""
+        """Release the emergency stop and the drums, and clear the faults of the drives, as an operator does."""
         for program in self._programs:
             program.contact = True
             program.reset()
 
 
 def _each_fault(faults: Any) -> Iterable[Any]:
-    """Iterable of one or several faults."""
+    """Convert one or several faults to an iterable."""
     return elements(faults, str | Injected, "faults", 'Give texts: faults=["cell 3 sticks at 40 s"].')

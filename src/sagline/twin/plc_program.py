@@ -1,4 +1,4 @@
-"""Program in the PLC of one group: ownership, heartbeat, ramp, limits, hold.
+"""Program of the PLC of one group: ownership, heartbeat, ramp, limits and hold.
 
 The SCL source has the same statements in the same order. The program uses plain numbers, so that a scan takes
 microseconds.
@@ -63,33 +63,33 @@ class Program:
     Attributes:
         owner: Id of the controller that owns the group, 0 for none.
         echo: Counter of the last accepted command, 0 before the first.
-        fault: Reason of an automatic stop. A command to hold acknowledges the fault after the end of the ramp, and
-            after at least 100 ms.
+        fault: Reason of an automatic stop. A command to hold acknowledges the fault, if the ramp has ended and at least
+            100 ms have passed.
         powered: True for each drive that has power and a released brake.
         length: Set points at the end of the scan's period [m].
         tension: Expected tensions at the drums [N].
         drive_fault: Fault codes of the drives, 0 for none.
         contact: State of the normally closed contact of the emergency stop: False if the stop is pressed, or if the
             wire is broken.
-        emergency: True after the contact has opened, until a reset with a closed contact.
+        emergency: True from the opening of the contact until a reset with a closed contact.
         locked: True if the drums are locked until the operator releases them.
     """
 
     def __init__(self, limits: PlcLimits, period: float) -> None:
-        """Begin with brakes on and without owner; period of a scan [s]."""
+        """Begin with brakes on and without an owner; period: period of a scan [s]."""
         self.limits, self.period = limits, period
         count = len(limits.least)
         self.winches = range(count)
         self.owner, self.echo, self.fault = 0, 0, GroupFault.NONE
         self.powered = [False] * count
-        self._loaded = [False] * count  # True for each drive that has the expected tension
+        self._loaded = [False] * count  # True for each drive that produces the expected tension
         self.length, self.tension = [0.0] * count, [0.0] * count
         self.drive_fault = [0] * count
         self.contact, self.emergency, self.locked = True, False, False
         self._order: Order | None = None
         self._fresh = False
         self._moved = -OWNER_TIMEOUT  # time of the last change of the command counter [s]
-        self._target = [0.0] * count  # set points of the last command, or lengths of the drives [m]
+        self._target = [0.0] * count  # set points of the last command, or present lengths of the drives [m]
         self._rate = [0.0] * count
         self._ramp = 0.0  # remaining time of the ramp [s]
         self._left = 0.0  # remaining time [s] until the set points of the last command are reached
@@ -97,7 +97,7 @@ class Program:
         self._mode = _LEAVE
 
     def claim(self, owner: int, now: float) -> None:
-        """Set an owner if there is none, or its counter has not changed for OWNER_TIMEOUT; now: time [s]."""
+        """Set an owner if there is none, or if its counter is unchanged for OWNER_TIMEOUT; now: time [s]."""
         if owner > 0 and owner != self.owner and (not self.owner or now - self._moved >= OWNER_TIMEOUT - TINY):
             self.seize(owner, now)
 
@@ -109,25 +109,25 @@ class Program:
             self._stop(GroupFault.HEARTBEAT)
 
     def take(self, order: Order) -> None:
-        """Accept a command if it is from the owner and newer than the last command."""
+        """Accept a command that is from the owner and newer than the last command."""
         if self.owner and order.owner == self.owner and (not self.echo or newer(order.counter, self.echo)):
             self.echo, self._order, self._fresh = order.counter, order, True
 
     def reset(self) -> None:
-        """Release the drums and clear the drive faults, as by the operator; the brakes remain on."""
+        """Release the drums and clear the drive faults, as an operator does. The brakes remain on."""
         self.emergency = self.locked = False
         self.drive_fault = [0] * len(self.drive_fault)
         self.fault, self._order = GroupFault.NONE, None
         self._brake()
 
     def restart(self) -> None:
-        """Restart with brakes on and without owner."""
+        """Restart the PLC, with brakes on and without an owner."""
         self.owner, self.echo, self._order, self._fresh = 0, 0, None, False
         self.fault = GroupFault.NONE
         self._brake()
 
     def trip(self, winch: int, code: int) -> None:
-        """Trip a drive; it has no power until the operator resets it."""
+        """Trip a drive. It has no power until the operator resets it."""
         self.drive_fault[winch], self.powered[winch] = code, False
         self._stop(GroupFault.DRIVE)
 
@@ -152,7 +152,7 @@ class Program:
             self._brake()
             return
         if self._lags(encoder):
-            if self.fault == GroupFault.FOLLOWING_ERROR:  # set points are at the drives' positions
+            if self.fault == GroupFault.FOLLOWING_ERROR:  # the set points are the drives' positions
                 self.locked = True
                 self._brake()
                 return
@@ -165,7 +165,7 @@ class Program:
             self.fault = GroupFault.NONE
             if order.enable != self.powered:
                 self._switch(order, encoder)
-                waited = 0.0  # a drive starts at its set point, so that it has no deviation
+                waited = 0.0  # a drive starts without a distance from its set point
             self._obey(order, waited, cell)
             return
         elif order is not None and waited >= min(HEARTBEAT, order.valid_for) - TINY:
@@ -186,7 +186,7 @@ class Program:
         return True
 
     def _move_to_drives(self, encoder: list[float], cell: list[float]) -> None:
-        """Replace set points that are too far from their drives by the drives' positions; use the cell tensions."""
+        """Replace set points that are too far from their drives by the positions and cell tensions of the drives."""
         read = self._valid_tensions([max(reading, 0.0) for reading in cell])
         self.length, self._rate, self.tension = list(self.length), list(self._rate), list(self.tension)
         for i in self.winches:
@@ -200,7 +200,7 @@ class Program:
         self._rate, self._ramp, self._mode = [0.0] * len(self._rate), 0.0, _LEAVE
 
     def _switch(self, order: Order, encoder: list[float]) -> None:
-        """Switch on the enabled drives at their present lengths, and switch off the others.
+        """Switch on the enabled drives at their present lengths, and switch off all others.
 
         A drive first produces the expected tension; its brake is released with the next command.
         """
@@ -227,16 +227,16 @@ class Program:
         self._slow_down(cell)
 
     def _valid_tensions(self, tension: list[float]) -> list[float]:
-        """Expected tensions; the previous tension replaces a tension outside the limits."""
+        """Set the expected tensions. A tension outside the limits is replaced by the previous tension."""
         rows = zip(tension, self.tension, self.limits.tension, strict=True)
         return [new if 0.0 <= new <= most and isfinite(new) else old for new, old, most in rows]
 
     def _follow(self, order: Order, waited: float, cell: list[float]) -> None:
-        """Follow new set points, if lengths, steps, rates and tensions are within their limits."""
+        """Follow new set points whose lengths, steps, rates and tensions are within their limits."""
         least, most, speed, tightest = self.limits
         lengths, rates, tensions, before = order.length, order.rate, order.tension, self._target
         self._mode, self._ramp = _FOLLOW, 0.0
-        waited = max(waited, 0.0) + PERIOD  # the previous command may have been late
+        waited = max(waited, 0.0) + PERIOD  # because the previous command may have been late
         for i in self.winches:
             length, fastest = lengths[i], speed[i]
             if self.powered[i]:
@@ -257,10 +257,10 @@ class Program:
         self._drive(cell)
 
     def _drive(self, cell: list[float]) -> None:
-        """Advance the set points by a scan, unless this winds in a cable beyond its tension limit.
+        """Advance the set points by a scan. A cable beyond its tension limit is not wound in.
 
-        The set points move linearly to the set points of the last command within one cycle. After that, they continue
-        at the rates of the command. Lengths and rates stay within their limits.
+        Within one cycle, the set points move linearly to those of the last command. After the cycle, they continue at
+        the rates of the command. Lengths and rates stay within their limits.
         """
         limit, length, powered, target, rate = self.limits.tension, self.length, self.powered, self._target, self._rate
         left, period, moved = self._left, self.period, []
@@ -283,7 +283,7 @@ class Program:
         self.length, self._left = moved, max(left - period, 0.0)
 
     def _within_limits(self, i: int, length: float) -> float:
-        """Next set point of a winch, with a limited rate; a set point out of range may only move toward the range."""
+        """Next set point of a winch, with a limited rate. A set point out of range may only move toward the range."""
         at, farthest = self.length[i], self.limits.speed[i] * self.period + TINY
         if length > at + farthest:
             length = at + farthest
@@ -295,13 +295,13 @@ class Program:
         return min(max(length, min(least, at)), max(most, at))
 
     def _stop(self, fault: GroupFault) -> None:
-        """Begin to slow down and hold after a fault."""
+        """Begin to slow down because of a fault, and hold afterwards."""
         if not self.fault:
             self.fault, self._since = fault, self._now
             self._ramp = RAMP if any(self._rate) and not self._ramp else self._ramp
 
     def _slow_down(self, cell: list[float]) -> None:
-        """Reduce the rates linearly to zero; a cable beyond its tension limit is not wound in."""
+        """Reduce the rates linearly to zero. A cable beyond its tension limit is not wound in."""
         if self._ramp <= 0.0:
             return
         share, period = self._ramp / RAMP, min(self.period, self._ramp)
@@ -317,7 +317,7 @@ class Program:
 
     @property
     def _was_reported(self) -> bool:
-        """True if the ramp has ended, and the fault has been reported for at least the heartbeat time."""
+        """True if the ramp has ended and the fault has been reported during the heartbeat time."""
         return not self._ramp and self._now - self._since >= HEARTBEAT - TINY
 
     @property

@@ -36,7 +36,7 @@ ROWS: Final = ("length", "rate", "torque", "tension", "filtered", "counts", "sta
 
 
 class Server:
-    """Servers of a machine's PLCs, each with its own address; the plant runs in real time.
+    """Servers of a machine's PLCs, each with its own address. The machine runs in real time.
 
     Attributes:
         machine: The machine.
@@ -57,8 +57,8 @@ class Server:
 
         Args:
             machine: Machine of the PLCs; its period is the scan period of the PLCs.
-            host: Address to listen at; by default this computer only.
-            port: Port of the first group; the next groups have the next ports. 0 for any free ports.
+            host: Address of this computer for the servers; by default other computers cannot connect.
+            port: Port of the first group. The other groups have the following ports. 0: any free ports.
             modbus: True if the servers use Modbus TCP instead of S7.
 
         Raises:
@@ -70,7 +70,7 @@ class Server:
         check_first_port(first_port, machine.robot)
         self._pace = Pace(machine.period)
         self._groups = range(len(machine.groups))
-        self._seen = [b""] * len(machine.groups)  # last commands that were read
+        self._seen = [b""] * len(machine.groups)  # last commands that were read from the blocks
         first = [self._block(group) or SILENT for group in self._groups]
         self._servers = _block_servers(first, place, first_port, flag(modbus, "modbus"))
         self.addresses = self._servers.addresses
@@ -84,8 +84,8 @@ class Server:
         """Serve until interrupted.
 
         Args:
-            watch: Function that is called after every scan with the machine's time [s] and the true state. The next
-                scan overwrites the state.
+            watch: Function that is called after every scan with the machine's time [s] and its true state. The next
+                scan overwrites this state.
         """
         while True:
             self._pace.wait()
@@ -99,7 +99,7 @@ class Server:
             asked = CLAIM.read(claim)
             if not isinstance(asked, Refusal):
                 self.machine.claim(group, asked["owner"])
-            if command != self._seen[group]:  # a command from before the claim is ignored
+            if command != self._seen[group]:  # a command that is older than the claim is ignored
                 self._seen[group] = command
                 order = self._command(group, command)
                 if order is not None:
@@ -112,7 +112,7 @@ class Server:
         self._servers.close()
 
     def _command(self, group: int, data: bytes) -> Command | None:
-        """Command in DB102; None if the block is empty or incomplete."""
+        """Read the command in DB102; None if the block is empty or incomplete."""
         values = TO_PLC.read(data)
         if isinstance(values, Refusal):
             return None
@@ -139,7 +139,7 @@ class Server:
 
 
 def check_first_port(port: int, robot: Robot) -> None:
-    """Refuse a first port that leaves no ports for the other groups of a robot; 0 means any free ports."""
+    """Refuse a first port with too few ports after it for the groups of a robot. 0 means any free ports."""
     count = len(groups_of(robot.cable_count))
     last = LAST_PORT + 1 - count
     if port > last:
@@ -148,7 +148,7 @@ def check_first_port(port: int, robot: Robot) -> None:
 
 
 def block_of(group: int, report: Report) -> bytes:
-    """Block of a PLC's report; group from 0."""
+    """Create the block of the report of a PLC; the group index begins at 0."""
     head = {
         "counter": report.counter,
         AGAIN: report.counter_again,
@@ -178,7 +178,7 @@ def _block_servers(blocks: list[bytes], host: str, port: int, modbus: bool) -> B
         return S7Servers(blocks, host, port)
 
 
-SWITCHING_ON: Final = 60.0  # longest time of the start [s], including the loading of kernels from the disk
+SWITCHING_ON: Final = 60.0  # longest time for the start [s], including the loading of kernels from the disk
 
 
 class _RemoteMachine(NamedTuple):
@@ -194,7 +194,7 @@ class _RemoteMachine(NamedTuple):
 
 @contextmanager
 def machine_in_process(robot: Robot, nominal: Robot, start: Pose, *, seed: int = 0) -> Iterator[_RemoteMachine]:
-    """Context of a machine in another process, in real time; the process is killed at the end."""
+    """Context with a machine in another process, in real time. At the end of the context, the process is killed."""
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe()
     place = context.Array("d", 3)
@@ -210,7 +210,7 @@ def machine_in_process(robot: Robot, nominal: Robot, start: Pose, *, seed: int =
 
 
 def _receive_addresses(pipe: Connection) -> tuple[str, ...]:
-    """Addresses from the other process; raises the error of that process."""
+    """Wait for the addresses from the other process, or raise the error of this process."""
     answer: tuple[str, ...] | SaglineError | None = None
     with suppress(EOFError):
         answer = pipe.recv() if pipe.poll(SWITCHING_ON) else None
@@ -223,7 +223,7 @@ def _receive_addresses(pipe: Connection) -> tuple[str, ...]:
 
 
 def _serve(robot: Robot, nominal: Robot, start: Pose, seed: int, pipe: Connection, place: Any) -> None:
-    """Run the machine until killed; SIGINT is ignored, because the controller must first stop the robot."""
+    """Run the machine until killed. SIGINT is ignored, because the controller must first stop the robot."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         machine = Machine(robot, nominal=nominal, start=start, seed=seed, period=SCAN)

@@ -25,10 +25,10 @@ from sagline.twin.plc_program import LEFT, PlcLimits
 
 
 class _EncoderScale:
-    """Conversion between lengths and encoder counts, from the turns of known drums, or with a constant radius.
+    """Conversion between lengths and encoder counts: by the turns on known drums, or with a constant radius.
 
     Attributes:
-        per_meter: Counts per meter of unstrained cable that is paid out, at the reference lengths, (m,).
+        per_meter: Counts per meter of unstrained paid-out cable, at the reference lengths, (m,).
     """
 
     def __init__(self, robot: Robot, length: Array, counts: Array) -> None:
@@ -50,7 +50,7 @@ class _EncoderScale:
             self._at_no_length = counts - length * self.per_meter
 
     def counts(self, length: Array) -> Array:
-        """Counts of the encoders, not rounded, at unstrained lengths off the drums [m]."""
+        """Convert unstrained lengths off the drums [m] to counts of the encoders, not rounded."""
         if self._drums is None:
             found: Array = length * self.per_meter + self._at_no_length
             return found
@@ -61,7 +61,7 @@ class _EncoderScale:
         return found
 
     def lengths(self, counts: Array) -> Array:
-        """Unstrained lengths off the drums at counts of the encoders [m]."""
+        """Convert counts of the encoders to unstrained lengths off the drums [m]."""
         if self._drums is None:
             found: Array = (counts - self._at_no_length) / self.per_meter
             return found
@@ -74,19 +74,19 @@ class _EncoderScale:
 
 SHARE: Final = 0.2  # largest phase of the highest mode in a step [rad]
 NEAR: Final = 1e-6  # largest deviation from a whole number of steps, in periods
-REACH: Final = 2.0  # length of the cable if cable_length is unknown, relative to the largest distance of frame anchors
+REACH: Final = 2.0  # cable length if cable_length is unknown, divided by the largest distance of two frame anchors
 
 
 class Start(NamedTuple):
-    """Machine before it is switched on."""
+    """State of a machine before it is switched on."""
 
     state: Equilibrium  # equilibrium of the true robot
     nominal: _EncoderScale  # conversion of the encoders in the PLCs
-    true: _EncoderScale  # conversion of the encoders at the true drums
+    true: _EncoderScale  # conversion of the encoders by the true drums
 
 
 def initial_state(true: Robot, nominal: Robot, start: Any, surveyed: bool) -> Start:
-    """True equilibrium at the start, and conversions of the encoders."""
+    """Compute the true equilibrium at the start and the conversions of the encoders."""
     pose = _start_pose(nominal, start)
     plan = inverse(nominal, pose)
     planned = _feasible_lengths(plan.unstrained_length, nominal, "start")
@@ -131,7 +131,7 @@ def winch_limits(robot: Robot, scale: _EncoderScale) -> PlcLimits:
 
 
 def check_step(robot: Robot, state: Equilibrium, step: float, period: float) -> None:
-    """Refuse a step [s] that is too coarse for the robot's modes, and a period [s] out of range.
+    """Refuse a step [s] that is too long for the robot's modes, and a period [s] out of range.
 
     The period must be a whole multiple of the step, and at most the heartbeat.
     """
@@ -180,7 +180,7 @@ def _zero_errors(true: Robot, nominal: Robot) -> Array:
 
 
 def _routed_length(robot: Robot, pose: Pose) -> Array:
-    """Length on pulleys and dead length [m], (m,)."""
+    """Sum of the length on the pulley and the dead length of each cable [m], (m,)."""
     if robot.winches is None or not robot.winches.anything_behind:
         return np.zeros(robot.cable_count)
     whole, bare = (inverse(some, pose).unstrained_length for some in (robot, robot.replace(winches=None)))

@@ -266,8 +266,7 @@ class Simulator:
     def release(self, *winches: int) -> None:
         """Release locked drums. Their set points change linearly to the next given values.
 
-        The integral part of a motor's controller starts at zero. The motor therefore holds only the expected tension at
-        first.
+        The integral part of a motor's controller starts at zero. At first, the motor holds the expected tension only.
 
         Args:
             winches: Indices of the winches, from 0; none for all.
@@ -288,8 +287,7 @@ class Simulator:
         """Shift set points suddenly, as if an encoder lost counts. The drives move to the shifted set points.
 
         Args:
-            length: Shift of the present set points [m]. The motion to the next set points starts at the shifted set
-                points.
+            length: Shift of the present set points [m], from which the motion to the next set points starts.
             winches: Indices of the winches, from 0; none for all.
 
         Raises:
