@@ -177,7 +177,7 @@ class Controller(Preparation):
         """Move straight to a pose.
 
         Args:
-            pose: Pose at the end, a single pose.
+            pose: Pose at the end of the motion, a single pose.
             speed: Largest speed of the origin [m/s], > 0.
             angular_speed: Largest angular speed of the platform [rad/s], > 0.
 
@@ -233,7 +233,7 @@ class Controller(Preparation):
             by: Displacement [m], shape (3,), or displacement and rotation vector [m, rad], shape (6,), world axes.
 
         Raises:
-            RefusedError: If the robot is not idle, or the pose at the end has no tensions within the limits.
+            RefusedError: If the robot is not idle, or if no tensions within the limits hold the platform at the end.
         """
         c, far = self._context, checked_displacement(by)
         check_transition(self.state, State.JOGGING, "the jog")

@@ -19,7 +19,7 @@ MOVING: Final = 1e-3  # [m/s], a set point that changes faster counts as a motio
 
 
 class Cycle(NamedTuple):
-    """Data of one cycle for the fault rules. They are known after the sample, before the next command.
+    """Data of one cycle for the fault rules, collected between the sample and the next command.
 
     Attributes:
         sample: The newest sample.
@@ -163,7 +163,7 @@ class Evidence:
         self._all_believed = False
 
     def stop(self) -> None:
-        """Store that a fault stops the motion. Faults before the winches stop are mostly consequences of it."""
+        """Store that a fault stops the motion. Until the winches stop, further faults are mostly its consequences."""
         self.stopped, self._still = True, 0
 
     def _wait(self, cycle: Cycle) -> None:

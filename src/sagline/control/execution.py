@@ -279,8 +279,8 @@ def null_space_error(execution: Execution, filter_time: float | None = None) -> 
         filter_time: Time constant of the input filter [s]; None for the default of the tension loop.
 
     Returns:
-        e_N = K_A N_L G f [N], shape (N, m); f is the filtered T_A minus the planned T_A. NaN outside the plan, and for
-        a robot without redundancy.
+        e_N = K_A N_L G f [N], shape (N, m), with f = filtered T_A - planned T_A. NaN outside the plan, and for a robot
+        without redundancy.
 
     Examples:
         >>> import sagline as sl

@@ -85,7 +85,7 @@ class BlockDiscarded(Fault):
             count = int(sample.discarded[group])
             self._quiet = 0
             reason = sample.reasons[group] if sample.reasons else None
-            why, step = reason or ("the link knows no reason", CHECK)
+            why, step = reason or ("the link gives no reason", CHECK)
             self._line = f"group {group}: a block was discarded, {count} so far: {why}. {step}."
         return self._line if self._quiet < WINDOW else None
 

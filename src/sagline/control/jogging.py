@@ -106,7 +106,7 @@ class PlatformJog:
         end = self._solver.step(*self._at(1.0))
         if end.status is not PoseStatus.SOLVED:
             reason = f"the pose at its end is {end.status.name}"
-            raise RefusedError("the jog", reason, "Jog by less, or elsewhere.")
+            raise RefusedError("the jog", reason, "Jog by less, or in another direction.")
         self._solver.reset()
         first = self._solver.step(*self._at(0.0))
         lead = begin.length - first.unstrained_length

@@ -168,7 +168,7 @@ def gains_along(plan: Plan, every: float = EVERY) -> Gains | None:
     """Gains of the tension loop along a plan.
 
     Args:
-        plan: Plan along a path, or of a single pose; feasible.
+        plan: Feasible plan, along a path or of a single pose.
         every: Time between two rows [s], > 0; each row is at the nearest sample of the plan.
 
     Returns:

@@ -27,7 +27,7 @@ class SetPoint(NamedTuple):
     """Set point for the end of a cycle.
 
     Attributes:
-        length: Unstrained lengths off the drums, of the model [m], shape (m,).
+        length: Unstrained lengths off the drums in the model [m], shape (m,).
         rate: Rates of these lengths [m/s], shape (m,).
         tension: T_A planned for the set point [N], shape (m,); NaN if unknown.
         drum_tension: Expected tension at the drums [N], shape (m,).

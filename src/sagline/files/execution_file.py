@@ -43,7 +43,7 @@ def load_execution(file: os.PathLike[str] | str, plan: int | None = None) -> Exe
     Args:
         file: The log.
         plan: Index of the plan, from 0; -1 is the last plan. None: all cycles of the log; the execution then has a plan
-            only if the log has exactly one.
+            only if the log has exactly one plan.
 
     Returns:
         The execution. Its status is UNKNOWN if the log does not contain the end of the plan.

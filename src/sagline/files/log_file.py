@@ -212,8 +212,8 @@ def load_log(file: os.PathLike[str] | str, sensors: Sensors | None = None) -> Wi
         0,320530,312004,299911,0.41,0.52,0.39,1012.5,998.1,2003.0
         30,318112,311870,301442,0.44,0.50,0.41,,,
 
-    - `count_0`, `count_1`, ...: encoder counts; or `length_0`, ...: cable lengths off the drums from the
-      controller. `C0` and `L0` are other names of `count_0` and `length_0`.
+    - `count_0`, `count_1`, ...: encoder counts; or `length_0`, ...: lengths off the drums, as the controller reports
+    them. `C0` and `L0` are other names of `count_0` and `length_0`.
     - `load_cell_0`, ...: tensions at the frame ends; cables without a load cell have no column.
     - `x`, `y`, `z`, all or some: position of the target in the axes of the measuring system.
     - `qx`, `qy`, `qz`, `qw`, or `alpha`, `beta`, `gamma` (about z, then the new y, then the new x): rotation of the

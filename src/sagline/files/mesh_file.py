@@ -76,7 +76,7 @@ def load_mesh(file: str | os.PathLike[str], unit: str = "m", name: str | None = 
 
 
 def meters(unit: str, item: str) -> float:
-    """Length of a unit [m]; InvalidValueError if it is not a unit of length."""
+    """Length of a unit [m]; raise InvalidValueError if it is not a unit of length."""
     try:
         factor = in_si(f"1 {label(unit, item)}", "m", item)
     except InvalidValueError:

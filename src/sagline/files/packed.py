@@ -98,7 +98,7 @@ def unpack(data: bytes, most: int = 1 << 62) -> dict[str, NDArray[Any]]:
         found[column.name] = _values(column, plain[start:end])
         start = end
     if start != len(plain):
-        raise ValueError("the data are longer than the header states")
+        raise ValueError("the data are longer than their header states")
     return found
 
 

@@ -189,9 +189,9 @@ def _check_plan(data: Dataset, cables: int) -> None:
 def save_plan(plan: Plan, file: os.PathLike[str] | str) -> None:
     """Write a plan to a NetCDF file atomically.
 
-    The dimensions are pose (absent for a single pose) and cable. The times of a path are a coordinate of pose.
-    Infeasible poses are included, with status, shortfall, blocking cables and proof; their lengths and forces are NaN.
-    A digest over all values and attributes follows the NetCDF data; it detects later changes.
+    The dimensions are pose (absent for a single pose) and cable. The times of a path are a coordinate of the dimension
+    pose. Infeasible poses are included, with status, shortfall, blocking cables and proof; their lengths and forces are
+    NaN. A digest over all values and attributes follows the NetCDF data; it detects later changes.
 
     Args:
         plan: A plan of one robot.

@@ -121,7 +121,7 @@ def _check_settings(attributes: Any) -> None:
         number(attributes[name], name, "", low=0.0)
     if (attributes["cable_mass"] == "modal") != (attributes["integrator"] == "exact"):
         found = f"{attributes['integrator']} for cable_mass {attributes['cable_mass']}"
-        raise InvalidValueError("integrator", found, "exact for modal only", STEP)
+        raise InvalidValueError("integrator", found, "exact with modal only", STEP)
 
 
 def _check_times(time: Array) -> None:

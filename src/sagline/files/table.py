@@ -52,7 +52,8 @@ class CsvTable:
     ) -> CsvTable:
         """Read a CSV text; the first row contains the names of the columns, `name` or `name [unit]`.
 
-        Columns are separated by commas, semicolons or tabs. With the latter two, numbers may have a decimal comma.
+        Columns are separated by commas, or by semicolons or tabs. Without commas between them, decimal commas are
+        allowed.
         """
         mark = separator_of(text)
         reader = csv.reader(io.StringIO(text), strict=True, delimiter=mark)

@@ -163,7 +163,7 @@ def _cables(materials: list[Element], assumed: dict[str, str]) -> Cable:
 
 
 def _winches(root: Element, chains: list[Element]) -> tuple[Winch | None, tuple[str, ...]]:
-    """Pulleys and drums, and their data that are lost."""
+    """Pulleys and drums of the file, and a list of the lost data."""
     lost, radii, axes = [], [], []
     for k, chain in enumerate(chains):
         item = f"chain {k + 1}: base"

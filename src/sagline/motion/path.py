@@ -103,7 +103,7 @@ def checked_time(time: ArrayLike, item: str = "time") -> Array:
     if late.size:
         k = int(late[0]) + 1
         raise InvalidValueError(
-            f"{item}[{k}]", f"{clock[k]} s", f"> {clock[k - 1]} s (the one before)", "Sort them by time."
+            f"{item}[{k}]", f"{clock[k]} s", f"> {clock[k - 1]} s (the one before)", "Sort the samples by time."
         )
     return clock
 

@@ -134,7 +134,7 @@ def _rest_to_rest(
             "the timing of the path",
             f"given by durations and {given[0]}" if given else "missing",
             "either durations, or limits of speed and acceleration",
-            "Omit one of them." if given else "Give durations=... or speed=...",
+            "Omit one of the two." if given else "Give durations=... or speed=...",
         )
     times = segments.durations_within(*limits) if durations is None else _checked_durations(durations, len(segments))
     ends = np.cumsum(times)

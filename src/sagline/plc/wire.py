@@ -142,7 +142,7 @@ class WireError(Exception):
 
 
 class Wire(Protocol):
-    """Connection to one PLC. Its methods raise `WireError`. One thread calls all of them except `abort`, `reached`."""
+    """Connection to one PLC. Its methods raise `WireError`. One thread calls all except `abort` and `reached`."""
 
     def open(self) -> None:
         """Connect. The longest wait depends on the protocol."""

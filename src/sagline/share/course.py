@@ -24,7 +24,7 @@ from sagline.statics.tables import chord_geometry
 if TYPE_CHECKING:
     from sagline.viewer.session import PlayedLog
 
-MOST_RATE: Final = 100.0  # samples per second of a screen; samples are omitted if a run has twice as many or more
+MOST_RATE: Final = 100.0  # samples per second of a screen; a run with at least twice as many loses samples
 
 
 class _SampleVerdict(NamedTuple):

@@ -144,7 +144,7 @@ def check_first_port(port: int, robot: Robot) -> None:
     last = LAST_PORT + 1 - count
     if port > last:
         allowed = f"0 to {last}, because {count} groups have {count} ports"
-        raise InvalidValueError("port of the first group", port, allowed, "Choose another with --port.")
+        raise InvalidValueError("port of the first group", port, allowed, "Choose another port with --port.")
 
 
 def block_of(group: int, report: Report) -> bytes:

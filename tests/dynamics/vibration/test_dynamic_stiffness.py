@@ -122,10 +122,10 @@ def test_a_pose_that_is_not_feasible_has_no_dynamics() -> None:
     """Refused alike by all that take a single state; `vibration` has a status for it."""
     state = sl.inverse(sl.load_robot("cogiro"), sl.Pose((0, 0, 40), np.eye(3))).state
     calls: tuple[tuple[Callable[[sl.Equilibrium], object], str], ...] = (
-        (sl.frequency_slopes, "one without lengths"),
-        (sl.linearized, "one without lengths or stiffness"),
-        (lambda state: sl.dynamic_stiffness(state, 1.0), "one without lengths"),
-        (lambda state: sl.frequency_response(state, [1.0]), "one without lengths"),
+        (sl.frequency_slopes, "a state without lengths"),
+        (sl.linearized, "a state without lengths or stiffness"),
+        (lambda state: sl.dynamic_stiffness(state, 1.0), "a state without lengths"),
+        (lambda state: sl.frequency_response(state, [1.0]), "a state without lengths"),
     )
     for of, value in calls:
         with refused("state", value, "a state that was solved", kind=sl.InvalidValueError):

@@ -184,9 +184,9 @@ def test_what_is_refused() -> None:
     shallow = feasible_plan(COGIRO, 1, 1, sl.Parabolic()).state[0]
     cases: tuple[tuple[Any, *tuple[str, ...]], ...] = (
         (plan.state, "a batch of 2", "a single state"),
-        (plan.state[1], "one without lengths", "a state that was solved"),
+        (plan.state[1], "a state without lengths", "a state that was solved"),
         (plan, "a batch of 2", "a single state"),
-        (sl.vibration(plan.state[1], up_to=1.0), "one whose status is NO_LENGTHS"),
+        (sl.vibration(plan.state[1], up_to=1.0), "a vibration with the status NO_LENGTHS"),
     )
     for given, *parts in cases:
         with refused("state", *parts, kind=sl.InvalidValueError):
@@ -201,7 +201,7 @@ def test_what_is_refused() -> None:
 def test_cables_over_pulleys_are_refused() -> None:
     over = one_pose(sl.load_robot("ipanema-2-pulleys"), sl.Catenary())
     for given in (over, sl.vibration(over, up_to=1.0)):
-        with refused("state", "one with pulleys or dead length"):
+        with refused("state", "a robot with pulleys or dead length"):
             sl.frequency_slopes(given)
 
 

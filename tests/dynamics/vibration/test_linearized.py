@@ -162,7 +162,7 @@ def test_what_is_refused() -> None:
     unbounded = '0 with inputs="lengths": a step of a length would cause infinite tensions'
     cases: tuple[tuple[tuple[Any, ...], *tuple[str, ...]], ...] = (
         ((plan.state,), "state", "a batch of 2", "a single state"),
-        ((plan.state[1],), "state", "one without lengths or stiffness", "a state that was solved"),
+        ((plan.state[1],), "state", "a state without lengths or stiffness", "a state that was solved"),
         ((plan,), "state", "a batch of 2", "a single state"),
         ((state, sl.Damping(air_damping=0.1)), "air_damping", "0.1 N s/m^2", "0 for massless cables"),
         ((state, sl.Damping(1e-3)), "loss_time", "0.001 s", unbounded),

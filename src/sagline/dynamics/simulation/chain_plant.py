@@ -255,7 +255,7 @@ def check_lumped(given: InitialConditions) -> None:
     light = np.flatnonzero(~(given.robot.cables.linear_density > 0.0))
     if light.size:
         step = 'Give a density, or cable_mass="none".'
-        raise InvalidValueError(f"cable {light[0]}: linear_density", "0 kg/m", "> 0 kg/m if it has mass", step)
+        raise InvalidValueError(f"cable {light[0]}: linear_density", "0 kg/m", "> 0 kg/m for a cable with mass", step)
 
 
 def wave_frequency(given: InitialConditions, nodes: int) -> float:

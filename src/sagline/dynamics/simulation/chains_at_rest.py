@@ -85,7 +85,7 @@ def chains_at_rest(state: Equilibrium, nodes: int) -> _ChainsAtRest:
             break
         near = bool(np.abs(motion).max() <= NEAR * length.max())
     else:
-        raise _no_rest("start", "an equilibrium; its chains have no equilibrium near it")
+        raise _no_rest("start", "an equilibrium, near which its chains have none")
     ends = pose.position + robot.platform_anchors @ pose.matrix.T
     force = _solve_chains(chains, ends - exits, force)
     place = np.empty((len(force), nodes + 1, 3))

@@ -231,11 +231,11 @@ def _from_equilibrium(state: Equilibrium, table: Any) -> InitialConditions:
     """Initial conditions for a robot at rest."""
     if state.pose.shape:
         item = f"a batch of {len(state)} equilibria"
-        raise InvalidValueError("start", item, "a single equilibrium, or a plan", "Give a single one: state[0].")
+        raise InvalidValueError("start", item, "a single equilibrium, or a plan", "Give one of them: state[0].")
     robot, length = state.one_robot, state.unstrained_length
     if np.isnan(length).any():
         step = "Give a feasible pose."
-        raise InvalidValueError("start", "a state without lengths", "one with a solution", step)
+        raise InvalidValueError("start", "a state without lengths", "a state with a solution", step)
     tension, end = TimeTable.constant(np.nan_to_num(drum_tension(state))), 0.0
     lengths = TimeTable.constant(length)
     if table is not None:

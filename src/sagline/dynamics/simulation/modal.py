@@ -131,7 +131,7 @@ def modal_simulation(given: InitialConditions, damping: Damping, step: Any, reco
     if (found.loss >= 1.0).any():
         k = int(np.argmax(found.loss >= 1.0))
         value = f"a ratio of {found.loss[k]:.3g} at {found.frequency[k]:.3g} Hz with cable mass"
-        raise InvalidValueError("damping", value, "< 1 for modes", 'Give less, or cable_mass="lumped".')
+        raise InvalidValueError("damping", value, "< 1 for modes", 'Give a smaller ratio, or cable_mass="lumped".')
     usual = min(LONGEST, SHARE / frequency[-1])
     fine = usual if step is None else number(step, "step", "s", above=0.0)
     every = max(1, math.ceil(record / fine - 1e-9))

@@ -145,7 +145,7 @@ def _check_order(events: list[Event], robot: Robot) -> None:
             mass += event.mass
     if len(broken) == robot.cable_count:
         step = "Keep at least one cable: a platform without cables only falls."
-        raise InvalidValueError("events", "a break of every cable", "at least one left", step)
+        raise InvalidValueError("events", "a break of every cable", "at least one unbroken cable", step)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -181,7 +181,7 @@ class Occurrence:
         kind: "break", "stall", "brake", "drop" or "pick up" for scheduled events; "saturate" or "slack" for other
             events.
         cable: Index of the cable or winch, or None for the platform.
-        tension_before: Largest tension of this cable, or of all cables, before the event [N].
+        tension_before: Largest tension before the event [N]: of the named cable, or of any cable if none is named.
         tension_after: Largest tension of any cable after the event, until the next event or the end [N].
     """
 
@@ -198,7 +198,8 @@ class Simulation(Result, Saved, Tabular):
 
     Attributes:
         robot: The robot.
-        time: Times of the samples [s], increasing, shape (N,): after each fixed number of steps, and at the end.
+        time: Times of the samples [s], increasing, shape (N,). A fixed number of steps is between two samples; the last
+            sample is at the end.
         pose: Poses of the platform, a batch of N.
         twist: Velocity of the platform's origin and angular velocity, world axes [m/s, rad/s], shape (N, 6).
         tensions: Tensions at the frame ends [N], shape (N, m).
@@ -209,7 +210,7 @@ class Simulation(Result, Saved, Tabular):
         step: Time step of the integrator [s].
         nodes: Positions of the nodes of every cable, world axes [m], shape (N, m, P, 3); None without cable mass, NaN
             for a broken cable.
-        integrator: "runge-kutta" or "splitting"; "exact" for modes.
+        integrator: "runge-kutta" or "splitting"; "exact" for cable_mass="modal".
         winches: "ideal", "robot" or SecondOrder(...).
         winding: "constant" or "remembered".
         damping: Energy losses of the cables.

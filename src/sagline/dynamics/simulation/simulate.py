@@ -280,7 +280,7 @@ def _every(record: Any, step: float) -> int:
     """Convert the interval between records [s] to a number of steps."""
     given = RECORD if record is None else number(record, "record", "s", above=0.0)
     if record is not None and given < 0.999 * step:
-        raise InvalidValueError("record", f"{given:g} s", f">= {step:g} s, the step", "Give a longer one, or a step.")
+        raise InvalidValueError("record", f"{given:g} s", f">= {step:g} s, the step", "Increase it, or reduce step.")
     return max(1, round(min(given / step, MOST_STEPS)))
 
 

@@ -229,7 +229,7 @@ class Simulator:
     def _take_tension(self, tension: ArrayLike) -> None:
         if self._kind != d.DRUMS:
             step = "Omit it: these winches have no motors."
-            raise InvalidValueError("tension", "given", 'None except for winches="robot"', step)
+            raise InvalidValueError("tension", "given", 'None, unless winches="robot"', step)
         copy_in(self._expected, tension, "tension", "N")
 
     def _refuse(self, with_tension: bool) -> NoReturn:

@@ -64,7 +64,7 @@ def checked_step(
     parts = LONGEST / given
     if stride and (parts < 0.5 or abs(parts - round(parts)) > 1e-9 * parts):
         step_to = "Give for instance 1e-3 or 5e-4, because drives close their loops every millisecond."
-        raise InvalidValueError("step", f"{given:g} s", "a whole part of 0.001 s", step_to)
+        raise InvalidValueError("step", f"{given:g} s", "0.001 s divided by a whole number", step_to)
     return LONGEST / round(parts) if stride else given
 
 

@@ -136,7 +136,7 @@ def _with_margin(robot: Robot, margin: float) -> Robot:
     if (low >= high).any():
         i = int(np.argmax(low >= high))
         most = f"< {0.5 * (robot.tension_max[i] - robot.tension_min[i]):g} N, half the range of cable {i}"
-        raise InvalidValueError("margin", f"{margin:g} N", most, "Give a smaller one.")
+        raise InvalidValueError("margin", f"{margin:g} N", most, "Give a smaller margin.")
     return robot.replace(tension_min=low, tension_max=high)
 
 

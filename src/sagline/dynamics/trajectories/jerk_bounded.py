@@ -1,4 +1,4 @@
-"""Time-optimal motion along a curve with bounded jerk, by linear programs in the jerk over normalized time."""
+"""Time-optimal motion along a curve with bounded jerk, computed by linear programs."""
 
 from __future__ import annotations
 

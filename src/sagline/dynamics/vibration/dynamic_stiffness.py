@@ -113,7 +113,7 @@ def check_solved(state: Equilibrium) -> None:
     """Reject a state without lengths."""
     if np.isnan(state.unstrained_length).any():
         raise InvalidValueError(
-            "state", "one without lengths", "a state that was solved", "See the status of the plan."
+            "state", "a state without lengths", "a state that was solved", "See the status of the plan."
         )
 
 

@@ -127,7 +127,7 @@ def frequency_map(
     instance(robot, Robot, "robot")
     poses = pose_of(poses, "poses")
     if not poses.shape:
-        raise InvalidValueError("poses", "a single pose", "a batch of them", "For one pose use vibration.")
+        raise InvalidValueError("poses", "a single pose", "a batch of poses", "For a single pose, use vibration.")
     limit = number(up_to, "up_to", "Hz", above=0.0)
     known = optional(damping, Damping, "damping") or Damping()
     report = callback(progress, "progress")

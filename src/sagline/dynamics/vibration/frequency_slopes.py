@@ -36,7 +36,7 @@ class FrequencySlopes(Result):
 
     Equal frequencies have no separate derivatives, because they split when a parameter changes. Their rows contain the
     derivatives for an increasing parameter, in ascending order. For a decreasing parameter the values have the opposite
-    sign. The mean of equal frequencies has the mean of the values as its derivative.
+    sign. The mean of these values is the derivative of the mean of the equal frequencies.
 
     Attributes:
         state: The state.
@@ -85,8 +85,8 @@ def frequency_slopes(state: Equilibrium | HasState, together: float = 1e-6) -> F
         FrequencySlopes; NaN where a frequency is NaN.
 
     Raises:
-        InvalidValueError: If the state has another type, is a batch, or has shallow cables, pulleys, dead lengths or no
-            lengths; if the vibration was not solved.
+        InvalidValueError: If the state has another type, is a batch, has no lengths, or has shallow cables, pulleys or
+            dead lengths; if the vibration was not solved.
 
     Examples:
         The cable whose axial stiffness has the largest effect on the first massless frequency, and the effect of the
@@ -118,7 +118,7 @@ def frequency_slopes(state: Equilibrium | HasState, together: float = 1e-6) -> F
 
 def _with_cable_mass(vibration: Vibration, together: float) -> FrequencySlopes:
     if vibration.status is not VibrationStatus.SOLVED:
-        told = f"one whose status is {vibration.status.name}"
+        told = f"a vibration with the status {vibration.status.name}"
         raise InvalidValueError("state", told, "a vibration that was solved", "Use its state for massless frequencies.")
     rest = _rest(vibration.state)
     cables, groups = string_data(rest), list(_groups(vibration.frequency, together))
@@ -129,7 +129,7 @@ def _with_cable_mass(vibration: Vibration, together: float) -> FrequencySlopes:
 def _rest(state: Equilibrium) -> StateSlopes:
     check_model(single_state(state))
     if state.contact is not None:
-        value, allowed = "one with pulleys or dead length", "cables from frame anchors"
+        value, allowed = "a robot with pulleys or dead length", "cables from frame anchors"
         raise InvalidValueError("state", value, allowed, "Use the robot without winches: robot.replace(winches=None).")
     check_solved(state)
     return state_slopes(state)

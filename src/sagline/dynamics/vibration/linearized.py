@@ -132,7 +132,7 @@ def _check(state: Equilibrium, damping: Damping, inputs: Inputs) -> None:
     single_state(state)
     if damping.air_damping:
         value = f"{damping.air_damping:g} N s/m^2"
-        raise InvalidValueError("air_damping", value, "0 for massless cables", "Use vibration, or omit it.")
+        raise InvalidValueError("air_damping", value, "0 for massless cables", "Use vibration, or omit air_damping.")
     if not damping.loss_time:
         return
     item, value = "loss_time", f"{damping.loss_time:g} s"
@@ -209,7 +209,7 @@ def _solved_slopes(state: Equilibrium) -> CableSlopes:
     if np.isfinite(slopes.matrix).all():
         return slopes
     step = "See the status of the plan. Straight cables have no stiffness; use another model."
-    raise InvalidValueError("state", "one without lengths or stiffness", "a state that was solved", step)
+    raise InvalidValueError("state", "a state without lengths or stiffness", "a state that was solved", step)
 
 
 def _stretch_loss(state: Equilibrium, slopes: CableSlopes, loss_time: float) -> tuple[Array, Array, Array, Array]:
@@ -224,7 +224,7 @@ def _stretch_loss(state: Equilibrium, slopes: CableSlopes, loss_time: float) -> 
     per_speed = (follows @ slopes.by_length[..., None])[..., 0]  # cable that is paid out has no strain
     if not np.isfinite(per_motion).all():
         step = "Use modal_damping, or tighten the cable."
-        raise InvalidValueError("state", "one with a folded cable", "cables that stretch, for loss_time", step)
+        raise InvalidValueError("state", "a state with a folded cable", "cables that stretch, for loss_time", step)
     forces = np.swapaxes(per_motion @ motions_of_ends(slopes.levers), -1, -2)
     by_motion = np.stack([on_platform(forces[:, k], slopes.levers).sum(axis=-1) for k in range(6)], axis=-1)
     at_frame = frame_end_forces(state)

@@ -91,7 +91,7 @@ def _in_world(own: Complex, axes: Array) -> Complex:
 
 
 def _driven_stiffness(motions: PlaneModes, square: Complex, loss: complex) -> Complex:
-    """Part of the fixed-end modes in the platform-end stiffness, for equal or no damping, (t, F, d, d)."""
+    """Contribution of the fixed-end modes to the platform-end stiffness, with equal or no damping, (t, F, d, d)."""
     with np.errstate(all="ignore"):
         shares = square[..., None] ** 2 / (loss * motions.square[:, None] - square[..., None])
     return np.asarray(-np.einsum("tka,tfk,tkb->tfab", motions.drive, shares, motions.drive, optimize=True))
@@ -100,7 +100,7 @@ def _driven_stiffness(motions: PlaneModes, square: Complex, loss: complex) -> Co
 def _driven_stiffness_with_loss(
     motions: PlaneModes, square: Complex, loss: complex, lost: Array, scaled: Complex
 ) -> tuple[Complex, Complex]:
-    """Part of the fixed-end modes in the platform-end stiffness, with stretch loss; lost: (t, d + k, d + k)."""
+    """Contribution of the fixed-end modes to the platform-end stiffness, with stretch loss; lost (t, d + k, d + k)."""
     d, factor = motions.drive.shape[2], scaled[None, :, None, None]
     by_end = -square[..., None, None] * motions.drive[:, None] + factor * lost[:, None, d:, :d]
     alone = loss * motions.square[:, None] - square[..., None]

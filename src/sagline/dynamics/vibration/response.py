@@ -94,7 +94,7 @@ def frequency_response(state: Equilibrium, frequency: ArrayLike, damping: Dampin
     check_model(single_state(state))
     given = checked(frequency, "frequency", "Hz", low=0.0)
     if given.ndim != 1 or not given.size:
-        raise InvalidValueError("frequency", f"of shape {given.shape}", "a list of frequencies", "Give one or more.")
+        raise InvalidValueError("frequency", f"of shape {given.shape}", "a list of frequencies", "Give at least one.")
     check_memory(f"{given.size:,} frequencies", _BYTES * given.size, "Split them into parts.")
     known = optional(damping, Damping, "damping") or Damping()
     model = vibration_model(state)
@@ -102,7 +102,7 @@ def frequency_response(state: Equilibrium, frequency: ArrayLike, damping: Dampin
     check_mode_count(modes_below(model, 0, max(float(given.max()), LOWEST)), float(given.max()), "frequency")
     if massless_modes(model, 0)[1].shape[1]:
         step = "Simulate it; vibration() names the unstable directions."
-        raise InvalidValueError("state", "an unstable equilibrium", "a stable one, which has a response", step)
+        raise InvalidValueError("state", "an unstable equilibrium", "a stable equilibrium, which has a response", step)
     slopes = cable_slopes(state)
     receptance = Receptance(model, slopes.matrix, slopes.blocks, known)
     compliance, still = receptance.by_modes(given, receptance.fixed_end_modes(float(given.max())))

@@ -67,7 +67,7 @@ def _most_excited(state: Equilibrium, frequency: Array, shape: Array, path: Path
         raise InvalidValueError(item, value, "a motion, and modes that it can excite", "Use another path or state.")
     if np.isnan(frequency).any():
         step = "Use a stable state: this platform falls."
-        raise InvalidValueError("modes", "of an unstable state", "of a stable one", step)
+        raise InvalidValueError("modes", "of an unstable state", "of a stable state", step)
     frequency, shape = frequency[known], shape[:, known]
     excited = np.max([excitation(state.one_robot, segment, frequency, shape) for segment in segments], axis=0)
     order = np.argsort(-excited, kind="stable")[:2]
