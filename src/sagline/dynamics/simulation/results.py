@@ -198,8 +198,7 @@ class Simulation(Result, Saved, Tabular):
 
     Attributes:
         robot: The robot.
-        time: Times of the samples [s], increasing, shape (N,). A fixed number of steps is between two samples; the last
-            sample is at the end.
+        time: Times of the samples [s], increasing, shape (N,): at constant intervals, and at the end.
         pose: Poses of the platform, a batch of N.
         twist: Velocity of the platform's origin and angular velocity, world axes [m/s, rad/s], shape (N, 6).
         tensions: Tensions at the frame ends [N], shape (N, m).

@@ -80,8 +80,7 @@ def fastest(
         margin: Distance from both limits [N], >= 0.
         jerk: Largest jerk of the platform's origin [m/s^3], > 0; None for no bound.
         angular_jerk: Largest second derivative of the angular velocity [rad/s^3], > 0; None for no bound.
-        progress: Function that is called after each segment with the number of finished segments and their total
-            number.
+        progress: Function that is called after each segment with two numbers: finished segments, all segments.
 
     Returns:
         Path at the sample rate of the given path. Its jerk is None without a jerk bound.

@@ -93,8 +93,7 @@ class CableComponents(NamedTuple):
             amplitudes: Amplitudes of the components, shape (T, K).
 
         Returns:
-            For each of the two: the modes, the displacements of the platform ends along their directions, (t, d, K),
-            and the amplitudes, (t, k, K).
+            For both: modes; displacements of platform ends along their directions, (t, d, K); amplitudes, (t, k, K).
         """
         own, inside = self.mesh.axes @ ends[self.mesh.taut], self.plane.square.size
         swing = amplitudes[:inside].reshape(*self.plane.square.shape, ends.shape[2])

@@ -101,8 +101,7 @@ def frequency_map(
         up_to: Upper limit of the mode frequencies [Hz], > 0; by default 20 Hz.
         tension: Tension distribution method, as in `inverse`.
         damping: Energy losses, which limit the largest receptance; by default a modal damping of 1 %. None: no losses.
-        progress: Function that is called after every few poses with the number of finished poses and their total
-            number.
+        progress: Function that is called after every few poses with two numbers: finished poses, all poses.
 
     Returns:
         FrequencyMap.
