@@ -104,7 +104,7 @@ const cable = (() => {
     ].join("");
   }
 
-  /** Rows of the table: quantity, factor and digits of its unit, and those of the difference. */
+  /** Rows of the table: quantity, factor and digits; then unit, factor and digits of the difference. */
   const ROWS = [
     ["length", 1, 4, "mm", 1e3, 1], ["sag", 1e3, 1, "mm", 1e3, 1], ["vertical", 1, 2, "N", 1, 2],
     ["frameEnd", 1, 2, "N", 1, 2], ["platformEnd", 1, 2, "N", 1, 2],
@@ -112,9 +112,9 @@ const cable = (() => {
 
   function sentence(found, closed) {
     const more = 1e3 * (closed.length - found.length);
-    const apart = Math.abs(more) < 0.05 ? "equal to 0.1 mm" : `${written(Math.abs(more), 1)} mm ${more > 0 ? "longer" : "shorter"}`;
-    const outside = closed.valid ? "" : " It is outside its range: the lowest point of the cable is inside the span.";
-    return `Exact length ${written(found.length, 3)} m, sag ${written(1e3 * found.sag)} mm; the article’s cable is ${apart}.${outside}`;
+    const apart = Math.abs(more) < 0.05 ? "the same within 0.1 mm" : `${written(Math.abs(more), 1)} mm ${more > 0 ? "longer" : "shorter"}`;
+    const outside = closed.valid ? "" : " The article’s model is not valid here: the lowest point of the cable is between its ends.";
+    return `Exact length ${written(found.length, 3)} m, sag ${written(1e3 * found.sag)} mm; the article’s length is ${apart}.${outside}`;
   }
 
   function begin(page) {
