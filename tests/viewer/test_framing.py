@@ -1,6 +1,7 @@
 """Where the camera stands."""
 
 import time
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -10,10 +11,12 @@ import pytest
 import sagline as sl
 from sagline.viewer import shapes
 from sagline.viewer.camera import BORDER, FIELD, Framing, fitted
+from sagline.viewer.page import Page
 from sagline.viewer.server import start_server, stop_server
 from tests.tiers import extended, wide
 from tests.viewer.client import Client, await_that
-from tests.viewer.shown import put
+from tests.viewer.shown import ROBOT, Shown, put, shown
+from tests.viewer.test_push_show import POSE, look
 
 
 def seen(points: np.ndarray, camera: np.ndarray, target: np.ndarray, aspect: float, field: float) -> np.ndarray:
@@ -117,3 +120,21 @@ def test_a_camera_that_is_just_being_put_somewhere_has_not_been_moved_by_hand() 
             assert asked.result() is None
     finally:
         stop_server(server)
+
+
+@pytest.fixture
+def page() -> Iterator[Shown]:
+    yield from shown(lambda server: Page(server, (), ROBOT, pose=POSE))
+
+
+def test_a_camera_follows_a_jump_of_the_platform_out_of_the_picture_but_no_drag(page: Shown) -> None:
+    with Client(page.url) as client:
+        camera = look(client, page)
+        for x, expected in ((1.0, 0.5), (9.0, 8.5), (0.5, 0.0)):  # near, out of sight, and back
+            page.viewer.later(lambda x=x: page.viewer.go(sl.Pose([x, 0.5, 1.5], np.eye(3))))  # type: ignore[misc]
+            await_that(lambda x=x: page.position[0] == x)  # type: ignore[misc]
+            assert camera.position[0] == expected
+        assert np.array(camera.position) - camera.look_at == pytest.approx([0.0, -10.0, 0.0])
+        client.drag([9.0, 0.5, 1.5])
+        await_that(lambda: page.position[0] == 9.0)
+        assert camera.position[0] == 0.0

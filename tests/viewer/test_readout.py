@@ -8,6 +8,7 @@ import pytest
 
 import sagline as sl
 from sagline.viewer import readout
+from sagline.viewer.missing import missing_of
 from sagline.viewer.page import home_pose
 from sagline.viewer.robot_scene import ACTUAL, INFEASIBLE, PLATFORM, REST, WANTED
 from sagline.viewer.snapshot import Settings, snapshot_at
@@ -94,8 +95,16 @@ def test_no_number_has_a_false_sign_or_runs_out_of_its_column() -> None:
         assert "e+" not in shown
 
 
-def test_infeasible_pose_shows_dashes_and_the_reason() -> None:
+def test_infeasible_pose_shows_a_compromise_or_dashes_and_the_reason() -> None:
     snapshot = snapshot_at(ROBOT, sl.Pose([7.2, 3.0, 1.5], np.eye(3)), Settings(mass=50.0), None)
+    missing = missing_of(snapshot)
+    assert missing is not None
+    html = readout.numbers_html(snapshot, SCALE, None, missing.state)
+    told = np.array([[float(cell) for cell in row[1:]] for row in cells(html)])
+    assert told[:, 0] == pytest.approx(missing.state.chord_tension, abs=0.0501)
+    assert np.all(told[:, 0] >= ROBOT.tension_min - 0.1)  # the limits hold, and the missing force is not balanced
+    assert told[[each.cable for each in missing.limits], 4] == pytest.approx(0.0, abs=0.1)
+    assert "compromise" in html
     assert all(cell == "–" for row in cells(readout.numbers_html(snapshot, SCALE, None)) for cell in row[1:])
     assert "Not feasible" in readout.verdict(snapshot)
     assert snapshot.reason in readout.verdict(snapshot)

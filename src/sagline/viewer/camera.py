@@ -42,6 +42,11 @@ class Camera(NamedTuple):
         across, down = self.reach * (2.0 * np.asarray(at) - 1.0)
         return np.asarray(self.axes @ np.array([across, down, 1.0]))
 
+    def sees(self, point: Array) -> bool:
+        """True if a point (3,) is in the picture."""
+        place, depth = self.project(point)
+        return bool(depth > 0.0 and np.all((place >= 0.0) & (place <= self.pixels)))
+
     def project(self, points: Array) -> tuple[Array, Array]:
         """Picture positions of points (..., 3) [px], shape (..., 2), and depths [m], negative behind the camera."""
         across, down, deep = np.moveaxis((points - self.place) @ self.axes, -1, 0)
@@ -172,6 +177,13 @@ class Framing:
             known = self._server.get_clients().get(client)
         if known is not None:
             self._follow(known.camera)
+
+    def pan(self, before: Array, after: Array) -> None:
+        """Move the cameras that see a point (3,), but not its position after a jump, by the same displacement."""
+        for client, known in self._server.get_clients().items():
+            camera = Camera.of(known.camera)
+            if camera is not None and camera.sees(before) and not camera.sees(after):
+                self.look(client, np.concatenate((camera.place, known.camera.look_at)) + np.tile(after - before, 2))
 
     def moved(self, client: int) -> Array | None:
         """Position and target of the camera of a client [m], shape (6,), if the user has moved it, else None."""

@@ -13,6 +13,7 @@ from typing import Final, TypeVar
 from sagline.core.arrays import Array
 from sagline.core.errors import SaglineError
 from sagline.robot.equilibrium import Equilibrium
+from sagline.viewer.missing import MissingWrench
 from sagline.viewer.player import Configuration, Played
 from sagline.viewer.snapshot import Settings, Snapshot
 from sagline.viewer.tension_scale import TensionScale
@@ -28,6 +29,7 @@ class View:
     ghost: bool  # True if straight cables are drawn beside the sagging ones
     wrench: Array | None = None  # external wrench on the platform while it is dragged, shape (6,)
     played: Played | None = None  # played motion (run, simulation or log) if it is shown; None for a pose of the user
+    missing: MissingWrench | None = None  # missing wrench of an infeasible pose, if one was found
     playing: bool = False  # True if the clock runs
 
     @property

@@ -25,6 +25,7 @@ from sagline.statics.stiffness import modes
 from sagline.viewer import readout, shapes
 from sagline.viewer.camera import Framing
 from sagline.viewer.feature import Feature, View
+from sagline.viewer.missing import missing_of
 from sagline.viewer.panel import ControlPanel
 from sagline.viewer.player import Beside, Configuration, InMotion, Played, Player
 from sagline.viewer.robot_scene import APART, TRACE_POINTS, RobotScene
@@ -184,8 +185,9 @@ class Page:
         return next(each for each in self.features if isinstance(each, kind))
 
     def go(self, pose: Pose) -> None:
-        """Move the platform to a pose."""
+        """Move the platform to a pose; a camera follows that would lose it."""
         self.player.leave()
+        self.framing.pan(np.asarray(self.scene.gizmo.position), pose.position)
         self.scene.place(pose)
         self.refresh()
 
@@ -255,7 +257,8 @@ class Page:
         played = player.played if player.following else None
         self.panel.show_what_if("" if played is None else played.unchanged)
         playing, scale = player.clock.playing, self.panel.color_scale(snapshot.tension)
-        self._show(View(snapshot, settings, scale, self.panel.ghost, self.wrench, played, playing=playing))
+        missing = None if isinstance(snapshot, InMotion) or snapshot.feasible else missing_of(snapshot)
+        self._show(View(snapshot, settings, scale, self.panel.ghost, self.wrench, played, missing, playing=playing))
 
     def _from_gizmo(self, settings: Settings) -> Snapshot:
         if self._changed is None or self._changed[0] != settings.changes:
@@ -278,7 +281,7 @@ class Page:
             if played is not None and traced != self._traced:
                 self._traced = traced
                 self.scene.show_traces(*played.traces(TRACE_POINTS, settings.error_scale))
-        self.panel.read_out(*_readings(snapshot, view.scale))
+        self.panel.read_out(*_readings(view))
         self.panel.show_sag(_largest_sag(snapshot), APART * self.size)
         for feature in self.features:
             key = feature.depends(view)
@@ -289,12 +292,14 @@ class Page:
         self.updates += 1
 
 
-def _readings(snapshot: Configuration, scale: TensionScale) -> tuple[str, str]:
+def _readings(view: View) -> tuple[str, str]:
     """Verdict and numbers."""
+    snapshot, scale = view.snapshot, view.scale
     if isinstance(snapshot, InMotion):
         return snapshot.verdict, snapshot.numbers(scale)
     frequencies = modes(snapshot.plan.state).frequency if snapshot.plan is not None and snapshot.feasible else None
-    return readout.verdict(snapshot), readout.numbers_html(snapshot, scale, frequencies)
+    compromise = None if view.missing is None else view.missing.state
+    return readout.verdict(snapshot), readout.numbers_html(snapshot, scale, frequencies, compromise)
 
 
 def _largest_sag(snapshot: Configuration) -> float:

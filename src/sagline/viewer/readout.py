@@ -14,15 +14,19 @@ from sagline.core.numbers import n
 from sagline.dynamics.vibration.mode_list import MASSLESS
 from sagline.kinematics.status import PoseStatus
 from sagline.robot.batch import pulleys_of
+from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.tension.margin import capacity_margin
+from sagline.tension.margin import cable_margins, capacity_margin
 from sagline.viewer.server import chosen_by
 from sagline.viewer.shapes import dead_runs
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.tension_scale import Color, Colors, ForceUnit, TensionScale, force_unit, number_text
 
 EXACT: Final = 1e-9  # [m], smaller distances count as zero
+COMPROMISE: Final = (
+    '<div class="bad"><b>Closest compromise</b>: tensions within the limits; the missing force is unbalanced</div>'
+)
 _ALONE = 1e-9  # smaller distances from a limit, relative to the robot's highest tension, count as at the limit
 
 
@@ -57,11 +61,18 @@ def refused(message: str) -> str:
     return verdict_box("bad", "Not possible", escape(message))
 
 
-def numbers_html(snapshot: Snapshot, scale: TensionScale, frequencies: Array | None) -> str:
-    """The pose, the numbers of every cable, and the platform's natural frequencies."""
+def numbers_html(
+    snapshot: Snapshot, scale: TensionScale, frequencies: Array | None, compromise: Equilibrium | None = None
+) -> str:
+    """The pose, the numbers of every cable, and the platform's natural frequencies.
+
+    At an infeasible pose, `compromise` contains the tensions within the limits that are nearest to force balance.
+    """
+    state = compromise if compromise is not None else None if snapshot.plan is None else snapshot.plan.state
     parts = (
         pose_line(snapshot.pose),
-        _cable_numbers(snapshot, scale),
+        COMPROMISE if compromise is not None else "",
+        _cable_numbers(snapshot.robot, state, scale),
         _listed(frequencies),
         _material_line(snapshot),
         _pulley_line(snapshot.robot),
@@ -194,28 +205,34 @@ def pose_line(pose: Pose) -> str:
     return f"<b>Position</b> {position} m<br><b>α, β, γ</b> {turned}"
 
 
-def _cable_numbers(snapshot: Snapshot, scale: TensionScale) -> str:
-    unit, wrap, plan = force_unit(snapshot.robot), _wrap_column(snapshot), snapshot.plan
-    cables = None if plan is None else plan.state.cables
-    unknown = np.full(snapshot.robot.cable_count, np.nan)
+def _cable_numbers(robot: Robot, state: Equilibrium | None, scale: TensionScale) -> str:
+    unit, unknown = force_unit(robot), np.full(robot.cable_count, np.nan)
+    tension, winch, length, sag, margin = (
+        (unknown,) * 5
+        if state is None
+        else (
+            state.chord_tension, state.cables.frame_end_tension, state.unstrained_length, 1e3 * state.cables.sag,
+            cable_margins(state),
+        )
+    )  # fmt: skip
     columns = {
-        f"tension<br>[{unit.name}]": (snapshot.tension / unit.newtons, unit.form),
-        f"winch<br>[{unit.name}]": (unknown if cables is None else cables.frame_end_tension / unit.newtons, unit.form),
-        "length<br>[m]": (unknown if plan is None else plan.unstrained_length, ".4f"),
-        "sag<br>[mm]": (unknown if cables is None else 1e3 * cables.sag, ".1f"),
-        f"to limit<br>[{unit.name}]": (snapshot.margin / unit.newtons, unit.form),
-        **wrap,
+        f"tension<br>[{unit.name}]": (tension / unit.newtons, unit.form),
+        f"winch<br>[{unit.name}]": (winch / unit.newtons, unit.form),
+        "length<br>[m]": (length, ".4f"),
+        "sag<br>[mm]": (sag, ".1f"),
+        f"to limit<br>[{unit.name}]": (margin / unit.newtons, unit.form),
+        **_wrap_column(robot, state),
     }
     texts = [[number_text(value, form) for value in values] for values, form in columns.values()]
-    return cable_table_html(("cable", *columns), texts, scale.colors(snapshot.tension))
+    return cable_table_html(("cable", *columns), texts, scale.colors(tension))
 
 
-def _wrap_column(snapshot: Snapshot) -> dict[str, tuple[Array, str]]:
+def _wrap_column(robot: Robot, state: Equilibrium | None) -> dict[str, tuple[Array, str]]:
     """Wrap angles [degree] and their format, for a robot with pulleys."""
-    radius = pulleys_of(snapshot.robot).radius
+    radius = pulleys_of(robot).radius
     if not radius.any():
         return {}
-    contact = None if snapshot.plan is None else snapshot.plan.state.contact
+    contact = None if state is None else state.contact
     angle = np.full(radius.shape, np.nan) if contact is None else np.degrees(contact.wrap_angle)
     return {"wrap<br>[°]": (np.where(radius > 0.0, angle, np.nan), ".1f")}
 

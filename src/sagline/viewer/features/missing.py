@@ -16,7 +16,7 @@ from sagline.tension.singular import unresisted_motion
 from sagline.viewer import shapes
 from sagline.viewer.feature import BackgroundTask, Feature, View
 from sagline.viewer.features.tensions import SHARING
-from sagline.viewer.missing import MissingWrench, NearestFeasible, missing_of, nearest_feasible
+from sagline.viewer.missing import MissingWrench, NearestFeasible, nearest_feasible
 from sagline.viewer.page import Page
 from sagline.viewer.readout import definitions, html_block
 from sagline.viewer.robot_scene import INFEASIBLE, Nodes
@@ -118,7 +118,6 @@ class MissingFeature(Feature):
         self._page, self._panel, self._nodes = page, page.panel, Nodes(page.server.scene)
         self._body = shapes.platform_solid(page.robot)
         self._task = BackgroundTask(page.later)
-        self.missing: MissingWrench | None = None  # missing wrench at the shown pose
         self._key: Key = ()  # key of the shown pose; () while it is feasible
         self._found: tuple[Key, NearestFeasible | None] = ((), None)
         self._shown: tuple[Snapshot, View] | None = None
@@ -133,13 +132,11 @@ class MissingFeature(Feature):
         """Explain an infeasible pose; remove the explanation at a feasible pose."""
         snapshot = view.snapshot
         if not isinstance(snapshot, Snapshot) or snapshot.feasible:
-            self.missing = None
             if self._key:
                 self._clear()
             return
-        self.missing = missing_of(snapshot)
-        self._draw_force(snapshot, self.missing)
-        self._draw_limits(snapshot, self.missing)
+        self._draw_force(snapshot, view.missing)
+        self._draw_limits(snapshot, view.missing)
         model, wrench = _load(snapshot, view)
         load = b"" if wrench is None else wrench.tobytes()
         pose = snapshot.pose
@@ -169,9 +166,9 @@ class MissingFeature(Feature):
     def _explain(self) -> None:
         """Write the explanation, and draw the nearest feasible pose (the previous one until it is computed)."""
         assert self._shown is not None
-        snapshot, nearest = self._shown[0], self._found[1] if self._found[0] else None
+        (snapshot, view), nearest = self._shown, self._found[1] if self._found[0] else None
         searching = self._found[0] != self._key
-        self._panel.explain(explanation(snapshot, self.missing, nearest, searching=searching))
+        self._panel.explain(explanation(snapshot, view.missing, nearest, searching=searching))
         nodes = self._nodes
         if nearest is None:
             nodes.hide("/nearest", "/nearest_way")

@@ -11,7 +11,6 @@ from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.robot.equilibrium import Equilibrium
 from sagline.viewer.feature import Feature, View
-from sagline.viewer.features.missing import MissingFeature
 from sagline.viewer.page import Page
 from sagline.viewer.readout import css_color, html_block, sentence, swatch
 from sagline.viewer.robot_scene import Nodes
@@ -249,7 +248,7 @@ class ProofFeature(Feature):
             return None, None
         if snapshot.plan is not None and snapshot.feasible:
             return snapshot.plan.state, None
-        missing = self._page.feature(MissingFeature).missing
+        missing = view.missing
         return (None, None) if missing is None else (missing.state, missing.wrench)
 
     def _draw(self, state: Equilibrium | None, missing: Array | None) -> None:
