@@ -54,6 +54,8 @@ class ControlPanel:
             self._numbers = self._gui.add_html("")
             with self._gui.add_folder("Feasible tensions"):
                 self._polygon = self._gui.add_html("")
+        with readings.add_tab("Control"):  # for small screens; see browser/control.js
+            self._gui.add_html(readout.sentence("Pose, push, cut and all other controls are below."))
         readings.dock_right()
         readings.set_width(RIGHT_WIDTH)
         readings.expand()  # closed at first in the bottom sheet of a small screen

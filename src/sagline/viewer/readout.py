@@ -24,9 +24,7 @@ from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.tension_scale import Color, Colors, ForceUnit, TensionScale, force_unit, number_text
 
 EXACT: Final = 1e-9  # [m], smaller distances count as zero
-COMPROMISE: Final = (
-    '<div class="bad"><b>Closest compromise</b>: tensions within the limits; the missing force is unbalanced</div>'
-)
+COMPROMISE: Final = "<div><b>Closest compromise</b>: tensions within the limits; the missing force is unbalanced</div>"
 _ALONE = 1e-9  # smaller distances from a limit, relative to the robot's highest tension, count as at the limit
 
 

@@ -32,7 +32,7 @@ from sagline.viewer.access import CLIENTS, Access, bracketed
 STYLES: Final = ("page.css", "state.css", "keys.css", "balance.css", "film.css", "timeline.css")
 SCRIPTS: Final = (  # in the order of execution, before viser's client
     "theme.js", "channel.js", "choices.js", "dress.js", "dialog.js",
-    "pose.js", "factors.js", "copies.js", "link.js", "names.js", "said.js", "keys.js",
+    "pose.js", "factors.js", "control.js", "copies.js", "link.js", "names.js", "said.js", "keys.js",
     "dot.js", "hand.js",
     "strip.js", "pictures.js", "mp4.js", "recorder.js", "film.js",
     "timeline_plot.js", "timeline.js",

@@ -11,6 +11,7 @@ from sagline.viewer.features.cut import CutFeature
 from sagline.viewer.features.export import ExportFeature
 from sagline.viewer.features.history import HistoryFeature
 from sagline.viewer.features.keyboard import KeyboardFeature
+from sagline.viewer.features.labels import LabelsFeature
 from sagline.viewer.features.missing import MissingFeature
 from sagline.viewer.features.modes import ModesFeature
 from sagline.viewer.features.proof import ProofFeature
@@ -35,6 +36,7 @@ FEATURES: Final[tuple[Callable[[Page], Feature | None], ...]] = (
     TensionsFeature,
     MissingFeature,
     ProofFeature,
+    LabelsFeature,
     StateFeature,
     HistoryFeature,
 )

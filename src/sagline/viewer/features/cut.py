@@ -17,6 +17,7 @@ from sagline.robot.pose import Pose
 from sagline.viewer import shapes
 from sagline.viewer.camera import camera_of, nearest_line, screen_point
 from sagline.viewer.feature import BackgroundTask, Feature, View
+from sagline.viewer.features.state import FIRST
 from sagline.viewer.page import Page
 from sagline.viewer.playback import PlayedSimulation
 from sagline.viewer.player import PlayerState
@@ -89,7 +90,7 @@ class CutFeature(Feature):
         self._number = 0  # of the player, for the played cut
         self._before: tuple[Before, ...] = ()  # states of the page before each of the successive cuts
         gui = page.server.gui
-        with gui.add_folder("Cut a cable", expand_by_default=False):
+        with gui.add_folder("Cut a cable", expand_by_default=False, order=FIRST + 0.03):
             self._cable: Any = gui.add_dropdown("Cable to cut", tuple(map(str, range(page.robot.cable_count))))
             hint = "Cables with mass vibrate and take longer to compute."
             self._mass = gui.add_dropdown("Cables in motion", tuple(CABLE_MASS), hint=hint)

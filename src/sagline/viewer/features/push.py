@@ -16,6 +16,7 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.viewer import shapes
 from sagline.viewer.camera import Camera, camera_of, ray_distance, screen_point
 from sagline.viewer.feature import Feature, View
+from sagline.viewer.features.state import FIRST
 from sagline.viewer.page import Page
 from sagline.viewer.push import Push, PushResponse, Reserve, push_response, semi_axes
 from sagline.viewer.readout import definitions, refused, sentence, verdict_box
@@ -101,7 +102,7 @@ class PushFeature(Feature):
 
     def _build_folder(self, page: Page) -> None:
         gui, center = page.server.gui, page.robot.center_of_mass.tolist()
-        with gui.add_folder("Push", expand_by_default=False):
+        with gui.add_folder("Push", expand_by_default=False, order=FIRST + 0.02):
             self._text = gui.add_html(HELP)
             self._force: Any = gui.add_number(
                 f"Force [{self._unit.name}]", 0.0, min=0.0, step=0.1, hint="On the platform; 0 for none."
