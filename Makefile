@@ -91,10 +91,12 @@ soak: env ## the long tests that test-all leaves out, then all others in a rando
 c: env ## C99 of all kernels, as OUT/kernels.c
 	$(BIN)/python -m tools.translate $(OUT)/kernels.c
 
-docs: env ## the documentation site, into build/site; warnings are errors
+docs: env ## the documentation site, into build/site; warnings and dead links are errors
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
-	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
-	@echo "open build/site/index.html; its search needs a server: $(BIN)/python -m http.server -d build/site"
+	$(BIN)/python -m tools.pages
+	$(BIN)/zensical build --strict --clean
+	$(BIN)/python -m tools.pages.check build/site
+	@echo "open build/site/index.html"
 
 dist: env ## wheel and source distribution, into dist
 	$(BIN)/python -m hatchling build

@@ -1,5 +1,5 @@
 /* One cable, moved by sliders: docs/explore.md. Both cables are computed by the library's kernels, compiled to
-   WebAssembly; docs/hooks/explore.py describes their calls. All values are in SI units, except in the texts of the page. */
+   WebAssembly; tools/pages/explore.py describes their calls. All values are in SI units, except in the texts of the page. */
 "use strict";
 
 const cable = (() => {

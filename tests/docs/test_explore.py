@@ -1,12 +1,10 @@
 """docs/explore.md in headless Chromium: its script calculates what the library does, and people can use it."""
 
-import importlib.util
 import re
 import shutil
 from collections.abc import Iterator
 from itertools import product
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -16,6 +14,7 @@ from playwright.sync_api import Browser, Page
 import sagline as sl
 from tests.chromium import NEEDED, PATIENCE, launched
 from tests.tiers import extended
+from tools.pages import explore
 
 DOCS = Path(__file__).parents[2] / "docs"
 FLAGS = "--disable-gpu --disable-component-update"
@@ -33,28 +32,19 @@ pytestmark = [extended, NEEDED]
 
 
 @pytest.fixture(scope="module")
-def hook() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("explore", DOCS / "hooks" / "explore.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-@pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
     yield from launched(FLAGS)
 
 
 @pytest.fixture(scope="module")
-def site(hook: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The page without its theme."""
     folder = tmp_path_factory.mktemp("site")
-    for file in (DOCS / "explore.js", DOCS / "extra.css", hook.KERNELS):
+    for file in (DOCS / "explore.js", DOCS / "extra.css", explore.KERNELS):
         shutil.copy(file, folder)
     head = '<!doctype html><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
-    made = hook.on_page_markdown((DOCS / "explore.md").read_text(encoding="utf-8"))
+    made = explore.with_cable((DOCS / "explore.md").read_text(encoding="utf-8"))
+    assert f'data-span="{explore.SPAN:g}" data-gravity="{explore.GRAVITY:g}"' in made
     (folder / "explore.html").write_text(f'{head}<link rel="stylesheet" href="extra.css">{made}', encoding="utf-8")
     return folder / "explore.html"
 
@@ -78,23 +68,21 @@ def page(browser: Browser, site: Path) -> Iterator[Page]:
     ]
 
 
-def grid(hook: ModuleType) -> list[dict[str, float]]:
+def grid() -> list[dict[str, float]]:
     """Cables from end to end of every slider and beyond, level ones too."""
     rises, densities = (-5.0, -4.0, -0.1, 0.0, 3.0), (1e-4, 0.01, 0.067, 0.5)
     every = product(rises, densities, (5e3, 44e3, 5e6), (20.0, 100.0, 2000.0))
-    fixed = {"span": hook.SPAN, "gravity": hook.GRAVITY}
+    fixed = {"span": explore.SPAN, "gravity": explore.GRAVITY}
     return [fixed | dict(zip(("rise", "density", "stiffness", "tension"), one, strict=True)) for one in every]
 
 
 @pytest.mark.parametrize(("function", "model"), [("exact", sl.Catenary()), ("empirical", sl.Empirical())])
-def test_the_script_calculates_what_the_library_does(
-    page: Page, hook: ModuleType, function: str, model: sl.CableModel
-) -> None:
-    given = grid(hook)
+def test_the_script_calculates_what_the_library_does(page: Page, function: str, model: sl.CableModel) -> None:
+    given = grid()
     found: list[dict[str, Any]] = page.evaluate(ALL % function, given)
     column = {name: np.array([one[name] for one in given]) for name in given[0]}
     cable = sl.Cable(column["density"], column["stiffness"])
-    state = model.from_tension(cable, column["span"], column["rise"], column["tension"], hook.GRAVITY)
+    state = model.from_tension(cable, column["span"], column["rise"], column["tension"], explore.GRAVITY)
     for name, field in NAMES.items():
         scale = column["tension"] if name not in ("length", "sag") else column["span"]
         error = np.abs([one[name] for one in found] - getattr(state, field)) / scale
@@ -114,7 +102,7 @@ def told(slider: Any) -> float:
     return float(slider.get_attribute("aria-valuetext").split()[0].replace("−", "-"))
 
 
-def test_sliders_move_by_keyboard_and_every_number_follows(page: Page, hook: ModuleType) -> None:
+def test_sliders_move_by_keyboard_and_every_number_follows(page: Page) -> None:
     weight, stiffness = page.get_by_label("Weight"), page.get_by_label("Stiffness EA")
     tension, height = page.get_by_label("Tension along the chord"), page.get_by_label("Height of the platform end")
     assert [told(each) for each in (weight, stiffness, tension, height)] == [67.0, 44.0, 100.0, -4.0]
@@ -152,9 +140,9 @@ def test_the_pictures_follow(page: Page) -> None:
     assert [picture.inner_html() for picture in pictures.all()] == before
 
 
-def test_what_the_page_says_of_its_cables(page: Page, hook: ModuleType) -> None:
+def test_what_the_page_says_of_its_cables(page: Page) -> None:
     """Slack and heavy decimeters too short, out of range; taut half the weight's stretch too long; level always out."""
-    note = page.get_by_text(hook.NOTE)
+    note = page.get_by_text("Outside the article’s range")
     assert not note.is_visible()
     page.get_by_role("button", name="Heavy and slack").click()
     assert note.is_visible()
@@ -165,7 +153,7 @@ def test_what_the_page_says_of_its_cables(page: Page, hook: ModuleType) -> None:
     slider.focus()
     page.keyboard.press("End")
     # the force at the lower end is smaller by half the weight along the slope, and stretches it by so much less
-    chord, less = 160**0.5, 0.5 * 0.067 * hook.GRAVITY * 4.0 / 44e3
+    chord, less = 160**0.5, 0.5 * 0.067 * explore.GRAVITY * 4.0 / 44e3
     assert table(page)["length"][2] == f"+{1e3 * chord * less / (1.0 + told(slider) / 44e3) ** 2:.1f} mm"
     page.get_by_label("Height of the platform end").fill("0")
     assert note.is_visible()
@@ -180,14 +168,14 @@ def test_nothing_is_wider_than_the_screen(page: Page) -> None:
         assert page.evaluate(over) == []
 
 
-def test_without_javascript_there_is_a_picture_and_a_table(browser: Browser, site: Path, hook: ModuleType) -> None:
+def test_without_javascript_there_is_a_picture_and_a_table(browser: Browser, site: Path) -> None:
     context = browser.new_context(java_script_enabled=False)
     page = context.new_page()
     page.set_default_timeout(1e3 * PATIENCE)
     page.goto(site.as_uri())
     assert page.get_by_role("slider").count() == 0
     assert page.get_by_text("JavaScript").first.is_visible()
-    assert page.locator("[data-still]").locator("path").count() == 2 * len(hook.STANDING)
+    assert page.locator("[data-still]").locator("path").count() == 2 * len(explore.STANDING)
     state = sl.Catenary().from_tension(sl.Cable(0.067, 44e3), 12.0, -4.0, 30.0)
-    assert f"| 30 | {state.unstrained_length:.4f} |" in hook.standing()
+    assert f"| 30 | {state.unstrained_length:.4f} |" in explore.standing()
     context.close()

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from typing import Any, Final
+from typing import Final
 
 from sagline.control.faults import FAULT_TABLE
 from sagline.control.states import TABLE, State
@@ -31,9 +31,9 @@ COLUMN, LINE, WIDE, HIGH, EDGE = 190.0, 96.0, 124.0, 36.0, 24.0  # px
 IN_WORDS: Final = (State.STOPPING, State.EMERGENCY, State.OFF)  # targets of most states: without arrows
 
 
-def on_page_markdown(markdown: str, **_: Any) -> str:
-    """Replace the marked lines of a page by the tables."""
-    return MARK.sub(lambda found: MADE[found[1]](), markdown)
+def with_tables(page: str) -> str:
+    """A page with the tables in place of the marked lines."""
+    return MARK.sub(lambda found: MADE[found[1]](), page)
 
 
 def states() -> str:
