@@ -68,7 +68,9 @@ def measured(span: "float", *, rise: "float | None" = None) -> "Cable":  # type:
 
 
 def test_a_docstring_becomes_markdown() -> None:
-    text = documented(measured.__doc__, {"CableError": "core.md#e", "Cable": "cables.md#c"}, {"Returns": "Cable"})
+    text = documented(
+        measured.__doc__, {"CableError": "core.md#e", "Cable": "cables.md#c", "span": "plot.md#s"}, {"Returns": "Cable"}
+    )
     items = [line for line in text.splitlines() if line.startswith("- ")]
     assert items == [
         "- **`span`**: Distance [m].",

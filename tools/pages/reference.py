@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from enum import Enum
 from functools import cached_property
 from textwrap import dedent
-from types import ModuleType
+from types import MappingProxyType, ModuleType
 from typing import Any, Final
 
 import sagline as sl
@@ -117,7 +117,7 @@ def _page(group: ModuleType, values: dict[str, Any], links: dict[str, str]) -> s
             file = f"plot-{name}.svg"
             parts.append(f'```python\nsl.plot.save(sl.plot.{FIGURES[name]}, "{file}")\n```')
             parts.append(f"<!-- drawn above: {file} -->")
-    return "\n\n".join(parts) + "\n"
+    return "\n\n".join(filter(None, parts)) + "\n"
 
 
 def _entry(name: str, value: Any, links: dict[str, str]) -> Iterator[str]:
@@ -126,6 +126,8 @@ def _entry(name: str, value: Any, links: dict[str, str]) -> Iterator[str]:
     if not isinstance(value, type):
         yield from _callable(name, value, links)
         return
+    if bases := [_linked(base.__name__, links) for base in value.__bases__ if base.__name__ in links]:
+        yield f"Bases: {', '.join(bases)}"
     kinds = {key: kind for base in reversed(value.__mro__) for key, kind in inspect.get_annotations(base).items()}
     own = vars(value).get("__init__")
     if not issubclass(value, (Enum, Exception)):
@@ -164,7 +166,7 @@ def signature(name: str, value: Any, method: bool = False) -> str:
     return text if len(text) <= WIDE else f"{name}(\n    " + ",\n    ".join(rows) + f",\n){end}"
 
 
-def documented(text: str | None, links: dict[str, str], kinds: dict[str, Any] | None = None) -> str:
+def documented(text: str | None, links: dict[str, str], kinds: Mapping[str, Any] = MappingProxyType({})) -> str:
     """A docstring as Markdown; `kinds` are the annotations of its attributes, or that of `Returns`."""
 
     def section(found: re.Match[str]) -> str:
@@ -172,17 +174,18 @@ def documented(text: str | None, links: dict[str, str], kinds: dict[str, Any] | 
         if found[1] == "Examples":
             body = DOCTEST.sub(lambda each: f"```pycon\n{each[0].rstrip()}\n```\n", body)
         elif found[1] in ("Args", "Attributes", "Raises"):
-            body = ITEM.sub(lambda item: _item(item[1], item[2], links, (kinds or {}).get(item[1])), body)
-        elif found[1] == "Returns" and isinstance(kind := (kinds or {}).get("Returns"), str):
+            named = links if found[1] == "Raises" else {}
+            body = ITEM.sub(lambda item: _item(_linked(item[1], named), item[2], links, kinds.get(item[1])), body)
+        elif found[1] == "Returns" and isinstance(kind := kinds.get("Returns"), str):
             body = f"- {_linked(kind, links)}: {' '.join(body.split())}"
         return f"**{found[1].replace('Args', 'Parameters')}**\n\n{body.strip()}\n\n"
 
     return SECTION.sub(section, inspect.cleandoc(text or "") + "\n").strip()
 
 
-def _item(name: str, text: str, links: dict[str, str], kind: object) -> str:
+def _item(title: str, text: str, links: dict[str, str], kind: object) -> str:
     of_kind = f" ({_linked(kind, links)})" if isinstance(kind, str) else ""
-    return f"- **{_linked(name, links)}**{of_kind}: {' '.join(text.split())}\n"
+    return f"- **{title}**{of_kind}: {' '.join(text.split())}\n"
 
 
 def _linked(name: str, links: dict[str, str]) -> str:
