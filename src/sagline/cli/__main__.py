@@ -1,4 +1,4 @@
-"""Entry point of the shell and of `python -m sagline.cli`; it handles signals before any import."""
+"""Entry point of the command `sagline` and of `python -m sagline.cli`; signals are handled before other imports."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from sagline.cli.ending import SIGNALS, exit_code_of
 
 def app_entry() -> None:
     """Run the command and end the process."""
-    for descriptor in range(3):  # if a standard stream is closed, the next opened file would get its number
+    for descriptor in range(3):  # otherwise an opened file would get the descriptor of a closed standard stream
         try:
             os.fstat(descriptor)
         except OSError:
             os.open(os.devnull, os.O_RDONLY if descriptor == 1 else os.O_RDWR)
-            if descriptor == 1:  # it is read-only: every write raises an error, so that no output is lost silently
+            if descriptor == 1:  # a read-only replacement: writing raises an error, so no output is lost silently
                 sys.stdout = os.fdopen(1, "w", encoding="utf-8", closefd=False)
     debug = "--debug" in sys.argv
     code = exit_code_of(lambda: _command(debug), debug=debug, last=True)

@@ -1,4 +1,4 @@
-"""`sagline article`: the article's studies, figures and tables redone, as one page."""
+"""`sagline article`: a page that reproduces the article's studies, figures and tables."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ def article(
     folder: OutOption = Path("output"),
     as_json: JsonOption = False,
 ) -> None:
-    """Redo the article's figures, tables and errata, as one page with its statements and the computed values.
+    """Reproduce the article's figures, tables and errata, as one page that compares the article with computed values.
 
-    The page is DIR/article.html, which needs no other file; DIR/article.json has the numbers.
+    The page is DIR/article.html and needs no other file. The numbers are in DIR/article.json.
 
     For example:
 
@@ -35,8 +35,8 @@ def article(
     """
     from sagline.article.report import NAMES, write_article
 
-    Output(folder, "", NAMES)  # it refuses files that cannot be written
-    what = "repeating the studies of the article"
+    Output(folder, "", NAMES)  # `Outputs` raises an error if a file cannot be written
+    what = "reproducing the studies of the article"
     with working(what) as line:
 
         def progress(done: int, total: int, name: str) -> None:

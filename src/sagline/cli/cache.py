@@ -1,4 +1,4 @@
-"""`sagline cache`: the folder of kernels that numba has compiled."""
+"""`sagline cache`: the folder with the kernels that numba has compiled."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ def cache(
     clear: Annotated[bool, flag("Remove the files.", "--clear")] = False,
     as_json: JsonOption = False,
 ) -> int:
-    """Show and check the folder of kernels that numba has compiled, or clear it.
+    """Show and check the folder with the kernels that numba has compiled, or remove its files.
 
-    The folder is used if SAGLINE_BACKEND is numba, or the installation has no compiled library. A damaged file is
-    never run: the next run replaces it. Exit code 1 if there are damaged files.
+    The folder is used if SAGLINE_BACKEND is numba, or if the installation has no compiled library. Damaged files are
+    never used, and the next run replaces them. Exit code 1 if there are damaged files.
 
     For example:
 
@@ -40,7 +40,7 @@ def cache(
         found = {"backend": backend(), "folder": folder, "files": len(files), "bytes": sum(sizes)}
         show_json({**found, "damaged": damaged, "writable": _is_writable(folder), "cleared": clear})
     else:
-        access = "" if _is_writable(folder) else ", which cannot be written: each run compiles its kernels"
+        access = "" if _is_writable(folder) else ", which cannot be written, so each run compiles its kernels"
         show_text(f"Back end of the kernels: {backend()}", whole=True)
         show_text(f"Folder: {folder}{access}", whole=True)
         show_text(f"{counted(len(files), 'file')}, {n(sum(sizes) / 1e6, '.3g', 'MB')}{', removed' * clear}")
@@ -50,7 +50,7 @@ def cache(
 
 
 def _is_whole(file: Path) -> bool:
-    """True if the content of a file has its digest; False too for unfinished files of killed processes."""
+    """True if a file's content agrees with its digest; False for damaged and for unfinished files."""
     from sagline.kernels.sources import SUFFIX, is_whole
 
     try:
@@ -60,13 +60,13 @@ def _is_whole(file: Path) -> bool:
 
 
 def _is_writable(folder: Path) -> bool:
-    """True if files can be written to a folder, or the folder can be made."""
+    """True if files can be written to a folder, or if the folder can be created."""
     nearest = next(place for place in (folder, *folder.parents) if place.exists())
     return nearest.is_dir() and os.access(nearest, os.W_OK | os.X_OK)
 
 
 def _remove(files: list[Path]) -> None:
-    """Remove files, and their folders if nothing else is in them."""
+    """Remove files, and the folders that are empty afterwards."""
     for file in files:
         try:
             file.unlink(missing_ok=True)
@@ -75,5 +75,5 @@ def _remove(files: list[Path]) -> None:
                 file, f"cannot be removed ({error.strerror})", "Check the permissions of its folder."
             ) from None
     for folder in {file.parent for file in files}:
-        with suppress(OSError):  # another process has written a file
+        with suppress(OSError):  # another process has written a file into the folder
             folder.rmdir()

@@ -1,4 +1,4 @@
-"""`sagline calibrate`: parameters of a robot from its log, or the poses to measure at."""
+"""`sagline calibrate`: the parameters of a robot from its log, or a plan of the poses to measure."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ FIGURES: Final = (".png", ".svg", ".pdf")
 
 
 class _Request(NamedTuple):
-    """Options for the fit and for the choice of poses; the deviations are those of sensors given by options."""
+    """Options of the fit and of the choice of poses; `deviations`: standard deviations that options give, by sensor."""
 
     robot: str
     unknowns: tuple[str, ...] | None
@@ -74,7 +74,7 @@ def calibrate(
     log: Annotated[
         Path | None,
         argument(
-            "LOG", "CSV: one row per pose; count_0, ... or length_0, ..., load_cell_0, ..., and x, y, z if measured."
+            "LOG", "CSV file, one row per pose: count_0, ... or length_0, ...; load_cell_0, ...; x, y, z if measured."
         ),
         only_without("--plan"),
     ] = None,
@@ -95,13 +95,15 @@ def calibrate(
     tension_deviation: Annotated[float | None, _deviation_option("a load cell's reading, '5 N'", "N")] = None,
     position_deviation: Annotated[float | None, _deviation_option("a measured coordinate, '1 mm'", "m")] = None,
     rotation_deviation: Annotated[float | None, _deviation_option("a measured rotation, '1 mrad'", "rad")] = None,
-    folds: Annotated[int, option("NUMBER", "Folds of the cross-validation; 0 for none."), only_without("--plan")] = 5,
+    folds: Annotated[
+        int, option("NUMBER", "Groups of poses for the cross-validation; 0 for none."), only_without("--plan")
+    ] = 5,
     robust: Annotated[bool, flag("Give outliers less weight.", "--robust/--no-robust"), only_without("--plan")] = True,
     model: Annotated[ModelOption, only_without("--plan")] = ModelName.CATENARY,
     plot: Annotated[
         Path | None, option("FILE", "Figure of the fit: .png, .svg or .pdf."), only_without("--plan")
     ] = None,
-    plan: Annotated[int | None, option("NUMBER", "Choose this number of poses to measure, instead of a LOG.")] = None,
+    plan: Annotated[int | None, option("NUMBER", "Without LOG: choose this number of poses to measure.")] = None,
     seed: Annotated[SeedOption, only_with("--plan")] = 0,
     style: Annotated[FigureStyle, STYLE, only_with("--plot")] = FigureStyle.PLAIN,
     write_table: Annotated[TableOption, only_without("--plan")] = False,
@@ -109,11 +111,11 @@ def calibrate(
 ) -> int:
     """Estimate anchors, zeros and cables of a robot from its own readings.
 
-    LOG has the readings of encoders, load cells and, if there is one, a measuring system at some poses. The result is
-    the parameters with their standard errors, the unobserved combinations, and the outliers. --out can be repeated: the
-    calibrated robot, .yaml; the whole result, .nc; or a folder for both. --plan chooses poses and tensions before the
-    measurement and predicts the errors; then --out is their file, .yaml. Exit code 1 if the fit did not converge, or
-    contradicts the model or the deviations.
+    LOG has the readings of encoders and load cells at several poses, and optionally those of a measuring system. The
+    result has the parameters with standard errors, the combinations that no reading observes, and the outliers.
+    --out writes the calibrated robot (.yaml), the whole result (.nc), or both into a folder; it can be repeated.
+    --plan chooses poses and tensions before the measurement and predicts the standard errors; --out then writes the
+    poses (.yaml). Exit code 1 if the fit did not converge or contradicts the model or the deviations.
 
     For example:
 
@@ -140,7 +142,7 @@ def calibrate(
 
 
 def _files(robot: str, out: Iterable[Path], names: Iterable[str]) -> tuple[Path, ...]:
-    """The files of `--out`; a folder means files with these names in it, after the name of the robot."""
+    """The files of `--out`; in a folder, their names are the robot's name and these endings."""
     stem = file_stem(Path(robot).stem)
     folders = {place: [place / f"{stem}-{name}" for name in names] for place in out if not is_file(place)}
     return tuple(file for place in out for file in folders.get(place, [place]))
@@ -154,11 +156,13 @@ def _fit(request: _Request, log: Path | None, model: CableModel, folds: int, *, 
     from sagline.files.robot_file import load_robot
 
     if log is None:
-        step = "Give the readings, or choose poses with --plan 40."
+        step = "Give the file of the readings, or choose poses with --plan 40."
         raise InvalidValueError("LOG", "missing", "a CSV file, or --plan", step)
     if log.suffix.lower() in (*ROBOTS, WHOLE):
         raise FileError(
-            log, "is not a CSV file of readings", "Give the readings of encoders and load cells, winches.csv."
+            log,
+            "is not a CSV file of readings",
+            "Give the file of the readings of encoders and load cells, such as winches.csv.",
         )
     request.check_files((*ROBOTS, WHOLE, TABLE))
     robot, readings = load_robot(request.robot), _log(log, request.deviations)
@@ -205,7 +209,7 @@ def _plan_poses(request: _Request, count: int, seed: int, *, as_json: bool) -> i
 
 
 def _log(file: Path, deviations: dict[str, float]) -> WinchLog:
-    """The log; deviations on the command line replace those of its comments."""
+    """The log; deviations on the command line replace the deviations in the comments of the file."""
     from sagline.files.log_file import load_log, sensors_of_comments
     from sagline.files.reading import read_text
     from sagline.files.table import TABLE_LIMIT
@@ -217,7 +221,7 @@ def _log(file: Path, deviations: dict[str, float]) -> WinchLog:
 
 
 def _written(found: Calibration, request: _Request, line: Any) -> list[Path]:
-    """Write the robot if the search has converged, the whole result and the figure; returns the files."""
+    """Write the result, the figure and, if the fit has converged, the robot; returns the files."""
     from sagline.calibration.findings import CalibrationStatus
     from sagline.core.table import csv_text
     from sagline.files.robot_file import dump_robot
@@ -261,7 +265,7 @@ def _tell_files(files: list[Path]) -> None:
 
 
 def _tell_offset(found: Calibration, files: list[Path]) -> None:
-    """Print a note on the zero offsets of measured lengths, because a robot file does not contain them."""
+    """Print the zero offsets of measured lengths as a note, because a robot file does not contain them."""
     robots = [file.name for file in files if file.suffix.lower() in ROBOTS]
     if robots and found.length_offset.any():
         whole = next((file.name for file in files if file.suffix.lower() == WHOLE), None)
@@ -271,7 +275,7 @@ def _tell_offset(found: Calibration, files: list[Path]) -> None:
 
 
 def _rows(found: Calibration) -> Iterator[Sequence[object]]:
-    """Names of the columns, then the parameters with their standard errors and prior values."""
+    """The heads of the columns, then one row per parameter: value, standard error and prior value."""
     numbers = found.parameters
     yield "name", "value", "standard error", "before", "unit"
     yield from zip(numbers.labels, found.values, found.standard_error, numbers.prior, numbers.units, strict=True)

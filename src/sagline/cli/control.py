@@ -1,4 +1,4 @@
-"""`sagline control`: the controller with the lines of an operator."""
+"""`sagline control`: the controller, which carries out the commands that an operator types."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ def control(
     name: RobotArgument,
     plc: Annotated[
         str,
-        option("ADDRESS,...", "Address, host, host:port or [IPv6]:port, of the PLC of each group, in order.", "--plc"),
+        option("ADDRESS,...", "Address of the PLC of each group: host, host:port or [IPv6]:port.", "--plc"),
     ],
     modbus: ModbusOption = False,
-    shadow: Annotated[bool, flag("Read and log only; nothing is sent.", "--shadow")] = False,
+    shadow: Annotated[bool, flag("Only read and log; send no commands.", "--shadow")] = False,
     log: LogOption = None,
     priority: PriorityOption = None,
 ) -> int:
     """Control a machine: connect, home, follow paths, until quit.
 
-    The commands are lines: home, goto 0.2,-0.4,1.4, run path.yaml, jog 3 +5mm, pause, resume, stop, state, ack, off,
-    help. Lines from a pipe are executed one after the other; the first error ends the session. Ctrl-C stops all winches
-    and releases the machine, exit code 130. Software is not a safety function: have an emergency stop wired in
-    hardware.
+    Each input line is a command: home, goto 0.2,-0.4,1.4, run path.yaml, jog 3 +5mm, pause, resume, stop, state, ack,
+    off, help. Lines from a pipe are executed one after the other; the first error ends the session. Ctrl-C stops all
+    winches and releases the machine (exit code 130). Software is not a safety function: the machine needs an emergency
+    stop that is wired in hardware.
 
     For example:
 
@@ -45,7 +45,7 @@ def control(
 
     robot = load_robot(name)
     if priority is not None:
-        set_priority(priority)  # before the threads of link and log, which inherit it
+        set_priority(priority)  # before the threads of link and log start, because they inherit the priority
     with ExitStack() as stack:
         link = stack.enter_context(closing(_link(robot, plc, modbus=modbus)))
         record = None
@@ -55,7 +55,7 @@ def control(
             record = stack.enter_context(Recorder(log, robot))
         controller = Controller(robot, link, pace=Pace(), record=record, shadow=shadow)
         gc.collect()
-        gc.freeze()  # the garbage collector skips all existing objects, because the loop is in real time
+        gc.freeze()  # the real-time loop is faster if the garbage collector skips all existing objects
         session = OperatorSession(controller, alone=not sys.stdin.isatty(), shadow=shadow)
         return session.run()
 

@@ -1,4 +1,4 @@
-"""`sagline convert`: robot files and MuJoCo models from robots of other tools."""
+"""`sagline convert`: conversion of robots of other tools to robot files, and of any robot to a MuJoCo model."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ if TYPE_CHECKING:
 
 
 class _Format(StrEnum):
-    """Formats of the converted robot."""
+    """Formats of the output."""
 
     ROBOT = "robot"
     MJCF = "mjcf"
 
 
-LEAST = 1e-6  # smallest distance that is printed [m]
+LEAST = 1e-6  # smallest position error that is printed [m]
 ENDINGS = {_Format.ROBOT: (".yaml", ".yml"), _Format.MJCF: (".xml", ".mjcf")}
 
 
@@ -60,15 +60,15 @@ def convert(
         quantity_option("QUANTITY", "Axial stiffness EA of all cables, for instance '700 kN'.", "N"),
         only_with("--linear-density"),
     ] = None,
-    cable_set: Annotated[str | None, option("NAME", "CASPR: set of cables. Default: that of the file.")] = None,
+    cable_set: Annotated[str | None, option("NAME", "CASPR: name of the cable set. Default: that of the file.")] = None,
     at: Annotated[
         tuple[str, str, str] | None,
         option("X Y Z", "MuJoCo: initial position of the platform [m]. Default: middle of the test box."),
     ] = None,
 ) -> None:
-    r"""Convert a robot of CASPR or WireX to a robot file, or any robot to a MuJoCo model.
+    r"""Convert a robot of CASPR or WireX to a robot file, or convert any robot to a MuJoCo model.
 
-    Assumptions and losses are printed on stderr and written into the robot file.
+    Assumptions, and data of the input that are lost, are printed on stderr and written into the robot file.
 
     For example:
 
@@ -91,7 +91,7 @@ def convert(
         )
     if at is not None and form is _Format.ROBOT:
         raise InvalidValueError(
-            "--at", "given for a robot file", "--kind mjcf", "A robot file has no pose: leave it out."
+            "--at", "given for a robot file", "--kind mjcf", "A robot file contains no pose. Leave the option out."
         )
     place = None if at is None else decimal_numbers(at, "--at", "m", FARTHEST)
     imported = _read(source, _material(linear_density, axial_stiffness), cable_set)
@@ -135,7 +135,7 @@ def _material(density: float | None, stiffness: float | None) -> Cable | None:
 
 
 def _mjcf(robot: Robot, at: list[float] | None) -> tuple[str, str]:
-    """The model, and the position error of tendons without sag and weight."""
+    """The MuJoCo model, and the position error that results because its tendons have no sag and no weight."""
     from sagline.cables.models import Elastic
     from sagline.files.mjcf import dump_mjcf
     from sagline.kinematics.confirm import confirm

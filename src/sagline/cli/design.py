@@ -1,4 +1,4 @@
-"""`sagline design`: a search for better robots."""
+"""`sagline design`: the search for a better robot."""
 
 from __future__ import annotations
 
@@ -25,25 +25,25 @@ if TYPE_CHECKING:
     from sagline.optimization.front import Front
 
 FIGURE: Final = "front"
-MOST_ROWS: Final = 12  # largest number of printed rows; front.csv has all rows
+MOST_ROWS: Final = 12  # largest number of printed robots; front.csv lists all of them
 
 
 def design(
     robot: RobotArgument,
-    file: Annotated[Path, argument("DESIGN", "Design variables with their bounds, and goals, design.yaml.")],
+    file: Annotated[Path, argument("DESIGN", "File with design variables, their bounds and goals, design.yaml.")],
     out: OutOption = Path("front"),
     evaluations: Annotated[
-        str | None, option("NUMBER", "Number of candidate robots. Default: that of the file.")
+        str | None, option("NUMBER", "Number of robots to evaluate. Default: the number in the file.")
     ] = None,
     figures: FiguresOption = True,
     formats: FormatsOption = USUAL_FORMATS,
     style: StyleOption = FigureStyle.PLAIN,
     as_json: JsonOption = False,
 ) -> None:
-    r"""Search for a better robot. A file has the design variables (anchors, cables, limits) and the goals.
+    r"""Search for a better robot; a file states the design variables (anchors, cables, limits) and the goals.
 
-    The best robots are ordinary robot files; front.csv lists them. Every evaluated robot is written to the folder at
-    once: after Ctrl-C, or with more --evaluations, the same command continues.
+    The best robots are written as robot files, and front.csv lists them. The folder receives every robot as soon as it
+    is evaluated. Therefore the same command continues the search after Ctrl-C, or with more --evaluations.
 
     For example:
 

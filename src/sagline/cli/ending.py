@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from threading import ExceptHookArgs
 
-OUTSIDE, BAD_INPUT, UNEXPECTED, INTERRUPTED, CUT_OFF = 1, 2, 70, 130, 141  # the last one is that of SIGPIPE
+OUTSIDE, BAD_INPUT, UNEXPECTED, INTERRUPTED, CUT_OFF = 1, 2, 70, 130, 141  # the shell reports 141 after SIGPIPE
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 REPORT = "the authors of sagline"
 
@@ -26,12 +26,12 @@ def exit_code_of(command: Callable[[], object], *, debug: bool = False, last: bo
     Args:
         command: The work; returns the exit code, None for 0.
         debug: True if the traceback of an error is printed before its message.
-        last: True if the process ends afterwards; Ctrl-C then has no effect.
+        last: True if the process ends after the command; then Ctrl-C has no effect during the ending.
 
     Returns:
-        The exit code: BAD_INPUT for an error of sagline or the system, UNEXPECTED for a mistake in the program,
-        INTERRUPTED for Ctrl-C, even if Python lost it, 143 and 129 for SIGTERM and SIGHUP, CUT_OFF if the output no
-        longer has a reader.
+        The exit code: BAD_INPUT for an error of sagline or the system; UNEXPECTED for a mistake in the program;
+        INTERRUPTED for Ctrl-C, even if Python lost the interrupt; 143 and 129 for SIGTERM and SIGHUP; CUT_OFF if
+        the reader of the output has closed the pipe.
     """
     interrupts = _Interrupts()
     code = UNEXPECTED
@@ -40,7 +40,7 @@ def exit_code_of(command: Callable[[], object], *, debug: bool = False, last: bo
             code = _finished(command)
         finally:
             interrupts.ignore()
-    except BaseException as error:  # an interrupt may come in the line above
+    except BaseException as error:  # an interrupt can occur in the line above
         interrupts.ignore()
         if not interrupts.received:
             code = _report(error, debug)
@@ -60,14 +60,15 @@ def report_thread(failed: ExceptHookArgs) -> None:
 def _finished(command: Callable[[], object]) -> int:
     code = command()
     if sys.stdout is not None:
-        sys.stdout.flush()  # a write error is then reported by this command, not at the end of Python
+        sys.stdout.flush()  # otherwise Python would report a write error only when it ends
     return code if isinstance(code, int) else 0
 
 
 def _report(error: BaseException, debug: bool) -> int:
-    """Print the message of an error; returns the exit code."""
+    """Print the message of an error, and return the exit code."""
     _give_up_unwritable()
-    if isinstance(error, BrokenPipeError) or isinstance(error.__context__, BrokenPipeError):  # typer raises the latter
+    # typer raises another error after a BrokenPipeError
+    if isinstance(error, BrokenPipeError) or isinstance(error.__context__, BrokenPipeError):
         return CUT_OFF
     if isinstance(error, SystemExit):
         return error.code if isinstance(error.code, int) else 0 if error.code is None else UNEXPECTED
@@ -97,7 +98,7 @@ def _message(error: BaseException) -> tuple[str, str, int]:
     if isinstance(error, SaglineError):
         return HEAD, str(error), BAD_INPUT
     if isinstance(error, Abort):
-        return HEAD, "the input ended before all questions were answered. Answer them, or give the options.", BAD_INPUT
+        return HEAD, "the input ended before all questions were answered. Answer all, or give the options.", BAD_INPUT
     if hasattr(error, "format_message"):  # errors of the command line itself
         return HEAD, _usage(error), BAD_INPUT
     if isinstance(error, MemoryError):
@@ -141,7 +142,7 @@ def _interrupted(number: int) -> int:
 
 
 def _give_up_unwritable() -> None:
-    """Discard the buffer of a stdout that cannot be written, because Python would try again at its end."""
+    """Discard the buffer of a stdout that cannot be written; otherwise Python would try again when it ends."""
     try:
         if sys.stdout is not None:
             sys.stdout.flush()
@@ -153,9 +154,9 @@ def _give_up_unwritable() -> None:
 
 
 class _Interrupts:
-    """Handler of Ctrl-C, SIGTERM and SIGHUP in the main thread; not installed for signals that the process ignores.
+    """Handler of Ctrl-C, SIGTERM and SIGHUP in the main thread; signals that the process ignores stay ignored.
 
-    SIGTERM and SIGHUP do what Ctrl-C does at that moment: a controller, for instance, stops its robot first.
+    SIGTERM and SIGHUP have the same effect as Ctrl-C: a controller, for instance, stops its robot before it ends.
     """
 
     def __init__(self) -> None:
@@ -172,7 +173,7 @@ class _Interrupts:
 
     def _receive(self, number: int, frame: FrameType | None) -> None:
         self.received = self.received or number
-        sys.unraisablehook = lambda _: None  # messages of unfinished objects are not useful
+        sys.unraisablehook = lambda _: None  # Python's messages about unfinished objects do not help the user
         pressed = signal.getsignal(signal.SIGINT)
         if number == signal.SIGINT or pressed == self._receive or not callable(pressed):
             pressed = signal.default_int_handler

@@ -1,4 +1,4 @@
-"""`sagline examples`: the files for the commands of the documentation."""
+"""`sagline examples`: the files that the commands of the documentation use."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def examples(
     folder: OutOption = Path("sagline-examples"),
     force: ForceOption = False,
 ) -> None:
-    """Write the files for the commands of the documentation: a robot, a path, lengths, measurements, scripts.
+    """Write the files that the commands of the documentation use: a robot, a path, lengths, measurements and scripts.
 
     For example:
 
@@ -29,7 +29,7 @@ def examples(
         sagline track own_robot.yaml own_path.yaml
     """
     sources = example_files()
-    Output(folder, "", [file.name for file in sources])  # it refuses files that cannot be written
+    Output(folder, "", [file.name for file in sources])  # `Outputs` raises an error if a file cannot be written
     existing = [file.name for file in sources if (folder / file.name).exists()]
     if existing and not force:
         raise FileError(folder / existing[0], "exists", "Choose another folder with --out, or replace it with --force.")
@@ -42,7 +42,7 @@ def examples(
 
 
 def example_files() -> list[Path]:
-    """Folder of the example files: beside the modules of an installed package, beside the docs in the source tree."""
+    """Folder of the example files: next to the installed modules, or next to the docs in the source tree."""
     inside = Path(str(files("sagline"))) / "examples"
     folder = inside if inside.is_dir() else Path(__file__).parents[3] / "examples"
     return sorted(file for file in folder.glob("*") if file.suffix in KINDS)

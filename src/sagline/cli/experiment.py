@@ -1,4 +1,4 @@
-"""`sagline experiment`: the article's experiment at ten points, repeated."""
+"""`sagline experiment`: repetition of the article's experiment at ten points."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ PARTS: Final = 1000  # steps of the progress bar
 def experiment(
     name: Annotated[str, argument("NAME", "article: ten points, Table 2 and figures 25-27.")],
     waits: Annotated[
-        bool, flag("Without real time and network: half a minute instead of 14 minutes.", "--in-process")
+        bool, flag("Run without real time and network, in half a minute instead of 14 minutes.", "--in-process")
     ] = False,
     true: TrueOption = None,
     seed: SeedOption = 1,
@@ -42,10 +42,10 @@ def experiment(
     write_table: TableOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Repeat an experiment: home, the ten points of Table 2, home, as one page with the article's numbers.
+    """Repeat the article's experiment (home, the ten points of Table 2, home) as one page that compares the numbers.
 
-    The controller drives a twin of the prototype in another process, over S7 and in real time, which takes 14 minutes.
-    The page is DIR/experiment.html, which needs no other file; DIR/experiment.json has the numbers.
+    The controller drives a twin of the prototype in another process, over S7 and in real time; this takes 14 minutes.
+    The page is DIR/experiment.html and needs no other file. The numbers are in DIR/experiment.json.
 
     For example:
 
@@ -64,7 +64,7 @@ def experiment(
     nominal = load_robot(PROTOTYPE)
     real = nominal if true is None else load_robot(true)
     if real.cable_count != nominal.cable_count:
-        step = "Begin a robot file with base: article-prototype, and give the values that differ."
+        step = "Begin a robot file with base: article-prototype, and give the values that differ from it."
         raise InvalidValueError("--true", f"a robot of {real.cable_count} cables", f"{nominal.cable_count}", step)
     output = Output(folder, "", [*NAMES, *[TABLE] * write_table])
     how = _how(None if true is None else real.name, waits)
@@ -105,11 +105,11 @@ def apart_over_s7(true: Robot, nominal: Robot, seed: int, tell: Tell) -> Experim
 def _how(true: str | None, waits: bool) -> str:
     machine = "a twin of the prototype as planned" if true is None else f"a twin of {true}"
     way = "in one process, not in real time" if waits else "over four S7 connections, in real time"
-    return f"The controller drove {machine}, {way}; its model was the prototype of Table 1, with our anchors."
+    return f"The controller drove {machine}, {way}; its model was the prototype of Table 1, with assumed anchors."
 
 
 def _rows(result: Experiment) -> list[list[object]]:
-    """Names of the columns, then number, desired position and both distances of each point."""
+    """The heads of the columns, then one row per point: number, desired position and both distances."""
     table = result.table
     heads = ["point", *(f"desired {axis} [m]" for axis in "xyz"), "distance, article [m]", "distance [m]"]
     rows = zip(table.points, table.desired.tolist(), table.distance.tolist(), result.distance.tolist(), strict=True)

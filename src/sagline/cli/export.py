@@ -1,4 +1,4 @@
-"""`sagline export-c` and `sagline export-scl`: source code for the microcontroller or the PLCs of a robot."""
+"""`sagline export-c` and `sagline export-scl`: source code for a robot's microcontroller or PLCs."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ def export_c(
         bool, flag("Single precision, for controllers without double precision in hardware.", "--float")
     ] = False,
 ) -> None:
-    """Write C99 for the kinematics of a robot on a microcontroller, and SCL for a cable's length on a PLC.
+    """Write C99 source of a robot's kinematics for a microcontroller, and SCL source of a cable's length for a PLC.
 
-    The source has the same kernels as sagline: tensions and lengths of a pose, and on request the pose of given
-    lengths, over pulleys too. It needs no heap, and every call returns a status. Header and SCL file are written beside
-    the source. --tension can be repeated.
+    The source has the kernels of sagline, including pulleys. They compute the tensions and lengths of a pose and, with
+    --forward, the pose of given lengths. The source needs no heap, and every call returns a status. The header and the
+    SCL file are written next to the source. --tension can be repeated.
 
     For example:
 
@@ -63,10 +63,10 @@ def export_scl(
     robot: RobotArgument,
     out: OutOption = Path("plc.scl"),
 ) -> None:
-    """Write SCL source for the PLCs of a robot, for TIA Portal: data blocks, limits, and the program of a group.
+    """Write SCL source for the PLCs of a robot, for TIA Portal: data blocks, limits, and the program of one group.
 
-    The program accepts commands of one controller at a time, enforces the limits, and slows the winches down when
-    commands are missing. It has not been compiled yet; its head lists the settings of the CPU.
+    The program accepts commands of one controller at a time. It enforces the limits, and slows the winches down when
+    commands are missing. It has not been compiled yet; the comment at its head lists the settings of the CPU.
 
     For example:
 

@@ -36,10 +36,11 @@ Cell = float | str
 def forward(
     name: RobotArgument,
     file: Annotated[
-        Path, argument("CSV", "Columns length_0, length_1, ... and optionally time; units: length_0 [mm].")
+        Path,
+        argument("CSV", "Columns length_0, length_1, ... and optionally time. Units in the heads: length_0 [mm]."),
     ],
     counts: Annotated[
-        bool, flag("The columns are count_0, count_1, ...: encoder counts of the robot's winches.", "--counts")
+        bool, flag("The columns are count_0, count_1, ..., the encoder counts of the robot's winches.", "--counts")
     ] = False,
     model: ModelOption = ModelName.CATENARY,
     wrench: WrenchOption = None,
@@ -50,8 +51,8 @@ def forward(
 ) -> int:
     """Find the poses of the platform from measured cable lengths.
 
-    The first sample needs no initial pose; each later sample starts from the pose before it. Exit code 1 if a sample
-    has no stable equilibrium.
+    The first sample needs no initial pose. The pose of each sample is the initial pose of the next sample. Exit code 1
+    if a sample has no stable equilibrium.
 
     For example:
 
@@ -110,7 +111,7 @@ def _counted(file: Path, robot: Robot) -> LengthSamples:
 
 
 def _rows(lengths: LengthSamples, found: ForwardSolution) -> list[list[Cell]]:
-    """Header and one row per sample, with the time if the file has it."""
+    """The header, then one row per sample; rows have the time if the input file has it."""
     from sagline.kinematics.status import ForwardStatus
 
     units = {"x": "m", "y": "m", "z": "m", "force_residual": "N", "moment_residual": "N*m"}

@@ -20,11 +20,11 @@ from sagline.robot.robot import Robot
 if TYPE_CHECKING:
     from sagline.viewer.page import Page
 
-LATER = "trimesh"  # a package that the viewer loads on demand
+LATER = "trimesh"  # a package that the viewer imports only when it is needed
 
 
 class ServerAddress(NamedTuple):
-    """Address and port (0: any free port) of the page, True to open a browser here, and arguments of `start_server`."""
+    """Address and port of the page (0: any free port); `browser`: open a browser here; `access`: see `start_server`."""
 
     host: str
     port: int
@@ -33,7 +33,7 @@ class ServerAddress(NamedTuple):
 
 
 def check_viewer() -> None:
-    """Raise FileError if a package of the viewer is not installed."""
+    """Raise FileError if a package that the viewer needs is not installed."""
     try:
         import sagline.viewer.features  # noqa: F401
     except ModuleNotFoundError as error:
@@ -49,14 +49,14 @@ def serve(
     meanwhile: Callable[[Page], AbstractContextManager[None]] = lambda _: nullcontext(),
     **page: Any,
 ) -> int:
-    """Serve a page until Ctrl-C inside the context `meanwhile`; `page`: arguments of `Page`. Returns the exit code."""
+    """Serve a page until Ctrl-C, inside the context `meanwhile`; returns the exit code. `page` goes to `Page`."""
     from sagline.viewer import server as web
     from sagline.viewer.features import FEATURES
     from sagline.viewer.page import Page
 
     server = web.start_server(address.host, address.port, robot.name, **address.access)
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
-        signal.signal(signal.SIGINT, signal.default_int_handler)  # from now on Ctrl-C is the normal end
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # Ctrl-C is the normal end of the command from here
     try:
         show_text(f"{robot.name} is at {server.url}   (Ctrl-C stops it)", whole=True)
         if not server.access.local:
@@ -77,5 +77,5 @@ def serve(
 
 
 def _has_display() -> bool:
-    """True if there is a display for a browser; over SSH, the browser would open in the terminal."""
+    """True if a browser can open a window; over SSH, it would open in the terminal."""
     return sys.platform in ("win32", "darwin") or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 class _TensionPlace(StrEnum):
-    """Points of a cable at which its tension is measured."""
+    """Places on a cable where its tension can be measured."""
 
     FRAME_END = "frame-end"
     PLATFORM_END = "platform-end"
@@ -38,30 +38,30 @@ class _TensionPlace(StrEnum):
 
 STEPS = 25  # number of samples along each axis of the working range
 TABLE = "-cable.csv"
-TOLERANCE = 5e-3  # position tolerance [m]; the article has 6 mm
+TOLERANCE = 5e-3  # position error that the printed range keeps [m]; the article states 6 mm
 
 
 def identify(
-    file: Annotated[Path, argument("CSV", "Columns span, rise, length, tension; units in brackets: span [mm].")],
+    file: Annotated[Path, argument("CSV", "Columns span, rise, length, tension. Units in the heads: span [mm].")],
     length_error: Annotated[
-        float, quantity_option("LENGTH", "Standard error of a length, 0.002 or '2 mm'.", "m", above=0.0)
+        float, quantity_option("LENGTH", "Standard error of a measured length, 0.002 or '2 mm'.", "m", above=0.0)
     ] = 0.001,
     tension_error: Annotated[
-        float, quantity_option("FORCE", "Standard error of a tension, 5 or '5 N'.", "N", above=0.0)
+        float, quantity_option("FORCE", "Standard error of a measured tension, 5 or '5 N'.", "N", above=0.0)
     ] = 1,
     tension_at: Annotated[
         _TensionPlace, choice_option("PLACE", "Place of the tension measurement", _TensionPlace)
     ] = _TensionPlace.FRAME_END,
     offset: Annotated[
-        bool, flag("Estimate the zero of the lengths as another unknown.", "--offset/--no-offset")
+        bool, flag("Estimate the zero offset of the measured lengths as a further parameter.", "--offset/--no-offset")
     ] = False,
     folder: Annotated[OutOption, only_with("--csv")] = Path("output"),
     write_table: TableOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Estimate linear density and axial stiffness of a measured cable, and its empirical model.
+    """Estimate the linear density, the axial stiffness and the empirical model of a measured cable.
 
-    Standard errors and warnings show the weakly identifiable parameters.
+    Large standard errors and warnings show which parameters are weakly identifiable.
 
     For example:
 
@@ -98,7 +98,7 @@ def identify(
     grid = TextTable(
         ["", "value", "standard error", "unit"], texts, f"{len(data.span)} measurements", left=frozenset({0, 3})
     )
-    show_table(grid, f"{verdict} (about 1 if the errors are right)")
+    show_table(grid, f"{verdict} (about 1 if the standard errors are right)")
     show_text(
         f"The empirical model with k_h, k_p has position errors below {n(1e3 * TOLERANCE, 'g', 'mm')} in the "
         f"measured range if T_x is above {n(model.tension_min(TOLERANCE), '.3g', 'N')}."

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class _Winding(StrEnum):
-    """Models of the cable on the drums."""
+    """Assumptions about the tension of the cable on the drums."""
 
     CONSTANT = "constant"
     REMEMBERED = "remembered"
@@ -34,9 +34,9 @@ def lengths(
     file: RunArgument,
     out: FileOption = None,
 ) -> int:
-    """Write the planned lengths of a run as CSV: one row per sample, for `sagline forward` and controllers.
+    """Write the planned lengths of a run as CSV, one row per sample; `sagline forward` and controllers read the file.
 
-    Only feasible samples are written; stderr has the number of the others (exit code 1).
+    Only feasible samples are written. If others exist, their number is printed on stderr, and the exit code is 1.
 
     For example:
 
@@ -53,17 +53,17 @@ def encoder(
         _Winding,
         option(
             "WINDING",
-            "Tension of the cable on the drums. constant: winding_tension of the winches; remembered: tension at "
-            "which the path wound the cable.",
+            "Tension of the cable on the drums. constant: winding_tension of the winches; remembered: the "
+            "tension at the time when the path wound the cable.",
         ),
     ] = _Winding.CONSTANT,
     out: FileOption = None,
 ) -> int:
-    """Write the encoder counts of a run as CSV: one row per sample, for the drives.
+    """Write the encoder counts of a run as CSV, one row per sample, for the drives.
 
     The robot needs drum_radius, groove_pitch, counts_per_turn and length_zero of its winches, and the diameter of its
-    cables. Only feasible samples are written. Exit code 1 if others exist, or if winches exceed their speed_limit or
-    torque_limit.
+    cables. Only feasible samples are written. Exit code 1 if some samples are not feasible, or if winches exceed
+    their speed_limit or torque_limit.
 
     For example:
 
@@ -91,7 +91,7 @@ def encoder(
 
 
 def write_rows(plan: Plan, name: str, rows: Sequence[Sequence[float]], out: Path | None) -> int:
-    """Write the rows of solved samples, with times; `name` formats a column; returns the exit code."""
+    """Write the rows of solved samples with their times; returns the exit code. `name` formats a column's head."""
     from sagline.core.table import csv_text
 
     kept = np.atleast_1d(plan.solved)
@@ -118,7 +118,7 @@ def write_rows(plan: Plan, name: str, rows: Sequence[Sequence[float]], out: Path
 
 
 def _plan_of(file: Path, out: Path | None) -> Plan:
-    """The plan in a run; FileError if no sample is feasible, or if the run would be overwritten."""
+    """The plan in the file of a run; FileError if no sample is feasible, or if the output would replace this file."""
     from sagline.files.plan_file import load_plan
 
     if out is not None and out.exists() and out.resolve() == file.resolve():

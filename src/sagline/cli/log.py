@@ -1,4 +1,4 @@
-"""`sagline log`: contents of a log of the controller, printed or converted."""
+"""`sagline log`: a log of the controller, printed or converted."""
 
 from __future__ import annotations
 
@@ -22,24 +22,25 @@ if TYPE_CHECKING:
 TABLE: Final = "-cycles.csv"
 MOST_EVENTS: Final = 20  # largest number of listed events
 MOST_PLANS: Final = 100_000
-# limits of the classes of delay of a cycle [s]
+# limits between the bars of the histogram of delays [s]
 LATE: Final = (0.0, 1e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 1e-1, np.inf)
 EXTREME: Final = ("name", "value", "unit", "time", "cable")
-BAR: Final = 30  # length of the longest bar in characters
+BAR: Final = 30  # length of the longest bar of the histogram, in characters
 
 
 def log(
-    file: Annotated[Path, argument("RUN.mcap", "A log; the process may have been killed.")],
+    file: Annotated[Path, argument("RUN.mcap", "A log of the controller, also of a controller that was killed.")],
     to: Annotated[
         Path | None,
         option(
             "FILE",
-            "Write the log to this file instead: .nc is a data set with the plan, .mcap a complete log.",
+            "Write a file instead of printing: .nc is a data set with the plan; .mcap is a complete log.",
             "--to",
         ),
     ] = None,
     plan: Annotated[
-        str | None, option("NUMBER", "Only the cycles of this plan, from 0. Default: all.", "--plan-number")
+        str | None,
+        option("NUMBER", "Only the cycles of this plan; numbers start at 0. Default: all cycles.", "--plan-number"),
     ] = None,
     folder: Annotated[OutOption, only_with("--csv")] = Path("output"),
     write_table: TableOption = False,
@@ -89,7 +90,7 @@ def _tell(done: Execution) -> None:
         for name, value, unit, time, cable in _extremes(done)
     ]
     show_table(TextTable(["largest", "value", "cable", "at [s]"], largest))
-    show_table(TextTable(["cycles that began late by", "cycles", ""], _histogram(done), left=frozenset({0, 2})))
+    show_table(TextTable(["cycles by their delay", "cycles", ""], _histogram(done), left=frozenset({0, 2})))
     if done.events:
         rows = [_row(done, event) for event in done.events[:MOST_EVENTS]]
         show_table(TextTable(["at [s]", "event", "text"], rows, left=frozenset({1, 2}), prose=frozenset({2})))
@@ -106,7 +107,7 @@ def _row(done: Execution, event: Event) -> list[str]:
 
 
 def _states(done: Execution) -> list[list[str]]:
-    """Time and cycles in each state of the controller."""
+    """Time and number of cycles in each state of the controller."""
     from sagline.control.states import State
 
     codes, counts = np.unique(done.state, return_counts=True)
@@ -117,7 +118,7 @@ def _states(done: Execution) -> list[list[str]]:
 
 
 def _extremes(done: Execution) -> list[tuple[str, float, str, float, int | None]]:
-    """Name, value, unit, time [s] and cable of the largest errors; the cable is None for an error of the platform."""
+    """The largest errors: name, value, unit, time [s] and cable; the cable is None for errors of the platform."""
     from sagline.control.execution import position_error
 
     errors: list[tuple[str, Array, str]] = [
@@ -141,7 +142,7 @@ def _extremes(done: Execution) -> list[tuple[str, float, str, float, int | None]
 
 
 def _histogram(done: Execution) -> list[list[str]]:
-    """Histogram of the delays of cycles, without the empty classes at its end."""
+    """Histogram of the cycles' delays, without the empty bars at its end."""
     counts = [int(np.count_nonzero(done.late <= 0.0))]
     counts += [int(np.count_nonzero((done.late > low) & (done.late <= high))) for low, high in pairwise(LATE)]
     names = [

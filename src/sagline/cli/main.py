@@ -1,4 +1,4 @@
-"""The command `sagline`: its subcommands, loaded when they are needed, and the start and end of all of them."""
+"""The command `sagline`; each subcommand is imported only when it is needed."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from sagline.cli.ending import exit_code_of
 from sagline.cli.options import Condition
 from sagline.files.writing import finished_files
 
-GROUPS = {  # the commands in the order of the help
+GROUPS = {  # the subcommands in the order in which the help lists them
     "Robots": ("robots", "show", "new", "convert", "design", "calibrate", "identify"),
     "Lengths and tensions": ("track", "lengths", "encoder", "forward", "tension"),
     "Motion and workspace": ("simulate", "vibrate", "workspace", "sweep"),
@@ -32,8 +32,13 @@ GROUPS = {  # the commands in the order of the help
     "Installation": ("examples", "cache"),
 }
 NAMES = tuple(chain.from_iterable(GROUPS.values()))
-MODULES = {"encoder": "lengths", "show": "robots", "export-c": "export", "export-scl": "export"}  # or their names
-FORMER = {  # former names of options, which remain valid, by command
+MODULES = {
+    "encoder": "lengths",
+    "show": "robots",
+    "export-c": "export",
+    "export-scl": "export",
+}  # types of parameters, or names of these types
+FORMER = {  # former names of options, by command; they remain valid
     "convert": {"--format": "--kind"},
     "log": {"--plan": "--plan-number"},
     "vibrate": {"--force": "--axis"},
@@ -43,21 +48,21 @@ DEBUG = "--debug"
 HYPHEN = "\N{NON-BREAKING HYPHEN}"
 MOST_NAMES = 6  # largest number of files listed after an error
 START = """\
-Cable robots with sagging cables: from a robot and a path to proven cable lengths.
+Cable robots with sagging cables: plan cable lengths for a path, and prove that they are feasible.
 
 Start here:
 
     sagline run                         the article's test, with its figures
     sagline show cogiro                 all values of a robot
     sagline track cogiro                a plan of cable lengths along a path
-    sagline view cogiro                 a platform to drag in the browser
+    sagline view cogiro                 a robot in the browser; its platform can be dragged
     sagline examples --out DIR          files to try all commands with
-    sagline new my_robot.yaml           a robot of your own, by questions
+    sagline new my_robot.yaml           a robot file of your own, from a few answers
 """
 
 
 class _Formatter(cast(Any, typer.Context.formatter_class)):  # type: ignore[misc]
-    """Help text whose lines are not broken inside names with hyphens."""
+    """Formatter of help texts that does not break lines inside names with hyphens."""
 
     def write_dl(self, rows: Sequence[tuple[str, str]], *more: Any, **extra: Any) -> None:
         """Write a list of options or commands."""
@@ -68,21 +73,21 @@ class _Formatter(cast(Any, typer.Context.formatter_class)):  # type: ignore[misc
         super().write_text(text.replace("-", HYPHEN))
 
     def getvalue(self) -> str:
-        """The text, with usual hyphens."""
+        """The help text, with the non-breaking hyphens replaced by usual ones."""
         return str(super().getvalue()).replace(HYPHEN, "-")
 
 
 class _Command(TyperCommand):
-    """A subcommand that rejects empty texts and options without effect; its help names arguments without braces.
+    """A subcommand that rejects empty arguments and options without effect; its help shows arguments without braces.
 
     Attributes:
-        conditions: Conditions of the options that have an effect only with or without others, by parameter.
+        conditions: For each parameter, the other options that must be given, or must be missing.
     """
 
     conditions: Mapping[str, Sequence[Condition]]
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parse the arguments; an empty text is an error, because as a path it would mean the current folder."""
+        """Parse the arguments; reject empty texts, because an empty path would mean the current folder."""
         former = FORMER.get(self.name or "", {})
         args = [former.get(name, name) + sign + value for name, sign, value in (arg.partition("=") for arg in args)]
         if not ctx.resilient_parsing:  # resilient parsing is used for completion in the shell
@@ -97,7 +102,7 @@ class _Command(TyperCommand):
         return super().parse_args(ctx, args)
 
     def _check_conditions(self, given: Mapping[str, Any]) -> None:
-        """Reject an option that has no effect because another one is missing or given."""
+        """Reject an option that has no effect because of the other options."""
         by_label: dict[str, Any] = {_label(parameter): parameter for parameter in self.params}
         for label, parameter in by_label.items():
             for condition in self.conditions.get(parameter.name, ()) if given.get(parameter.name) is not None else ():
@@ -116,7 +121,7 @@ class _Command(TyperCommand):
 
 
 class _Commands(Mapping[str, _Command]):
-    """The subcommands by name; the module of each is imported on demand."""
+    """The subcommands by name; the module of a subcommand is imported when it is read here."""
 
     def __getitem__(self, name: str) -> _Command:
         """The subcommand of a name."""
@@ -134,10 +139,10 @@ class _Commands(Mapping[str, _Command]):
 
 
 class _Group(TyperGroup):
-    """The subcommands; each error in one of them ends in one line and an exit code."""
+    """The group of the subcommands; an error in a subcommand becomes one line and an exit code."""
 
     def __init__(self, **attributes: Any) -> None:
-        """Take the attributes of typer."""
+        """Take the attributes from the group that typer makes."""
         super().__init__(**attributes)
         self.commands: Any = _Commands()
 
@@ -178,7 +183,7 @@ class _Group(TyperGroup):
 app = typer.Typer(
     cls=_Group,
     no_args_is_help=True,
-    rich_markup_mode=None,  # plain help: equal text at every width, nothing folded, no colors
+    rich_markup_mode=None,  # plain help has the same text at every width, and no colors
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
@@ -186,7 +191,7 @@ app = typer.Typer(
 
 @cache
 def _load_command(name: str) -> _Command:
-    """Import a subcommand and read its options from its signature."""
+    """Import a subcommand, and read its options from the signature of its function."""
     function = getattr(import_module(f"sagline.cli.{MODULES.get(name, name)}"), name.replace("-", "_"))
     text = _help(function.__doc__)
     info = CommandInfo(name=name, cls=_Command, callback=function, help=text, short_help=text.partition("\n\n")[0])
@@ -204,7 +209,7 @@ def _label(parameter: Any) -> str:
 
 
 def _before(finished: Sequence[Path]) -> str:
-    """Names of the files that were complete before an error."""
+    """The note about the files that were complete before an error."""
     names = ", ".join(file.name for file in finished[:MOST_NAMES])
     more = f" and {len(finished) - MOST_NAMES} more" if len(finished) > MOST_NAMES else ""
     return f"Complete files before the error: {names}{more} in {finished[0].parent}"
@@ -217,7 +222,7 @@ def _print_version(wanted: bool) -> None:
 
 
 def _help(text: str | None) -> str:
-    """A docstring as help text; indented paragraphs keep their lines."""
+    """A docstring as help text; the lines of indented paragraphs are not joined."""
     paragraphs = cleandoc(text or "").split("\n\n")
     return "\n\n".join(f"\b\n{paragraph}" if paragraph.startswith(" ") else paragraph for paragraph in paragraphs)
 

@@ -24,10 +24,10 @@ if TYPE_CHECKING:
     from sagline.robot.pose import Pose, PoseBox
     from sagline.robot.robot import Robot
 
-MIDDLE = 0.5  # edges of the box of the printed feasible share, relative to the frame's edges
-GRID = 7  # number of poses along each edge of a box
-NEARLY_ALL = 0.95  # smallest feasible share of the box in the file
-_BOXES = (0.7, 0.6, 0.5, 0.4, 0.3, 0.2)  # edges of the tried boxes, relative to the frame's edges, in this order
+MIDDLE = 0.5  # box of the printed feasible share: its edges relative to those of the frame
+GRID = 7  # number of poses along each edge of this box and of the test box
+NEARLY_ALL = 0.95  # smallest feasible share in the test box of the file
+_BOXES = (0.7, 0.6, 0.5, 0.4, 0.3, 0.2)  # boxes to try in this order: their edges relative to those of the frame
 
 
 ROPE_NAMES = "dyneema-sk78, dyneema-sk62, steel-6x19, steel-7x19"
@@ -35,7 +35,7 @@ ROPE_NAMES = "dyneema-sk78, dyneema-sk62, steel-6x19, steel-7x19"
 
 QUESTIONS = {  # text of the question and default, by the name of the option
     "frame": ("Frame, length x width x height", "6 x 4 x 3 m"),
-    "layout": ("Cables from the top, or mixed from above and below (top, mixed)", "top"),
+    "layout": ("All cables from above, or from above and below (top, mixed)", "top"),
     "cables": ("Number of cables (6 to 8)", "8"),
     "platform": ("Platform, length x width x height", "0.5 x 0.5 x 0.4 m"),
     "mass": ("Mass of the platform with its load", "30 kg"),
@@ -47,7 +47,7 @@ QUESTIONS = {  # text of the question and default, by the name of the option
 def new(
     file: Annotated[Path, argument("FILE", "The robot file to write, my_robot.yaml.")],
     frame: Annotated[str | None, option("SIZE", 'Edges of the frame, "6 x 4 x 3 m".')] = None,
-    layout: Annotated[str | None, option("LAYOUT", "Cables from the top, or mixed: from above and below.")] = None,
+    layout: Annotated[str | None, option("LAYOUT", "top: cables from above; mixed: from above and below.")] = None,
     cables: Annotated[str | None, option("NUMBER", "Number of cables, 6 to 8.")] = None,
     platform: Annotated[str | None, option("SIZE", 'Edges of the platform, "0.5 x 0.5 x 0.4 m".')] = None,
     mass: Annotated[str | None, option("MASS", 'Mass of the platform with its load, "30 kg".')] = None,
@@ -56,9 +56,9 @@ def new(
     force: ForceOption = False,
     look: Annotated[bool, flag("Show it in the browser afterwards.", "--view")] = False,
 ) -> int:
-    r"""Make a robot file of your own: the command asks for missing options, checks the robot and describes it.
+    r"""Make a robot file of your own; the command asks for missing options, checks the robot and describes it.
 
-    Without a terminal, the answers are the lines of the input; an empty line is the default.
+    Without a terminal, the answers are read from the lines of stdin. An empty line means the default.
 
     For example:
 
@@ -86,7 +86,7 @@ def new(
     if share < NEARLY_ALL:
         show_note(
             "Advice: ",
-            "for a larger share, try a larger platform, the other layout, a thicker rope or a lighter load.",
+            "for a larger share, try a larger platform, the other layout, a thicker rope or a smaller mass.",
             style="bold",
         )
     for what, command in (("Written", ""), ("Look at it", "sagline view "), ("Every value", "sagline show ")):
@@ -107,7 +107,7 @@ def _check_file(file: Path, *, force: bool) -> None:
 
 
 def _answered(name: str, answers: dict[str, str | None]) -> tuple[Design, dict[str, str]]:
-    """The design and its answers; on a terminal a question with a wrong answer is repeated."""
+    """The design and the answers that define it; on a terminal, a question with an invalid answer is repeated."""
     asks = sys.stdin is not None and sys.stdin.isatty() and sys.stderr.isatty()
     said: dict[str, str] = {}
     for key, (question, default) in QUESTIONS.items():
@@ -131,7 +131,7 @@ def _answered(name: str, answers: dict[str, str | None]) -> tuple[Design, dict[s
 
 
 def _read(key: str, question: str, default: str) -> str:
-    """An answer from a pipe or a file: one line; an empty line is the default."""
+    """An answer from a line of a pipe or a file; an empty line means the default."""
     line = "" if sys.stdin is None or sys.stdin.isatty() else sys.stdin.readline()
     if line:
         return line.strip() or default
@@ -142,7 +142,7 @@ def _read(key: str, question: str, default: str) -> str:
 
 
 def _design(name: str, said: dict[str, str]) -> Design:
-    """The design from the answers so far; valid values replace missing ones."""
+    """The design from the first answers; valid values replace the answers that are still missing."""
     from sagline.cables.rope import ROPES
     from sagline.cli.values import quantity
     from sagline.robot.catalogue import COUNTS, LAYOUTS, Design
@@ -187,7 +187,7 @@ def _edges(text: str, item: str) -> Array:
 
 
 def _boxed(design: Design) -> tuple[Robot, Plan]:
-    """The robot with the largest box of nearly feasible poses, and the plan of the middle of its frame."""
+    """The robot with its test box, the largest with enough feasible poses, and the plan in the middle of the frame."""
     from sagline.kinematics.inverse import inverse
 
     robot = design.robot()
@@ -200,7 +200,7 @@ def _boxed(design: Design) -> tuple[Robot, Plan]:
 
 
 def grid(box: PoseBox) -> Pose:
-    """Level poses on a grid in a box, a batch of GRID cubed."""
+    """Level poses on a grid in a box, GRID cubed of them as one batch."""
     from sagline.robot.pose import Pose
 
     axes = [np.linspace(low, high, GRID) for low, high in zip(box.low, box.high, strict=True)]

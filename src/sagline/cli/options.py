@@ -1,4 +1,4 @@
-"""Arguments and options of the subcommands: functions to declare them, and common ones."""
+"""Arguments and options of the subcommands: functions that declare them, and those that several commands have."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class ModelName(StrEnum):
 
 
 class TensionVariable(StrEnum):
-    """Kinds of tension for which a tension distribution is optimal."""
+    """Tension variables of the tension distribution methods."""
 
     CHORD = "chord"
     HORIZONTAL = "horizontal"
@@ -62,7 +62,7 @@ class Tension(StrEnum):
     POLYGON_WALK = "polygon-walk"
 
     def build(self, variable: TensionVariable) -> TensionMethod:
-        """The method for a tension."""
+        """The method with a tension variable."""
         from sagline.tension.methods import METHODS
 
         return METHODS[self.value.title().replace("-", "")](variable.value)
@@ -80,7 +80,7 @@ class FigureStyle(StrEnum):
     SLIDES_WIDE = "slides-wide"
 
     def active(self) -> AbstractContextManager[object]:
-        """Context in which new figures have this style."""
+        """A context; figures that are made inside it have this style."""
         if self is FigureStyle.PLAIN:
             return nullcontext()
         from sagline.plot import style
@@ -90,7 +90,7 @@ class FigureStyle(StrEnum):
 
 
 def robot_completions(incomplete: str) -> list[str]:
-    """Names of presets and robot files that begin with a text, for completion in the shell."""
+    """Completion in the shell: the presets and robot files whose names begin with a text."""
     from glob import escape, glob
 
     from sagline.robot.catalogue import robot_names
@@ -105,12 +105,12 @@ def argument(metavar: str, text: str, completion: Callable[[str], list[str]] | N
 
 
 def option(metavar: str, text: str, *names: str) -> Any:
-    """An option with a value; without names its name is that of the parameter."""
+    """An option with a value; without `names`, it has the name of the parameter."""
     return typer.Option(*names, metavar=metavar, help=text)
 
 
 def converted_option(metavar: str, text: str, function: str, *names: str, **arguments: object) -> Any:
-    """An option; a function of `sagline.cli.values` makes its value from text, name and further arguments."""
+    """An option whose text a function of `sagline.cli.values` converts to the value."""
 
     def converted(parameter: typer.CallbackParam, value: Any) -> Any:
         if not isinstance(value, str):
@@ -123,12 +123,12 @@ def converted_option(metavar: str, text: str, function: str, *names: str, **argu
 
 
 def quantity_option(metavar: str, text: str, unit: str, *names: str, **limits: float) -> Any:
-    """An option whose value is a number in SI or a text with a unit, at least `low` or greater than `above`."""
+    """An option for a number, in SI or with a unit; the number is at least `low` and greater than `above`."""
     return converted_option(metavar, text, "quantity", *names, unit=unit, **limits)
 
 
 def choice_option(metavar: str, text: str, choices: type[StrEnum]) -> Any:
-    """An option whose value is one of a few words; its help lists them."""
+    """An option whose value is one of a few words; the help lists the words."""
     return option(metavar, f"{text}: {', '.join(each.value for each in choices)}.")
 
 
@@ -138,18 +138,18 @@ def flag(text: str, *names: str) -> Any:
 
 
 def out_option(default: str | bool = True) -> Any:
-    """`--out`; text for the default value if it is None."""
-    text = "Folder for the files. With a suffix it is the main file; the other files are named after it."
+    """The option `--out`; its help shows this text as the default."""
+    text = "Folder for the files. A name with a suffix is the main file; the other names then begin with its stem."
     return typer.Option("--out", metavar="DIR|FILE", help=text, show_default=default)
 
 
 @dataclass(frozen=True)
 class Condition:
-    """Condition, beside an option in `Annotated`: the option has an effect only with, or only without another one.
+    """Condition of an option that has an effect only with, or only without, another option; part of `Annotated`.
 
     Attributes:
         other: The other option, "--prove", or the name of an argument in the help, "PATH".
-        given: False if the option has an effect only without the other one.
+        given: True if the other option must be given; False if it must be missing.
     """
 
     other: str
@@ -161,21 +161,21 @@ class Condition:
             step = f"Add {self.other}, or leave out {option}."
             return InvalidValueError(option, f"given without {self.other}", "both", step)
         step = f"Leave out {option}, or {self.other}."
-        return InvalidValueError(option, f"given with {self.other}", "one of both", step)
+        return InvalidValueError(option, f"given with {self.other}", "only one of the two", step)
 
 
 def only_with(other: str) -> Condition:
-    """Condition: the option has an effect only together with the other one."""
+    """Condition of an option that has an effect only together with another option."""
     return Condition(other, given=True)
 
 
 def only_without(other: str) -> Condition:
-    """Condition: the option has an effect only without the other one."""
+    """Condition of an option that has an effect only without another option."""
     return Condition(other, given=False)
 
 
 def _unchanged(value: Any) -> Any:
-    """The unchanged value; a callback converts it, because typer would reformat the error of a parser."""
+    """The unchanged text; a callback converts it, because typer would change the error message of a parser."""
     return value
 
 
@@ -184,7 +184,7 @@ RobotArgument = Annotated[
 ]
 OutOption = Annotated[Path, out_option()]
 FileOption = Annotated[Path | None, out_option("stdout")]
-JsonOption = Annotated[bool, flag("Print the numbers as JSON and nothing else on stdout.", "--json")]
+JsonOption = Annotated[bool, flag("Print only the numbers on stdout, as JSON.", "--json")]
 TableOption = Annotated[bool, flag("Write the whole table as a CSV file.", "--csv/--no-csv")]
 FiguresOption = Annotated[bool, flag("Draw figures.", "--figures/--no-figures")]
 STYLE = choice_option("STYLE", "Style of the figures", FigureStyle)
@@ -193,7 +193,7 @@ FormatsOption = Annotated[
     Any,
     converted_option(
         "FORMATS",
-        f"Formats of the figures, with commas between: {', '.join(FORMATS)}.",
+        f"Formats of the figures, separated by commas: {', '.join(FORMATS)}.",
         "formats_of",
         "--format",
         known=FORMATS,
@@ -203,7 +203,7 @@ FormatsOption = Annotated[
 ForceOption = Annotated[bool, flag("Replace files that exist.", "--force")]
 ModelOption = Annotated[ModelName, choice_option("MODEL", "Cable model", ModelName)]
 VariableOption = Annotated[
-    TensionVariable, choice_option("VARIABLE", "Tension that the method distributes", TensionVariable)
+    TensionVariable, choice_option("VARIABLE", "Tension variable of the method", TensionVariable)
 ]
 WrenchOption = Annotated[
     Any,
@@ -233,20 +233,33 @@ PoseOption = Annotated[
 ]
 TensionOption = Annotated[Tension, choice_option("METHOD", "Tension distribution method", Tension)]
 LossTimeOption = Annotated[
-    float | None, quantity_option("TIME", "Loss time [s] of the cables' stretch: EA (1 + i omega TIME).", "s", low=0.0)
+    float | None,
+    quantity_option(
+        "TIME", "Loss time [s] of the cable material: axial stiffness EA (1 + i omega TIME).", "s", low=0.0
+    ),
 ]
 AirDampingOption = Annotated[
     float,
-    quantity_option("NUMBER", "Air damping of a cable per length and velocity [N s/m^2].", "N*s/m^2", low=0.0),
+    quantity_option("NUMBER", "Damping of the cables by air, per length and velocity [N s/m^2].", "N*s/m^2", low=0.0),
 ]
 ModbusOption = Annotated[bool, flag("Use Modbus TCP instead of S7.", "--modbus")]
 PriorityOption = Annotated[
-    int | None, option("NUMBER", "Schedule in real time (SCHED_FIFO of Linux) with this priority, 1 to 99.")
+    int | None, option("NUMBER", "Run in real time (Linux's SCHED_FIFO) with this priority, 1 to 99.")
 ]
 SeedOption = Annotated[
-    int, converted_option("NUMBER", "Seed of the random numbers.", "whole_of", least=0, most=2**63 - 1)
+    int,
+    converted_option(
+        "NUMBER",
+        "Seed of the random numbers; the same seed gives the same numbers.",
+        "whole_of",
+        least=0,
+        most=2**63 - 1,
+    ),
 ]
 HostOption = Annotated[str, option("ADDRESS", "Address to listen on; 0.0.0.0 and :: mean all addresses.")]
 PortOption = Annotated[int, converted_option("NUMBER", "Port to listen on; 0 selects a free port.", "port_of")]
-TrueOption = Annotated[str | None, option("ROBOT", "File of the real robot if it differs from the nominal one.")]
+TrueOption = Annotated[
+    str | None,
+    option("ROBOT", "Robot file of the simulated machine, if it differs from the robot that the controller assumes."),
+]
 LogOption = Annotated[Path | None, option("FILE", "Write a log to this MCAP file, run.mcap.")]

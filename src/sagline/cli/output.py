@@ -26,20 +26,20 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-ENDING = re.compile(r"\.[a-z]{1,5}", re.IGNORECASE)  # ending of a file, by which --out is a file and not a folder
+ENDING = re.compile(r"\.[a-z]{1,5}", re.IGNORECASE)  # suffix by which --out is recognized as a file
 
 
 @dataclass(frozen=True, slots=True)
 class TextTable:
-    """A table of texts; it is split between columns if it is too wide; cells are never cut.
+    """A table of texts. A table that is too wide is split into pieces between its columns; cells are never shortened.
 
     Attributes:
-        heads: Heads of the columns; they may have several lines.
-        rows: One text per column in each row.
+        heads: Heads of the columns; a head may have several lines.
+        rows: Rows, each with one text per column.
         title: Title of the table; "" for none.
-        keys: Number of leading columns that name a row; they are repeated in each piece.
-        left: Indices of the left-aligned columns; other columns are right-aligned.
-        prose: Indices of the columns that may be broken into lines, between words.
+        keys: Number of first columns that name the row; each piece repeats them.
+        left: Indices of the left-aligned columns; all others are right-aligned.
+        prose: Indices of the columns whose cells may be broken into several lines.
     """
 
     heads: Sequence[str]
@@ -50,10 +50,10 @@ class TextTable:
     prose: frozenset[int] = field(default=frozenset())
 
     def pieces(self, console: Console, width: int) -> list[tuple[Table, int]]:
-        """The smallest number of pieces that fit a width, with about the same number of columns and smallest widths."""
+        """The pieces of the table: as few as fit the width, each with about the same number of columns."""
         full = self._filled(console, width)
         even = list(_split(range(self.keys, len(self.heads)), len(full)))
-        for parts in (even, full):  # evenly, if the number of pieces stays the same
+        for parts in (even, full):  # distribute the columns evenly if this does not need more pieces
             tables = [self._table([*range(self.keys), *part], first=part[0] == self.keys) for part in parts]
             pieces = [(table, _least(console, table)) for table in tables]
             if all(least <= width for _, least in pieces):
@@ -61,7 +61,7 @@ class TextTable:
         return pieces
 
     def _filled(self, console: Console, width: int) -> list[range]:
-        """Consecutive columns, as many in each piece as fit, at least one."""
+        """Columns of each piece: as many consecutive columns as fit, and at least one."""
         parts, first, count = [], self.keys, len(self.heads)
         while first < count:
             end = first + 1
@@ -94,7 +94,7 @@ class TextTable:
 
 
 def show_table(grid: TextTable, verdict: str = "") -> None:
-    """Print a table as part of the result, below a verdict."""
+    """Print a verdict and a table below it, as part of the result."""
     if verdict:
         show_text(verdict, style="bold")
     show_pieces(grid.pieces)
@@ -105,7 +105,7 @@ def _least(console: Console, table: Table) -> int:
 
 
 def _split(columns: range, count: int) -> Iterable[range]:
-    """Consecutive parts whose sizes differ by at most one."""
+    """Consecutive parts of the columns; the sizes of the parts differ by at most one."""
     edges = [len(columns) * k // count for k in range(count + 1)]
     return [columns[first:end] for first, end in pairwise(edges)]
 
@@ -116,12 +116,12 @@ def number_text(number: float, form: str) -> str:
 
 
 def is_file(out: Path) -> bool:
-    """True if `--out` is a file and not a folder: it ends like a file, and is not a folder that exists."""
+    """True if `--out` is a file: it has a suffix, and no folder has this name."""
     return ENDING.fullmatch(out.suffix) is not None and not out.is_dir()
 
 
 def file_of(out: Path, name: str) -> Path:
-    """The file of `--out`, with its usual name if `--out` is a folder; nothing is created."""
+    """The file that `--out` means; in a folder it has its usual name. Nothing is created."""
     if is_file(out):
         return out
     check_folder(out)
@@ -129,7 +129,7 @@ def file_of(out: Path, name: str) -> Path:
 
 
 class Output:
-    """The files that a command writes; the command fails before any work if one cannot be written."""
+    """The files that a command writes; if a file cannot be written, the command fails before any work."""
 
     def __init__(
         self,
@@ -143,16 +143,16 @@ class Output:
         """Check that all files can be written.
 
         Args:
-            out: A folder; or the first file by its name, whose beginning the other files get instead of the stem.
+            out: A folder; or the path of the first file, whose stem then replaces `stem` in the other names.
             stem: Beginning of all names; "" if `out` must be a folder.
-            parts: Rest of each name, with its suffix.
-            figures: Rest of the name of each figure, without suffix.
+            parts: For each file, the end of its name with the suffix.
+            figures: For each figure, the end of its name without suffix.
             formats: Suffixes of the figures.
             style: Style of the figures.
         """
         whole = [*parts, *(f"{figure}.{suffix}" for figure in figures for suffix in formats)]
         self.folder, self.files, self._stem = out, list[Path](), stem
-        self._main: dict[str, str] = {}  # name of the first file, if `out` is a file
+        self._main: dict[str, str] = {}  # path of the first file, if `out` is a file
         self._figures, self._formats, self._style = list(figures), formats, style
         if is_file(out):
             suffix = Path(f"_{whole[0]}").suffix if stem and whole else ""
@@ -168,7 +168,7 @@ class Output:
         return self._main.get(part, f"{self._stem}{part}")
 
     def file(self, part: str) -> Path:
-        """Path of a file that is about to be written; the folder is created if missing."""
+        """Path of a file to write now; a missing folder is created."""
         create_folder(self.folder)
         self.files.append(self.folder / self._name(part))
         return self.files[-1]
@@ -185,7 +185,7 @@ class Output:
         write_text(self.file(part), csv_text(rows))
 
     def draw(self, *figures: Callable[[], Figure | Axes]) -> None:
-        """Make figures in the chosen style, and save them under the checked names, in their order."""
+        """Make figures in the chosen style, and save them under the checked names; both have the same order."""
         from sagline.plot import save
 
         for make in figures:
@@ -197,7 +197,7 @@ class Output:
     def report(
         self, record: Callable[[], Mapping[str, object]], verdict: str, tell: Callable[[], None], *, as_json: bool
     ) -> None:
-        """Print a record and the files as JSON, or the verdict, the text of `tell` and the files."""
+        """Print a record and the files as JSON; or print the verdict, the text that `tell` prints, and the files."""
         if as_json:
             show_json({**record(), "files": self.files})
         else:
@@ -206,7 +206,7 @@ class Output:
             self.show()
 
     def show(self) -> None:
-        """Print the folder and the names of the files in it; the formats of a figure share one name."""
+        """Print the folder and the names of its files; a figure in several formats is printed once."""
         if not self.files:
             return
         suffixes: dict[str, list[str]] = {}

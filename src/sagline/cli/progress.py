@@ -1,4 +1,4 @@
-"""The progress line on a terminal: name of the work, and remaining time of long work."""
+"""The progress line on a terminal: the name of the work, and the remaining time if the work is long."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from rich.text import Text
 from sagline.core.errors import printable
 from sagline.core.progress import Progress as ProgressCallback
 
-PATIENCE = 2.0  # longer work shows a bar and the remaining time [s]
+PATIENCE = 2.0  # time [s] after which the line shows a bar and the remaining time
 
 
 class ProgressLine:
-    """One live line on a terminal; no effect elsewhere."""
+    """One line that is updated on a terminal; no effect outside a terminal."""
 
     def __init__(self, bar: Progress, what: str) -> None:
         """Add the work to a progress bar; the bar is disabled outside a terminal."""
@@ -24,12 +24,12 @@ class ProgressLine:
         self._task = bar.add_task(printable(what), total=None)
 
     def stage(self, what: str) -> ProgressCallback:
-        """Begin a new part of the work; returns the function that takes its progress."""
+        """Begin a new part of the work; returns the function that reports the progress of this part."""
         self._bar.reset(self._task, total=None, description=printable(what))
         return self.progress
 
     def progress(self, done: int, total: int) -> None:
-        """Show the finished part."""
+        """Show the progress of the current part."""
         self._bar.update(self._task, completed=done, total=total)
 
     def name(self, what: str) -> None:
@@ -51,7 +51,7 @@ def progress_line(console: Console, what: str) -> Iterator[ProgressLine]:
 
 
 class _Late(ProgressColumn):
-    """A column that appears when known work takes longer than `PATIENCE`."""
+    """A column that appears if work of known size takes longer than `PATIENCE`."""
 
     def __init__(self, column: ProgressColumn) -> None:
         super().__init__()

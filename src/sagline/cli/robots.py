@@ -1,4 +1,4 @@
-"""`sagline robots` and `sagline show`: the presets, and the values of a robot."""
+"""`sagline robots` and `sagline show`: a list of the presets, and all values of one robot."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def robots(
     ]
     show_table(TextTable(heads, rows, left=frozenset({0, 2, 4, 5})), f"{len(robots)} preset robots.")
     show_text(
-        "Frame: length × width × height over the floor. Without a size in the source: size of the box of the anchors."
+        "Frame: length × width × height above the floor. If the source gives no size: the box around the anchors."
     )
     show_text("")
     for robot in robots:
@@ -86,7 +86,7 @@ def show(
     write_table: TableOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Show every value of a robot with its unit; assumed values are marked, with the reason. --csv writes its cables.
+    """Show every value of a robot with its unit; assumed values are marked, with the reason. --csv writes the cables.
 
     For example:
 
@@ -126,7 +126,7 @@ def show(
 
 
 def _cables(robot: Robot) -> list[list[object]]:
-    """Names of the columns, then anchors, material and limits of each cable; empty cells for unknown values."""
+    """The heads of the columns, then anchors, material and limits of each cable; cells of unknown values are empty."""
     heads = ["cable", *(f"{field} {axis} [{unit}]" for field, unit in ANCHORS.items() for axis in "xyz")]
     known = {field: np.asarray(value) for field in PER_CABLE if (value := _value(robot, field)) is not None}
     columns = [np.broadcast_to(value, robot.cable_count).tolist() for value in known.values()]
@@ -151,7 +151,7 @@ def _short(robot: Robot) -> dict[str, Any]:
 
 
 def _frame(robot: Robot) -> Array:
-    """Edge lengths of the frame; without a frame, those of the box from the floor around the anchors."""
+    """Edge lengths of the frame, or, without a frame, of the box around the anchors and down to the floor."""
     if robot.frame_size is not None:
         return robot.frame_size
     low, high = robot.frame_anchors.min(axis=0), robot.frame_anchors.max(axis=0)
@@ -160,7 +160,7 @@ def _frame(robot: Robot) -> Array:
 
 
 def _platform(robot: Robot) -> Array:
-    """Edge lengths of the platform; if not given, those of the box around its anchors."""
+    """Edge lengths of the platform, or, if they are not given, of the box that encloses its anchors."""
     extent: Array = np.ptp(robot.platform_anchors, axis=0)
     return extent if robot.platform_size is None else robot.platform_size
 
@@ -198,7 +198,7 @@ def _record(robot: Robot) -> dict[str, Any]:
 
 
 def _parts_of(deviations: Mapping[str, Array]) -> dict[str, Any]:
-    """Standard deviations, each with its unit."""
+    """The robot's standard deviations, each with its unit."""
     from sagline.robot.tolerances import UNCERTAIN
 
     return {
@@ -207,7 +207,7 @@ def _parts_of(deviations: Mapping[str, Array]) -> dict[str, Any]:
 
 
 def _deviations(deviations: Mapping[str, Array], head: str) -> TextTable:
-    """Table of standard deviations; one number for a field if all its values are equal."""
+    """Table of the standard deviations; a field with equal values has one number."""
     from sagline.robot.tolerances import UNCERTAIN
 
     rows = []
@@ -251,7 +251,7 @@ def _winches(robot: Robot, winches: Winch) -> TextTable:
 
 
 def _spread(value: Any, digits: int = 5) -> str:
-    """One value if all cables have it, otherwise all values; counts need more digits than lengths."""
+    """One value if it is the same for all cables, otherwise all values; counts need more digits than lengths."""
     if isinstance(value, str | list):
         return value if isinstance(value, str) else f"({', '.join(value)})"
     return f"{value[0]:.{digits}g}" if np.all(value == value[0]) else _numbers(value, digits)

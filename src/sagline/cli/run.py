@@ -1,4 +1,4 @@
-"""`sagline run`: the article's simulated robots along its path."""
+"""`sagline run`: the article's two simulated robots along the article's path."""
 
 from __future__ import annotations
 
@@ -28,8 +28,10 @@ if TYPE_CHECKING:
 
 ROBOTS = ("article-suspended", "article-mixed")
 FIGURES = ("figure-18-path", "figure-19-velocity", "figure-20-suspended", "figure-21-mixed", "figure-22-error")
-HULLS = ("hull-suspended", "hull-mixed")  # workspaces with sag, the article's future work
-CELLS = 20  # cells along the longest edge of the frame; half a second per robot, error of volumes 0.2 %
+HULLS = ("hull-suspended", "hull-mixed")  # the article names workspaces with sag as future work
+CELLS = (
+    20  # cells along the longest edge of the frame: this takes half a second per robot, and volumes are within 0.2 %
+)
 
 
 def run(
@@ -40,9 +42,9 @@ def run(
     table: TableOption = False,
     as_json: JsonOption = False,
 ) -> int:
-    """Run the article's test: both simulated robots, its empirical model and the exact one, figures 18 to 22.
+    """Run the article's test: two simulated robots, the empirical and the exact cable model, figures 18 to 22.
 
-    The tension distribution is the least norm of the horizontal tensions T_x, as in the article's figures.
+    The tension distribution has the least norm of the horizontal tensions T_x, as in the article's figures.
     """
     from sagline.cables.models import Catenary, Empirical
     from sagline.cli.study import run_along, run_name, tell
@@ -53,8 +55,8 @@ def run(
     from sagline.workspaces.workspace import workspace
 
     models = Empirical(), Catenary()
-    # The article describes (55), the tensions closest to the previous ones. However, its figures show lower cables near
-    # their minimum, and curves that return to their start. This is the minimum norm of T_x.
+    # The article's equation (55) selects the tensions closest to the previous ones. However, its figures show lower
+    # cables near their minimum tension, and curves that return to their start. Both mean the minimum norm of T_x.
     tension = MinimumNorm("horizontal")
     robots = [load_robot(name) for name in ROBOTS]
     plans = [run_name(robot, model) for robot in robots for model in models]
@@ -62,7 +64,7 @@ def run(
     drawn = [*FIGURES, *HULLS] if figures else []
     output = Output(folder, "", [*files, *(f"{name}.glb" for name in HULLS)], drawn, formats, style)
     path, runs = article_path(), []
-    with working("planning and confirming the article's path") as line:
+    with working("planning the article's path, and confirming it with exact cables") as line:
         for robot in robots:
             runs += [run_along(robot, path, model, tension, line) for model in models]
     with working("workspaces of both robots") as line:
@@ -87,7 +89,7 @@ def run(
 
 
 def _figures(suspended: ConfirmedRun, mixed: ConfirmedRun) -> tuple[Callable[[], Figure | Axes], ...]:
-    """The article's figures 18 to 22, with its own cable model, in the order of FIGURES."""
+    """The article's figures 18 to 22, computed with the article's cable model, in the order of FIGURES."""
     from sagline import plot
 
     path = suspended.plan.path

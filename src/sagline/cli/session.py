@@ -1,4 +1,4 @@
-"""Session of `sagline control`: reads the lines of an operator or a pipe while the controller runs its cycles."""
+"""Session of `sagline control`: reads lines from an operator or a pipe while the controller runs its cycles."""
 
 from __future__ import annotations
 
@@ -27,17 +27,17 @@ from sagline.robot.pose import Pose
 
 EVERY: Final = 0.2  # time between two updates of the status line [s]
 PROMPT: Final = "> "
-FAILED: Final = 1  # exit code after a fault
-LATE: Final = 0.02  # delay above which a note is printed at the end [s]
+FAILED: Final = 1  # exit code after a fault of the machine
+LATE: Final = 0.02  # delay of cycles above which a note is printed at the end [s]
 AXES: Final = ("x", "y", "z")
 CONFIRM: Final = "--confirm"
 
 
 class StatusLine:
-    """Last line of a terminal, which does not scroll with the lines above; no effect if stdout is not a terminal."""
+    """Fixed last line of a terminal, below the lines that scroll; no effect if stdout is not a terminal."""
 
     def __init__(self, *, shown: bool) -> None:
-        """Use stdout if it is a terminal and `shown` is True."""
+        """Use stdout if stdout is a terminal and `shown` is True."""
         self._shown = shown and sys.stdout is not None and sys.stdout.isatty()
         self._next, self._size = 0.0, (0, 0)
 
@@ -54,7 +54,7 @@ class StatusLine:
             self._say(f"\x1b7\x1b[r\x1b[{rows};1H\x1b[2K\x1b8")
 
     def update(self, text: str) -> None:
-        """Show a text, shortened to the line, at most every `EVERY` seconds."""
+        """Show a text, shortened to one line, at most once per `EVERY` seconds."""
         if not self._shown or time.monotonic() < self._next:
             return
         self._next = time.monotonic() + EVERY
@@ -86,45 +86,50 @@ class StatusLine:
 
 
 class _Line(NamedTuple):
-    """A line: its text (None at the end of the input), and its action, which raises the error of an invalid line."""
+    """A line: its text (None at the end of the input) and its action; for an invalid line, it raises the error."""
 
     text: str | None
     act: Callable[[], object]
 
 
 class OperatorSession:
-    """Session: reading of lines, cycles of the controller, and printing of events."""
+    """Session that reads lines, runs the cycles of the controller, and prints events."""
 
     def __init__(self, controller: Controller, *, alone: bool, shadow: bool) -> None:
-        """Prepare a session; `alone`: each line waits for the previous one, as from a pipe; `shadow`: read-only."""
+        """Prepare a session; `alone`: a line waits until the previous one is done; `shadow`: nothing is sent."""
         control = controller
         self.control, self._alone, self._shadow = controller, alone, shadow
         self._event_count = 0
         self._ended = self._is_interrupted = False
-        self._wait = 0  # number of cycles to wait
+        self._wait = 0  # number of cycles until the next line is read
         self._lines: SimpleQueue[_Line] = SimpleQueue()
         self._line = StatusLine(shown=not alone)
-        # arguments, help, parser of the arguments, and action of each command
+        # for each command: its arguments, its help, the parser of its arguments, and its action
         self._words: dict[str, tuple[str, str, Callable[[str], Any], Callable[..., object]]] = {
             "home": (
                 "[X,Y,Z[,A,B,C]] | --confirm",
-                "set lengths and start at this pose, by default the middle of the test box; or confirm it",
+                "set the lengths at this pose, by default the middle of the test box; or confirm the last pose",
                 self._home_pose,
                 self._home,
             ),
             "goto": ("X,Y,Z[,A,B,C]", "move straight to a pose [m, degrees]", partial(_pose, "goto"), self._go_to),
             "run": ("FILE", "follow a path, path.yaml", load_path, control.start),
-            "jog": ("WINCH|AXIS LENGTH", "jog 3 +5mm: a winch, from 0; jog z -10mm: the platform", self._jog, _call),
+            "jog": (
+                "WINCH|AXIS LENGTH",
+                "jog 3 +5mm: winch 3 (the first is 0); jog z -10mm: the platform",
+                self._jog,
+                _call,
+            ),
             "pause": ("", "pause the path", _nothing, control.pause),
             "resume": ("", "resume the path", _nothing, control.resume),
-            "stop": ("", "stop and abandon the path", _nothing, control.stop),
-            "wait": ("SECONDS", "wait before the next line", self._cycles, self._wait_for),
+            "stop": ("", "stop, and give up the path", _nothing, control.stop),
+            "wait": ("SECONDS", "wait [s] before the next line", self._cycles, self._wait_for),
             "state": ("", "show pose, lengths and tensions", _nothing, self._show_state),
             "ack": ("", "acknowledge a fault", _nothing, control.acknowledge),
             "connect": ("", "take control of the machine", _nothing, control.connect),
             "off": ("", "release the machine", _nothing, control.off),
             "help": ("", "show this list", _nothing, self._show_help),
-            "quit": ("", "release the machine and end", _nothing, self._end),
+            "quit": ("", "release the machine, and end the session", _nothing, self._end),
         }
 
     def run(self) -> int:
@@ -164,7 +169,7 @@ class OperatorSession:
         self._lines.put(_Line(None, self._end))
 
     def _parse(self, text: str) -> _Line:
-        """Parse a line; an error is raised by its action."""
+        """Parse a line; for an invalid line, the returned action raises the error."""
         word, _, rest = text.partition(" ")
         if not word or word.startswith("#"):
             return _Line("", lambda: None)
@@ -207,7 +212,7 @@ class OperatorSession:
         self._line.update(self._status)
 
     def _next_line(self) -> _Line | None:
-        """Next line: immediately from an operator; from a pipe only when the platform is at rest."""
+        """The next line: an operator's line immediately, a line of a pipe only when the platform is at rest."""
         if self._wait or (self._alone and self.control.moving):
             return None
         if self._alone and self.control.state in (State.FAULT, State.EMERGENCY):
@@ -219,7 +224,7 @@ class OperatorSession:
             return None
 
     def _carry_out(self, line: _Line) -> None:
-        """Carry out a line; an error is printed, or ends the session of a pipe."""
+        """Carry out a line; an error of an operator's line is printed, an error in a pipe ends the session."""
         if self._alone and line.text:
             show_text(f"{PROMPT}{line.text}", whole=True)
         try:
@@ -235,7 +240,7 @@ class OperatorSession:
         self.control.start(self.control.path_to(pose))
 
     def _home_pose(self, text: str) -> Pose | None:
-        """Pose to home at; None to confirm the last one."""
+        """The pose at which to home; None confirms the last pose."""
         if text == CONFIRM:
             return None
         return _pose("home", text) if text else middle_pose(self.control.robot)
@@ -310,7 +315,7 @@ def _pose(item: str, text: str) -> Pose:
 
 
 def _tensions(filtered: Array) -> str:
-    """Smallest and largest tension, and the load cells without a reading; filtered: [N], (m,)."""
+    """Text of the smallest and largest tension, and of the load cells without a reading; filtered: [N], (m,)."""
     read = np.isfinite(filtered)
     lost = [f"no reading of cell {cell}" for cell in np.flatnonzero(~read)]
     known = [f"{filtered[read].min():.0f} to {filtered[read].max():.0f} N"] if read.any() else []

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from sagline.share.course import SharedMotion
 
 ENDINGS: Final = (".html", ".htm")
-HEAD: Final = 2000  # number of first bytes of a page, which contain its mark
+HEAD: Final = 2000  # number of bytes at the start of a page that contain its mark
 
 
 def share(
@@ -31,10 +31,10 @@ def share(
     ],
     out: Annotated[Path | None, out_option("run.html or ROBOT.html here")] = None,
 ) -> None:
-    """Make one HTML page of a robot or a run that needs no server and no network: for a phone, a mail, a lecture.
+    """Write a robot or a run as one HTML page that needs no server and no network: for a phone, a mail, a lecture.
 
-    A run is played, a robot can be dragged; the page contains the kernels. The view turns by mouse, touch and keys. The
-    file has about 160 kB, and 150 kB more for each minute of a run.
+    The page plays a run, or lets the platform of a robot be dragged; it contains the kernels. Mouse, touch and keys
+    rotate the view. The file has about 160 kB, and 150 kB more for each minute of a run.
 
     For example:
 
@@ -67,7 +67,7 @@ def share(
 
 
 def _found(source: Path) -> Robot | SharedMotion:
-    """A robot, or a run to play."""
+    """The robot of the argument, or the run to play."""
     from sagline.files.calibration_file import FORMAT as CALIBRATION
     from sagline.files.calibration_file import load_calibration
     from sagline.files.netcdf import is_of
@@ -89,7 +89,7 @@ def _found(source: Path) -> Robot | SharedMotion:
     plan = load_plan(source)
     if not plan.state.pose.shape:
         step = "Save a plan of a path, or share the robot."
-        raise InvalidValueError("run", "a plan of a single pose", "a plan of poses in a row", step)
+        raise InvalidValueError("run", "a plan of a single pose", "a plan of a sequence of poses", step)
     return of_plan(plan)
 
 
@@ -111,5 +111,7 @@ def _free(file: Path) -> Path:
 
     check_file(file)
     if file.exists() and MADE.encode() not in file.read_bytes()[:HEAD]:
-        raise FileError(file, "exists, and is not a page of sagline", "Name the page with --out; it may be this one.")
+        raise FileError(
+            file, "exists, and is not a page of sagline", "Give a name of the page with --out; it may be this name."
+        )
     return file

@@ -1,4 +1,4 @@
-"""`sagline simulate`: the motion of a robot along a path in time, with vibration and breaking cables."""
+"""`sagline simulate`: the simulated motion of a robot along a path, with vibration and breaking cables."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ if TYPE_CHECKING:
 
 
 class _ShaperKind(StrEnum):
-    """Input shapers of a path against vibration."""
+    """Input shapers, which reduce the vibration that a path excites."""
 
     NONE = "none"
     ZV = "zv"
@@ -61,7 +61,7 @@ class _ShaperKind(StrEnum):
 
 
 class _CableMass(StrEnum):
-    """Models of the cable mass in motion."""
+    """Models of the mass of moving cables."""
 
     NONE = "none"
     LUMPED = "lumped"
@@ -74,17 +74,20 @@ STEP = "Give the cable and the time of the break: --break 3@2.5s."
 
 _PathOption = Annotated[
     Path | None,
-    argument("PATH", "Waypoints in .yaml, or time and pose in .csv. Default: at rest at the pose of --pose."),
+    argument("PATH", "Waypoints in .yaml, or times and poses in .csv. Default: the platform is at rest at --pose."),
 ]
 _ShaperOption = Annotated[
     _ShaperKind, choice_option("SHAPER", "Input shaper of the path", _ShaperKind), only_with("PATH")
 ]
 _BreaksOption = Annotated[
-    list[str] | None, option("CABLE@TIME", "A cable breaks: 3@2.5s. The option can be repeated.", "--break")
+    list[str] | None,
+    option(
+        "CABLE@TIME", "Cable and time of a break: 3@2.5s means cable 3 at 2.5 s. The option can be repeated.", "--break"
+    ),
 ]
 _StepOption = Annotated[
     float | None,
-    quantity_option("TIME", "Time step of the integrator [s]. Default: chosen for the robot.", "s", above=0.0),
+    quantity_option("TIME", "Time step of the integrator [s]. Default: a step that suits the robot.", "s", above=0.0),
 ]
 
 
@@ -109,12 +112,12 @@ def simulate(
     write_table: TableOption = False,
     as_json: JsonOption = False,
 ) -> int:
-    """Simulate a robot along a path in time: vibration, input shapers and breaking cables.
+    """Simulate the motion of a robot along a path, with vibration, input shapers and breaking cables.
 
-    Lengths are planned as `sagline track` plans them. The result is the largest tension, the residual vibration at the
-    end, the energy balance and the events. Figures show tensions and motion, and the energy balance. Without
-    --loss-time, a loss time of 1 ms is assumed if a cable breaks, as in the viewer, and none otherwise. Play the file
-    with `sagline view ROBOT FILE`.
+    The lengths are planned as by `sagline track`. The result has the largest tension, the residual vibration at the
+    end, the energy balance and the events. Figures show the tensions, the motion and the energy balance. The default
+    of --loss-time is 1 ms if a cable breaks (as in the viewer), otherwise 0. To play the result in the browser, use
+    `sagline view ROBOT FILE`.
 
     For example:
 
@@ -191,7 +194,7 @@ def _start(
     load: Array | None,
     line: ProgressLine,
 ) -> Plan | Equilibrium:
-    """A plan along the path, shaped if a shaper is chosen; or the robot at rest."""
+    """The plan of the path, after input shaping if a shaper is chosen; without a path, the plan of one pose at rest."""
     from sagline.cli.values import middle_pose
     from sagline.dynamics.trajectories.shapers import EI, ZV, ZVD, shaped
     from sagline.dynamics.vibration.vibration import to_shape, vibration
@@ -225,7 +228,7 @@ def _duration(start: Plan | Equilibrium) -> float:
 
 
 def _verdict(simulation: Simulation, summary: Summary) -> str:
-    """Largest tension, and the cables whose limit it exceeds."""
+    """Text of the largest tension, and of the cables whose tension exceeds the limit."""
     rows = {row.key: row for row in summary.rows}
     above = rows["cables_above_tension_max"]
     limits = f"above tension_max: {above.text}" if above.value else "all cables stay below tension_max"

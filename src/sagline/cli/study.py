@@ -1,4 +1,4 @@
-"""Run of a robot along a path: the plan, its confirmation, and a summary in a few numbers."""
+"""Plan of a robot along a path, its confirmation with exact cables, and its summary in a few numbers."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from sagline.tension.method import TensionMethod
 if TYPE_CHECKING:
     from sagline.cli.progress import ProgressLine
 
-ROWS = {  # rows of a summary: label and number format
+ROWS = {  # rows of a summary: the label and the number format
     "position_error_max_mm": ("position error, largest [mm]", ".3g"),
     "position_error_mean_mm": ("position error, mean [mm]", ".3g"),
     "chord_tension_min_n": ("chord tension, smallest [N]", ".1f"),
@@ -40,15 +40,17 @@ ROWS = {  # rows of a summary: label and number format
     "feasible_share_percent": ("feasible poses [%]", ".4g"),
     "inverse_us_per_pose": ("inverse kinematics [µs per pose]", ".2f"),
 }
-WIDE, NARROW = 30, 16  # widths of the robot and of the tension method in a column's head, in characters
-LONGEST = "unstrained_length_max_m"  # position errors below the rounding error of lengths are zero
-MOST_GAPS = 5  # largest number of printed gaps
+WIDE, NARROW = 30, 16  # largest widths of the robot and of the tension method in a column's head, in characters
+LONGEST = "unstrained_length_max_m"  # smaller position errors are printed as zero, because lengths have rounding errors
+MOST_GAPS = 5  # largest number of infeasible parts of a path that are printed
 WIDEN = " Move the path, or widen the tension limits."
-SAME_PLACE = 1e-6  # [m], far above rounding errors and far below the distance to a second equilibrium
+SAME_PLACE = (
+    1e-6  # [m], far above the rounding errors of an equilibrium, and far below its distance from a second equilibrium
+)
 
 
 class ConfirmedRun(NamedTuple):
-    """A confirmed plan along a path, and the time of the compiled inverse kinematics [s]."""
+    """A plan along a path, its confirmation, and the computing time of the inverse kinematics [s]."""
 
     confirmation: Confirmation
     seconds: float
@@ -67,7 +69,7 @@ class ConfirmedRun(NamedTuple):
     def lost(self) -> int:
         """Number of planned poses without a stable equilibrium of the platform."""
         stays = self.confirmation.held
-        if isinstance(self.plan.state.cables.model, Catenary):  # exact plan: any other place is another equilibrium
+        if isinstance(self.plan.state.cables.model, Catenary):  # exact: a different position is another equilibrium
             stays = stays & (np.linalg.norm(self.confirmation.position_error, axis=-1) < SAME_PLACE)
         return int(np.sum(self.plan.feasible & ~stays))
 
@@ -81,7 +83,7 @@ def run_along(
     robot: Robot, path: Path, model: CableModel, tension: TensionMethod, line: ProgressLine, wrench: Array | None = None
 ) -> ConfirmedRun:
     """Plan a path, and confirm the plan with exact cables."""
-    inverse(robot, path.pose[:1], model, tension, wrench)  # loads the compiled kernels before the timing
+    inverse(robot, path.pose[:1], model, tension, wrench)  # load the compiled kernels before the time is measured
     start = perf_counter()
     progress = line.stage(f"{robot.name}: planning {len(path):,} poses")
     plan = inverse(robot, path, model, tension, wrench, progress=progress)
@@ -90,7 +92,7 @@ def run_along(
 
 
 def summary(run: ConfirmedRun) -> dict[str, float]:
-    """The numbers of a run over its feasible poses, by the keys of ROWS; NaN if there are none."""
+    """The numbers of a run's feasible poses, by the keys of ROWS; NaN if no pose is feasible."""
     plan = run.plan
     error = 1e3 * np.linalg.norm(run.confirmation.position_error, axis=-1)
     known = error[~np.isnan(error)]
@@ -106,7 +108,7 @@ def summary(run: ConfirmedRun) -> dict[str, float]:
 
 
 def _gap_text(gap: Gap, plan: Plan) -> str:
-    """Time, shortfall and limiting cables of an infeasible part of a path."""
+    """Text about an infeasible part of a path: its time, its shortfall and the limiting cables."""
     assert plan.path is not None
     first, last = (f"{plan.path.time[k]:g} s" for k in (gap.first, gap.last))
     when = f"from {first} to {last}" if gap.last > gap.first else f"at {first}"
@@ -115,8 +117,8 @@ def _gap_text(gap: Gap, plan: Plan) -> str:
     count = plan.state.one_robot.cable_count
     cables = "all cables" if len(gap.cables) == count else f"cables {', '.join(map(str, gap.cables))}"
     if np.isinf(gap.shortfall):
-        return f"{when}: no additional force alone is sufficient; limits of {cables}"
-    short = f"short by up to {n(gap.shortfall, '.3g', 'N')}"
+        return f"{when}: no additional force alone is sufficient; limiting: {cables}"
+    short = f"shortfall up to {n(gap.shortfall, '.3g', 'N')}"
     if gap.hopeless:
         short += f", and at {gap.hopeless} of {gap.last - gap.first + 1} poses no additional force alone is sufficient"
     return f"{when}: {short}; limits of {cables}"
@@ -135,7 +137,7 @@ def tell(runs: Sequence[ConfirmedRun], output: Output, notes: Sequence[str] = ()
 
 
 def _verdict(runs: Sequence[ConfirmedRun]) -> str:
-    """Number of feasible, stable poses of all runs."""
+    """Sentence with the number of feasible, stable poses of all runs."""
     poses = sum(run.plan.status.size for run in runs)
     held = sum(int(np.sum(run.plan.feasible)) - run.lost for run in runs)
     of = "" if len(runs) == 1 else f" of {len(runs)} runs"
@@ -170,7 +172,7 @@ def _complaints(run: ConfirmedRun) -> int:
     if gaps:
         limits = all(gap.status is PoseStatus.INFEASIBLE for gap in gaps)
         show_note("", "The file contains the feasible part and marks the rest." + WIDEN * limits)
-    if run.lost > np.sum(plan.feasible & ~plan.solved):  # more than the gaps state
+    if run.lost > np.sum(plan.feasible & ~plan.solved):  # the infeasible parts do not include them
         what = f"{run.lost} of the planned poses are not stable equilibria: the platform would leave its path"
         show_note(f"{name}: ", f"{what}; move the path, or raise the tensions", style="bold red")
     return OUTSIDE if gaps or run.lost else 0

@@ -1,4 +1,4 @@
-"""`sagline sweep`: many robots, poses and wrenches, computed into a folder."""
+"""`sagline sweep`: the computation of many robots, poses and wrenches, whose results are stored in a folder."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ if TYPE_CHECKING:
 
 ENDS = {
     "feasible": "tensions within their limits",
-    "infeasible": "proof that there are no such tensions",
-    "unable": "no result; see the status",
+    "infeasible": "proof that no tensions within the limits exist",
+    "unable": "no result; the status states the reason",
     "open": "too close to the boundary for a verdict",
     "lost": "no verdict",
 }
 
 
 def sweep(
-    file: Annotated[Path, argument("SWEEP.yaml", "Robots, poses, wrenches and quantities.")],
+    file: Annotated[Path, argument("SWEEP.yaml", "File with robots, poses, wrenches and the quantities to compute.")],
     out: Annotated[Path | None, out_option("SWEEP in output")] = None,
     workers: Annotated[
         str | None,
@@ -43,8 +43,9 @@ def sweep(
 ) -> int:
     """Compute tensions, lengths or shortfalls of every robot at every pose under every wrench.
 
-    Each task writes its chunk to the disk, and DIR/done has the progress. The same command continues a sweep that was
-    stopped. Read the numbers with sl.sweep.load("DIR"), or as Zarr. Exit code 1 if requests have no verdict.
+    Each task stores its part of the results, and the folder DIR/done records the progress. If a sweep was stopped, the
+    same command continues it. Read the results with sl.sweep.load("DIR"), or as Zarr. Exit code 1 if requests have
+    no verdict.
 
     For example:
 
@@ -58,11 +59,11 @@ def sweep(
     count = None if workers is None else whole_of(workers, "--workers", 1, MOST_WORKERS)
     request = load_sweep(file)
     folder = Path("output") / file.stem if out is None else out
-    Output(folder, "", ["done"])  # it refuses a folder that cannot be written
+    Output(folder, "", ["done"])  # `Outputs` raises an error if the folder cannot be written
     parent = folder.absolute().parent
     made = [place for place in (parent, *parent.parents) if not place.exists()]
     create_folder(parent)
-    if (folder / "done").exists():  # another sweep is an error here, without the advice to continue it
+    if (folder / "done").exists():  # the folder of another sweep raises an error
         open_matching_folder(folder, request)
     again = _again(file, folder, workers, scheduler)
     what = f"{len(request):,} requests"
@@ -75,7 +76,7 @@ def sweep(
     except SaglineError as error:
         if (folder / "done").exists():
             error.add_note(f"The finished tasks are kept. To continue: {again}")
-        with suppress(OSError):  # not empty
+        with suppress(OSError):  # the sweep has requests
             for place in made:
                 place.rmdir()
         raise

@@ -1,4 +1,4 @@
-"""`sagline tension`: tension distributions of one pose by all methods."""
+"""`sagline tension`: comparison of all tension distribution methods at one pose."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from sagline.robot.robot import Robot
     from sagline.tension.method import TensionMethod
 
-LEFT_OUT = ("Closest", "QuadraticProgram", "PolygonWalk")  # at one pose their tensions equal those of other methods
+LEFT_OUT = ("Closest", "QuadraticProgram", "PolygonWalk")  # at a single pose, they give the tensions of other methods
 
 
 def tension(
@@ -55,10 +55,10 @@ def tension(
     table: TableOption = False,
     as_json: JsonOption = False,
 ) -> int:
-    """Compare nine tension distribution methods at one pose, and draw their tensions in the tension polygon.
+    """Compare nine tension distribution methods at one pose, and draw their tensions into the tension polygon.
 
-    Three methods are left out: at one pose, without targets, Closest and QuadraticProgram give the tensions of
-    MinimumNorm; PolygonWalk gives those of LowestSum, MinimumNorm or Centroid.
+    Three methods are left out, because at a single pose they give the tensions of others: Closest and QuadraticProgram
+    those of MinimumNorm; PolygonWalk those of LowestSum, MinimumNorm or Centroid.
 
     For example:
 
@@ -79,7 +79,7 @@ def tension(
     output = Output(folder, file_stem(robot.name), parts, ["-tension"] * drawn, formats, style)
     least = inverse(
         robot, place, model.build(), MinimumNorm(variable.value), wrench
-    )  # raises an error if no method applies
+    )  # raises an error if no method is defined for the robot
     fewer_cables = robot.cable_count < robot.degrees_of_freedom
     plans: dict[str, Plan | None] = {"balance": least}
     if not fewer_cables:
@@ -105,8 +105,9 @@ def tension(
     def tell() -> None:
         show_table(_grid(robot, plans))
         if margin is not None:
-            what = "Capacity margin, the additional force in any direction that the cables can balance"
-            show_text(f"{what}: {n(margin, unit='N')}")
+            show_text(
+                f"Capacity margin: {n(margin, unit='N')}. The cables can balance this additional force in any direction."
+            )
 
     count = sum(plan is not None and plan.feasible for plan in plans.values())
     verdict = f"{robot.name}: {count} of {len(plans)} methods have tensions within the limits."
@@ -127,7 +128,7 @@ def _plan(robot: Robot, pose: Pose, model: ModelName, method: TensionMethod, wre
 
 
 def reason(robot: Robot, pose: Pose, plan: Plan) -> str:
-    """Status of a plan of one pose: shortfall and blocking cables, or the motion that no cable resists."""
+    """Sentence on an infeasible pose: its shortfall and limiting cables, or the motion that no cable resists."""
     from sagline.kinematics.status import PoseStatus
     from sagline.tension.singular import unresisted_motion
 
@@ -166,7 +167,7 @@ def _grid(robot: Robot, plans: dict[str, Plan | None]) -> TextTable:
         if plan is not None and plan.feasible:
             rows.append([title, *(f"{value:.1f}" for value in plan.chord_tension), ""])
         else:
-            why = "not defined here" if plan is None else PoseStatus(int(plan.status)).name.lower().replace("_", " ")
+            why = "not defined" if plan is None else PoseStatus(int(plan.status)).name.lower().replace("_", " ")
             rows.append([title, *[""] * robot.cable_count, why])
     heads = ["", *map(str, range(robot.cable_count)), ""]
     if not any(row[-1] for row in rows):

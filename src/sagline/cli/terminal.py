@@ -1,4 +1,4 @@
-"""Output of the commands: results on stdout, notes on stderr, without control characters for the terminal."""
+"""Output of the commands: results on stdout, notes on stderr; control characters in texts are removed."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from sagline.files.writing import json_text
 if TYPE_CHECKING:
     from sagline.cli.progress import ProgressLine
 
-FREE = 1 << 16  # width of output to a file or a pipe
+FREE = 1 << 16  # width of output to a file or a pipe, in characters
 
 _out = Console(highlight=False, markup=False, emoji=False)
 _wide = Console(highlight=False, markup=False, emoji=False, width=FREE)  # console for files and pipes
@@ -29,7 +29,7 @@ _err = Console(stderr=True, highlight=False, markup=False, emoji=False)
 
 
 def working(what: str) -> AbstractContextManager[ProgressLine]:
-    """Show work and its progress on a terminal inside the block."""
+    """Show the work and its progress on a terminal inside the `with` block."""
     from sagline.cli.progress import progress_line
 
     return progress_line(_err, what)
@@ -60,13 +60,13 @@ def notices() -> Iterator[None]:
 
 
 def show_note(head: str, text: str, style: str = "") -> None:
-    """Print one line on stderr; paths in it are not broken into lines."""
-    with suppress(OSError):  # without stderr, the message is lost
+    """Print one line on stderr; a path in the line is not broken."""
+    with suppress(OSError):  # if stderr is closed, the message is lost
         _err.print(Text.assemble((printable(head), style), printable(text).replace(SPACE, " ")), soft_wrap=True)
 
 
 def show_text(what: str, indent: int = 0, style: str = "", *, whole: bool = False) -> None:
-    """Print a part of the result; lines are broken between words, or kept `whole` so that paths can be copied."""
+    """Print a part of the result; long lines are broken between words; `whole` keeps a line, for paths to copy."""
     if whole:
         _emit(Text(printable(what), style))
     else:
@@ -75,19 +75,19 @@ def show_text(what: str, indent: int = 0, style: str = "", *, whole: bool = Fals
 
 
 def show_pieces(pieces: Callable[[Console, int], Iterable[tuple[RenderableType, int]]]) -> None:
-    """Print parts of the result, made for the width of the terminal, each with its smallest width."""
+    """Print parts of the result; `pieces` makes them for a width, each with its smallest width."""
     console = _out if _out.is_terminal else _wide
     for piece, least in pieces(console, console.width):
         _emit(piece, max(console.width, least))
 
 
 def show_json(what: Any) -> None:
-    """Print the result for a program: one JSON document; null means not finite."""
+    """Print the result as one JSON document, for programs; null replaces numbers that are not finite."""
     _write("".join(c if _fits(c) else json.dumps(c)[1:-1] for c in json_text(what)) + "\n")
 
 
 def show_data(text: str) -> None:
-    """Print the text of a file: in UTF-8 unchanged, but without control characters on a terminal."""
+    """Print the text of a file in UTF-8; on a terminal, control characters are removed."""
     if sys.stdout is None or sys.stdout.isatty():
         _write(printable(text, "\n\t"))
         return
@@ -107,7 +107,7 @@ def _fits(character: str) -> bool:
 
 
 def _emit(what: RenderableType, width: int | None = None) -> None:
-    """Print in a width; None does not break lines."""
+    """Print with lines of a width; with None, lines are not broken."""
     console = _out if _out.is_terminal else _wide
     with _refused(), console.capture() as captured:
         console.print(what, width=width, soft_wrap=width is None, crop=False)
@@ -115,7 +115,7 @@ def _emit(what: RenderableType, width: int | None = None) -> None:
 
 
 def _write(text: str) -> None:
-    """Write to stdout; all output goes through here or `show_data`."""
+    """Write to stdout; only this function and `show_data` do so."""
     with _refused():
         sys.stdout.write(text.encode(_encoding(), "backslashreplace").decode(_encoding()))
         sys.stdout.flush()
@@ -123,7 +123,7 @@ def _write(text: str) -> None:
 
 @contextmanager
 def _refused() -> Iterator[None]:
-    """Turn errors of the system on stdout into FileError; a pipe without reader remains a BrokenPipeError."""
+    """Convert the system's errors of stdout to FileError; a BrokenPipeError (no reader) is not converted."""
     try:
         if sys.stdout is None:
             raise OSError(errno.EBADF, "it is closed")

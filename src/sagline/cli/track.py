@@ -40,14 +40,14 @@ if TYPE_CHECKING:
     from sagline.motion.path import Path as MotionPath
     from sagline.robot.robot import Robot
 
-TOO_FAR = 100.0  # largest ratio to the robot's size, as for measured lengths
+TOO_FAR = 100.0  # largest distance of a path from the robot, divided by the robot's size
 FIGURES = ("path", "velocity", "cables", "error")
 
 
 def track(
     robot: RobotArgument,
     path: Annotated[
-        Path | None, argument("PATH", "Waypoints in .yaml, or time and pose in .csv. Default: the article's path.")
+        Path | None, argument("PATH", "Waypoints in .yaml, or times and poses in .csv. Default: the article's path.")
     ] = None,
     model: ModelOption = ModelName.CATENARY,
     tension: TensionOption = Tension.CLOSEST,
@@ -63,9 +63,9 @@ def track(
 ) -> int:
     """Plan the cable lengths of a robot along a path, and confirm them with exact catenaries.
 
-    The lengths of the chosen model are given to exact catenaries; the position error is the distance of the resulting
-    equilibrium from the planned pose. The plan is written to DIR/ROBOT-MODEL.nc, with --csv
-    also poses, lengths and tensions as a table.
+    The confirmation gives exact catenaries the lengths of the chosen model, and finds the equilibrium of the platform.
+    The position error is the distance of this equilibrium from the planned pose. The plan is written to
+    DIR/ROBOT-MODEL.nc; --csv also writes poses, lengths and tensions as a table.
 
     For example:
 
@@ -99,7 +99,7 @@ def track(
 
 
 def check_unit(file: Path, way: MotionPath, robot: Robot) -> None:
-    """Raise FileError if the path of a file is so far from the robot that it must be in another unit."""
+    """Raise FileError if a path is so far from the robot that its numbers are probably in another unit."""
     size = float(np.linalg.norm(np.ptp(robot.frame_anchors, axis=0)))
     away = np.linalg.norm(way.pose.position - robot.frame_anchors.mean(axis=0), axis=1)
     k = int(np.argmax(away))
@@ -111,7 +111,7 @@ def check_unit(file: Path, way: MotionPath, robot: Robot) -> None:
 
 
 def _figures(run: ConfirmedRun) -> tuple[Callable[[], Figure | Axes], ...]:
-    """Figures in the order of FIGURES."""
+    """The figures, in the order of FIGURES."""
     from sagline import plot
 
     way = run.plan.path

@@ -1,4 +1,4 @@
-"""`sagline twin`: a simulated machine in real time with servers of its own, until Ctrl-C."""
+"""`sagline twin`: a simulated machine that runs in real time, with one server per PLC, until Ctrl-C."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from sagline.twin.server import Server
 
 LOOK: Final = 0.1  # time between two checks of the PLCs [s]
-LATE: Final = 0.05  # largest delay of a scan without a message [s]
-STATUS: Final = {  # the first applicable text, by the names of `GroupStatus`
+LATE: Final = 0.05  # delay of a scan above which a message is printed [s]
+STATUS: Final = {  # the first text whose bit of `GroupStatus` is set is printed
     "EMERGENCY": "emergency stop",
     "LOCKED": "drums locked",
     "BRAKED": "brakes on",
@@ -63,9 +63,9 @@ def twin(
 ) -> int:
     """Simulate plant, drives and PLCs of a robot in real time, until Ctrl-C.
 
-    Each group of two winches has a PLC, a server with the data blocks of the real one, on consecutive ports from --port
-    on. The PLCs use ROBOT. The log has the true pose of the platform. The first lines show the command
-    that connects a controller; the next lines show the states of the PLCs. Exit code 130 after Ctrl-C.
+    Each group of two winches has a simulated PLC: a server with the data blocks of a real PLC. The servers use
+    consecutive ports from --port on. The PLCs have the values of ROBOT. The log has the true pose of the platform. The
+    first lines show the command that connects a controller; later lines show changes of the PLCs. Exit code 130.
 
     For example:
 
@@ -94,12 +94,12 @@ def twin(
             watch.recorder = stack.enter_context(Recorder(log, real, period=SCAN))
         _greet(name, server, modbus=modbus)
         gc.collect()
-        gc.freeze()  # the garbage collector skips all existing objects, because the loop is in real time
+        gc.freeze()  # the real-time loop is faster if the garbage collector skips all existing objects
         try:
             server.run(watch)
         finally:
             if server.late > LATE:
-                show_note("Note: ", f"This computer was busy: the machine was up to {server.late:.2f} s late.")
+                show_note("Note: ", f"This computer was busy: the twin was up to {server.late:.2f} s late.")
     return 0
 
 
@@ -121,7 +121,7 @@ class TwinMonitor:
     """Observer that prints changes of the PLCs and records the motion of the platform."""
 
     def __init__(self, machine: Machine) -> None:
-        """Watch a machine from its present state."""
+        """Prepare to watch a machine, beginning with its present state."""
         self.recorder: Recorder | None = None
         self._stopped = ""
         self._machine = machine
@@ -129,7 +129,7 @@ class TwinMonitor:
         self._next = 0.0
 
     def __call__(self, time: float, reading: Reading) -> None:
-        """Record the true state after a scan at a time [s], and print all changes."""
+        """Record the true state after the scan at `time` [s], and print all changes of the PLCs."""
         if self.recorder is not None:
             self.recorder.truth(time, reading.position.copy(), reading.quaternion.copy())
         if time >= self._next:
@@ -152,7 +152,7 @@ class TwinMonitor:
 
 
 def _doing(report: Report) -> str:
-    """State of a PLC, in a few words."""
+    """Text of the state of a PLC."""
     from sagline.control.link import GroupStatus, fault_text
 
     state = next((words for name, words in STATUS.items() if report.status & GroupStatus[name]), "not ready")

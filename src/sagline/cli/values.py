@@ -20,20 +20,20 @@ if TYPE_CHECKING:
     from sagline.workspaces.wrench_sets import WrenchSet
 
 LAST_PORT = 65535
-MOST_POSES = 1_000_000  # largest number of poses of a grid
-HEAVIEST = 1e12  # [kg], larger than on any machine, far below overflow
+MOST_POSES = 1_000_000  # largest number of poses on a grid
+HEAVIEST = 1e12  # [kg], larger than on any machine, and far below the overflow of numbers
 
 _KINDS: Final = {"force": "N", "moment": "N m", "linear": "m/s^2", "angular": "rad/s^2"}  # kinds of loads and units
 _SIGN: Final = re.compile(r"\s*(?:±|\+/-|\+-)\s*")
 _SPAN: Final = re.compile(r"(.*?)(?:\.\.|\bto\b)(.*)", re.DOTALL)
-_UNIT: Final = re.compile(r"(?!e[-+]?[0-9])[a-zµ].*", re.IGNORECASE | re.DOTALL)  # not an exponent
+_UNIT: Final = re.compile(r"(?!e[-+]?[0-9])[a-zµ].*", re.IGNORECASE | re.DOTALL)  # an exponent (e3) is not a unit
 _POINTS: Final = re.compile(r"([0-9]{1,4})\s*[x×]\s*([0-9]{1,4})\s*[x×]\s*([0-9]{1,4})")
 _STEP: Final = "Give forces, moments and accelerations with units: --loads '±100 N, ±20 N m'."
-_LONGEST: Final = 200  # largest number of characters of a set of loads or a box
+_LONGEST: Final = 200  # largest number of characters of the text of a set of loads or of a box
 
 
 def quantity(text: str, item: str, unit: str, *, low: float = -np.inf, above: float = -np.inf) -> float:
-    """A number in SI from a text with or without unit, "20" or "20 kg"; at least `low` and greater than `above`."""
+    """A number in SI units from "20" or "20 kg"; it is at least `low` and greater than `above`."""
     number = cast(float, in_si(text, unit, item))
     if abs(number) > HEAVIEST:
         raise InvalidValueError(item, repr(text), f"up to {HEAVIEST:g} {unit}", f"Correct {item}.")
@@ -41,25 +41,25 @@ def quantity(text: str, item: str, unit: str, *, low: float = -np.inf, above: fl
 
 
 def whole_of(text: str, item: str, least: int, most: int) -> int:
-    """A whole number from its digits, from `least` to `most`."""
+    """A whole number between `least` and `most`, from a text of digits."""
     if not re.fullmatch(r"[0-9]{1,20}", text) or not least <= int(text) <= most:
         raise InvalidValueError(item, repr(text), f"a whole number from {least} to {most}", "Choose another.")
     return int(text)
 
 
 def port_of(text: str, item: str) -> int:
-    """A TCP port from its digits; 0 for any free port."""
+    """A TCP port from a text of digits; 0 means any free port."""
     return whole_of(text, item, 0, LAST_PORT)
 
 
 def ratio(text: str, item: str) -> float:
-    """A ratio from 0 on: "0.02" or "2 %"."""
+    """A nonnegative ratio from "0.02" or "2 %"."""
     number, percent = text.strip().removesuffix("%"), text.strip().endswith("%")
     return quantity(number, item, "", low=0.0) / (100.0 if percent else 1.0)
 
 
 def formats_of(text: str, item: str, known: tuple[str, ...]) -> tuple[str, ...]:
-    """Formats of figures from "png, pdf"."""
+    """Formats of figures from a text such as "png, pdf"."""
     found = tuple(dict.fromkeys(part.strip().lower() for part in text.split(",")))
     if not set(found) <= set(known):
         raise InvalidValueError(item, repr(text), ", ".join(known), f"Give one or several: {item} png,pdf.")
@@ -67,14 +67,14 @@ def formats_of(text: str, item: str, known: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def middle_pose(robot: Robot) -> Pose:
-    """Level pose in the middle of a robot's test box; InvalidValueError if it has none."""
+    """Level pose in the middle of a robot's test box; InvalidValueError if the robot has no test box."""
     if robot.test_box is None:
         raise InvalidValueError("--pose", "missing", "X,Y,Z or X,Y,Z,A,B,C", "This robot has no test box.")
     return Pose((robot.test_box.low + robot.test_box.high) / 2, np.eye(3))
 
 
 def robot_with_payload(name: str, payload: float | None) -> Robot:
-    """A robot by its name or file, with a payload [kg]; its inertia grows in proportion."""
+    """The robot of a name or a file, with a payload [kg]; its inertia increases in proportion to its mass."""
     from sagline.files.robot_file import load_robot
 
     robot = load_robot(name)
@@ -84,13 +84,13 @@ def robot_with_payload(name: str, payload: float | None) -> Robot:
 def wrenches_of(text: str, item: str) -> WrenchSet:
     """A set of loads: "±100 N, ±20 N m", "±2 m/s^2", or one wrench from "fx,fy,fz[,mx,my,mz]".
 
-    One number of a kind applies to all axes; three numbers apply to x, y and z.
+    A single force (moment, acceleration) holds for all axes; three numbers hold for x, y and z.
     """
     from sagline.workspaces.wrench_sets import Accelerations, WrenchBox, WrenchPolytope
 
     if len(text) > _LONGEST or not _SIGN.match(text):
         if "±" in text or len(text) > _LONGEST:
-            raise InvalidValueError(item, repr(text), "each with ±, or none", _STEP)
+            raise InvalidValueError(item, repr(text), "all with ±, or all without", _STEP)
         return WrenchPolytope([cast(Any, wrench_of_text(text, item, _STEP))])
     found: dict[str, list[float]] = {kind: [] for kind in _KINDS}
     for part in text.split(","):
@@ -109,7 +109,7 @@ def wrenches_of(text: str, item: str) -> WrenchSet:
 
 
 def _load_of(part: str, item: str) -> tuple[str, float]:
-    """The kind of a load, and its size in SI."""
+    """The kind of a load (force, moment, acceleration) and its size in SI units."""
     sign = _SIGN.match(part)
     if sign is not None and _UNIT.search(part) is not None:
         for kind, unit in _KINDS.items():
@@ -134,7 +134,7 @@ def points_of(text: str, item: str) -> tuple[int, ...]:
 
 
 def box_of(text: str, item: str) -> PoseBox:
-    """A box of level poses from "-2..2, -1..1, 1..3 m"; one number means a plane."""
+    """A box of level poses from "-2..2, -1..1, 1..3 m"; one number instead of a span makes it a plane."""
     step = f'Give x, y and z, each from..to: {item} "-2..2, -1..1, 1..3 m".'
     parts = text.replace("−", "-").split(",")
     if len(parts) != 3 or len(text) > _LONGEST:

@@ -64,9 +64,9 @@ class _Direction(StrEnum):
     ABOUT_Z = "about z"
 
 
-LEAST_SHARE = 0.05  # smallest share of the platform in a printed mode; the file has all modes
+LEAST_SHARE = 0.05  # modes with a smaller share of the platform are not printed; the file has all modes
 COLUMNS = ("mode", "kind", "frequency_hz", "platform_share", "cable", "cable_share", "damping_ratio")
-LOWEST = 3  # number of lowest modes that are always printed
+LOWEST = 3  # number of the lowest modes, which are always printed
 FIGURES = ("frequency", "peak")  # figures of a map
 TABLE, MAP = "-modes.csv", "-vibration-map.nc"
 
@@ -75,7 +75,7 @@ _PointsOption = Annotated[
     Any,
     converted_option(
         "NXxNYxNZ",
-        "Map the lowest frequency and the largest response at this number of poses of the test box.",
+        "Map the lowest frequency and the largest response over the test box, at NXxNYxNZ poses.",
         "points_of",
         "--map",
     ),
@@ -83,12 +83,12 @@ _PointsOption = Annotated[
 _DampingOption = Annotated[
     float,
     converted_option(
-        "RATIO", "Damping ratio of every mode, 0.01 or '1 %', in addition to that of the cables.", "ratio"
+        "RATIO", "Damping ratio of every mode, 0.01 or '1 %', in addition to the damping of the cables.", "ratio"
     ),
 ]
 _AxisOption = Annotated[
     _Direction,
-    choice_option("AXIS", "Force of the response figure", _Direction),
+    choice_option("AXIS", "Axis of the force or moment in the figure of the response", _Direction),
     only_with("--figures"),
     only_without("--map"),
 ]
@@ -98,13 +98,13 @@ def vibrate(
     name: RobotArgument,
     pose: Annotated[PoseOption, only_without("--map")] = None,
     points: _PointsOption = None,
-    up_to: Annotated[float, quantity_option("HZ", "All modes below this frequency are found.", "Hz", above=0.0)] = 20,
+    up_to: Annotated[float, quantity_option("HZ", "Find all modes below this frequency.", "Hz", above=0.0)] = 20,
     damping: _DampingOption = 0.01,
     loss_time: LossTimeOption = None,
     air_damping: AirDampingOption = 0,
     axis: _AxisOption = _Direction.X,
     film: Annotated[
-        int | None, option("MODE", "Write a film of this mode, ten seconds, as GIF."), only_without("--map")
+        int | None, option("MODE", "Write an animation of this mode, ten seconds, as GIF."), only_without("--map")
     ] = None,
     tension: TensionOption = Tension.CLOSEST,
     wrench: Annotated[WrenchOption, only_without("--map")] = None,
@@ -116,11 +116,11 @@ def vibrate(
     write_table: Annotated[TableOption, only_without("--map")] = True,
     as_json: JsonOption = False,
 ) -> int:
-    """Find all natural frequencies of a pose: those of the platform and those of the cables as strings.
+    """Find all natural frequencies at a pose: the platform's, and those of the cables, which vibrate as strings.
 
-    The table shows the platform's share of each mode, the cable with the largest share, and the frequencies of
-    massless cables. DIR/ROBOT-modes.csv has all modes. The figure shows the response to a force with and without cable
-    mass. Exit code 1 if the pose is not feasible or no stable equilibrium.
+    The table shows, for each mode, the platform's share and the cable with the largest share, and the frequencies with
+    massless cables. DIR/ROBOT-modes.csv has all modes. The figure shows the response to a force, with and without
+    cable mass. Exit code 1 if the pose is not feasible or is not a stable equilibrium.
 
     For example:
 
@@ -194,12 +194,12 @@ def _verdict(found: Vibration, modes: list[ListedMode]) -> str:
 
     frequency = [mode.frequency for mode in modes if mode.kind == WITH_MASS]
     lowest = f", the lowest at {min(frequency):.3f} Hz" if frequency else ""
-    proof = "the list is complete by the exact count" if found.complete else "some may be missing"
+    proof = "the list is complete, because an exact count agrees" if found.complete else "some may be missing"
     return f"{counted(len(frequency), 'mode')} with cable mass below {found.up_to:g} Hz{lowest}; {proof}."
 
 
 def _tell(found: Vibration, modes: list[ListedMode], state: Equilibrium) -> None:
-    """Print the table; each massless mode is in the row of the mode most similar to it."""
+    """Print the table; a massless mode is in the row of the mode that is most similar to it."""
     from sagline.dynamics.vibration.mode_list import MASSLESS, WITH_MASS, mode_correlation
 
     swinging = [mode for mode in modes if mode.kind == WITH_MASS]
@@ -248,7 +248,7 @@ def _tell(found: Vibration, modes: list[ListedMode], state: Equilibrium) -> None
         higher = ", ".join(number_text(frequency, ".3f") for frequency in beyond)
         show_text(f"Massless modes above this frequency: {higher} Hz")
     else:
-        show_text("Each massless frequency is in the row of the mode with most of its motion.")
+        show_text("A massless frequency is in the row of the mode whose motion is most similar.")
 
 
 def _numbers(mode: ListedMode) -> tuple[Any, ...]:
@@ -278,7 +278,7 @@ def _vibrate_in_box(
     *,
     as_json: bool,
 ) -> int:
-    """Compute, write and draw the map over the test box; returns the exit code."""
+    """Compute, write and draw the maps over the test box; returns the exit code."""
     from sagline.dynamics.vibration.frequency_map import frequency_map
 
     poses = _grid(robot, points)
@@ -306,7 +306,7 @@ def _vibrate_in_box(
 
 
 def _grid(robot: Robot, points: Sequence[int]) -> Pose:
-    """Level poses on an even grid over the test box; an axis with one point has its middle."""
+    """Level poses on an even grid over the test box; an axis with a single point has it in the middle."""
     from sagline.robot.pose import Pose
 
     box = robot.test_box
@@ -321,7 +321,7 @@ def _grid(robot: Robot, points: Sequence[int]) -> Pose:
 
 
 def _table_of_map(found: FrequencyMap) -> TextTable:
-    """Minimum and maximum of each quantity, and their positions."""
+    """Minimum and maximum of each quantity, each with its position."""
     rows = []
     for label, values, form in (
         ("lowest, with cable mass [Hz]", found.frequency, ".3f"),

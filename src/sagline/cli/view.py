@@ -41,7 +41,7 @@ _RobotOption = Annotated[
     str,
     argument(
         "ROBOT",
-        "A preset (see sagline robots) or a robot file, robot.yaml; a log of the controller, run.mcap; or a "
+        "A preset (see sagline robots), a robot file, robot.yaml, a log of the controller, run.mcap, or a "
         "calibration, found.nc.",
         robot_completions,
     ),
@@ -55,10 +55,11 @@ _RunOption = Annotated[
     ),
 ]
 _BesideOption = Annotated[
-    Path | None, option("RUN", "Another run of the same robot, shown as a ghost with the same clock.")
+    Path | None, option("RUN", "Another run of the same robot, shown as a ghost at the same time.")
 ]
 _TruthOption = Annotated[
-    Path | None, option("TWIN.mcap", "With a log: the log of the twin, with the true pose of the platform.")
+    Path | None,
+    option("TWIN.mcap", "For a log of the controller: the log of the twin, which has the true pose of the platform."),
 ]
 _AllowHostOption = Annotated[
     list[str] | None,
@@ -74,25 +75,27 @@ def view(
     truth: _TruthOption = None,
     pose: PoseOption = None,
     mode: Annotated[
-        str | None, option("NUMBER", "Natural mode to animate at the start: 1, 2, ...; 'massless 1'.")
+        str | None,
+        option("NUMBER", "Natural mode to animate at the start: 1, 2, ..., or 'massless 1' for massless cables."),
     ] = None,
     wrench: WrenchOption = None,
     payload: PayloadOption = None,
     host: HostOption = "127.0.0.1",
     port: PortOption = 8080,
     token: Annotated[
-        bool, flag("Answer only requests with the token of the printed address.", "--token/--no-token")
+        bool, flag("Accept only requests with the token in the printed address.", "--token/--no-token")
     ] = True,
     clients: Annotated[
-        int, converted_option("NUMBER", "Largest number of open pages.", "whole_of", least=1, most=1000)
+        int,
+        converted_option("NUMBER", "Largest number of pages open at the same time.", "whole_of", least=1, most=1000),
     ] = 32,
     allow_host: _AllowHostOption = None,
-    browser: Annotated[bool, flag("Open it in a browser here.", "--browser/--no-browser")] = True,
+    browser: Annotated[bool, flag("Open the page in a browser on this machine.", "--browser/--no-browser")] = True,
 ) -> int:
     """Show a robot in the browser; its platform can be dragged, and the cables follow.
 
-    Only the printed address opens the page. Over SSH, forward the port (`ssh -L 8080:localhost:8080 ...`) and open the
-    printed address at home.
+    Only the printed address opens the page. Over SSH, forward the port (`ssh -L 8080:localhost:8080 ...`), and open
+    the printed address on the computer in front of you.
 
     For example:
 
@@ -139,7 +142,7 @@ def view(
 
 
 def _check_cable_count(robot: Robot) -> None:
-    """Refuse an underconstrained platform, for which the page has no margin and no polygon."""
+    """Reject an underconstrained platform, for which the page would have no margin and no polygon."""
     if robot.cable_count < robot.degrees_of_freedom:
         allowed = f">= {robot.degrees_of_freedom} for {robot.motion_pattern}"
         step = "Draw its motion with sagline track, or record a simulation."
@@ -147,7 +150,7 @@ def _check_cable_count(robot: Robot) -> None:
 
 
 def view_robot(robot: Robot, name: str | Path, address: ServerAddress, mass: float | None = None, **start: Any) -> int:
-    """Serve a robot, with its mass if it has a payload [kg], until Ctrl-C; returns the exit code."""
+    """Serve a robot with a payload [kg] until Ctrl-C; returns the exit code."""
     _check_cable_count(robot)
     serve, Source = _viewer()
     if start.get("mode"):
@@ -189,7 +192,7 @@ def view_log(
     truth: Path | None = None,
     beside: Path | None = None,
 ) -> int:
-    """Serve a log of the controller, `live` while it grows, until Ctrl-C; returns the exit code."""
+    """Serve a log of the controller until Ctrl-C; `live`: follow a growing log. Returns the exit code."""
     from sagline.files.robot_file import load_robot
 
     serve, Source = _viewer()
@@ -214,7 +217,7 @@ def view_log(
 
 
 def played_in(robot: Robot, file: Path) -> Played:
-    """The run, simulation or log in a file of a robot; FileError if it belongs to another robot."""
+    """The run, simulation or log of a robot in a file; FileError if the file belongs to another robot."""
     from sagline.files.netcdf import is_of
     from sagline.files.plan_file import load_plan
     from sagline.files.simulation_file import FORMAT, load_simulation
@@ -238,7 +241,7 @@ def played_in(robot: Robot, file: Path) -> Played:
 
 
 def played_beside(robot: Robot, first: Path, second: Path) -> Beside:
-    """The second run of a robot, played beside the first; both are named by their files."""
+    """The second run of a robot, to be played together with the first; the names of both are those of their files."""
     from sagline.viewer.player import Beside
 
     names = (first.name, second.name) if first.name != second.name else (str(first), str(second))
@@ -246,14 +249,14 @@ def played_beside(robot: Robot, first: Path, second: Path) -> Beside:
 
 
 def _check_robot(file: Path, kind: str, made_for: Robot, robot: Robot, *, alone: bool = False) -> None:
-    """Raise FileError for a file of another robot; the next step names the file only, or the file and the robot."""
+    """Raise FileError for a file of another robot; the next step is the command that views this file."""
     if made_for.name != robot.name:
         step = f"View it as: sagline view {file if alone else f'{made_for.name} {file}'}"
         raise FileError(file, f"is a {kind} of {made_for.name}, not of {robot.name}", step)
 
 
 def _first_session(follower: LogFollower, logs: list[Path], *, live: bool) -> PlayedLog:
-    """Cycles in a log; for live logs, waits until all logs have begun and contain a cycle."""
+    """Cycles in a log; for a growing log, waits until all logs exist and contain a cycle."""
     from sagline.files.mcap_reader import has_begun
 
     while live and not all(map(has_begun, logs)):
@@ -290,7 +293,7 @@ def _following(follower: LogFollower, viewer: Page) -> Iterator[None]:
 
 
 def _viewer() -> tuple[Callable[..., int], type[Source]]:
-    """The server of the viewer and the sources of its pages; FileError if its packages are missing."""
+    """The modules of the viewer's server and of its pages; FileError if packages of the viewer are missing."""
     from sagline.cli import hosting
 
     hosting.check_viewer()
@@ -316,7 +319,7 @@ def _mode(text: str | None) -> str:
 
 
 def _check_mode(robot: Robot, pose: Pose | None, mode: str, wrench: Any) -> None:
-    """Refuse a mode that is not in the list at the first pose of the page; where there is no list the page says why."""
+    """Reject a mode that the list at the first pose lacks; if there is no list, the page states the reason."""
     from sagline.dynamics.vibration.vibration import VibrationStatus, vibration
     from sagline.kinematics.inverse import inverse
     from sagline.robot.reach import home_pose
@@ -326,4 +329,4 @@ def _check_mode(robot: Robot, pose: Pose | None, mode: str, wrench: Any) -> None
     found = vibration(inverse(robot, home_pose(robot) if pose is None else pose, wrench=wrench).state, up_to=UP_TO)
     if found.status is VibrationStatus.SOLVED and mode_of(found, mode) is None:
         allowed = f"{range_of_modes(found)}, below {UP_TO:g} Hz"
-        raise InvalidValueError("--mode", repr(mode), allowed, "Choose one of the list on the page.")
+        raise InvalidValueError("--mode", repr(mode), allowed, "Choose a mode of the list on the page.")

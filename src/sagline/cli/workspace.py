@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from sagline.workspaces.proof import Proof
     from sagline.workspaces.space import Limit, Workspace
 
-MOST_LIMITS = 12  # largest number of printed limits
+MOST_LIMITS = 12  # largest number of limits that are printed
 LoadsOption = Annotated[
     Any,
     converted_option(
@@ -52,7 +52,7 @@ LoadsOption = Annotated[
 
 
 def _criteria(robot: str, limits: dict[str, float | None], scene: str | None, *, in_frame: bool) -> list[Criterion]:
-    """The criteria of the options; without --scene the scene of the robot file is used."""
+    """The criteria that the options state; without --scene, the scene of the robot file is used."""
     from sagline.workspaces.criteria import (
         Clearance,
         InFrame,
@@ -74,7 +74,7 @@ def _criteria(robot: str, limits: dict[str, float | None], scene: str | None, *,
 
 
 def _obstacles(robot: str, scene: str | None) -> tuple[Obstacle, ...]:
-    """Obstacles of --scene, a robot file or a mesh file, at least one; without it those of the robot, if any."""
+    """The obstacles of --scene (a robot file or a mesh file), at least one; without --scene, those of the robot."""
     from sagline.files.mesh_file import load_mesh
     from sagline.files.robot_file import load_scene
     from sagline.robot.catalogue import robot_names
@@ -92,36 +92,39 @@ def _obstacles(robot: str, scene: str | None) -> tuple[Obstacle, ...]:
 _TiltOption = Annotated[
     float,
     quantity_option(
-        "ANGLE", "The platform has to tilt by this angle about any axis, '10deg'. Default: level.", "rad", low=0.0
+        "ANGLE",
+        "Angle by which the platform must be able to tilt about any axis, '10deg'. Default: the platform is level.",
+        "rad",
+        low=0.0,
     ),
 ]
 _BoxOption = Annotated[
     Any,
     converted_option("BOX", "Box of positions: '-2..2, -1..1, 1..3 m'. Default: the robot's frame.", "box_of"),
 ]
-_ReserveOption = Annotated[
-    float | None, quantity_option("FORCE", "Least capacity margin at all poses [N].", "N", low=0.0)
+_ReserveOption = Annotated[float | None, quantity_option("FORCE", "Least allowed capacity margin [N].", "N", low=0.0)]
+_MaxSagOption = Annotated[
+    float | None, quantity_option("LENGTH", "Largest allowed sag of a cable, '5 cm'.", "m", above=0.0)
 ]
-_MaxSagOption = Annotated[float | None, quantity_option("LENGTH", "Largest sag of a cable, '5 cm'.", "m", above=0.0)]
 _MinStiffnessOption = Annotated[
-    float | None, quantity_option("NUMBER", "Least translational stiffness [N/m].", "N/m", above=0.0)
+    float | None, quantity_option("NUMBER", "Least allowed translational stiffness [N/m].", "N/m", above=0.0)
 ]
 _MinFrequencyOption = Annotated[
-    float | None, quantity_option("HZ", "Least natural frequency with massless cables.", "Hz", above=0.0)
+    float | None, quantity_option("HZ", "Least allowed natural frequency, with massless cables.", "Hz", above=0.0)
 ]
 _ClearanceOption = Annotated[
     float | None,
-    quantity_option("LENGTH", "Least distance of cables, platform and obstacles, '3 cm'.", "m", above=0.0),
+    quantity_option("LENGTH", "Least allowed distance between cables, platform and obstacles, '3 cm'.", "m", above=0.0),
 ]
 _SceneOption = Annotated[
     str | None,
-    option("FILE", "With --clearance: a robot file with a scene, or a mesh in meters. Default: the robot's scene."),
+    option("FILE", "Obstacles for --clearance: a robot file or a mesh in meters. Default: the robot's scene."),
     only_with("--clearance"),
 ]
 
 
 class HullName(StrEnum):
-    """Hulls of a workspace."""
+    """Hulls of a workspace: from the exact margin, or from its lower (inner) or upper bound (outer)."""
 
     EXACT = "exact"
     INNER = "inner"
@@ -132,7 +135,7 @@ _ToProveOption = Annotated[
     Any, converted_option("BOX", "Prove that all poses of this box are feasible.", "box_of", "--prove")
 ]
 _BudgetOption = Annotated[
-    float, quantity_option("TIME", "With --prove: time for the proof [s].", "s", above=0.0), only_with("--prove")
+    float, quantity_option("TIME", "Largest time for the proof of --prove [s].", "s", above=0.0), only_with("--prove")
 ]
 
 
@@ -148,13 +151,13 @@ def workspace(
     min_frequency: _MinFrequencyOption = None,
     clearance: _ClearanceOption = None,
     scene: _SceneOption = None,
-    in_frame: Annotated[bool, flag("The whole platform stays within the frame.", "--in-frame")] = False,
+    in_frame: Annotated[bool, flag("Require that the whole platform is within the frame.", "--in-frame")] = False,
     to_prove: _ToProveOption = None,
     budget: _BudgetOption = 10,
     cells: Annotated[int, option("NUMBER", "Cells of the grid along the longest edge of the box.")] = 32,
     hull: Annotated[
         HullName,
-        option("HULL", "exact; or inner or outer, by the lower or the upper bound of the margin.", "--hull"),
+        option("HULL", "Hull from the exact margin, or from its lower (inner) or upper bound (outer).", "--hull"),
     ] = HullName.EXACT,
     model: ModelOption = ModelName.CATENARY,
     folder: OutOption = Path("output"),
@@ -164,11 +167,11 @@ def workspace(
     table: TableOption = False,
     as_json: JsonOption = False,
 ) -> int:
-    """Find the workspace of a robot: its volume with an error bar, and the limits at its boundary.
+    """Find the workspace of a robot: its volume with an error bar, and the criteria that limit it.
 
-    A pose belongs to it if the sagging cables can balance all loads with tensions within their limits. DIR has the
-    workspace in NetCDF, its hull in GLB, and figures. Exit code 1 if it is empty, with the nearest pose, or if the box
-    of --prove is not proved completely.
+    A pose belongs to the workspace if the sagging cables can balance all loads with tensions within their limits. DIR
+    has the workspace in NetCDF, its hull in GLB, and figures. Exit code 1 if the workspace is empty (then the pose
+    closest to feasible is printed), or if the box of --prove is not proved completely.
 
     For example:
 
@@ -192,8 +195,8 @@ def workspace(
         "clearance": clearance,
     }
     cable = model.build()
-    if tilt > pi:  # the user may have meant degrees, but a number without unit is in radians
-        step = "Give its unit, --tilt 10deg: no rotation turns by more than half a turn."
+    if tilt > pi:  # a number without unit is in radians, but the user may have meant degrees
+        step = "Give the angle with its unit, --tilt 10deg; it cannot be more than half a turn."
         raise InvalidValueError("--tilt", f"{tilt:g} rad", "0 to 180deg", step)
     robot = robot_with_payload(name, payload)
     criteria = _criteria(name, limits, scene, in_frame=in_frame)
@@ -225,7 +228,7 @@ def workspace(
 
                 line.stage("drawing")
                 output.draw(lambda: plot.workspace(space))
-                if space.unit == "m³":  # for a plane, the first figure is the slice
+                if space.unit == "m³":  # for a plane, the first figure is the slice through the workspace
                     output.draw(lambda: plot.slice(space))
         if table:
             rows = [[limit.criterion, "" if limit.cable < 0 else limit.cable, limit.share] for limit in space.limits]

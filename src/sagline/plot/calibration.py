@@ -30,21 +30,21 @@ if TYPE_CHECKING:
     from sagline.core.arrays import Array
 
 PARTS: Final = ("all", "residuals", "correlation", "errors")
-BANDS: Final = ((2.0, 0.35), (1.0, 0.55))  # half widths of the bands in standard deviations, and opacity
-REACH: Final = 5.0  # [standard deviations], larger residuals are drawn at the edge
-MOST_POSES: Final = 1500  # largest number of drawn poses; of more, evenly chosen ones and all outliers
-MOST_NAMED: Final = 8  # largest number of named outliers
-POINTS: Final = 25  # points along each side of a map
+BANDS: Final = ((2.0, 0.35), (1.0, 0.55))  # for each band, its half width in standard deviations and its opacity
+REACH: Final = 5.0  # largest residual on the axis [standard deviations]; larger ones are drawn at the edge
+MOST_POSES: Final = 1500  # largest number of drawn poses; a longer log has an even selection and all outliers
+MOST_NAMED: Final = 8  # largest number of outliers with a name
+POINTS: Final = 25  # number of points along each side of a map
 MARKS: Final = ("o", "s", "^", "D")
-PANEL, MATRIX, BESIDE, MAP = 1.3, 3.8, 1.2, 2.7  # [in]: heights of panel and matrix, extra height and width of a map
-LINE: Final = 1.3 / 72.0 / (0.75 * MATRIX)  # height of a name of 1 pt next to the matrix, as a share of its height
+PANEL, MATRIX, BESIDE, MAP = 1.3, 3.8, 1.2, 2.7  # heights of panel and matrix; extra height and width of a map [in]
+LINE: Final = 1.3 / 72.0 / (0.75 * MATRIX)  # height of a name in a font of 1 pt, as a share of the matrix's height
 LEADER: Final[dict[str, Any]] = {"arrowstyle": "-", "linewidth": 0.5, "relpos": (1.0, 0.5), "shrinkB": 0.0}
 ROUND: Final = FuncFormatter(lambda value, _: f"{value:g}")
 PER_METER: Final = 1e3  # [mm]
 
 
 class _Kind(NamedTuple):
-    """Residuals of one kind: label of the axis, values in standard deviations (N, c), columns, and name of outliers."""
+    """Residuals of one kind: axis label, values (N, c) in standard deviations, columns, and word for the outliers."""
 
     label: str
     values: Array
@@ -57,13 +57,13 @@ def calibration(found: Calibration, part: str = "all", *, height: float | None =
 
     Residuals are in standard deviations of their sensors, in the order of the rows of the log. The bands are one and
     two standard deviations wide. Outliers have a ring, and values off the scale are triangles at the edge. The
-    correlations are those of all estimated parameters, grouped by kind. The maps show the expected position error on a
-    level slice, before (from the priors) and after the calibration. They exclude translations and rotations of the
-    world if these are not observable.
+    correlation matrix has all estimated parameters, grouped by kind. The maps show the expected position error on a
+    level slice, before (from the priors) and after the calibration. Translations and rotations of the world do not
+    count in the maps if the readings do not observe them.
 
     Args:
         found: From `calibrate`.
-        part: "residuals", "correlation" or "errors"; "all" for all of them.
+        part: "residuals", "correlation" or "errors"; "all" for these three parts.
         height: Height of the slice [m]; None for the middle of the calibration's poses.
 
     Returns:
@@ -99,7 +99,7 @@ def calibration(found: Calibration, part: str = "all", *, height: float | None =
 
 
 def _kinds(found: Calibration) -> list[_Kind]:
-    """The residuals of the readings, by kinds."""
+    """The residuals, grouped by the kind of reading."""
     sensors, m = found.sensors, found.robot.cable_count
     cables, axes = tuple(f"cable {k}" for k in range(m)), ("$x$", "$y$", "$z$")
     spans = (
@@ -116,7 +116,7 @@ def _kinds(found: Calibration) -> list[_Kind]:
 
 
 def _residuals(figure: SubFigure, found: Calibration) -> None:
-    """A panel for each kind."""
+    """Draw a panel for each kind of reading."""
     kinds = _kinds(found)
     panels = figure.subplots(len(kinds), 1, sharex=True, squeeze=False)[:, 0]
     held = np.isin(found.rows, [outlier.row for outlier in found.outliers])
@@ -151,7 +151,7 @@ def _residuals(figure: SubFigure, found: Calibration) -> None:
 
 
 def _mark_outliers(ax: Axes, found: Calibration, kind: _Kind) -> None:
-    """Mark outliers by a ring, with cable and size."""
+    """Mark each outlier by a ring, and write its cable and its size."""
     named = 0
     for outlier in found.outliers:
         if outlier.quantity != kind.quantity:
@@ -171,7 +171,7 @@ def _mark_outliers(ax: Axes, found: Calibration, kind: _Kind) -> None:
 
 
 def _correlation(figure: SubFigure, found: Calibration) -> None:
-    """The correlation matrix with lines between kinds, and their names."""
+    """Draw the correlation matrix, with lines between the kinds of parameters, and the names of the kinds."""
     ax = figure.subplots()
     ax.set_facecolor(GAP_COLOR)
     image = ax.imshow(found.correlation, vmin=-1.0, vmax=1.0, cmap="PuOr_r", interpolation="nearest", rasterized=True)
@@ -194,7 +194,7 @@ def _correlation(figure: SubFigure, found: Calibration) -> None:
 
 
 def _apart(places: Array, least: float, end: float) -> Array:
-    """Ascending positions between 0 and an end, moved apart to a minimum distance."""
+    """Ascending positions between 0 and `end`, moved apart so that they keep a minimum distance."""
     moved = np.array(places)
     for k in range(1, len(moved)):
         moved[k] = max(moved[k], moved[k - 1] + least)
@@ -205,7 +205,7 @@ def _apart(places: Array, least: float, end: float) -> Array:
 
 
 def _errors(figure: SubFigure, found: Calibration, at: float | None) -> None:
-    """Maps of the expected errors before and after."""
+    """Draw maps of the expected errors before and after the calibration."""
     x, y, z = _slice(found, at)
     grid = np.stack(np.meshgrid(x, y, [z], indexing="ij"), axis=-1).reshape(-1, 3)
     poses = Pose(grid, np.eye(3))
@@ -230,7 +230,7 @@ def _errors(figure: SubFigure, found: Calibration, at: float | None) -> None:
     bar = color_bar(shown, list(panels), label, shrink=0.85, pad=0.02, format=ROUND)
     bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     bar.ax.yaxis.set_minor_locator(NullLocator())
-    without = ", without shift and turn of the world" if own else ""
+    without = ", without translation and rotation of the world" if own else ""
     set_heading(figure, f"at z = {n(z, '.3g', 'm')}{without}; dots: poses of the log")
 
 
@@ -242,7 +242,7 @@ def _height_of_maps(found: Calibration) -> float:
 
 
 def _before(found: Calibration) -> Calibration:
-    """The robot before the calibration, with its priors."""
+    """The state before the calibration: uncalibrated robot, prior values and prior deviations."""
     numbers = found.parameters
     return replace(
         found, robot=found.before, values=numbers.prior, covariance=locked(np.diag(numbers.prior_deviation**2))
@@ -250,7 +250,7 @@ def _before(found: Calibration) -> Calibration:
 
 
 def _slice(found: Calibration, at: float | None) -> tuple[Array, Array, float]:
-    """Coordinates of a level grid over the robot's poses, or over the poses of the log."""
+    """Coordinates of a level grid over the robot's test box, or over the poses of the log."""
     low, high = found.poses.position.min(axis=0), found.poses.position.max(axis=0)
     box = found.robot.test_box
     if box is not None:

@@ -45,19 +45,19 @@ AZIMUTH, ELEVATION = np.radians(-60.0), np.radians(24.0)
 USUAL: Final = view_axes(float(AZIMUTH), float(ELEVATION))
 FRAME, GROUND, BODY, WHEEL = "0.45", (0.5, 0.5, 0.5, 0.12), (0.835, 0.369, 0.0, 0.16), "0.4"
 CABLE_WIDTH, FRAME_WIDTH, BODY_WIDTH, THIN, GAP = 1.2, 0.7, 1.1, 0.6, 1.3  # line widths [pt]
-SPECK: Final = 1.5  # shorter pieces of a line between two gaps are omitted [pt]
-SPARE: Final = 0.05  # margin as a share of the picture
+SPECK: Final = 1.5  # pieces of a line between two gaps are omitted if they are shorter [pt]
+SPARE: Final = 0.05  # margin around the drawing, as a share of the picture
 LEAST, MOST = 0.35, 1.1  # smallest and largest ratio of height to width
-PLACES: Final = np.linspace(0.12, 0.72, 31)  # positions of the number along a cable, from the frame
-BESIDE, ROOM = 0.8, 0.8  # distances of a number from its cable and from other lines, in text sizes
-CLEAR = 1.15  # distance of a number beside its cable from other lines, in text sizes
+PLACES: Final = np.linspace(0.12, 0.72, 31)  # positions for the number along a cable, from the frame end, 0 to 1
+BESIDE, ROOM = 0.8, 0.8  # distances of a number from its own cable and from other lines, in text sizes
+CLEAR = 1.15  # distance from other lines, in text sizes, of a number that is next to its cable
 FROM_ANCHOR = 1.6  # distance of a number from the frame end, in text sizes
 ARROW: Final = 0.16  # largest length of the axes, as a share of the picture's width
 END_ON: Final = 0.12  # an axis that appears shorter than this share of its length has no name
 
 
 class _Stroke(NamedTuple):
-    """A line of the drawing: points in the world (P, 3) [m], style, width [pt], True if it hides lines behind it."""
+    """A line of the drawing: points in the world (P, 3) [m], style, width [pt]; True if it hides lines behind it."""
 
     points: Array
     color: Any
@@ -75,9 +75,9 @@ def drawing(
 ) -> Axes:
     """The robot at rest as a line drawing for print, with hidden lines removed.
 
-    Hidden parts are computed instead of painted over. A cable is interrupted where it passes behind another cable, the
-    frame or the platform. Every cable has its number and the color of its chord tension. The projection is parallel;
-    the three axes at the ground have equal lengths, and this length is written next to them.
+    The drawing contains only the visible parts of lines. A cable is interrupted where it passes behind another cable,
+    the frame or the platform. Every cable has its number and the color of its chord tension. The projection is
+    parallel. The three axes at the ground have equal lengths, and this length is written next to them.
 
     Args:
         robot: The robot.
@@ -109,7 +109,7 @@ def drawing(
 
 
 def draw_at_rest(robot: Robot, where: Pose, plan: Plan | None, view: Array = USUAL, ax: Axes | None = None) -> Axes:
-    """The robot at a pose, with its tensions if they are known."""
+    """Draw the robot at a pose; the cables have the colors of their tensions if these are known."""
     held, scale = plan is not None and bool(plan.feasible), TensionScale.of(robot)
     tension = plan.chord_tension if plan is not None else np.full(len(robot.frame_anchors), np.nan)
     courses = catenary_points(robot, where, plan) if plan is not None and held else straight_points(robot, where)
@@ -118,13 +118,13 @@ def draw_at_rest(robot: Robot, where: Pose, plan: Plan | None, view: Array = USU
     if held:
         tension_bar(ax, scale, tension, "right")
     elif plan is not None:
-        ax.set_title("no tensions within the limits balance the platform here", fontsize=current().label)
+        ax.set_title("no tensions within the limits balance the platform at this pose", fontsize=current().label)
     _draw(ax, scene, view)
     return ax
 
 
 class _Scene(NamedTuple):
-    """Geometry of the drawing in world axes; faces of the platform (6, 4, 3) have their corners in order."""
+    """Geometry of the drawing in world axes; the corners of each face of the platform (6, 4, 3) are in order."""
 
     cables: list[_Stroke]
     others: list[_Stroke]
@@ -133,7 +133,7 @@ class _Scene(NamedTuple):
 
     @classmethod
     def of(cls, robot: Robot, where: Pose, courses: Array, colors: Array, *, dashed: bool) -> _Scene:
-        """The robot with its platform at a pose."""
+        """Geometry of the robot with the platform at a pose."""
         style = (0, (3.0, 2.0)) if dashed else "-"
         cables = [
             _Stroke(course, color, CABLE_WIDTH, style, covers=True)
@@ -151,12 +151,12 @@ class _Scene(NamedTuple):
 
     @property
     def points(self) -> Array:
-        """All points, shape (n, 3)."""
+        """All points of the geometry [m], shape (n, 3)."""
         return np.concatenate([stroke.points for stroke in (*self.cables, *self.others)] + [self.flat[0]])
 
 
 def _axes(ax: Axes | None, scene: _Scene, view: Array, *, bar: bool) -> Axes:
-    """Axes with one scale whose limits fit the picture."""
+    """Axes with equal scales, whose limits fit the picture."""
     low, high = (end(scene.points @ view[:2].T, axis=0) for end in (np.min, np.max))
     spare = SPARE * float((high - low).max())
     low, high = low - spare, high + spare
@@ -173,7 +173,7 @@ def _axes(ax: Axes | None, scene: _Scene, view: Array, *, bar: bool) -> Axes:
 
 
 def _draw(ax: Axes, scene: _Scene, view: Array) -> None:
-    """Draw everything with the visible parts of its lines, at the size on paper."""
+    """Draw the visible parts of all lines; widths and gaps are computed for the size on paper."""
     figure: Any = ax.get_figure(root=True)
     figure.draw_without_rendering()
     point = float(np.ptp(ax.get_xlim())) / (ax.bbox.width / figure.dpi * 72.0)  # [m]
@@ -217,7 +217,7 @@ def _seen_from_outside(face: Array) -> bool:
 
 
 def _number_positions(cables: Sequence[Array], courses: Sequence[Array], size: float) -> list[Array]:
-    """Positions of the cable numbers: on the cable, or next to it if another cable is too close."""
+    """Positions of the cables' numbers: on the cable, or next to the cable if another cable is too close."""
     starts = np.concatenate([course[:-1] for course in courses])
     steps = np.concatenate([course[1:] for course in courses]) - starts
     owners = np.repeat(np.arange(len(courses)), [len(course) - 1 for course in courses])
@@ -231,7 +231,7 @@ def _number_positions(cables: Sequence[Array], courses: Sequence[Array], size: f
         candidates = np.concatenate((on, on + across, on - across))
         other = owners != k
         beside = np.arange(len(candidates)) >= len(on)
-        space = np.where(beside, CLEAR, ROOM) * size  # so that its own cable is the nearest
+        space = np.where(beside, CLEAR, ROOM) * size  # the number's own cable must be the nearest
         free = np.minimum(_distances(candidates, starts[other], steps[other]) / space, 1.0)
         free = np.minimum(free, np.linalg.norm(candidates - cable[0], axis=1) / (FROM_ANCHOR * size))
         for place in chosen:
@@ -251,13 +251,13 @@ def _distances(points: Array, starts: Array, steps: Array) -> Array:
 
 
 def _label_boxes(places: Sequence[Array], size: float) -> list[Array]:
-    """Boxes that lines leave free around numbers, corners (4, 2) in order."""
+    """Boxes around numbers in which no line is drawn; each has its corners (4, 2) in order."""
     corners = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
     return [place + corners * (0.35 * size * len(str(k)) + 0.1 * size, 0.55 * size) for k, place in enumerate(places)]
 
 
 def _free_axes(occupied: Array, view: Array, limits: Array, size: float) -> tuple[Array, Array, str]:
-    """World axes in the emptiest corner of the picture; their position has no meaning."""
+    """Draw the directions of the world axes in the emptiest corner of the picture."""
     width = float(np.ptp(limits[0]))
     decade = 10.0 ** floor(log10(ARROW * width))
     length = max(step * decade for step in (1.0, 2.0, 5.0) if step * decade <= ARROW * width)
@@ -271,7 +271,7 @@ def _free_axes(occupied: Array, view: Array, limits: Array, size: float) -> tupl
 
 
 def _draw_axes(ax: Axes, start: Array, ends: Array, length: str, look: Style) -> None:
-    """Three arrows with their names, and their length."""
+    """Draw three arrows with their names, and write their length."""
     longest = float(np.linalg.norm(ends - start, axis=1).max())
     arrow: dict[str, Any] = {"arrowstyle": "-|>", "mutation_scale": 5.0 * look.line, "linewidth": 0.6 * look.line}
     arrow |= {"color": "black", "shrinkA": 0.0, "shrinkB": 0.0}

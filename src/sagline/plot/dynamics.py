@@ -47,18 +47,18 @@ if TYPE_CHECKING:
 
     from sagline.core.arrays import Array
 
-AT_REST = 1e-7  # smallest range of the energies that the axis shows, as a share of the potential energy
-THIN, WIDE = 0.6, 3.6  # width of a mode of the cables only, and of the platform only [pt]
+AT_REST = 1e-7  # smallest range of the energy axis, as a share of the potential energy
+THIN, WIDE = 0.6, 3.6  # line width if only the cables move, and if only the platform moves [pt]
 FAINT = 0.4  # opacity of thin lines
-SHARES = (1.0, 0.5, 0.0)  # platform shares in the legend
+SHARES = (1.0, 0.5, 0.0)  # platform shares that the legend shows
 PANELS: Final = {6: 3, 4: 2, 3: 3, 2: 2, 1: 1}  # number of heights -> panels per row, so that no panel is empty
-HIGHEST, LOWEST = 2e2, 1e-3  # limits relative to the static response, because undamped peaks and zeros are unbounded
-MARK = 0.035  # longest mark of a mode, as a share of the axes' height
+HIGHEST, LOWEST = 2e2, 1e-3  # limits of the axis relative to the static response; undamped curves have none
+MARK = 0.035  # length of the longest mark of a mode, as a share of the axes' height
 FAINTEST = 0.15  # opacity of the mark of a mode without platform motion
 
 
 def energy(simulation: Simulation) -> Figure:
-    """Kinetic and potential energy, work supplied and energy lost over time, and the error of the balance below.
+    """Kinetic and potential energy, supplied work and lost energy over time; below, the error of the energy balance.
 
     The potential energy is drawn minus its initial value.
 
@@ -79,7 +79,7 @@ def energy(simulation: Simulation) -> Figure:
     figure = sheet(height=4.2)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.4, 1.0))
     rise = balance.potential - balance.potential[0]
-    courses = {"kinetic": balance.kinetic, "potential, from its start": rise}
+    courses = {"kinetic": balance.kinetic, "potential, minus its initial value": rise}
     courses |= {"supplied": balance.supplied, "lost": balance.lost}
     if balance.removed.any():
         courses["removed"] = balance.removed
@@ -101,7 +101,7 @@ def energy(simulation: Simulation) -> Figure:
         low, high = ax.get_ylim()
         ax.set_ylim(min(low, -share * widest), max(high, share * widest))
     worst = n(_largest(balance.error), ".2g", "J", size=_largest(balance.potential))
-    text = wrap_heading(f"sum of all, supplied negative, minus its initial value: at most {worst}", current().tick)
+    text = wrap_heading(f"kinetic + potential + lost - supplied, minus initial value: at most {worst}", current().tick)
     below.set_title(text, fontsize=current().tick, loc="left")
     return figure
 
@@ -115,12 +115,12 @@ def frequencies(
 ) -> Axes:
     """Natural frequencies along a path (Campbell diagram): with cable mass, and massless (dashed).
 
-    Width and opacity of a line show the platform's share of the mode's kinetic energy. Where a wide line fades and its
-    neighbor grows, platform and cable exchange the motion.
+    Width and opacity of a line show the platform's share of the mode's kinetic energy. If a wide line fades while its
+    neighbor becomes wide, the motion passes from one mode to the other.
 
     Args:
         vibrations: Vibrations of N successive states, from `vibration`.
-        time: Ascending abscissae of the states, shape (N,), for example times of a path [s]; None for their indices.
+        time: Ascending times or other abscissae of the states, shape (N,), with the unit in `label`; None for indices.
         label: Label of the time axis, with its unit.
         ax: Axes to draw on; None for a new figure.
 
@@ -128,7 +128,7 @@ def frequencies(
         The axes.
 
     Raises:
-        InvalidValueError: If there are fewer than two, or the number of times is wrong.
+        InvalidValueError: If there are fewer than two vibrations, or if the number of times is not the same.
 
     Examples:
         >>> import sagline as sl
@@ -161,7 +161,7 @@ def frequencies(
 
 
 def _swinging(states: tuple[Vibration, ...], clock: Array) -> LineCollection:
-    """Segments between neighbors, with the mean share of both."""
+    """Segments between neighboring states, each with the mean share of its two ends."""
     pieces, shares = [], []
     for (first, one), (second, other) in pairwise(zip(clock, states, strict=True)):
         count = min(one.frequency.size, other.frequency.size)
@@ -180,14 +180,14 @@ def _widths(share: Array) -> Array:
 
 
 def _colors(share: Array) -> list[tuple[float, float, float]]:
-    """Colors mixed with white; with opacity, overlapping line ends would be visible."""
+    """Colors mixed with white, because transparent lines would be darker where their ends overlap."""
     dense = FAINT + (1.0 - FAINT) * share
     red, green, blue = (1.0 - dense * (1.0 - part) for part in to_rgb(BLUE))
     return list(zip(red.tolist(), green.tolist(), blue.tolist(), strict=True))
 
 
 def _filled(rows: list[Array]) -> Array:
-    """Rows of different lengths as one table, filled with NaN."""
+    """Rows of different lengths as one table; missing values are NaN."""
     table = np.full((len(rows), max(row.size for row in rows)), np.nan)
     for k, row in enumerate(rows):
         table[k, : row.size] = row
@@ -223,14 +223,14 @@ MAP_QUANTITIES: Final = {
 
 
 def frequency_map(found: FrequencyMap, quantity: str = "frequency") -> Figure:
-    """One quantity of a map over a grid of poses, a panel for each of some heights.
+    """One quantity of a map over a grid of poses, with one panel for each of several heights.
 
     Args:
         found: Map from `frequency_map`, of poses on a grid along x, y and z.
         quantity: "frequency", "massless_frequency", "platform_share", "peak" or "peak_frequency".
 
     Returns:
-        The figure; hatched without a solution.
+        The figure; cells without a solution are hatched.
 
     Raises:
         InvalidValueError: If the quantity does not exist, or the poses are not on a grid.
@@ -247,7 +247,7 @@ def frequency_map(found: FrequencyMap, quantity: str = "frequency") -> Figure:
     name, label, logarithmic = MAP_QUANTITIES[choice(quantity, "quantity", MAP_QUANTITIES)]
     x, y, z, values = _gridded(instance(found, FrequencyMap, "found"), getattr(found, name))
     shown = max(count for count in PANELS if count <= z.size)
-    rows = np.linspace(0, z.size - 1, shown).astype(np.intp)  # the lowest, the highest, and some in between
+    rows = np.linspace(0, z.size - 1, shown).astype(np.intp)  # the lowest, the highest, and some heights between
     known = values[:, :, rows][np.isfinite(values[:, :, rows])]
     low, high = (float(known.min()), float(known.max())) if known.size else (0.5, 1.0)
     scale = LogNorm(low, max(high, 1.01 * low)) if logarithmic and low > 0.0 else Normalize(low, high)
@@ -265,7 +265,7 @@ def frequency_map(found: FrequencyMap, quantity: str = "frequency") -> Figure:
 
 
 def _gridded(found: FrequencyMap, values: Array) -> tuple[Array, Array, Array, Array]:
-    """The grid's coordinates, and values at its points, (nx, ny, nz)."""
+    """The coordinates of the grid, and the values at its points, (nx, ny, nz)."""
     axes = [np.unique(column) for column in found.pose.position.T]
     shape = tuple(axis.size for axis in axes)
     places = tuple(np.searchsorted(axis, column) for axis, column in zip(axes, found.pose.position.T, strict=True))
@@ -280,22 +280,23 @@ def _gridded(found: FrequencyMap, values: Array) -> tuple[Array, Array, Array, A
 def response(
     vibration: Vibration | FrequencyResponse, force: str = "x", motion: str | None = None, ax: Axes | None = None
 ) -> Axes:
-    """Amplitude of the platform for a force of 1 N, over frequency: with cable mass, and massless.
+    """Amplitude of the platform's motion for a force of 1 N, over frequency, with cable mass and with massless cables.
 
     Marks at the bottom are the modes with cable mass; darker marks have a larger platform share.
 
     Args:
-        vibration: Vibration of a stable state, from `vibration`, whose damping both curves have; or the result of
-            `frequency_response`, drawn at its own frequencies without marks of modes.
-        force: "x", "y" or "z" for a force along this axis; "about x" and so on for a moment about it [N m].
-        motion: Drawn motion, named like `force`; None for the motion along or about the force.
+        vibration: Vibration of a stable state, from `vibration`; both curves have its damping. A result of
+            `frequency_response` is drawn at its own frequencies, without marks of modes.
+        force: "x", "y" or "z" for a force along this axis [N]; "about x", "about y" or "about z" for a moment [N m].
+        motion: Motion to draw, with the names of `force`; None for the motion along the force or about the moment.
         ax: Axes to draw on; None for a new figure.
 
     Returns:
         The axes, both logarithmic.
 
     Raises:
-        InvalidValueError: If the vibration has no modes or the response no frequencies, or the motion does not exist.
+        InvalidValueError: If the vibration has no modes, if the response has no frequencies, or if the motion does not
+            exist.
 
     Examples:
         >>> import sagline as sl
@@ -345,11 +346,11 @@ def _cause(force: str) -> str:
 
 
 def _damping(vibration: Vibration | FrequencyResponse) -> str:
-    """Damping of both curves, in words."""
+    """Text of the damping that both curves have."""
     damping = vibration.damping
     parts = [
         f"modal damping {100.0 * damping.modal_damping:g} %" if damping.modal_damping else "",
         f"loss time {damping.loss_time:g} s" if damping.loss_time else "",
         f"air damping {damping.air_damping:g} N s/m²" if damping.air_damping else "",
     ]
-    return ", ".join(filter(None, parts)) or "undamped: peaks have no top"
+    return ", ".join(filter(None, parts)) or "undamped: peaks are infinite"

@@ -1,4 +1,4 @@
-"""An execution over time: states, tensions, their errors, position errors and faults."""
+"""An execution over time: states, tensions, tension errors, position errors and faults."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from sagline.core.arrays import Array
 
 PER_METER: Final = 1e3  # [mm]
-STATES: Final = {  # states with a separate color
+STATES: Final = {  # states that have a color of their own
     State.HOMING: ORANGE, State.MOVING: BLUE, State.JOGGING: SKY, State.PAUSING: GREEN, State.STOPPING: PURPLE,
     State.FAULT: VERMILLION, State.EMERGENCY: "#8B0000",
 }  # fmt: skip
@@ -48,9 +48,9 @@ STATES: Final = {  # states with a separate color
 def execution(done: Execution) -> Figure:
     """Overview of an execution: states, tensions, their error, and the estimated position of the platform.
 
-    From top to bottom: the states, with a line at each fault; the measured tensions, and the planned ones (dashed);
-    the part of their error that lengths can correct without moving the platform, filtered as in the tension loop; and
-    the estimated position minus the planned one.
+    The panels are, from top to bottom: the states, with a line at each fault; the measured and the planned tensions
+    (dashed); the part of the tension error that lengths can correct while the platform stays at rest, filtered as in
+    the tension loop; and the estimated minus the planned position.
 
     Args:
         done: The execution.
@@ -77,7 +77,7 @@ def execution(done: Execution) -> Figure:
             panel.tick_params(labelbottom=False)
         _mark_faults(panel, done)
     own: Any = parts[0].get_legend()
-    own.remove()  # its place is that of the names of the faults
+    own.remove()  # the names of the faults are written at the place of the label
     figure_legend(figure, parts[:1])
     return figure
 
@@ -139,11 +139,11 @@ def measured_tensions(done: Execution, ax: Axes | None = None) -> Axes:
         draw_series(
             ax, clock, planned, color="black", linewidth=0.7, linestyle=DASHED, label="planned" if i == 0 else "_"
         )
-    return _finished(ax, clock, "tension at the frame [N]")
+    return _finished(ax, clock, "tension at the frame end [N]")
 
 
 def mendable_tensions(done: Execution, ax: Axes | None = None) -> Axes:
-    """Part of the tension errors that lengths can correct without moving the platform, filtered as in the tension loop.
+    """Part of the tension errors that lengths can correct with the platform at rest, filtered as in the tension loop.
 
     Args:
         done: The execution.
@@ -165,7 +165,7 @@ def mendable_tensions(done: Execution, ax: Axes | None = None) -> Axes:
 
 
 def place_errors(done: Execution, ax: Axes | None = None) -> Axes:
-    """Estimated minus planned position of the platform's origin, along x, y and z.
+    """Estimated minus planned position of the platform's origin, along x, y and z, over time.
 
     Args:
         done: The execution.
@@ -192,14 +192,14 @@ def _clock(done: Execution) -> Array:
 
 
 def _finished(ax: Axes, clock: Array, label: str) -> Axes:
-    """Labels of the axes, their limits, and names of the lines."""
+    """Set the labels and limits of the axes, and write the names of the lines."""
     format_clock(ax, clock, label)
     name_lines(ax)
     return ax
 
 
 def _mark_faults(ax: Axes, done: Execution) -> None:
-    """A line at each fault, with its name above the states."""
+    """Draw a line at each fault; the fault's name is above the panel of the states."""
     for event in done.events:
         if event.kind is EventKind.FAULT and len(done):
             name = "" if ax.get_yticks().size else event.name

@@ -1,4 +1,4 @@
-"""Film of a mode: exaggerated motion of platform and cables."""
+"""Animation of a mode, with an exaggerated motion of platform and cables."""
 
 from __future__ import annotations
 
@@ -23,21 +23,21 @@ from sagline.viewer.swing import PERIOD, Swing
 if TYPE_CHECKING:
     from sagline.core.progress import Progress
 
-SECONDS = 10.0  # duration of the film [s], whole periods, so that it repeats without a jump
+SECONDS = 10.0  # duration of the animation [s]; it has whole periods, so that it repeats without a jump
 PICTURES = 25  # pictures per period
-HEIGHT, DOTS = 3.8, 140  # height [in], dots per inch
+HEIGHT, DOTS = 3.8, 140  # height of a picture [in], and dots per inch
 COLORS = 48
-LEAST_SHARE = 0.01  # smallest share of a cable in the energy that is written
+LEAST_SHARE = 0.01  # cables with a smaller share of the energy are not named
 
 
 def film(vibration: Vibration, number: int, file: os.PathLike[str] | str, *, progress: Progress | None = None) -> None:
-    """Film a mode with cable mass for ten seconds, as a GIF that repeats.
+    """Write an animation of a mode with cable mass as a GIF, which has ten seconds and repeats.
 
     Args:
         vibration: Vibration, from `vibration`.
         number: Number of the mode, 1 for the lowest.
         file: The file, "mode.gif" for instance; an existing file is replaced.
-        progress: Function that is called with the number of drawn pictures and the total number.
+        progress: Function that is called with the number of finished pictures and the total number.
 
     Raises:
         InvalidValueError: If the mode does not exist.
@@ -56,7 +56,7 @@ def film(vibration: Vibration, number: int, file: os.PathLike[str] | str, *, pro
         raise FileError(path, f"the suffix is {path.suffix or 'missing'}", "Name it .gif.")
     modes = [mode for mode in listed_modes(instance(vibration, Vibration, "vibration")) if mode.kind == WITH_MASS]
     if not 1 <= whole_number(number, "number", 1) <= len(modes):
-        step = "Raise up_to for more."
+        step = "Raise up_to to find more modes."
         raise InvalidValueError("number", number, f"1 to {len(modes)}, modes with cable mass", step)
     pictures = _pictures(Swing.of(vibration, modes[number - 1]), callback(progress, "progress"))
     rounds = round(SECONDS / PERIOD)
@@ -70,7 +70,7 @@ def film(vibration: Vibration, number: int, file: os.PathLike[str] | str, *, pro
 
 
 def _pictures(swing: Swing, progress: Progress | None) -> list[Image.Image]:
-    """Pictures of one period, with a common color table."""
+    """Pictures of one period; all have the same color table."""
     robot, mode = swing.state.one_robot, swing.mode
     figure = sheet(HEIGHT)
     canvas: Any = FigureCanvasAgg(figure)
@@ -83,7 +83,7 @@ def _pictures(swing: Swing, progress: Progress | None) -> list[Image.Image]:
     edges = [ax.plot([0.0], [0.0], [0.0], color=VERMILLION, linewidth=1.6)[0] for _ in EDGES]
     ax.scatter(*robot.frame_anchors.T, color="black", s=7.0, depthshade=False)
     for artist in ax.get_children():
-        artist.set_clip_on(False)  # the axes are square, but the picture is wider
+        artist.set_clip_on(False)  # the axes are square, but the picture is wider than high
     _frame(ax, swing)
     ax.set_title(f"{robot.name}, mode {mode.number}: {mode.frequency:.3f} Hz {mode.kind}", fontsize=LABEL, y=0.97)
     figure.text(0.5, 0.02, f"{energy_shares(mode)}; {swing.text}", fontsize=TICK, ha="center")
@@ -105,7 +105,7 @@ def _pictures(swing: Swing, progress: Progress | None) -> list[Image.Image]:
 
 
 def energy_shares(mode: ListedMode) -> str:
-    """Shares of platform and cables in the kinetic energy of a mode, in words."""
+    """Text of the platform's and the cables' shares of a mode's kinetic energy."""
     words = f"kinetic energy: platform {100.0 * mode.platform_share:.0f} %"
     if mode.cable is None or mode.cable_share < LEAST_SHARE:
         return f"{words}, each cable less than {100.0 * LEAST_SHARE:g} %"
@@ -113,7 +113,7 @@ def energy_shares(mode: ListedMode) -> str:
 
 
 def _frame(ax: Axes3D, swing: Swing) -> None:
-    """Limits of the view at one scale along all axes, without numbers."""
+    """Set the limits of the view, with equal scales along all axes and without numbers."""
     points = swing.rest.reshape(-1, 3)
     ax.set_box_aspect(fit_space(ax, points.min(axis=0), points.max(axis=0)), zoom=1.5)
     ax.set_axis_off()

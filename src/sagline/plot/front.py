@@ -1,4 +1,4 @@
-"""Candidates of an optimization and the best among them."""
+"""Candidates of an optimization, and the best of them."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def _draw_pair(ax: Axes, front: Front, k: int) -> None:
     order = np.argsort(better[:, 0])
     ax.plot(*every.T, ".", color=GAP_COLOR, markersize=3.0, label="candidates", linestyle="none")
     if front.better:
-        ax.plot(*better[order].T, "o-", color=BLUE, markersize=4.0, linewidth=1.0, label="none is better")
+        ax.plot(*better[order].T, "o-", color=BLUE, markersize=4.0, linewidth=1.0, label="no robot is better")
     ax.plot(*front.start_values[[0, k]], "D", color=VERMILLION, markersize=6.0, label="start", linestyle="none")
     format_axes(ax, _label_of(front.goals[0]), _label_of(front.goals[k]))
 
@@ -86,7 +86,7 @@ def _label_of(goal: Goal) -> str:
 
 
 def best_until(values: Array, *, highest: bool) -> Array:
-    """Best value up to each index; NaN before the first finite value."""
+    """Best value of all candidates up to each index; NaN before the first finite value."""
     sign = 1.0 if highest else -1.0
     found = np.maximum.accumulate(np.where(np.isfinite(values), sign * values, -np.inf))
     return np.asarray(np.where(np.isfinite(found), sign * found, np.nan))

@@ -1,4 +1,4 @@
-"""Labels in figures: axes with their units, names at the ends of lines, legends, headings that fit the width."""
+"""Labels in figures: axis labels with units, names at the ends of lines, legends, and headings that fit the width."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ POINT = 1.0 / 72.0  # [in]
 WIDE = {SANS: 0.58, SERIF: 0.48}  # mean width of a letter in text sizes
 SHARE = 0.9  # largest width of a heading, as a share of the figure's width
 MOST = 0.3  # largest width of names next to the axes, as a share of the figure's width
-SPACING = 1.15  # distance of names in text sizes
-END = 0.02  # a line that ends farther from the right side than this share of the axes' width has no name there
+SPACING = 1.15  # distance between two names, in text sizes
+END = 0.02  # lines that end at a larger distance from the right side have no name there; share of the axes' width
 LEADER = 8.0  # distance from the end of a line to its name [pt]
 
 
@@ -57,7 +57,7 @@ def name_lines(ax: Axes, title: str = "") -> None:
 
 
 def figure_legend(figure: FigureBase, panels: Iterable[Axes], place: Any = "outside upper center") -> None:
-    """One legend of all lines of some axes."""
+    """Draw one legend for all lines of several axes."""
     look = current()
     handles = {label: line for ax in panels for line, label in zip(*ax.get_legend_handles_labels(), strict=True)}
     columns = legend_columns(list(handles), figure.get_figure(root=True).get_figwidth(), look.tick)
@@ -77,7 +77,7 @@ def legend_above(ax: Axes, labels: Sequence[str], title: str = "") -> dict[str, 
 
 
 def legend_columns(labels: Sequence[str], width: float, size: float) -> int:
-    """Number of legend columns that fit, at least 1, without empty columns."""
+    """Number of legend columns, at least 1: as many as fit the width and are not empty."""
     widest = max((TextPath((0.0, 0.0), label, size=size).get_extents().width for label in labels if label), default=0.0)
     columns = max(1, min(len(labels), int((width / POINT + 1.2 * size) / (widest + 3.6 * size))))
     return ceil(len(labels) / ceil(len(labels) / columns))
@@ -91,7 +91,7 @@ def set_heading(target: FigureBase | Axes, text: str) -> None:
 
 
 def wrap_heading(text: str, size: float) -> str:
-    """Heading broken into lines to fit the figure width of the current style."""
+    """Heading with line breaks, so that it fits the figure width of the current style."""
     look = current()
     return fill(text, int(SHARE * look.width / POINT / (WIDE[look.font] * size)))
 
@@ -103,13 +103,13 @@ def break_labels(figure: Figure) -> None:
         length, height = ax.yaxis.label.get_window_extent().height, ax.bbox.height
         if length > height and len(words) > 2 and "\n" not in ax.yaxis.get_label_text():
             lines = [(" ".join(words[:k]), " ".join(words[k:])) for k in range(1, len(words))]
-            whole = [pair for pair in lines if all(line.count("$") % 2 == 0 for line in pair)]  # no broken formula
+            whole = [pair for pair in lines if all(line.count("$") % 2 == 0 for line in pair)]  # no broken formulas
             if whole:
                 ax.yaxis.label.set_text("\n".join(min(whole, key=lambda pair: max(map(len, pair)))))
 
 
 class _End(NamedTuple):
-    """End of a line with its name; position in data units, and height in the axes from 0 to 1."""
+    """End of a line, with the name of the line; its position in data units, and its height in the axes from 0 to 1."""
 
     name: str
     color: Any
@@ -118,19 +118,19 @@ class _End(NamedTuple):
 
 
 def _is_line(handle: Artist) -> bool:
-    """True for a line of more than two points, False for a mark across the axes or a set of points."""
+    """True for a line with more than two points; False for a mark across the axes and for a set of points."""
     if not isinstance(handle, Line2D) or handle.get_linestyle() in ("None", "", " "):
         return False
     return np.size(np.asarray(handle.get_xdata())) > 2
 
 
 def _ends(ax: Axes, handles: Sequence[Artist], labels: Sequence[str]) -> list[_End]:
-    """Ends of the lines; empty if one is not at the right side, or names are too many or too long."""
+    """Ends of the lines; empty if an end is not at the right side, or if the names are too many or too long."""
     figure, look = cast(Figure, ax.get_figure(root=True)), current()
     longest = max((len(label) for handle, label in zip(handles, labels, strict=True) if _is_line(handle)), default=0)
     if longest * WIDE[look.font] * look.tick * POINT > MOST * figure.get_figwidth():
         return []
-    figure.draw_without_rendering()  # this computes the height of the axes
+    figure.draw_without_rendering()  # the layout determines the height of the axes
     found = []
     for handle, label in zip(handles, labels, strict=True):
         if not _is_line(handle):
@@ -148,13 +148,13 @@ def _ends(ax: Axes, handles: Sequence[Artist], labels: Sequence[str]) -> list[_E
 
 
 def _spacing(ax: Axes) -> float:
-    """Distance of names, as a share of the height of the axes."""
+    """Distance between names, as a share of the axes' height."""
     figure = cast(Figure, ax.get_figure(root=True))
     return SPACING * current().tick * figure.dpi * POINT / ax.bbox.height
 
 
 def _write(ax: Axes, ends: Sequence[_End], title: str) -> None:
-    """Write the names next to the ends of the lines without overlap; their common prefix is above them."""
+    """Write the names without overlap next to the ends of the lines; a common prefix is written above them."""
     look, names = current(), [end.name for end in ends]
     if not title and len(names) > 1 and len({name.rpartition(" ")[0] for name in names}) == 1:
         title, names = names[0].rpartition(" ")[0], [name.rpartition(" ")[2] for name in names]
@@ -179,7 +179,7 @@ def _points(ax: Axes) -> float:
 
 
 def spread_heights(heights: Array, spacing: float) -> Array:
-    """Heights of names: least-squares closest to those of the line ends, in order, with a minimum distance."""
+    """Heights of names in order, with a minimum distance; the squared distances from the line ends are minimal."""
     order = np.argsort(heights, kind="stable")
     steps = spacing * np.arange(heights.size)
     placed = np.asarray(isotonic_regression(heights[order] - steps).x)

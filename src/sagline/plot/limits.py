@@ -1,4 +1,4 @@
-"""Triangles cut where the limit of a workspace changes, so that the regions of the limits have smooth borders."""
+"""Division of triangles where the limit of a workspace changes, so that regions of one limit have smooth borders."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy as np
 
 from sagline.core.arrays import Array, Indices
 
-BISECTIONS: Final = 5  # a border is located to this power of 1/2 of an edge
+BISECTIONS: Final = 5  # number of bisections that locate a border on an edge
 Find = Callable[[Array], Indices]
 
 
 def cut_at_limits(points: Array, triangles: Indices, limit: Indices, find: Find) -> tuple[Array, Indices]:
-    """Triangles of one limit each, and their limits.
+    """Divide triangles so that each part has a single limit.
 
     points: (V, d); triangles: (T, 3); limit: code of the limit at each point (V,); find: function that gives the codes
     of points (n, d).
@@ -25,7 +25,7 @@ def cut_at_limits(points: Array, triangles: Indices, limit: Indices, find: Find)
     corners, whole = [points[triangles[~mixed]]], [codes[~mixed, 0]]
     if mixed.any():
         triangles = triangles[mixed]
-        edges = np.sort(np.stack((triangles, np.roll(triangles, -1, axis=1)), axis=2), axis=2)  # (T, 3, 2), from k on
+        edges = np.sort(np.stack((triangles, np.roll(triangles, -1, axis=1)), axis=2), axis=2)  # (T, 3, 2)
         pairs, place = np.unique(edges.reshape(-1, 2), axis=0, return_inverse=True)
         borders = _borders(points[pairs], limit[pairs], find)[place.reshape(-1, 3)]
         for tips, middles, own in _pieces(points[triangles], borders, limit[triangles]):
@@ -35,7 +35,7 @@ def cut_at_limits(points: Array, triangles: Indices, limit: Indices, find: Find)
 
 
 def _borders(ends: Array, codes: Indices, find: Find) -> Array:
-    """Points of edges (E, 2, d) at which the limit changes, by bisection; the middle without a change."""
+    """Points of edges (E, 2, d) at which the limit changes, by bisection; middles of edges without a change."""
     ends = ends.copy()
     change = np.flatnonzero(codes[:, 0] != codes[:, 1])
     for _ in range(BISECTIONS):
@@ -46,8 +46,8 @@ def _borders(ends: Array, codes: Indices, find: Find) -> Array:
 
 
 def _pieces(tips: Array, borders: Array, codes: Indices) -> list[tuple[Array, tuple[Array, Array], Indices]]:
-    """Six triangles of each triangle: every corner with the borders of its edges and a common point."""
-    # With two limits, the common point is the middle between both borders, so that the border is straight.
+    """Six parts of each triangle, between its corners, the borders on its edges and a common point."""
+    # If a triangle has two limits, the common point is midway between both borders, so that the border is straight.
     changes = codes != np.roll(codes, -1, axis=1)
     weight = changes[:, :, None] / changes.sum(axis=1)[:, None, None]
     common = (weight * borders).sum(axis=1)

@@ -14,11 +14,11 @@ import numpy as np
 
 from sagline.core.arrays import Array, Indices
 
-FLAT = 1e-9  # smallest extent of a surface or line that hides others, as a share of the picture's size
-TOUCHING = 1e-6  # a line closer to a surface than this share of the picture's size lies on it, not behind it
+FLAT = 1e-9  # surfaces and lines with a smaller extent hide nothing; share of the picture's size
+TOUCHING = 1e-6  # a line this close to a surface is on it, not behind it; share of the picture's size
 CHUNK = 2_000_000  # number of pairs of segments and limits per block
-FAR = 1e3  # depth in front of everything, in picture sizes
-ALONG = 3.0  # limit for nearly parallel lines: ratio of hidden length along the line to the width of the strip
+FAR = 1e3  # depth of a plane in front of all lines and surfaces, in picture sizes
+ALONG = 3.0  # largest length that a strip hides of a nearly parallel line, divided by the strip's width
 
 
 class FlatLine(NamedTuple):
@@ -26,9 +26,9 @@ class FlatLine(NamedTuple):
 
     Attributes:
         points: Coordinates to the right, up, and toward the viewer [m], shape (P, 3).
-        half_width: Half of its width [m], within which it hides lines behind it; 0 if it hides nothing.
-        gap: Additional distance at crossings [m]. Lines that are less than half_width + gap behind it, such as cables
-            that meet at an anchor, are not hidden.
+        half_width: Half of the line's width [m], within which it hides lines behind it; 0 if it hides nothing.
+        gap: Additional distance at crossings [m]. A line that is less than half_width + gap behind this line, such as a
+            cable that ends at the same anchor, is not hidden.
     """
 
     points: Array
@@ -37,15 +37,15 @@ class FlatLine(NamedTuple):
 
 
 class _Covers(NamedTuple):
-    """R convex flat pieces that hide lines behind them, each within K limits.
+    """R flat convex pieces that hide lines behind them; K limits are the sides of a piece.
 
     Attributes:
         normals: Outward normals of the limits in the picture, shape (R, K, 2).
-        offsets: Upper bounds of the product of normal and position inside, shape (R, K).
-        planes: Depth is planes[:, :2] times position plus planes[:, 2], shape (R, 3).
-        behind: Smallest distance of a hidden point behind the piece, shape (R,).
-        owners: Indices of their lines, -1 for surfaces, shape (R,).
-        hides: Indices of the lines that they hide, -1 for all except their owners, shape (R,).
+        offsets: Largest products of each normal and a position in the piece, shape (R, K).
+        planes: Coefficients of the depth, which is planes[:, :2] times position plus planes[:, 2], shape (R, 3).
+        behind: Smallest distance behind the piece at which points are hidden, shape (R,).
+        owners: Index of the line to which the piece belongs, -1 for surfaces, shape (R,).
+        hides: Index of the line that the piece hides, -1 for all lines except its owner, shape (R,).
     """
 
     normals: Array
@@ -57,7 +57,7 @@ class _Covers(NamedTuple):
 
 
 class _Crossing(NamedTuple):
-    """A crossing of a front line and a line behind it; position and unit direction of the front line, shapes (3,)."""
+    """A crossing of a front line and a line behind it: position and unit direction of the front line, shapes (3,)."""
 
     line: int
     behind: int
@@ -66,7 +66,7 @@ class _Crossing(NamedTuple):
 
 
 def view_axes(azimuth: float, elevation: float) -> Array:
-    """Unit vectors to the right, up, and toward the viewer in world axes, as rows, shape (3, 3)."""
+    """Unit vectors to the right, up and toward the viewer, in world axes, as the rows of a matrix."""
     around, above = np.array([np.cos(azimuth), np.sin(azimuth)]), np.array([np.cos(elevation), np.sin(elevation)])
     toward = np.array([above[0] * around[0], above[0] * around[1], above[1]])
     right = np.array([-around[1], around[0], 0.0])
@@ -100,7 +100,7 @@ def visible_parts(
 
 
 def _rest(spans: Array) -> list[tuple[float, float]]:
-    """Complement of spans (n, 2) within 0 to 1."""
+    """The parts of the range 0 to 1 that spans (n, 2) leave free."""
     left, reached = [], 0.0
     for low, high in spans[np.argsort(spans[:, 0])].tolist():
         if low > reached:
@@ -110,7 +110,7 @@ def _rest(spans: Array) -> list[tuple[float, float]]:
 
 
 def _hidden(starts: Array, ends: Array, owners: Indices, covers: _Covers) -> list[Array]:
-    """Hidden spans of segments (S, 3), 0 at the start and 1 at the end, each of shape (n, 2)."""
+    """Hidden spans (n, 2) of each of S segments; 0 is the start of a segment and 1 is its end."""
     if not len(covers.owners):
         return [np.empty((0, 2)) for _ in starts]
     at_once = max(1, CHUNK // covers.offsets.size)
@@ -122,7 +122,7 @@ def _hidden(starts: Array, ends: Array, owners: Indices, covers: _Covers) -> lis
 
 
 def _hidden_at_once(starts: Array, ends: Array, owners: Indices, covers: _Covers) -> list[Array]:
-    """Spans within all limits and behind the plane: all k + 1 linear functions along a segment are <= 0."""
+    """Spans in which all k + 1 linear functions along a segment are <= 0: within all limits and behind the plane."""
     steps = ends - starts
     outside = np.einsum("sc,rkc->srk", starts[:, :2], covers.normals) - covers.offsets
     rise = np.einsum("sc,rkc->srk", steps[:, :2], covers.normals)
@@ -142,7 +142,7 @@ def _hidden_at_once(starts: Array, ends: Array, owners: Indices, covers: _Covers
 def _covers(
     lines: Sequence[FlatLine], surfaces: Sequence[Array], crossings: Sequence[_Crossing], size: float
 ) -> _Covers:
-    """Strips along the lines, wider at crossings, and the surfaces."""
+    """All pieces: the surfaces, and strips along the lines, which are wider at crossings."""
     corners, behind, owners, hides = [], [], [], []
     for number, line in enumerate(lines):
         long = np.linalg.norm(np.diff(line.points[:, :2], axis=0), axis=1) > FLAT * size
@@ -169,7 +169,7 @@ def _covers(
     padded = np.array([np.concatenate((each, np.repeat(each[-1:], most - len(each), axis=0))) for each in corners])
     padded = padded.reshape(len(corners), most, 3)
     along = np.roll(padded[..., :2], -1, axis=1) - padded[..., :2]
-    normals = np.stack((along[..., 1], -along[..., 0]), axis=-1)  # outward for counter-clockwise corners
+    normals = np.stack((along[..., 1], -along[..., 0]), axis=-1)  # outward if the corners are counter-clockwise
     offsets = np.einsum("rkc,rkc->rk", normals, padded[..., :2])
     planes = np.array([_plane(each) for each in corners]).reshape(-1, 3)
     numbers = np.array([owners, hides], dtype=np.int64)
@@ -185,7 +185,7 @@ def _crossings(lines: Sequence[FlatLine], starts: Array, ends: Array, owners: In
     turn = _cross(steps[None, front, :2], steps[:, None, :2])
     crossing = np.abs(turn) > 0.0
     safe = np.where(crossing, turn, 1.0)
-    here = _cross(away, steps[:, None, :2]) / safe  # along the front line
+    here = _cross(away, steps[:, None, :2]) / safe  # parameter along the front line
     there = _cross(away, steps[None, front, :2]) / safe
     inside = crossing & (np.minimum(here, there) >= 0.0) & (np.maximum(here, there) <= 1.0)
     inside &= owners[:, None] != owners[None, front]
@@ -206,20 +206,20 @@ def _cross(one: Array, other: Array) -> Array:
 
 
 def _strip(start: Array, end: Array, half_width: float) -> Array:
-    """A flat strip from one point to another, level across, its corners counter-clockwise, shape (4, 3)."""
+    """Corners (4, 3), counter-clockwise, of a strip between two points; its depth does not change across the strip."""
     along = (end - start)[:2]
     across = half_width / float(np.hypot(*along)) * np.array([-along[1], along[0], 0.0])
     return np.stack((start - across, end - across, end + across, start + across))
 
 
 def _area(corners: Array) -> float:
-    """Area in the picture, positive for counter-clockwise corners."""
+    """Signed area in the picture, positive if the corners are counter-clockwise."""
     x, y = corners[:, 0] - corners[0, 0], corners[:, 1] - corners[0, 1]
     return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
 
 
 def _plane(corners: Array) -> Array:
-    """Depth in the picture as a plane: a, b and c of a x + b y + c."""
+    """Coefficients a, b and c of the depth a x + b y + c of a plane in the picture."""
     middle = corners.mean(axis=0)
     slopes, *_ = np.linalg.lstsq(corners[:, :2] - middle[:2], corners[:, 2] - middle[2], rcond=None)
     return np.array([*slopes, middle[2] - slopes @ middle[:2]])

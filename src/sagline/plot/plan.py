@@ -1,4 +1,4 @@
-"""Paths, plans and their confirmation over time: lengths, tensions, position errors, velocity."""
+"""Plots over time of paths, plans and confirmations: lengths, tensions, position errors, velocity."""
 
 from __future__ import annotations
 
@@ -39,16 +39,16 @@ if TYPE_CHECKING:
 
 OVERVIEW = ("unstrained_length", "adjusting_length", "horizontal_tension", "vertical_force")
 INFEASIBLE = "infeasible"
-LEAST_ERROR = 1e-3  # [mm], rounding errors are drawn as a flat line
-FLAT = 0.01  # errors below this share of the axis look like a flat line
+LEAST_ERROR = 1e-3  # smallest range of the axis [mm], so that rounding errors are a flat line
+FLAT = 0.01  # errors below this share of the axis look like a flat line, and are written as a number
 UNCONFIRMED = "not confirmed"  # color of planned lengths without a stable equilibrium
-OTHER_CABLES = "0.82"  # color of the other cables behind each cable
+OTHER_CABLES = "0.82"  # color of the other cables in the background of each panel
 ROW_HEIGHT = 1.45  # height of a row of panels [in]
 LIMITED = {"chord_tension": "chord", "frame_end_tension": "frame_end"}
-START_COLOR = "#A84300"  # vermilion, dark enough for text
+START_COLOR = "#A84300"  # a vermilion that is dark enough for text
 WIDTH, SIDE = 4.4, 1.5  # width of the axes of a top view, and height of the panel of z [in]
 MOST_ARROWS = 100  # number of arrows along a path
-LEVEL = 1e-9  # a path with a smaller change of height is planar [m]
+LEVEL = 1e-9  # paths with a smaller change of height are level [m]
 
 
 def tensions(plan: Plan, quantity: str = "chord_tension", ax: Axes | None = None) -> Axes:
@@ -64,7 +64,7 @@ def tensions(plan: Plan, quantity: str = "chord_tension", ax: Axes | None = None
         The axes.
 
     Raises:
-        InvalidValueError: If there is no such quantity.
+        InvalidValueError: If the quantity is unknown.
 
     Examples:
         >>> import sagline as sl
@@ -91,7 +91,7 @@ def lengths(plan: Plan, quantity: str = "unstrained_length", ax: Axes | None = N
         The axes.
 
     Raises:
-        InvalidValueError: If there is no such quantity.
+        InvalidValueError: If the quantity is unknown.
 
     Examples:
         >>> import sagline as sl
@@ -133,27 +133,27 @@ def overview(plan: Plan) -> Figure:
 
 
 def abscissa(plan: Plan) -> tuple[Array, str]:
-    """Times of a plan's path or numbers of its poses (N,), and their label; InvalidValueError without poses."""
+    """Times of a plan's path or numbers of its poses (N,), and the axis label; InvalidValueError without poses."""
     if not plan.status.size:
-        raise InvalidValueError("plan", "one of no pose", "one pose at least", "Plan some poses first.")
+        raise InvalidValueError("plan", "a plan without poses", "at least one pose", "Plan some poses first.")
     return (np.arange(plan.status.size, dtype=np.float64), "pose") if plan.path is None else (plan.path.time, TIME)
 
 
 def _values(plan: Plan, quantity: str, table: dict[str, tuple[str, float]]) -> tuple[Array, str]:
-    """A quantity of the cables in the unit of its label, shape (N, m), and the label."""
+    """A quantity of the cables, shape (N, m), in the unit of its axis label, and this label."""
     label, scale = table[choice(quantity, "quantity", table)]
     return scale * np.atleast_2d(getattr(instance(plan, Plan, "plan").state.cables, quantity)), label
 
 
 def _format(ax: Axes, plan: Plan, label: str) -> None:
-    """Shade the infeasible poses, label the axes over time or over the numbers of poses, and limit them."""
+    """Shade the infeasible poses; set the labels and limits of axes over time or over the numbers of poses."""
     clock, axis = abscissa(plan)
     shade_spans(ax, clock, [(gap.first, gap.last) for gap in plan.gaps], INFEASIBLE)
     format_clock(ax, clock, label, axis)
 
 
 def _draw_cables(ax: Axes, plan: Plan, quantity: str, table: dict[str, tuple[str, float]]) -> None:
-    """One line per cable, with infeasible poses shaded."""
+    """Draw one line per cable; infeasible poses are shaded."""
     values, label = _values(plan, quantity, table)
     clock, _ = abscissa(plan)
     for i, course in enumerate(values.T):
@@ -164,8 +164,8 @@ def _draw_cables(ax: Axes, plan: Plan, quantity: str, table: dict[str, tuple[str
 def error(confirmation: Confirmation, ax: Axes | None = None) -> Axes:
     """Position error along x, y and z over time: confirmed position minus planned position.
 
-    Poses without a plan, and poses for which no stable equilibrium was found, are shaded. Errors too small for the
-    axis are written as numbers.
+    Infeasible poses, and poses for which no stable equilibrium was found, are shaded. If the errors are too small to
+    see, the largest one is written as a number.
 
     Args:
         confirmation: A confirmed plan.
@@ -189,7 +189,7 @@ def error(confirmation: Confirmation, ax: Axes | None = None) -> Axes:
 
 
 def errors(*confirmations: Confirmation) -> Figure:
-    """Position errors of several plans side by side, on one scale: the article's figure 22.
+    """Position errors of several plans, side by side with the same scale, as in the article's figure 22.
 
     Args:
         confirmations: Confirmed plans.
@@ -198,7 +198,7 @@ def errors(*confirmations: Confirmation) -> Figure:
         A figure with one panel per confirmation, with the robot as its title.
 
     Raises:
-        InvalidValueError: If there are no confirmations, or one is of another type.
+        InvalidValueError: If no confirmation is given, or if an argument is not a confirmation.
 
     Examples:
         >>> import sagline as sl
@@ -211,7 +211,7 @@ def errors(*confirmations: Confirmation) -> Figure:
         >>> figure = sl.plot.errors(*map(sl.confirm, plans))
     """
     if not confirmations:
-        raise InvalidValueError("confirmations", "none", "one at least", HOW_TO_GET["Confirmation"])
+        raise InvalidValueError("confirmations", "none", "at least one", HOW_TO_GET["Confirmation"])
     figure = sheet(height=2.8)
     panels = figure.subplots(1, len(confirmations), sharey=True, squeeze=False)[0]
     for ax, confirmation in zip(panels, confirmations, strict=True):
@@ -219,7 +219,7 @@ def errors(*confirmations: Confirmation) -> Figure:
         ax.set_title(confirmation.plan.state.one_robot.name, fontsize=current().tick)
         hide_shared_labels(ax)
     for ax, confirmation in zip(panels, confirmations, strict=True):
-        _write_flat_error(ax, confirmation)  # on the common scale of all panels
+        _write_flat_error(ax, confirmation)  # the scale that all panels have
     figure_legend(figure, panels)
     return figure
 
@@ -236,7 +236,7 @@ def _draw_errors(ax: Axes, confirmation: Confirmation) -> None:
 
 
 def _write_flat_error(ax: Axes, confirmation: Confirmation) -> None:
-    """Write the largest error if the axis shows a flat line."""
+    """Write the largest error as a number if it is too small to see."""
     errors = np.abs(1e3 * confirmation.position_error)
     known = errors[np.isfinite(errors)]
     if known.size and known.max() < FLAT * max(map(abs, ax.get_ylim())):
@@ -246,10 +246,10 @@ def _write_flat_error(ax: Axes, confirmation: Confirmation) -> None:
 
 
 def small_multiples(plan: Plan, quantity: str = "chord_tension") -> Figure:
-    """One quantity over time: one panel per cable on one scale, with all other cables in gray behind it.
+    """One quantity over time, with one panel per cable and equal scales; the other cables are gray in the background.
 
-    This is easier to read than one panel with many crossing lines, also without color. The robot's limits of this
-    quantity are dotted if they are in the range of the axis.
+    This is easier to read than a single panel with many crossing lines, also in print without color. Dotted lines are
+    the robot's limits of this quantity, if they are in the range of the axis.
 
     Args:
         plan: The plan; without a path, the abscissa is the index of the pose.
@@ -258,10 +258,10 @@ def small_multiples(plan: Plan, quantity: str = "chord_tension") -> Figure:
             "adjusting_length" [mm].
 
     Returns:
-        A figure of a panel for each cable.
+        A figure with one panel per cable.
 
     Raises:
-        InvalidValueError: If there is no such quantity.
+        InvalidValueError: If the quantity is unknown.
 
     Examples:
         >>> import sagline as sl
@@ -298,11 +298,11 @@ def small_multiples(plan: Plan, quantity: str = "chord_tension") -> Figure:
 
 
 def path(path: Path, ax: Axes | None = None) -> Axes:
-    """Top view of a path, with its start and direction; in a new figure, also the height over time below it.
+    """Top view of a path, with its start and direction; a new figure has a second panel with the height over time.
 
     Args:
         path: The path.
-        ax: Axes to draw on; None for a new figure. The height of a level path is in the heading only.
+        ax: Axes to draw on; None for a new figure. The heading states the height of a level path.
 
     Returns:
         The axes of the top view.
@@ -359,7 +359,7 @@ def velocity(path: Path, ax: Axes | None = None) -> Axes:
 
 
 def _arrow_samples(path: Path) -> list[int]:
-    """Samples of the arrows, before the middle of each motion between two rests; of many motions, an even selection."""
+    """Samples of the arrows, before the middle of each motion between two rests; an even selection of many motions."""
     speed = np.linalg.norm(path.twist[:, :2], axis=1)
     moving = np.concatenate(([False], speed > 1e-3 * speed.max(initial=0.0), [False]))
     edges = np.flatnonzero(np.diff(moving.astype(np.int8))).reshape(-1, 2)

@@ -1,4 +1,4 @@
-"""The polygon of feasible tensions, with the results of the tension methods."""
+"""The polygon of feasible tensions, with the tensions of distribution methods as marks."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ if TYPE_CHECKING:
 
 MARKERS = "osD^v<>phXP*"
 LARGEST, LEAST = 11.0, 4.0  # sizes of the first and of the last mark [pt]
-SAME = 1e-6  # places closer than this share of the polygon's extent are equal
-CLOSE = 0.06  # places closer than this share of the extent are drawn enlarged too
-AROUND = 1.6  # width of the enlarged part, relative to the extent of its places
+SAME = 1e-6  # marks closer than this share of the polygon's extent count as equal
+CLOSE = 0.06  # marks closer than this share of the extent are also drawn in a second, enlarged panel
+AROUND = 1.6  # width of the enlarged part, relative to the extent of its marks
 SIZE, ENLARGED = 5.8, 2.6  # heights of the panels [in]
-LONGEST = 48  # letters per line of the names of equal places
+LONGEST = 48  # letters per line of the names of equal marks
 POINT = 1.0 / 72.0  # [in]
-TRIES, SPARE = 5, 0.03  # largest number of iterations of the axes' size, and its extra growth (relative)
-SHORT = 1e-9  # a side shorter than this share of the longest side has no direction
+TRIES, SPARE = 5, 0.03  # largest number of iterations that enlarge the axes, and relative extra size of each
+SHORT = 1e-9  # sides shorter than this share of the longest side have no direction of their own
 GAP = 4.0  # distance between a side and its name [pt]
 
 
@@ -41,15 +41,15 @@ def polygon(shape: TensionPolygon, points: Mapping[str, ArrayLike] | None = None
 
     Args:
         shape: The polygon from `tension_polygon`, for two redundant cables.
-        points: Chord tensions (m,) by name, drawn at their positions in the polygon; NaN are omitted. Equal ones have
-            one mark with all their names. None: no points.
+        points: Chord tensions (m,) by name; each is a mark in the polygon. Tensions with NaN have no mark. Equal
+            tensions have a common mark with all their names. None: no marks.
         ax: Axes to draw on; None for a new figure.
 
     Returns:
         The axes.
 
     Raises:
-        InvalidValueError: If there is no polygon to draw, or points are not tensions of its cables.
+        InvalidValueError: If the polygon is empty, or if points are not tensions of its cables.
 
     Examples:
         >>> import sagline as sl
@@ -68,7 +68,7 @@ def polygon(shape: TensionPolygon, points: Mapping[str, ArrayLike] | None = None
     places = {str(name): shape.coordinates(tensions) for name, tensions in points.items()}
     if wrong := [name for name, place in places.items() if place.ndim != 1]:
         raise InvalidValueError(
-            f"points[{wrong[0]!r}]", "a batch of tensions", "those of one pose", "Give them one by one."
+            f"points[{wrong[0]!r}]", "a batch of tensions", "the tensions of one pose", "Give each pose a name."
         )
     corners = np.asarray(shape.vertices)
     extent = float(np.ptp(corners, axis=0).max())
@@ -90,13 +90,13 @@ def polygon(shape: TensionPolygon, points: Mapping[str, ArrayLike] | None = None
 
 
 def _panels(places: Sequence[Array], near: float) -> list[Axes]:
-    """Axes of a new figure: of the polygon, and of the places near one another, if there are such places."""
+    """Axes of a new figure: one for the polygon, and one for the enlarged part if marks are close together."""
     near_each = [[other for other in places if np.linalg.norm(other - place) < near] for place in places]
     cluster = max(near_each, key=len, default=[])
     several = len(cluster) > 1
     figure = sheet(SIZE + ENLARGED * several)
     if not several:
-        figure.set_layout_engine("compressed")  # needed for axes of equal scales
+        figure.set_layout_engine("compressed")  # axes with equal scales need it
         return [figure.add_subplot()]
     panels: list[Axes] = list(figure.subplots(2, 1, height_ratios=(SIZE, ENLARGED)))
     low, high = (end(cluster, axis=0) for end in (np.min, np.max))
@@ -108,7 +108,7 @@ def _panels(places: Sequence[Array], near: float) -> list[Axes]:
 
 
 def _draw_places(ax: Axes, groups: Sequence[tuple[Array, list[str]]]) -> None:
-    """Empty marks, smaller ones inside larger ones."""
+    """Draw empty marks, of decreasing size, so that equal ones are one inside the other."""
     for k, (place, names) in enumerate(groups):
         color, marker = COLORS[k % len(COLORS)], MARKERS[k % len(MARKERS)]
         size = LARGEST - (LARGEST - LEAST) * k / max(len(groups) - 1, 1)
@@ -117,7 +117,7 @@ def _draw_places(ax: Axes, groups: Sequence[tuple[Array, list[str]]]) -> None:
 
 
 def _equal_places(places: Mapping[str, Array], least: float) -> list[tuple[Array, list[str]]]:
-    """Known places with the names of those that are closer to them than the least distance."""
+    """Marks that are farther apart than a least distance, each with the names of all marks that are closer to it."""
     groups: list[tuple[Array, list[str]]] = []
     for name, place in places.items():
         if np.isfinite(place).all():
@@ -127,7 +127,7 @@ def _equal_places(places: Mapping[str, Array], least: float) -> list[tuple[Array
 
 
 class _Name(NamedTuple):
-    """Name of a side: middle of the side [N], offset and half size of the name [pt], True if it is moved outward."""
+    """Name of a side: middle of the side [N], offset and half size of the name [pt]; True if it is moved outward."""
 
     text: str
     middle: Array
@@ -137,10 +137,10 @@ class _Name(NamedTuple):
 
 
 def _name_sides(ax: Axes, shape: TensionPolygon, corners: Array) -> None:
-    """Write the names; the axes are enlarged until all names are inside."""
+    """Write the names of the sides, and enlarge the axes until all names are inside."""
     figure = cast(Figure, ax.get_figure(root=True))
     for _ in range(TRIES):
-        figure.draw_without_rendering()  # this computes the size of the polygon on the sheet
+        figure.draw_without_rendering()  # the layout determines the size of the polygon on the sheet
         scale = ax.bbox.width / (figure.dpi * POINT) / float(np.ptp(ax.get_xlim()))  # points per newton
         names = _names(shape, corners, scale)
         reach = np.array([name.middle + (name.offset + sign * name.half) / scale for name in names for sign in (-1, 1)])
@@ -166,7 +166,7 @@ def _name_sides(ax: Axes, shape: TensionPolygon, corners: Array) -> None:
 
 
 def _names(shape: TensionPolygon, corners: Array, scale: float) -> list[_Name]:
-    """Place each name outside of its side, where a convex polygon has no lines; overlapping names move outward."""
+    """Place each name outside its side, where a convex polygon has no lines; overlapping names are moved outward."""
     names: list[_Name] = []
     size = current().tick
     normals = _normals(corners)
@@ -176,7 +176,7 @@ def _names(shape: TensionPolygon, corners: Array, scale: float) -> list[_Name]:
         text, middle = f"cable {side.cable} {side.limit}", 0.5 * (corners[k] + corners[(k + 1) % len(corners)])
         out = normals[k]
         half = 0.5 * np.array([TextPath((0.0, 0.0), text, size=size).get_extents().width + 4.0, 1.3 * size])
-        away = least = GAP + half @ np.abs(out)  # distance at which the whole box is outside of the line
+        away = least = GAP + half @ np.abs(out)  # distance at which the whole box of the name is outside of the line
         while any(
             np.all(np.abs(scale * (middle - name.middle) + away * out - name.offset) < half + name.half + 1.0)
             for name in names
@@ -187,7 +187,7 @@ def _names(shape: TensionPolygon, corners: Array, scale: float) -> list[_Name]:
 
 
 def _normals(corners: Array) -> Array:
-    """Outward directions of the sides (h, 2); for a side of zero length the mean of its neighbors."""
+    """Outward directions of the sides (h, 2); a side of zero length has the mean direction of its neighbors."""
     along = np.roll(corners, -1, axis=0) - corners
     lengths = np.linalg.norm(along, axis=1)
     long = np.flatnonzero(lengths > SHORT * lengths.max())

@@ -34,20 +34,20 @@ if TYPE_CHECKING:
     from sagline.kinematics.plan import Plan
 
 POINTS = 50  # points around each pulley
-FLAT = 1e-6  # a platform thinner than this share of the robot's size has a line as its shadow
+FLAT = 1e-6  # the shadow of a platform is a line if it is thinner than this share of the robot's size
 _SIGNS = np.array(list(product((-1.0, 1.0), repeat=3)))
-EDGES = tuple(  # edges of a box: between corners that differ in one direction
+EDGES = tuple(  # the edges of a box are between corners that differ in a single coordinate
     (a, b) for a, b in combinations(range(8), 2) if np.count_nonzero(_SIGNS[a] != _SIGNS[b]) == 1
 )
 FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))  # seen from outside
 FRAME_COLOR, FLOOR_COLOR, SHADOW_COLOR, WHEEL_COLOR = "0.6", "0.955", "0.82", "0.35"
-SAME_PLACE = 0.04  # anchors closer than this share of the robot's size have a common label
+SAME_PLACE = 0.04  # anchors have a common label if they are closer than this share of the robot's size
 HALO = [patheffects.withStroke(linewidth=2.0, foreground="white")]
 LABEL_DISTANCE = 0.045  # distance of a label outward from its anchor, as a share of the robot's size
 
 
 def drawn_pose(robot: Robot, pose: PoseLike | None) -> Pose:
-    """The given pose, or the middle of the robot's test box; InvalidValueError for a batch or without both."""
+    """The given pose, or the middle of the robot's test box; InvalidValueError for a batch, or if both are missing."""
     if pose is not None:
         return single_pose(pose)
     if robot.test_box is None:
@@ -57,7 +57,7 @@ def drawn_pose(robot: Robot, pose: PoseLike | None) -> Pose:
 
 
 def catenary_points(robot: Robot, pose: Pose, plan: Plan) -> Array:
-    """Points of the cables in the world for a feasible plan of the pose [m], shape (m, points, 3)."""
+    """Points of the cables in the world [m], shape (m, points, 3), from a feasible plan of the pose."""
     contact = plan.state.contact
     wraps = shapes.wraps(robot, pose, None if contact is None else contact.wrap_angle)
     free = shapes.catenaries(shapes.chords(robot, pose, wraps[:, -1]), plan.state.cables, 1.0)
@@ -71,7 +71,7 @@ def straight_points(robot: Robot, pose: Pose) -> Array:
 
 
 def pulleys_and_drums(robot: Robot, pose: Pose) -> tuple[list[Array], list[tuple[Array, bool]]]:
-    """Circles of pulleys and known drums; cables behind pulleys, drawn by their rise, and True for vertical ones."""
+    """Circles of pulleys and known drums; cables between drum and pulley, and True for those that are vertical."""
     turn = np.linspace(0.0, 2.0 * np.pi, POINTS)[:, None]
     pulleys = np.swapaxes(points_on_pulleys(robot, pose, turn), 0, 1)[pulleys_of(robot).radius > 0.0]
     known = None if robot.winches is None else robot.winches.drum_radius
@@ -83,7 +83,7 @@ def pulleys_and_drums(robot: Robot, pose: Pose) -> tuple[list[Array], list[tuple
 
 
 def _rims(ends: Array, radius: float) -> Array:
-    """Both rims of a horizontal drum as one line; its axis is given by two end points (2, 3)."""
+    """Both rims of a horizontal drum as one line; the end points of the drum's axis are (2, 3)."""
     axis = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
     turn = np.linspace(0.0, 2.0 * np.pi, POINTS)[:, None]
     rim = radius * (np.cos(turn) * np.cross(axis, [0.0, 0.0, 1.0]) + np.sin(turn) * [0.0, 0.0, 1.0])
@@ -91,7 +91,7 @@ def _rims(ends: Array, radius: float) -> Array:
 
 
 def frame_box(robot: Robot) -> Array | None:
-    """Corners of the frame, shape (8, 3). The top of the frame is at the highest anchors."""
+    """Corners of the frame, shape (8, 3); the top of the frame is at the height of the highest anchor."""
     if robot.frame_size is None:
         return None
     top = robot.frame_anchors.max(axis=0)
@@ -101,7 +101,7 @@ def frame_box(robot: Robot) -> Array | None:
 
 
 def platform_box(robot: Robot, pose: Pose) -> Array:
-    """Corners of the platform in the world, shape (8, 3): a box of its size, or the box around its anchors."""
+    """Corners of the platform in the world, shape (8, 3): the box of its size, or the box around its anchors."""
     low, high = robot.platform_anchors.min(axis=0), robot.platform_anchors.max(axis=0)
     size = high - low if robot.platform_size is None else robot.platform_size
     corners: Array = pose.position + _box_corners(0.5 * (low + high), size) @ pose.matrix.T
@@ -115,7 +115,7 @@ def _box_corners(middle: Array, size: Array) -> Array:
 
 
 def ground(points: Array, platform: Array) -> tuple[Array, Array]:
-    """The ground under all points, at z = 0 or lower, and the platform's shadow on it: corners, each (k, 3)."""
+    """Corners (k, 3) of the ground, at z = 0 or below the lowest point, and of the platform's shadow on the ground."""
     low, high = points.min(axis=0), points.max(axis=0)
     height = min(0.0, float(low[2]))
     outline = _box_corners(0.5 * (low + high), high - low)[[0, 2, 6, 4], :2]
@@ -130,8 +130,9 @@ def robot(robot: Robot, pose: PoseLike | None = None, ax: Axes3D | None = None) 
     """The robot in space at rest: frame, platform, and its cables as exact catenaries.
 
     Cables have the color of their chord tension, on the scale of the robot's limits as in `sagline view`, and their
-    numbers at the frame. Pulleys are turned into the planes of their cables. Dead length is drawn as a vertical line of
-    its rise, dotted if rise and length differ. The ground with the platform's shadow is at z = 0 or lower.
+    numbers at the frame. Pulleys are turned into the planes of their cables. Between drum and pulley, a cable is a
+    vertical line from one height to the other, dotted if its length is different. The ground with the platform's shadow
+    is at z = 0 or lower.
 
     Args:
         robot: The robot.
@@ -157,7 +158,7 @@ def robot(robot: Robot, pose: PoseLike | None = None, ax: Axes3D | None = None) 
     format_space_axes(
         ax,
         points,
-        robot.name if plan.feasible else f"{robot.name}: no tensions within the limits balance the platform here",
+        robot.name if plan.feasible else f"{robot.name}: no tensions within the limits balance this pose",
     )
     if plan.feasible:
         tension_bar(ax, TensionScale.of(robot), plan.chord_tension, "left")
@@ -165,11 +166,11 @@ def robot(robot: Robot, pose: PoseLike | None = None, ax: Axes3D | None = None) 
 
 
 def draw_robot(ax: Axes3D, robot: Robot, where: Pose, color: str | None = None) -> tuple[Plan, Array]:
-    """Frame, platform, cables and ground, without labels of the axes."""
-    ax.computed_zorder = False  # matplotlib's own order uses object centers and would draw the floor over objects on it
+    """Draw frame, platform, cables and ground; the axes have no labels yet."""
+    ax.computed_zorder = False  # matplotlib's order by centers would draw the floor over objects on it
     plan = inverse(robot, where)
     courses = catenary_points(robot, where, plan) if plan.feasible else straight_points(robot, where)
-    colors = TensionScale.of(robot).colors(plan.chord_tension) / 255.0  # gray without a tension
+    colors = TensionScale.of(robot).colors(plan.chord_tension) / 255.0  # cables without a tension are gray
     for line, own in zip(courses, colors, strict=True):
         style = "-" if plan.feasible else (0, (3.0, 2.0))
         ax.plot(*line.T, color=own if color is None else color, linewidth=1.4, linestyle=style, zorder=2.0)
@@ -187,7 +188,7 @@ def draw_robot(ax: Axes3D, robot: Robot, where: Pose, color: str | None = None) 
 
 
 def _draw_wheels(ax: Axes3D, robot: Robot, pose: Pose) -> Array:
-    """Draw pulleys, cables behind them, and known drums; returns their points (n, 3)."""
+    """Draw pulleys, known drums and the cables between them; returns their points (n, 3)."""
     circles, runs = pulleys_and_drums(robot, pose)
     for circle in circles:
         ax.plot(*circle.T, color=WHEEL_COLOR, linewidth=0.9, zorder=1.9)
@@ -202,13 +203,13 @@ def _draw_box(ax: Axes3D, corners: Array, color: str, width: float) -> None:
 
 
 def _draw_ground(ax: Axes3D, points: Array, platform: Array) -> None:
-    """Draw the ground under everything, and the platform's shadow on it."""
+    """Draw the ground below all objects, and the platform's shadow on the ground."""
     for flat, color in zip(ground(points, platform), (FLOOR_COLOR, SHADOW_COLOR), strict=True):
         ax.add_collection3d(Poly3DCollection([flat], facecolor=color, edgecolor="none", zorder=0.5))
 
 
 def _number_cables(ax: Axes3D, anchors: Array, points: Array) -> None:
-    """The number of each cable above and outside its anchor; close anchors have a common label."""
+    """Write each cable's number above and outside its anchor; anchors that are close have a common label."""
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
     left = list(range(len(anchors)))
     while left:
@@ -216,14 +217,14 @@ def _number_cables(ax: Axes3D, anchors: Array, points: Array) -> None:
         left = [k for k in left if k not in together]
         place = anchors[together].mean(axis=0)
         out = (place - points.mean(axis=0)) * (1.0, 1.0, 0.0)
-        out = 0.5 * out / (np.linalg.norm(out) or 1.0) + (0.0, 0.0, 0.85)  # upward: the axes have numbers below
+        out = 0.5 * out / (np.linalg.norm(out) or 1.0) + (0.0, 0.0, 0.85)  # upward, because the axes have numbers below
         place = place + LABEL_DISTANCE * size * out
         text = ", ".join(map(str, together))
         ax.text(*place, text, fontsize=current().tick, ha="center", va="center", path_effects=HALO, zorder=5.0)
 
 
 def tension_bar(ax: Axes, scale: TensionScale, tension: Array, place: Literal["left", "right"]) -> None:
-    """Color bar of the cable tensions."""
+    """Draw the color bar of the cable tensions."""
     steps = np.geomspace(scale.low, scale.high, 128)
     shown = ScalarMappable(LogNorm(scale.low, scale.high), ListedColormap(scale.colors(steps) / 255.0))
     below, above = tension.min() < scale.low * (1.0 - 1e-6), tension.max() > scale.high * (1.0 + 1e-6)
@@ -238,7 +239,7 @@ def tension_bar(ax: Axes, scale: TensionScale, tension: Array, place: Literal["l
 
 
 def fit_space(ax: Axes3D, low: Array, high: Array) -> Array:
-    """Limit axes to a box whose sides are at least a tenth of the longest one; returns the sides."""
+    """Limit axes to a box whose sides are at least a tenth of its longest side; returns the lengths of the sides."""
     size: Array = np.maximum(high - low, 0.1 * np.max(high - low))
     middle = 0.5 * (low + high)
     ax.set(**{f"{name}lim": (m - 0.5 * s, m + 0.5 * s) for name, m, s in zip("xyz", middle, size, strict=True)})
@@ -246,7 +247,7 @@ def fit_space(ax: Axes3D, low: Array, high: Array) -> Array:
 
 
 def format_space_axes(ax: Axes3D, points: Array, title: str) -> None:
-    """Labels, and ticks spaced by the width of their numbers, without ticks where two axes meet."""
+    """Write the labels; set ticks so that their numbers do not overlap, but none where two axes meet."""
     ax.set_title(title, fontsize=current().label, y=0.97)
     low, high = points.min(axis=0), points.max(axis=0)
     low[2] = min(0.0, low[2])

@@ -1,4 +1,4 @@
-"""Figures without pyplot: size and style, axes, lines over time, and files with the fonts inside."""
+"""Figures without pyplot: size and style, axes, lines over time, and files with embedded fonts."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ if TYPE_CHECKING:
 
     from sagline.core.arrays import Array, Flags
 
-# Okabe and Ito 2008, "Color universal design", without the two that are too pale for a line on white
+# Okabe and Ito 2008, "Color universal design", without the two colors that are too pale for lines on white
 BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"
 COLORS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
 GAP_COLOR = "#BBBBBB"
 DASHED: Final[Any] = (0, (4.0, 1.6))  # a line style of Matplotlib
 LINE_STYLES: Final[Any] = ("-", DASHED, (0, (1.0, 1.2)), (0, (5.0, 1.5, 1.0, 1.5)), (0, (7.0, 2.0)))
-MAP_COLORS: Final = "cividis"  # readable with all kinds of color vision
-MOST_POINTS: Final = 4000  # largest number of points of a line; a longer line is drawn through the extrema of its parts
+MAP_COLORS: Final = "cividis"  # a color map that is readable with all kinds of color vision
+MOST_POINTS: Final = 4000  # largest number of points of a line; of more points, the extrema of parts are drawn
 LABEL, TICK = PLAIN.label, PLAIN.tick  # text sizes in the documentation [pt]
 RESOLUTION = 300  # dots per inch
 
@@ -51,12 +51,12 @@ _reference = re.compile(r'(href="#|url\(#)([^")]+)')
 _name = re.compile(r' id="([^"]+)"')
 SVG = "{http://www.w3.org/2000/svg}"
 FAMILY = re.compile(r"font-family:\s*([^;]+)")
-OWN = frozenset({SANS, SERIF})  # fonts of Matplotlib, whose licenses allow embedding in documents
+OWN = frozenset({SANS, SERIF})  # fonts that come with Matplotlib; their licenses allow embedding in documents
 _Face = tuple[str, str, str]  # family, style and weight
 
 
 class Sheet(Figure):
-    """A figure without pyplot that a notebook can show; it keeps the style in which it was created."""
+    """A figure without pyplot, which a notebook can show; the figure keeps the style in which it was created."""
 
     def __init__(self, *arguments: Any, **named: Any) -> None:
         """Create a figure; the arguments are those of Matplotlib."""
@@ -65,17 +65,17 @@ class Sheet(Figure):
         self._fitted = False
 
     def draw(self, renderer: Any) -> None:
-        """Draw in the style of the figure, also objects that Matplotlib makes when drawing, such as tick labels."""
+        """Draw in the style of the figure, which then also holds for objects that Matplotlib makes while it draws."""
         with Using(self.style):
             if not self._fitted:
-                self._fitted = True  # before the first drawing
+                self._fitted = True  # the figure has not been drawn yet
                 _thicken(self, self.style.line)
-                self.draw_without_rendering()  # this computes the length of the axes
+                self.draw_without_rendering()  # the layout determines the length of the axes
                 break_labels(self)
             super().draw(renderer)
 
     def savefig(self, *arguments: Any, **named: Any) -> None:
-        """Write the figure, in its style."""
+        """Write the figure in its own style."""
         with Using(self.style):
             super().savefig(*arguments, **named)
 
@@ -91,7 +91,7 @@ def sheet(height: float) -> Sheet:
 
 
 def _thicken(figure: Figure, factor: float) -> None:
-    """Multiply line widths and marker sizes by a factor, except those of frames and ticks."""
+    """Multiply line widths and marker sizes by a factor; frames and ticks do not change."""
     owners: list[Any] = [*figure.axes, *figure.legends, *(ax.get_legend() for ax in figure.axes if ax.get_legend())]
     for line in (line for owner in owners for line in owner.get_lines()):
         line.set_linewidth(factor * line.get_linewidth())
@@ -113,7 +113,7 @@ def axes_or_new(ax: Axes | None, height: float = 3.0) -> Axes:
 
 
 def format_axes(ax: Axes, x: str, y: str) -> None:
-    """Labels, a light grid, and lines at the left and below only."""
+    """Set labels, a light grid, and a frame that has only its left and lower line."""
     look = current()
     ax.set_xlabel(x, fontsize=look.label)
     ax.set_ylabel(y, fontsize=look.label)
@@ -134,7 +134,7 @@ def format_clock(ax: Axes, clock: Array, label: str, axis: str = TIME) -> None:
 
 
 def hide_shared_labels(ax: Axes) -> None:
-    """Hide numbers and labels that other axes of the grid repeat: to the left if y is shared, below if x is shared."""
+    """Hide numbers and labels that other axes of the grid repeat, at the left if y is shared, below if x is shared."""
     place: Any = ax.get_subplotspec()
     if ax.get_shared_x_axes().get_siblings(ax) != [ax] and not place.is_last_row():
         ax.tick_params(axis="x", which="both", labelbottom=False)
@@ -145,7 +145,7 @@ def hide_shared_labels(ax: Axes) -> None:
 
 
 def draw_map(ax: Axes, x: Array, y: Array, values: Array, scale: Normalize, title: str) -> None:
-    """Values (nx, ny) at the points of a level grid, as colors; white with lines where there is none."""
+    """Draw values (nx, ny) at the points of a level grid as colors; cells without a value are white and hatched."""
     ax.patch.set(facecolor="white", hatch="////", edgecolor="0.6")
     edges = _cell_edges(x), _cell_edges(y)
     ax.pcolormesh(*edges, np.ma.masked_invalid(values.T), norm=scale, cmap=MAP_COLORS, rasterized=True)
@@ -165,7 +165,7 @@ def _cell_edges(middles: Array) -> Array:
 
 
 def color_bar(shown: ScalarMappable, axes: Any, label: str, **look: Any) -> Colorbar:
-    """Color bar next to axes, with its label."""
+    """Draw a color bar next to axes, with its label."""
     figure = np.ravel(axes)[0].figure
     bar: Colorbar = figure.colorbar(shown, ax=axes, **look)
     bar.set_label(label, fontsize=current().label)
@@ -174,7 +174,7 @@ def color_bar(shown: ScalarMappable, axes: Any, label: str, **look: Any) -> Colo
 
 
 def mark_event(ax: Axes, time: float, name: str, color: str, zorder: float) -> None:
-    """Vertical line at a time, with a name above the axes; no name for ""."""
+    """Draw a vertical line at a time, with a name above the axes; "" for none."""
     ax.axvline(time, color=color, linewidth=1.0, zorder=zorder)
     if name:
         ax.annotate(
@@ -184,12 +184,12 @@ def mark_event(ax: Axes, time: float, name: str, color: str, zorder: float) -> N
 
 
 def cable_look(cable: int) -> dict[str, Any]:
-    """Color and line style of a cable; neighbors (pairs at a winch post of most robots) have equal colors."""
+    """Color and line style of a cable; two neighbors have equal colors, because most robots have pairs of winches."""
     return {"color": COLORS[cable // 2 % len(COLORS)], "linestyle": "-" if cable % 2 == 0 else DASHED}
 
 
 def draw_series(ax: Axes, clock: Array, course: Array, **look: Any) -> None:
-    """Draw a line over time; a sample without neighbors is a point."""
+    """Draw a line over time; a sample is a point if its neighbors are missing."""
     if clock.size > MOST_POINTS:
         few = 2 * -(-clock.size // MOST_POINTS)
         rows = np.arange(clock.size // few * few).reshape(-1, few)
@@ -206,13 +206,13 @@ def draw_series(ax: Axes, clock: Array, course: Array, **look: Any) -> None:
 
 
 def draw_components(ax: Axes, clock: Array, courses: Array, name: str = "{}") -> None:
-    """The components (N, 3) along x, y and z over time; `name` formats the symbol of an axis."""
+    """Draw the components (N, 3) along x, y and z over time; `name` formats the symbol of each component."""
     for axis, course, color, style in zip("xyz", courses.T, COLORS, LINE_STYLES, strict=False):
         draw_series(ax, clock, course, color=color, linestyle=style, linewidth=1.2, label=f"${name.format(axis)}$")
 
 
 def true_runs(flags: Flags) -> list[tuple[int, int]]:
-    """First and last sample of each run of flags."""
+    """First and last sample of each sequence in which the flag is True."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(np.int8)))
     return [(int(first), int(end) - 1) for first, end in edges.reshape(-1, 2)]
 
@@ -220,7 +220,7 @@ def true_runs(flags: Flags) -> list[tuple[int, int]]:
 def shade_spans(
     ax: Axes, clock: Array, spans: Iterable[tuple[int, int]], label: str, color: str = GAP_COLOR, alpha: float = 0.5
 ) -> None:
-    """Shade the spans of samples (first, last), each up to halfway to its neighbors."""
+    """Shade spans of samples (first, last), each extended halfway to the neighboring samples."""
     if clock.size > 1:
         middles = [0.5 * (before + after) for before, after in pairwise(clock)]
         edges = np.array([clock[0], *middles, clock[-1]])
@@ -232,7 +232,7 @@ def shade_spans(
 
 
 def svg_text(figure: Figure, dots: int, **settings: str) -> str:
-    """A figure as an SVG element for a page, without date and creator, so that each call gives an equal text."""
+    """A figure as an SVG element for a page; date and creator are left out, so that each call gives the same text."""
     written = BytesIO()
     with matplotlib.rc_context(cast(Any, settings)):
         figure.savefig(written, format="svg", dpi=dots, metadata={"Date": None, "Creator": None}, transparent=True)
@@ -241,7 +241,7 @@ def svg_text(figure: Figure, dots: int, **settings: str) -> str:
 
 
 def unique_names(svg: str, prefix: str) -> str:
-    """A drawing whose identifiers begin with a prefix, so that a page can contain several; unused ones are removed."""
+    """A drawing whose identifiers begin with a prefix, so that a page can have several; unused ones are removed."""
     used = {found[1] for found in _reference.findall(svg)}
     svg = _name.sub(lambda found: f' id="{prefix}{found[1]}"' if found[1] in used else "", svg)
     return _reference.sub(lambda found: f"{found[1]}{prefix}{found[2]}", svg)
@@ -251,7 +251,7 @@ def save(drawing: Figure | Axes, file: os.PathLike[str] | str) -> None:
     """Write a figure to a file atomically; the suffix (.png, .svg, .pdf) selects the format.
 
     Args:
-        drawing: A figure, or Axes (their whole figure is saved).
+        drawing: A figure, or Axes, whose whole figure is saved.
         file: The file; an existing file is replaced.
 
     Raises:
@@ -267,10 +267,10 @@ def save(drawing: Figure | Axes, file: os.PathLike[str] | str) -> None:
     figure = drawing if isinstance(drawing, Figure) else cast(Figure, drawing.get_figure(root=True))
     path = file_path(file)
     kind = path.suffix.lstrip(".").lower()
-    known = sorted(figure.canvas.get_supported_filetypes().keys() - {"pgf"})  # pgf needs LaTeX, which may be missing
+    known = sorted(figure.canvas.get_supported_filetypes().keys() - {"pgf"})  # .pgf is left out, because it needs LaTeX
     if kind not in known:
         raise FileError(path, f"the suffix is {path.suffix or 'missing'}", f"Choose one of {', '.join(known)}.")
-    # equal figures give equal bytes: no date, no random names
+    # no date and no random names, so that equal figures give equal bytes
     metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
     drawn = BytesIO()  # matplotlib would leave a file open after a write error
     with matplotlib.rc_context({"svg.hashsalt": "sagline"}):
@@ -283,7 +283,7 @@ def save(drawing: Figure | Axes, file: os.PathLike[str] | str) -> None:
 
 
 def _with_fonts(svg: str) -> str:
-    """Embed the fonts of a drawing, each with the used letters only."""
+    """Embed the fonts of a drawing; each font has only the letters that the drawing uses."""
     letters = _letters(svg)
     faces = [_face(face, "".join(sorted(used))) for face, used in sorted(letters.items()) if used]
     if not faces:
@@ -293,7 +293,7 @@ def _with_fonts(svg: str) -> str:
 
 
 def _letters(svg: str) -> dict[_Face, set[str]]:
-    """Letters used with each embedded font."""
+    """The letters that the drawing uses, by font."""
     found: dict[_Face, set[str]] = {}
 
     def visit(element: ElementTree.Element, style: str) -> None:
@@ -316,12 +316,12 @@ def _last(style: str, name: str, default: str) -> str:
 
 
 def _face(face: _Face, letters: str) -> str:
-    """A rule of a style sheet that holds the letters of a font."""
+    """A rule of a style sheet that contains the letters of a font."""
     family, style, weight = face
     properties = FontProperties(family=[family], weight=int(weight) if weight.isdigit() else weight)
     properties.set_style(cast(Literal["normal", "italic", "oblique"], style))
     options = subset.Options(notdef_outline=True)
-    options.drop_tables += ["FFTM"]  # time stamp table, which cannot be subset
+    options.drop_tables += ["FFTM"]  # the table of time stamps cannot be reduced
     with TTFont(fontManager.findfont(properties), recalcTimestamp=False) as font:
         subsetter = subset.Subsetter(options)
         subsetter.populate(text=letters)

@@ -24,11 +24,11 @@ from sagline.plot.sheet import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SHOWN: Final = 0.5  # smallest largest tension at which the limit is drawn, as a share of the limit
+SHOWN: Final = 0.5  # the limit is drawn if the largest tension exceeds this share of it
 
 
 def simulation(simulation: Simulation) -> Figure:
-    """Tensions at the frame ends, and displacement and rotation of the platform from its first pose, over time.
+    """Tensions at the frame ends over time, and displacement and rotation of the platform relative to its first pose.
 
     Args:
         simulation: The simulation.

@@ -1,4 +1,4 @@
-"""Styles of figures for journals and slides: width, fonts, line widths, names at lines."""
+"""Styles of figures for journals and slides: width, fonts, line widths, and names at the ends of lines."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import matplotlib
 
 from sagline.core.arguments import choice, whole_number
 
-SANS, SERIF = "DejaVu Sans", "STIXGeneral"  # fonts of Matplotlib, available on any computer; the second resembles Times
+SANS, SERIF = "DejaVu Sans", "STIXGeneral"  # fonts of Matplotlib, so on any computer; the second resembles Times
 SLIDE_HEIGHT, PAGE_HEIGHT = 6.0, 9.0  # largest heights of a figure [in]
 
 
@@ -20,15 +20,15 @@ class Style:
     """A style of figures, activated by `style`.
 
     Attributes:
-        name: Name; "" for the style of the documentation.
+        name: Name of the style; "" for the style of the documentation.
         width: Width of every figure [in].
-        height: Heights of figures, relative to those of the documentation.
+        height: Factor of the heights of figures; it is 1 in the documentation.
         tallest: Largest height of a figure [in].
         font: Font family of all text.
         mathematics: Matplotlib's name for the font of formulas.
-        label: Size of the text at axes, in titles and at bars [pt].
-        tick: Size of numbers and of names of lines [pt].
-        line: Widths of lines and sizes of markers, relative to those of the documentation.
+        label: Font size of axis labels, titles and labels of bars [pt].
+        tick: Font size of numbers and of the names of lines [pt].
+        line: Factor of line widths and marker sizes; it is 1 in the documentation.
     """
 
     name: str
@@ -64,30 +64,30 @@ class Style:
             "figure.figsize": self.size(3.0),
             "lines.linewidth": 1.1 * self.line,
             "axes.linewidth": 0.6 * self.line,
-            "pdf.fonttype": 42,  # embedded TrueType fonts, because journals refuse Type 3
+            "pdf.fonttype": 42,  # embed TrueType fonts, because journals reject Type 3 fonts
             "ps.fonttype": 42,
             "svg.fonttype": "none",
         }
 
 
-# text of 6 pt or more if the figure is shown 8 cm wide, on a phone or in a column
+# text has at least 6 pt if the figure is only 8 cm wide, on a phone or in a column
 PLAIN: Final = Style("", 4.7, 0.85, PAGE_HEIGHT, SANS, "dejavusans", 10.0, 9.0, 1.0)
 _IEEE = Style("ieee", 3.5, 0.75, PAGE_HEIGHT, SERIF, "stix", 9.0, 8.0, 1.0)
 _MDPI = Style("mdpi", 5.45, 0.85, PAGE_HEIGHT, SERIF, "stix", 10.0, 9.0, 1.0)
 _SLIDES = Style("slides", 6.0, 1.5, SLIDE_HEIGHT, SANS, "dejavusans", 16.0, 14.0, 1.8)
-STYLES: Final = {  # styles for one column and for two columns, by name
+STYLES: Final = {  # by name: the styles for one column and for two columns
     # IEEE Author Center, "Size requirements for graphics": 3.5 in and 7.16 in
     "ieee": (_IEEE, replace(_IEEE, width=7.16, height=0.9)),
-    # the class mdpi.cls: text of 394.36 pt, with the margin beside it 525.5 pt, 72.27 pt per inch
+    # mdpi.cls: the text is 394.36 pt wide, or 525.5 pt with the margin next to it; an inch has 72.27 pt
     "mdpi": (_MDPI, replace(_MDPI, width=7.27, height=0.95)),
-    # 13.33 in by 7.5 in, half of the slide or the whole slide, with space for a heading
+    # half a slide or a whole slide of 13.33 in by 7.5 in, with space for a heading
     "slides": (_SLIDES, replace(_SLIDES, width=12.4, height=1.9, label=18.0, tick=16.0, line=2.0)),
 }
 _current: ContextVar[Style] = ContextVar("style", default=PLAIN)
 
 
 def current() -> Style:
-    """Style of new figures."""
+    """Current style, which new figures have."""
     return _current.get()
 
 
@@ -95,16 +95,16 @@ def style(name: str, columns: int = 1) -> Using:
     """Style of figures for a journal or a slide; figures that are created inside its `with` statement keep it.
 
     Figures have the width of the column, fonts of Matplotlib (available on any computer), and text sizes for print at
-    this width; names are at the ends of lines if there is space. Figures created directly with Matplotlib inside the
-    block also have these fonts and sizes. In PDF and SVG, text remains text and the fonts are embedded.
+    this width. Names are at the ends of lines if there is space. Inside the block, figures that are created directly
+    with Matplotlib have the same fonts and sizes. In PDF and SVG, text is stored as text, with embedded fonts.
 
     Args:
-        name: "ieee" for 3.5 in or 7.16 in, "mdpi" for 5.45 in or 7.27 in, "slides" for half a slide or a whole one of
-            13.33 in by 7.5 in.
-        columns: Width of the figure: 1 for a column, 2 for the width of the page.
+        name: "ieee" for widths of 3.5 in or 7.16 in, "mdpi" for 5.45 in or 7.27 in, "slides" for half a slide or a
+            whole slide of 13.33 in by 7.5 in.
+        columns: Width of the figure: 1 for one column, 2 for the whole width.
 
     Returns:
-        Context manager for a `with` statement, also a decorator; its value is the `Style` with width and sizes.
+        Context manager for a `with` statement, which can also be used as a decorator. Its value is the `Style`.
 
     Raises:
         InvalidValueError: If the style does not exist, or `columns` is not 1 or 2.
@@ -123,7 +123,7 @@ class Using(ContextDecorator):
     """Context manager of a style; it can be used repeatedly and nested."""
 
     def __init__(self, chosen: Style) -> None:
-        """Store the style; it is activated by the `with` statement."""
+        """Store the style, which the `with` statement activates."""
         self.style = chosen
         self._open: list[ExitStack] = []
 

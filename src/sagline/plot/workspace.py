@@ -1,4 +1,4 @@
-"""A workspace: a slice with its boundary, margins and limiting cables; the hull around the robot."""
+"""Plots of a workspace: a slice with its boundary, margins and limiting cables; the hull around the robot."""
 
 from __future__ import annotations
 
@@ -37,33 +37,33 @@ if TYPE_CHECKING:
 
     from sagline.core.arrays import Array, Flags, Indices
 
-POINTS: Final = 200  # grid points along the longer side
+POINTS: Final = 200  # number of grid points along the longer side
 LINES: Final = 5  # largest number of contour lines of the margin, approximately
-ROOM: Final = 11.0  # [pt], a region whose largest width is below twice this has no name
+ROOM: Final = 11.0  # a region has no name if its largest width is below twice this length [pt]
 OUTSIDE: Final = to_rgba(GAP_COLOR, 0.35)
-BESIDE: Final = 1e-6  # offset of the slice, as a share of the distance to the end of the box
-PALE: Final = 0.45  # share of a region's color, mixed with white
-Key = tuple[int, int]  # index of the criterion, and cable
+BESIDE: Final = 1e-6  # offset of the slice from a plane of symmetry, as a share of the distance to the end of the box
+PALE: Final = 0.45  # share of the limit's color in the color of its region; the rest is white
+Key = tuple[int, int]  # a limit: index of the criterion, and cable
 Color = tuple[float, float, float]
 HALO: Final = [patheffects.withStroke(linewidth=2.2, foreground="white")]
 NEAR_SIDE, FAR_SIDE = 0.5, 0.22  # opacity of the hull in front of and behind the robot
-FINEST: Final = 90  # cells along the longest side of the drawn hull; more are slow and not visible
+FINEST: Final = 90  # number of cells along the longest side of the drawn hull; more would be slow and not visible
 HEIGHT = 3.4  # [in]
-WHOLE, ROBOT, BARS = (0.0, 0.0, 1.0, 0.94), (-0.02, 0.0, 0.7, 0.96), (0.78, 0.2, 0.19, 0.6)  # axes in the sheet
+WHOLE, ROBOT, BARS = (0.0, 0.0, 1.0, 0.94), (-0.02, 0.0, 0.7, 0.96), (0.78, 0.2, 0.19, 0.6)  # axes' places in the sheet
 ABOVE, BELOW = (-0.05, 0.42, 1.05, 0.52), (0.2, 0.1, 0.75, 0.3)  # position of the axes in a narrow sheet
-MOST_LIMITS: Final = 10  # largest number of separate bars
+MOST_LIMITS: Final = 10  # largest number of limits that have their own bar
 REST: Final = "others"
 
 
 def slice(space: Workspace, normal: str = "z", at: float | None = None, ax: Axes | None = None) -> Axes:
     """A slice through a workspace, perpendicular to a world axis.
 
-    The bold line is the boundary by the criteria of the workspace, at the resolution of the slice. Inside, thin lines
-    are contours of the margin [N], and colors show the limit that is reached first: the cable of the margin, or the
-    name of another criterion.
+    The bold line is the boundary of the workspace, computed with its criteria at the resolution of the slice. Inside,
+    thin lines are contours of the margin [N]. Colors show which limit is reached first: the cable that limits the
+    margin, or another criterion.
 
     Args:
-        space: The workspace; the slice has its robot, loads, orientations and criteria.
+        space: The workspace, whose robot, loads, orientations and criteria the slice has.
         normal: Axis perpendicular to the slice: "x", "y" or "z".
         at: Coordinate on this axis [m]; None for the middle of the workspace.
         ax: Axes to draw on; None for a new figure.
@@ -87,7 +87,7 @@ def slice(space: Workspace, normal: str = "z", at: float | None = None, ax: Axes
     size = high - low
     longest = max(size[first], size[second])
     shape = tuple(max(2, round(POINTS * float(size[axis] / longest))) for axis in plane.axes)
-    # in a plane of symmetry, rounding errors would select one of two limiting cables; a parallel plane is drawn instead
+    # in a plane of symmetry, rounding errors would select one of two cables; therefore a parallel plane is drawn
     beside = plane._replace(at=plane.at + BESIDE * float(high[plane.normal] - plane.at))
     cut = slice_of(space.levels().details, beside, low, high, (shape[0], shape[1]))
     ax = axes_or_new(ax, height=0.9 + 5.6 * float(np.clip(size[second] / size[first], 0.3, 1.3)))
@@ -126,14 +126,14 @@ def _plane(space: Workspace, normal: str, at: float | None) -> Plane:
 
 
 def _limit_name(key: Key, space: Workspace) -> str:
-    """Name of a limit; for the margin, the first criterion, only the cable."""
+    """Name of a limit; if the limit is the margin, only the name of the cable."""
     which, cable = key
     named = [space.criteria[which].title] if which > 0 or cable < 0 else []
     return ", ".join(named + [f"cable {cable}"] * (cable >= 0))
 
 
 def limit_colors(space: Workspace) -> dict[Key, Color]:
-    """Colors of all possible limits; a limit has one color in all figures of a workspace."""
+    """Colors of all possible limits; a limit has the same color in all figures of a workspace."""
     count = space.robot.cable_count
     colors = {(0, cable): _shade(cable_color(cable)) for cable in range(-1, count)}
     others = [(which, cable) for which in range(1, len(space.criteria)) for cable in range(-1, count)]
@@ -141,7 +141,7 @@ def limit_colors(space: Workspace) -> dict[Key, Color]:
 
 
 def limit_finder(space: Workspace, keys: Sequence[Key]) -> Find:
-    """Function that gives the indices of the limits at positions (N, 3) [m] among keys."""
+    """Function that gives, for positions (N, 3) [m], the indices of their limits in `keys`."""
     details, index = space.levels().details, {key: k for k, key in enumerate(keys)}
 
     def find(positions: Array) -> Indices:
@@ -158,7 +158,7 @@ def _shade(color: tuple[int, int, int]) -> Color:
 
 
 def _draw_regions(ax: Axes, cut: Slice, space: Workspace, levels: Array, numbers: Sequence[Text]) -> None:
-    """Pale colors by the limit, each region with its name beside the numbers of the lines; gray outside."""
+    """Fill the region of each limit with a pale color, and write its name beside the numbers; gray outside."""
     ax.set_facecolor(OUTSIDE)
     inside = ax.contourf(cut.across, cut.up, cut.level, levels=[0.0, np.inf], colors=["white"], zorder=0.8)
     shades, codes = limit_colors(space), np.stack((cut.criterion, cut.cable), axis=-1)
@@ -175,7 +175,7 @@ def _draw_regions(ax: Axes, cut: Slice, space: Workspace, levels: Array, numbers
     for drawn in (image, borders):
         drawn.set_clip_path(inside.get_paths()[0], ax.transData)
     figure: Any = ax.get_figure(root=True)
-    figure.draw_without_rendering()  # this computes the size of the slice on the sheet
+    figure.draw_without_rendering()  # the layout determines the size of the slice on the sheet
     boxes: list[BboxBase] = [number.get_window_extent() for number in numbers]
     free = (cut.level >= 0.0) & ~_on_lines(cut.margin, levels)
     for k in np.unique(region):
@@ -184,7 +184,7 @@ def _draw_regions(ax: Axes, cut: Slice, space: Workspace, levels: Array, numbers
 
 
 def _triangles_at_borders(cut: Slice, region: Indices, find: Find) -> tuple[Array, Indices]:
-    """Triangles of the cells whose corners have several limits, cut at the limits: (U, 3, 2), and their limits (U,)."""
+    """Triangles (U, 3, 2) of the cells with several limits, divided where the limit changes, and their limits (U,)."""
     rows, columns = region.shape
     place = np.arange(region.size).reshape(rows, columns)
     cells = np.stack((place[:-1, :-1], place[:-1, 1:], place[1:, 1:], place[1:, :-1]), axis=-1).reshape(-1, 4)
@@ -213,9 +213,9 @@ def _on_lines(margin: Array, levels: Array) -> Flags:
 def _name_region(
     ax: Axes, cut: Slice, within: Flags, free: Flags, name: str, boxes: Sequence[BboxBase]
 ) -> list[BboxBase]:
-    """Write the name in the middle of each sufficiently large part, between lines if possible, and over no box.
+    """Write the name in the middle of each large part of a region: between lines if possible, and over no other text.
 
-    Returns the boxes of the written names.
+    Returns the boxes around the written names.
     """
     parts, count = label(within)
     figure: Any = ax.get_figure(root=True)
@@ -246,7 +246,7 @@ def _name_region(
 
 
 def _draw_lines(ax: Axes, cut: Slice, levels: Array) -> Sequence[Text]:
-    """Boundary, and contour lines of the margin inside; returns their numbers."""
+    """Draw the boundary, and contour lines of the margin inside; returns the numbers at the contour lines."""
     numbers: Sequence[Text] = ()
     if levels.size:
         margin = np.ma.masked_where((cut.level < 0.0) | ~np.isfinite(cut.margin), cut.margin)
@@ -260,7 +260,7 @@ def _draw_lines(ax: Axes, cut: Slice, levels: Array) -> Sequence[Text]:
 
 
 def round_levels(largest: float) -> Array:
-    """Round margins above 0 up to the largest, about `LINES` of them."""
+    """About `LINES` round values of the margin, from 0 (excluded) to the largest margin."""
     if not np.isfinite(largest) or largest <= 0.0:
         return np.empty(0)
     coarse = largest / LINES
@@ -272,8 +272,8 @@ def round_levels(largest: float) -> Array:
 def workspace(space: Workspace) -> Figure:
     """The hull of a workspace around its robot, and its limits.
 
-    Faces have the color of the limit there: the cable of the margin, or another criterion; they are gray at the box of
-    the workspace. The bars are shares of the surface. For a plane workspace, the slice is drawn.
+    The color of a face shows its limit: the cable that limits the margin, or another criterion. Faces on the box of the
+    workspace are gray. The bars show each limit's share of the surface. A workspace in a plane is drawn as a slice.
 
     Args:
         space: The workspace.
@@ -296,7 +296,7 @@ def workspace(space: Workspace) -> Figure:
         return slice(space, AXES[flat[0]]).get_figure(root=True)  # type: ignore[return-value] # a new figure
     limits, narrow = space.limits, current().narrow
     figure = sheet(height=2.3 * HEIGHT if limits and narrow else HEIGHT)
-    figure.set_layout_engine("none")  # layout engines do not know the extent of 3D axes
+    figure.set_layout_engine("none")  # Matplotlib's layout does not include the extent of 3D axes
     ax: Any = figure.add_axes((ABOVE if narrow else ROBOT) if limits else WHOLE, projection="3d")
     colors = limit_colors(space)
     _, points = draw_robot(ax, space.robot, _place(space), "0.4")
@@ -315,7 +315,7 @@ def workspace(space: Workspace) -> Figure:
 
 
 def _place(space: Workspace) -> Pose:
-    """A pose inside: the middle of the robot's test box, or the grid point with the largest margin."""
+    """A pose in the workspace: the middle of the robot's test box, or the grid point with the largest margin."""
     box, turn = space.robot.test_box, space.orientations.quaternion[0]
     if box is not None and space.levels()(0.5 * (box.low + box.high)[None])[0] >= 0.0:
         return Pose.from_quaternion(0.5 * (box.low + box.high), turn)
@@ -324,7 +324,7 @@ def _place(space: Workspace) -> Pose:
 
 
 def _draw_hull(ax: Axes3D, space: Workspace, colors: dict[Key, tuple[float, float, float]]) -> None:
-    """Faces of the hull in the colors of their limits, cut where the limit changes."""
+    """Draw the faces of the hull in the colors of their limits, divided where the limit changes."""
     chosen, faces = _coarser(space.surface.vertices, space.surface.faces)
     if not len(faces):
         return
@@ -349,7 +349,7 @@ def _draw_hull(ax: Axes3D, space: Workspace, colors: dict[Key, tuple[float, floa
 
 
 def _coarser(vertices: Array, faces: Indices) -> tuple[Indices, Indices]:
-    """A simplified mesh for print: indices of the kept corners, one of each cell of a grid, and faces of these."""
+    """A simplified mesh for print: indices of the kept corners, one for each cell of a grid, and faces between them."""
     if not len(faces):
         return np.empty(0, dtype=np.int64), faces
     low = vertices.min(axis=0)
@@ -362,7 +362,7 @@ def _coarser(vertices: Array, faces: Indices) -> tuple[Indices, Indices]:
 
 
 def _draw_bars(ax: Axes, space: Workspace, colors: dict[Key, tuple[float, float, float]]) -> None:
-    """The shares of the surface, the largest at the top."""
+    """Draw the limits' shares of the surface as bars; the largest is at the top."""
     keys = [(limit.number, limit.cable) for limit in space.limits]
     bars = [
         (_limit_name(key, space), 100.0 * limit.share, colors[key])

@@ -1,4 +1,4 @@
-"""Boundary of a set that a function describes: surface, volume with an error bar, and components."""
+"""Boundary of the set where a function is nonnegative: surface, volume with an error bar, and components."""
 
 from __future__ import annotations
 
@@ -40,13 +40,14 @@ class Boundary(Result):
     """Result of `boundary`.
 
     Attributes:
-        surface: The boundary, closed along the faces of the box; other vertices are on the boundary to 1e-10 of a cell.
-        volume: Volume of the set within the box [m^3]: enclosed volume of the surface plus volume between its triangles
-            and the boundary.
+        surface: The boundary, closed along the faces of the box. All other vertices are on the boundary, with an error
+            of at most 1e-10 of a cell.
+        volume: Volume of the set within the box [m^3]. It is the volume that the surface encloses, plus the volume
+            between the flat triangles and the curved boundary.
         volume_error: Error bound of the volume [m^3]. The bound neglects parts and gaps that are thinner than two cells
             of the finest grid.
         grid: Values of the function at the nodes of the grid before refinement.
-        components: Components of the set. Parts are one component if a walk between them was found.
+        components: Components of the set. Two parts are one component if a walk between them was found.
         open_faces: Faces of the box that the set reaches, for example "x low"; the set may continue beyond them.
         evaluations: Number of positions at which the function was evaluated.
     """
@@ -61,7 +62,7 @@ class Boundary(Result):
 
 
 class _Counted:
-    """Level function that counts the positions at which it is evaluated."""
+    """Level function with a counter of the positions at which it was evaluated."""
 
     def __init__(self, level: Level) -> None:
         self._level = level
@@ -83,9 +84,9 @@ def boundary(
 
     The function may have jumps and infinite values, but not NaN. It is evaluated at the nodes of a grid; `cells` is the
     number of cells along the longest side, or along each axis. Cells that the boundary crosses are then halved `refine`
-    times. The method of marching cubes gives a closed net of triangles from the signs at the nodes. Its vertices are on
-    the edges of the grid. The volume between net and boundary, and the error bound, follow from the distances between
-    triangles' centers and boundary.
+    times. The method of marching cubes gives a closed net of triangles from the signs at the nodes. The vertices of the
+    net are on the edges of the grid. The distances of the triangles' centers from the boundary give the volume between
+    net and boundary, and the error bound.
     """
     corners = exactly(low, "low", "m", (3,)), exactly(high, "high", "m", (3,))
     for name, a, b in zip("xyz", *corners, strict=True):
@@ -118,10 +119,10 @@ INWARD: Final = 0.01  # distance, relative to a cell, from a vertex to the posit
 
 
 def uncertain_volume(level: Level, surface: Surface, uncertainty: Array, cell: float) -> float:
-    """Volume between the boundaries for levels that differ by `uncertainty` (V,) [m^3].
+    """Volume [m^3] between the boundaries of two level functions that differ by `uncertainty`, (V,), at the vertices.
 
-    The slope at a vertex is computed from a position inside. cell: edge of a cell [m], the largest distance of the
-    boundaries.
+    The slope at a vertex is computed with a position inside. cell: edge of a cell [m]; the distance between the two
+    boundaries is limited to this length.
     """
     k = np.flatnonzero(uncertainty > 0.0)
     if not len(k):
@@ -149,7 +150,7 @@ def _cells_of(cells: int | tuple[int, int, int], size: Array) -> tuple[int, int,
 def _place_vertices(
     net: Net, grid: Grid, level: Level, *, precision: float = 1e-10, narrow: float = 1e-12
 ) -> tuple[Net, Array, Array]:
-    """Net, vertices (V, 3) [m] on the exact boundary, and decrease of the function along their edges (V,) [1/m]."""
+    """Net, vertices (V, 3) [m] on the exact boundary, and the function's decrease along the edges of the net [1/m]."""
     inner, outer = grid.positions(net.inner), grid.positions(net.outer)
     at_inner, at_outer = grid.values[tuple(net.inner.T)], grid.values[tuple(net.outer.T)]
     k = np.flatnonzero((net.inner != net.outer).any(axis=1))
@@ -186,9 +187,9 @@ def _faces_on_box(surface: Surface, grid: Grid) -> list[NDArray[np.bool_]]:
     return [(corners[:, :, k] == axis[end]).all(axis=1) for k, axis in enumerate(grid.axes) for end in (0, -1)]
 
 
-MEAN: Final = 3.0 / 4.0  # ratio of the mean distance to the distance at the center, for a curved triangle
+MEAN: Final = 3.0 / 4.0  # mean distance of a triangle from a curved boundary, divided by that of its center
 MISSED: Final = 5.0 / 12.0  # largest relative error of the mean distance
-FLAT: Final = 1e-6  # smaller distances, relative to the reach, are ignored
+FLAT: Final = 1e-6  # distances that are smaller, relative to the reach of the search, are ignored
 
 
 def _bulge_volumes(level: Level, vertices: Array, faces: Indices, slope: Array, grid: Grid) -> tuple[Array, Array]:
@@ -208,7 +209,7 @@ def _bulge_volumes(level: Level, vertices: Array, faces: Indices, slope: Array, 
 def _distances_to_boundary(
     level: Level, points: Array, normals: Array, slope: Array, outward: Array, inward: Array
 ) -> Array:
-    """Distances (N,) [m] of points (N, 3) from the boundary along normals, to a few percent; NaN if out of reach."""
+    """Distances (N,) [m] of points (N, 3) from the boundary along normals, to a few percent; NaN beyond the reach."""
     at_points = level_values(level, points)
     reach = np.where(at_points >= 0.0, outward, inward)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -225,7 +226,7 @@ def _distances_to_boundary(
 
 
 def _between(level: Level, ends: Brackets) -> Array:
-    """Position of the sign change in a bracket, by interpolation, or by iteration if an end value is infinite."""
+    """Position of the sign change in a bracket, by interpolation; by iteration if an end has an infinite value."""
     inner, outer, at_inner, at_outer = (part[ends.k] for part in ends[:4])
     with np.errstate(invalid="ignore"):
         share = at_inner / (at_inner - at_outer)
@@ -234,7 +235,7 @@ def _between(level: Level, ends: Brackets) -> Array:
     return np.asarray(inner + share[:, None] * (outer - inner))
 
 
-PRECISE: Final = 1e-4  # precision for display, relative to the level at the nearer node, or to an edge at jumps
+PRECISE: Final = 1e-4  # precision for display, relative to the level at the nearer node; at jumps, to the edge
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -248,7 +249,7 @@ class Outline(Result):
         on_box: True for triangles on a face of the box, shape (F,).
         open_faces: Faces of the robot's box that the workspace reaches, for example "x low".
         volume: Volume [m^3], or area in a plane [m^2], enclosed by the triangles.
-        parts: Number of components, without walks between them.
+        parts: Number of components; walks between them are not searched.
         grid: The level at the nodes.
     """
 
@@ -263,7 +264,7 @@ class Outline(Result):
 
     @property
     def shares(self) -> dict[int, float]:
-        """Share of the boundary for each limiting cable, without the faces of the box, largest first."""
+        """Share of each limiting cable in the boundary outside the faces of the box; the largest is first."""
         areas = vertex_areas(self.surface.vertices, self.surface.faces[~self.on_box])
         k = np.flatnonzero(areas > 0.0)
         cables, place = np.unique(self.cable[k], return_inverse=True)

@@ -29,16 +29,16 @@ from sagline.statics.slopes import cable_slopes
 from sagline.statics.stiffness import compliance_of, modes
 from sagline.workspaces.criterion import NOT_NEGATIVE, POSITIVE, Criterion, Given, Judged
 
-_PRECISION: Final = 1e-6  # [m], a smaller jump of the clearance function between poses is acceptable
+_PRECISION: Final = 1e-6  # [m], smaller jumps of the clearance between neighboring poses are acceptable
 _CABLE: Final = re.compile(r"cable (\d+)")
 _CORNERS: Final = 0.5 * np.array(list(product((-1.0, 1.0), repeat=3)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LeastMargin(Criterion):
-    """The cables balance every wrench of the set, with a reserve in any direction.
+    """The cables balance every wrench of the set, plus an additional load, the reserve, in any direction.
 
-    Every workspace has this criterion, as the first one, with zero reserve by default.
+    This is the first criterion of every workspace; its default reserve is zero.
 
     Attributes:
         limit: Reserve [N], >= 0.
@@ -52,7 +52,7 @@ class LeastMargin(Criterion):
 
     @property
     def always(self) -> bool:
-        """True for zero reserve, because every workspace includes this criterion."""
+        """True if the reserve is zero, because every workspace includes this criterion."""
         return self.limit == 0.0
 
     def judge(self, given: Given) -> Judged:
@@ -60,7 +60,7 @@ class LeastMargin(Criterion):
         return Judged(locked(given.margin - self.limit), given.cable)
 
     def scale(self, robot: Robot) -> float:
-        """Weight of the platform [N]; without gravity the largest tension of a cable."""
+        """Weight of the platform [N]; without gravity, the largest allowed tension of a cable."""
         weight = robot.mass * robot.gravity
         if weight > 0.0:
             return weight
@@ -73,7 +73,7 @@ class MaximumSag(Criterion):
     """The sag of every cable below its chord is within a limit, under the middle load of the set.
 
     Attributes:
-        limit: Largest sag [m], > 0.
+        limit: Largest allowed sag [m], > 0.
     """
 
     title = "sag"
@@ -94,11 +94,11 @@ class PositionError(Criterion):
     """The position error of a simpler cable model is within a limit.
 
     The simpler model gives tensions and lengths for the middle load of the set. The actual pose is the equilibrium of
-    exact cables with these lengths, as in `confirm`.
+    the platform on exact cables with these lengths, as in `confirm`.
 
     Attributes:
         model: Cable model, for example `Straight()`.
-        limit: Largest distance between the actual and the planned platform origin [m], > 0.
+        limit: Largest allowed distance [m] between the actual and the planned platform origin, > 0.
     """
 
     title = "position error"
@@ -119,7 +119,7 @@ class PositionError(Criterion):
         return f"{super(PositionError, self).__str__()} with {type(self.model).__name__}"
 
     def judge(self, given: Given) -> Judged:
-        """Limit minus position error [m]; NaN if the model has no lengths, or no equilibrium exists at the lengths."""
+        """Limit minus position error [m]; NaN if the model has no lengths, or these give no equilibrium."""
         found = confirm(given.planned(self.model))
         error = np.where(found.held, np.linalg.norm(found.position_error, axis=1), np.nan)
         return Judged(given.spread(self.limit - error))
@@ -127,13 +127,13 @@ class PositionError(Criterion):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LeastStiffness(Criterion):
-    """The stiffness against a force on the center of mass is above a limit in any direction.
+    """The stiffness against a force on the center of mass is above a limit, in any direction of the force.
 
-    The value is the stiffness in the softest direction, at fixed lengths. The platform can rotate freely. The value is
-    0 without a stable equilibrium. The load is the middle load of the set.
+    The value is the stiffness in the softest direction, at fixed lengths, for a platform that can rotate. The value is
+    0 if the equilibrium is not stable. The load is the middle load of the set.
 
     Attributes:
-        limit: Smallest stiffness [N/m], > 0.
+        limit: Smallest allowed stiffness [N/m], > 0.
     """
 
     title = "stiffness"
@@ -153,10 +153,10 @@ class LeastStiffness(Criterion):
 class LeastFrequency(Criterion):
     """The lowest natural frequency of the platform on massless cables is above a limit; see `modes`.
 
-    The load is the middle load of the set. The frequency is 0 Hz without a stable equilibrium.
+    The load is the middle load of the set. The frequency is 0 Hz if the equilibrium is not stable.
 
     Attributes:
-        limit: Smallest natural frequency [Hz], > 0.
+        limit: Smallest allowed natural frequency [Hz], > 0.
     """
 
     title = "frequency"
@@ -181,7 +181,7 @@ class Clearance(Criterion):
     `clearance`.
 
     Attributes:
-        limit: Smallest distance [m], > 0.
+        limit: Smallest allowed distance [m], > 0.
         obstacles: Obstacles, Box, Capsule, Sphere and Mesh, one or several.
     """
 
@@ -203,7 +203,7 @@ class Clearance(Criterion):
 
     def __str__(self) -> str:
         """Title, limit and counts of obstacles: "clearance ≥ 30 mm (1 obstacle, 12 triangles)"."""
-        solids: Any = self.obstacles  # a tuple after the check
+        solids: Any = self.obstacles  # the check converts a single obstacle to a tuple
         triangles = sum(len(one.faces) for one in solids if isinstance(one, Mesh))
         counts = counted(len(solids), "obstacle") + (f", {counted(triangles, 'triangle')}" if triangles else "")
         return f"{super(Clearance, self).__str__()} ({counts})"
@@ -216,7 +216,7 @@ class Clearance(Criterion):
         return Judged(given.spread(value - self.limit), given.spread_cables(cables[pair]))
 
     def excluded(self, robot: Robot, pose: Pose, half: Array) -> Flags:
-        """True for boxes of positions with an obstacle that is nearer than the limit at every position."""
+        """True for boxes of positions if an obstacle is nearer than the limit at every position of the box."""
         return np.asarray(_clearance_rows(robot, self.obstacles).of_platform(pose, half) < self.limit)
 
 
@@ -224,11 +224,11 @@ class Clearance(Criterion):
 class InFrame(Criterion):
     """The platform's box and anchors keep a distance from the faces of the frame.
 
-    The frame is the robot's frame_size, or otherwise the box around its anchors and the floor. For a planar robot, only
-    directions in its plane are used.
+    The frame is the robot's frame_size; a robot without frame_size has the box around its anchors and the floor. For a
+    planar robot, only distances along its plane count.
 
     Attributes:
-        limit: Smallest distance from the faces [m], >= 0.
+        limit: Smallest allowed distance from the faces [m], >= 0.
     """
 
     title = "frame"
@@ -258,17 +258,17 @@ class InFrame(Criterion):
 
 @lru_cache(maxsize=4)
 def _clearance_rows(robot: Robot, obstacles: Obstacle | Sequence[Obstacle]) -> ClearanceRows:
-    """Clearance measurement, prepared once for all poses of the robot."""
+    """Function that measures the clearance; its data are prepared once for all poses of the robot."""
     return ClearanceRows(robot, check_obstacles(obstacles, robot), precision=_PRECISION)
 
 
 def _cable_of(pair: tuple[str, str]) -> int:
-    """First cable of a pair of names; -1 if there is none."""
+    """First cable of a pair of bodies, from their names; -1 if neither body is a cable."""
     return next((int(found[1]) for name in pair if (found := _CABLE.fullmatch(name))), -1)
 
 
 def _least_stiffness(freedom: Array, matrix: Array) -> Array:
-    """Stiffness against a force on the center of mass in the softest direction [N/m], (N,); 0 if unstable.
+    """Stiffness against a force on the center of mass, in the softest direction [N/m], (N,); 0 if unstable.
 
     Arguments: free motions (n, 6), and stiffness matrices of the platform in world axes (N, 6, 6), which may be NaN.
     """

@@ -31,8 +31,8 @@ CONTINUOUS: Final = "MinimumNorm, QuadraticProgram, PNorm, AnalyticCenter, Centr
 class Given:
     """N poses of a robot at which criteria are evaluated.
 
-    Tensions are computed on first use, for the K poses with a nonnegative margin. They balance the middle wrench of the
-    wrench set.
+    Tensions are computed when they are first needed, for the K poses with a nonnegative margin. They balance the middle
+    wrench of the wrench set.
 
     Attributes:
         robot: The robot.
@@ -97,8 +97,8 @@ class Judged(NamedTuple):
     """Values of a criterion at N poses.
 
     Attributes:
-        value: Distance to the limit in the criterion's unit, >= 0 if the criterion is met; NaN without tensions, shape
-            (N,).
+        value: Distance to the limit in the criterion's unit, shape (N,): >= 0 if the criterion is met, and NaN if
+            the pose has no tensions.
         cable: Limiting cable, -1 for none, shape (N,); None if no pose has a single limiting cable.
     """
 
@@ -115,7 +115,7 @@ class Criterion:
         unit: Unit of its values.
         needs_tensions: True if the criterion depends on the tensions.
         sense: Relation to the limit, "≤" or "≥"; "" without a limit.
-        _limit_range: Range of the field `limit`, as in `number`; empty if it is not checked.
+        _limit_range: Allowed range of the field `limit`, as in `number`; empty for no check.
     """
 
     title: ClassVar[str]
@@ -125,7 +125,7 @@ class Criterion:
     _limit_range: ClassVar[Mapping[str, float]] = MappingProxyType({})
 
     def __post_init__(self) -> None:
-        """Check the limit, and reject an instance of this abstract class."""
+        """Check the limit; an instance of this abstract class is an error."""
         if type(self) is Criterion:
             step = "Choose one of the criteria, MaximumSag(0.05) for instance."
             raise InvalidValueError("Criterion()", "the abstract base class", "a criterion", step)
@@ -145,13 +145,13 @@ class Criterion:
         raise NotImplementedError
 
     def scale(self, robot: Robot) -> float:
-        """Unit size for the comparison of criteria with different units; by default the limit.
+        """Scale that makes the values of different criteria comparable by division; by default the limit.
 
         Args:
             robot: The robot.
 
         Returns:
-            The size in the criterion's unit, > 0.
+            The scale in the criterion's unit, > 0.
         """
         limit: float | None = getattr(self, "limit", None)
         if limit is None:
@@ -169,7 +169,7 @@ class Criterion:
         """
 
     def excluded(self, robot: Robot, pose: Pose, half: Array) -> Flags:
-        """Proof for boxes of positions that no tensions meet the criterion at any position of the box.
+        """Proofs for boxes of positions: at no position of the box do any tensions meet the criterion.
 
         Args:
             robot: The robot.
@@ -177,7 +177,7 @@ class Criterion:
             half: Half edges of the boxes [m], shape (3,).
 
         Returns:
-            True for a box with a proof, shape (N,).
+            True if the box has a proof, shape (N,).
         """
         return np.zeros(len(pose), dtype=np.bool_)
 
@@ -192,7 +192,7 @@ class Criterion:
         return f"{self.title} {self.sense} {limit}" if self.sense else self.title
 
     def values(self, given: Given) -> Array:
-        """Distances of poses to the limit, without the cables.
+        """Distances of poses to the limit, without the limiting cables.
 
         Args:
             given: The poses.
@@ -204,7 +204,7 @@ class Criterion:
 
 
 def check_continuous(method: TensionMethod, criteria: Sequence[Criterion]) -> None:
-    """Reject criteria on tensions that jump from pose to pose, or that depend on the previous pose."""
+    """Reject a criterion on tensions if the method's tensions can jump, or depend on the previous pose."""
     jumps = not method.continuous or (isinstance(method, PolygonWalk) and method.optimum == "1-norm")
     first = next((one for one in criteria if one.needs_tensions), None)
     if first is None or not (jumps or isinstance(method, Closest)):

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from sagline.core.arrays import Array, Indices
 from sagline.workspaces.grid import Level, level_values
 
-TRIAL = 3  # number of steps of regula falsi in which the width of a bracket must fall to an eighth
-ITERATIONS = 100  # largest number of steps; a jump takes about 45 (bisection), a continuous function 5 to 8
+TRIAL = 3  # number of steps of regula falsi, in which the width of a bracket must decrease to an eighth
+ITERATIONS = 100  # largest number of steps; bisection at a jump needs about 45, a continuous function 5 to 8
 
 
 class Brackets(NamedTuple):
-    """A pair of positions on each of N rays; a function changes its sign between the two positions.
+    """Two positions on each of N rays, between which a function changes its sign.
 
     Attributes:
         inner: Position inside [m], shape (N, 3).
@@ -41,7 +41,7 @@ class Brackets(NamedTuple):
 def brackets(
     level: Level, points: Array, outward: Array, at_points: Array, step: Array, outer_limit: Array, inner_limit: Array
 ) -> Brackets:
-    """Search outward from inside points (N, 3) [m], inward from others, in steps that triple up to a limit."""
+    """Search along rays from points (N, 3) [m]: outward from inside points, inward from others; each step triples."""
     is_inside = at_points >= 0.0
     limit = np.where(is_inside, outer_limit, inner_limit)
     away = np.where(is_inside, 1.0, -1.0)[:, None] * outward
@@ -71,7 +71,7 @@ def crossings(
     precision: float = 1e-10,
     narrow: float = 1e-12,
 ) -> Array:
-    """Inside share of each of V lines, (V,), by `crossings_of` with the same function for all lines."""
+    """As `crossings_of`, with one function for all V lines."""
 
     def values(_: Indices, positions: Array) -> Array:
         return level_values(level, positions)
@@ -89,12 +89,12 @@ def crossings_of(
     precision: float = 1e-10,
     narrow: float = 1e-12,
 ) -> Array:
-    """Inside share of each of V lines, (V,), by regula falsi with a reduced weight of an end that does not move.
+    """Share of each of V lines that is inside, (V,), by regula falsi; an end that does not move has a reduced weight.
 
     `values` has two arguments, indices of lines and one position on each line, and returns the function of each line. A
     bracket is bisected if an end value is infinite. It is bisected several times if regula falsi is slower than
     bisection, for example at jumps. `precision` is relative to the smaller end value, `narrow` to the length of the
-    line. The weights follow Anderson & Björck 1973 (the Illinois method has weights of 1/2).
+    line. The weights follow Anderson & Björck 1973; the Illinois method would have weights of 1/2.
     """
     low, high = np.zeros(len(inner)), np.ones(len(inner))
     at_low, at_high = at_inner.copy(), at_outer.copy()
@@ -127,7 +127,7 @@ def crossings_of(
 
 
 class _BisectionSchedule:
-    """Number of bisection steps for each bracket; it doubles after every slow trial of regula falsi."""
+    """Number of bisection steps of each bracket; it doubles after each trial in which regula falsi was slow."""
 
     def __init__(self, count: int) -> None:
         self._width = np.ones(count)  # width of the bracket at the start of a trial
@@ -151,7 +151,7 @@ class _BisectionSchedule:
 
 
 def distance_to_box(points: Array, directions: Array, low: Array, high: Array) -> Array:
-    """Distances (N,) [m] from positions (3,) or (N, 3) in a box to the box surface along unit directions (N, 3)."""
+    """Distances (N,) [m] of the box surface from positions (3,) or (N, 3) in the box, along unit directions (N, 3)."""
     walls = np.where(directions > 0.0, high - points, low - points)
     with np.errstate(divide="ignore", invalid="ignore"):
         lengths: Array = np.where(directions != 0.0, walls / directions, np.inf).min(axis=1)

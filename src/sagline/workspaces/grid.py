@@ -1,8 +1,8 @@
-"""Grid of values of a function of positions, refinement where the sign changes, and the net around the inside.
+"""Grid with the values of a function of positions, its refinement at sign changes, and the net around the inside.
 
-The method of marching cubes gives the net, which depends only on signs. The position of a vertex on its edge is
-computed afterwards with the exact function. Inside nodes are connected along the edges of the grid. Outside nodes are
-also connected across faces and corners, so that the net is closed everywhere.
+The method of marching cubes gives the net, which depends only on the signs at the nodes. The position of a vertex on
+its edge is computed afterwards with the exact function. Two inside nodes are connected if they share an edge of the
+grid. Two outside nodes are also connected across faces and corners of cells, so that the net is closed everywhere.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from sagline.core.errors import FileError, InvalidValueError
 from sagline.core.results import Result
 
 Level = Callable[[Array], Array]
-"""A function from positions [m], shape (N, 3), to values, shape (N,), >= 0 inside; it may be infinite or jump."""
+"""A function of positions (N, 3) [m] that returns values (N,), >= 0 inside; values may be infinite and may jump."""
 Mask = NDArray[np.bool_]
 
 _CELL = tuple(product((0, 1), repeat=3))  # the corners of a cell
-_HALVED = tuple(product((0, 1, 2), repeat=3))  # indices of the nodes of a cell after its edges are halved
+_HALVED = tuple(product((0, 1, 2), repeat=3))  # indices of the nodes of a cell whose edges have been halved
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -32,8 +32,8 @@ class Grid(Result):
 
     Attributes:
         x: Coordinates of the nodes [m], shape (nx,).
-        y: The same along y, shape (ny,).
-        z: The same along z, shape (nz,).
+        y: Coordinates of the nodes along y, shape (ny,).
+        z: Coordinates of the nodes along z, shape (nz,).
         values: The function, >= 0 inside, shape (nx, ny, nz).
         evaluated: True if the function was evaluated, shape (nx, ny, nz). Other nodes have the value of a neighbor, and
             only its sign is valid.
@@ -90,7 +90,7 @@ def sample_grid(level: Level, low: Array, high: Array, cells: tuple[int, int, in
 
 
 def refine_grid(grid: Grid, level: Level) -> Grid:
-    """Grid of half the step, evaluated only in cells that the boundary crosses on one of the grids."""
+    """Grid with half the step; it is evaluated only in cells that the boundary crosses on the old or the new grid."""
     axes = [np.interp(np.arange(2 * len(a) - 1) / 2.0, np.arange(len(a)), a) for a in grid.axes]
     nearest = np.ix_(*(np.arange(len(axis)) // 2 for axis in axes))
     fine = _grid(axes, grid.values[nearest], np.zeros([len(axis) for axis in axes], dtype=np.bool_), lock=False)
@@ -116,7 +116,7 @@ def _crossed_cells(inside: Mask, nodes: tuple[tuple[int, ...], ...] = _CELL, str
 
 
 def _views(nodes: Mask, offsets: tuple[tuple[int, ...], ...], stride: int) -> list[Mask]:
-    """Views of a mask of nodes: one for each node of a cell, over all cells."""
+    """For each of a cell's eight nodes, a view of a mask of nodes that has the value at this node for all cells."""
     count = [(n - 1) // stride for n in nodes.shape]
     return [
         nodes[tuple(slice(a, a + stride * (n - 1) + 1, stride) for a, n in zip(offset, count, strict=True))]
@@ -131,11 +131,11 @@ def _grid(axes: list[Array], values: Array, evaluated: Mask, *, lock: bool = Tru
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Net:
-    """Triangles with each vertex on an edge of the grid, or at a node on the border of the grid.
+    """Triangles whose vertices are on edges of the grid, or at nodes on the border of the grid.
 
     Attributes:
-        inner: Inside node of the edge of each vertex, shape (V, 3).
-        outer: Outside node, shape (V, 3); equal to `inner` at the border.
+        inner: For each vertex, the inside node of its edge, shape (V, 3).
+        outer: For each vertex, the outside node of its edge, shape (V, 3); equal to `inner` at the border.
         faces: Vertices of each triangle, counterclockwise as seen from outside, shape (F, 3).
         first: Index of each vertex before merging, shape (V,).
     """
@@ -156,7 +156,7 @@ def triangulate(inside: Mask) -> Net:
     except ModuleNotFoundError:
         raise FileError.not_installed("scikit-image", "Workspaces need it", "workspace") from None
     padded = np.pad(np.where(inside, np.float32(1.0), np.float32(-1.0)), 1, constant_values=-1.0)
-    # this older method uses only signs, and its vertices are on edges
+    # the older method of the package uses only signs, and puts all vertices on edges
     middle, faces, _, _ = marching_cubes(  # type: ignore[no-untyped-call]
         padded, 0.0, method="lorensen", gradient_direction="ascent"
     )
@@ -169,7 +169,7 @@ def triangulate(inside: Mask) -> Net:
 
 
 def merge_vertices(inner: Indices, outer: Indices, faces: Indices, shape: tuple[int, ...]) -> Net:
-    """Net with a single vertex per edge or node of the grid, without triangles that are then degenerate."""
+    """Net with at most one vertex per edge or node of the grid; triangles that become degenerate are removed."""
     node = np.ravel_multi_index(tuple(np.minimum(inner, outer).T), shape)
     direction = np.abs(outer - inner) @ np.array([1, 2, 3])
     _, first, place = np.unique(4 * node.astype(np.int64) + direction, return_index=True, return_inverse=True)

@@ -25,7 +25,7 @@ BLOCK: Final = 1 << 12  # poses per block, about 0.1 s; interrupts are handled b
 
 
 class Details(NamedTuple):
-    """Level and limiting criterion at N positions.
+    """Levels and limiting criteria at N positions.
 
     Attributes:
         level: >= 0 inside, shape (N,).
@@ -33,8 +33,8 @@ class Details(NamedTuple):
         criterion: Index of the limiting criterion, shape (N,).
         cable: Limiting cable, -1 for none, shape (N,).
         rotation: Index of the limiting rotation, shape (N,).
-        uncertainty: Bound of the error of the level, shape (N,). It is 0 if the sign of the level is certain, or if the
-            margin is not the limiting criterion.
+        uncertainty: Error bound of the level, shape (N,). It is 0 if the sign of the level is certain, or if the margin
+            is not the limiting criterion.
     """
 
     level: Array
@@ -47,7 +47,7 @@ class Details(NamedTuple):
 
 @dataclass(eq=False)
 class Levels:
-    """Smallest value of all criteria, each divided by its scale, at positions of the platform: >= 0 inside.
+    """Level function: the smallest value of all criteria, each divided by its scale, at a position; >= 0 inside.
 
     If the margin is negative, criteria on tensions are ignored, because there are no tensions. The level at a position
     is the smallest level of all rotations, or the largest level if one feasible rotation is sufficient.
@@ -60,9 +60,9 @@ class Levels:
         model: Cable model.
         tension: Tension distribution method.
         moment_arm: Lever arm as in `margin` [m].
-        held: Normal axis of a planar workspace, and the coordinate of its plane [m]; None otherwise.
-        on_block: Called after each block with its number of poses.
-        hull: "exact" for the margin, "inner" for its lower bound, "outer" for its upper bound.
+        held: For a planar workspace, the normal axis and the coordinate of its plane [m]; otherwise None.
+        on_block: Function that is called after each block with the number of poses in the block.
+        hull: Margin to use: "exact" for its value, "inner" for its lower bound, "outer" for its upper bound.
         middle: Middle of the wrench set, shape (6,); the tensions balance this wrench.
     """
 
@@ -111,7 +111,7 @@ class Levels:
         return flat
 
     def margins_of(self, wrenches: WrenchSet, positions: Array, rotation: Indices) -> Array:
-        """Margins (N,) [N] of another wrench set at positions (N, 3) [m]; rotation: indices of the rotations, (N,)."""
+        """Margins (N,) [N] of another wrench set at positions (N, 3) [m]; `rotation`: index of the rotation, (N,)."""
         rows = np.hstack((self.in_plane(positions), self.orientations.quaternion[rotation]))
         return MarginRows(self.robot, wrenches, self.model, self.moment_arm).rows(rows).value
 
@@ -125,7 +125,7 @@ class Levels:
         return found
 
     def _in_rotation(self, positions: Array, rotation: int) -> Details:
-        """Details in one rotation."""
+        """Details at positions, in one rotation."""
         rows = self.orientations.at(positions, rotation)
         bracket = self._margins.rows(rows)
         margin = {"exact": bracket.value, "inner": bracket.low, "outer": bracket.high}[self.hull]
@@ -147,7 +147,7 @@ class Levels:
         return Details(level, margin, criterion, cable, np.full(len(rows), rotation, dtype=np.int64), uncertainty)
 
     def _uncertainty(self, bracket: Bracket) -> Array:
-        """Distance from reserve to farther bound of the margin, in scales; 0 if the reserve is outside the bounds."""
+        """Distance from reserve to farther bound of the margin, in scales; 0 if the reserve is beyond both bounds."""
         reserve = self.criteria[0].limit if isinstance(self.criteria[0], LeastMargin) else 0.0
         unsure = (bracket.low < reserve) & (reserve <= bracket.high)
         if reserve == 0.0:

@@ -32,11 +32,11 @@ from sagline.workspaces.wrench_sets import WrenchSet, load_of
 class MarginStatus(Status):
     """Status of one pose of a margin; `text` states its meaning and the next step."""
 
-    FEASIBLE = codes.MARGIN_FEASIBLE, "the cables balance every load of the set within their limits, sag included"
+    FEASIBLE = codes.MARGIN_FEASIBLE, "the cables, with their sag, balance every load of the set within their limits"
     INFEASIBLE = (
         codes.MARGIN_INFEASIBLE,
-        "the cables cannot balance a load of the set within their limits with any sag; move the "
-        "platform, widen the limits of the limiting cable, or reduce the load",
+        "at least one load of the set exceeds the limits of the cables, for any sag force; move the platform, "
+        "widen the limits of the limiting cable, or reduce the load",
     )
     OPEN = (
         codes.MARGIN_OPEN,
@@ -64,26 +64,26 @@ _POSE_BYTES = 200.0  # memory per pose for rows and results [bytes]
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Margin(Result, Tabular):
-    """Result of `margin` at a single pose or N of them.
+    """Result of `margin` at a single pose or at N poses.
 
     Attributes:
-        robot: The robot, or one per pose.
+        robot: The robot, or one robot per pose.
         pose: The poses.
         wrenches: The set of loads.
         moment_arm: Lever arm that converts moments to forces [m]; None for each robot's mean lever arm.
         value: Largest additional load that can be balanced in every direction [N], shape () or (N,). A moment counts as
-            a force at the lever arm. A negative value is the excess of the load. The value is infinite for straight
-            cables without limits. It is -infinite if the status has no margin or a cable has no admissible tension. It
-            is never NaN. It is continuous, except for small jumps where the exact curves of the cables determine its
-            sign.
+            a force at the lever arm. A negative value is minus the excess of the load. The value is infinite for
+            straight cables without limits. It is -infinite if the pose has no margin (see status), or if a cable has no
+            admissible tension. It is never NaN. It is continuous, except for small jumps where the exact shape of the
+            cables determines its sign.
         low: Lower bound of the margin for all sag forces [N], with the shape of value. If the bound is nonnegative,
             every load of the set is proved feasible. Without sag, both bounds are equal to the value.
-        high: Upper bound of the margin [N]; if the bound is negative, a load of the set is proved infeasible.
+        high: Upper bound of the margin [N]. If the bound is negative, at least one load is proved infeasible.
         direction: Normal of the nearest facet, shape (..., 6): force part, and moment part [1/m], in world axes. Its
             length is 1 if the moment part is multiplied by the lever arm. An additional load opposite to this direction
             exceeds the limits first. If the force part is zero, this load is a pure moment.
-        limiting_cable: Index of the cable with a tension limit that has the largest effect on the value, -1 for none,
-            with the shape of value.
+        limiting_cable: Index of the cable whose tension limit has the largest effect on the value, -1 for none, with
+            the shape of value.
         status: Codes of `MarginStatus`, with the shape of value.
     """
 
@@ -106,7 +106,7 @@ class Margin(Result, Tabular):
         return locked(np.asarray(self.status == MarginStatus.FEASIBLE))
 
     def __str__(self) -> str:
-        """Margin of a single pose; for a batch, the number of poses per status, and smallest and largest margin."""
+        """Margin of a single pose; for a batch, the number of poses per status, the smallest and the largest margin."""
         if self.value.ndim == 0:
             cable = f", cable {int(self.limiting_cable)}" * (int(self.limiting_cable) >= 0)
             status = MarginStatus(int(self.status))
@@ -125,7 +125,7 @@ class Margin(Result, Tabular):
 
 
 def _newtons(value: ArrayLike) -> str:
-    """Text of a margin, including infinite ones."""
+    """Text of a margin, which may be infinite."""
     number = float(np.asarray(value))
     return n(number, unit="N") if np.isfinite(number) else f"{number:g} N".replace("-", "−")
 
@@ -141,11 +141,11 @@ def margin(
 ) -> Margin:
     """Signed margin of a set of loads at each pose, with a bracket for the cables' sag.
 
-    The margin is also valid at poses without a tension distribution. With sag, the bracket is proved for all tensions.
-    If low >= 0, every load of the set can be balanced within the limits. If high < 0, at least one load cannot be
-    balanced. If zero is within the bracket, the result of `inverse` for a single load narrows the bracket. The
-    admissible tensions are the same as in `inverse`: a sagging cable is at most fifteen times as long as its chord, and
-    a cable without upper limit is stretched to at most twice its length.
+    Poses without a tension distribution have a margin, too. The bracket from `low` to `high` is proved for the sag
+    forces of all tensions. If low >= 0, every load of the set can be balanced within the limits. If high < 0, at least
+    one load cannot be balanced. If zero is within the bracket, `inverse` can decide on a single load. The admissible
+    tensions are the same as in `inverse`: a sagging cable is at most fifteen times as long as its chord, and a cable
+    without upper limit is stretched to at most twice its length.
 
     Args:
         robot: The robot, or a sequence of N robots, one per pose.
@@ -153,9 +153,9 @@ def margin(
         wrenches: The set of loads; None for the weight alone.
         model: Cable model; with `Straight()` both ends of the bracket are equal to the value.
         moment_arm: Lever arm [m], >= 0; a moment counts as a force at this arm. None: the mean distance of the platform
-            anchors from the center of mass. 0: only forces count, as in `capacity_margin`; the value is then -infinite
-            if a moment alone is infeasible.
-        progress: Called after every few thousand poses with the number of finished poses and the number of all poses.
+            anchors from the center of mass. 0: only additional forces count, as in `capacity_margin`; then the value is
+            -infinite if the moments alone are infeasible.
+        progress: Function that is called from time to time with the number of finished poses and of all poses.
 
     Returns:
         Margin.
@@ -184,7 +184,7 @@ def margin(
     arm = None if moment_arm is None else number(moment_arm, "moment_arm", "m", low=0.0)
     prepared = MarginRows(robots, load, model, arm)
     rows = pose_rows(pose)
-    check_memory(f"margins at {len(rows):,} poses", _POSE_BYTES * len(rows), "Divide the poses into parts.")
+    check_memory(f"margins at {len(rows):,} poses", _POSE_BYTES * len(rows), "Divide the poses between several calls.")
     found = prepared.rows(rows, report)
     value, low, high, cable, status = (locked(array.reshape(shape)) for array in found[:5])
     direction = locked(found.direction.reshape(*shape, 6))

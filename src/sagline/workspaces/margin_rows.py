@@ -28,13 +28,13 @@ _CATENARY = Catenary()
 
 
 class Bracket(NamedTuple):
-    """Margins of N poses; `Margin` has these fields, and also the robot and the poses.
+    """Margins of N poses. `Margin` has the same fields, the robot and the poses.
 
     Attributes:
         value: Continuous margin between `low` and `high` [N], (N,).
         low: Lower bound of the margin for all sag forces [N], (N,).
         high: Upper bound [N], (N,).
-        cable: Cable with a limit that has the largest effect on the value, -1 for none, (N,).
+        cable: Cable whose limit has the largest effect on the value, -1 for none, (N,).
         status: Codes of `MarginStatus`, (N,).
         direction: Normal of the nearest facet, (N, 6).
     """
@@ -64,9 +64,9 @@ class MarginRows:
         moment_arm: float | None = None,
         cables: Array | None = None,
     ) -> None:
-        """Prepare one robot or R robots; moment_arm [m] as in `margin`.
+        """Prepare one robot or R robots; `moment_arm` [m] has the meaning that it has in `margin`.
 
-        If `cables` is given, the R robots are copies of the given robot with these cable tables (R, m, CABLE_COLUMNS).
+        If `cables` is given, the R robots are copies of one robot with these tables of cables (R, m, CABLE_COLUMNS).
         """
         robots = together(robot)
         shared = first_of(robots)
@@ -77,7 +77,9 @@ class MarginRows:
         self.cable_count = m = shared.cable_count
         if table.shape[1:] != (m, tables.CABLE_COLUMNS) or not len(table) or len(bodies) not in (1, len(table)):
             wanted = f"shape (R, {m}, {tables.CABLE_COLUMNS})"
-            raise InvalidValueError("cables", f"of shape {table.shape}", wanted, "Make it from cable_table(robot).")
+            raise InvalidValueError(
+                "cables", f"of shape {table.shape}", wanted, "Make the tables with cable_table(robot)."
+            )
         self.robot_count = len(table)
         limits = (LIMITS_OF[shared.tension_limits_of], np.nan)
         inertias = bodies_of(robots).inertia
@@ -92,7 +94,7 @@ class MarginRows:
         )
 
     def about(self, wrench: Array) -> MarginRows:
-        """Margins for the wrench set plus an unchecked wrench [N, N m], shape (6,); all other data are shared."""
+        """Margins for the wrench set plus an unchecked wrench [N, N m], (6,); all other data are shared."""
         model, limits, terms, (center, half, others, ellipsoids, corners, sizes, rates, inertias), arms = self._given
         there = _locked(center + wrench)
         moved = object.__new__(MarginRows)
@@ -138,14 +140,14 @@ def mean_arms(table: Array, bodies: Array) -> Array:
 
 
 def _arms(table: Array, bodies: Array, moment_arm: float | None) -> tuple[Array, Array]:
-    """Lever arms of the norm [m], and positive lever arms for the division of moments [m]."""
+    """Lever arms of the norm [m], and positive lever arms by which moments are divided [m]."""
     means = mean_arms(table, bodies)
     own = means if moment_arm is None else np.array([number(moment_arm, "moment_arm", "m", low=0.0)])
     return locked(own), locked(np.where(means > 0.0, means, 1.0))
 
 
 def _set_terms(wrenches: WrenchSet, inertias: Array) -> SetTerms:
-    """Wrench set in the form of the kernel: segments along one axis become a box."""
+    """Wrench set in the form that the kernel needs: segments along a single axis become a box."""
     segments = np.abs(wrenches.segments)
     straight = np.count_nonzero(segments, axis=1) <= 1
     half = segments[straight].sum(axis=0)

@@ -21,7 +21,7 @@ _STARTS: Final = 3  # number of best grid points from which the search starts
 _STEP: Final = 0.1  # initial step, as a share of the box
 _EVALUATIONS: Final = 300  # largest number of evaluations from each start
 _PRECISION: Final = 1e-4  # precision of the position [m]
-_FAR: Final = 1e6  # finite value in place of an infinite level, for the search
+_FAR: Final = 1e6  # finite value that replaces an infinite level in the search
 _UNHELD: Final = 1e3  # reduction of the merit at infeasible poses, if criteria need tensions
 
 
@@ -31,11 +31,11 @@ class Nearest(Result):
 
     Attributes:
         pose: A single pose.
-        level: Level of the pose: < 0, or >= 0 if a region smaller than a grid cell was found.
+        level: Level of the pose: < 0, or >= 0 if the search has found a feasible region that is smaller than a cell.
         margin: Margin of the loads at the pose [N].
         criterion: Index of the most violated criterion.
         cables: Indices of the cables that make the pose infeasible.
-        reason: Reason as a sentence.
+        reason: Sentence that explains why the pose is infeasible.
     """
 
     pose: Pose
@@ -70,9 +70,9 @@ def nearest_to(levels: Levels, grid: Grid, low: Array, high: Array) -> Nearest:
 
 
 def _merit(levels: Levels, positions: Array) -> Array:
-    """Finite merit of positions: level, or a value from the feasible fraction of the load if it is infeasible.
+    """Finite merit of positions: the level, or for infeasible loads a value from their feasible fraction.
 
-    Margins alone would lead to singular poses, because all margins are small there.
+    Margins alone would lead to singular poses, where all margins have a small absolute value.
     """
     found = levels.details(positions)
     bare = levels.margins_of(NO_LOAD, positions, found.rotation)
@@ -80,7 +80,7 @@ def _merit(levels: Levels, positions: Array) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
         short = np.where(bare > 0.0, _share(bare, found.margin), bare / weight) - 1.0
     tensions = any(one.needs_tensions for one in levels.criteria)
-    short -= _UNHELD if tensions else 0.0  # every level with tensions is above this
+    short -= _UNHELD if tensions else 0.0  # levels of poses with tensions are above this value
     return np.maximum(np.where(found.margin >= 0.0, found.level, short), -_FAR)
 
 
@@ -90,7 +90,7 @@ def _share(bare: Array, margin: Array) -> Array:
 
 
 def _simplex_search(levels: Levels, start: Array, low: Array, high: Array) -> tuple[Array, float]:
-    """Position of a local maximum of the merit by a simplex search, and the merit there."""
+    """Position of a local maximum of the merit, by a simplex search, and its merit."""
     from scipy.optimize import minimize  # the import takes a quarter of a second
 
     free = np.flatnonzero(high > low)

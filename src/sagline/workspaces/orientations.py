@@ -1,4 +1,4 @@
-"""Orientations of the platform in a workspace: level, or several rotations; all or any of them must be feasible."""
+"""Orientations of the platform in a workspace: level, or several rotations, of which all or any must be feasible."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _AXES: Final = _CORNERS / np.linalg.norm(_CORNERS, axis=1, keepdims=True)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Orientations:
-    """Rotations of the platform; all of them, or any of them, must be feasible at a position.
+    """Rotations of the platform; at a position, either all rotations or any one of them must be feasible.
 
     A continuous set of rotations is represented by the listed samples.
 
@@ -51,7 +51,7 @@ class Orientations:
             need: "all" or "any".
 
         Raises:
-            InvalidValueError: If a matrix is not a rotation, there is no rotation, or `need` is another word.
+            InvalidValueError: If a matrix is not a rotation, if no rotation is given, or if `need` is another word.
 
         Examples:
             >>> import numpy as np
@@ -77,7 +77,7 @@ class Orientations:
         return len(self.quaternion)
 
     def __str__(self) -> str:
-        """Description in one line."""
+        """Description of the rotations in one line."""
         if len(self) > 1:
             most = 2.0 * np.arctan2(np.linalg.norm(self.quaternion[:, :3], axis=1), np.abs(self.quaternion[:, 3])).max()
             return f"{self.need} of {len(self)} sampled rotations, by up to {n(np.degrees(most), unit='°')}"
@@ -91,7 +91,7 @@ class Orientations:
         return Orientations._of, (self.quaternion, self.need)
 
     def at(self, positions: Array, index: int) -> Array:
-        """Pose rows of the platform at positions, in one of the rotations.
+        """Rows of poses: the platform at positions, in one of the rotations.
 
         Args:
             positions: Positions of the platform origin [m], shape (N, 3).
@@ -107,10 +107,10 @@ class Orientations:
 
 @dataclass(frozen=True, slots=True)
 class Tilts:
-    """Rotations about any axis by up to an angle; all of them must be feasible at a position.
+    """All rotations by at most an angle, about any axis; all of them must be feasible at a position.
 
     The samples are the level orientation, and rotations by the full angle about 26 axes in all directions. For a planar
-    robot, they are rotations by the angle and by half of it, in both directions.
+    robot, the samples are rotations by the angle and by half the angle, in both directions.
 
     Attributes:
         angle: Largest angle of rotation [rad], 0 to pi.
@@ -122,12 +122,12 @@ class Tilts:
         """Check the angle."""
         angle = number(self.angle, "angle", "rad", low=0.0)
         if angle > np.pi:
-            step = "Give the angle in radians, at most half a turn."
+            step = "Give the angle in radians; it is at most half a turn."
             raise InvalidValueError("angle", f"{angle:.6g} rad", "0 to pi rad", step)
         object.__setattr__(self, "angle", angle)
 
     def sampled(self, robot: Robot) -> Orientations:
-        """Rotations that sample all tilts up to the angle.
+        """Sample the tilts up to the angle.
 
         Args:
             robot: The robot; its motion pattern gives the axes of rotation of the platform.
@@ -157,13 +157,13 @@ def _level() -> Orientations:
 def check_tilt(robot: Robot, angle: float, item: str) -> None:
     """Reject a tilt by an angle [rad] if the platform's motion pattern has no rotation; `item` is for messages."""
     if angle > 0.0 and robot.motion_pattern not in ROTATING:
-        value, step = f"{np.degrees(angle):.4g} deg", "Leave the tilt out."
+        value, step = f"{np.degrees(angle):.4g} deg", "Leave out the tilt."
         allowed = f"none, because a platform with motion_pattern {robot.motion_pattern} cannot rotate"
         raise InvalidValueError(item, value, allowed, step)
 
 
 def orientations_of(robot: Robot, given: Any, tilt: float) -> Orientations:
-    """Orientations from the argument of `workspace`, or from the tilt of the box [rad]; checked for the robot."""
+    """Orientations for a robot, checked: from the argument of `workspace`, or from the tilt of the box [rad]."""
     if given is not None and tilt > 0.0:
         step = "Give the tilt of the box, or orientations."
         value = f"given with a box of tilt {np.degrees(tilt):.4g} deg"
@@ -186,7 +186,10 @@ def _check_turns(robot: Robot, given: Orientations) -> None:
     if wrong.size:
         k = int(wrong[0])
         allowed = "a turn about plane_normal" if robot.motion_pattern in ROTATING else "no turn"
-        value, step = f"a turn by {turn_in_words(turns[k])}", "Leave it out, or give the robot another motion_pattern."
+        value, step = (
+            f"a turn by {turn_in_words(turns[k])}",
+            "Leave out this rotation, or give the robot another motion_pattern.",
+        )
         raise InvalidValueError(
             f"orientations[{k}]", value, f"{allowed}, by motion_pattern {robot.motion_pattern}", step
         )

@@ -1,4 +1,4 @@
-"""Proofs for boxes of poses with sagging cables: every pose of a box is feasible, or no pose is."""
+"""Proofs, with sagging cables, that every pose of a box is feasible, or that no pose of the box is feasible."""
 
 from __future__ import annotations
 
@@ -29,18 +29,21 @@ from sagline.workspaces.wrench_sets import WrenchSet, load_of
 
 
 class ProofVerdict(Status):
-    """Verdict on a box of poses, or on a part of a box."""
+    """Verdict on a box of poses, or on a cell of a box."""
 
-    OPEN = OPEN, "without a proof for the whole box: see the shares; a longer budget proves more cells"
-    PROVED_INSIDE = INSIDE, "at every pose every load is balanced by tensions within the limits"
+    OPEN = OPEN, "the whole box has no proof; the shares state how much is proved; a longer budget proves more cells"
+    PROVED_INSIDE = INSIDE, "at every pose, tensions within the limits balance every load"
     PROVED_OUTSIDE = OUTSIDE, "at every position, at least one load cannot be balanced by tensions within the limits"
 
 
 BLOCK: Final = 1 << 11  # boxes per block, about 0.03 s; interrupts are handled between blocks
-MOST_CELLS: Final = 4_000_000  # largest number of waiting cells, 100 MB
+MOST_CELLS: Final = 4_000_000  # largest number of cells that wait for a proof; they take 100 MB
 OBLONG: Final = 0.6  # an edge is halved if it is longer than this share of the longest edge
-PARTS: Final = (1, 4, 8, 16)  # numbers of parts of an edge; parts by two are hardly smaller
-PRECISION: Final = (1.0, 1e-12)  # weight of nonlinear terms; relative rounding error of a sum of a thousand terms
+PARTS: Final = (1, 4, 8, 16)  # possible numbers of parts of an edge
+PRECISION: Final = (
+    1.0,
+    1e-12,
+)  # weight of the nonlinear terms, and the relative rounding error of a sum of a thousand terms
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -59,13 +62,13 @@ class Cells(Result):
 
 
 class Prover:
-    """Proofs for rows of boxes; all box-independent data are prepared once.
+    """Proofs for rows of boxes; data that do not depend on the boxes are prepared once.
 
     Attributes:
         size: Approximate mean length of a chord [m].
         axes: Axes about which the platform may rotate, shape (1 or 3, 3).
-        deadline: End of the proofs on the monotonic clock [s].
-        tried: Number of boxes that were tried.
+        deadline: Time on the monotonic clock at which the proofs end [s].
+        tried: Number of boxes for which a proof was tried.
     """
 
     def __init__(
@@ -76,7 +79,7 @@ class Prover:
         precision: tuple[float, float] = PRECISION,
         progress: Progress | None = None,
     ) -> None:
-        """Prepare the proofs for a robot without pulleys; only tests change `precise`."""
+        """Prepare the proofs for a robot without pulleys; `precise` is for tests."""
         limits = (LIMITS_OF[robot.tension_limits_of], np.nan)
         self._given = (
             (model.code, *model.parameters), limits, robot_terms(robot), _load_terms(wrenches, robot), precision,
@@ -90,8 +93,8 @@ class Prover:
     def verdicts(self, middle: Array, half: Array, rotations: Array | None = None, turns: Array | float = 0.0) -> Codes:
         """Verdicts (N,) of boxes of poses, block by block; OPEN after the deadline.
 
-        Arguments: centers (N, 3) and half edges (3,) of the boxes [m], rotation vectors (N, 3), None for level, and the
-            largest rotation relative to these vectors [rad], () or (N,).
+        Arguments: centers (N, 3) and half edges (3,) of the boxes [m]; rotation vectors (N, 3), None for level; and the
+            largest angle between an orientation of the box and its rotation vector [rad], () or (N,).
         """
         boxes = np.zeros((len(middle), BOX_COLUMNS))
         boxes[:, :3] = middle
@@ -120,7 +123,7 @@ class Prover:
 
 
 def _bisect(prover: Prover, box: PoseBox, smallest: float) -> Cells:
-    """Bisect a box breadth-first, until all cells are proved, the smallest edge [m] is reached, or the time is over."""
+    """Divide a box breadth-first until all cells are proved, they have the smallest edge [m], or the time is over."""
     half = 0.5 * (box.high - box.low)
     waiting = (box.low + half)[None]
     done: list[tuple[Array, Array, Codes]] = []
@@ -143,16 +146,16 @@ def _bisect(prover: Prover, box: PoseBox, smallest: float) -> Cells:
 def _decide(prover: Prover, middle: Array, half: Array, tilt: float) -> Codes:
     """Verdicts of cells of positions, for level poses or for all tilts up to a largest tilt.
 
-    Tilts are rotation vectors in a ball, which is covered by cubes. For a planar robot they are rotations about the
-    normal of its plane, and their range is divided into intervals. The angle between the rotation at the middle of a
-    cube and another rotation of the cube is at most the length of the difference of the two rotation vectors. A cell is
-    outside if one orientation is infeasible, and inside if all orientations are feasible. A cube is not divided further
-    if it is smaller than the rotation of the cables within a cell, that is, the cell's size divided by a chord.
+    Tilts are rotation vectors in a ball, which cubes cover. For a planar robot, tilts are rotations about the normal of
+    its plane, and intervals cover their range. The angle between two rotations of a cube is at most the length of the
+    difference of their rotation vectors. A cell is outside if one orientation is infeasible, and inside if all
+    orientations are feasible. Cubes are divided until they are smaller than the angle by which the directions of the
+    cables vary within a cell, which is the cell's size divided by the length of a chord.
     """
     if tilt == 0.0:
         return prover.verdicts(middle, half)
     verdict = np.full(len(middle), ProofVerdict.PROVED_INSIDE, dtype=np.int8)
-    cells, vectors = np.arange(len(middle)), np.zeros((len(middle), 3))  # one row per open cube
+    cells, vectors = np.arange(len(middle)), np.zeros((len(middle), 3))  # one row per cube without a proof
     finest, axes = float(np.linalg.norm(half)) / prover.size, prover.axes
     for place, parts in enumerate(PARTS):
         turn = tilt if parts == 1 else tilt * np.sqrt(len(axes)) / parts
@@ -175,7 +178,7 @@ def _decide(prover: Prover, middle: Array, half: Array, tilt: float) -> Codes:
 
 
 def _smaller_cubes(cells: Indices, vectors: Array, edges: Array, parts: int, more: int) -> tuple[Indices, Array]:
-    """Parts of each cube that intersect the ball of tilts, and their cells; edges: half edges around the ball."""
+    """Parts of each cube that intersect the ball of tilts, and the cells they belong to."""
     count = more // parts
     steps = (2.0 * np.arange(count) + 1.0 - count) / more
     places = np.stack(np.meshgrid(*[steps] * len(edges), indexing="ij"), axis=-1).reshape(-1, len(edges))
@@ -186,7 +189,7 @@ def _smaller_cubes(cells: Indices, vectors: Array, edges: Array, parts: int, mor
 
 
 def _children(half: Array) -> tuple[Array, Array]:
-    """Centers of the parts of a box relative to the center of the box, and half edges; all long edges are bisected."""
+    """Centers of a box's parts relative to its center, and half edges of the parts; all long edges are bisected."""
     long = (half >= OBLONG * half.max()) & (half > 0.0)
     halved = np.where(long, 0.5 * half, half)
     steps = [np.array([-1.0, 1.0]) * halved[k] if long[k] else np.zeros(1) for k in range(3)]
@@ -227,10 +230,10 @@ class Proof(Result):
         model: Cable model of the proofs.
         verdict: Verdict on the whole box.
         inside: Share of the box, 0 to 1, in which every load is proved feasible.
-        outside: Share of the box in which a load is proved infeasible.
-        open: Share without a proof.
-        cells: The cells.
-        tried: Number of boxes that were tried.
+        outside: Share of the box in which at least one load is proved infeasible.
+        open: Share of the box without a proof.
+        cells: The cells of the box.
+        tried: Number of boxes for which a proof was tried.
     """
 
     robot: Robot
@@ -251,12 +254,12 @@ class Proof(Result):
 
     @property
     def inside_volume(self) -> float:
-        """Volume that is proved inside [m^3], a lower bound of the workspace in the box."""
+        """Volume that is proved inside [m^3]; it is a lower bound of the workspace's volume in the box."""
         return self.inside * self.volume
 
     @property
     def outside_volume(self) -> float:
-        """Volume that is proved outside [m^3]; the rest of the box is an upper bound of the workspace."""
+        """Volume that is proved outside [m^3]; the workspace's volume in the box is at most the rest of the box."""
         return self.outside * self.volume
 
     @property
@@ -265,7 +268,7 @@ class Proof(Result):
         return self.open * self.volume
 
     def __str__(self) -> str:
-        """Verdict, and share and volume of each kind of cell."""
+        """The verdict, then share and volume of the cells inside, outside and without a proof."""
         rows = (("inside", self.inside), ("outside", self.outside), ("open", self.open))
         shares = "\n".join(f"  {word:<8}{share:>8.2%}{share * self.volume:>12.5g} m3" for word, share in rows)
         return f"{self.verdict.name}: {self.verdict.text}\n{shares}\n  {counted(self.tried, 'box')} tried"
@@ -281,13 +284,13 @@ def prove(
     smallest: float | None = None,
     progress: Progress | None = None,
 ) -> Proof:
-    """Prove that every pose of a box is feasible, or that no pose is; or divide the box into cells of both kinds.
+    """Prove that every pose of a box is feasible, or that none is, or do so for each cell of the divided box.
 
     Without a tilt of the box, poses are level. With a tilt, the orientations of a position are all rotations by at most
     this angle about any axis (for a planar platform, about the normal of its plane). A position is inside if all its
-    orientations are feasible, and outside if one of them is not. The box is halved along its edges repeatedly until
-    every cell is proved. Cells without a proof at the end of the budget are open. With `Catenary()`, the proofs are
-    valid for the exact cables, with the same admissible tensions as in `margin`.
+    orientations are feasible, and outside if at least one orientation is infeasible. The box is divided until every
+    cell is proved. Cells without a proof at the end of the budget are open. With `Catenary()`, the proofs are valid for
+    the exact cables; the admissible tensions are the same as in `margin`.
 
     Args:
         robot: The robot, without pulleys.
@@ -295,9 +298,9 @@ def prove(
         wrenches: Set of loads; the cables must balance all of them. None for the weight alone.
         budget: Time limit for the proofs [s], > 0.
         model: Cable model.
-        smallest: Shortest allowed longest edge of a cell [m]; smaller cells are not examined. None: only the budget is
-            a limit.
-        progress: Called after every few thousand cells with the number of finished cells and the number of known cells.
+        smallest: Smallest length of a cell's longest edge [m]; a division that goes below it is not made. None: only
+            the budget is a limit.
+        progress: Function that is called from time to time with the number of finished cells and of known cells.
 
     Returns:
         Proof.
@@ -321,13 +324,13 @@ def prove(
     check_provable(instance(robot, Robot, "robot"))
     check_tilt(robot, instance(box, PoseBox, "box").tilt, "box: tilt")
     if box.tilt > 0.0 and load.accelerations[1] > 0.0:
-        step = "Give their moments as WrenchBox(moment=...), or prove the level poses."
+        step = "Replace the accelerations by WrenchBox(moment=...), or prove level poses."
         raise InvalidValueError("wrenches: angular accelerations", "given", "none if the box is tilted", step)
     seconds = number(budget, "budget", "s", above=0.0)
     least = 0.0 if smallest is None else number(smallest, "smallest", "m", above=0.0)
     report = callback(progress, "progress")
     model = model_of(model)
-    # loading or compiling the kernel is not part of the budget
+    # the time to load or compile the kernel does not count
     Prover(robot, load, model).verdicts(box.low[None], np.zeros(3))
     prover = Prover(robot, load, model, progress=report)
     prover.deadline = time.monotonic() + seconds
@@ -342,7 +345,7 @@ def prove(
 
 
 def check_provable(robot: Robot) -> None:
-    """Reject robots with pulleys, or with fewer cables than degrees of freedom; proofs do not support them."""
+    """Reject robots with pulleys or with fewer cables than degrees of freedom, for which no proofs are implemented."""
     check_cable_count(robot)
     if robot.winches is not None and (robot.winches.pulley_radius > 0.0).any():
         cable = int(np.argmax(robot.winches.pulley_radius > 0.0))

@@ -20,14 +20,15 @@ AXES: Final = "xyz"
 
 
 class Region(NamedTuple):
-    """Region of positions, and its grid.
+    """Region of positions, with the number of cells of its grid.
 
     Attributes:
         box: The given box, or the robot's own box.
         low: Lowest corner of the region [m], shape (3,).
-        high: Highest corner [m], which is higher along every axis.
-        flat: Index of the axis along which the box has no extent; None if there is none. With a flat axis, the
-            positions are in a plane, and the region has a thickness. A volume divided by the thickness is an area.
+        high: Highest corner [m], above the lowest corner along every axis.
+        flat: Index of the axis along which the box has no extent; None if it has an extent along all axes. With a flat
+            axis, the positions are in a plane, and the region has a thickness. Its volume divided by the thickness is
+            the area.
         thickness: Thickness of the region along the flat axis [m]; 1 without a flat axis.
         cells: Number of cells along each axis.
     """
@@ -46,7 +47,7 @@ class Region(NamedTuple):
 
 
 def region_of(robot: Robot, box: PoseBox | None, cells: int) -> Region:
-    """Region of a box; the default box contains frame and test box, and is flat for a planar robot."""
+    """Region of a box; the default box encloses the frame and the test box, and is flat for a planar robot."""
     plane = _plane_axis(robot)
     optional(box, PoseBox, "box")
     if box is None:
@@ -74,7 +75,7 @@ def region_of(robot: Robot, box: PoseBox | None, cells: int) -> Region:
 
 
 def _own(robot: Robot) -> tuple[Array, Array]:
-    """Corners of the smallest box around frame and test box [m]."""
+    """Corners [m] of the smallest box that encloses the frame and the test box."""
     low, high = bounds(robot)
     if robot.test_box is None:
         return low.copy(), high.copy()
@@ -82,25 +83,25 @@ def _own(robot: Robot) -> tuple[Array, Array]:
 
 
 def flat_axis(box: PoseBox) -> tuple[int, float] | None:
-    """First axis along which a box has no extent, and the coordinate of the box along it [m]; None if there is none."""
+    """First axis along which a box has no extent, and the box's coordinate on it [m]; None without such an axis."""
     flat = np.flatnonzero(box.high - box.low <= ROUNDING)
     return (int(flat[0]), float(box.low[flat[0]])) if flat.size else None
 
 
 def _plane_axis(robot: Robot) -> int | None:
-    """Axis of a planar robot's plane normal; raises an error if the normal is not along an axis."""
+    """Axis of the normal of a planar robot's plane; raises an error if the normal is not along an axis."""
     if robot.plane_normal is None:
         return None
     axis = int(np.argmax(np.abs(robot.plane_normal)))
     if abs(robot.plane_normal[axis]) < 1.0 - ROUNDING:
         normal = ", ".join(f"{x:.4g}" for x in robot.plane_normal)
-        step = "Turn the robot's coordinates so that its plane is upright or level along the axes."
+        step = "Rotate the robot's coordinates so that the normal of its plane is along an axis."
         raise InvalidValueError("plane_normal", f"({normal})", "along x, y or z for a workspace", step)
     return axis
 
 
 def _place_of_plane(robot: Robot, axis: int) -> float:
-    """Coordinate of a planar robot's plane along the normal [m]."""
+    """Coordinate of a planar robot's plane along its normal [m]."""
     return float(robot.frame_anchors[:, axis].mean() - robot.platform_anchors[:, axis].mean())
 
 
@@ -128,7 +129,7 @@ class Plane(NamedTuple):
         return f"{AXES[self.normal]} = {self.at:.3g} m"
 
     def positions(self, across: Array, up: Array) -> Array:
-        """Positions (U C, 3) of a grid in the plane, row by row, from coordinates of columns (C,) and rows (U,) [m]."""
+        """Positions (U C, 3) [m] of a grid, row by row; across, up: coordinates of the C columns and U rows [m]."""
         places = np.empty((up.size, across.size, 3))
         first, second = self.axes
         places[..., self.normal] = self.at
@@ -147,10 +148,10 @@ class Slice:
         plane: The plane.
         across: Coordinates of the columns [m], shape (C,).
         up: Coordinates of the rows [m], shape (U,).
-        level: >= 0 inside of the workspace, shape (U, C).
+        level: Level of each node, >= 0 in the workspace, shape (U, C).
         margin: Signed margins [N], shape (U, C): negative if the loads are infeasible, -infinite if the robot is
             singular.
-        criterion: Index of the deciding criterion, shape (U, C).
+        criterion: Index of the limiting criterion, shape (U, C).
         cable: Limiting cable, -1 for none, shape (U, C).
     """
 
@@ -164,7 +165,7 @@ class Slice:
 
 
 def slice_of(find: Find, plane: Plane, low: Array, high: Array, shape: tuple[int, int]) -> Slice:
-    """Slice of a function of positions, for example `Levels.details`, in a box; low, high: box corners (3,) [m]."""
+    """Slice through a function of positions, such as `Levels.details`; low, high: corners of the box (3,) [m]."""
     first, second = plane.axes
     across, up = np.linspace(low[first], high[first], shape[0]), np.linspace(low[second], high[second], shape[1])
     found = find(plane.positions(across, up))

@@ -24,23 +24,23 @@ from sagline.workspaces.surface import Components, Surface, vertex_areas
 from sagline.workspaces.wrench_sets import WrenchSet
 
 HULLS: Final[dict[Hull, str]] = {
-    "inner": "inner: all positions inside are proved feasible",
-    "outer": "outer: all positions outside are proved infeasible",
+    "inner": "inner: every position inside is proved feasible",
+    "outer": "outer: every position outside is proved infeasible",
 }
-BY_BOX: Final = -1  # value of `limiting` on a face of the box
-MOST_LIMITS: Final = 10  # largest number of printed shares
-_MOST_PARTS: Final = 5  # largest number of components with printed volumes
+BY_BOX: Final = -1  # value of `limiting` at vertices on a face of the box
+MOST_LIMITS: Final = 10  # largest number of shares that are printed
+_MOST_PARTS: Final = 5  # largest number of components whose volumes are printed
 _WIDTH: Final = 80  # width of the printed text, in columns
 _HEAD: Final = 12  # indentation of each line, in columns
 
 
 class Limit(NamedTuple):
-    """Share of the surface with one limiting criterion and cable.
+    """Share of the surface that one criterion and one cable limit.
 
     Attributes:
         criterion: Title of the criterion.
         cable: Limiting cable, -1 if there is none.
-        share: Share of the surface without the faces of the box.
+        share: Share of the surface outside the faces of the box, 0 to 1.
         number: Index of the criterion, from 0.
     """
 
@@ -50,7 +50,7 @@ class Limit(NamedTuple):
     number: int
 
     def __str__(self) -> str:
-        """Criterion and cable."""
+        """Names of the criterion and the cable."""
         return self.criterion if self.cable < 0 else f"{self.criterion}, cable {self.cable}"
 
 
@@ -70,12 +70,13 @@ class Workspace(Result, Saved):
         model: Cable model.
         tension: Tension distribution method, for criteria on tensions.
         moment_arm: Lever arm as in `margin` [m]; None for the mean lever arm.
-        hull: "exact" by the margin, "inner" by its lower bound, or "outer" by its upper bound.
+        hull: Margin that determines the surface: "exact" for its value, "inner" for its lower bound, "outer" for its
+            upper bound.
         unit: Unit of the volume, "m³" or "m²".
         volume: Volume or area in this unit.
         volume_error: Error bound of the volume; 0 for an empty workspace. It includes the volume between triangles and
-            boundary, and the uncertainty of the margin at vertices. It excludes parts and gaps that are thinner than
-            two cells of the finest grid.
+            boundary, and the uncertainty of the margin at vertices. It does not include parts and gaps that are thinner
+            than two cells of the finest grid.
         components: Components of the workspace.
         surface: The closed boundary, including the faces of the box that the workspace reaches.
         limiting: Index of the limiting criterion at each vertex of the surface, shape (V,); -1 on a face of the box.
@@ -84,8 +85,8 @@ class Workspace(Result, Saved):
         open_faces: Faces of the box that the workspace reaches, for example "x low". The workspace may continue beyond
             these faces; the volume is the volume inside the box.
         x: Coordinates of the nodes of the grid [m], shape (X,).
-        y: The same along y, shape (Y,).
-        z: The same along z, shape (Z,).
+        y: Coordinates of the nodes along y, shape (Y,).
+        z: Coordinates of the nodes along z, shape (Z,).
         level: Smallest value of the criteria, each divided by its scale, at these nodes, >= 0 inside, shape (X, Y, Z).
         nearest: The pose nearest to feasibility if the workspace is empty; otherwise None.
     """
@@ -121,7 +122,7 @@ class Workspace(Result, Saved):
 
     @property
     def limits(self) -> tuple[Limit, ...]:
-        """Criteria and cables that limit the workspace; the one with the largest share of the surface is the first."""
+        """Criteria and cables that limit the workspace, in decreasing order of their shares of the surface."""
         inner = (self.limiting[self.surface.faces] != BY_BOX).any(axis=1)  # False for triangles on the box
         areas = vertex_areas(self.surface.vertices, self.surface.faces[inner])
         k = np.flatnonzero((self.limiting != BY_BOX) & (areas > 0.0))
@@ -138,7 +139,7 @@ class Workspace(Result, Saved):
     def field(self) -> Any:
         """Level, margin, limiting criterion and cable at the points of the grid, with their coordinates.
 
-        The result is an xarray Dataset with dimensions x, y and z. It is computed at each call.
+        The result is an xarray Dataset with dimensions x, y and z. Each call computes it again.
         """
         return formats().module_of(self).field_of(self)
 
@@ -181,10 +182,10 @@ def _summary_lines(space: Workspace) -> list[str]:
 
 
 def amount_of(space: Workspace) -> str:
-    """Volume or area with its error bar, "789.4 ± 0.2 m³", and the number of parts."""
+    """Text of the volume or area with its error bar, "789.4 ± 0.2 m³", and of the number of parts."""
     if space.nearest is not None:
         return f"empty, 0 {space.unit}"
-    if space.volume_error <= 1e-9 * space.volume:  # the whole box
+    if space.volume_error <= 1e-9 * space.volume:  # the workspace is the whole box
         return f"{space.volume:.6g} ± 0 {space.unit}"
     places = max(0, 1 - int(np.floor(np.log10(space.volume_error))))
     size = f"{space.volume:.{places}f} ± {space.volume_error:.{places}f} {space.unit}"
@@ -214,7 +215,7 @@ def facts_of(space: Workspace) -> list[tuple[str, str]]:
 
 
 def _separation_text(components: Components) -> str:
-    """Proof that the parts are separate, or the state of the search."""
+    """Sentence on the parts: proved separate, or the result of the search for a connection."""
     proved = int(components.separate.sum())
     if proved == components.count:
         return "proved: no path in the box leads from one part to another"

@@ -1,4 +1,4 @@
-"""Closed surfaces of triangles, and the components of the set that a surface encloses."""
+"""Closed surfaces of triangles, and the components of the set inside a surface."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Surface(Result):
         return len(np.unique(there)) == len(there) and bool(np.array_equal(np.sort(there), np.sort(back)))
 
     def __str__(self) -> str:
-        """Numbers of vertices and triangles, and extent."""
+        """Numbers of vertices and triangles, and extent of the surface."""
         counts = f"{counted(len(self.faces), 'triangle')} with {len(self.vertices):,} vertices"
         if not len(self.vertices):
             return counts
@@ -75,18 +75,18 @@ def normals_of(vertices: Array, faces: Indices) -> Array:
 
 
 def volumes_of(vertices: Array, faces: Indices) -> Array:
-    """Contribution of each triangle to the enclosed volume, (F,) [m^3]: signed volume of the tetrahedron over it."""
+    """Contribution of each triangle to the enclosed volume, (F,) [m^3]: signed volume of a tetrahedron over it."""
     if not len(faces):
         return np.zeros(0)
-    top = vertices.mean(axis=0)  # reference point near the surface, which reduces cancellation
+    top = vertices.mean(axis=0)  # a reference point near the surface reduces rounding errors
     return np.asarray(np.einsum("fi,fi->f", vertices[faces[:, 0]] - top, normals_of(vertices, faces)) / 3.0)
 
 
-_TOLD: Final = 8  # largest number of printed volumes
+_TOLD: Final = 8  # largest number of volumes that are printed
 
 
 def vertex_areas(vertices: Array, faces: Indices) -> Array:
-    """Area of the surface for each vertex, (V,) [m^2]: a third of the area of all triangles at the vertex."""
+    """Share of each vertex in the surface's area, (V,) [m^2]: a third of the area of the triangles at the vertex."""
     areas = np.linalg.norm(normals_of(vertices, faces), axis=1) / 3.0
     return np.asarray(np.bincount(faces.ravel(), np.repeat(areas, 3), minlength=len(vertices)), dtype=np.float64)
 
@@ -99,8 +99,8 @@ class Components(Result):
         volume: Volume of each component [m^3], shape (K,).
         vertices: Index of the component of each vertex of the surface, shape (V,).
         x: Coordinates of the nodes of the grid that separates the components [m], shape (nx,).
-        y: The same along y, shape (ny,).
-        z: The same along z, shape (nz,).
+        y: Coordinates of the nodes along y, shape (ny,).
+        z: Coordinates of the nodes along z, shape (nz,).
         nodes: Index of the component of each node, -1 outside all components, shape (nx, ny, nz).
         separate: True if it is proved that no path in the box leads from the component to another one, shape (K,).
     """
@@ -136,11 +136,11 @@ class Components(Result):
             position: Positions [m], shape (..., 3), each in the set.
 
         Returns:
-            Index of the component, shape (...,): component of the nearest node of the cell, or -1 if no node of the
-            cell is in a component.
+            Index of the component, shape (...,). It is that of the nearest node of the cell that is in a component, or
+            -1 if no node of the cell is in a component.
 
         Raises:
-            InvalidValueError: If a position does not have this form.
+            InvalidValueError: If the positions have another shape.
         """
         given = checked(position, "position", "m", shape=(3,))
         axes = self.axes
@@ -159,17 +159,17 @@ class Components(Result):
 
 
 def components_of(grid: Grid, nodes: NDArray[np.int32], inner: Indices, faces: Indices, volumes: Array) -> Components:
-    """Components of a set, without proofs of their separation.
+    """Components of a set; their separation is not proved.
 
-    Arguments: the grid, the labels of its nodes (1 and higher in the set), the inner nodes and triangles of the set's
-    net, and volumes (F,) [m^3].
+    Arguments: the grid; the labels of its nodes, 1 and higher in the set; the inner nodes and the triangles of the
+    set's net; and the volumes (F,) [m^3] of the triangles.
     """
     count = int(nodes.max())
     vertices = nodes[tuple(inner.T)] - 1
     volume = np.bincount(vertices[faces[:, 0]], volumes, minlength=count)
     order = np.argsort(-volume, kind="stable")
     rank = np.empty(count + 1, dtype=np.int32)
-    rank[order], rank[-1] = np.arange(count), -1  # number 0, outside, becomes -1
+    rank[order], rank[-1] = np.arange(count), -1  # label 0 (outside) becomes -1
     labels = locked(np.ascontiguousarray(rank[nodes - 1]))
     separate = locked(np.full(count, count == 1))
     return Components(locked(volume[order]), locked(rank[vertices]), grid.x, grid.y, grid.z, labels, separate)

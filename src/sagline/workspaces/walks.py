@@ -1,8 +1,9 @@
-"""Walks between the components of a set on a grid: paths of positions in the set, with steps smaller than the grid's.
+"""Walks between the components of a set on a grid: paths of positions in the set, closer together than nodes.
 
-A thin part of a set can be between the nodes of a grid, so that the inside nodes form several components. The path of
-nodes with the highest values between two components leads along such a part. Positions of the path that are outside the
-set are moved into the set, across the path. The path is divided until all positions are in the set and close together.
+A thin part of a set can be between the nodes of a grid; then the inside nodes form several components although the set
+is connected. A path of nodes with the highest values between two components follows such a part. Positions of the path
+that are outside the set are moved into it, across the path. The path is divided until all positions are in the set and
+close together.
 """
 
 from __future__ import annotations
@@ -33,10 +34,10 @@ _Node = tuple[int, int, int]
 
 
 def labels_of(level: Level, grid: Grid) -> tuple[Labels, int, tuple[Array, ...]]:
-    """Component label of each node (0 outside, 1 to count inside), the count, and the walks that connect parts."""
+    """Component label of each node (0 outside, 1 to count inside), the count, and the walks that were found."""
     from scipy.ndimage import binary_erosion, label  # the import takes a fifth of a second
 
-    nodes, count = label(grid.inside)  # nodes are connected along the axes, as in the net
+    nodes, count = label(grid.inside)  # as in the net, nodes are connected along the axes
     if count < 2:
         return nodes, count, ()
     low, high = (np.array([axis[end] for axis in grid.axes]) for end in (0, -1))
@@ -58,7 +59,7 @@ def labels_of(level: Level, grid: Grid) -> tuple[Labels, int, tuple[Array, ...]]
 
 
 def _widest_path(values: Array, labels: Labels, start: Indices, ends: Indices) -> Indices | None:
-    """Path of nodes (K, 3) from `start` to another component, with the highest smallest value; None if not found."""
+    """Path of nodes (K, 3) from `start` to another component whose lowest value is the highest; None if not found."""
     shape, others = values.shape, set(ends.tolist()) - {0}
     before: dict[_Node, _Node | None] = dict.fromkeys((x, y, z) for x, y, z in start.tolist())
     waiting: list[tuple[float, _Node]] = [(-np.inf, node) for node in before]
@@ -81,7 +82,7 @@ def _widest_path(values: Array, labels: Labels, start: Indices, ends: Indices) -
 
 
 def _walk(level: Level, path: Array, step: Array) -> Array | None:
-    """Positions (K, 3) in the set, close to each other, along a path with both ends in the set; None if not found."""
+    """Positions (K, 3) in the set, close together, along a path whose ends are in the set; None if not found."""
     turn = np.random.default_rng(0)
     path, at = path.copy(), level_values(level, path).copy()
     if len(path) > 2:
@@ -98,14 +99,14 @@ def _walk(level: Level, path: Array, step: Array) -> Array | None:
         between, at = _moved_inside(level, between, level_values(level, between), along[k], turn)
         found = at >= 0.0
         path = np.insert(path, k[found] + 1, between[found], axis=0)
-        share = 0.5 if found.all() else turn.uniform(0.2, 0.8)  # another position after a division has failed
+        share = 0.5 if found.all() else turn.uniform(0.2, 0.8)  # try another position after a division has failed
     return None
 
 
 def _moved_inside(
     level: Level, points: Array, at_points: Array, along: Array, turn: np.random.Generator
 ) -> tuple[Array, Array]:
-    """Positions (N, 3), moved across directions (N, 3) until the function is nonnegative, and its values (N,)."""
+    """Positions (N, 3) after moving across directions (N, 3) until the function is nonnegative, and its values (N,)."""
     points, at_points = points.copy(), at_points.copy()
     size = np.linalg.norm(along, axis=1)
     unit = along / np.maximum(size, np.finfo(np.float64).tiny)[:, None]

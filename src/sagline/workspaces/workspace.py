@@ -31,7 +31,7 @@ from sagline.workspaces.wrench_sets import WrenchSet, load_of
 
 LEAST_CELLS: Final = 4
 _CROSSED: Final = 100  # approximate number of evaluated poses per cell at the boundary
-ON_BOX: Final = 1e-9  # a vertex counts as on a face if its distance, relative to the box, is smaller
+ON_BOX: Final = 1e-9  # a vertex is on a face if its distance from the face, relative to the box, is smaller
 _CATENARY = Catenary()
 
 
@@ -61,19 +61,18 @@ def workspace(
         robot: The robot. The workspace of a planar robot is an area; its plane_normal must be along x, y or z.
         box: Box of positions; a box without extent along an axis is a part of a plane. Its tilt has the meaning of
             `Tilts`. None: the whole frame of the robot, or the box of its anchors down to the floor.
-        wrenches: Loads on the platform in addition to its weight; None if there are none.
-        orientations: Orientations of the platform: `Tilts` or `Orientations`; None for level.
+        wrenches: Loads on the platform in addition to its weight; None for the weight alone.
+        orientations: Orientations of the platform, `Tilts` or `Orientations`; None for the level orientation.
         criteria: Further criteria, for example `MaximumSag(0.05)`. Criteria on tensions use the tensions for the load
             in the middle of the set.
-        model: Cable model; the default is exact.
+        model: Cable model; the default is the exact model.
         tension: Tension distribution method for criteria on tensions; its tensions must be continuous.
         cells: Number of cells along the box's longest edge, 4 to 128.
-        refine: Number of times that cells on the boundary are halved, up to 3; True for once.
+        refine: Number of times that cells at the boundary are halved, 0 to 3; True means 1.
         moment_arm: Lever arm that converts moments to forces in the margin [m]; None for the mean lever arm.
-        hull: "exact" for the boundary by the sign of the margin. "inner" for the positions at which all loads are
-            proved feasible, by the lower bound of the margin. "outer" for the positions at which no load is proved
-            infeasible, by the upper bound.
-        progress: Called between blocks with the number of finished poses and the expected total number.
+        hull: Margin that determines the boundary. "exact": its value. "inner": its lower bound; every position inside
+            is proved feasible. "outer": its upper bound; every position outside is proved infeasible.
+        progress: Function that is called from time to time with the number of finished poses and the expected total.
 
     Returns:
         Workspace.
@@ -140,7 +139,7 @@ def workspace(
 
 
 def _progress_of(progress: Progress, cells: tuple[int, int, int]) -> Callable[[int], None]:
-    """Progress for an estimated number of poses: all nodes, and the poses in cells at the boundary."""
+    """Function that reports progress, relative to the estimated number of poses at nodes and in boundary cells."""
     x, y, z = cells
     about, done = (x + 1) * (y + 1) * (z + 1) + _CROSSED * (x * y + y * z + z * x), 0
 
@@ -153,7 +152,7 @@ def _progress_of(progress: Progress, cells: tuple[int, int, int]) -> Callable[[i
 
 
 def _checked(robot: Robot, criteria: Sequence[Criterion], tension: TensionMethod) -> tuple[Criterion, ...]:
-    """Checked criteria, with the margin first."""
+    """Checked criteria; the margin is the first one."""
     instance(robot, Robot, "robot")
     if not isinstance(criteria, list | tuple):
         raise InvalidValueError("criteria", brief(criteria), "a list of criteria", "Give [MaximumSag(0.05)].")
@@ -172,6 +171,6 @@ def _on_box(vertices: Array, region: Region) -> Flags:
 
 
 def _open_faces(faces: Sequence[str], region: Region) -> tuple[str, ...]:
-    """Open faces of the box; the faces of the slab around a plane do not count."""
+    """Faces of the box that the workspace reaches, without the faces of the slab around a plane."""
     flat = None if region.flat is None else AXES[region.flat]
     return tuple(face for face in faces if face[0] != flat)

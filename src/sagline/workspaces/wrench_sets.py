@@ -26,7 +26,7 @@ def _wrench(wrench: Array) -> str:
 
 
 def _segments(segments: Array) -> str:
-    """Text of segments: sizes of the segments along axes, and number of the other segments."""
+    """Text of segments: the sizes of those along axes, and the number of all others."""
     along = np.count_nonzero(segments, axis=1) == 1
     sizes = np.abs(segments[along]).sum(axis=0)
     parts = [f"±{_each(own, unit)}" for own, unit in ((sizes[:3], "N"), (sizes[3:], "N m")) if own.any()]
@@ -35,7 +35,7 @@ def _segments(segments: Array) -> str:
 
 
 def _each(values: Array, unit: str) -> str:
-    """Text of three numbers; a single number if they are equal."""
+    """Text of three numbers; equal numbers are written once."""
     if np.ptp(values) == 0.0:
         return n(values[0], unit=unit)
     return f"({', '.join(n(value) for value in values)}) {unit}"
@@ -50,12 +50,12 @@ class WrenchSet(ByFields):
 
     Attributes:
         center: A wrench [N, N m], shape (6,).
-        segments: Vectors s, shape (S, 6); each adds all wrenches between -s and s.
-        ellipsoids: Matrices A; each adds A s for all s with length at most 1, shape (E, 6, 6).
+        segments: Vectors s, shape (S, 6); each vector adds all wrenches between -s and s.
+        ellipsoids: Matrices A, shape (E, 6, 6); each matrix adds A s for all vectors s with length at most 1.
         corners: Corners of the polytopes [N, N m], polytope by polytope, shape (C, 6).
         sizes: Number of corners of each polytope, shape (P,).
         accelerations: Largest acceleration of the center of mass along each world axis [m/s^2], and largest angular
-            acceleration about each [rad/s^2], shape (2,); their loads follow from the robot's mass and inertia.
+            acceleration about each world axis [rad/s^2], shape (2,). Mass and inertia of the robot give the loads.
     """
 
     center: Array
@@ -79,7 +79,7 @@ class WrenchSet(ByFields):
         )
 
     def __str__(self) -> str:
-        """Description in one line, for example "±100 N, ±20 N m"."""
+        """Description of the set in one line, for example "±100 N, ±20 N m"."""
         parts = [_wrench(self.center)] if self.center.any() else []
         parts += [_segments(self.segments)] if self.segments.any() else []
         parts += ["an ellipsoid"] * len(self.ellipsoids)
@@ -95,7 +95,7 @@ class WrenchSet(ByFields):
         return f"<{type(self).__name__}: {self}>"
 
     def _fill(self, **parts: Array) -> None:
-        """Set the given parts; all others are empty."""
+        """Set the given fields; all others are empty."""
         none = {
             "center": np.zeros(6),
             "segments": np.zeros((0, 6)),
