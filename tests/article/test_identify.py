@@ -143,7 +143,7 @@ def test_a_stiffness_and_a_zero_of_lengths_cannot_be_told_apart_at_one_tension()
 
 def test_bad_measurements_are_refused() -> None:
     data, _ = measured(20.0, 600.0)
-    shapes = "four arrays of one length, at least 2"
+    shapes = "four arrays of equal length, at least 2"
     with refused("the measurements", "of shapes [(1,)]", shapes, kind=sl.InvalidValueError):
         sl.identify_cable(*(values[:1] for values in data))
     with refused("the measurements", "of shapes [(5,), (40,)]", shapes, kind=sl.InvalidValueError):

@@ -128,7 +128,7 @@ WRONG: dict[str, tuple[str, tuple[str, ...]]] = {
     ),
     "a catalogue of one": (
         "free: [{cable: [{name: a, linear_density: 1 g/m, axial_stiffness: 1 kN}]}]\n" + GOALS,
-        ("free[0].cable: catalogue", "[a CableChoice]", "two cables or more"),
+        ("free[0].cable: catalogue", "[a CableChoice]", "at least two cables"),
     ),
     "a cable without weight": (
         "free: [{cable: [{name: a, linear_density: -1 g/m, axial_stiffness: 1 kN}]}]\n" + GOALS,

@@ -1,4 +1,4 @@
-"""The studies of the article, computed again: each study is a module with pure functions of numbers."""
+"""The studies of the article, computed again; a module has a study (functions of numbers) or a chapter of the page."""
 
 from sagline.core.surface import group
 

@@ -1,4 +1,4 @@
-"""Possible causes of the errors of Table 2, single causes and combinations, and the limits of ten poses."""
+"""Findings about possible causes of the errors of Table 2, alone and combined, and about the limits of ten poses."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from sagline.plot.sheet import BLUE, VERMILLION
 from sagline.present.page import Finding, Panel, Table
 
 COUNTS = ("one parameter", "two parameters", "three parameters")
-SHOWN = 8  # rows of the table with two and with three parameters
-FEW = 6e-3  # largest remaining error of a good explanation [m]
-PRINTING = 1e-3 / np.sqrt(12.0)  # scatter of positions that are printed in whole millimeters [m]
-NOTHING = 0.95  # a model explains nothing if its remaining error, relative to the measured error, is larger
-ALIKE = 0.2  # a slope over height counts as zero if it is smaller, relative to the measured slope
-AS_MEASURED = 0.15  # a slope counts as equal to the measured slope if the relative difference is smaller
+SHOWN = 8  # number of rows with two parameters, and with three, in the table of explanations
+FEW = 6e-3  # an explanation is good if its remaining error is at most this [m]
+PRINTING = 1e-3 / np.sqrt(12.0)  # standard deviation of the rounding of positions to whole millimeters [m]
+NOTHING = 0.95  # a model explains nothing if its remaining error exceeds this share of the measured error
+ALIKE = 0.2  # a slope over height counts as zero below this share of the measured slope
+AS_MEASURED = 0.15  # a slope counts as equal to the measured slope below this relative difference
 LOWEST, HIGHEST = "P8", "P7"
 
 
 def best_explanations(study: TenPoses, draw: Drawings) -> Finding:
-    """The best explanations, and the benefit of more parameters."""
+    """Finding: the best explanations, and the benefit of more parameters."""
     one, two, three = (study.best(count) for count in (1, 2, 3))
     second = study.explanations[1][1]
     alone = {found.parameters[0].name: found for found in study.explanations[0]}
@@ -65,7 +65,7 @@ def best_explanations(study: TenPoses, draw: Drawings) -> Finding:
 
 
 def limits_of_ten_points(study: TenPoses) -> Finding:
-    """Limits of ten points: parameters that the points cannot separate."""
+    """Finding: limits of ten points, and the parameters that ten points cannot separate."""
     few = [found for found in study.explanations[1] if found.rms < FEW]
     named = all(found.names & {PULLEY, ANCHORS} for found in few)
     zeros = 1e3 * study.single_zero
@@ -83,9 +83,9 @@ def limits_of_ten_points(study: TenPoses) -> Finding:
         },
         data=(
             Table(
-                "Accuracy of the zero of each cable from ten points, standard deviation",
+                "Standard deviation of the zero offset of each cable, if it is estimated from ten points",
                 ("", *(f"cable {i}" for i in range(zeros.size))),
-                [("its own zero [mm]", *(n(x, ".0f") for x in zeros))],
+                [("zero offset of its length [mm]", *(n(x, ".0f") for x in zeros))],
             ),
         ),
         every="Every" if named else "Not every",
@@ -146,7 +146,7 @@ def _values(found: Explanation) -> str:
 
 
 def _told(found: Explanation, name: str) -> str:
-    """A value with its standard uncertainty, or with a mark for a value at a limit."""
+    """Text of a value with its standard uncertainty, or with a mark if the value is at a limit."""
     k = [parameter.name for parameter in found.parameters].index(name)
     value, unit = found.values[k], found.parameters[k].unit
     if found.at_limit[k]:
@@ -155,13 +155,13 @@ def _told(found: Explanation, name: str) -> str:
 
 
 def _ratio(found: Explanation, name: str) -> float:
-    """Distance of a value from nominal, in standard deviations."""
+    """Distance of a value from its nominal value, in standard deviations."""
     k = [parameter.name for parameter in found.parameters].index(name)
     return float(abs(found.values[k]) / found.deviation[k])
 
 
 def single_causes(study: TenPoses) -> Finding:
-    """Each class of parameters alone: an example, the best value, the remaining error, and the reason for the error."""
+    """Finding: each class of parameters alone, with an example, the best value, the remaining error and its reason."""
     ranked = study.explanations[0]
     alone = {found.parameters[0].name: found for found in ranked}
     slopes = {name: _slope(study, found) for name, found in alone.items()}
@@ -198,7 +198,7 @@ def single_causes(study: TenPoses) -> Finding:
 def _table_of_classes(study: TenPoses, alone: dict[str, Explanation], slopes: dict[str, float]) -> Table:
     trends = {trend.parameter.name: trend for trend in study.trends}
     return Table(
-        "Single imperfections; best value: the value within the plausible range that fits Table 2 best",
+        "Single imperfections; the best value is the plausible value that agrees best with Table 2",
         (
             "off",
             "for example",
@@ -247,14 +247,14 @@ def _so(study: TenPoses, found: Explanation, slope: float) -> str:
     if abs(slope) <= ALIKE * abs(measured):
         return "raises all poses equally"
     return (
-        "increases with height: opposite to the measurement"
+        "increases with height, which is opposite to the measurement"
         if slope * measured < 0.0
         else "decreases with height, with another slope"
     )
 
 
 def _slope(study: TenPoses, found: Explanation) -> float:
-    """Change of the vertical error with height, predicted by an explanation [mm/m]."""
+    """Change of the vertical error with height that an explanation predicts [mm/m]."""
     return float(fit_line(study.table.desired[:, 2], 1e3 * found.predicted[:, 2]).slope)
 
 

@@ -35,7 +35,7 @@ FACTORS = np.array([1.0, 2.0, 4.0, 8.0, 16.0, 32.0])
 
 
 def intercept_chapter() -> Chapter:
-    """Figures 6 and 7."""
+    """Chapter about figures 6 and 7."""
     sampling = published_sampling()
     platform, frame = intercept_studies(sampling)
     draw = Drawings("intercept")
@@ -47,7 +47,7 @@ def intercept_chapter() -> Chapter:
 
 
 def constants_chapter() -> Chapter:
-    """Dependence of k_h and k_p on the sampled tensions."""
+    """Chapter about the dependence of k_h and k_p on the sampled tensions."""
     study = constants_study(published_sampling(), LOWEST, HIGHEST, FACTORS)
     draw = Drawings("constants")
     return chapter("constants", (_range(study, draw), _limit(study, draw)))
@@ -125,8 +125,8 @@ def _range(study: ConstantsStudy, draw: Drawings) -> Finding:
             "over_highest": [c._asdict() for c in study.over_highest],
         },
         panels=(
-            draw.panel(figure, f"k_p as a function of the lowest tension, up to {n(found.highest, '.3g', 'N')}."),
-            draw.panel(second, f"|k_h| as a function of the highest tension, from {n(found.lowest, '.3g', 'N')}."),
+            draw.panel(figure, f"k_p over the lowest tension; the highest is {n(found.highest, '.3g', 'N')}."),
+            draw.panel(second, f"|k_h| over the highest tension; the lowest is {n(found.lowest, '.3g', 'N')}."),
         ),
         k_h=abs(found.k_h_frame),
         least_k_p=min(all_k_p),
@@ -136,7 +136,7 @@ def _range(study: ConstantsStudy, draw: Drawings) -> Finding:
 
 def _limit(study: ConstantsStudy, draw: Drawings) -> Finding:
     last = study.scaled[-1]
-    figure, ax = axes("factor on both ends of the range", "distance from the limit [%]")
+    figure, ax = axes("factor of both ends of the range", "deviation from the limit [%]")
     limits = {"k_p": SHALLOW_K_P, "k_h_frame": SHALLOW_K_H, "k_h_platform": SHALLOW_K_H}
     labels = {"k_p": "$k_p$ from $g^2/24$", "k_h_frame": "$|k_h|$, frame end", "k_h_platform": "$|k_h|$, platform end"}
     for (name, limit), color in zip(limits.items(), (BLUE, VERMILLION, PURPLE), strict=True):
@@ -147,7 +147,7 @@ def _limit(study: ConstantsStudy, draw: Drawings) -> Finding:
     return finding(
         "taut-limit",
         numbers={"scaled": [c._asdict() for c in study.scaled], "factors": FACTORS, "g_squared_over_24": SHALLOW_K_P},
-        panels=(draw.panel(figure, "Deviation of the constants from g/2 and g²/24."),),
+        panels=(draw.panel(figure, "Deviation of |k_h| from g/2, and of k_p from g²/24."),),
         data=(
             table_of(
                 "The constants by the article's regressions",

@@ -1,4 +1,4 @@
-"""Small drawings for the page about the article, readable on a phone: curves, curves with fits, maps of errors."""
+"""Small drawings for the page about the article, which are readable on a phone: curves, fits and maps of errors."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ if TYPE_CHECKING:
     from matplotlib.contour import ContourSet
     from matplotlib.path import Path
 
-WIDTH, HEIGHT = 4.6, 3.1  # size on a desktop screen [in]; on a phone it is four fifths of this
-LEFT, RIGHT, BELOW, ABOVE = 0.16, 0.975, 0.5, 0.12  # margins: the first ones relative to the width, the others in [in]
+WIDTH, HEIGHT = 4.6, 3.1  # size on a desktop screen [in]; on a phone, drawings have four fifths of this size
+LEFT, RIGHT, BELOW, ABOVE = 0.16, 0.975, 0.5, 0.12  # left, right: relative to the width; others [in]
 POINT = 1.0 / 72.0  # [in]
-APART = 40.0  # smallest distance between the numbers of two lines [pt]
+APART = 40.0  # smallest distance between the numbers of two contour lines [pt]
 NAME_SIZE = TICK  # text size of legends [pt]
-SHARES = np.array([0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8])  # places of a number along its line
+SHARES = np.array([0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8])  # possible places of a number along its line
 SHADES = "viridis"
-MOST_POINTS = 400  # largest number of points of a curve over time, to limit the size of the page
+MOST_POINTS = 400  # largest number of points of a curve over time; it limits the size of the page
 
 _remarks = re.compile(r"<metadata>.*?</metadata>|<!--.*?-->|\n\s*(?=\n)", flags=re.DOTALL)
 _size = re.compile(r' (?:width|height)="[^"]*pt"')
@@ -42,22 +42,22 @@ MAP_LEFT, MAP_RIGHT = 0.13, 0.9  # margins with space for a color bar
 
 
 class Drawings:
-    """Converter from figures to the drawings of a page, with identifiers that are unique in the page."""
+    """Converter of figures to the drawings of a page; identifiers are unique in the page."""
 
     def __init__(self, page: str) -> None:
         """Prepare drawings; their identifiers begin with the name of this part of the page."""
         self._names = (f"{page}-{k}-" for k in count(1))
 
     def panel(self, figure: Sheet, caption: str) -> Panel:
-        """Drawing of a figure for the page; the caption is the text for screen readers."""
+        """Convert a figure to a drawing of the page; screen readers read the caption."""
         svg = svg_text(figure, 200, **{"svg.hashsalt": "sagline", "svg.fonttype": "path"})
-        svg = _size.sub("", _remarks.sub("", svg).strip(), count=2)  # the page sets the size
+        svg = _size.sub("", _remarks.sub("", svg).strip(), count=2)  # the page determines the size
         return Panel(unique_names(svg.replace("<svg ", '<svg role="img" ', 1), next(self._names)), caption)
 
 
 def axes(x: str, y: str, height: float = HEIGHT) -> tuple[Sheet, Axes]:
     """A small figure with one pair of axes."""
-    figure = Sheet(figsize=(WIDTH, height))  # fixed margins take half the time of an automatic layout
+    figure = Sheet(figsize=(WIDTH, height))  # fixed margins take half of the time that an automatic layout takes
     figure.subplots_adjust(left=LEFT, right=RIGHT, bottom=BELOW / height, top=1.0 - ABOVE / height)
     ax = figure.add_subplot()
     format_axes(ax, x, y)
@@ -65,7 +65,7 @@ def axes(x: str, y: str, height: float = HEIGHT) -> tuple[Sheet, Axes]:
 
 
 def legend_above(ax: Axes, title: str = "") -> None:
-    """Legend above the axes in as many columns as fit; the figure becomes higher by the height of the legend."""
+    """Draw a legend above the axes in as many columns as fit, and increase the figure's height accordingly."""
     figure = cast(Sheet, ax.get_figure(root=True))
     handles, labels = ax.get_legend_handles_labels()
     room = ax.get_position().width * figure.get_figwidth()
@@ -94,7 +94,7 @@ def legend_above(ax: Axes, title: str = "") -> None:
 
 
 def _grow(figure: Sheet, more: float) -> None:
-    """Add height above the axes [in]; the size of the axes does not change."""
+    """Increase the figure's height above the axes [in]; the size of the axes does not change."""
     before, place = figure.get_figheight(), figure.subplotpars
     after = before + more
     figure.set_figheight(after)
@@ -102,9 +102,9 @@ def _grow(figure: Sheet, more: float) -> None:
 
 
 def logarithmic_with_floor(ax: Axes, floor: float, told: str) -> None:
-    """A logarithmic vertical axis that ends at a floor."""
-    # A shaded strip with a text covers curves below the floor; these curves are not clipped. If no curve is below the
-    # floor, the axis is an ordinary logarithmic axis.
+    """Make the vertical axis logarithmic; it ends at a floor."""
+    # A shaded strip with a text covers the parts of curves below the floor. If no part is below the floor, the axis is
+    # an ordinary logarithmic axis.
     ax.set_yscale("log")
     values = np.concatenate([np.asarray(line.get_ydata(), dtype=np.float64) for line in ax.get_lines()])
     seen = values[np.isfinite(values)]
@@ -133,14 +133,14 @@ def shades(number: int) -> list[tuple[float, float, float, float]]:
 
 
 def thinning(number: int) -> slice:
-    """Samples at equal index steps, at most `MOST_POINTS`."""
+    """At most `MOST_POINTS` samples, at equal index steps."""
     return slice(None, None, max(1, number // MOST_POINTS))
 
 
 def cables_over_time(
     time: Array, values: Array, label: str, width: float, name: str = "", stops: Iterable[float] = ()
 ) -> tuple[Sheet, Axes]:
-    """One line per cable over time, values (N, m), and a vertical line at each stop."""
+    """Draw one line per cable over time, from values (N, m), and a vertical line at each stop."""
     figure, ax = axes("time without stops [s]" if stops else "time [s]", label, height=2.7)
     part = thinning(len(time))
     for i, course in enumerate(values[part].T):
@@ -160,7 +160,7 @@ def with_fit(ax: Axes, x: Array, y: Array, fine: Array, fit: Array) -> None:
 def error_panels(
     names: Sequence[str], position: Array, series: Sequence[tuple[str, Array, float, str]], caption: str, draw: Drawings
 ) -> list[Panel]:
-    """Errors as areas of circles at positions (N, 3), seen along y and along x; series: label, errors, scale, color."""
+    """Draw errors as areas of circles at positions (N, 3), seen along y and x; series: label, errors, scale, color."""
     panels = []
     for column, name in ((0, "x"), (1, "y")):
         figure, ax = axes(f"${name}$ [m]", "$z$ [m]")
@@ -214,9 +214,9 @@ def map_axes(x: str, y: str) -> tuple[Sheet, Axes]:
 def draw_errors(
     ax: Axes, x: Array, y: Array, error: Array, edges: Array, ticks: tuple[float, ...], lines: tuple[float, ...]
 ) -> None:
-    """Fill a map between round values of the error, and draw contour lines of some values."""
-    # Signed errors are interpolated through zero, so that bands around zero keep their true width. Values below the
-    # first edge are gray, as shown in the color bar.
+    """Fill a map with one color between two round values of the error, and draw some contour lines."""
+    # Signed errors are interpolated through zero, so that bands around zero have their true width. Values below the
+    # first edge are gray, as in the color bar.
     colors = matplotlib.colormaps["magma_r"](np.linspace(0.04, 0.92, len(edges)))
     filled = [*colors[::-1], matplotlib.colors.to_rgba(GAP_COLOR), *colors]
     ax.contourf(x, y, error, levels=[*-edges[::-1], *edges], colors=filled, extend="both").set_rasterized(True)
@@ -236,7 +236,7 @@ def draw_errors(
 
 
 def _number_lines(ax: Axes, drawn: ContourSet) -> None:
-    """Numbers near the middle of the lines, apart from one another, with a halo for a dark background."""
+    """Write the number of each contour line near its middle, apart from other numbers, with a halo."""
     figure: Any = ax.get_figure(root=True)
     apart, places = APART * POINT * figure.dpi, list[Array]()  # [pixels]
     inside = ax.bbox.padded(-0.5 * apart)
@@ -257,7 +257,7 @@ def _number_lines(ax: Axes, drawn: ContourSet) -> None:
 
 
 def _along_longest(ax: Axes, path: Path) -> Array:
-    """Points on the longest piece of a line, from its middle outward [pixels], shape (n, 2)."""
+    """Points (n, 2) on the longest piece of a line, in the order of their distance from its middle [pixels]."""
     polygons = map(np.asarray, path.to_polygons(closed_only=False))
     pieces = [ax.transData.transform(piece) for piece in polygons if len(piece) > 1]
     passed = [np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(piece, axis=0).T)))) for piece in pieces]

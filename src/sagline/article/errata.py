@@ -18,29 +18,29 @@ from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.present.page import Chapter, Finding, Table
 
-POSE = (2.0, 1.0, 1.5)  # position of the simulated robots outside of their planes of symmetry [m]
-PATH_RATE = 5.0  # samples per second, sufficient because the errors change slowly
-TAUT = 1e4  # [N], so large that only the leading terms matter
+POSE = (2.0, 1.0, 1.5)  # position of the platform outside of the planes of symmetry of both simulated robots [m]
+PATH_RATE = 5.0  # samples per second; they are sufficient because the errors change slowly
+TAUT = 1e4  # tension [N] that is so large that only the leading terms matter
 
 
-LONG = 15.0  # the simulated frame [m]
+LONG = 15.0  # length of the simulated robots' frame [m]
 TAUTER = 20.0  # factor of the sampled tensions, so that only the leading terms matter
 NEARLY = 1e-6  # angle from vertical or level [rad]
 TURN = (0.3, 0.2, 0.1)  # [rad], about z, y, x
 
-# label, value, unit; for a difference also the size of its terms, to show rounding errors
+# label, value, unit; for a difference, also the size of its terms, so that rounding errors can be recognized
 Number: TypeAlias = tuple[str, float, str] | tuple[str, float, str, float]
 
 
 def _erratum(number: int, numbers: Sequence[Number]) -> Finding:
-    """Erratum of docs/errata.md with the numbers that prove it."""
+    """Finding of an erratum of docs/errata.md, with the numbers that prove it."""
     rows = [(label, n(value, ".5g", unit, size=size[0] if size else 0.0)) for label, value, unit, *size in numbers]
     table = Table("Computed", ("quantity", "value"), rows)
     return finding(f"erratum-{number}", {label: value for label, value, *_ in numbers}, data=(table,))
 
 
 def sign_of_intercept() -> Finding:
-    """Erratum 1: the intercept of pi at the platform end is +wD/2; the printed sign gives errors of centimeters."""
+    """Erratum 1: the intercept of pi at the platform end is +wD/2; the printed sign causes errors of centimeters."""
     cable, chord = sl.load_robot(ROBOTS[0]).cables, 10.0
     angle = 0.754  # the article's angle [rad]
     state = sl.Catenary().from_tension(cable, chord * np.cos(angle), chord * np.sin(angle), TAUT, GRAVITY)
@@ -60,7 +60,7 @@ def sign_of_intercept() -> Finding:
 
 
 def gravity_twice() -> Finding:
-    """Erratum 2: gravity is counted in (5), and again in (6) and (51)."""
+    """Erratum 2: (5) contains gravity, and (6) and (51) contain gravity again."""
     robot = sl.load_robot(ROBOTS[0])
     weight = robot.mass * robot.gravity
     numbers: list[Number] = [("weight of the platform", weight, "N")]
@@ -74,7 +74,7 @@ def gravity_twice() -> Finding:
 
 
 def euler_rates() -> Finding:
-    """Erratum 3: Euler-angle rates in (5), and the term M W x' of (5), compared with the Newton-Euler equations."""
+    """Erratum 3: (5) has Euler-angle rates and a term M W x', which the Newton-Euler equations do not have."""
     robot = sl.load_robot(ROBOTS[0])
     angles, rates, curvatures = np.array([0.4, 0.3, -0.2]), np.array([0.5, -0.6, 0.4]), np.array([0.3, 0.2, -0.5])
     still, velocity = np.zeros(3), np.array([1.0, 0.0, 0.0])
@@ -125,13 +125,13 @@ def rank_of_h() -> Finding:
 
 
 def _lifted(force: float) -> float:
-    """Vertical force of all cables if (49) is solved for a resultant vertical force [N]."""
+    """Vertical force of all cables together [N], if (49) is solved for a given vertical force."""
     robot = sl.load_robot(ROBOTS[0])
     pose = sl.Pose.from_euler(POSE, 0.0, 0.0, 0.0)
     balance = sl.article_balance(robot, pose)
     wanted = np.array([0.0, 0.0, force, 0.0, 0.0, 0.0])
     tension = balance.h.T @ np.linalg.solve(balance.h @ balance.h.T, wanted - balance.b)
-    cables_alone = sl.article_balance(robot.replace(gravity=0.0), pose)  # the vector b without the platform's weight
+    cables_alone = sl.article_balance(robot.replace(gravity=0.0), pose)  # b of (49) without the weight
     return float((balance.h @ tension + cables_alone.b)[2])
 
 
@@ -151,7 +151,7 @@ def _angular(angles: Array, rates: Array, curvatures: Array) -> tuple[Array, Arr
 
 
 def _reversed(angles: Array) -> Array:
-    """Vector along x, y, z from angles about z, y, x: the most favorable interpretation of (5)."""
+    """Vector along x, y, z from angles about z, y, x; this is the most favorable interpretation of (5)."""
     return angles[::-1]
 
 
@@ -160,7 +160,7 @@ def _largest(vector: Array) -> float:
 
 
 def stretch_by_end_tension() -> Finding:
-    """Erratum 5: (36) computes the elongation from the tension at B instead of the mean tension."""
+    """Erratum 5: (36) computes the elongation from the tension at B; the mean tension is correct."""
     cable = simulated_cable()
     end = End.at_angle(LONG)
     study = stretch_study(cable, end, np.array([500.0]))
@@ -183,7 +183,7 @@ def stretch_by_end_tension() -> Finding:
 
 
 def sag_constant() -> Finding:
-    """Erratum 6: k_p of shallow cables is g^2/24."""
+    """Erratum 6: for shallow cables, k_p is g^2/24, not 4.385."""
     sampling = article_sampling()
     taut = sag_study(sampling.between(*(TAUTER * sampling.tensions[[0, -1]])))
     return _erratum(
@@ -197,7 +197,7 @@ def sag_constant() -> Finding:
 
 
 def sign_in_bound() -> Finding:
-    """Erratum 7: the lower bound (54) for T_x of a suspended cable."""
+    """Erratum 7: the lower bound (54) of T_x has the wrong sign for a suspended cable."""
     from scipy.optimize import brentq
 
     cable, chord = simulated_cable(), 10.0
@@ -219,7 +219,7 @@ def sign_in_bound() -> Finding:
 
 
 def vertical_and_level() -> Finding:
-    """Erratum 8: the equations exclude poses below an anchor, and poses with a level cable."""
+    """Erratum 8: the equations exclude poses vertically below an anchor, and poses with a level cable."""
     robot = sl.load_robot(ROBOTS[0])
     under = robot.frame_anchors[0] - robot.platform_anchors[0] - [0.0, 0.0, 2.0]
     cable, chord = simulated_cable(), 10.0
@@ -242,7 +242,7 @@ def vertical_and_level() -> Finding:
 
 
 def error_formula() -> Finding:
-    """Erratum 9: (56) is a sum of B_i - P, but Table 2 has distances."""
+    """Erratum 9: (56) is a sum of vectors B_i - P, but Table 2 has distances."""
     table, robot = table2(), sl.load_robot("article-prototype")
     sums = np.array([(robot.platform_anchors + actual - desired).sum(axis=0) for desired, actual in _pairs()])
     literal = np.linalg.norm(sums, axis=1)
@@ -326,5 +326,5 @@ DEMONSTRATIONS = (
 
 
 def errata_chapter() -> Chapter:
-    """All errata with their demonstrations, in the order of docs/errata.md."""
+    """Chapter of all errata with their numbers, in the order of docs/errata.md."""
     return chapter("errata", [demonstrate() for demonstrate in DEMONSTRATIONS])

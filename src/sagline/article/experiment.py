@@ -1,8 +1,8 @@
-"""Repetition of the article's experiment with controller and machine: home, the ten poses of Table 2, home.
+"""Repetition of the article's experiment with a controller and a machine: home, the ten poses of Table 2, home.
 
 In the article, the prototype moves from point to point "with low speed", and stops at each point for the measurement of
-its position. The experiment takes about 14 minutes. Speed and stops are assumed, so that the duration is the same. The
-machine is a twin, because the true position is then known.
+its position. The experiment takes about 14 minutes. Speed and stops are not published; they are chosen so that the
+duration is the same. The machine is a twin, because the true position of a twin is known.
 """
 
 from __future__ import annotations
@@ -27,22 +27,22 @@ from sagline.core.status import Status
 
 PROTOTYPE: Final = "article-prototype"
 SPEED: Final = 0.06  # largest speed of the platform [m/s]; the fastest winch then has 61 mm/s
-STOP: Final = 14.0  # duration of a stop at each point, and at home before and after [s]; the total is 13.9 minutes
-LOOK: Final = 1.0  # duration at the end of a stop [s]; measured values are means over this duration
-BIAS: Final = 2.0  # [N], 0.1 % of the range of a 2 kN load cell
+STOP: Final = 14.0  # duration of a stop at each point, and at home at start and end [s]; the total is 13.9 minutes
+LOOK: Final = 1.0  # measured values are means over this last part of a stop [s]
+BIAS: Final = 2.0  # load cell offset [N], 0.1 % of the range of a 2 kN load cell
 NEXT: Final = "Correct the cause, and start again."
 EVERY: Final = 10  # number of cycles between two points of a curve in a figure
 
 Where = Callable[[], Array]  # the true position of the platform's origin [m], shape (3,)
-Tell = Callable[[float], None]  # completed share of the experiment
+Tell = Callable[[float], None]  # function that is called with the completed share of the experiment
 
 
 class StopObserver:
-    """Observer of stops and of the motions between them; used as a `sagline.control.Recorder`."""
+    """Recorder (`sagline.control.Recorder`) of the stops and of the motions between them."""
 
     def __init__(self, where: Where, tell: Tell | None = None) -> None:
-        """No observations yet."""
-        self.stopped = ""  # this recorder never stops
+        """Prepare a recorder without observations."""
+        self.stopped = ""  # "": the recorder has not failed
         self.farthest = self.misjudged = 0.0
         self.courses: list[Array] = []
         self.cycles = self.acted = self.stood = 0
@@ -53,7 +53,7 @@ class StopObserver:
         self._before: Array | None = None
 
     def begins(self, plan: sl.Plan) -> None:
-        """Receive the plan of a motion; the first cycle still belongs to the previous stop."""
+        """Store the plan of a motion; its first cycle belongs to the previous stop."""
         self._plan, self._begun = plan, False
 
     def ends(self, status: Status, reason: str) -> None:
@@ -88,20 +88,20 @@ class StopObserver:
                 )
 
     def _stand(self, place: Array, cycle: control.Recorded, answer: control.Sample) -> None:
-        """Keep the last second of a stop."""
+        """Store the last second of a stop."""
         self.stood += 1
         self.acted += self._before is not None and bool((cycle.correction != self._before).any())
         self._before = cycle.correction.copy()
         self._seen.append((place.copy(), cycle.position, answer.tension, self._before))
 
     def seen(self) -> tuple[Array, ...]:
-        """Means over the last second: true and estimated position, tension, correction."""
+        """Means over the last second of a stop: true and estimated position, tension, correction."""
         return tuple(np.mean(rows, axis=0) for rows in zip(*self._seen, strict=True))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Experiment:
-    """Result of the experiment: K points of the time series, m winches."""
+    """Result of the experiment, with K points of the time series and m winches."""
 
     table: Table2
     robot: sl.Robot  # robot used by the controller
@@ -109,7 +109,7 @@ class Experiment:
     estimated: Array  # positions estimated from the encoders at the stops [m], shape (10, 3)
     tension: Array  # measured tensions at the stops, means over a second [N], shape (10, m)
     planned_tension: Array  # planned tensions at the stops [N], shape (10, m)
-    # largest tension error of a cable that changes of length can correct without moving the platform [N], shape (10,)
+    # largest tension error in the null space, which lengths can correct with the platform at rest [N], shape (10,)
     null_error: Array
     correction: Array  # correction of the lengths by the tension loop at the stops [m], shape (10, m)
     back: Array  # final minus initial position of the platform at home [m], shape (3,)
@@ -117,12 +117,12 @@ class Experiment:
     cells: Array  # measured tensions [N], shape (K, m)
     planned: Array  # planned tensions [N], shape (K, m)
     lengths: Array  # lengths minus lengths at home [m], shape (K, m)
-    stops: Array  # times of the ten stops, in the scale of `time` [s], shape (10,)
+    stops: Array  # times of the ten stops, without the durations of the stops as in `time` [s], shape (10,)
     duration: float  # duration from home to home, including stops [s]
     winch_speed: float  # largest speed of a winch [m/s]
     farthest: float  # largest distance of the true position from the set point in motion [m]
     misjudged: float  # largest distance of the true position from the estimate [m]
-    acting: float  # share of the cycles at stops with a change of the lengths by the tension loop
+    acting: float  # share of the cycles at stops in which the tension loop changes the lengths
     events: tuple[control.Event, ...]  # events of the controller
 
     @property
@@ -137,7 +137,7 @@ class Experiment:
 
 
 def pair(robot: sl.Robot, errors: Errors) -> tuple[sl.Robot, sl.Robot]:
-    """Robot with errors, and planned robot, both with the data that a twin needs."""
+    """The robot with errors, and the robot of the plan, both with the data that a twin needs."""
     true, nominal = robot_with_errors(robot, errors), robot
     assert true.winches is not None
     assert robot.winches is not None
@@ -154,7 +154,7 @@ def pair(robot: sl.Robot, errors: Errors) -> tuple[sl.Robot, sl.Robot]:
 
 
 def with_cells(robot: sl.Robot) -> sl.Robot:
-    """Robot with alternating load cell offsets of +2 N and -2 N, if the robot has no offsets."""
+    """The robot, with load cell offsets of alternately +2 N and -2 N if it has none."""
     winches = robot.winches
     if winches is None or winches.load_cell_bias.any():
         return robot
@@ -200,10 +200,10 @@ def experiment(controller: control.Controller, watch: StopObserver) -> Experimen
 
 
 def _executed(controller: control.Controller, leg: sl.Path, name: str) -> control.Execution:
-    """Execution of a motion; raises RefusedError if the motion does not reach its end."""
+    """Carry out a motion; RefusedError if the motion does not reach its end."""
     try:
         done = controller.execute(leg)
-    except control.RefusedError as error:  # for a fault during planning, which takes some time
+    except control.RefusedError as error:  # a fault may have occurred during planning, which takes some time
         raise (
             error if controller.state is control.State.IDLE else _ended(controller, f"before the motion to {name}")
         ) from None
@@ -213,7 +213,7 @@ def _executed(controller: control.Controller, leg: sl.Path, name: str) -> contro
 
 
 def _stand(controller: control.Controller, name: str) -> None:
-    """Stop for the duration of a measurement."""
+    """Wait at a stop for the duration of the measurement."""
     for _ in range(round(STOP / PERIOD)):
         controller.cycle()
         if controller.state is not control.State.IDLE:
@@ -221,7 +221,7 @@ def _stand(controller: control.Controller, name: str) -> None:
 
 
 def _ended(controller: control.Controller, where: str) -> control.RefusedError:
-    """Error for an experiment that a fault has ended."""
+    """Error after a fault has ended the experiment."""
     faults = [event.text for event in controller.events if event.kind is control.EventKind.FAULT]
     reason = faults[-1] if faults else controller.events[-1].text
     return control.RefusedError(f"the experiment, {where}", reason.rstrip("."), NEXT)
@@ -267,7 +267,7 @@ def _result(
 
 
 def _legs(period: float) -> list[sl.Path]:
-    """Straight paths from point to point, quintic as in the article, with one sample per cycle."""
+    """Straight paths from point to point, with quintic polynomials as in the article and one sample per cycle."""
     places = level_poses(points())
     return [sl.quintic_path([places[k], places[k + 1]], speed=SPEED, rate=1.0 / period) for k in range(len(places) - 1)]
 

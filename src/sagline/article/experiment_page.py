@@ -24,7 +24,7 @@ NOTATION = (
     "The true position of a twin is known; the true position of a prototype must be measured."
 )
 JERK = 2.0  # duration of the jerk phase in the article [s]
-AREA = 600.0  # area of the circle of the largest error in a figure [pt^2]
+AREA = 600.0  # area of the circle that shows the largest error [pt^2]
 
 
 def write_experiment(result: Experiment, folder: Path | str, how: str) -> Path:
@@ -41,7 +41,7 @@ def write_experiment(result: Experiment, folder: Path | str, how: str) -> Path:
 
 
 def experiment_chapter(result: Experiment, how: str) -> Chapter:
-    """Chapter of an experiment."""
+    """Chapter about an experiment."""
     draw = Drawings("experiment")
     return chapter(
         "experiment",
@@ -97,13 +97,13 @@ def _cells(result: Experiment, draw: Drawings) -> Finding:
             "off_plan_at_first_N": np.abs(off[early]).max(),
             "off_plan_at_stops_N": np.abs(at_stops).max(),
         },
-        panels=(_courses(result, cells, "load cells [N]", "Load cells; dashed: the ten stops, omitted.", draw),),
+        panels=(_courses(result, cells, "load cells [N]", "Load cells; stops (dashed) take no time here.", draw),),
     )
 
 
 def _lengths(result: Experiment, draw: Drawings) -> Finding:
     lengths = result.lengths
-    caption = "Lengths from the encoders, minus the lengths at home; dashed: the ten stops, omitted."
+    caption = "Lengths from the encoders, minus the lengths at home. The ten stops (dashed) take no time here."
     return finding(
         "encoders",
         numbers={"least_m": lengths.min(), "largest_m": lengths.max()},
@@ -136,13 +136,13 @@ def _run(result: Experiment) -> Finding:
         ("duration", "about 14 min", n(result.duration / 60.0, ".1f", "min")),
         ("samples", "100 a second", "100 a second"),
         (
-            "speed of the platform, stop at each point",
-            "“low”, until it is measured",
+            "speed of the platform; duration of the stop at each point",
+            "“low”; not measured yet",
             f"{SPEED:g} m/s at most, {STOP:g} s",
         ),
         ("the fastest winch", "", n(1e3 * result.winch_speed, ".0f", "mm/s")),
-        ("largest distance of true position and set point in motion", "", n(1e3 * result.farthest, ".2f", "mm")),
-        ("largest distance of true position and estimate", "", n(1e3 * result.misjudged, ".2f", "mm")),
+        ("largest distance between true position and set point, in motion", "", n(1e3 * result.farthest, ".2f", "mm")),
+        ("largest distance between true and estimated position", "", n(1e3 * result.misjudged, ".2f", "mm")),
         ("share of the time at stops with an active tension loop", "", n(100.0 * result.acting, ".1f", "%")),
         ("largest change of a length at the stops", "", n(1e3 * np.abs(result.correction).max(), ".2f", "mm")),
         ("faults and notes", "", "; ".join(event.text for event in told) or "none"),

@@ -12,30 +12,30 @@ import sagline as sl
 from sagline.article.machine import Errors, Parameter
 from sagline.core.arrays import Array, Flags
 
-STEP = 0.01  # step of the difference quotients, relative to a plausible error
+STEP = 0.01  # step of the difference quotients, relative to the typical error of the parameter
 ITERATIONS = 20
-CONVERGED = 1e-5  # largest change of the platform position in the last step [m]; printed positions are in millimeters
-NEAR = 1e-3  # a value is at its limit if its distance, relative to a plausible error, is smaller
+CONVERGED = 1e-5  # a fit has converged if its last step moves the platform by less [m]; Table 2 has millimeters
+NEAR = 1e-3  # a value is at its limit if its distance from the limit, relative to the typical error, is smaller
 
 Model: TypeAlias = tuple[Parameter, ...]
 ErrorOf: TypeAlias = Callable[[Sequence[Errors]], Array]  # actual minus desired positions of K machines [m], (K, N, 3)
 
 
 class Explanation(NamedTuple):
-    """Best fit to the measured positions by errors of some parameters, within their plausible limits."""
+    """Best fit to the measured positions by errors of some parameters; the errors are within plausible limits."""
 
     parameters: Model  # the parameters, k of them
     values: Array  # errors of the parameters in their units, shape (k,)
     deviation: Array  # standard deviations of the errors in their units, shape (k,); NaN at a limit
-    at_limit: Flags  # True for errors at a plausible limit, shape (k,)
+    at_limit: Flags  # True for errors that are at their plausible limit, shape (k,)
     predicted: Array  # actual minus desired position with these errors [m], shape (N, 3)
     rms: float  # root mean square of measured minus predicted position, over all coordinates [m]
     worst: float  # largest distance of measured and predicted position [m]
     # Akaike's information criterion, corrected for few measurements; smaller values are better, and a difference of 2
     # is small
     aicc: float
-    # root mean square of measured minus predicted position over all coordinates; each pose is predicted by the fit to
-    # all other poses [m]
+    # root mean square of measured minus predicted position over all coordinates [m]; the prediction of a pose is from a
+    # fit to all other poses
     left_out: float
 
     @property
@@ -45,14 +45,14 @@ class Explanation(NamedTuple):
 
 
 class _Tangent(NamedTuple):
-    """First-order model of the positions, at given errors of a model's parameters."""
+    """First-order model of the positions, about given errors of the parameters."""
 
     error: Array  # actual minus desired position, shape (3 N,) [m]
     slopes: Array  # derivatives with respect to each parameter, shape (3 N, k) [m per unit of the parameter]
 
 
 def explanations(error_of: ErrorOf, measured: Array, models: Sequence[Model]) -> tuple[Explanation, ...]:
-    """Fit models to measured positions by Gauss-Newton steps within plausible limits, all models together."""
+    """Fit all models together to measured positions, by Gauss-Newton steps within plausible limits."""
     values, slopes = _start(error_of, measured, models)
     steps = [np.zeros(len(model)) for model in models]
     moving = list(range(len(models)))
@@ -62,7 +62,7 @@ def explanations(error_of: ErrorOf, measured: Array, models: Sequence[Model]) ->
         for i, one in zip(moving, near, strict=True):
             right = measured.ravel() - one.error + one.slopes @ values[i]
             step = _bounded_least_squares(models[i], one.slopes, right) - values[i]
-            if step @ steps[i] < 0.0:  # a step against the previous one, because the steps oscillate about the solution
+            if step @ steps[i] < 0.0:  # opposite to the previous step: the steps oscillate about the solution
                 step *= 0.5
             values[i], steps[i], slopes[i] = values[i] + step, step, one.slopes
             if np.abs(one.slopes @ step).max() > CONVERGED:
@@ -88,7 +88,7 @@ def subsets(parameters: Sequence[Parameter], most: int) -> list[Model]:
 
 
 def tangents(error_of: ErrorOf, models: Sequence[Model], values: Sequence[Array]) -> list[_Tangent]:
-    """First-order model of each model at its values; finite differences use steps away from the upper limits."""
+    """First-order model of each fit at its values; the steps of finite differences are away from upper limits."""
     points, steps = [], []
     for model, x in zip(models, values, strict=True):
         high = limits(model)[1]
@@ -110,7 +110,7 @@ def limits(model: Model) -> tuple[Array, Array]:
 
 
 def _bounded_least_squares(model: Model, slopes: Array, right: Array) -> Array:
-    """Least-squares solution within the limits; the unknowns are scaled by their upper limits."""
+    """Least-squares solution within the limits; unknowns are divided by their upper limits."""
     from scipy.optimize import lsq_linear
 
     low, high = limits(model)
@@ -119,7 +119,7 @@ def _bounded_least_squares(model: Model, slopes: Array, right: Array) -> Array:
 
 
 def corrected_aic(rms: float, count: int, parameters: int) -> float:
-    """Akaike's information criterion, corrected for few measurements."""
+    """Akaike's information criterion, corrected for a small number of measurements."""
     # source: Hurvich and Tsai 1989, Biometrika 76(2), 297-307
     unknown = parameters + 1
     return float(
@@ -132,7 +132,7 @@ def _errors(model: Model, values: Array) -> Errors:
 
 
 def _start(error_of: ErrorOf, measured: Array, models: Sequence[Model]) -> tuple[list[Array], list[Array]]:
-    """Initial values and first-order model of every model, from derivatives at zero errors that all models use."""
+    """Initial values and first-order model of every fit, from common derivatives at zero errors."""
     alone: list[Model] = [(parameter,) for parameter in dict.fromkeys(p for model in models for p in model)]
     near = {
         model[0]: one for model, one in zip(alone, tangents(error_of, alone, [np.zeros(1)] * len(alone)), strict=True)
@@ -173,7 +173,7 @@ def _deviation(slopes: Array, free: Flags, rest: Array) -> Array:
 
 
 def _left_out(model: Model, values: Array, slopes: Array, rest: Array) -> float:
-    """Cross-validation: rms residual of all poses [m]; a linear fit to all other poses predicts each pose."""
+    """Cross-validation: rms error [m] of all poses, each of which a linear fit to all other poses predicts."""
     right, pose = rest.ravel() + slopes @ values, np.arange(rest.size) // rest.shape[1]
     left = [
         right[pose == k] - slopes[pose == k] @ _bounded_least_squares(model, slopes[pose != k], right[pose != k])

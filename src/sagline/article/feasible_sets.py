@@ -1,4 +1,4 @@
-"""Figures 3 to 5: tensions and lengths for a given position of a cable's end."""
+"""Study of figures 3 to 5: tensions and lengths with which a cable ends at a given position."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ CHORD = 10.0  # [m]
 TOLERANCES = (0.01, 0.001, 0.0001)  # [m]
 TENSIONS = np.linspace(10.0, 500.0, 200)  # [N]
 PSI_TENSIONS = np.array([30.0, 60.0, 120.0, 200.0, 300.0, 400.0])  # [N]
-SHOWN = 2  # index of the length for which the set psi is drawn alone
-LOW_PART = 50.0  # lower end of the curve [N], as in the article
+SHOWN = 2  # index of the length whose set psi has a drawing of its own
+LOW_PART = 50.0  # lowest tension of the curve [N], as in the article
 
 
 class End(NamedTuple):
@@ -33,21 +33,21 @@ class End(NamedTuple):
 
     @classmethod
     def at_angle(cls, chord: float) -> End:
-        """End of a chord [m] at the article's angle."""
+        """End of a chord, from its length [m], at the article's angle."""
         return cls(chord * float(np.cos(ANGLE)), chord * float(np.sin(ANGLE)))
 
     @property
     def chord(self) -> float:
-        """D [m]."""
+        """Length D of the chord [m]."""
         return float(np.hypot(self.span, self.rise))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _FeasibleSets:
-    """The sets psi for some lengths, the curve Psi over all lengths, and the line pi through the projection of Psi."""
+    """The sets psi of some lengths, the curve Psi over all lengths, and the line pi fitted to the projection of Psi."""
 
     cable: sl.Cable  # material
-    end: End  # desired position B_d
+    end: End  # desired position B_d of the platform end
     tolerance: float  # epsilon_max of (20) [m]
     psi_lengths: Array  # lengths L of the sets psi [m], shape (s,)
     psi: Array  # outlines of the sets psi in the (T_x, T_z) plane [N], shape (s, points, 2)
@@ -58,19 +58,19 @@ class _FeasibleSets:
 
     @property
     def tangent(self) -> float:
-        """Tan phi, the slope of pi in the article (26)."""
+        """The slope of pi by the article's (26), tan phi."""
         return self.end.rise / self.end.span
 
     @property
     def half_weight(self) -> float:
-        """Half the weight w D, the magnitude of the article's intercept (28) [N]."""
+        """The magnitude of the intercept by the article's (28), half the weight w D [N]."""
         return 0.5 * float(self.cable.linear_density) * GRAVITY * self.end.chord
 
 
 def feasible_sets(
     cable: sl.Cable, end: End, tolerance: float, tensions: Array, psi_tensions: Array, points: int = 80
 ) -> _FeasibleSets:
-    """Exact sets psi and curve Psi of the article."""
+    """The article's sets psi and curve Psi, computed exactly."""
     # At a given L, the map from T to B is one to one. The inverse map of the outline of the tolerance, |dx| + |dz| =
     # epsilon_max around B_d, is therefore the outline of psi. A search is not necessary. Source: Gia Luan & Truong
     # Thinh 2020, (20), (21), figures 3 to 5, statements 1 and 2
@@ -95,14 +95,14 @@ def feasible_sets(
 
 
 def _diamond(points: int) -> Array:
-    """Points on |x| + |z| = 1; the last point equals the first, shape (points + 1, 2)."""
+    """Points on |x| + |z| = 1, shape (points + 1, 2); the last point is equal to the first."""
     share = np.linspace(0.0, 4.0, points + 1)
     edges = np.arange(5.0)
     return np.stack([np.interp(share, edges, CORNERS[:, k]) for k in range(2)], axis=-1)
 
 
 def feasible_chapter() -> Chapter:
-    """Chapter about the tensions for which the cable ends at a point, with and without a tolerance."""
+    """Chapter about the tensions with which a cable ends at a point, exactly or within a tolerance."""
     end = End.at_angle(CHORD)
     studies = [feasible_sets(simulated_cable(), end, e, TENSIONS, PSI_TENSIONS) for e in TOLERANCES]
     draw = Drawings("feasible")
@@ -140,7 +140,7 @@ def _psi(studies: list[_FeasibleSets], draw: Drawings) -> Finding:
             "times_smaller": ratio,
         },
         panels=(
-            draw.panel(figure, f"ψ for L = {n(length, '.5g', 'm')} and three tolerances."),
+            draw.panel(figure, f"The set ψ for L = {n(length, '.5g', 'm')} and three tolerances."),
             draw.panel(
                 second, "The same sets relative to their middle, along and across the chord; the scales differ."
             ),
@@ -169,7 +169,7 @@ def _curve(study: _FeasibleSets, draw: Drawings) -> Finding:
             "d_last_m": study.lengths[-1] - CHORD,
             "strictly_falling": bool(np.all(np.diff(study.lengths) < 0.0)),
         },
-        panels=(draw.panel(figure, "Ψ over T_x, with ψ as segments at six lengths."),),
+        panels=(draw.panel(figure, "The curve Ψ over T_x, with the sets ψ of six lengths as segments."),),
     )
 
 
@@ -204,7 +204,7 @@ def _line(study: _FeasibleSets, draw: Drawings) -> Finding:
         },
         panels=(
             draw.panel(figure, "The projection of Ψ and the fitted line."),
-            draw.panel(second, "The remainder: the exact T_z minus the line."),
+            draw.panel(second, "The difference: the exact T_z minus the line."),
         ),
     )
 

@@ -14,16 +14,16 @@ from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.present.page import Chapter, Finding, Table, table_of
 
-SPANS = np.linspace(1.0, 13.0, 13)  # working range of the simulated robots [m]
+SPANS = np.linspace(1.0, 13.0, 13)  # spans of the working range of the simulated robots [m]
 RISES = np.linspace(-5.0, 4.0, 10)  # [m]
 TENSIONS = np.linspace(20.0, 400.0, 77)  # [N]
 TOLERANCES = (1e-3, 2e-3, 5e-3, 10e-3)  # [m]
 EDGES, TICKS = np.outer(10.0 ** np.arange(-4.0, -1.0), (1.0, 2.0, 5.0)).ravel(), (1e-4, 1e-3, 1e-2)  # map range [m]
 LINES = (1e-3, 5e-3, 1e-2)  # contour lines of the map [m]
-SAMPLES, LENGTH_ERROR, TENSION_ERROR, SEED = 60, 1e-3, 1.0, 2020  # scatter of the synthetic measurements [m], [N]
+SAMPLES, LENGTH_ERROR, TENSION_ERROR, SEED = 60, 1e-3, 1.0, 2020  # standard deviations of lengths [m] and tensions [N]
 BOTH = ("linear_density", "axial_stiffness")
 UNITS = {"linear_density": "kg/m", "axial_stiffness": "N", "length_offset": "m"}
-CASES = (  # lowest and highest chord tension [N], and the unknowns
+CASES = (  # for each set of measurements: lowest and highest chord tension [N], and the unknowns
     ("loose and taut", 30.0, 600.0, BOTH),
     ("taut only", 300.0, 600.0, BOTH),
     ("loose only", 15.0, 40.0, BOTH),
@@ -32,7 +32,7 @@ CASES = (  # lowest and highest chord tension [N], and the unknowns
 
 
 def identify_chapter() -> Chapter:
-    """Chapter with identify_empirical for the simulation's cable, and identify_cable for synthetic measurements."""
+    """Chapter: identify_empirical for the simulation's cable, and identify_cable for synthetic measurements."""
     fit = identify_empirical(simulated_cable(), SPANS, RISES, TENSIONS)
     draw = Drawings("identify")
     return chapter("identify", (_constants(fit, draw), _limits(fit, draw), _measured()))
@@ -58,7 +58,7 @@ def _constants(fit: EmpiricalFit, draw: Drawings) -> Finding:
         panels=(
             draw.panel(
                 figure,
-                f"Position error of (20), largest value of all rises, between {len(fit.spans)} spans and "
+                f"Position error (20), the largest value over all rises, for {len(fit.spans)} spans and "
                 f"{len(fit.tensions)} tensions.",
             ),
         ),
@@ -70,7 +70,7 @@ def _constants(fit: EmpiricalFit, draw: Drawings) -> Finding:
 
 
 def _limits(fit: EmpiricalFit, draw: Drawings) -> Finding:
-    figure, ax = axes("$T_x$ from here on [N]", "cable weight $wL$ up to [N]")
+    figure, ax = axes("lowest $T_x$ [N]", "largest cable weight $wL$ [N]")
     frontier = {}
     for tolerance, color in zip(TOLERANCES, shades(len(TOLERANCES)), strict=True):
         frontier[tolerance] = np.array([fit.weight_max(tolerance, tension) for tension in fit.tensions])
@@ -83,10 +83,10 @@ def _limits(fit: EmpiricalFit, draw: Drawings) -> Finding:
     return finding(
         "validity-limits",
         numbers={"limits": limits},
-        panels=(draw.panel(figure, "Heaviest cable as a function of the lowest tension, for four tolerances."),),
+        panels=(draw.panel(figure, "Weight of the heaviest cable over the lowest tension, for four tolerances."),),
         data=(
             table_of(
-                "Limits that keep the position error of (20) below a tolerance",
+                "Limits that keep the position error (20) below a tolerance",
                 ("tolerance", [n(1e3 * each, unit="mm") for each in TOLERANCES], ""),
                 ("T_x,min [N]", [limit["tension_min_N"] for limit in limits], ".3g"),
                 ("w_max, all tensions [N]", [limit["weight_max_N"] for limit in limits], ".2f"),
@@ -134,7 +134,7 @@ def _measured() -> Finding:
         },
         data=(
             Table(
-                "Results; in parentheses: standard uncertainty of the last digits",
+                "Results, with the standard uncertainty of the last digits in parentheses",
                 ("chord tensions", "ρ", "EA", "offset", "χ² per freedom", "warnings"),
                 rows,
             ),

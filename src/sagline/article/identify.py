@@ -1,4 +1,4 @@
-"""The article's identification for any cable and working range."""
+"""The article's identification of the empirical model, for any cable and working range."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from sagline.core.results import Result
 from sagline.kernels.cable.batch import batch_end
 
 CONFIDENCE = 0.95
-POINT_BYTES = 400.0  # memory for a combination of span, rise and tension during the fit
+POINT_BYTES = 400.0  # memory per combination of span, rise and tension during the fit
 
 
 class Estimate(NamedTuple):
     """A fitted constant and its confidence interval.
 
-    The interval is computed as for least squares. The residuals are not noise, but errors of the model within the
-    working range. The interval therefore shows how the constant varies within the range, not the accuracy of the fit.
+    The interval is computed as for least squares. However, the residuals are not noise, but errors of the model in the
+    working range. Therefore, the interval shows how the constant varies within the range.
     """
 
     value: float  # value of the constant
@@ -38,17 +38,17 @@ class Estimate(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EmpiricalFit(Result):
-    """An empirical model for one cable and working range, and its errors.
+    """An empirical model for one cable and one working range, and the errors of the model.
 
-    The axes of the maps are s spans, r rises and t tensions, in ascending order. The position error is |dx| + |dz|,
-    (20) of the article. It is the distance between B_d and the end of an exact cable with the force and the length of
-    the model.
+    The arrays have axes for s spans, r rises and t tensions, in ascending order. The position error is |dx| + |dz|, as
+    in (20) of the article: the distance between B_d and the end of an exact cable that has the model's force and
+    length.
 
     Attributes:
         model: The model to use.
         k_h: Intercept constant of the model [m/s^2].
         k_p: Sag constant of the model [m^2/s^4].
-        cable: Material of a single cable.
+        cable: Material of the cable.
         gravity: Gravitational acceleration [m/s^2].
         spans: Sampled spans [m], shape (s,).
         rises: Sampled rises [m], shape (r,).
@@ -73,26 +73,26 @@ class EmpiricalFit(Result):
     cable_weight: Array
 
     def tension_min(self, tolerance: float) -> float:
-        """T_x,min of the article [N]: at this T_x and above, all sampled cables have allowed position errors.
+        """T_x,min of the article [N]: the lowest T_x from which on all sampled cables keep a tolerance.
 
         Args:
             tolerance: Allowed position error [m], > 0.
 
         Returns:
-            The lowest such tension; NaN if the highest sampled tension is too low.
+            The tension; NaN if cables exceed the tolerance even at the highest sampled tension.
         """
         worst = self.position_error.max(axis=(0, 1))
         return _first_of_good_tail(self.tensions, worst <= _tolerance(tolerance))
 
     def weight_max(self, tolerance: float, tension: float | None = None) -> float:
-        """w_max of the article [N]: up to this weight w L, all sampled cables have allowed position errors.
+        """w_max of the article [N]: the largest weight w L up to which all sampled cables keep a tolerance.
 
         Args:
             tolerance: Allowed position error [m], > 0.
-            tension: Smallest T_x that is included [N]; None for all.
+            tension: Only cables with at least this T_x count [N]; None for all cables.
 
         Returns:
-            The largest such sampled weight; NaN if even the lightest cable is too heavy.
+            The weight; NaN if even the lightest cable exceeds the tolerance.
         """
         counted = self.tensions >= (0.0 if tension is None else number(tension, "tension", "N"))
         weight = self.cable_weight[..., counted].ravel()
@@ -106,14 +106,14 @@ def identify_empirical(
 ) -> EmpiricalFit:
     """Find the constants of the empirical model for a cable and its working range.
 
-    Both equations are linear in their constants, so that one least-squares step for each constant is sufficient. The
-    first step determines k_h from T_z with the slope tan phi. The second step determines k_p from L by (48) with this
-    k_h.
+    T_z is linear in k_h, and L is linear in k_p, so that one least-squares step for each constant is sufficient. The
+    first step determines k_h from T_z, with the slope tan phi. The second step determines k_p from L by (48), with
+    the k_h of the first step.
 
     Args:
         cable: Material of a single cable with positive density.
         spans: Horizontal distances of the ends [m], shape (s,), > 0.
-        rises: Heights of the platform end above the frame end [m], shape (r,); negative for a lower platform end.
+        rises: Heights of the platform end above the frame end [m], shape (r,); negative if the platform end is lower.
         tensions: T_x [N], shape (t,), > 0.
         gravity: Gravitational acceleration [m/s^2], > 0.
 
@@ -121,7 +121,7 @@ def identify_empirical(
         The fit; its `model` can be used in `inverse`.
 
     Raises:
-        InvalidValueError: If `cable` is not a cable or has no weight, or a value is out of range.
+        InvalidValueError: If `cable` is not a cable or has no weight, or if a value is out of range.
         CableGeometryError: If a span and a rise are both zero.
 
     Examples:
@@ -147,11 +147,9 @@ def identify_empirical(
     )
     for name, axis in zip(("spans", "rises", "tensions"), axes, strict=True):
         if not axis.size:
-            raise InvalidValueError(
-                name, "empty", "one number at least", "Give the range in which the cable will work."
-            )
+            raise InvalidValueError(name, "empty", "at least one number", "Give the range in which the cable is used.")
     gravity = number(gravity, "gravity", "m/s^2", above=0.0)
-    check_memory("spans, rises and tensions", POINT_BYTES * math.prod(map(len, axes)), "Give fewer of them.")
+    check_memory("spans, rises and tensions", POINT_BYTES * math.prod(map(len, axes)), "Give fewer values.")
     span, rise, tension = np.meshgrid(*axes, indexing="ij")
     chord_tension = tension * np.hypot(span, rise) / span
     exact = Catenary().from_tension(cable, span, rise, chord_tension, gravity)
@@ -199,7 +197,7 @@ def end_position_error(state: CableState) -> Array:
 
 
 def _estimate(shape: Array, value: Array) -> Estimate:
-    """Least-squares factor in value = factor * shape, with its confidence interval."""
+    """Least-squares factor of value = factor * shape, with its confidence interval."""
     from scipy.stats import t
 
     x, y = shape.ravel(), value.ravel()
@@ -215,7 +213,7 @@ def _tolerance(tolerance: float) -> float:
 
 
 def _first_of_good_tail(values: Array, good: Flags) -> float:
-    """First value for which this value and all later values are good; NaN if the last value is not good."""
+    """First value from which on all values are good; NaN if the last value is not good."""
     bad = np.flatnonzero(~good)
     first = int(bad[-1]) + 1 if bad.size else 0
     return float(values[first]) if first < values.size else float("nan")

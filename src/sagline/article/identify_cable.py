@@ -19,8 +19,8 @@ from sagline.core.results import Result
 
 TensionAt = Literal["frame_end", "platform_end", "chord"]
 UNITS = {"linear_density": "kg/m", "axial_stiffness": "N", "length_offset": "m"}
-TOO_LOOSE = 0.5  # a value is not determined if its relative standard error is larger
-TOO_CLOSE = 0.95  # two values cannot be separated if their correlation is larger
+TOO_LOOSE = 0.5  # a value counts as not determined if its relative standard error is larger
+TOO_CLOSE = 0.95  # two values count as not separable if their correlation is larger
 ITERATIONS = 30  # iterations to compute the chord tension from the tension at an end
 WEIGHTINGS = 3  # iterations of the weights, because they depend slightly on the solution
 _ADVICE = {
@@ -31,17 +31,17 @@ _ADVICE = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CableFit(Result):
-    """A cable that was identified from measurements.
+    """Result of `identify_cable`.
 
     Attributes:
         cable: The identified cable.
         names: Unknowns, in the order of the following arrays: "linear_density" [kg/m], "axial_stiffness" [N],
             "length_offset" [m]. The offset is positive if the measured lengths are too long.
         values: Estimates, shape (k,).
-        covariance: Covariance of the values, shape (k, k), from the given measurement errors.
+        covariance: Covariance of the values, shape (k, k), which follows from the given standard errors.
         residuals: Measured minus predicted length [m], shape (n,).
         chi_squared: Sum of squares of the residuals in standard errors, divided by the degrees of freedom. The value is
-            about 1 if the cable model and the measurement errors are correct, and much larger otherwise.
+            about 1 if the cable model and the standard errors are correct, and much larger if one of them is wrong.
     """
 
     cable: Cable
@@ -65,7 +65,7 @@ class CableFit(Result):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Texts about values that the data do not determine or cannot separate; empty if there are none."""
+        """Texts about values that the data do not determine or do not separate; empty if all values are determined."""
         found = []
         for name, value, error in zip(self.names, self.values, self.standard_error, strict=True):
             if name != "length_offset" and error > TOO_LOOSE * value:
@@ -108,9 +108,9 @@ def identify_cable(
         tension: Measured tension [N], shape (n,), > 0.
         length_error: Standard error of a length [m], > 0.
         tension_error: Standard error of a tension [N], > 0.
-        tension_at: Place of the measurement: "frame_end" (a load cell at the winch), "platform_end" or "chord".
+        tension_at: Measured tension: "frame_end" (load cell at the winch), "platform_end" or "chord".
         unknowns: One or several of "linear_density", "axial_stiffness", "length_offset".
-        start: Initial values, and values of known parameters; None for 0.1 kg/m and 100 kN.
+        start: Initial values of the unknowns, and values of the known parameters; None for 0.1 kg/m and 100 kN.
         gravity: Gravitational acceleration [m/s^2], > 0.
 
     Returns:
@@ -163,17 +163,17 @@ class _Measured:
             raise InvalidValueError(
                 "the measurements",
                 f"of shapes {sorted(sizes)}",
-                f"four arrays of one length, at least {unknowns}",
-                "Give span, rise, length and tension of at least one measurement per unknown value.",
+                f"four arrays of equal length, at least {unknowns}",
+                "Give span, rise, length and tension of at least one measurement per unknown.",
             )
 
     def predicted(self, cable: Cable, tension: Array) -> Array:
-        """Lengths of exact cables [m] with the given tension at the place of the measurement."""
+        """Lengths [m] of exact cables whose tension at the place of measurement is given."""
         chord = np.hypot(self.span, self.rise)
         half = 0.5 * cable.linear_density * self.gravity * chord
         side = {"frame_end": 1.0, "platform_end": -1.0, "chord": 0.0}[self.tension_at]
         across = half * self.span / chord if side else 0.0
-        floor = 1e-3 * tension  # at least this, because half the weight of the cable can exceed the measured tension
+        floor = 1e-3 * tension  # a lower limit, because half the weight of the cable can exceed the measured tension
         tau = np.maximum(side * half * self.rise / chord + np.sqrt(np.maximum(tension**2 - across**2, 0.0)), floor)
         state = Catenary().from_tension(cable, self.span, self.rise, tau, self.gravity)
         for _ in range(ITERATIONS if side else 0):
@@ -228,7 +228,7 @@ def _fit(data: _Measured, names: tuple[str, ...], known: Cable, length_error: fl
 
 
 def _bounds(names: tuple[str, ...]) -> tuple[list[float], list[float]]:
-    """Bounds that every rope satisfies: 1 mg/m to 1 t/m, 1 N to 1 PN."""
+    """Bounds of the unknowns, which every rope satisfies: 1 mg/m to 1 t/m, and 1 N to 1 PN."""
     low = {"linear_density": np.log(1e-6), "axial_stiffness": 0.0, "length_offset": -np.inf}
     high = {"linear_density": np.log(1e3), "axial_stiffness": np.log(1e15), "length_offset": np.inf}
     return [low[name] for name in names], [high[name] for name in names]
@@ -248,5 +248,5 @@ def _checked_unknowns(unknowns: Sequence[str]) -> tuple[str, ...]:
         raise InvalidValueError("unknowns", brief(unknowns), allowed, "Give a list of unknowns.")
     names = tuple(choice(name, "unknowns", UNITS) for name in unknowns)
     if len(set(names)) != len(names):
-        raise InvalidValueError("unknowns", brief(names), "each of them once", "Give each name once.")
+        raise InvalidValueError("unknowns", brief(names), "each name once", "Give each name once.")
     return names

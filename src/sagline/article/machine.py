@@ -1,4 +1,4 @@
-"""Robots with parameter errors, and the resulting equilibria of the platform."""
+"""Robots with parameter errors, and the equilibria of the platform that result from the errors."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ MODULUS, DENSITY, LOAD = "Young's modulus E", "linear density ρ", "load"
 ANCHORS, DRUM, ZERO = "anchor height", "drum radius", "zero of the lengths"
 PULLEY, DEAD = "pulley radius", "dead cable"
 WIDTH, HEIGHT = "platform anchors, outward", "platform anchors, up and down"
-Errors: TypeAlias = Mapping[str, float]  # errors of parameters in their units, by name; a missing error is zero
+Errors: TypeAlias = Mapping[str, float]  # error of each parameter in its unit, by name; missing errors are zero
 
 
 class Parameter(NamedTuple):
-    """Parameter of the prototype that may differ from Table 1, by the same error for all cables."""
+    """Parameter of the prototype that may differ from Table 1; the error is the same for all cables."""
 
     name: str
     unit: str  # unit of the error
@@ -46,7 +46,7 @@ def robot_with_errors(robot: sl.Robot, errors: Errors) -> sl.Robot:
     """Robot with errors of some parameters: anchors, cables, routing and load."""
     off = {parameter.name: 0.0 for parameter in PARAMETERS} | dict(errors)
     cables, winches, outward = robot.cables, robot.winches, np.sign(robot.platform_anchors)
-    changes: dict[str, Any] = {}  # parts without errors are reused, because a fit makes a thousand robots
+    changes: dict[str, Any] = {}  # parts without errors are not copied, because a fit needs a thousand robots
     if off[MODULUS] or off[DENSITY]:
         changes["cables"] = cables.replace(
             axial_stiffness=cables.axial_stiffness * (1.0 + 0.01 * off[MODULUS]),
@@ -66,15 +66,15 @@ def robot_with_errors(robot: sl.Robot, errors: Errors) -> sl.Robot:
 
 
 def wound_lengths(plan: sl.Plan, home: sl.Plan, errors: Errors) -> Array:
-    """Actual lengths from the winches for commanded lengths."""
+    """Actual lengths that the winches give for commanded lengths."""
     from_home = plan.unstrained_length - home.unstrained_length
     return plan.unstrained_length + 0.01 * errors.get(DRUM, 0.0) * from_home + 1e-3 * errors.get(ZERO, 0.0)
 
 
 def rest_positions(robot: sl.Robot, plan: sl.Plan, home: sl.Plan, errors: Sequence[Errors]) -> Array:
-    """Equilibria of robots with errors at the lengths that are planned for the robot without errors."""
-    # Encoders are set to the planned lengths with the platform at rest in its home pose, so that additional lengths on
-    # pulleys and dead lengths at home have no effect
+    """Equilibria of robots with errors; their lengths are planned for the robot without errors."""
+    # In the home pose, the encoders are set to the planned lengths. Therefore, the lengths on pulleys and the dead
+    # lengths at home have no effect.
     robots = [robot_with_errors(robot, one) for one in errors]
     off_drum = np.stack([wound_lengths(plan, home, one) for one in errors]) + _not_counted(robots, home)[:, None]
     count, poses, m = off_drum.shape
@@ -84,15 +84,15 @@ def rest_positions(robot: sl.Robot, plan: sl.Plan, home: sl.Plan, errors: Sequen
         index = int(np.argmin(found.solved))
         raise sl.InvalidValueError(
             "the changed robot",
-            f"not held in a stable equilibrium at pose {index % poses}",
+            f"without a stable equilibrium at pose {index % poses}",
             "smaller changes",
-            "Change the robot by less.",
+            "Reduce the change of the robot.",
         )
     return found.pose.position.reshape(count, poses, 3)
 
 
 def _not_counted(robots: Sequence[sl.Robot], home: sl.Plan) -> Array:
-    """Additional cable lengths due to pulleys and dead length at the home pose [m], shape (K, m)."""
+    """Cable lengths on pulleys and behind them, at the home pose [m], shape (K, m)."""
     added = np.zeros((len(robots), home.unstrained_length.shape[-1]))
     behind = [index for index, robot in enumerate(robots) if has_routing(robot)]
     if behind:

@@ -1,4 +1,4 @@
-"""Errors of the five cable models, and the range in which each model is sufficient."""
+"""Errors of the five cable models, and the ranges in which they are sufficient."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ MODELS: tuple[sl.CableModel, ...] = (
     sl.Empirical(),
     sl.Parabolic(),
     sl.Catenary(),
-)  # in the order from coarse to exact
+)  # from the least to the most accurate model
 CHORDS = np.geomspace(1.0, 30.0, 41)  # [m]
 TENSIONS = np.geomspace(5.0, 2000.0, 61)  # [N]
 TOLERANCE = 1e-3  # [m]
@@ -39,18 +39,18 @@ EDGES, LINES = 10.0 ** np.arange(-9.0, 1.0), (1e-4, 1e-3, 1e-2)  # filled contou
 TICKS = (1e-9, 1e-6, 1e-3, 1.0)  # [m]
 FINE_CHORDS, FINE_TENSIONS = np.geomspace(1.0, 30.0, 140), np.geomspace(5.0, 2000.0, 180)  # abscissae of the maps
 FINE_DENSITIES = np.geomspace(0.01, 1.0, 140)  # [kg/m]
-FINE_ANGLES = np.radians(np.linspace(-85.0, 0.0, 140))  # a suspended cable, with the platform end below the frame end
+FINE_ANGLES = np.radians(np.linspace(-85.0, 0.0, 140))  # the platform end is below the frame end
 REFERENCE = {"chord": 10.0, "angle": float(np.radians(-30.0)), "density": 0.067, "tension": 100.0}
 USES = ((3.0, 300.0), (10.0, 300.0), (10.0, 50.0), (10.0, 15.0), (25.0, 100.0))  # chord [m], tension [N] of the table
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _ModelErrors:
-    """Errors of the five models relative to the exact model, for all combinations of four quantities of a cable.
+    """Errors of the five models relative to the exact model, for every combination of four quantities of a cable.
 
     All models have the same horizontal tension. The length error is therefore the error of the length at a winch. The
-    position error, |dx| + |dz| of (20), is the distance between the desired position and the end of an exact cable with
-    the force and length of the model.
+    position error is |dx| + |dz| of (20): the distance of the desired position from the end of an exact cable that has
+    the model's force and length.
     """
 
     models: tuple[sl.CableModel, ...]  # the models, shape (5,)
@@ -64,7 +64,7 @@ class _ModelErrors:
     position_error: Array  # position error [m], shape (5, c, a, r, t)
 
     def sufficient(self, tolerance: float) -> Array:
-        """The coarsest sufficient model."""
+        """The least accurate of the sufficient models, for each cable."""
         within = np.abs(self.length_error) <= tolerance
         coarsest: Array = np.argmax(within, axis=0).astype(np.float64)
         return coarsest
@@ -111,7 +111,7 @@ def _name(model: object) -> str:
 
 
 def _study(**varied: Array) -> _ModelErrors:
-    """Errors over the given quantities; all other quantities have their reference values."""
+    """Errors as a function of the given quantities; all other quantities have their reference values."""
     at = (varied.get(name, np.array([REFERENCE[name]])) for name in ("chord", "angle", "density", "tension"))
     return model_errors(float(simulated_cable().axial_stiffness), *at)
 
@@ -150,20 +150,20 @@ def _sufficient(draw: Drawings) -> Finding:
         "sufficient-model",
         numbers={"share_of_map": shares},
         panels=(
-            _choice("chord [m]", FINE_CHORDS, fine[0], "Over chord and tension.", draw),
-            _choice("linear density [kg/m]", FINE_DENSITIES, fine[1], "Over density and tension.", draw),
-            _choice("angle below level [°]", -np.degrees(FINE_ANGLES), fine[2], "Over angle and tension.", draw),
+            _choice("chord [m]", FINE_CHORDS, fine[0], "Error over chord and tension.", draw),
+            _choice("linear density [kg/m]", FINE_DENSITIES, fine[1], "Error over density and tension.", draw),
+            _choice("angle below level [°]", -np.degrees(FINE_ANGLES), fine[2], "Error over angle and tension.", draw),
         ),
     )
 
 
 def _choice(label: str, heights: Array, errors: Array, caption: str, draw: Drawings) -> Panel:
-    """Map of the coarsest sufficient model; the borders are at the positive or negative allowed length error."""
+    """Map of the least accurate sufficient model; at its borders, a length error has the allowed size."""
     names = [_name(model) for model in MODELS]
     colors = matplotlib.colormaps["viridis_r"](0.9 * np.arange(len(names)) / (len(names) - 1))
     figure, ax = map_axes("chord tension [N]", label)
     ax.add_patch(Rectangle((0.0, 0.0), 1.0, 1.0, transform=ax.transAxes, color=colors[-1], zorder=0.5))
-    for error, color in zip(errors[-2::-1], colors[-2::-1], strict=True):  # coarser models over better ones
+    for error, color in zip(errors[-2::-1], colors[-2::-1], strict=True):  # less accurate models on top
         band = ax.contourf(FINE_TENSIONS, heights, error, levels=[-TOLERANCE, TOLERANCE], colors=[color])
         band.set_rasterized(True)
     if heights is FINE_CHORDS:

@@ -19,7 +19,7 @@ AREA = 2e4  # area of a circle per meter of error [pt^2/m]
 
 
 def poses_chapter() -> Chapter:
-    """Chapter about the ten poses of the prototype, and possible causes of the errors."""
+    """Chapter about the ten poses of the prototype, and about possible causes of their errors."""
     study = ten_poses()
     draw = Drawings("poses")
     return chapter(
@@ -52,7 +52,7 @@ def _table(study: TenPoses) -> Finding:
         },
         data=(
             table_of(
-                "The ten poses, and the plan of sagline for them",
+                "The ten poses, with their plan by sagline",
                 ("pose", table.points, ""),
                 ("desired x, y, z [m]", [", ".join(n(x, ".2f") for x in place) for place in table.desired], ""),
                 ("error x, y, z [mm]", [", ".join(n(1e3 * x, ".0f") for x in error) for error in table.error], ""),
@@ -71,11 +71,11 @@ def _tour(draw: Drawings) -> Finding:
     assert path is not None
     panels = []
     for values, label, caption in (
-        (cables.frame_end_tension, "tension at the winch [N]", "Planned tensions, for figure 25."),
+        (cables.frame_end_tension, "tension at the winch [N]", "Planned tensions, to be compared with figure 25."),
         (
             1e3 * (cables.unstrained_length - cables.unstrained_length[0]),
             "$L - L_{home}$ [mm]",
-            "Planned differences of length from the home pose, for figure 26.",
+            "Planned lengths minus the lengths at home, to be compared with figure 26.",
         ),
     ):
         figure, _ = cables_over_time(path.time, values, label, 0.9, stops=stops.tolist())
@@ -103,7 +103,7 @@ def _space(study: TenPoses, draw: Drawings) -> Finding:
     ends = np.array([height.min(), height.max()])
     ax.plot(ends, 1e3 * (line.slope * ends + line.intercept), color="black", linewidth=0.9, label="line")
     legend_above(ax)
-    panels.append(draw.panel(figure, "Actual minus desired height."))
+    panels.append(draw.panel(figure, "Actual minus desired height of the platform."))
     tension = study.plan.horizontal_tension.mean(axis=1)
     against = float(np.corrcoef(tension, table.distance)[0, 1])
     return finding(
@@ -144,8 +144,8 @@ def _trends(study: TenPoses, draw: Drawings) -> Finding:
         "one-parameter-off",
         numbers={"height_slope_mm_per_m": slopes, "measured_slope_mm_per_m": 1e3 * study.height_line.slope},
         panels=(
-            draw.panel(figure, "Trends of the vertical error over height, and the measured errors."),
-            draw.panel(second, "The other parameters."),
+            draw.panel(figure, "Measured vertical errors over height, and trends that single parameters predict."),
+            draw.panel(second, "Trends of the other parameters."),
         ),
         data=(
             Table(

@@ -22,12 +22,12 @@ LOWEST, HIGHEST = (20.0, 400.0), (500.0, 200_000.0)  # search intervals for both
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InterceptStudy:
-    """Intercepts b_pi for the forces on one end of the cable, and the regressions of the article."""
+    """Intercepts b_pi of the forces on one end of the cable, and the article's regressions."""
 
     sampling: Sampling  # the cables, a angles, c chords, r densities
-    slope: Array  # a_pi of the fitted lines, shape (a, c, r)
-    intercept: Array  # b_pi of the fitted lines [N], shape (a, c, r)
-    r_squared: Array  # quality of the fit of the lines, shape (a, c, r)
+    slope: Array  # slopes a_pi of the fitted lines, shape (a, c, r)
+    intercept: Array  # intercepts b_pi of the fitted lines [N], shape (a, c, r)
+    r_squared: Array  # deviations of the samples from the lines, shape (a, c, r)
     h_b: Array  # h_b in b_pi = h_b D [N/m], shape (a, r)
     k_h_of_angle: Array  # k_h in h_b = k_h rho, for each angle [m/s^2], shape (a,)
     k_h: float  # k_h in h_b = k_h rho, for all angles together [m/s^2]
@@ -74,7 +74,7 @@ class StretchStudy:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SagStudy:
-    """The sequence of regressions of the article from d to k_p, for cables without stretch."""
+    """The article's sequence of regressions that begins with d and ends with k_p, for cables without stretch."""
 
     sampling: Sampling  # the cables, a angles, c chords, r densities, t tensions
     adjusting_length: Array  # adjusting lengths d [m], shape (a, c, r, t)
@@ -100,30 +100,30 @@ class SagStudy:
 
 
 def length_shape(tension: Array) -> Array:
-    """Shape (41) of the adjusting length, 1/T_x^2 [1/N^2]."""
+    """Function (41), 1/T_x^2 [1/N^2], to which d is proportional."""
     return tension**-2
 
 
 def chord_shape(chord: Array) -> Array:
-    """Shape (43) of a_d, D^3 [m^3]."""
+    """Function (43), D^3 [m^3], to which a_d is proportional."""
     return chord**3
 
 
 def angle_shape(angle: Array) -> Array:
-    """Shape (44) of q_a, cos^4 of the chord's angle."""
+    """Function (44), cos^4 of the chord's angle, to which q_a is proportional."""
     shape: Array = np.cos(angle) ** 4
     return shape
 
 
 def density_shape(density: Array) -> Array:
-    """Shape (45) of p_q, rho^2 [kg^2/m^2]."""
+    """Function (45), rho^2 [kg^2/m^2], to which p_q is proportional."""
     return density**2
 
 
 def stretch_study(cable: sl.Cable, end: End, tensions: Array) -> StretchStudy:
     """Adjusting lengths of a cable without its elongation: by (36) and (38), and with the true elongation."""
     # The elongation by the force at the platform end, |T| L/EA, is too large by w L^2 sin(phi)/(2 EA), because half of
-    # the cable's weight acts along the chord (erratum 5) source: Gia Luan & Truong Thinh 2020, (33) to (38), figures 8
+    # the cable's weight acts along the chord (erratum 5). Source: Gia Luan & Truong Thinh 2020, (33) to (38), figures 8
     # and 9
     model, chord_tension = sl.Catenary(), tensions * end.chord / end.span
     stiff = model.from_tension(cable.replace(axial_stiffness=UNSTRETCHABLE), *end, chord_tension, GRAVITY)
@@ -171,25 +171,25 @@ class Constants(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ConstantsStudy:
-    """The constants for different ranges of tensions."""
+    """The constants k_h and k_p for different ranges of tensions."""
 
-    sampling: Sampling  # the cables; only the tensions differ
+    sampling: Sampling  # the cables, which are the same for all ranges of tensions
     over_lowest: tuple[Constants, ...]  # ranges from each lowest tension to the highest tension of the article
     over_highest: tuple[Constants, ...]  # ranges from the lowest tension of the article to each highest tension
     # the article's range times 1, 2, 4, and so on, up to the limit of taut cables
     scaled: tuple[Constants, ...]
-    published: Constants  # the range with the published |k_h| (at the frame end) and k_p as results
+    published: Constants  # the range that gives the published |k_h| (at the frame end) and k_p
 
 
 def constants(sampling: Sampling) -> Constants:
-    """Both constants, from the article's regressions."""
+    """Both constants from the article's regressions, for sampled cables."""
     platform, frame = intercept_studies(sampling)
     tensions = sampling.tensions
     return Constants(float(tensions.min()), float(tensions.max()), platform.k_h, frame.k_h, sag_study(sampling).k_p)
 
 
 def constants_study(sampling: Sampling, lowest: Array, highest: Array, factors: Array) -> ConstantsStudy:
-    """The constants for many ranges of tensions, and the range that gives the published constants."""
+    """The constants for many ranges of tensions, and the range of tensions that gives the published constants."""
     found = published_range(sampling)
     return ConstantsStudy(
         sampling=sampling,
@@ -202,7 +202,7 @@ def constants_study(sampling: Sampling, lowest: Array, highest: Array, factors: 
 
 @cache
 def published_sampling() -> Sampling:
-    """Assumed sampling of the article, with the range of tensions that gives the published constants."""
+    """Assumed samples of the article, in the range of tensions that gives the published constants."""
     sampling = article_sampling()
     found = published_range(sampling)
     return sampling.between(found.lowest, found.highest)
@@ -210,8 +210,8 @@ def published_sampling() -> Sampling:
 
 def published_range(sampling: Sampling) -> Constants:
     """The range of tensions that gives both published constants: k_h = -4.845 at the frame end and k_p = 4.385."""
-    # The two ends of the range determine the two constants: k_p decreases with the lower end, and |k_h| increases with
-    # the upper end
+    # The two ends of the range determine the two constants: if the lower end increases, k_p decreases; if the upper end
+    # increases, |k_h| increases.
     from scipy.optimize import brentq
 
     def best_lowest(highest: float) -> float:
@@ -230,7 +230,7 @@ def published_range(sampling: Sampling) -> Constants:
     except ValueError:  # there is no change of sign between the ends of the search
         raise sl.InvalidValueError(
             "the sampled cables",
-            "such that no range of tensions gives the published constants",
+            "cables for which no range of tensions gives the published constants",
             f"lowest tensions in {LOWEST} N, highest in {HIGHEST} N",
             "Sample chords and densities as the article did.",
         ) from None

@@ -37,7 +37,7 @@ Progress = Callable[[int, int, str], None]
 _numbers = re.compile(r"(\d+)(?:-(\d+))?")
 REDONE = "3-15, 17-22 and 25-27; the others are drawings and photographs without data"
 KEY = "five-models"  # key of the finding with the numbers of the drawing
-FIRST, LAST = 1e-3, 1e4  # ends of the axis [mm]; smaller values are written at the edge of the drawing
+FIRST, LAST = 1e-3, 1e4  # limits of the axis [mm]; a text at the edge replaces smaller values
 ROBOTS = (("suspended", BLUE, -0.16), ("mixed", VERMILLION, 0.16))
 
 
@@ -99,7 +99,7 @@ PARTS = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Selection:
-    """Requested chapters, figures and tables."""
+    """The chapters, figures and tables that are requested."""
 
     whole: frozenset[str]  # keys of completely requested chapters
     figures: frozenset[int]  # numbers of requested figures
@@ -107,13 +107,13 @@ class _Selection:
 
     @property
     def parts(self) -> tuple[ReportPart, ...]:
-        """The chapters with requested findings."""
+        """The chapters that have requested findings."""
         return tuple(
             p for p in PARTS if p.key in self.whole or self.figures & {*p.figures} or self.tables & {*p.tables}
         )
 
     def cut(self, chapter: Chapter) -> Chapter:
-        """The chapter with the requested findings only."""
+        """The chapter, with only the findings that are requested."""
         if chapter.key in self.whole:
             return chapter
         kept = (f for f in chapter.findings if self.figures & {*f.figures} or self.tables & {*f.tables})
@@ -121,7 +121,7 @@ class _Selection:
 
 
 def selection(words: Sequence[str]) -> _Selection:
-    """Chapters, figures and tables that the words select; everything without words."""
+    """Chapters, figures and tables that the words of the command select; no words select everything."""
     if not words:
         return _Selection(frozenset(part.key for part in PARTS), frozenset(), frozenset())
     whole: set[str] = set()
@@ -155,12 +155,12 @@ def _checked_range(kind: str, word: str, first: int, last: int) -> set[int]:
 def _unknown(word: str) -> sl.InvalidValueError:
     keys = [part.key for part in PARTS]
     near = get_close_matches(word.lower(), [*keys, "figures", "tables"], n=1)
-    step = f"Did you mean {near[0]}?" if near else "Give no word for everything."
+    step = f"Did you mean {near[0]}?" if near else "Without a word, everything is selected."
     return sl.InvalidValueError("part", repr(word), f"{', '.join(keys)}, figures N-M, table 2", step)
 
 
 def _picture(chapters: Sequence[Chapter]) -> Panel | None:
-    """Drawing of the largest position errors of each model for both robots; None without position errors."""
+    """Drawing of each model's largest position error, for both robots; None if the chapter has no position errors."""
     numbers = next((f.numbers for c in chapters for f in c.findings if f.key == KEY), None)
     if numbers is None:
         return None
@@ -184,5 +184,5 @@ def _picture(chapters: Sequence[Chapter]) -> Panel | None:
     ax.set_ylim(len(models) - 0.5, -0.5)
     legend_above(ax)
     return Drawings("result").panel(
-        figure, "Lengths planned with each cable model, applied to exact cables along the article's path."
+        figure, "Position errors of exact cables along the article's path, with lengths that each cable model plans."
     )

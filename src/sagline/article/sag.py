@@ -36,7 +36,7 @@ DRAWN = (1, 3, 5, 7, 9)  # indices of drawn densities
 
 
 def sag_chapter() -> Chapter:
-    """Chapter about the regressions from the adjusting length to k_p."""
+    """Chapter about the regressions that lead from the adjusting length to k_p."""
     end = End.at_angle(CHORD)
     stretch, sag = stretch_study(simulated_cable(), end, TENSIONS), sag_study(published_sampling())
     draw = Drawings("sag")
@@ -77,19 +77,19 @@ def _relieved(study: StretchStudy, draw: Drawings) -> Finding:
     numbers = {"error_of_36_mm": np.abs(printed).max(), "error_with_mean_tension_mm": np.abs(mended).max()}
     figure, ax = axes("$|T|$ [N]", "$d$ [mm]")
     ax.plot(study.magnitude, 1e3 * study.unstretchable, color=BLUE, linewidth=2.4, alpha=0.5, label="does not stretch")
-    ax.plot(study.magnitude, 1e3 * study.relieved, color=VERMILLION, linewidth=1.1, label="stretch taken out, (38)")
+    ax.plot(study.magnitude, 1e3 * study.relieved, color=VERMILLION, linewidth=1.1, label="without stretch by (38)")
     ax.set_yscale("log")
     legend_above(ax)
     second, bx = axes("$|T|$ [N]", "error of $d$ [mm]")
     bx.plot(study.magnitude, printed, color=VERMILLION, linewidth=1.3, label="(36), (38)")
-    bx.plot(study.magnitude, mended, color=GREEN, linewidth=1.3, label="with the mean tension")
+    bx.plot(study.magnitude, mended, color=GREEN, linewidth=1.3, label="without stretch by the mean tension")
     legend_above(bx)
     return finding(
         "stretch-removed",
         numbers=numbers,
         panels=(
-            draw.panel(figure, "d over |T|: unstretchable, and stretchable with (38)."),
-            draw.panel(second, "The difference of the two."),
+            draw.panel(figure, "d over |T|: of the cable that does not stretch, and of the elastic cable with (38)."),
+            draw.panel(second, "The difference between both."),
         ),
     )
 
@@ -164,8 +164,8 @@ def _density(study: SagStudy, draw: Drawings) -> Finding:
             "densities_kg_per_m": densities,
         },
         panels=(
-            draw.panel(figure, "p_q with its parabola."),
-            draw.panel(second, "p_q/ρ² should not depend on ρ."),
+            draw.panel(figure, "p_q with the fitted parabola."),
+            draw.panel(second, "p_q/ρ²; by (45) it would not depend on ρ."),
         ),
         heaviest=each[-1],
     )
@@ -181,5 +181,5 @@ def _middle_and_dense(study: SagStudy) -> str:
 
 
 def _away(fit: Array, values: Array) -> float:
-    """Largest distance from a fit divided by the largest value, along the fitted axis (the second to last axis)."""
+    """Largest distance from a fit, divided by the largest value, along the axis of the fit (the second to last one)."""
     return float((np.abs(fit - values).max(axis=-2) / values.max(axis=-2)).max())

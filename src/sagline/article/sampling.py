@@ -11,13 +11,13 @@ import sagline as sl
 from sagline.core.arrays import Array, checked
 from sagline.core.fields import given, rule
 
-GRAVITY = 9.81  # [m/s^2], in all of the article's studies
+GRAVITY = 9.81  # [m/s^2], the same in all studies of the article
 ANGLE = 0.754  # angle of the article's figure 10 [rad]
-UNSTRETCHABLE = 1e20  # [N], so stiff that the strain is below the rounding error
+UNSTRETCHABLE = 1e20  # stiffness [N] for which the strain is below the rounding error
 
 
 class FittedLine(NamedTuple):
-    """Lines y = slope x + intercept fitted along the last axis."""
+    """Lines y = slope x + intercept, fitted to samples along the last axis."""
 
     slope: Array  # slope, shape (...)
     intercept: Array  # intercept, shape (...)
@@ -26,7 +26,7 @@ class FittedLine(NamedTuple):
 
 
 def fit_line(x: Array, y: Array) -> FittedLine:
-    """Least-squares line through samples along the last axis."""
+    """Fit a least-squares line to samples along the last axis."""
     x, y = np.broadcast_arrays(x, y)
     away_x = x - x.mean(axis=-1, keepdims=True)
     away_y = y - y.mean(axis=-1, keepdims=True)
@@ -38,7 +38,7 @@ def fit_line(x: Array, y: Array) -> FittedLine:
 
 
 def fit_factor(shape: Array, y: Array, axis: int = -1) -> Array:
-    """Least-squares factor a in y = a * shape, along one axis."""
+    """Least-squares factor a of y = a * shape, along one axis."""
     # all other regressions of the article have this form; the shape is 1/T_x^2, D^3, cos^4(phi), rho^2, D or rho
     shape, y = np.broadcast_arrays(shape, y)
     factor: Array = np.sum(shape * y, axis=axis) / np.sum(shape**2, axis=axis)
@@ -60,12 +60,12 @@ class Sampling:
     axial_stiffness: float = UNSTRETCHABLE  # EA of all cables [N]
 
     def __attrs_post_init__(self) -> None:
-        """Check the four quantities."""
+        """Check the four quantities of the cables."""
         for about in (about for about in attrs.fields(Sampling) if about.metadata):
             object.__setattr__(self, about.name, checked(getattr(self, about.name), about.name, **about.metadata))
 
     def hang(self) -> sl.CableState:
-        """The exact cables."""
+        """States of the sampled cables, by the exact model."""
         angle, chord, density, tension = np.meshgrid(
             self.angles, self.chords, self.densities, self.tensions, indexing="ij"
         )
@@ -82,7 +82,7 @@ class Sampling:
 def article_sampling() -> Sampling:
     """Assumed samples; the article gives only phi = 0.754 rad and rho in (0, 2)."""
     # Chords from 2 to 16 m, as in the frames of the article's Table 1; five angles around 0.754 rad; ten densities;
-    # sixty tensions from 100 N to 10 kN, evenly spaced source: Gia Luan & Truong Thinh 2020, figures 6 to 15
+    # sixty tensions from 100 N to 10 kN, evenly spaced. Source: Gia Luan & Truong Thinh 2020, figures 6 to 15
     return Sampling(
         angles=[0.25, 0.5, ANGLE, 1.0, 1.25],
         chords=np.linspace(2.0, 16.0, 8),

@@ -1,4 +1,4 @@
-"""Figures 17 to 22: both robots along the planar path, with each of the five cable models."""
+"""Study of figures 17 to 22: both robots along the planar path, with each of the five cable models."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from sagline.article.models import MODELS
 from sagline.core.arrays import Array
 
 ROBOTS = ("article-suspended", "article-mixed")  # the article's first and second configuration
-# The article describes (55), the tensions closest to the previous tensions. In its figures, however, unneeded cables
-# are near their minimum, and curves return to their initial values. This agrees with the minimum norm of the article's
-# variable T_x.
+# The article's (55) selects the tensions closest to the previous ones. In its figures, however, cables that are not
+# needed are near their minimum, and curves return to their initial values. Both agree with the minimum norm of the
+# article's variable T_x.
 METHOD = sl.MinimumNorm("horizontal")
 ERROR_BAND = 6e-3  # [m], the article's "(-6, 6) mm"
 
 
 class Figures(NamedTuple):
-    """Numbers of a run, over the feasible poses."""
+    """Numbers of a run; only feasible poses count."""
 
     error_max: float  # largest distance of the platform from the planned position [m]
     error_mean: float  # mean distance [m]
@@ -31,7 +31,7 @@ class Figures(NamedTuple):
     vertical_max: float  # largest |T_z| [N]
     step_max: float  # largest change of T_x between two samples [N]
     slope_max: float  # largest |dT_x/dt| [N/s]
-    # largest change of dT_x/dt between two steps [N/s]; at a corner of a curve, it remains with smaller steps
+    # largest change of dT_x/dt between two steps [N/s]; at a kink of T_x, smaller steps do not reduce it
     slope_jump: float
     length_min: float  # smallest L [m]
     length_max: float  # largest L [m]
@@ -43,7 +43,7 @@ class Figures(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PathStudy:
-    """Both robots along one path.
+    """Both robots along the same path.
 
     Attributes:
         path: The path, N samples.
@@ -64,7 +64,7 @@ class PathStudy:
 
     @property
     def tension_ratio(self) -> float:
-        """Ratio of the highest T_x of the mixed robot to that of the suspended robot, with the empirical model."""
+        """Highest T_x of the mixed robot, divided by that of the suspended robot, with the empirical model."""
         suspended, mixed = (figures(run) for run in self.of(sl.Empirical))
         return mixed.tension_max / suspended.tension_max
 
@@ -76,12 +76,12 @@ class LowTension:
     tension_min: Array  # lower limit of the chord tension [N], shape (k,)
     suspended: Array  # largest error along one axis of the first configuration [m], shape (k,)
     mixed: Array  # largest error along one axis of the second configuration [m], shape (k,)
-    suspended_bound: Figures  # first configuration with the bound (54), for T_adj = 0, as the lower limit
-    mixed_bound: Figures  # second configuration with this bound
+    suspended_bound: Figures  # first configuration; the lower limit is the bound (54) with T_adj = 0
+    mixed_bound: Figures  # second configuration with the same lower limit
 
 
 def path_study(rate: float = 100.0, models: Sequence[sl.CableModel] = MODELS) -> PathStudy:
-    """Plan both robots along the article's path, and apply the lengths to exact cables.
+    """Plan both robots along the article's path, and find the equilibria of exact cables with the planned lengths.
 
     The plan is the "simple controller" of the article, which computes lengths from tensions. The resulting pose of the
     platform is the equilibrium on exact cables, with the same inertial forces.
@@ -96,7 +96,7 @@ def path_study(rate: float = 100.0, models: Sequence[sl.CableModel] = MODELS) ->
 
 
 def low_tension_study(limits: Array, rate: float = 10.0) -> LowTension:
-    """The empirical model at low tensions, where cables may become slack."""
+    """Study of the empirical model at low tensions, at which cables may become slack."""
     path, robots = sl.article_path(rate), [sl.load_robot(name) for name in ROBOTS]
     suspended, mixed = (
         [figures(_run(robot.replace(tension_min=low), path, sl.Empirical(), METHOD)).axis_error_max for low in limits]

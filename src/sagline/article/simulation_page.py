@@ -33,10 +33,10 @@ from sagline.present.page import Chapter, Finding, Panel, Table, Verdict
 
 LIMITS = np.array(
     [15.0, 17.0, 18.0, 18.5, 19.0, 19.5, 20.0, 22.5, 25.0, 30.0, 40.0, 50.0]
-)  # lower limits of the chord tension [N]
-CORNER = (5.0, 3.5, 1.5)  # corner of the path [m]
+)  # lower limits of the chord tension in the study [N]
+CORNER = (5.0, 3.5, 1.5)  # corner of the path, from which distances are measured [m]
 FLOOR = 1e-9  # smallest drawn distance [m]
-NEAR = 1.05  # tensions are near the minimum if they are below this multiple of the lower limit
+NEAR = 1.05  # a tension is near its minimum if it is below this multiple of the lower limit
 
 
 def simulation_chapter() -> Chapter:
@@ -208,7 +208,7 @@ def _models(study: PathStudy, draw: Drawings) -> Finding:
             ax.plot(study.path.time[part], distance, color=color, linewidth=1.1, label=type(model).__name__)
         logarithmic_with_floor(ax, 1e3 * FLOOR, f"below {n(FLOOR, '.3g', 'm')}")
         legend_above(ax)
-        panels.append(draw.panel(figure, f"Position error of four models, {robot}; the exact model is the reference."))
+        panels.append(draw.panel(figure, f"Position errors of four models, {robot}; the exact model is the reference."))
     shallow = [figures(run).error_max for run in study.of(sl.Parabolic)]
     return finding(
         "five-models",
@@ -241,10 +241,10 @@ def _models(study: PathStudy, draw: Drawings) -> Finding:
 
 
 def _low_tension(low: LowTension, draw: Drawings) -> Finding:
-    figure, ax = axes("lower limit of the chord tension [N]", "largest error on an axis [mm]")
+    figure, ax = axes("lower limit of the chord tension [N]", "largest error along an axis [mm]")
     ax.plot(low.tension_min, 1e3 * low.suspended, color=BLUE, marker="o", markersize=3.0, label="suspended")
     ax.plot(low.tension_min, 1e3 * low.mixed, color=VERMILLION, marker="o", markersize=3.0, label="mixed")
-    ax.axhline(1e3 * ERROR_BAND, color="0.5", linewidth=0.8, linestyle=":", label="the article's 6 mm")
+    ax.axhline(1e3 * ERROR_BAND, color="0.5", linewidth=0.8, linestyle=":", label="6 mm, as in the article")
     ax.set_yscale("log")
     legend_above(ax)
     bound: tuple[Figures, Figures] = (low.suspended_bound, low.mixed_bound)
@@ -259,7 +259,7 @@ def _low_tension(low: LowTension, draw: Drawings) -> Finding:
             "bound_54_mm": [1e3 * f.axis_error_max for f in bound],
             "bound_54_lowest_N": [f.tension_min for f in bound],
         },
-        panels=(draw.panel(figure, "Error of the empirical model as a function of the lower tension limit."),),
+        panels=(draw.panel(figure, "Largest position error of the empirical model over the lower tension limit."),),
         good_from=good.min(),
     )
 

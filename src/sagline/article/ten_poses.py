@@ -32,31 +32,31 @@ TOUR_SPEED = 0.2  # assumed speed [m/s]; the article states "low speed"
 
 
 class Trend(NamedTuple):
-    """Effect of a typical error of one parameter."""
+    """Effect that a typical error of one parameter has on the positions."""
 
     parameter: Parameter
     error: Array  # predicted actual minus desired position [m], shape (10, 3)
-    # change of the vertical error with the height of the pose [mm/m]; the measured change is negative
+    # change of the vertical error per height of the pose [mm/m]; the measured change is negative
     height_slope: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TenPoses:
-    """The ten poses, their errors, and possible explanations."""
+    """The ten poses, their errors, and possible explanations of these errors."""
 
     table: Table2
     plan: sl.Plan  # the prototype's plan for the ten poses, with the empirical model
-    home: sl.Plan  # the plan of its home pose
+    home: sl.Plan  # the plan of the prototype's home pose
     model_error: Array  # error of the empirical model at the ten poses [m], shape (10, 3)
     height_line: FittedLine  # least-squares line of the measured vertical error over the height of the pose
     trends: tuple[Trend, ...]  # effects of single parameters
     # all explanations by one, two and three parameters; each group is sorted by the remaining error
     explanations: tuple[tuple[Explanation, ...], ...]
-    # part of the effect of a pulley radius on the positions that an offset of the lengths and an anchor height can
-    # reproduce together, as a ratio of the lengths of vectors
+    # effect of a pulley radius: share that a length offset and an anchor height reproduce together, as a
+    # ratio of the lengths of vectors
     imitated: float
     single_zero: Array  # standard deviations of the length offsets of all cables [m], shape (m,)
-    dead_meter: Array  # predicted actual minus desired position with 1 m of dead length [m], shape (10, 3)
+    dead_meter: Array  # actual minus desired position that 1 m of dead length would cause [m], shape (10, 3)
     measured_rms: float  # root mean square of the measured errors, over all coordinates [m]
 
     def best(self, count: int) -> Explanation:
@@ -64,12 +64,12 @@ class TenPoses:
         return self.explanations[count - 1][0]
 
     def explanation(self, *names: str) -> Explanation:
-        """The explanation by the parameters with these names."""
+        """The explanation that has the parameters with these names."""
         return next(found for found in self.explanations[len(names) - 1] if found.names == set(names))
 
 
 def ten_poses(most: int = 3) -> TenPoses:
-    """Plan the prototype at the ten poses, and search for causes of the measured errors."""
+    """Plan the prototype at the ten poses, and search for possible causes of the measured errors."""
     # Every model with up to three parameters is fitted with the exact machine, within plausible limits. No fit can be
     # better than 0.3 mm, because the printed positions are in whole millimeters.
     table, robot = table2(), sl.load_robot("article-prototype")
@@ -117,7 +117,7 @@ def _trend(parameter: Parameter, error: Array, table: Table2) -> Trend:
 
 
 def _limits(robot: sl.Robot, error_of: ErrorOf, plan: sl.Plan, found: Explanation) -> tuple[float, Array]:
-    """Limits of ten poses near the best explanation by two parameters: values of `imitated` and `single_zero`."""
+    """Limits of ten poses, computed near the best explanation by two parameters: `imitated` and `single_zero`."""
     at = dict(zip((p.name for p in found.parameters), found.values, strict=True))
     three = tuple(p for p in PARAMETERS if p.name in (PULLEY, ZERO, ANCHORS))
     slopes = tangents(error_of, [three], [np.array([at.get(p.name, 0.0) for p in three])])[0].slopes

@@ -1,4 +1,4 @@
-"""Findings and chapters of the report, with texts from data/report.toml and numbers from the studies."""
+"""Findings and chapters of the report; the texts are in data/report.toml, the numbers come from the studies."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ class _Numbers(Formatter):
     """Formatter of numbers for readers: {extent:.3g mm}, {100*share:.1f %}, {errors[2]:.2f}; texts do not change."""
 
     def get_field(self, field_name: str, args: Sequence[Any], kwargs: Mapping[str, Any]) -> tuple[Any, Any]:
-        """Value of a name, multiplied by a factor if a factor precedes the name."""
+        """Value of a name; a factor before the name multiplies it."""
         factor, _, name = field_name.rpartition("*")
         value, key = super().get_field(name, args, kwargs)
         return (float(factor) * value if factor else value), key
 
     def format_field(self, value: Any, format_spec: str) -> str:
-        """Text of a number with the format and the unit of its field."""
+        """Text of a number, with the format and the unit of its field."""
         form, _, unit = format_spec.partition(" ")
         return n(value, form or ".4g", unit) if format_spec else str(value)
 
@@ -42,7 +42,7 @@ def finding(
     data: Sequence[Table] = (),
     **words: Any,
 ) -> Finding:
-    """Finding of a key; its texts use `numbers`, which are also saved, and `words`."""
+    """Finding with a key; its texts use `numbers` and `words`; `numbers` are also saved."""
     entry, known = _texts()["findings"][key], numbers or {}
     statement, measured = (_Numbers().format(entry.get(part, ""), **{**known, **words}) for part in _PARTS)
     return Finding(
@@ -60,7 +60,7 @@ def finding(
 
 
 def chapter(key: str, findings: Sequence[Finding], **words: Any) -> Chapter:
-    """Chapter of a key; its introduction uses `words`."""
+    """Chapter with a key; its introduction uses `words`."""
     entry = _texts()["chapters"][key]
     return Chapter(key, entry["title"], _Numbers().format(entry["lead"], **words), tuple(findings))
 

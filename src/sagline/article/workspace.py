@@ -1,4 +1,4 @@
-"""Chapter about the future work of the article: boundary of the workspace with and without sag."""
+"""Chapter about the article's future work: the boundary of the workspace, with and without sag."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ POINTS = 121  # number of points along each side of a slice
 
 
 class _Workspaces(NamedTuple):
-    """Workspace of a robot with and without sag."""
+    """Workspaces of a robot with sag and without sag."""
 
     exact: sl.Workspace  # workspace with exact catenaries
     straight: sl.Workspace  # workspace with straight cables without weight
@@ -61,7 +61,7 @@ def _volumes(pairs: dict[str, _Workspaces]) -> Finding:
         },
         data=(
             table_of(
-                "Volumes within the frame.",
+                "Volumes of the workspaces within the frame.",
                 ("robot", pairs, ""),
                 ("with sag [m³]", [pair.exact.volume for pair in pairs.values()], ".1f"),
                 ("error [m³]", [pair.exact.volume_error for pair in pairs.values()], ".1f"),
@@ -98,7 +98,7 @@ def _panel(pair: _Workspaces, normal: int, at: float, draw: Drawings) -> Panel:
         ax.plot([], [], color=color, linestyle=style, label=label)
     ax.set(xlim=(box.low[first], box.high[first]), ylim=(box.low[second], box.high[second]))
     legend_above(ax)
-    return draw.panel(figure, f"{pair.exact.robot.name}: the boundary in the plane {plane}; the frame is the border.")
+    return draw.panel(figure, f"{pair.exact.robot.name}: boundaries in the plane {plane}; the frame is the border.")
 
 
 def _farthest(pair: _Workspaces) -> float:
@@ -110,7 +110,7 @@ def _farthest(pair: _Workspaces) -> float:
     ends = []
     for space in pair:
         level = space.levels()(places.reshape(-1, 3)).reshape(reach.size, len(ways))
-        first = (level < 0.0).argmax(axis=0)  # distance that is beyond the boundary
+        first = (level < 0.0).argmax(axis=0)  # index of the first outside position on each ray
         row = np.arange(len(ways))
         inner, outer = level[first - 1, row], level[first, row]
         end = reach[first - 1] + (reach[first] - reach[first - 1]) * inner / (inner - outer)

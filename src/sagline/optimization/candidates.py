@@ -19,11 +19,11 @@ from sagline.robot.robot import Robot
 from sagline.statics.tables import cable_table
 
 MOST_SAMPLES = 1000
-COINCIDENT = 1e-9  # [m], cables are coincident if their ends are closer
+COINCIDENT = 1e-9  # two cables coincide if both of their ends are closer than this [m]
 
 
 class Candidates:
-    """All robots that differ from one robot in the design variables."""
+    """All robots that differ from the initial robot only in the design variables."""
 
     def __init__(self, robot: Robot, free: Sequence[Free], item: str = "free") -> None:
         """Bind the design variables to the initial robot; `item` is their name in messages."""
@@ -46,12 +46,12 @@ class Candidates:
         return np.array([part.start for part in self.parts])
 
     def units(self, values: Array) -> Array:
-        """Points of the unit cube from design variables, both (N, d); a choice becomes the middle of its interval."""
+        """Convert design variables (N, d) to points of the unit cube; a choice becomes the middle of its interval."""
         span = np.where(self._choices > 0, self._choices, self._high - self._low)
         return np.asarray((values - self._low + 0.5 * (self._choices > 0)) / span)
 
     def values(self, points: Array) -> Array:
-        """Design variables from points of the unit cube, both (N, d)."""
+        """Convert points of the unit cube (N, d) to design variables (N, d)."""
         inside = np.minimum(self._low + points * (self._high - self._low), self._high)
         chosen = np.minimum(np.floor(points * self._choices), self._choices - 1)
         return np.asarray(np.where(self._choices > 0, chosen, inside))
@@ -63,7 +63,7 @@ class Candidates:
         return found
 
     def write(self, cables: Array, values: Array) -> None:
-        """Set design variables (N, d) in cable tables (N, m, CABLE_COLUMNS), in place."""
+        """Write design variables (N, d) into cable tables (N, m, CABLE_COLUMNS), in place."""
         first = 0
         for bound in self._bound:
             last = first + len(bound.parts)
@@ -71,7 +71,7 @@ class Candidates:
             first = last
 
     def costs(self, values: Array) -> Array | None:
-        """Cost of a meter of cable, shape (N,); None without a catalogue; raises an error if an entry has no cost."""
+        """Cost per meter of cable, shape (N,); None without a catalogue; raises an error if an entry has no cost."""
         for k, one in enumerate(self.free):
             if isinstance(one, FreeCable):
                 missing = [entry.name for entry in one.catalogue if entry.cost is None]
@@ -83,7 +83,7 @@ class Candidates:
         return None
 
     def robots(self, values: Array, names: Sequence[str]) -> tuple[Robot, ...]:
-        """Robots from design variables (N, d); the constructor of the robot checks them."""
+        """Robots with design variables (N, d); the constructor of the robot checks the values."""
         return tuple(
             self._robot(table, own, name) for table, own, name in zip(self.cables(values), values, names, strict=True)
         )
@@ -128,7 +128,7 @@ def free_parts(free: object, item: str) -> tuple[Free, ...]:
 
 
 def impossible(cables: Array) -> Flags:
-    """Mask (N,) of cable tables (N, m, CABLE_COLUMNS) with coincident cables, or a lower limit above the upper one."""
+    """Mask (N,) of cable tables (N, m, CABLE_COLUMNS): True if cables coincide, or if tension limits contradict."""
     ends = cables[..., : tables.PLATFORM_Z + 1]
     first, second = np.triu_indices(cables.shape[1], 1)
     apart = np.abs(ends[:, first] - ends[:, second]).max(axis=-1, initial=0.0)
@@ -137,10 +137,10 @@ def impossible(cables: Array) -> Flags:
 
 
 class PlatformBox:
-    """Box of the platform at G poses; a frame anchor inside is not allowed."""
+    """Box of the platform at G poses; no frame anchor may be inside it."""
 
     def __init__(self, robot: Robot, poses: Pose) -> None:
-        """Store the platform's size, or otherwise the extent of its anchors."""
+        """Store the size of the platform; if it is not given, the extent of the platform's anchors."""
         low, high = robot.platform_anchors.min(axis=0), robot.platform_anchors.max(axis=0)
         self._half = 0.5 * ((high - low) if robot.platform_size is None else robot.platform_size)
         self._middle = 0.5 * (low + high)
@@ -148,7 +148,7 @@ class PlatformBox:
         self._reach = float(np.linalg.norm(np.abs(self._middle) + self._half))
 
     def holds(self, points: Array) -> Indices:
-        """Index of the first pose at which a point (..., 3) [m] is inside the platform, -1 for none, shape (...)."""
+        """Index (...) of the first pose at which a point (..., 3) [m] is inside the platform; otherwise -1."""
         flat = points.reshape(-1, 3)
         found = np.full(len(flat), -1)
         low, high = self._position.min(axis=0) - self._reach, self._position.max(axis=0) + self._reach
@@ -159,7 +159,7 @@ class PlatformBox:
         return found.reshape(points.shape[:-1])
 
     def holds_at(self, points: Array, poses: Pose) -> Flags:
-        """Mask (N,) of poses: True if one of the points of a pose, (N, m, 3) [m], is inside the platform."""
+        """Mask (N,) of poses: True if one of the pose's points (N, m, 3) [m] is inside the platform."""
         found = np.zeros(len(points), dtype=np.bool_)
         away = points - poses.position[:, None]
         near = np.flatnonzero((np.abs(away) < self._reach).all(axis=-1).any(axis=-1))
@@ -171,12 +171,12 @@ class PlatformBox:
 
 @frozen(weakref_slot=False)
 class AnchorErrors:
-    """Sample of normally distributed errors of all anchor coordinates, which is the same for all candidates.
+    """Normally distributed errors of all anchor coordinates; one sample of errors is used for all candidates.
 
     Attributes:
         deviation: Standard deviation of each coordinate [m], > 0.
         samples: Number of robots with errors for each candidate, 1 to 1000.
-        take: Value of the candidate from the values of its samples, "worst" or "mean".
+        take: Rule for the value of a candidate: the "worst" or the "mean" value of its samples.
         seed: Seed of the sample, a whole number >= 0.
 
     Raises:
@@ -200,13 +200,13 @@ class AnchorErrors:
         """Cable tables of robots with anchor errors.
 
         Args:
-            cables: Tables of candidates, shape (N, m, CABLE_COLUMNS).
+            cables: Cable tables of candidates, shape (N, m, CABLE_COLUMNS).
 
         Returns:
-            Shape (N, samples, m, CABLE_COLUMNS).
+            Cable tables, shape (N, samples, m, CABLE_COLUMNS).
         """
         many = np.repeat(cables[:, None], self.samples, axis=1)
-        ends = tables.PLATFORM_Z + 1  # the first columns are those of both ends
+        ends = tables.PLATFORM_Z + 1  # the first columns of a table are the coordinates of both ends
         errors = np.random.default_rng(self.seed).standard_normal((self.samples, cables.shape[1], ends))
         many[..., :ends] += self.deviation * errors
         return many

@@ -1,4 +1,4 @@
-"""Design search: optimization of the design variables of a robot for goals."""
+"""Design search: optimization of a robot's design variables with respect to goals."""
 
 from __future__ import annotations
 
@@ -48,39 +48,40 @@ def design(
 ) -> Front:
     """Search for a robot that is better than the given robot, or for a Pareto front of better robots.
 
-    The search begins with the robot itself and a seeded sample. Results for one seed are identical bit by bit.
-    Candidates with a frame anchor inside the platform at a pose are dropped; their values are NaN.
+    The search begins with the robot itself and a random sample of candidates. The same seed gives results that are
+    identical bit by bit. A candidate is dropped, with NaN as its values, if a frame anchor is inside the platform at a
+    pose.
 
     Args:
         robot: Initial robot of the search.
         free: Design variables: `FreeAnchors`, `FreeCable`, `FreeLimit`.
         goals: Goals, or their names. "cma" and "differential_evolution" optimize the weighted sum of the goals. "nsga2"
-            finds a Pareto front: no robot of the front is better than another one in every goal.
+            finds a Pareto front, in which no robot is better than another robot in every goal.
         wrenches: Set of loads at every pose, for example a `WrenchBox`; None for the weight alone.
         poses: Poses; None for a grid of level poses in a box.
         box: Box of the grid; None for the robot's test box, level.
         grid: Number of poses of the grid along x, y and z.
-        inner: Anchors that the machine moves during operation, as `FreeAnchors`. At each pose, they are at the
-            positions with the largest margin.
-        robust: Errors of the anchors that the rating of a robot includes.
+        inner: Anchors that the machine moves during operation, as `FreeAnchors`. At each pose, these anchors are at
+            the positions with the largest margin.
+        robust: Errors of the anchors; a robot is then rated by robots with such errors. None: exact anchors.
         model: Cable model.
         optimizer: "cma", "differential_evolution" or "nsga2".
         evaluations: Largest number of robots that are rated.
         seed: Seed of all random numbers.
-        folder: Folder of the rated robots; created if missing, in a folder that exists. An interrupted search, or a
+        folder: Folder of the rated robots; it is created if its parent folder exists. An interrupted search, or a
             search with more evaluations, continues from this folder. None: no folder.
-        progress: Called after each generation with the number of rated robots and the largest number.
+        progress: Function that is called after each generation with the number of rated robots and `evaluations`.
 
     Returns:
         Front. If no robot is better, the front contains the initial robot, and `better` is False.
 
     Raises:
-        InvalidValueError: If an argument is of the wrong kind, a design variable does not exist in the robot or is out
-            of its range, or the evaluations are too few for two generations.
+        InvalidValueError: If an argument is of the wrong kind, if the robot does not have a design variable, if its
+            value is outside the bounds, or if the evaluations are too few for two generations.
         FileError: If the folder contains another search, or cannot be written.
 
     Examples:
-        Posts with a variable height, equal for all posts:
+        Posts with a variable height, which is the same for all posts:
 
         >>> import sagline as sl
         >>> robot = sl.load_robot("article-suspended")
@@ -102,8 +103,8 @@ def design(
     count = whole_number(evaluations, "evaluations", 1, MOST_EVALUATIONS)
     if count < 2 * population:
         allowed = f">= {2 * population:,}, two generations of {optimizer} for {dimensions} free numbers"
-        raise InvalidValueError("evaluations", f"{count:,}", allowed, "Give more evaluations or fewer variables.")
-    ledger = Ledger(request, candidates, count, progress)  # errors are raised before any file is written
+        raise InvalidValueError("evaluations", f"{count:,}", allowed, "Give more evaluations, or fewer variables.")
+    ledger = Ledger(request, candidates, count, progress)  # errors must be raised before any file is written
     sample = latin_hypercube(population - 1, dimensions, request.seed)
     first = np.concatenate((candidates.units(candidates.start[None]), sample))
     with nullcontext() if folder is None else open_record(folder, request) as ledger.record:

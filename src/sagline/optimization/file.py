@@ -28,7 +28,7 @@ WAYS: Final = ("goal", "maximize", "minimize")
 
 
 def load_design(file: str | os.PathLike[str]) -> dict[str, Any]:
-    r"""Read a design file: the arguments of `design` except for the robot.
+    r"""Read a design file, which has all arguments of `design` except for the robot.
 
     A quantity is a number in SI or a text with its unit:
 
@@ -37,14 +37,14 @@ def load_design(file: str | os.PathLike[str]) -> dict[str, Any]:
           - frame_anchors: {along: [0, 0, 1], low: -1 m, high: 1 m, cables: [0, 1]}
           - platform_anchors: {low: -5 cm, high: 5 cm}
           - tension_max: {low: 500 N, high: 3 kN}
-          - cable:                    # the robot's own among them
+          - cable:                    # one of these is the robot's own
               - {name: 4 mm, linear_density: 10 g/m, axial_stiffness: 300 kN, cost: 2.5}
               - {name: 6 mm, linear_density: 22 g/m, axial_stiffness: 700 kN, cost: 4, tension_max: 5 kN}
         goals:
           - workspace_share           # or mean_margin, least_margin, largest_tension, ... (see Goal)
           - {minimize: cable_cost, weight: 0.5}
-        wrenches: {force: 50 N, moment: 5 N*m}             # or three of each, with center; or accelerations
-        box: {low: [-2, -1, 1], high: [2, 1, 2]}           # the robot's test box if left out
+        wrenches: {force: 50 N, moment: 5 N*m}             # or three numbers each; also center, accelerations
+        box: {low: [-2, -1, 1], high: [2, 1, 2]}           # default: the robot's test box
         grid: [9, 7, 5]
         inner:
           - frame_anchors: {along: [0, 0, 1], low: -1, high: 1, symmetry: together}
@@ -57,7 +57,7 @@ def load_design(file: str | os.PathLike[str]) -> dict[str, Any]:
         file: The file.
 
     Returns:
-        Names of arguments and their values; only arguments in the file are included.
+        Names and values of the arguments that the file contains.
 
     Raises:
         FileError: If the file cannot be read, or a value is wrong; the message names the key and the value.
@@ -85,11 +85,11 @@ class _Part(YamlEntry):
     """A mapping in a design file."""
 
     def si(self, key: str, unit: str) -> Any:
-        """Quantity of a key in SI."""
+        """Quantity of a key in SI units."""
         return in_si(getattr(self, key), unit, key)
 
     def given(self, **units: str) -> dict[str, Any]:
-        """Quantities of the given keys in SI, by the unit of each key."""
+        """Quantities of several keys in SI units; `units` has the unit of each key."""
         return {key: self.si(key, unit) for key, unit in units.items() if key in self.model_fields_set}
 
 
@@ -141,7 +141,7 @@ class _Free(_Part):
         given = [key for key in keys if getattr(self, key)]
         if len(given) != 1:
             value = f"of {' and '.join(given)}" if given else "empty"
-            raise InvalidValueError(item, value, f"one of {', '.join(keys)}", "Begin another entry, with its own dash.")
+            raise InvalidValueError(item, value, f"one of {', '.join(keys)}", "Begin each entry with a dash.")
         key = given[0]
         where = f"{item}.{key}"
         if key == "cable":
@@ -161,7 +161,7 @@ class _Goal(_Part):
     @model_validator(mode="before")
     @classmethod
     def _accept_name(cls, data: object) -> object:
-        """Accept only the name of a goal."""
+        """Read an entry that is only the name of a goal."""
         return {"goal": data} if isinstance(data, str) else data
 
     def wanted(self) -> Goal:
@@ -189,7 +189,7 @@ class _Wrenches(_Part):
     accelerations: _Accelerations | None = None
 
     def wrenches(self) -> WrenchSet:
-        """Box of wrenches, plus loads of accelerations."""
+        """Box of wrenches, plus the loads of accelerations if the file has them."""
         center = self.center
         if isinstance(center, list) and len(center) == 6:
             center = [in_si(one, "N" if k < 3 else "N*m", f"center[{k}]") for k, one in enumerate(center)]
@@ -250,7 +250,7 @@ class _Design(_Part):
 
 
 def _made(item: str, make: Callable[[], T]) -> T:
-    """Object from a part of the file; errors name the part."""
+    """Make an object from a part of the file; errors name this part."""
     try:
         return make()
     except InvalidValueError as error:

@@ -1,9 +1,9 @@
-"""Folder of a design search: rated candidates and the resulting robots. A search continues from the rated candidates.
+"""Folder of a design search: rated candidates, from which a search can be continued, and the resulting robots.
 
 `design.json` identifies the search by a digest of the request without the number of evaluations. `evaluations.csv` has
 one line with a checksum per candidate; lines are appended after each generation. After a crash, or on a full disk, the
-last line may be incomplete. The search detects such a line, removes it and computes it again. `front.csv` and the robot
-files are written at the end.
+last line may be incomplete. A continued search removes such a line, and rates its candidate again. `front.csv` and the
+robot files are written at the end.
 """
 
 from __future__ import annotations
@@ -45,24 +45,24 @@ class DesignFolder:
         self._file, self._handle, self.known = file, handle, known
 
     def add(self, rows: Array) -> None:
-        """Append design variables and goals of candidates, shape (N, d + g), and flush them to the disk."""
+        """Append rows of candidates, design variables and goals, (N, d + g), and flush them to the disk."""
         self.add_lines([repr(float(x)) for x in row] for row in rows)
 
     def add_lines(self, lines: Iterable[list[str]]) -> None:
-        """Append lines of cells and flush them to the disk."""
+        """Append lines, each from its cells, and flush them to the disk."""
         data = "".join(map(_line, lines)).encode()
         try:
             while data:
                 data = data[os.write(self._handle, data) :]
             os.fsync(self._handle)
         except OSError as error:
-            step = "Free some space and start again: the search continues from here."
+            step = "Free some space and start again; the search continues from here."
             raise FileError(self._file, f"cannot be written ({error.strerror})", step) from None
 
 
 @contextmanager
 def open_record(folder: Path | str, request: Request) -> Iterator[DesignFolder]:
-    """Open a new or an existing record in a folder; raises an error if it is of another search, or in use."""
+    """Open a new or an existing record in a folder; raises an error if it is from another search, or in use."""
     place = file_path(folder, "folder", folder=True)
     check_files(place, [REQUEST, EVALUATIONS])
     create_folder(place, parents=False)
@@ -94,7 +94,7 @@ def digest_of(request: Request) -> str:
 
 
 def _canonical(value: Any) -> str:
-    """Text that is different for different values."""
+    """Text of a value for the digest; different values have different texts."""
     if isinstance(value, np.ndarray):
         return f"array({value.dtype.str}, {value.shape}, {np.ascontiguousarray(value).tobytes().hex()})"
     if is_dataclass(value) or attrs.has(type(value)):
@@ -109,7 +109,7 @@ def _canonical(value: Any) -> str:
 
 
 def _check_request(place: Path, digest: str, request: Request) -> None:
-    """Refuse the folder of another search."""
+    """Reject the folder if it contains another search."""
     file = place / REQUEST
     if not exists(file):
         if exists(place / EVALUATIONS):
@@ -119,7 +119,7 @@ def _check_request(place: Path, digest: str, request: Request) -> None:
         stored = json.loads(read_text(file, 1.0))
         own = str(stored["request"])
     except (ValueError, TypeError, KeyError, RecursionError):
-        raise FileError(file, "is not a request of a search", ANOTHER) from None
+        raise FileError(file, "is not the request of a search", ANOTHER) from None
     if own != digest:
         asked = f"{request.robot.name} with {request.optimizer} and seed {request.seed}"
         reason = f"contains another search ({own[:8]}) than the requested one ({digest[:8]}): {asked}"
@@ -127,7 +127,7 @@ def _check_request(place: Path, digest: str, request: Request) -> None:
 
 
 def _read(file: Path, heads: list[str]) -> tuple[Array, int]:
-    """Rows of complete lines, and their size in bytes. An incomplete last line is ignored."""
+    """Rows of the complete lines, and the size of these lines in bytes; an incomplete last line is ignored."""
     none = np.zeros((0, len(heads)))
     lines = read_text(check_file(file), LIMIT).splitlines(keepends=True)
     if not lines:
@@ -150,14 +150,14 @@ def _read(file: Path, heads: list[str]) -> tuple[Array, int]:
 
 
 def _line(cells: list[str]) -> str:
-    """Line of CSV with a checksum of all other cells as its last cell."""
+    """Line of CSV; its last cell is a checksum of all other cells."""
     text = StringIO()
     csv.writer(text, lineterminator="").writerow(cells)
     return f"{text.getvalue()},{crc32(text.getvalue().encode()):08x}\n"
 
 
 def _cells(line: str) -> list[str] | None:
-    """Cells of a line without the checksum; None if the checksum is wrong."""
+    """Cells of a line, without the checksum; None if the checksum is wrong."""
     text, _, check = line.rpartition(",")
     if not line.endswith("\n") or check != f"{crc32(text.encode()):08x}\n":
         return None

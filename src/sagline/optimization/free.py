@@ -26,11 +26,11 @@ class DesignVariable(NamedTuple):
 
     Attributes:
         name: Name in messages and tables.
-        unit: Unit of the variable; "" for the index of a choice.
+        unit: Unit of the variable; "" if the variable is the index of a choice.
         low: Lower bound [unit].
         high: Upper bound [unit].
         start: Value of the initial robot [unit], within the bounds.
-        choices: Number of choices 0, 1, ...; 0 for a continuous variable.
+        choices: Number of choices, whose indices are 0, 1, ...; 0 for a continuous variable.
     """
 
     name: str
@@ -42,7 +42,7 @@ class DesignVariable(NamedTuple):
 
 
 class Bound(NamedTuple):
-    """Design variables for a given robot.
+    """Design variables of a part, for one robot.
 
     Attributes:
         parts: The K design variables.
@@ -54,7 +54,7 @@ class Bound(NamedTuple):
 
 
 class Free(ByFields):
-    """Design variables: `FreeAnchors`, `FreeCable` or `FreeLimit`."""
+    """Interface of `FreeAnchors`, `FreeCable` and `FreeLimit`."""
 
     __slots__ = ()
 
@@ -66,16 +66,16 @@ class Free(ByFields):
             item: Name of the design variable in messages.
 
         Returns:
-            Design variables and the function that writes them.
+            The design variables, and the function that writes their values.
 
         Raises:
-            InvalidValueError: If the robot lacks the variable, or its value is outside the bounds.
+            InvalidValueError: If the robot does not have the variable, or if the robot's value is outside the bounds.
         """
         raise NotImplementedError
 
 
 def check_order(low: Array, high: Array, unit: str, *, strictly: bool = False) -> None:
-    """Reject bounds (K,) if low is above high, or, with `strictly`, equal to high."""
+    """Reject bounds (K,) with low above high; `strictly` also rejects equal bounds."""
     for k in np.flatnonzero(low >= high if strictly else low > high):
         where = f"[{k}]" if len(low) > 1 else ""
         allowed = f"< high{where}, {high[k]:g} {unit}" if strictly else f"<= high{where}, {high[k]:g} {unit}"
@@ -83,13 +83,13 @@ def check_order(low: Array, high: Array, unit: str, *, strictly: bool = False) -
 
 
 def cable_numbers(cables: Any) -> tuple[int, ...]:
-    """Checked cable indices without repetitions; empty for None, which means all cables."""
+    """Checked cable indices without repetitions; None (all cables) becomes empty."""
     if cables is None:
         return ()
-    step = "Number the cables from 0, or leave cables out for all."
+    step = "Number the cables from 0, or leave out `cables` for all cables."
     found = [integer(one) for one in elements(cables, (), "cables", step)]
     if not found or any(one is None or not 0 <= one <= sys.maxsize for one in found) or len(set(found)) < len(found):
-        raise InvalidValueError("cables", brief(cables), "numbers of cables that differ", step)
+        raise InvalidValueError("cables", brief(cables), "different numbers of cables", step)
     return tuple(one for one in found if one is not None)
 
 
@@ -103,19 +103,19 @@ def cables_of_robot(cables: tuple[int, ...], robot: Robot, item: str) -> Indices
 
 
 def whose_text(cables: Indices, count: int) -> str:
-    """Suffix of a name, with the indices of the cables; empty for all cables."""
+    """Suffix of a variable's name with the indices of its cables; empty if it concerns all cables."""
     return "" if len(cables) == count else f"[{' '.join(map(str, cables))}]"
 
 
-SAME: Final = 1e-9  # relative tolerance for equal cables of robot and catalogue
+SAME: Final = 1e-9  # relative tolerance by which the robot's cable and a cable of the catalogue count as equal
 
 
 def _one_cable(value: Any, item: str) -> Cable:
-    """Checked material of one cable, with numbers instead of arrays."""
+    """Checked material of one cable, as numbers."""
     cable = instance(value, Cable, item)
     if cable.linear_density.shape != ():
         shape = f"of shape {cable.linear_density.shape}"
-        raise InvalidValueError(item, shape, "one cable's material, numbers", "Give Cable(0.067, 44e3).")
+        raise InvalidValueError(item, shape, "the material of one cable, as numbers", "Give Cable(0.067, 44e3).")
     if not float(cable.linear_density) > 0.0:
         raise InvalidValueError(f"{item}: linear_density", "0 kg/m", "> 0 kg/m", "Give the mass per length.")
     return cable
@@ -127,12 +127,12 @@ class CableChoice:
 
     Attributes:
         name: Name in messages and files.
-        cable: Material of the cable, with numbers instead of arrays.
-        cost: Cost per meter, in any currency, >= 0; None if no goal requires it.
-        tension_max: Upper tension limit [N], > 0; None to keep the robot's limits.
+        cable: Material of the cable, as numbers.
+        cost: Cost per meter, in any currency, >= 0; None if no goal needs the cost.
+        tension_max: Upper tension limit [N], > 0; None: the limits of the robot.
 
     Raises:
-        InvalidValueError: If the material has values for several cables, or an argument is of the wrong kind.
+        InvalidValueError: If the material has values for several cables, or if an argument is of the wrong kind.
     """
 
     name: str = field(metadata=checked_by(label))
@@ -146,10 +146,10 @@ class CableChoice:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FreeCable(Free):
-    """The material of all cables, from a catalogue.
+    """Choice of the material of all cables from a catalogue.
 
     Attributes:
-        catalogue: The cables, preferably sorted by weight, because the search assumes that neighbors are similar.
+        catalogue: The cables. They should be sorted by weight, because the search assumes that neighbors are similar.
     """
 
     catalogue: tuple[CableChoice, ...]
@@ -158,23 +158,23 @@ class FreeCable(Free):
         """Check the catalogue.
 
         Args:
-            catalogue: Two or more cables, including the robot's own.
+            catalogue: Two or more cables; one of them is the robot's own cable.
 
         Raises:
-            InvalidValueError: If `catalogue` has another form, or equal names.
+            InvalidValueError: If `catalogue` has another form, or if two cables have the same name.
         """
         given: Any = catalogue
         if not isinstance(given, Sequence) or isinstance(given, str) or len(given) < 2:
             step = "Give [CableChoice(name, cable), ...]."
-            raise InvalidValueError("catalogue", brief(given), "two cables or more", step)
+            raise InvalidValueError("catalogue", brief(given), "at least two cables", step)
         entries = tuple(instance(one, CableChoice, f"catalogue[{k}]") for k, one in enumerate(given))
         names = [one.name for one in entries]
         if twice := [name for name in names if names.count(name) > 1]:
-            raise InvalidValueError("catalogue", f"with {twice[0]!r} twice", "names that differ", "Rename one of them.")
+            raise InvalidValueError("catalogue", f"with {twice[0]!r} twice", "different names", "Rename one of them.")
         object.__setattr__(self, "catalogue", entries)
 
     def bound(self, robot: Robot, item: str) -> Bound:
-        """Design variables for a given robot."""
+        """Design variables of this part, for a given robot."""
         own = robot.cables
         for k, one in enumerate(self.catalogue):
             pairs = ((own.linear_density, one.cable.linear_density), (own.axial_stiffness, one.cable.axial_stiffness))
@@ -191,7 +191,7 @@ class FreeCable(Free):
 
 
 def _write_cables(catalogue: tuple[CableChoice, ...], cables: Array, values: Array) -> None:
-    """Set material and tension limit from the index in the catalogue."""
+    """Write the material and the tension limit that the index in the catalogue selects."""
     which = values[:, 0].astype(np.int64)
     for name, column in (("linear_density", tables.DENSITY), ("axial_stiffness", tables.STIFFNESS)):
         cables[:, :, column] = np.array([getattr(one.cable, name) for one in catalogue])[which, None]
@@ -205,7 +205,7 @@ LIMITS: Final = {"tension_min": tables.TENSION_MIN, "tension_max": tables.TENSIO
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FreeLimit(Free):
-    """A variable tension limit; all cables of the variable have the same value.
+    """Variable tension limit; its cables all have the same value.
 
     Attributes:
         which: "tension_min" or "tension_max".
@@ -229,7 +229,7 @@ class FreeLimit(Free):
             cables: Indices of the cables, from 0; None for all.
 
         Raises:
-            InvalidValueError: If low is not below high, or an argument is of the wrong kind.
+            InvalidValueError: If low is not below high, or if an argument is of the wrong kind.
 
         Examples:
             >>> import sagline as sl
@@ -241,13 +241,13 @@ class FreeLimit(Free):
         set_fields(self, which=choice(which, "which", LIMITS), low=lower, high=upper, cables=cable_numbers(cables))
 
     def bound(self, robot: Robot, item: str) -> Bound:
-        """Design variables for a given robot."""
+        """Design variables of this part, for a given robot."""
         cables = cables_of_robot(self.cables, robot, f"{item}: cables")
         own = getattr(robot, self.which)[cables]
         name = f"{self.which}{whose_text(cables, robot.cable_count)}"
         if len(set(own.tolist())) > 1:
             value = f"{own.min():g} to {own.max():g} N"
-            step = "Give cables with the same limit: FreeLimit(..., cables=[0, 1])."
+            step = "Give only cables with the same limit: FreeLimit(..., cables=[0, 1])."
             raise InvalidValueError(f"{item}: the robot's {name}", value, "the same for all of these cables", step)
         start = float(own[0])
         if not self.low <= start <= self.high:

@@ -1,4 +1,4 @@
-"""Design variables of anchors: shifts in a box or along lines, with or without a symmetry."""
+"""Design variables of anchors: shifts of the anchors in a box or along lines, with or without a symmetry."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ from sagline.robot.robot import Robot
 Symmetry: TypeAlias = str
 MIRRORED: Final = tuple("".join(axes) for count in (1, 2, 3) for axes in combinations("xyz", count))
 NAMES: Final = (*MIRRORED, "turned", "together")
-_ON_PLANE: Final = 1e-9  # tolerance, relative to the extent of the anchors
+_ON_PLANE: Final = 1e-9  # tolerance of positions, relative to the extent of the anchors
 
 
 def _symmetric_shifts(
     symmetry: Symmetry | None, anchors: Array, along: Array, bounds: tuple[Array, Array], item: str
 ) -> list[tuple[int | None, Array]]:
-    """Index of each leading anchor, and shifts (K, c, 3) of all anchors per meter of its shift along K directions.
+    """Index of each leading anchor, and shifts (K, c, 3) of all anchors if it shifts by a meter along K directions.
 
-    The index is None if there is a single leading anchor. Raises an error if an anchor could pass its mirror plane, or
-    is on the axis of rotation.
+    The index is None for a single leading anchor. An error is raised if an anchor could pass its mirror plane, or if an
+    anchor is on the axis of rotation.
     """
     count = len(anchors)
     if symmetry is None:
@@ -55,7 +55,7 @@ def _turned(anchors: Array, along: Array, item: str) -> Array:
     away = anchors[:, :2] - anchors[:, :2].mean(axis=0)
     if np.linalg.norm(away, axis=1).min() <= _ON_PLANE * max(float(np.ptp(anchors)), 1.0):
         step = 'Choose "together", or omit the cable with the anchor on the axis.'
-        raise InvalidValueError(f"{item}: symmetry", "'turned' with an anchor on the axis", "anchors around it", step)
+        raise InvalidValueError(f"{item}: symmetry", "'turned' with an anchor on the axis", "no anchor there", step)
     angle = np.arctan2(away[:, 1], away[:, 0])
     angle -= angle[0]
     shifts = np.repeat(along[:, None, :], len(anchors), axis=1)
@@ -65,7 +65,7 @@ def _turned(anchors: Array, along: Array, item: str) -> Array:
 
 
 def _mirrored(symmetry: str, anchors: Array, along: Array, bounds: tuple[Array, Array], item: str) -> Array:
-    """Mirrored shifts (K, c, 3) with the sign of an anchor's side; an anchor on the plane remains on the plane."""
+    """Mirrored shifts (K, c, 3), with the sign of each anchor's side; an anchor on the plane remains on it."""
     shifts = np.repeat(along[:, None, :], len(anchors), axis=1)
     for axis in ("xyz".index(name) for name in symmetry):
         low, high = float(anchors[:, axis].min()), float(anchors[:, axis].max())
@@ -73,7 +73,7 @@ def _mirrored(symmetry: str, anchors: Array, along: Array, bounds: tuple[Array, 
         away = anchors[:, axis] - plane
         side = np.where(np.abs(away) <= _ON_PLANE * max(high - low, 1.0), 0.0, np.sign(away))
         if side[0] == 0.0:
-            side = np.zeros_like(side)  # the leading anchor remains on the plane, and so do all others
+            side = np.zeros_like(side)  # the leading anchor is on the plane; it and all others remain there
         lead, side = side[0], side * side[0]
         shifts[..., axis] *= side
         inward = -np.minimum(*(bound * along[:, axis] * lead for bound in bounds)).sum()
@@ -84,7 +84,7 @@ def _mirrored(symmetry: str, anchors: Array, along: Array, bounds: tuple[Array, 
                 f"up to {inward:g} m inward",
                 f"< {room:g} m, the distance to the plane {name} = {plane:g} m",
             )
-            step = f"Narrow the bounds along {name}, because anchors would pass their mirror images."
+            step = f"Reduce the bounds along {name}, because anchors would pass their mirror images."
             raise InvalidValueError(f"{item}: the shift along {name}", value, allowed, step)
     return shifts
 
@@ -96,19 +96,19 @@ _AXES: Final = "xyz"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FreeAnchors(Free):
-    """Variable shifts of anchors from their positions in the robot, in a box or along lines.
+    """Variable shifts of anchors from their positions in the robot; the shifts are in a box or along lines.
 
-    The dead length of guides is constant during the search. It is adapted in the resulting robots.
+    The dead length of guides is constant during the search; the resulting robots have the correct dead length.
 
     Attributes:
         end: "frame" or "platform".
-        low: Lowest shifts [m], <= 0, shape (K,): along x, y, z, or along each direction in `along`.
-        high: Largest shifts [m], shape (K,), >= 0; a coordinate with low = high = 0 is fixed.
-        along: Directions, world axes for the frame and platform axes for the platform, shape (K, 3), unit vectors.
+        low: Lowest shifts [m], shape (K,), <= 0: along x, y, z, or along the directions in `along`.
+        high: Largest shifts [m], shape (K,), >= 0. A coordinate with low = high = 0 is fixed.
+        along: Directions as unit vectors, shape (K, 3), in world axes for "frame" and platform axes for "platform".
         cables: Indices of the cables with shifted anchors, from 0; empty for all.
-        symmetry: Relation of the shifts to the shift of the first anchor. "x", "xy" or other axes: mirrored at the
-            planes normal to these axes. "turned": rotated about the vertical by the angle between the anchors.
-            "together": equal. None: independent.
+        symmetry: Relation of the shifts to the shift of the first anchor. "x", "xy" or other axes: shifts are mirrored
+            at the planes normal to these axes. "turned": the shift is rotated about the vertical by the angle between
+            the anchors. "together": all shifts are equal. None: all shifts are independent.
     """
 
     end: str
@@ -133,14 +133,14 @@ class FreeAnchors(Free):
         Args:
             end: "frame" or "platform".
             low: Lowest shifts [m]: three numbers along x, y, z; with `along` one number per direction.
-            high: Largest shifts [m], of the same shape.
-            along: One or several directions of any nonzero length; None for x, y and z.
+            high: Largest shifts [m], with the shape of `low`.
+            along: One or several directions, vectors of any nonzero length; None for x, y and z.
             cables: Indices of the cables with shifted anchors, from 0; None for all.
             symmetry: "x", "y", "z", "xy", ..., "turned", "together", or None.
 
         Raises:
-            InvalidValueError: If low is above high, 0 (the position in the robot) is not between them, all coordinates
-                are fixed, or an argument is of the wrong kind.
+            InvalidValueError: If low is above high, if 0 (the position in the robot) is not between them, if all
+                coordinates are fixed, or if an argument is of the wrong kind.
 
         Examples:
             >>> import sagline as sl
@@ -152,7 +152,7 @@ class FreeAnchors(Free):
         lower, upper = (_shifts(value, name, len(directions)) for value, name in ((low, "low"), (high, "high")))
         check_order(lower, upper, "m")
         for k in np.flatnonzero((lower > 0.0) | (upper < 0.0)):
-            step = "Shifts are relative to the robot's anchors: give low <= 0 <= high."
+            step = "Give low <= 0 <= high, because shifts are relative to the robot's anchors."
             raise InvalidValueError(f"low[{k}] to high[{k}]", f"{lower[k]:g} to {upper[k]:g} m", "0 m inside", step)
         if not (upper > lower).any():
             raise InvalidValueError("high", "the same as low", "> low in a direction", "Widen the bounds.")
@@ -168,14 +168,14 @@ class FreeAnchors(Free):
         )
 
     def bound(self, robot: Robot, item: str) -> Bound:
-        """Design variables for a given robot."""
+        """Design variables of this part, for a given robot."""
         cables = cables_of_robot(self.cables, robot, f"{item}: cables")
         anchors = robot.frame_anchors if self.end == "frame" else robot.platform_anchors
         parts: list[DesignVariable] = []
         rates: list[Array] = []
         names = _direction_names(self.along)
         shifts = _symmetric_shifts(self.symmetry, anchors[cables], self.along, (self.low, self.high), item)
-        for which, moved in shifts:  # moved: shifts of each cable for each direction, (K, c, 3)
+        for which, moved in shifts:  # moved (K, c, 3): shifts of each cable's anchor for each direction
             for k, name in enumerate(names):
                 rate = np.zeros((robot.cable_count, tables.CABLE_COLUMNS))
                 rate[cables, ENDS[self.end] : ENDS[self.end] + 3] = moved[k]
@@ -187,10 +187,10 @@ class FreeAnchors(Free):
                 rates.append(rate)
         if not parts:
             step = "Omit the symmetry, or the directions across its planes."
-            raise InvalidValueError(f"{item}: symmetry", "fixes all anchors", "one that permits a shift", step)
+            raise InvalidValueError(f"{item}: symmetry", "fixes all anchors", "a symmetry that permits a shift", step)
 
         def write(tables_of_cables: Array, values: Array) -> None:
-            for k, rate in enumerate(rates):  # the number of candidates has no effect on the order of the sum
+            for k, rate in enumerate(rates):  # einsum sums in an order that does not depend on the number of candidates
                 tables_of_cables += values[:, k, None, None] * rate
 
         return Bound(tuple(parts), write)
@@ -215,7 +215,7 @@ def _shifts(value: ArrayLike, item: str, count: int) -> Array:
 
 
 def _direction_names(along: Array) -> list[str]:
-    """Axis names x, y, z, or the components of the direction."""
+    """Name of a direction: x, y or z, or its components."""
     names = []
     for vector in along:
         axis = np.flatnonzero(np.abs(vector) > 1.0 - _UNIT)

@@ -33,16 +33,16 @@ class Front(Result):
 
     Attributes:
         start: Initial robot of the search.
-        robots: The K better robots, sorted by the first goal, with the best robot first. Only the initial robot, if no
-            robot is better. For optimizers other than "nsga2", only the robot with the best weighted sum.
+        robots: The K better robots, sorted by the first goal; the best robot is the first. Optimizers other than
+            "nsga2" give one robot, with the best weighted sum. If no robot is better, it is the initial robot.
         goals: The g goals.
         values: Goal values of the robots, each in its unit, shape (K, g).
         start_values: Goal values of the initial robot, shape (g,).
         parts: The d design variables.
-        changed: Design variables of the robots, shape (K, d).
-        better: True if a robot is better than the start.
+        changed: Design variables of the K robots, shape (K, d).
+        better: True if a robot is better than the initial robot.
         evaluated: Design variables of all candidates in the order of evaluation, the initial robot first, shape (N, d).
-        evaluated_values: Goal values of all candidates, shape (N, g); NaN for an impossible candidate.
+        evaluated_values: Goal values of all candidates, shape (N, g); NaN for a dropped candidate.
         optimizer: Name of the optimizer.
         seed: Seed of the search.
     """
@@ -62,7 +62,7 @@ class Front(Result):
 
     @property
     def best(self) -> Robot:
-        """The first robot."""
+        """The best robot in the first goal."""
         return self.robots[0]
 
     @property
@@ -80,13 +80,13 @@ class Front(Result):
         return f"{len(self.robots)} of {count:,} robots are better than {name} in a goal; the first: {goals}."
 
     def save(self, folder: Path | str) -> list[Path]:
-        """Write the robots as robot files, and a table of them.
+        """Write each robot as a robot file, and a table of all robots.
 
         Args:
-            folder: The folder; created if missing, in a folder that exists. Files of the same names are replaced.
+            folder: The folder; it is created if its parent folder exists. Files with the same names are replaced.
 
         Returns:
-            The files: front.csv, and one .yaml file per robot with its name.
+            The files: front.csv, and for each robot a .yaml file with the robot's name.
 
         Raises:
             FileError: If a file cannot be written.
@@ -111,31 +111,31 @@ class Front(Result):
 
 
 def costs_of(values: Array, goals: tuple[Goal, ...], start: Array) -> Array:
-    """Scaled costs (N, g), to minimize, from goal values (N, g); at most PENALTY, and twice PENALTY for NaN."""
+    """Scaled costs (N, g) to be minimized, from goal values (N, g); at most PENALTY, or twice PENALTY for NaN."""
     signs = np.array([-1.0 if goal.maximize else 1.0 for goal in goals])
     scales = np.array([_scale_of(goal, value) for goal, value in zip(goals, start, strict=True)])
     costs = np.nan_to_num(signs * values / scales, nan=2.0 * PENALTY, posinf=PENALTY, neginf=-PENALTY)
     return np.asarray(np.where(np.isnan(values), PENALTY * 2.0, np.clip(costs, -PENALTY, PENALTY)))
 
 
-PENALTY = 1e9  # largest cost of a goal, much larger than normal values
+PENALTY = 1e9  # largest cost of a goal; it is much larger than usual costs
 
 
 def _scale_of(goal: Goal, start: float) -> float:
-    """Scale of a goal in its unit: the given scale, or the value of the first robot."""
+    """Scale of a goal in its unit: the given scale, or the goal's value for the initial robot."""
     if goal.scale is not None:
         return goal.scale
     return abs(float(start)) if np.isfinite(start) and start != 0.0 else 1.0
 
 
 def _weighted_costs(costs: Array, goals: tuple[Goal, ...]) -> Array:
-    """Weighted sum (N,) of costs (N, g)."""
+    """Weighted sums (N,) of costs (N, g)."""
     weights = np.array([goal.weight for goal in goals])
     return np.asarray(np.einsum("ng,g->n", costs, weights / weights.sum()))
 
 
 def pareto_front(costs: Array) -> Indices:
-    """Indices of the Pareto-optimal candidates from costs (N, g); only the first one of equal candidates."""
+    """Indices of the Pareto-optimal candidates, from costs (N, g); of equal candidates, only the first one."""
     _, first = np.unique(costs, axis=0, return_index=True)
     kept = np.sort(first)
     own = costs[kept]
@@ -147,14 +147,14 @@ def _beaten(one: Array, others: Array) -> bool:
     return bool(((others <= one).all(axis=1) & (others < one).any(axis=1)).any())
 
 
-LONGEST: Final = 80  # number of letters of a robot's name before the suffix
+LONGEST: Final = 80  # largest number of letters of a robot's name before the number
 
 
 class Ledger:
     """Rating of candidates for an optimizer.
 
-    An optimizer with the same seed requests the same candidates again. Recorded candidates are not rated again. A
-    continued search therefore has the same result as a search without interruption.
+    With the same seed, an optimizer requests the same candidates again. Recorded candidates are not rated again.
+    Therefore, a continued search has the same result as a search without interruption.
     """
 
     def __init__(
@@ -164,7 +164,7 @@ class Ledger:
         evaluations: int,
         progress: Progress | None,
     ) -> None:
-        """Prepare the rating, and reject goals that are not finite for the first robot."""
+        """Prepare the rating, and reject goals that are not finite for the initial robot."""
         self._request, self._candidates = request, candidates
         self.record: DesignFolder | None = None
         self._evaluations, self._progress = evaluations, progress
@@ -181,7 +181,7 @@ class Ledger:
 
     @property
     def costs(self) -> int:
-        """Number of costs per candidate: one per goal for a front, otherwise 1."""
+        """Number of costs per candidate: the number of goals for a front, otherwise 1."""
         return len(self._request.goals) if self._request.optimizer == "nsga2" else 1
 
     def rate(self, points: Array) -> Array:
@@ -202,7 +202,7 @@ class Ledger:
         return costs if self.costs > 1 else _weighted_costs(costs, self._request.goals)[:, None]
 
     def front(self) -> Front:
-        """Result: the best candidates as robots."""
+        """Result of the search, with the best candidates as robots."""
         request, costs = self._request, self._costs(self._rows)
         goals = self._rows[:, self._width :]
         if request.optimizer == "nsga2":
@@ -238,7 +238,7 @@ class Ledger:
         return costs_of(rows[:, self._width :], self._request.goals, self._first)
 
     def _recalled(self, values: Array) -> Array:
-        """Recorded rows of the candidates; the rows end at the first candidate without a record."""
+        """Recorded rows of the candidates, up to the first candidate without a record."""
         if self.record is None:
             return np.zeros((0, self._rows.shape[1]))
         first = len(self._rows)
@@ -247,12 +247,12 @@ class Ledger:
             wrong = int(np.argmax((known[:, : self._width] != values[: len(known)]).any(axis=1)))
             allowed = "the robot of this search; packages or machine may have changed since the search began"
             raise InvalidValueError(
-                f"row {first + wrong + 1} of the folder", "another robot", allowed, "Name another folder."
+                f"row {first + wrong + 1} of the folder", "another robot", allowed, "Give another folder."
             )
         return known
 
     def _check_first(self) -> None:
-        """Reject goals that are not finite for the first robot."""
+        """Reject goals that are not finite for the initial robot."""
         for goal, value in zip(self._request.goals, self._first, strict=True):
             if np.isinf(value):
                 item = f"{goal.kind} of {self._request.robot.name}"

@@ -16,14 +16,14 @@ from sagline.core.results import set_fields
 
 
 class Measured(NamedTuple):
-    """Quantities of candidates at G poses, for S samples of the anchors of each candidate (1 for exact anchors).
+    """Quantities of N candidates at G poses, for S samples of anchor errors (1 without errors).
 
     Attributes:
         margin: Margin of the wrench set [N], shape (N, S, G); -inf if a pose is singular or a cable has no length.
-        tension: Largest cable tension [N], shape (N, S, G), NaN without tensions; None if not needed.
-        sag: Largest cable sag [m], of the same shape, or None.
-        stiffness: Stiffness in the softest direction [N/m], of the same shape, or None.
-        cost: Cost of the cables, shape (N, S), or None.
+        tension: Largest cable tension [N], shape (N, S, G), NaN without tensions; None if no goal needs it.
+        sag: Largest cable sag [m], shape (N, S, G), NaN without tensions; None if no goal needs it.
+        stiffness: Stiffness in the softest direction [N/m], shape (N, S, G), NaN without tensions, or None as above.
+        cost: Cost of the cables, shape (N, S); None if no goal needs it.
     """
 
     margin: Array
@@ -39,9 +39,9 @@ class _Kind(NamedTuple):
     Attributes:
         unit: Unit of the goal; "" for a share or a currency.
         larger_is_better: True if it is maximized by default.
-        needs: Field of `Measured` that the goal uses.
-        over_poses: Function of that field, over the last axis, with the goal's value as result.
-        text: Description.
+        needs: Field of `Measured` from which the goal is computed.
+        over_poses: Function that computes the goal's value from this field, over the last axis.
+        text: Description of the goal.
     """
 
     unit: str
@@ -75,8 +75,8 @@ def heading(name: str, unit: str) -> str:
 KINDS: Final = MappingProxyType(
     {
         "workspace_share": _Kind("", True, "margin", _share, "share of the poses with a nonnegative margin"),
-        "mean_margin": _Kind("N", True, "margin", _mean, "mean margin of the poses"),
-        "least_margin": _Kind("N", True, "margin", _least, "least margin of the poses"),
+        "mean_margin": _Kind("N", True, "margin", _mean, "mean margin of all poses"),
+        "least_margin": _Kind("N", True, "margin", _least, "least margin of all poses"),
         "largest_tension": _Kind("N", False, "tension", _largest, "largest tension"),
         "largest_sag": _Kind("m", False, "sag", _largest, "largest sag"),
         "least_stiffness": _Kind("N/m", True, "stiffness", _least, "least stiffness against a force"),
@@ -91,8 +91,8 @@ class Goal:
     """A quantity to maximize or minimize.
 
     Tensions, sag and stiffness are for the platform's weight plus the middle of the wrench set, with the tension
-    distribution `MinimumNorm`. They are evaluated at the feasible poses of the initial robot. A candidate is rejected
-    if one of these poses is infeasible for it.
+    distribution `MinimumNorm`. They are evaluated at the feasible poses of the initial robot. A candidate for which one
+    of these poses is infeasible is rejected.
 
     Attributes:
         kind: "workspace_share" (share of the poses with a nonnegative margin), "mean_margin" or "least_margin"
@@ -100,7 +100,7 @@ class Goal:
             "cable_cost" (catalogue cost of cables, each as long as its longest chord).
         maximize: True to maximize, False to minimize.
         weight: Weight relative to other goals, > 0.
-        scale: Unit size of the goal, in its unit; None for the first robot's value, or 1 if this value is 0.
+        scale: Value by which the goal is divided, in its unit; None: the initial robot's value, or 1 if it is 0.
     """
 
     kind: str
@@ -117,7 +117,7 @@ class Goal:
             kind: One of the seven kinds.
             maximize: True to maximize, False to minimize; None: the default of the kind.
             weight: Weight relative to other goals, > 0.
-            scale: Unit size of the goal, > 0, or None.
+            scale: Value by which the goal is divided, > 0, or None.
 
         Raises:
             InvalidValueError: If the goal does not exist, or an argument is of the wrong kind.
@@ -129,7 +129,7 @@ class Goal:
         """
         found = KINDS[choice(kind, "goal", KINDS)]
         if maximize is not None and not isinstance(maximize, bool | np.bool_):
-            raise InvalidValueError("maximize", brief(maximize), "True, False or None", "Choose one of them.")
+            raise InvalidValueError("maximize", brief(maximize), "True, False or None", "Choose one of these goals.")
         set_fields(
             self,
             kind=str(kind),
@@ -153,7 +153,7 @@ class Goal:
 
         Args:
             measured: Quantities of the candidates.
-            worst: True for the worst value over a sample of anchors, False for the mean.
+            worst: True for the worst value of the samples of anchor errors, False for the mean value.
 
         Returns:
             Values in the unit of the goal, shape (N,).

@@ -1,4 +1,4 @@
-"""Moving anchors, with positions for the largest margin at each pose."""
+"""Moving anchors: anchors whose positions give the largest margin at each pose."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ class MovingAnchors(Result, Tabular):
     """Result of `moving_anchors` at G poses.
 
     Attributes:
-        robot: The robot with its anchors at their original positions.
+        robot: The robot, with the anchors at their original positions.
         pose: The poses, a batch of G.
         parts: The q moving coordinates.
-        moved: Values of these coordinates at each pose, shape (G, q).
+        moved: Values of the moving coordinates at each pose, shape (G, q).
         margin: Margin with moved anchors [N], shape (G,).
-        fixed_margin: Margin without moved anchors [N], shape (G,).
+        fixed_margin: Margin with the anchors at their original positions [N], shape (G,).
         moving: The given moving anchors.
     """
 
@@ -55,13 +55,13 @@ class MovingAnchors(Result, Tabular):
     moving: tuple[Free, ...]
 
     def __str__(self) -> str:
-        """Mean gain of margin."""
+        """Sentence with the mean increase of the margin."""
         gain = n(np.mean(self.margin - self.fixed_margin), unit="N") if len(self.moved) else "–"
         return f"{self.robot.name}, {counted(len(self.moved), 'pose')}: the margin is {gain} larger on average"
 
     @property
     def robots(self) -> tuple[Robot, ...]:
-        """Robot at each pose, for `inverse` and other functions that accept one robot per pose."""
+        """Robots with moved anchors, one per pose, for functions such as `inverse`."""
         names = [self.robot.name] * len(self.moved)
         return Candidates(self.robot, self.moving, "moving").robots(self.moved, names)
 
@@ -79,7 +79,7 @@ def moving_anchors(
 ) -> MovingAnchors:
     """Move anchors of a robot to the positions with the largest margin at each pose.
 
-    A sample gives first positions. Steps along one coordinate after another improve them.
+    The best positions of a sample are the start; then steps along one coordinate after another improve them.
 
     Args:
         robot: The robot.
@@ -89,7 +89,7 @@ def moving_anchors(
         box: Box of the grid; None for the robot's test box, level.
         grid: Number of poses of the grid along x, y and z.
         model: Cable model.
-        progress: Called after some poses with the number of finished poses and the number of all poses.
+        progress: Function that is called from time to time with the number of finished poses and of all poses.
 
     Returns:
         MovingAnchors.
@@ -98,7 +98,7 @@ def moving_anchors(
         InvalidValueError: If an argument is of the wrong kind.
 
     Examples:
-        Posts with anchors that move up and down together:
+        Posts whose anchors move up and down together:
 
         >>> import sagline as sl
         >>> robot = sl.load_robot("article-suspended")

@@ -1,4 +1,4 @@
-"""Ratings of candidates: goals of all candidates of a generation, from cable tables."""
+"""Ratings of candidates: the values of the goals for all candidates of a generation, from cable tables."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ BLOCK = 1 << 12  # poses per block, about 0.1 s; interrupts are handled between 
 def distribute(
     robot: Robot, model: CableModel, cables: Array, poses: Array, wrench: Array, *, stiffness: bool
 ) -> tuple[Array, Array, Array | None]:
-    """Largest tension [N], largest sag [m] and, on request, least stiffness [N/m], by the minimum norm, each (N,).
+    """Largest tension [N], largest sag [m] and, if requested, least stiffness [N/m], each (N,), with `MinimumNorm`.
 
-    Values are NaN without tensions. Each of the N pose rows has its own table (m, CABLE_COLUMNS). The stiffness is the
-    smallest stiffness against a force on the center of mass.
+    Values are NaN if there are no tensions. Each of the N pose rows has a table (m, CABLE_COLUMNS) of its own. The
+    stiffness is the smallest stiffness against a force on the center of mass.
     """
     method = MinimumNorm()
     options = kernel_options(robot, model, method.alone)
@@ -100,7 +100,7 @@ def _stiffness(
     return np.asarray(np.where(known & (softest > 0.0), 1.0 / np.where(softest > 0.0, softest, 1.0), np.nan))
 
 
-Margins: TypeAlias = Callable[[Array, Array], Array]  # margins from cable tables and pose rows
+Margins: TypeAlias = Callable[[Array, Array], Array]  # function that computes margins from cable tables and pose rows
 
 SPREAD: Final = 4  # number of sample points per coordinate
 STEP: Final = 0.25  # initial step, relative to the distance between the bounds
@@ -108,9 +108,10 @@ ITERATIONS: Final = 14  # number of halvings of the step
 
 
 def move_anchors(inner: Candidates, margins: Margins, cables: Array, poses: Array) -> tuple[Array, Array]:
-    """Best anchor coordinates (R, q) for R cable tables, each at its pose row, and margins (R,) [N].
+    """Best anchor coordinates (R, q) for R pairs of a cable table and a pose row, and their margins (R,) [N].
 
-    The result is a local maximum: a coordinate search with halved steps improves the best point of a sample.
+    A search along the coordinates, with steps that are halved, begins at the best point of a sample. The result is a
+    local maximum.
     """
     count, q = len(poses), len(inner.parts)
 
@@ -142,11 +143,11 @@ def move_anchors(inner: Candidates, margins: Margins, cables: Array, poses: Arra
     return inner.values(best), found
 
 
-ROWS: Final = 1 << 14  # pose rows per block, about 0.1 s and little memory
+ROWS: Final = 1 << 14  # pose rows per block; a block takes about 0.1 s and little memory
 
 
 class Rating:
-    """Goals of candidates, prepared once for a search."""
+    """Function that rates candidates; it is prepared once per search."""
 
     def __init__(
         self,
@@ -158,12 +159,12 @@ class Rating:
         robust: AnchorErrors | None,
         inner: Candidates | None,
     ) -> None:
-        """Prepare; raises an error if a goal needs tensions, but no pose is feasible for the first robot."""
+        """Prepare the rating; raises an error if a goal needs tensions that the initial robot has at no pose."""
         self._candidates, self._goals, self._robust, self._inner = candidates, tuple(goals), robust, inner
         self._model, self._poses, self.rows = model, poses, pose_rows(poses)
         self._wrench = np.zeros(6) if wrenches is None else middle_wrench(wrenches)
         self._wrenches = NO_LOAD if wrenches is None else wrenches
-        # all candidates have the lever arm of the first robot, so that their margins are comparable
+        # all candidates have the lever arm of the initial robot, so that their margins are comparable
         self._arm = float(mean_arms(cable_table(candidates.robot), body_table(candidates.robot))[0])
         self._needs = {goal.needs for goal in self._goals}
         self._solid = PlatformBox(candidates.robot, poses)
@@ -175,8 +176,8 @@ class Rating:
         """Values (N, g) of the goals for design variables (N, d).
 
         Values are NaN for an impossible candidate: it has coincident cables, a lower limit above an upper limit, or a
-        frame anchor inside the platform. Values are also NaN if a goal needs tensions, and the candidate has none at a
-        pose that is feasible for the first robot.
+        frame anchor inside the platform. Values are also NaN if a goal needs tensions, and a pose is infeasible for the
+        candidate but feasible for the initial robot.
         """
         size = max(1, ROWS // (len(self.rows) * (1 if self._robust is None else self._robust.samples)))
         parts = [self._rated(values[first : first + size]) for first in range(0, len(values), size)]
@@ -206,7 +207,7 @@ class Rating:
         return found
 
     def _measured(self, cables: Array, values: Array) -> Measured:
-        """Quantities that the goals need, for candidates that are not impossible."""
+        """Quantities that the goals need, for the possible candidates."""
         many = cables[:, None] if self._robust is None else self._robust.added(cables)
         shape = (*many.shape[:2], len(self.rows))
         robots = many.reshape(-1, *many.shape[2:])
@@ -233,7 +234,7 @@ class Rating:
         return Measured(margin, tension, sag, stiffness, cost)
 
     def _cost(self, cables: Array, values: Array) -> Array:
-        """Cost (N, S) of cables as long as their longest chords, from tables (N, S, G, m, CABLE_COLUMNS)."""
+        """Cost (N, S) of cables, each as long as its longest chord, from tables (N, S, G, m, CABLE_COLUMNS)."""
         costs = self._candidates.costs(values)
         if costs is None:
             step = "Add the design variable FreeCable([CableChoice(name, cable, cost=1.5), ...])."
@@ -243,7 +244,7 @@ class Rating:
         return np.asarray(costs[:, None] * chords.max(axis=2).sum(axis=-1))
 
     def _in_platform(self, cables: Array) -> Flags:
-        """Mask (N,): True if a frame anchor of a cable table (N, m, CABLE_COLUMNS) is inside the platform at a pose."""
+        """Mask (N,) of cable tables (N, m, CABLE_COLUMNS): True if a frame anchor is inside the platform at a pose."""
         return np.asarray((self._solid.holds(cables[..., : tables.FRAME_Z + 1]) >= 0).any(axis=-1))
 
     def _held_at(self, cables: Array) -> Flags:
@@ -252,6 +253,6 @@ class Rating:
         found = distribute(self._candidates.robot, self._model, each, self.rows, self._wrench, stiffness=False)
         held = ~np.isnan(found[0])
         if not held.any():
-            value, step = "feasible at none of the poses", "Choose other poses, wrenches or tension limits."
-            raise InvalidValueError(self._candidates.robot.name, value, "feasible at one pose at least", step)
+            value, step = "feasible at no pose", "Choose other poses, wrenches or tension limits."
+            raise InvalidValueError(self._candidates.robot.name, value, "feasible at one pose or more", step)
         return held

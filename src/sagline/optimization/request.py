@@ -1,4 +1,4 @@
-"""Checked request of a design search: robot, design variables, goals, loads and poses."""
+"""Request of a design search, checked: robot, design variables, goals, loads and poses."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot
 from sagline.workspaces.wrench_sets import WrenchSet
 
-COUNTS: Final = (9, 7, 5)  # points of the grid along x, y and z
+COUNTS: Final = (9, 7, 5)  # number of points of the grid along x, y and z
 MOST: Final = 100_000  # largest number of poses
 
 
 def poses_of(robot: Robot, poses: PoseLike | None, box: PoseBox | None, grid: Sequence[int]) -> Pose:
-    """The given poses as a batch, or a grid of level poses in a box, by default the robot's test box."""
+    """The given poses as a batch; otherwise, a grid of level poses in a box, by default in the robot's test box."""
     counts = _counts(grid)
     if poses is not None:
         if box is not None:
@@ -35,7 +35,7 @@ def poses_of(robot: Robot, poses: PoseLike | None, box: PoseBox | None, grid: Se
         given = pose_of(poses, "poses")
         batch = given if given.shape else Pose.from_quaternion(given.position[None], given.quaternion[None])
         if not 0 < len(batch) <= MOST:
-            raise InvalidValueError("poses", f"{len(batch):,} of them", f"1 to {MOST:,}", "Give one pose or more.")
+            raise InvalidValueError("poses", f"{len(batch):,} of them", f"1 to {MOST:,}", "Give at least one pose.")
     else:
         batch = _grid(_box(robot, box), counts)
     check_reach(robot, batch, "poses")
@@ -49,7 +49,7 @@ def _box(robot: Robot, box: PoseBox | None) -> PoseBox:
             raise InvalidValueError("box", f"missing, and {robot.name} has no test_box", "a PoseBox", step)
         return PoseBox(robot.test_box.low, robot.test_box.high)
     if instance(box, PoseBox, "box").tilt > 0.0:
-        step = "Give poses for other orientations."
+        step = "Give `poses` for other orientations."
         raise InvalidValueError("box: tilt", f"{box.tilt:g} rad", "0 rad, because the grid is level", step)
     return box
 
@@ -107,7 +107,7 @@ class Request:
 
     @property
     def candidates(self) -> Candidates:
-        """The robots among which the search chooses."""
+        """The candidates of the search."""
         return Candidates(self.robot, self.free)
 
 
@@ -115,7 +115,7 @@ def checked_request(
     robot: Any, free: Any, goals: Any, wrenches: Any, poses: Pose, model: Any, inner: Any, robust: Any,
     optimizer: Any, seed: Any,
 ) -> Request:  # fmt: skip
-    """Checked request from the arguments of `design`."""
+    """Make a request from the arguments of `design`, which are checked."""
     optional(wrenches, WrenchSet, "wrenches")
     request = Request(
         instance(robot, Robot, "robot"),
@@ -134,7 +134,7 @@ def checked_request(
         raise InvalidValueError("free", "empty", "FreeAnchors, FreeCable or FreeLimit", step)
     for k, one in enumerate(request.inner):
         if not isinstance(one, FreeAnchors):
-            raise InvalidValueError(f"inner[{k}]", brief(one), "FreeAnchors", "Only anchors move from pose to pose.")
+            raise InvalidValueError(f"inner[{k}]", brief(one), "FreeAnchors", "Give only anchors that move.")
     if request.inner and not any(goal.needs == "margin" for goal in request.goals):
         step = "Add Goal('mean_margin'), because anchors move to the largest margin."
         raise InvalidValueError("inner", "given without a goal about margins", "given with a goal about margins", step)
@@ -145,7 +145,7 @@ def checked_request(
 
 
 def _goals(given: Any) -> tuple[Goal, ...]:
-    """Checked goals; a name means the goal of this name."""
+    """Checked goals; a name is replaced by the goal with this name."""
     many = [given] if isinstance(given, Goal | str) else given
     if not isinstance(many, Sequence) or not many:
         step = 'Give [Goal("workspace_share")] for instance.'
@@ -163,12 +163,12 @@ def _refuse_weights(goals: tuple[Goal, ...]) -> None:
     for goal in goals:
         if goal.weight != 1.0:
             step = 'Omit the weight, or choose the optimizer "cma".'
-            allowed = "1: a front of robots has no weights"
+            allowed = "1, because a front of robots has no weights"
             raise InvalidValueError(f"weight of {goal.kind}", f"{goal.weight:g}", allowed, step)
 
 
 def _check_platform(request: Request) -> None:
-    """Refuse an initial robot with a frame anchor inside the platform; the search rejects such candidates later."""
+    """Reject an initial robot with a frame anchor inside the platform; the search rejects such candidates later."""
     anchors = request.robot.frame_anchors
     poses = PlatformBox(request.robot, request.poses).holds(anchors)
     if (poses >= 0).any():

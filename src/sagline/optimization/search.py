@@ -14,7 +14,7 @@ from sagline.core.errors import InvalidValueError
 
 
 def _optional_module(module: str) -> Any:
-    """Module of an optional package of `sagline[design]`; the error contains the command that installs it."""
+    """Import a module of a package of `sagline[design]`; the error contains the command that installs the package."""
     try:
         return import_module(module)
     except ModuleNotFoundError as error:
@@ -25,15 +25,15 @@ def _optional_module(module: str) -> Any:
         raise InvalidValueError(f"the package {package}", "missing", "installed", step) from None
 
 
-Rate: TypeAlias = Callable[[Array], Array]  # from points of the unit cube (N, d) to costs (N, g) to minimize
+Rate: TypeAlias = Callable[[Array], Array]  # points of the unit cube (N, d) -> costs (N, g)
 
 
 class Task(NamedTuple):
     """Problem of an optimizer.
 
     Attributes:
-        rate: Function that returns the costs of a generation of points of the unit cube.
-        first: Points of the first generation, with the initial robot first, shape (K, d).
+        rate: Function that returns the costs of a generation, from its points of the unit cube.
+        first: Points of the first generation, shape (K, d); the initial robot is the first point.
         goals: Number of costs, g.
         seed: Seed of the search.
         evaluations: Largest number of rated points, including the first generation.
@@ -47,14 +47,14 @@ class Task(NamedTuple):
 
 
 def latin_hypercube(count: int, dimensions: int, seed: int) -> Array:
-    """Latin hypercube sample (count, dimensions) from 0 to 1 (McKay, Beckman & Conover 1979)."""
+    """Latin hypercube sample (count, dimensions) of the unit cube (McKay, Beckman & Conover 1979)."""
     random = np.random.default_rng(seed)
     intervals = np.stack([random.permutation(count) for _ in range(dimensions)], axis=-1)
     return np.asarray((intervals + random.random((count, dimensions))) / count)
 
 
 SPREAD: Final = 0.2  # first standard deviation, relative to the distance between the bounds
-GROWTH: Final = 2  # factor of the population at each restart
+GROWTH: Final = 2  # factor by which the population grows at each restart
 LEAST_DIMENSIONS: Final = 2  # the package fails with one variable, so a second variable without effect is added
 
 
@@ -84,7 +84,7 @@ def _strategy(cma: Any, start: Array, random: np.random.Generator, population: i
     options = {
         "bounds": [0.0, 1.0],
         "randn": lambda *shape: random.standard_normal(shape),
-        "seed": np.nan,  # no seed, because randn has one
+        "seed": np.nan,  # no seed is given, because `randn` has one
         "verbose": -9,
         **({} if population is None else {"popsize": population}),
     }
@@ -125,7 +125,7 @@ def _search_nsga2(task: Task) -> None:
     left = task.evaluations
     while left > 0:
         asked = algorithm.ask()
-        if asked is None or not 0 < len(asked) <= left:  # None if all points that it finds are known
+        if asked is None or not 0 < len(asked) <= left:  # None if the optimizer finds only known points
             return
         costs = task.rate(asked.get("X"))
         evaluator.Evaluator().eval(static.StaticProblem(problem, F=costs), asked)

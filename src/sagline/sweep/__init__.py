@@ -1,4 +1,4 @@
-"""Sweeps: Dask workers compute every robot at every pose under every wrench, and write the results to a folder."""
+"""Sweeps: every robot at every pose under every wrench, computed by workers of Dask, with results in a folder."""
 
 from sagline.core.surface import group
 

@@ -1,4 +1,4 @@
-"""Workers of Dask: processes of this computer, or workers of a cluster with a given address."""
+"""Workers of Dask: processes of this computer, or workers of a cluster whose scheduler has a given address."""
 
 from __future__ import annotations
 
@@ -20,35 +20,35 @@ from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.sweep.folder import check_package, is_installed
 from sagline.sweep.work import task
 
-HERE: Final = "127.0.0.1"  # not reachable from other computers
+HERE: Final = "127.0.0.1"  # an address that other computers cannot reach
 DASHBOARD: Final = 8787
 PATIENCE: Final = 15.0  # longest wait for a scheduler, and for a worker [s]
-AHEAD: Final = 2  # number of tasks per worker, so that the next task is ready when a task is finished
+AHEAD: Final = 2  # number of tasks that are sent to each worker, so that the next task is ready when one is finished
 LOOK: Final = 5.0  # time between two checks of the number of workers [s]
 SCHEMES: Final = ("tcp://", "tls://", "ws://", "wss://")
 LOGGERS: Final = ("distributed", "tornado", "bokeh", "asyncio")
 SILENT: Final = logging.CRITICAL + 1
 
-SETTINGS: Final = {  # this setting of workers avoids that memory is released and allocated again for each array
+SETTINGS: Final = {  # with this setting, workers keep memory instead of releasing and allocating it for each array
     "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 1 << 28,
     "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 1 << 28,
     "distributed.worker.profile.enabled": False,
 }
 
-Job = tuple[str, str]  # folder and digest
+Job = tuple[str, str]  # arguments of a task: folder and digest
 Finish = Callable[[int, float, tuple[int, ...]], None]
 
 
 def cores() -> int:
-    """Number of processors available to this process."""
-    with suppress(AttributeError):  # not available on every system
+    """Number of processors that this process may use."""
+    with suppress(AttributeError):  # some systems do not have this function
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
 @contextmanager
 def local_workers(workers: int, tell: Callable[[str], None]) -> Iterator[Any]:
-    """Worker processes of this computer, not reachable from others; `tell` is called with the dashboard's address."""
+    """Start worker processes that only this computer can reach; `tell` is called with the dashboard's address."""
     with _silence_dask():
         import dask.config
         import distributed
@@ -70,7 +70,7 @@ def local_workers(workers: int, tell: Callable[[str], None]) -> Iterator[Any]:
             with settings.set(SETTINGS):
                 cluster = api.LocalCluster(**given)
         except (RuntimeError, OSError, TimeoutError) as error:
-            step = 'In a script, call run below the line if __name__ == "__main__":'
+            step = 'In a script, the call of run must be below the line if __name__ == "__main__":'
             raise SaglineError(f"The workers could not be started ({_first_line(error)}). {step}") from None
         with cluster, api.Client(cluster, set_as_default=False) as client:
             taken = "" if free else f"; port {DASHBOARD} is taken"
@@ -80,7 +80,7 @@ def local_workers(workers: int, tell: Callable[[str], None]) -> Iterator[Any]:
 
 @contextmanager
 def remote_workers(address: str) -> Iterator[Any]:
-    """The workers of the scheduler at an address, "tcp://10.0.0.1:8786"; raises SaglineError if there are none."""
+    """Connect to the workers of the scheduler at an address, "tcp://10.0.0.1:8786"; SaglineError without workers."""
     check_address(address)
     check_package("distributed", "a scheduler")
     with _silence_dask():
@@ -90,7 +90,7 @@ def remote_workers(address: str) -> Iterator[Any]:
 
         try:
             client = api.Client(address, timeout=PATIENCE, set_as_default=False)
-        except (OSError, ValueError, RuntimeError, MemoryError) as error:  # the last if another program answers
+        except (OSError, ValueError, RuntimeError, MemoryError) as error:  # last: another program answers
             step = "Start a scheduler: dask scheduler; and workers: dask worker ADDRESS."
             raise SaglineError(f"No scheduler answers at {address} ({_first_line(error)}). {step}") from None
         with client:
@@ -113,7 +113,7 @@ def check_address(address: object) -> str:
 
 
 def run_tasks(client: Any, job: Job, numbers: Iterable[int], finish: Finish, tell: Callable[[str], None]) -> None:
-    """Run tasks on the workers, a few per worker at a time; after an error or Ctrl-C, running tasks are finished."""
+    """Run tasks on the workers, a few per worker at a time; after an error or Ctrl-C, wait for the running tasks."""
     import distributed
 
     api: Any = distributed
@@ -134,7 +134,7 @@ def run_tasks(client: Any, job: Job, numbers: Iterable[int], finish: Finish, tel
             ahead.add(future)
 
     def take(future: Any) -> None:
-        if future.status == "lost":  # the worker ended before the result was fetched; the scheduler repeats the task
+        if future.status == "lost":  # the worker ended before its result was fetched; the scheduler repeats the task
             ahead.add(future)
             return
         number = which.pop(future)
@@ -159,7 +159,7 @@ def run_tasks(client: Any, job: Job, numbers: Iterable[int], finish: Finish, tel
 
 @contextmanager
 def _silence_dask() -> Iterator[None]:
-    """Silence Dask's loggers and warnings in the block; after a failure, the loggers remain silent for late reports."""
+    """Suppress Dask's logs and warnings in the block; after a failure, also the logs that come later."""
     loggers = [logging.getLogger(name) for name in LOGGERS]
     levels = [logger.level for logger in loggers]
     with warnings.catch_warnings():
@@ -203,7 +203,7 @@ def _first_line(error: BaseException) -> str:
 
 
 def dask_setup(worker: object) -> None:
-    """Ignore SIGINT in a worker process, so that it finishes its task; Dask calls it by name at the start."""
+    """Ignore SIGINT in a worker process, so that it finishes its task; Dask calls this function by its name."""
     if threading.current_thread() is threading.main_thread():
         with suppress(ValueError, OSError):
             signal.signal(signal.SIGINT, signal.SIG_IGN)

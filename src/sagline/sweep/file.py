@@ -26,10 +26,10 @@ from sagline.sweep.request import Request
 from sagline.tension.methods import method_of
 from sagline.workspaces.wrench_sets import WrenchBox, WrenchSet
 
-KEYS: Final = ("low", "high", "count")  # keys of an axis: both ends and the number of points
+KEYS: Final = ("low", "high", "count")  # keys of an axis: its two ends, and the number of points
 ANGLES: Final = ("alpha", "beta", "gamma")
 MOST: Final = 1_000_000  # largest number of points along an axis
-_POINT_BYTES: Final = 400.0  # bytes per point of a grid during the construction of poses
+_POINT_BYTES: Final = 400.0  # memory per point of a grid while poses are made [bytes]
 
 
 class _Grid(YamlEntry):
@@ -65,7 +65,7 @@ class _Wrenches(YamlEntry):
 
 
 class _Around(YamlEntry):
-    """Loads around each wrench: largest components of the force and of the moment, each as one or three numbers."""
+    """Loads around each wrench: the largest force and moment components, each as one number or three numbers."""
 
     force: Any = 0.0
     moment: Any = 0.0
@@ -85,23 +85,23 @@ class _SweepEntry(YamlEntry):
 def load_sweep(file: os.PathLike[str] | str) -> Request:
     """Read the request of a sweep from a file.
 
-    A sweep file is YAML. A quantity is a number in SI or a text with its unit. A variable quantity is an axis: both
-    ends and the number of points.
+    A sweep file is YAML. A quantity is a number in SI units, or a text with its unit. A quantity that varies is an
+    axis, with two ends and the number of points.
 
-        robots: [cogiro, own_robot.yaml]       # presets, and files beside this one
+        robots: [cogiro, own_robot.yaml]       # presets, and files in the same folder
         poses:
-          grid:                                # or path: own_path.yaml, the poses of a path
+          grid:                                # or path: own_path.yaml, for the poses of a path
             x: {low: -3 m, high: 3 m, count: 25}
             y: {low: -2 m, high: 2 m, count: 17}
             z: 1500 mm
             alpha: {low: -10 deg, high: 10 deg, count: 3}   # about z; beta about y, gamma about x
-        wrenches:                              # left out: the weight alone
+        wrenches:                              # default: the weight alone
           grid:                                # or rows: [[fx, fy, fz, mx, my, mz], ...]
             force_x: {low: -100 N, high: 100 N, count: 11}
             moment_z: 5 N*m
-        around: {force: 20 N, moment: 5 N*m}   # for the margin, of all loads up to that around each wrench
-        quantities: [tension, margin]          # of sl.sweep.QUANTITIES
-        model: catenary                        # default of sagline track; also tension: minimum-norm
+        around: {force: 20 N, moment: 5 N*m}   # the margin is for all these loads around each wrench
+        quantities: [tension, margin]          # names from sl.sweep.QUANTITIES
+        model: catenary                        # as in sagline track; the key tension is also possible
 
     Args:
         file: The file.
@@ -110,7 +110,7 @@ def load_sweep(file: os.PathLike[str] | str) -> Request:
         The request.
 
     Raises:
-        FileError: If the file cannot be read, or is not a valid request; the message names the key.
+        FileError: If the file cannot be read, or if it is not a valid request; the message names the key.
 
     Examples:
         >>> import sagline as sl
@@ -146,7 +146,7 @@ def _robots(given: Any, folder: Path) -> list[Robot]:
 
 
 def _beside(name: str, folder: Path) -> str | Path:
-    """Path of a robot file, relative to the folder of the sweep file; a name of a preset is not changed."""
+    """Path of a robot file, which is relative to the folder of the sweep file; the name of a preset is not changed."""
     return folder / name if Path(name).suffix.lower() in (".yaml", ".yml") else name
 
 
@@ -196,16 +196,16 @@ def _one(given: Any, item: str, unit: str) -> float:
 
 
 def _axis(given: Any, item: str, unit: str) -> Array:
-    """Points of an axis, or the single value."""
+    """Points of an axis, or a single value."""
     if not isinstance(given, dict):
         return np.array([_one(given, item, unit)])
     if set(given) != set(KEYS):
         keys = ", ".join(map(str, given)) or "nothing"
-        raise InvalidValueError(item, f"given by {brief(keys)}", ", ".join(KEYS), "Give all three, or one value.")
+        raise InvalidValueError(item, f"given by {brief(keys)}", ", ".join(KEYS), "Give all three keys, or one value.")
     low, high = (_one(given[key], f"{item}.{key}", unit) for key in KEYS[:2])
     count = whole_number(given["count"], f"{item}.count", 1, MOST)
     if high < low or (high > low) != (count > 1):
-        allowed = f"{count} points from low up to high" if count > 1 else "one value, because there is one point"
+        allowed = f"{count} points from low up to high" if count > 1 else "one value instead of an axis with one point"
         raise InvalidValueError(item, f"{low:g} to {high:g} {unit}", allowed, f"Correct {item}.")
     return np.linspace(low, high, count)
 

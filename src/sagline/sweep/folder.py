@@ -1,7 +1,7 @@
-"""Folders of sweeps: a Zarr group that contains the request, and for each task one chunk of each variable.
+"""Folders of sweeps: a Zarr group with the request and, for each task, one chunk of every variable.
 
-The folder contains the exact request. Therefore a number is sufficient to identify a task on any computer with access
-to the folder. The checksum of a chunk shows if the chunk is incomplete.
+The folder contains the exact request. Therefore, the number of a task is sufficient to compute the task on any computer
+with access to the folder. The checksum of a chunk shows whether the chunk is complete.
 """
 
 from __future__ import annotations
@@ -37,20 +37,20 @@ if TYPE_CHECKING:
 CONTENT: Final = Content(
     name="sweep",
     made="folder of sagline sweep",
-    give="Give the folder that sagline sweep wrote.",
+    give="Give a folder that sagline sweep has written.",
     again="Sweep again, into another folder.",
     key="sagline_sweep_format",
     version=1,
 )
 DIMENSIONS: Final = ("robot", "pose", "wrench")
-GROUP: Final = "numbers.zarr"  # name in the folder
-UNASKED: Final = -1  # status of requests that are not computed yet
+GROUP: Final = "numbers.zarr"  # name of the request in the folder
+UNASKED: Final = -1  # status of requests that have not been computed yet
 GIVEN: Final = {  # dimensions and units of the arrays of the request
     "position": ("pose", "axis", "m"),
     "quaternion": ("pose", "quaternion_part", "1"),
     "wrench": ("wrench", "wrench_part", "N, N m"),
 }
-SHAPES: Final = {  # dimensions of the parts of a set of loads
+SHAPES: Final = {  # dimensions of the arrays of a set of loads
     "center": (6,),
     "segments": (-1, 6),
     "ellipsoids": (-1, 6, 6),
@@ -62,14 +62,14 @@ STEP: Final = "Free some space or correct the permissions, and run the same swee
 
 
 class TaskSize(NamedTuple):
-    """Numbers of poses and wrenches of a task, all for one robot; they are constant in a folder."""
+    """Size of the tasks of a folder: numbers of poses and wrenches. A task has one robot."""
 
     poses: int
     wrenches: int
 
 
 class SweepFolder(NamedTuple):
-    """An open folder of a sweep: path, Zarr group, request with its digest, size of a task, and version of sagline."""
+    """An open folder of a sweep: path, Zarr group, request with its digest, size of the tasks, sagline's version."""
 
     path: Path
     group: Group
@@ -80,7 +80,7 @@ class SweepFolder(NamedTuple):
 
     @property
     def grid(self) -> tuple[int, int, int]:
-        """Numbers of tasks along robots, poses and wrenches."""
+        """Numbers of tasks along the axes of robots, poses and wrenches."""
         robots, poses, wrenches = self.request.shape
         return robots, math.ceil(poses / self.size.poses), math.ceil(wrenches / self.size.wrenches)
 
@@ -90,7 +90,7 @@ class SweepFolder(NamedTuple):
         return math.prod(self.grid)
 
     def part(self, number: int) -> RequestBox:
-        """Box of requests of a task."""
+        """Box of requests that a task computes."""
         _, poses, wrenches = self.request.shape
         robot, row, column = (int(k) for k in np.unravel_index(number, self.grid))
         first, left = row * self.size.poses, column * self.size.wrenches
@@ -98,18 +98,18 @@ class SweepFolder(NamedTuple):
         return RequestBox(robot, rows, slice(left, min(left + self.size.wrenches, wrenches)))
 
     def write(self, number: int, numbers: Mapping[str, NDArray[np.generic]]) -> None:
-        """Write the chunks of a task, each atomically; FileError if they cannot be written."""
+        """Write the chunks of a task, each of them atomically; FileError if a chunk cannot be written."""
         robot, rows, columns = self.part(number)
         try:
             for name, values in numbers.items():
                 array: Any = self.group[name]
-                # chunks of fill values are written too
+                # also write chunks that have only fill values
                 array.with_config({"write_empty_chunks": True})[robot, rows, columns] = values
         except OSError as error:
             raise FileError(self.path, f"cannot be written ({error.strerror or error})", STEP) from None
 
     def read(self, number: int) -> dict[str, NDArray[np.generic]] | None:
-        """Numbers of a task; None if a chunk is missing or damaged."""
+        """Results of a task from its chunks; None if a chunk is missing or damaged."""
         robot, rows, columns = self.part(number)
         numbers = {}
         for variable in variables_of(self.request.quantities):
@@ -123,7 +123,7 @@ class SweepFolder(NamedTuple):
         return numbers
 
     def _chunk(self, number: int, variable: SweepArray) -> Path:
-        """File of a chunk, with the name that Zarr gives it."""
+        """File of a chunk, with the name that Zarr uses."""
         place: list[Any] = [*np.unravel_index(number, self.grid), *[0] * variable.a_cable]
         return self.path.joinpath(GROUP, variable.name, "c", *map(str, place))
 
@@ -147,13 +147,13 @@ def make_folder(path: Path, request: Request, size: TaskSize) -> None:
             os.replace(place / path.name, path)
     except OSError as error:
         if error.errno in (errno.ENOTEMPTY, errno.EEXIST):
-            return  # another process has created the folder in the meantime; it is checked when it is opened
-        reason = f"cannot be made ({error.strerror or error})"
+            return  # another process has created the folder in the meantime; opening it will check it
+        reason = f"cannot be created ({error.strerror or error})"
         raise FileError(path, reason, "Check its name, the permissions and the space on the disk.") from None
 
 
 def open_folder(path: Path) -> SweepFolder:
-    """Open the folder of a sweep with its request; FileError if there is none or it is damaged."""
+    """Open the folder of a sweep, and read its request; FileError if there is no sweep, or if it is damaged."""
     import zarr
 
     check_package("zarr", "sweeps")
@@ -190,12 +190,12 @@ def open_folder(path: Path) -> SweepFolder:
 
 
 def request_digest(request: Request) -> str:
-    """Digest of a request, which is equal for the same robots, poses, wrenches, quantities and methods."""
+    """Digest of a request; it is equal for the same robots, poses, wrenches, quantities and methods."""
     return _digest([dump_robot(robot) for robot in request.robots], _options(request), request)
 
 
 def check_made_here(folder: SweepFolder) -> None:
-    """Raise FileError for a sweep of another version, because its numbers may differ."""
+    """Raise FileError for a sweep of another version of sagline, because its numbers may differ."""
     here = f"sagline {version('sagline')}"
     if folder.made_by != here:
         step = f"Finish the sweep with {folder.made_by}, or sweep into another folder."
@@ -215,7 +215,7 @@ def check_package(name: str, purpose: str) -> None:
 
 
 def _options(request: Request) -> dict[str, Any]:
-    """Values of a request for JSON, without robots and arrays."""
+    """Values of a request for JSON; robots and arrays are left out."""
     options = {
         "quantities": list(request.quantities),
         **choice_attributes("model", request.model, MODELS),
@@ -227,7 +227,7 @@ def _options(request: Request) -> dict[str, Any]:
 
 
 def _set_of(written: Mapping[str, Any]) -> WrenchSet:
-    """Wrench set from values that `_options` has written."""
+    """Wrench set from the values that `_options` has written."""
     kinds = {name: np.int64 if name == "sizes" else np.float64 for name in SHAPES}
     return WrenchSet(*(locked(np.array(written[name], kinds[name]).reshape(SHAPES[name])) for name in SHAPES))
 

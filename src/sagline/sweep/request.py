@@ -30,15 +30,15 @@ from sagline.workspaces.wrench_sets import WrenchSet, load_of
 
 
 class SweepArray(NamedTuple):
-    """One array of a sweep; its first dimensions are robot, pose and wrench.
+    """An array of results of a sweep; its first dimensions are robot, pose and wrench.
 
     Attributes:
         name: Name of the array.
         unit: Unit of the values, "" for a plain number.
-        long_name: Description.
-        a_cable: True for one value per cable, along a fourth dimension.
-        codes: Status type of its codes, if any.
-        whole: True for whole numbers.
+        long_name: Description of the array.
+        a_cable: True if the array has a value for each cable, along a fourth dimension.
+        codes: Status type, if the values are codes.
+        whole: True if the values are whole numbers.
     """
 
     name: str
@@ -56,7 +56,7 @@ class SweepArray(NamedTuple):
 
 _STATUS: Final = SweepArray("status", "", "status of each request", codes=PoseStatus)
 _PROOF: Final = SweepArray(
-    "proof", "N", "proved lower bound of the change of force that makes it feasible, 0 if it is feasible"
+    "proof", "N", "proved lower bound of the change of force that makes the request feasible, 0 if it is feasible"
 )
 
 QUANTITIES: Final = MappingProxyType(
@@ -69,26 +69,26 @@ QUANTITIES: Final = MappingProxyType(
         "length": (
             _STATUS,
             _PROOF,
-            SweepArray("length", "m", "unstrained length L, all cable off the drum", a_cable=True),
+            SweepArray("length", "m", "unstrained length L of the cable off the drum", a_cable=True),
         ),
-        "shortfall": (_STATUS, _PROOF, SweepArray("enough", "N", "change of the force that suffices")),
+        "shortfall": (_STATUS, _PROOF, SweepArray("enough", "N", "change of force that makes it feasible")),
         "margin": (
             SweepArray("margin_status", "", "verdict of the margin's bracket", codes=MarginStatus),
-            SweepArray("margin", "N", "additional load that the pose can carry; if negative, load to be removed"),
-            SweepArray("margin_low", "N", "lower end of the margin's bracket; feasible if it is not negative"),
-            SweepArray("margin_high", "N", "upper end of the margin's bracket; infeasible if it is negative"),
-            SweepArray("limiting_cable", "", "cable whose limit moves the margin fastest, -1 for none", whole=True),
+            SweepArray("margin", "N", "additional load that the cables can balance; if negative, load to be removed"),
+            SweepArray("margin_low", "N", "lower bound of the margin; the request is feasible if it is not negative"),
+            SweepArray("margin_high", "N", "upper bound of the margin; the request is infeasible if it is negative"),
+            SweepArray("limiting_cable", "", "cable whose limit has the most effect on the margin, or -1", whole=True),
         ),
     }
 )
 
 
 def variables_of(quantities: Iterable[str]) -> tuple[SweepArray, ...]:
-    """Variables of some quantities, without repetitions, in the order of `quantities`."""
+    """Variables of the given quantities, in their order and without repetitions."""
     return tuple(dict.fromkeys(variable for name in quantities for variable in QUANTITIES[name]))
 
 
-MOST: Final = 1 << 40  # largest number of requests, about a year on a hundred cores
+MOST: Final = 1 << 40  # largest number of requests; they take about a year on a hundred cores
 _CATENARY: Final = Catenary()
 
 
@@ -98,13 +98,13 @@ class Request(Result):
 
     Attributes:
         robots: The R robots.
-        poses: A batch of P.
+        poses: A batch of P poses.
         wrenches: External wrenches on the platform, about the center of mass in world axes [N, N m], shape (W, 6).
         quantities: Quantities, in the order of `sl.sweep.QUANTITIES`: "tension", "length",
             "shortfall", "margin".
         model: Cable model.
-        tension: Tension distribution method, applied to each request independently.
-        around: Loads around each wrench; the margin is the margin of all of them.
+        tension: Tension distribution method; each request is independent of all others.
+        around: Set of loads that is added to each wrench for the margin; None for each wrench alone.
         moment_arm: Lever arm of the margin's norm [m]; None for each robot's mean lever arm.
     """
 
@@ -132,8 +132,8 @@ class Request(Result):
         """Check the request.
 
         Args:
-            robots: A robot, or a sequence of robots; their numbers of cables may differ.
-            poses: A pose, or a batch.
+            robots: A robot, or a sequence of robots, which may have different numbers of cables.
+            poses: A single pose, or a batch.
             wrenches: Force [N], then moment [N m], shape (6,) or (W, 6); None for the weight alone.
             quantities: One or several of `sl.sweep.QUANTITIES`.
             model: Cable model.
@@ -142,8 +142,8 @@ class Request(Result):
             moment_arm: Lever arm of the margin's norm [m], >= 0, as in `sl.margin`.
 
         Raises:
-            InvalidValueError: If an argument is of the wrong kind or empty, the tension distribution method does not
-                support a robot, or a pose is outside the motions of a robot.
+            InvalidValueError: If an argument is of the wrong kind or empty, if the tension distribution method is not
+                defined for a robot, or if a robot cannot move to a pose.
         """
         machines = listed(robots, Robot, "robots")
         batch = pose_of(poses, "poses")
@@ -161,7 +161,7 @@ class Request(Result):
             if not len(some):
                 raise InvalidValueError(item, "empty", "one or more", f"Give {item}.")
         if (count := len(machines) * len(batch) * len(loads)) > MOST:
-            raise InvalidValueError("the sweep", f"of {count:,} requests", f"<= {MOST:,}", "Request fewer at a time.")
+            raise InvalidValueError("the sweep", f"of {count:,} requests", f"<= {MOST:,}", "Make several sweeps.")
         model, method = model_of(model), method_of(tension).alone
         for one in machines:
             kernel_options(without_guides(one, "a sweep", "inverse"), model, method)

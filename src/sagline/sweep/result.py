@@ -1,4 +1,4 @@
-"""State of a sweep on the disk: the results, and the file `done` with one line per finished task."""
+"""State of a sweep on the disk: the results, and the file `done`, which has one line per finished task."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ HEAD: Final = "#    task  seconds  feasible infeasible   unable     open     los
 
 
 class TaskMark(NamedTuple):
-    """Record of a finished task: computing time [s], or 0 for existing chunks, and outcomes of its requests."""
+    """Mark of a finished task: its computing time [s], 0 if its chunks existed, and the outcomes of its requests."""
 
     seconds: float
     counts: Counts
 
 
 def _read_marks(folder: SweepFolder) -> dict[int, TaskMark]:
-    """Marks of finished tasks, by the numbers of the tasks; damaged lines are ignored."""
+    """Marks of the finished tasks, by the numbers of the tasks; damaged lines are ignored."""
     try:
         lines = (folder.path / NAME).read_bytes().decode("ascii", "replace").splitlines(keepends=True)
     except FileNotFoundError:
@@ -53,15 +53,15 @@ def _read_marks(folder: SweepFolder) -> dict[int, TaskMark]:
 
 
 class TaskMarks:
-    """The file `done` while a sweep runs, locked against other processes."""
+    """The file `done` of a sweep that runs; it is locked for other processes."""
 
     def __init__(self, folder: SweepFolder, file: IO[bytes], marks: dict[int, TaskMark]) -> None:
-        """Continue after the given marks; `open_marks` calls this."""
+        """Continue after the given marks; use `open_marks` to make an instance."""
         self._folder, self._file = folder, file
         self.marks = marks
 
     def add(self, number: int, mark: TaskMark, left: float | None) -> None:
-        """Add the mark of a task, with the remaining time of the sweep [s] if known."""
+        """Add the mark of a task, with the remaining time of the sweep [s] if this is known."""
         self.marks[number] = mark
         counts = mark.counts
         progress = f"{len(self.marks)} of {self._folder.tasks}"
@@ -91,7 +91,7 @@ class TaskMarks:
 
 @contextmanager
 def open_marks(folder: SweepFolder) -> Iterator[TaskMarks]:
-    """Open the marks of a folder with a lock; FileError if another process works on this sweep."""
+    """Open the marks of a folder and lock them; FileError if another process works on this sweep."""
     path = folder.path / NAME
     try:
         file = path.open("a+b", buffering=0)
@@ -106,13 +106,13 @@ def open_marks(folder: SweepFolder) -> Iterator[TaskMarks]:
 
 
 def _total_of(marks: Mapping[int, TaskMark]) -> Counts:
-    """Sum of all counts."""
+    """Sum of the counts of all marks."""
     counts = np.array([mark.counts for mark in marks.values()], dtype=np.int64).reshape(-1, len(Counts._fields))
     return Counts(*counts.sum(axis=0).tolist())
 
 
 def _time_text(seconds: float) -> str:
-    """Time as text: 1:02:03, or 0:07."""
+    """Text of a time, 1:02:03 or 0:07."""
     whole = max(0, round(seconds))
     hours, minutes = whole // 3600, whole // 60 % 60
     return f"{hours}:{minutes:02d}:{whole % 60:02d}" if hours else f"{minutes}:{whole % 60:02d}"
@@ -129,15 +129,15 @@ def _mark(line: str) -> tuple[int, TaskMark] | None:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Sweep(Result):
-    """Sweep in a folder; its numbers are read when they are used.
+    """Sweep in a folder; results are read from the disk when they are needed.
 
     Attributes:
         folder: Path of the folder.
         request: The request.
         tasks: Number of tasks.
         done: Number of finished tasks.
-        counts: Outcomes of the requests of the finished tasks.
-        seconds: Sum of the computing times of all workers [s].
+        counts: Outcomes of the requests in the finished tasks.
+        seconds: Computing time of all workers together [s].
     """
 
     folder: Path
@@ -153,7 +153,7 @@ class Sweep(Result):
         return self.done == self.tasks
 
     def __str__(self) -> str:
-        """Text of the request, number of finished tasks, and outcomes of the requests."""
+        """Text with the size of the request, the number of finished tasks and the outcomes of the requests."""
         ends = ", ".join(f"{count:,} {name}" for name, count in self.counts._asdict().items() if count)
         return f"{self.request}; {self.done:,} of {counted(self.tasks, 'task')} done" + f": {ends}" * bool(ends)
 
@@ -163,42 +163,43 @@ class Sweep(Result):
         return tuple(variable.name for variable in variables_of(self.request.quantities))
 
     def values(self, name: str, index: Any = ()) -> NDArray[Any]:
-        """The numbers of one variable.
+        """The values of one variable.
 
         Args:
             name: One of `names`.
-            index: Robots, poses, wrenches and cables, as whole numbers, slices, or arrays of whole numbers or booleans,
-                for example (0, slice(10)). The default is all.
+            index: Selection of robots, poses, wrenches and cables by whole numbers, slices, or arrays of whole numbers
+                or booleans, for example (0, slice(10)). Default: all values.
 
         Returns:
-            Array of shape (R, P, W), for tensions and lengths (R, P, W, m), or the part selected by the index. Values
-            are NaN for requests without a solution. Before their computation, values are NaN and statuses are -1.
+            Array of shape (R, P, W), or (R, P, W, m) for tensions and lengths, or the part that the index selects.
+            Values are NaN for requests without a solution. For requests that have not been computed yet, values are
+            NaN, and statuses are -1.
 
         Raises:
-            InvalidValueError: If there is no such variable, the index is invalid, or more memory is required than is
-                available.
+            InvalidValueError: If the variable is unknown, if the index is invalid, or if the values need more memory
+                than is available.
             FileError: If a chunk is damaged.
         """
         choice(name, "name", self.names)
         array: Any = open_folder(self.folder).group[name]
         parts = index if isinstance(index, tuple) else (index,)
         if not parts:
-            check_memory(f"all of {name}", 2.0 * array.nbytes, "Give an index, to read a part.")
+            check_memory(f"all of {name}", 2.0 * array.nbytes, "Give an index that selects a part.")
         if len(parts) > array.ndim:
             allowed = f"at most {array.ndim} whole numbers and slices"
-            raise InvalidValueError("index", brief(index), allowed, "Count robot, pose, wrench and cable.")
+            raise InvalidValueError("index", brief(index), allowed, "The axes are robot, pose, wrench and cable.")
         chosen = tuple(part_of(part, (size,), "value") for part, size in zip(parts, array.shape, strict=False))
         try:
             return locked(np.asarray(array.oindex[chosen]))
         except IndexError:
-            raise InvalidValueError("index", brief(index), "slices upward", "Reverse the result.") from None
+            raise InvalidValueError("index", brief(index), "slices upward", "Reverse the result instead.") from None
         except (ValueError, RuntimeError, OSError) as error:
-            step = "Run the sweep again, to repeat the damaged part."
+            step = "Run the sweep again; it repeats the damaged part."
             raise FileError(self.folder, f"{name} cannot be read ({error})", step) from None
 
     @property
     def field(self) -> Any:
-        """All variables with units and labels, as a Dataset of xarray; values are read when they are used."""
+        """All variables with units and labels, as a Dataset of xarray; values are read when they are needed."""
         import xarray
 
         data: Dataset = xarray.open_zarr(
@@ -211,7 +212,7 @@ class Sweep(Result):
 
 
 def load(folder: os.PathLike[str] | str) -> Sweep:
-    """Open the folder of a sweep, which may still be running.
+    """Open the folder of a sweep; the sweep may still be running.
 
     Args:
         folder: The folder.

@@ -1,4 +1,4 @@
-"""Running and continuing of sweeps, on Dask workers or task by task."""
+"""Start and continuation of sweeps, on workers of Dask or in this process."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from sagline.sweep.result import Sweep, TaskMark, TaskMarks, load, open_marks
 from sagline.sweep.work import Counts, found_counts, measured_size, task
 
 MOST_WORKERS: Final = 1024
-FEW: Final = 4  # so few tasks take less time than the start of workers
+FEW: Final = 4  # up to this number, tasks take less time than the start of workers
 Tell = Callable[[str], None]
 
 
@@ -41,29 +41,29 @@ def run(
     progress: Progress | None = None,
     tell: Tell | None = None,
 ) -> Sweep:
-    """Run a sweep into a folder, or continue it.
+    """Run a sweep and store its results in a folder, or continue a stopped sweep.
 
-    The folder contains partial results after at most a minute, and a file `done` with one line per finished task. The
-    same call continues a stopped sweep, and does not compute complete chunks again. Ctrl-C stops the sweep after the
-    running tasks. A killed worker is replaced, and its task is repeated.
+    The folder contains first results after at most a minute, and a file `done` with one line per finished task. The
+    same call continues a stopped sweep, and does not repeat finished tasks. Ctrl-C stops the sweep when the running
+    tasks are finished. A worker that is killed is replaced, and its task is repeated.
 
     Args:
         request: The request.
-        folder: Path of the folder; created if missing. It may contain the same sweep, but no other files.
-        workers: Number of processes of this computer; None for one per processor. If the number is 1, Dask is missing,
-            or there are at most four tasks, no workers are started, and this process computes the tasks one after the
-            other.
+        folder: Path of the folder; a missing folder is created. It may contain the same sweep, but no other files.
+        workers: Number of worker processes on this computer; None for one per processor. No workers are started if the
+            number is 1, if Dask is missing, or if there are at most four tasks. Then this process computes the tasks
+            one after the other.
         scheduler: Address of the Dask scheduler of a cluster, "tcp://10.0.0.1:8786", instead of local workers. All
             workers of the cluster must have access to the folder under the same name.
         progress: Function that is called with the number of finished tasks and the number of all tasks.
-        tell: Function that is called with messages, such as the address of the dashboard.
+        tell: Function that is called with messages, for example with the address of the dashboard.
 
     Returns:
         The sweep, as returned by `load`.
 
     Raises:
         InvalidValueError: If an argument is of the wrong kind, or Zarr is not installed.
-        FileError: If the folder has other contents, or cannot be written; finished tasks are kept.
+        FileError: If the folder has other contents or cannot be written; finished tasks are kept.
         SaglineError: If the workers or the scheduler fail; finished tasks are kept.
 
     Examples:
@@ -85,7 +85,7 @@ def run(
     report, say = callback(progress, "progress"), callback(tell, "tell") or (lambda text: None)
     check_package("zarr", "sweeps")
     with ExitStack() as entered:
-        # before the folder is created, because nothing must be written without a scheduler
+        # connect before the folder is created, because nothing may be written without a scheduler
         remote = None if scheduler is None else entered.enter_context(remote_workers(scheduler))
         opened = _open_or_make_folder(path, request)
         marks = entered.enter_context(open_marks(opened))
@@ -123,7 +123,7 @@ def open_matching_folder(path: Path, request: Request) -> SweepFolder:
 
 
 def _open_or_make_folder(path: Path, request: Request) -> SweepFolder:
-    """Folder of a request, created if missing."""
+    """Folder of a request; a missing folder is created."""
     try:
         empty = not path.exists() or not any(path.iterdir())
     except OSError as error:
@@ -136,7 +136,7 @@ def _open_or_make_folder(path: Path, request: Request) -> SweepFolder:
 
 
 def _waiting(folder: SweepFolder, marks: TaskMarks) -> list[int]:
-    """Numbers of the remaining tasks; tasks with complete chunks on the disk are marked as finished."""
+    """Numbers of the remaining tasks; tasks whose chunks are complete on the disk are marked as finished."""
     waiting = []
     for number in range(folder.tasks):
         counts = found_counts(folder, number)
@@ -150,18 +150,18 @@ def _waiting(folder: SweepFolder, marks: TaskMarks) -> list[int]:
 
 @contextmanager
 def _workers(count: int, tasks: int, tell: Tell) -> Iterator[Any]:
-    """Client of Dask on this machine; None if tasks are computed one after the other."""
+    """Client of Dask with workers on this machine; None if this process computes the tasks one after the other."""
     if count > 1 and tasks > FEW and is_installed("distributed"):
         _check_not_imported()
         with local_workers(min(count, tasks), tell) as client:
             yield client
     else:
         if count > 1 and tasks > FEW:
-            tell('Tasks run one after the other without Dask. For parallel tasks, pip install "sagline[sweep]".')
+            tell('Without Dask, tasks run one after the other. For parallel tasks, pip install "sagline[sweep]".')
         yield None
 
 
 def _check_not_imported() -> None:
-    """End a worker that runs the user's script again by its import; the parent process reports the reason."""
+    """End a worker whose start runs the user's script again; the parent process reports the reason."""
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         raise SystemExit(1)

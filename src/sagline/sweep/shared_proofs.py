@@ -1,8 +1,8 @@
-"""Verdicts on many loads at each pose with shared proofs: the proof for one load is valid for a half-space of loads.
+"""Verdicts on many loads at each pose, with shared proofs: a proof for one load is valid for a half-space of loads.
 
 The proof that a load w is infeasible is a direction y and a gap: along y, the cable forces are too small by the gap.
-For another load w' at the same pose, the gap changes by -y (w' - w). A positive gap proves that w' is infeasible. This
-gap is also a lower bound of the change of the force that makes w' feasible.
+For another load w' at the same pose, the gap changes by -y (w' - w). If the new gap is positive, w' is infeasible, and
+the gap is a lower bound of the change of the force that makes w' feasible.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from sagline.robot.robot import Robot
 from sagline.statics.tables import robot_terms
 from sagline.tension.method import Options
 
-ITERATIONS: Final = 32  # largest number of proofs per pose that are tried on the other loads
-TRUST: Final = 1e-8  # smallest gap relative to the forces; ten times the tolerance of a verdict, far above rounding
-PROVED: Final = 0  # column of the proved bound in the brackets
+ITERATIONS: Final = 32  # largest number of proofs per pose that are applied to the other loads
+TRUST: Final = 1e-8  # smallest gap relative to the forces: ten times a verdict's tolerance, far above rounding errors
+PROVED: Final = 0  # column of the brackets that has the proved bound
 
 
 def proofs_of(robot: Robot, options: Options, poses: Array, loads: Array, found: InverseRows) -> Array:
-    """Decide the requests without a verdict from the tension distribution, and complete the feasible ones.
+    """Decide the requests that the tension distribution left without a verdict, and complete the feasible ones.
 
     Poses are rows (P, POSE_COLUMNS), and loads have the shape (W, 6). The P W requests in `found` are all loads at the
     first pose, then all loads at the next pose, and so on. Returns a proved lower bound of the necessary change of the
-    force [N], (P W,); 0 if the request is feasible, and NaN if it fails for another reason.
+    force [N], (P W,): 0 if the request is feasible, and NaN if it has no result for another reason.
     """
     proof = np.full(found.pose_status.size, np.nan)
     proof[found.pose_status == codes.POSE_SOLVED] = 0.0
@@ -59,7 +59,7 @@ def _shares(robot: Robot, loads: Array) -> bool:
 
 
 def _forces_at_hand(robot: Robot, loads: Array) -> Array:
-    """Upper estimate of the forces at each load [N], (W,); moments are divided by the smallest lever arm."""
+    """Upper bound of the forces at each load [N], (W,); moments are divided by the smallest lever arm."""
     arms = np.linalg.norm(robot.platform_anchors - robot.center_of_mass, axis=1)
     arm = float(arms[arms > 0.0].min(initial=np.inf))
     moments = np.abs(loads[:, 3:]).sum(axis=1) / arm
@@ -79,7 +79,7 @@ def _gaps(verdicts: tuple[Array, Array, Flags], along: Array, columns: Indices) 
 def _decide(
     robot: Robot, options: Options, poses: Array, loads: Array, found: InverseRows, which: Indices, proof: Array
 ) -> tuple[Array, Array, Flags]:
-    """Decide some requests; returns proved lower bounds, Farkas directions, and a mask of the requests with a proof."""
+    """Decide some requests; returns proved lower bounds, directions of the proofs, and a mask of proved requests."""
     rows = locked(poses[which // len(loads)])
     wrenches = locked(loads[which % len(loads)])
     n, m = robot.degrees_of_freedom, robot.cable_count

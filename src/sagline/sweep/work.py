@@ -1,4 +1,4 @@
-"""Tasks of a sweep: pure functions of the request and the number of the task."""
+"""Tasks of a sweep: functions of the request and of the number of the task."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ from sagline.workspaces.margin_rows import MarginRows
 
 # statuses of feasible, infeasible, open and lost requests
 INVERSE_ENDS: Final = (PoseStatus.SOLVED, PoseStatus.INFEASIBLE, PoseStatus.BORDERLINE, PoseStatus.NOT_CONVERGED)
-MARGIN_ENDS: Final = (MarginStatus.FEASIBLE, MarginStatus.INFEASIBLE, MarginStatus.OPEN, -1)  # no margin is lost
-ROWS: Final = 1 << 14  # number of requests per call; their arrays fit the cache of the processor
+MARGIN_ENDS: Final = (MarginStatus.FEASIBLE, MarginStatus.INFEASIBLE, MarginStatus.OPEN, -1)  # none is lost
+ROWS: Final = 1 << 14  # number of requests per call; their arrays fit into the cache of the processor
 
 
 class Counts(NamedTuple):
@@ -38,7 +38,7 @@ class Counts(NamedTuple):
     Attributes:
         feasible: Number of requests with tensions within the limits.
         infeasible: Number of requests with a proof that no such tensions exist.
-        unable: Number of requests without a result for another reason; see the status.
+        unable: Number of requests that have no result for another reason, which the status states.
         open: Number of requests that are too close to the boundary for a verdict.
         lost: Number of requests without a verdict.
     """
@@ -51,7 +51,7 @@ class Counts(NamedTuple):
 
 
 def compute_variables(request: Request, part: RequestBox) -> dict[str, NDArray[np.generic]]:
-    """All variables of a part by name, (poses, wrenches[, cables]): NaN for missing cables and results."""
+    """All variables of a part, by name, (poses, wrenches[, cables]); missing cables and results have NaN."""
     variables = variables_of(request.quantities)
     shape = part.shape
     filled: dict[str, NDArray[np.generic]] = {each.name: _empty(each, shape, request.cable_count) for each in variables}
@@ -72,7 +72,7 @@ def compute_variables(request: Request, part: RequestBox) -> dict[str, NDArray[n
 
 
 def count_outcomes(numbers: dict[str, NDArray[np.generic]]) -> Counts:
-    """Counts of a part from its variables."""
+    """Counts of the outcomes of a part, from its variables."""
     name, ends = ("status", INVERSE_ENDS) if "status" in numbers else ("margin_status", MARGIN_ENDS)
     status = numbers[name]
     feasible, infeasible, left, lost = (int(np.count_nonzero(status == int(code))) for code in ends)
@@ -80,7 +80,7 @@ def count_outcomes(numbers: dict[str, NDArray[np.generic]]) -> Counts:
 
 
 class _Inverse:
-    """Statuses, tensions and lengths of one robot, prepared once."""
+    """Function that computes statuses, tensions and lengths for one robot; it is prepared once."""
 
     def __init__(self, request: Request, robot: Robot) -> None:
         self._request, self._robot = request, robot
@@ -108,7 +108,7 @@ class _Inverse:
 
 
 class _Margins:
-    """Margins of one robot, prepared once."""
+    """Function that computes margins for one robot; it is prepared once."""
 
     def __init__(self, request: Request, robot: Robot) -> None:
         self._request = request
@@ -129,7 +129,7 @@ class _Margins:
 
 
 def _rows(poses: Pose, part: slice) -> Array:
-    """Poses with exactly these rows; the constructor of Pose would normalize the quaternions again."""
+    """Poses with unchanged rows; the constructor of Pose would normalize the quaternions again."""
     return locked(np.concatenate((poses.position[part], poses.quaternion[part]), axis=1))
 
 
@@ -145,19 +145,19 @@ SOLVERS: Final[dict[type[_Inverse | _Margins], frozenset[str]]] = {
 }
 
 
-SECONDS: Final = 0.75  # duration of a task [s], a hundred times the time of the scheduler for it
-LONGEST: Final = 10.0  # longest duration of a task [s], for a sweep of several days
-TASKS: Final = 4000  # largest number of tasks; tasks become longer, up to the longest duration
+SECONDS: Final = 0.75  # duration of a task [s], a hundred times the time that the scheduler needs for it
+LONGEST: Final = 10.0  # longest duration of a task [s], in sweeps of several days
+TASKS: Final = 4000  # number of tasks above which tasks become longer, up to the longest duration
 LARGEST: Final = 1 << 26  # largest output of a task [bytes]
-SAMPLES, SAMPLE = 16, 4096  # number of timed parts, and number of requests per part
-TIMED: Final = 0.5  # [s], sufficient to measure the time per request
+SAMPLES, SAMPLE = 16, 4096  # number of parts whose time is measured, and number of requests per part
+TIMED: Final = 0.5  # time [s] that is sufficient to measure the time per request
 
 
 def task(folder: str, digest: str, number: int) -> tuple[float, tuple[int, ...]]:
-    """Compute one task of a folder and write its chunks; returns time [s] and outcomes."""
+    """Compute one task of a folder and write its chunks; returns its computing time [s] and outcomes."""
     start = time.perf_counter()
     opened = _opened(folder, digest)
-    numbers = opened.read(number)  # complete chunks of a worker that ended before its report
+    numbers = opened.read(number)  # a worker has completed the chunks, but ended before its report
     if numbers is None:
         numbers = compute_variables(opened.request, opened.part(number))
         opened.write(number, numbers)
@@ -166,7 +166,7 @@ def task(folder: str, digest: str, number: int) -> tuple[float, tuple[int, ...]]
 
 @lru_cache(maxsize=4)
 def _opened(folder: str, digest: str) -> SweepFolder:
-    """Open a folder with a check of its digest; it stays open for the next tasks."""
+    """Open a folder and check its digest; the folder stays open for the next tasks."""
     found = open_folder(Path(folder))
     if found.digest != digest:
         step = "Give all workers access to the same folder under the same name."
@@ -176,19 +176,19 @@ def _opened(folder: str, digest: str) -> SweepFolder:
 
 
 def found_counts(folder: SweepFolder, number: int) -> Counts | None:
-    """Counts of a task from its chunks on the disk; None if a chunk is missing or incomplete."""
+    """Counts of the outcomes of a task, from its chunks on the disk; None if a chunk is missing or incomplete."""
     numbers = folder.read(number)
     return None if numbers is None else count_outcomes(numbers)
 
 
 def measured_size(request: Request) -> TaskSize:
-    """Task size for a suitable duration, from the measured time of some requests."""
+    """Task size that gives a suitable duration, from the measured time of some requests."""
     places = np.linspace(0, len(request) - 1, min(SAMPLES, len(request))).astype(np.int64)
     parts = [_sample(place, request) for place in np.transpose(np.unravel_index(places, request.shape))]
-    compute_variables(request, parts[0])  # loads the machine code
+    compute_variables(request, parts[0])  # the first call loads the machine code
     count, seconds = 0, 0.0
     for part in parts:
-        start = time.process_time()  # processor time, independent of other processes
+        start = time.process_time()  # processor time, which does not depend on other processes
         compute_variables(request, part)
         seconds += time.process_time() - start
         count += part.shape[0] * part.shape[1]
@@ -202,13 +202,13 @@ def measured_size(request: Request) -> TaskSize:
 
 
 def _size(rows: int, poses: int, wrenches: int) -> TaskSize:
-    """Task size for a number of requests; a task has all wrenches of a pose if possible, because they share proofs."""
+    """Task size for a number of requests; if possible, a task has all wrenches of a pose, because they share proofs."""
     wide = min(wrenches, rows)
     return TaskSize(min(poses, max(1, rows // wide)), wide)
 
 
 def _sample(place: Indices, request: Request) -> RequestBox:
-    """A box of a few requests that starts at given indices of robot, pose and wrench, (3,)."""
+    """A box of a few requests that starts at the indices (3,) of a robot, a pose and a wrench."""
     robot, pose, wrench = (int(k) for k in place)
     _, poses, wrenches = request.shape
     tall, wide = _size(SAMPLE, poses, wrenches)
