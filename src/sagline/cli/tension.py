@@ -105,9 +105,8 @@ def tension(
     def tell() -> None:
         show_table(_grid(robot, plans))
         if margin is not None:
-            show_text(
-                f"Capacity margin: {n(margin, unit='N')}. The cables can balance this additional force in any direction."
-            )
+            what = "The cables can balance this additional force in any direction"
+            show_text(f"Capacity margin: {n(margin, unit='N')}. {what}.")
 
     count = sum(plan is not None and plan.feasible for plan in plans.values())
     verdict = f"{robot.name}: {count} of {len(plans)} methods have tensions within the limits."
