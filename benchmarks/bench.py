@@ -39,6 +39,7 @@ from benchmarks.sweep import sweeps
 from sagline.core.arrays import Array, locked
 from sagline.kernels.cable.batch import BUFFERS, CHUNK, batch_from_length, batch_from_tension
 from tests.cables.reference import load_reference
+from tests.kinematics.test_underconstrained import places, suspended
 
 CABLES = 1_000_000
 POSES = 100_000
@@ -140,6 +141,9 @@ def inverse_kinematics() -> Iterator[Row]:
     miss = float(np.max(np.linalg.norm(found.pose.position - pose.position[some], axis=1)))
     yield Row("wrench residual of these exact plans", "1e-8 N", f"{residual:.1e} N")
     yield Row("position error after the exact forward kinematics, 10^4 poses", "1e-9 m", f"{miss:.1e} m")
+    few, spots = suspended(4), places(4, POSES // 5)
+    time = best_seconds(partial(sl.inverse, few, spots), 5) * 1e6 / len(spots)
+    yield Row("underconstrained, 4 cables, exact", "<= 5 x 8 cables", f"{time:.1f} us; {time / exact:.1f} x 8 cables")
     solver = sl.InverseSolver(robot)
     place, turn, lengths = np.array([1.0, 2.0, 1.5]), np.array([0.0, 0.0, 0.0, 1.0]), np.empty(8)
     step = best_of_calls(lambda: solver.step(place, turn)) * 1e6

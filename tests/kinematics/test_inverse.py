@@ -285,7 +285,7 @@ def test_bad_input() -> None:
         inverse(robot, pose, wrench=[0, 0, np.nan, 0, 0, 0])
     with refused("position[1]", "nan m"):
         InverseSolver(robot).step([0, np.nan, 0], [0, 0, 0, 1])
-    with refused("given", "None", "5 of x, y, z, yaw, level for 5 cables"):
+    with refused("article-suspended: number of cables", "5", "3, 4 or >= 6 for 3R3T"):
         inverse(without_cables(robot, 0, 1, 2), pose)
     other = inverse(load_robot("falcon-7"), Pose([-0.25, 0, 0.75], LEVEL))
     with refused("previous", "a plan of 7 cables", "8 cables"):

@@ -134,5 +134,5 @@ def test_wrong_given_values_are_refused(given: Any) -> None:
 def test_values_of_an_underconstrained_platform_need_one() -> None:
     with refused("given", None, "None for 8 cables and 3R3T"):
         sl.inverse(sl.load_robot("cogiro"), (0.0, 0.0, 2.0), given=("x", "y", "z", "level"))
-    with refused("given", "None", "2 of x, y, z, yaw, level for 2 cables"):
+    with refused("suspended: number of cables", "2", "3, 4 or >= 6 for 3R3T"):
         sl.inverse(suspended(2), (0.0, 0.0, 1.0))

@@ -40,8 +40,10 @@ def given_codes(robot: Robot, given: Sequence[Given] | None) -> Indices | None:
             raise InvalidValueError("given", brief(given), f"None for {m} cables and {robot.motion_pattern}", step)
         return None
     if given is None and not (3 <= m <= len(_DEFAULT) and robot.motion_pattern == "3R3T"):
-        step = "Name them, for instance given=('x', 'z')."
-        raise InvalidValueError("given", "None", f"{m} of {', '.join(CODES)} for {m} cables", step)
+        fewer = "3, 4 or " if robot.motion_pattern == "3R3T" else ""
+        allowed = f"{fewer}>= {robot.degrees_of_freedom} for {robot.motion_pattern}"
+        step = f"Add cables; or, in Python, name {m} given values for inverse, such as given=('x', 'z')."
+        raise InvalidValueError(f"{robot.name}: number of cables", m, allowed, step)
     names = _DEFAULT[:m] if given is None else tuple(choice(name, "given", CODES) for name in given)
     if len(names) != m or len(set(names)) != m or m < 2:
         allowed = f"{m} different names of {', '.join(CODES)} for {m} cables" if m > 1 else "at least 2 cables"
