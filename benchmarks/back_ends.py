@@ -39,13 +39,13 @@ def jobs() -> Iterator[tuple[str, str, Callable[[], object]]]:
 
 
 def longest(calls: list[Call], entry: str) -> Call:
-    """The call of an entry with the most numbers."""
+    """Of all calls of an entry, the call with the largest number of values."""
     found = [each for each in calls if each.symbol.removesuffix("_pulleys") == f"sagline_{entry}"]
     return max(found, key=lambda each: sum(part.size for part in arrays(each.before)))
 
 
 def arrays(value: Any) -> Iterator[Any]:
-    """Arrays in nested tuples."""
+    """All arrays in nested tuples."""
     if isinstance(value, tuple):
         for each in value:
             yield from arrays(each)

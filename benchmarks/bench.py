@@ -152,7 +152,7 @@ def inverse_kinematics() -> Iterator[Row]:
 
 
 def two_threads() -> Iterator[Row]:
-    """Two threads on two cores with half of the poses each, compared with one thread; runs before `one_core`."""
+    """Two threads on two cores, each with half of the poses, compared with one thread; this runs before `one_core`."""
     cores = len(os.sched_getaffinity(0))
     if cores < 2:
         return

@@ -38,7 +38,7 @@ def problem_of(log: sl.WinchLog) -> FitProblem:
 
 
 def plain_seconds(log: sl.WinchLog) -> float:
-    """Time of scipy's least squares with finite differences, for unknowns and lengths together [s]."""
+    """Time [s] of scipy's least squares with finite differences, whose unknowns include the lengths."""
     problem = problem_of(log)
     state = start_of(problem, log.commanded)
     width, deviation = len(problem.prior), log.sensors.tension_deviation
@@ -64,7 +64,7 @@ def plain_seconds(log: sl.WinchLog) -> float:
 
 
 def single() -> Iterator[Row]:
-    """63 numbers from 60 poses, with anchor errors of 5 cm."""
+    """Calibration of 63 numbers from 60 poses, with anchor errors of 5 cm."""
     log = varied(true_robot(COGIRO, ERRORS, 1), 60, 1).log
     own = best_seconds(lambda: sl.calibrate(COGIRO, log, UNKNOWNS, folds=0), 15)
     plain = plain_seconds(log)
@@ -100,7 +100,7 @@ def accuracy() -> Iterator[Row]:
 
 
 def large() -> Iterator[Row]:
-    """One iteration over many rows."""
+    """Time of one iteration of a calibration over many rows."""
     log = varied(true_robot(COGIRO, ERRORS, 1), 60, 1).log
     small = problem_of(log)
     state = start_of(small, log.commanded)
@@ -136,7 +136,7 @@ def large() -> Iterator[Row]:
 
 
 def poses() -> Iterator[Row]:
-    """40 poses that are selected from 500 for 63 unknowns, compared with random poses."""
+    """Standard errors of 63 unknowns with 40 poses that are selected from 500, compared with 40 random poses."""
     for name in ("cogiro", "article-suspended"):
         robot, sensors = with_drums(name), usual_sensors()
         seconds = best_seconds(lambda robot=robot, sensors=sensors: sl.calibration_poses(robot, 40, ALL, sensors), 3)  # type: ignore[misc]

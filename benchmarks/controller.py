@@ -18,12 +18,12 @@ SPEED, STAND = 0.047, 3.0  # speed [m/s] and stop [s]: fourteen minutes through 
 
 
 class Timed(Spy):
-    """A link that measures the time of the machine behind it."""
+    """A link that measures the computing time of the machine to which it leads."""
 
     seconds = 0.0
 
     def exchange(self, command: Command | None) -> Sample | Missing:
-        """Exchange and measure."""
+        """Exchange data with the machine, and measure the time."""
         begin = time.perf_counter()
         answer: Sample | Missing = self.link.exchange(command)
         self.seconds += time.perf_counter() - begin

@@ -1,6 +1,6 @@
 """Lateness of the cycles of a controller that drives a twin in another process over S7, in real time.
 
-`python -m benchmarks.cycles --minutes 14`: on a computer without other work. `--priority` has the same meaning as in
+Run `python -m benchmarks.cycles --minutes 14` on a computer without other work. `--priority` has the same meaning as in
 `sagline control`.
 """
 
@@ -22,9 +22,9 @@ from sagline.core.arrays import Array
 from sagline.twin.server import machine_in_process
 
 LATE = 5e-3  # cycles with a larger lateness count for the fault "cycle late" [s]
-SPEED = 0.1  # of the tour through the ten poses [m/s]
+SPEED = 0.1  # speed of the tour through the ten poses [m/s]
 LONG = 0.004  # speed of a path that takes a quarter of an hour [m/s]
-CORNERS = ([0.4, 0.3, 1.5], [-0.4, 0.3, 1.5])  # of this path [m]
+CORNERS = ([0.4, 0.3, 1.5], [-0.4, 0.3, 1.5])  # length of this path [m]
 PLANS = 6  # number of plans
 
 
@@ -81,7 +81,7 @@ def _beyond(late: Array, limit: float) -> int:
 
 
 def main() -> None:
-    """Drive, and print the table."""
+    """Drive the twin, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--minutes", type=float, default=14.0, help="duration of the tours")
     parser.add_argument("--priority", type=int, help="priority of the scheduler SCHED_FIFO, 1 to 99")

@@ -44,7 +44,7 @@ def residuals() -> Iterator[Row]:
 
 
 def shortest() -> Iterator[Row]:
-    """The same path at the tension limits."""
+    """The fastest motion along the same path within the tension limits."""
     robot, path = scene().robot, sl.quintic_path(WAYPOINTS, durations=2.0)
     for jerk in (None, 200.0):
         start = time.perf_counter()
@@ -59,7 +59,7 @@ def shortest() -> Iterator[Row]:
 
 
 def speed() -> Iterator[Row]:
-    """Motion in time without cable mass, 8 cables, 1 ms."""
+    """Computing time of motions of 8 cables without mass, with steps of 1 ms."""
     state, lengths = beside(sl.load_robot("article-suspended"), (0.0, 0.0, 1.5), AWAY)
     seen: dict[Integrator, str] = {"splitting": ">= 250", "runge-kutta": ">= 100"}
     for integrator, reach in seen.items():

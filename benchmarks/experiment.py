@@ -12,7 +12,7 @@ from sagline.article.experiment import in_process
 
 
 def experiment() -> Iterator[Row]:
-    """Ten points, fourteen minutes of a machine."""
+    """The experiment at ten points, which takes fourteen minutes of the machine's time."""
     begun = perf_counter()
     found = in_process()
     took = perf_counter() - begun

@@ -52,7 +52,7 @@ def percent(flags: Flags) -> str:
 
 
 def far_starts(share: float) -> Iterator[Row]:
-    """CoGiRo with start poses that have errors of a meter and up to 40 degrees."""
+    """Success for CoGiRo with start poses whose errors are a meter and up to 40 degrees."""
     plan = plan_of(sl.load_robot("cogiro"), int(share * BOX_POSES), seed=1)
     pose, count = plan.state.pose, len(plan.unstrained_length)
     for degrees in (2.0, 10.0, 20.0, 40.0):
@@ -65,7 +65,7 @@ def far_starts(share: float) -> Iterator[Row]:
 
 
 def without_start(share: float) -> Iterator[Row]:
-    """Every preset without a start pose, and with the planned poses as start poses."""
+    """Success for every preset, without start poses and with the planned poses as start poses."""
     worst_shift, worst_turn, worst_force = 0.0, 0.0, 0.0
     for name in sl.robot_names():
         robot = wider(sl.load_robot(name))

@@ -1,4 +1,4 @@
-"""Links to PLCs on the loopback interface: four servers in another process, as in `sagline twin`; write and read."""
+"""Times to write and read over links to PLCs: four servers in another process, as in `sagline twin`, on loopback."""
 
 from __future__ import annotations
 

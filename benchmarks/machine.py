@@ -22,7 +22,7 @@ ROBOTS = ("article-suspended", "article-mixed", "cogiro", "ipanema-1")
 
 
 def counts() -> Iterator[Row]:
-    """Counts to lengths and back, over four layers with a moving exit."""
+    """Conversion of counts to lengths and back, over four layers with a moving exit point."""
     robot = wound()
     drums = drums_of(robot)
     turns = np.random.default_rng(6).uniform(0.0, drums.most[0], (COUNTS // 8, 8))
@@ -40,14 +40,14 @@ def counts() -> Iterator[Row]:
 
 
 def hard_cables() -> Iterator[Row]:
-    """Random cables over pulleys, with dead length: length from tension, and the tension back."""
+    """Random cables over pulleys, with dead length: lengths from tensions, and tensions from these lengths."""
     tension, found, expected, _statuses = there_and_back(38_000, seed=3)
     worst = (np.abs(found - tension) / expected).max()
     yield Row("38,000 random cables, tension to length and back, relative to one rounding", "4", f"{worst:.1f} at most")
 
 
 def speed() -> Iterator[Row]:
-    """The same robots with and without pulleys and dead length, alternately."""
+    """Time of robots with pulleys and dead length, divided by the time of the same robots without them."""
     for name in ROBOTS:
         bare = sl.load_robot(name)
         over = bare.replace(winches=sl.Winch(0.05, dead_cable=4.0))

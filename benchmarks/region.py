@@ -1,4 +1,4 @@
-"""The region in the viewer: time after the move of a slider, and update rate of the page during this time.
+"""The region in the viewer: its time after a slider is moved, and the update rate of the page during this time.
 
 The values are wall times, which depend on the load of the machine. A client receives the messages instead of a browser.
 """

@@ -1,4 +1,4 @@
-"""Sweeps on all cores: workers and a plain loop, and 31 million tension requests of a planar robot with four cables."""
+"""Sweeps on all cores: workers compared with a loop, and 31 million requests of a planar robot with four cables."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SHARE = 10  # number of tasks for the comparison of a loop with workers
 
 
 def asked(poses: int, loads: int) -> sl.sweep.Request:
-    """Level poses in the plane except its edges, with forces to 100 N and moments to 3 N m."""
+    """Level poses in the plane, except on the edges of its area, with forces up to 100 N and moments up to 3 N m."""
     rng = np.random.default_rng(31)
     place = rng.uniform((0.6, 0.0, 0.5), (3.4, 0.0, 2.5), (poses, 3))
     wrenches = rng.uniform(-1.0, 1.0, (loads, 6)) * [100.0, 0.0, 100.0, 0.0, 3.0, 0.0]
@@ -33,7 +33,7 @@ def asked(poses: int, loads: int) -> sl.sweep.Request:
 
 
 def in_a_loop_and_on_workers() -> Iterator[Row]:
-    """The same tasks one after the other, and on two workers."""
+    """Time of the same tasks one after the other, and on two workers."""
     request = asked(POSES // SHARE, LOADS)
     size, times = measured_size(request), []
     with tempfile.TemporaryDirectory() as place:

@@ -1,6 +1,6 @@
 """`python -m tools.audit [PIP-AUDIT]`: licenses and known vulnerabilities of the packages that sagline needs.
 
-Exit code 0: nothing found; 1: a license or a vulnerability was found; 3: no database of vulnerabilities was reached.
+Exit code 0: no problem; 1: a license that is not permitted, or a vulnerability; 3: no database could be reached.
 `python -m tools.audit --pins` prints the versions of the installed packages, for constraints.txt.
 """
 
@@ -104,7 +104,7 @@ def verdict(packages: list[dict[str, Any]]) -> tuple[int, str]:
 
 
 def main() -> int:
-    """Print what is found."""
+    """Print licenses that are not permitted, and vulnerabilities."""
     packages = needed()
     if "--pins" in sys.argv:
         print(pins(packages), end="")

@@ -77,7 +77,7 @@ def public_values() -> dict[str, Any]:
 
 
 def public_functions() -> dict[tuple[str, str], FunctionType]:
-    """Public functions, public methods and constructors by module and qualified name."""
+    """Public functions, public methods and constructors, by module and qualified name."""
     found: dict[tuple[str, str], FunctionType] = {}
     for value in public_values().values():
         members: list[object] = [value]

@@ -28,7 +28,7 @@ from sagline.core.errors import InvalidValueError
 CLIENTS: Final = 32  # default of the largest number of clients
 MOST_CLIENTS: Final = 1000
 LARGEST: Final = 65_536  # largest message of a page [B]; the channel sends up to 10,000 characters of up to 4 B
-QUIET: Final = 60.0  # time after a line about a refusal without a line about another one of its kind [s]
+QUIET: Final = 60.0  # after a line about a rejected request, time without a line about the same kind of rejection [s]
 _ENTROPY: Final = 16  # size of a token [B]
 _HOST: Final = re.compile(r"(?:\[([0-9a-f:.]+)\]|([\w.-]+))(?::[0-9]{1,5})?", re.ASCII)  # name or address, and port
 
@@ -54,13 +54,13 @@ class Access:
         self.local = own is not None and _is_loopback(own)
         names = (own, None if self.local else gethostname().lower(), *self._allowed)
         self._names = frozenset(name for name in names if name)
-        self._once: set[str] = set()  # paths that work once
+        self._once: set[str] = set()  # paths that can be used once
         self._connected = 0
-        self._reported: dict[str, float] = {}  # time of the last line about each kind of refusal [s]
+        self._reported: dict[str, float] = {}  # time of the last line about each kind of rejection [s]
         self.guards = False
 
     def path_once(self) -> str:
-        """Path that leads to the page once; other users of this computer can read the command line of a browser."""
+        """Path that opens the page a single time; other users of this computer can read a browser's command line."""
         if not self.path:
             return ""
         path = f"/{secrets.token_urlsafe(_ENTROPY)}"
@@ -105,7 +105,7 @@ class Access:
         return serve(handle, *place, process_request=answer, **options | {"max_size": LARGEST})
 
     def _check_headers(self, request: Request) -> None:
-        """Refuse another host, and a page of another origin; programs other than browsers send no origin."""
+        """Reject requests to another host, or from a page of another origin; only browsers send an origin."""
         hosts, origins = request.headers.get_all("Host"), request.headers.get_all("Origin")
         if len(hosts) != 1 or not self._allows(_host_of(hosts[0])):
             step = "Name further hosts with --allow-host."
@@ -125,22 +125,22 @@ class Access:
             request.path = f"/{rest}"
 
     def _allows(self, host: str | None) -> bool:
-        """True for a host of this server; an IP address cannot be rebound."""
+        """True for a host of this server; any IP address counts, because DNS rebinding needs a name."""
         if host is None:
             return False
         return host in self._names or _is_loopback(host) or (not self.local and _is_address(host))
 
     def _is_own(self, origin: str, host: str) -> bool:
-        """True for the origin of the page at a host, or a named host, as of a proxy."""
+        """True for the origin of the page: at the requested host, or at an allowed host such as a proxy."""
         scheme, _, place = origin.lower().partition("://")
         return scheme in ("http", "https") and (place == host.lower() or _host_of(place) in self._allowed)
 
     def _report(self, error: InvalidValueError) -> None:
-        """Print a line, unless another refusal of this kind was reported a short time ago."""
+        """Print a line about a rejection, unless the same kind of rejection was reported a short time ago."""
         now = time.monotonic()
         if now - self._reported.get(error.item, -QUIET) >= QUIET:
             self._reported[error.item] = now
-            with suppress(OSError):  # without stderr, the line is lost
+            with suppress(OSError):  # if stderr is closed, the line is lost
                 print(f"Refused: {error}", file=sys.stderr, flush=True)
 
 

@@ -16,11 +16,11 @@ BY_HAND: Final = "chosen by hand"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ByHand(QuadraticProgram):
-    """Feasible tensions closest to tensions chosen by hand; at the pose of the choice, they are the chosen tensions.
+    """Feasible tensions that are closest to tensions chosen by hand; at the pose of the choice, both are equal.
 
     Tensions in force balance are the minimum-norm tensions plus a point of the null space. The sag forces shift the
-    minimum-norm tensions slightly, but not this point. At other poses the tensions are as close to the chosen ones as
-    balance and limits allow.
+    minimum-norm tensions slightly, but they do not shift this point. At other poses, the tensions are as close to the
+    chosen tensions as the balance and the limits allow.
     """
 
 
@@ -44,7 +44,7 @@ class DotField:
 
     @classmethod
     def of(cls, polygon: TensionPolygon, dot: Array, before: DotField | None = None) -> DotField:
-        """Drawing of a nonempty polygon of one or two redundant cables."""
+        """Make the drawing of a nonempty polygon, for one or two redundant cables."""
         corners, sides = polygon.vertices, polygon.sides
         if before is not None:
             low, high = before.low, before.high
@@ -116,7 +116,7 @@ def _extent(polygon: TensionPolygon, dot: Array) -> tuple[Array, Array]:
 def _clipped(
     corners: Array, sides: tuple[Side | None, ...], low: Array, high: Array
 ) -> tuple[Array, tuple[Side | None, ...]]:
-    """Part of a polygon within a box; the sides of the box are not limits."""
+    """Part of a polygon that is within a box; the sides of the box do not count as limits."""
     if corners.shape[1] == 1:
         return np.clip(corners, low, high), sides
     for axis, sign, end in ((0, 1.0, high[0]), (0, -1.0, -low[0]), (1, 1.0, high[1]), (1, -1.0, -low[1])):

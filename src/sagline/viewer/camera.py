@@ -1,4 +1,4 @@
-"""Cameras of clients: framing of the robot, and picking in the picture."""
+"""Cameras of clients: automatic framing of the robot, and selection of objects in the picture."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Camera(NamedTuple):
 
     @classmethod
     def of(cls, camera: Any) -> Camera | None:
-        """The camera of a client; None until it has sent a valid one."""
+        """The camera of a client; None until the client has sent a valid camera."""
         try:
             turn, place = np.asarray(camera.wxyz, dtype=np.float64), np.asarray(camera.position, dtype=np.float64)
             pixels = np.array([camera.image_width, camera.image_height], dtype=np.float64)
@@ -81,7 +81,7 @@ def ray_distance(solid: Solid, start: Array, direction: Array) -> float | None:
 
 
 def nearest_line(camera: Camera, at: tuple[float, float], lines: Array, within: float) -> int | None:
-    """Line within a distance [px] of a point of the picture, the front line if several are; None without a line."""
+    """The line nearest to the viewer within a distance [px] of a point of the picture; None without such a line."""
     places, deep = camera.project(lines)
     pixel = np.asarray(at) * camera.pixels
     start, run = places[:, :-1] - pixel, np.diff(places, axis=1)
@@ -116,7 +116,7 @@ _UP: Final = np.array([0.0, 0.0, 1.0])
 
 
 def fitted(low: Array, high: Array, aspect: float, field: float = FIELD) -> tuple[Array, Array]:
-    """The nearest camera that sees a whole box from the usual side.
+    """The camera that is as near as possible, and sees a whole box from the usual side.
 
     Returns:
         Position of the camera and its target [m].
@@ -134,7 +134,7 @@ def fitted(low: Array, high: Array, aspect: float, field: float = FIELD) -> tupl
 
 
 def _nearest(place: Array, depth: Array, slope: float) -> float:
-    """Distance of a camera at which points lie just within both edges: |x - X| = slope (t + z)."""
+    """Distance of a camera at which all points are just inside both edges of the picture: |x - X| = slope (t + z)."""
     return 0.5 * float(np.max(place / slope - depth) + np.max(-place / slope - depth))
 
 
@@ -152,7 +152,7 @@ class Framing:
     """Automatic framing of a box in the picture of every client that has not moved its camera."""
 
     def __init__(self, server: viser.ViserServer, low: Array, high: Array) -> None:
-        """Start framing for present and future clients of a server."""
+        """Start automatic framing for present and future clients of a server."""
         self._server = server
         self._low, self._high = low, high
         size = float(np.linalg.norm(high - low))
@@ -179,14 +179,14 @@ class Framing:
             self._follow(known.camera)
 
     def pan(self, before: Array, after: Array) -> None:
-        """Move the cameras that see a point (3,), but not its position after a jump, by the same displacement."""
+        """After a jump of a point (3,), move the cameras that have lost sight of it by the same displacement."""
         for client, known in self._server.get_clients().items():
             camera = Camera.of(known.camera)
             if camera is not None and camera.sees(before) and not camera.sees(after):
                 self.look(client, np.concatenate((camera.place, known.camera.look_at)) + np.tile(after - before, 2))
 
     def moved(self, client: int) -> Array | None:
-        """Position and target of the camera of a client [m], shape (6,), if the user has moved it, else None."""
+        """Position and target of the camera of a client [m], shape (6,); None if the user has not moved it."""
         known = self._server.get_clients().get(client)
         if known is None:
             return None

@@ -68,17 +68,17 @@ class Feature:
         """Do periodic work; it is called after every update, and at least every half second."""
 
     def put_on(self, played: Played | None) -> None:
-        """React to a new played motion, or to its removal."""
+        """React to a new played motion, or to the end of playing."""
 
 
 T = TypeVar("T")
 
 PATIENCE: Final = 2.0  # [s], the elapsed time of a longer calculation is shown
-NICENESS: Final = 10  # increase of the niceness: on a busy processor, a drag is then drawn up to twice as often
+NICENESS: Final = 10  # increase of the niceness, by which a busy processor draws a drag up to twice as often
 
 
 class BackgroundTask:
-    """One calculation at a time in a separate thread; a new one replaces the previous one."""
+    """Calculations in a separate thread, one at a time; a new calculation replaces the previous one."""
 
     def __init__(self, later: Callable[[Callable[[], None]], None]) -> None:
         """Store `later`, with which any thread makes the serving thread call a function."""
@@ -94,7 +94,7 @@ class BackgroundTask:
 
     @property
     def elapsed(self) -> float:
-        """Time since the start of the calculation [s]; 0 up to `PATIENCE`."""
+        """Time since the start of the calculation [s]; 0 until `PATIENCE` has passed."""
         elapsed = 0.0 if self._began is None else time.monotonic() - self._began
         return elapsed if elapsed > PATIENCE else 0.0
 

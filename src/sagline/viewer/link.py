@@ -31,12 +31,12 @@ _KINDS: Final = (*_NUMBERS, *_VECTORS, viser.GuiDropdownHandle, viser.GuiCheckbo
 
 
 def link_text(parts: dict[str, str]) -> str:
-    """Text of the parts of a state."""
+    """Write the text of a state from its parts."""
     return urlencode(parts, safe=_SAFE, quote_via=quote)
 
 
 def parts_of(text: str) -> dict[str, str]:
-    """Parts of the text of a state."""
+    """Read the parts of a state from its text."""
     try:
         pairs = parse_qsl(text, keep_blank_values=True, strict_parsing=True, max_num_fields=200, errors="strict")
     except (ValueError, UnicodeError):
@@ -62,7 +62,7 @@ def check_robot(text: str, robot: Robot) -> None:
 
 
 def pose_part(pose: Pose) -> str:
-    """A pose in the format of the command line, with twelve digits."""
+    """Text of a pose in the format of the command line, with twelve digits."""
     angles = pose.rotation.as_euler("ZYX", degrees=True)
     return listed([*pose.position, *angles] if np.any(np.abs(angles) > 1e-12) else pose.position)
 
@@ -88,7 +88,7 @@ def short(label: str) -> str:
 
 
 class LinkedControls:
-    """All controls of a page, including controls that are added later."""
+    """All controls of a page; later controls are included."""
 
     def __init__(self, gui: viser.GuiApi) -> None:
         """Store the present values as defaults; links contain only values that differ from the defaults."""

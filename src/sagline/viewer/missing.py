@@ -26,7 +26,7 @@ from sagline.workspaces.region import Region, region_of
 from sagline.workspaces.wrench_sets import WrenchBox
 
 ATTEMPTS: Final = 4
-MORE: Final = 1.0 + 1e-9  # factor on the wrench; the pose is then slightly inside the boundary
+MORE: Final = 1.0 + 1e-9  # factor of the wrench, by which the pose is slightly inside the boundary
 NEAR: Final = 1e-4  # relative distance to a limit below which a tension counts as at the limit
 _EXPLAINED: Final = (PoseStatus.INFEASIBLE, PoseStatus.BORDERLINE)
 
@@ -45,7 +45,7 @@ class _AtLimit(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MissingWrench:
-    """Smallest wrench with which a pose is feasible; a force without moment if a force suffices."""
+    """Smallest wrench that makes a pose feasible; it is a force without moment if a force is sufficient."""
 
     wrench: Array  # missing wrench about the center of mass, world axes [N, N m], shape (6,)
     state: Equilibrium  # plan with this wrench, in which the blocking cables are at their limits
@@ -58,7 +58,7 @@ class MissingWrench:
 
     @property
     def moment(self) -> Array:
-        """Moment of the wrench [N m], shape (3,); zero if a force alone suffices."""
+        """Moment of the wrench [N m], shape (3,); zero if a force alone is sufficient."""
         return self.wrench[3:]
 
 
@@ -83,7 +83,7 @@ def missing_of(snapshot: Snapshot) -> MissingWrench | None:
 
 
 def _step(plan: Plan) -> Array:
-    """Smallest sufficient force [N, N m], shape (6,); the smallest wrench if no force suffices."""
+    """Smallest sufficient force [N, N m], shape (6,); if no force is sufficient, the smallest wrench."""
     if plan.relief is not None and np.isfinite(plan.relief).all():
         return np.concatenate((plan.relief, np.zeros(3)))
     robot = plan.state.one_robot
@@ -100,7 +100,7 @@ def _step(plan: Plan) -> Array:
 
 
 def _limits(plan: Plan, held: Plan) -> tuple[_AtLimit, ...]:
-    """Cables at limits: the plan's blocking cables if a force suffices, else cables at limits in `held`."""
+    """Cables at limits: the plan's blocking cables if a force is sufficient, otherwise those at limits in `held`."""
     robot, tension = plan.state.one_robot, held.state.limited_tension
     to_lower, to_upper = tension - robot.tension_min, robot.tension_max - tension
     which = plan.blocking
@@ -171,7 +171,7 @@ class _Search:
         return self._inside(start, best)
 
     def _refined(self, start: Array, best: Array, step: Array) -> Array:
-        """The nearest feasible position, starting from a feasible one, on finer and finer grids."""
+        """The nearest feasible position; the search starts at a feasible position and uses finer and finer grids."""
         ways = np.linspace(-1.0, 1.0, 2 * AROUND + 1)
         offsets = np.stack(np.meshgrid(*[ways] * len(step), indexing="ij"), axis=-1).reshape(-1, len(step))
         for _ in range(ITERATIONS):

@@ -70,7 +70,7 @@ class Shot(NamedTuple):
 
 
 def _seen(camera: viser.CameraHandle, low: Array, high: Array) -> tuple[float, float, float, float]:
-    """Visible extent of a box to the side and upward [slope], its distance, and the advance of the camera [m]."""
+    """Visible extents of a box, horizontal and vertical [slope], its distance, and the advance of the camera [m]."""
     try:
         eye = np.array(camera.position, dtype=np.float64).reshape(3)
         edge = tan(0.5 * float(camera.fov)) * np.array([float(camera.aspect), 1.0])

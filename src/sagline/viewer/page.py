@@ -41,7 +41,7 @@ F = TypeVar("F", bound=Feature)
 
 
 class Source(NamedTuple):
-    """Python expressions for the objects with which a page was opened."""
+    """Python expressions that make the objects with which a page was opened."""
 
     robot: str = ""  # robot; "" if unknown
     mass: float | None = None  # mass of the platform with a payload [kg]; None for the robot's own mass
@@ -49,12 +49,12 @@ class Source(NamedTuple):
 
     @classmethod
     def of_robot(cls, name_or_path: str | PathLike[str], mass: float | None = None) -> Source:
-        """A robot from its name or its file, possibly with another mass [kg]."""
+        """Expression of a robot from its name or its file, with another mass [kg] if one is given."""
         return cls(f"sl.load_robot({fspath(name_or_path)!r})", mass)
 
     @classmethod
     def of_file(cls, kind: str, file: PathLike[str]) -> Source:
-        """A plan, simulation, execution or calibration from a file."""
+        """Expression of a plan, simulation, execution or calibration that is loaded from a file."""
         loaded = f"sl.load_{kind}({fspath(file)!r})"
         robot = f"{loaded}.state.one_robot" if kind == "plan" else f"{loaded}.robot"
         return cls(robot, None, "" if kind == "calibration" else loaded)
@@ -150,23 +150,23 @@ class Page:
             last = now
 
     def later(self, task: Callable[[], None]) -> None:
-        """Make the serving thread call a function; callable from any thread."""
+        """Make the serving thread call a function; any thread may call this method."""
         self._tasks.append(task)
         self._wake.set()
 
     def refresh(self) -> None:
-        """Show everything again; callable from any thread."""
+        """Solve and draw the page again; any thread may call this method."""
         self._wake.set()
 
     def extend(self, played: Played) -> None:
-        """Replace the played motion by a longer version of it; callable from any thread.
+        """Replace the played motion by a longer version of it; any thread may call this method.
 
         A clock at its end moves to the new end; a clock at an earlier time stays there.
         """
         self.later(lambda: self._extend(played))
 
     def stop(self) -> None:
-        """Make `serve` return; callable from any thread."""
+        """Make `serve` return; any thread may call this method."""
         self._stopping.set()
         self._wake.set()
 
@@ -185,7 +185,7 @@ class Page:
         return next(each for each in self.features if isinstance(each, kind))
 
     def go(self, pose: Pose) -> None:
-        """Move the platform to a pose; a camera follows that would lose it."""
+        """Move the platform to a pose; cameras that would lose sight of the platform follow it."""
         self.player.leave()
         self.framing.pan(np.asarray(self.scene.gizmo.position), pose.position)
         self.scene.place(pose)
@@ -201,7 +201,7 @@ class Page:
         self.go(pose)
 
     def check_near(self, pose: Pose) -> None:
-        """Reject a pose out of reach."""
+        """Reject a pose that is out of reach."""
         self.scene.check_near(pose.position)
         both = np.stack((self.home.position, pose.position)), np.stack((self.home.quaternion, pose.quaternion))
         check_reach(self.robot, Pose.from_quaternion(*both), "pose")

@@ -73,7 +73,7 @@ class ControlPanel:
         return scale
 
     def show_sag(self, sag: float, visible: float) -> None:
-        """Recommend a larger drawing of a largest sag that is not visible [m]."""
+        """Recommend a larger drawing if the largest sag [m] is too small to be seen."""
         factor = float(self._sag_scale.value)
         self._sag_hint.visible = 0.0 < sag * factor < visible
         if self._sag_hint.visible:
@@ -101,7 +101,7 @@ class ControlPanel:
         return METHODS[self._method_name]
 
     def show_what_if(self, reason: str) -> None:
-        """Show the controls that change the robot, or the reason why the robot cannot be changed."""
+        """Show the controls that change the robot; or the reason why a played motion does not allow changes."""
         shown = not reason
         factors = (self._sliders[each.label] for each in (self._density, self._stiffness))
         for handle in (self._mass, *factors, self._model, self._method):
@@ -182,7 +182,7 @@ class ControlPanel:
             self._forgetting.on_click(lambda _: self._forget())
 
     def _add_factor(self, label: str, low: float, high: float, hint: str, least: float | None = None) -> Any:
-        """Add a factor, initially 1, with a logarithmic slider; `least` at its left end may be 0 instead of `low`.
+        """Add a factor, initially 1, with a logarithmic slider; its left end is `least` (possibly 0), not `low`.
 
         The slider is HTML that browser/factors.js connects with the hidden number: sliders of viser are linear.
         """

@@ -1,4 +1,4 @@
-"""Plans and simulations in the form for the timeline."""
+"""Plans and simulations in the form that the player and the timeline need."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ class PlayedPlan:
         return Snapshot(plan.state.one_robot, plan.state.pose, plan, rest)
 
     def code(self, source: str, time: float) -> list[str]:
-        """Lines of Python for a sample; `source` is an expression for the plan."""
+        """Lines of Python that reproduce a sample; `source` is an expression of the plan."""
         index = self.index_at(time)
         lines = [f"plan = {source}", f"index = {index}"]
         lines += ["robot, pose = plan.state.one_robot, plan.state.pose[index]", "tension = plan.chord_tension[index]"]
@@ -134,7 +134,7 @@ FAILURES: Final = ("break", "stall", "slack", "saturate")  # kinds of events
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlayedSimulation:
-    """A simulation of N samples, from time 0 on."""
+    """A simulation with N samples; its times begin at 0."""
 
     simulation: Simulation
 
@@ -189,7 +189,7 @@ class PlayedSimulation:
         )
 
     def code(self, source: str, time: float) -> list[str]:
-        """Lines of Python for a sample; `source` is an expression for the simulation."""
+        """Lines of Python that reproduce a sample; `source` is an expression of the simulation."""
         index = _sample_at(self.time, time)
         return [
             f"simulation = {source}",

@@ -23,7 +23,7 @@ from sagline.viewer.timeline import Track
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InMotion:
-    """One sample of a simulation or a log, drawn from the lengths of its cables or from their nodes."""
+    """One sample of a simulation or a log; its cables are drawn from their lengths or from their nodes."""
 
     robot: Robot
     pose: Pose
@@ -100,13 +100,13 @@ class Played(Protocol):
 
     @property
     def unchanged(self) -> str:
-        """Text in place of the controls for changes of the robot."""
+        """Text that replaces the controls for changes of the robot."""
 
     def at(self, time: float) -> Configuration:
         """Configuration at a time [s]."""
 
     def code(self, source: str, time: float) -> list[str]:
-        """Lines of Python for the sample at a time [s]; `source` is an expression for the motion."""
+        """Lines of Python that reproduce the sample at a time [s]; `source` is an expression of the motion."""
 
     def traces(self, most: int, error_scale: float) -> tuple[Array, Array]:
         """Desired and actual positions (n, 3), n <= most, with a scaled error; NaN in gaps."""
@@ -116,7 +116,7 @@ class Played(Protocol):
 
 
 class Beside(NamedTuple):
-    """A second run with the same clock."""
+    """A second run, which is played with the same clock."""
 
     played: Played
     names: tuple[str, str]  # names of both runs on the timeline, the second run last
@@ -143,7 +143,7 @@ class Timeline:
         return Timeline(duration, time, self.playing)
 
     def toggled(self) -> Timeline:
-        """Running clock if this one is paused, from the start if it is at its end; otherwise a paused clock."""
+        """Clock after the play button: paused if this clock runs; otherwise running, at its end from the start."""
         time = 0.0 if not self.playing and self.time >= self.duration else self.time
         return Timeline(self.duration, time, not self.playing)
 

@@ -19,11 +19,11 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.stiffness import stiffness
 
-FORCES: Final = 24  # trials per iteration, which narrows the bounds of a limit by a factor of about 23
+FORCES: Final = 24  # trials per iteration, which divides the distance between the bounds of a limit by about 23
 ITERATIONS: Final = 4
 SMALLEST: Final = 1e-4  # first trial, as a share of the largest force
 BEYOND: Final = 1e3  # largest force, relative to weight and tensions, for cables without an upper limit
-AT_LIMIT: Final = 1e-9  # relative to the largest tension: a smaller excess over a limit counts as at the limit
+AT_LIMIT: Final = 1e-9  # a tension counts as at its limit if the excess, relative to the largest tension, is smaller
 
 
 class Push(NamedTuple):
@@ -154,7 +154,7 @@ def _redistributed(state: Equilibrium, push: Push) -> Reserve:
 
 
 def _bracket(is_exceeded: Callable[[Array], Flags], largest: float) -> tuple[float, float]:
-    """Bounds of the first force that exceeds a limit [N]; infinite if no force does."""
+    """Bounds of the smallest force that exceeds a limit [N]; infinite if no force exceeds a limit."""
     low, forces = 0.0, np.geomspace(SMALLEST * largest, largest, FORCES)
     high = np.inf
     for _ in range(ITERATIONS):

@@ -46,7 +46,7 @@ def verdict(snapshot: Snapshot) -> str:
 
 
 def headline(snapshot: Snapshot) -> str:
-    """The verdict in one or two words; it is the status if a pose is neither feasible nor proved infeasible."""
+    """The verdict in one or two words; the status, if the pose is neither feasible nor proved infeasible."""
     if snapshot.solved:
         return "Feasible"
     if snapshot.status is PoseStatus.INFEASIBLE:
@@ -183,7 +183,7 @@ def _ends(robot: Robot) -> str:
 
 
 def _nearest_limit(snapshot: Snapshot, unit: ForceUnit) -> str:
-    """The tension nearest to its limit, with the limit and the distance; or all tensions at their limits."""
+    """Text of the tension nearest to its limit, with the limit and the distance; or of all tensions at their limits."""
     margin, robot = snapshot.margin, snapshot.robot
     reach = _ALONE * float(np.nanmax(np.where(np.isfinite(robot.tension_max), robot.tension_max, margin.max())))
     at = np.flatnonzero(margin <= reach)

@@ -39,7 +39,7 @@ class Nodes:
         node = self._made.get(name)
         points = values.get("points")
         if node is not None and points is not None and len(node.points) != len(points):
-            node.remove()  # points and colors of another number would not arrive together
+            node.remove()  # if the number changes, points and colors would not arrive together
             node = None
         if node is None:
             node = self._made[name] = make(name, visible=visible, **values)
@@ -200,7 +200,7 @@ class RobotScene:
             )
 
     def place(self, pose: Pose) -> None:
-        """Move the platform with its gizmo to a pose."""
+        """Move the platform and its gizmo to a pose."""
         self._gizmo.position = pose.position
         self._gizmo.wxyz = np.roll(pose.quaternion, 1)
 
@@ -263,7 +263,7 @@ class RobotScene:
     def _build_lights(self) -> None:
         """Add light from above and below without shadows and environment map, for computers without a graphics card.
 
-        On these, the environment map of viser would block the page for five seconds.
+        On such computers, the environment map of viser would block the page for five seconds.
         """
         self._scene.configure_environment_map(hdri=None)
         self._scene.configure_default_lights(cast_shadow=False)
@@ -304,7 +304,7 @@ class RobotScene:
         )  # fmt: skip
 
     def _build_dead_cables(self, robot: Robot) -> None:
-        """Draw dead lengths, dashed if only their rise is known."""
+        """Draw dead lengths; they are dashed if only their rise is known."""
         runs, upright = shapes.dead_runs(robot)
         for name, which in (("/dead", upright), ("/dead_assumed", ~upright)):
             shown = runs[which & (runs[:, 0, 2] != runs[:, 1, 2])]
@@ -345,7 +345,7 @@ def _move(frame: Any, pose: Pose, other: Pose | None, error_scale: float) -> Non
 
 
 def _without_rounding(values: Array) -> Array:
-    """Values with 0 in place of the rounding errors of a browser, which turn a level platform by 1e-48."""
+    """Values, in which 0 replaces a browser's rounding errors; these would tilt a level platform by 1e-48."""
     return np.where(np.abs(values) < ROUNDING, 0.0, values)
 
 

@@ -40,7 +40,7 @@ SCRIPTS: Final = (  # in the order of execution, before viser's client
 NAME: Final = "sagline"  # title, label of the hidden text field, and prefix of the hidden pieces of HTML
 LOOPBACK: Final = "127.0.0.1"
 PORT: Final = 8080
-LOUD: Final = ("websockets.server", "asyncio")  # loggers to silence
+LOUD: Final = ("websockets.server", "asyncio")  # loggers whose entries are suppressed
 LONGEST: Final = 10_000  # largest number of characters in a message from a page
 _STOCK = infra.WebsockServer
 _ICON = (  # icon: a platform on two cables that sag
@@ -105,7 +105,7 @@ def _serving_our_page(title: str, access: Access) -> Iterator[None]:
 
 
 _running: list[PageServer] = []
-_quiet_process = ExitStack()  # silences the logging of the whole process while a server runs
+_quiet_process = ExitStack()  # suppresses the logs of the whole process while a server runs
 
 
 class PageServer(viser.ViserServer):
@@ -133,7 +133,7 @@ class PageServer(viser.ViserServer):
         return f"http://{bracketed(place)}:{self.get_port()}{path}"
 
     def request_share_url(self, verbose: bool = True) -> str | None:
-        """Reject the request, because viser would publish the page under a public address."""
+        """Reject the request for a tunnel, because viser would publish the page under a public address."""
         return None
 
 

@@ -1,4 +1,4 @@
-"""Logs of the controller in the form for the timeline."""
+"""Logs of the controller in the form that the player and the timeline need."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ WRONG = (State.FAULT, State.EMERGENCY)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlayedLog:
-    """N cycles of a controller, starting at time 0."""
+    """N cycles of a controller; their times begin at 0."""
 
     robot: Robot
     time: Array  # times of the cycles from 0 [s], shape (N,)
@@ -66,7 +66,7 @@ class PlayedLog:
     unchanged = "A log keeps its robot and loads; drag the platform to change them."
 
     def __post_init__(self) -> None:
-        """Determine for each cycle the cycle whose position is shown."""
+        """Determine, for each cycle, the cycle whose position is shown instead if its own is unknown."""
         known = np.flatnonzero(np.isfinite(self.position[:, 0]))
         last = np.searchsorted(known, np.arange(len(self.time)), side="right") - 1
         rows = known[np.maximum(last, 0)] if known.size else np.full(len(self.time), -1)
@@ -198,7 +198,7 @@ class PlayedLog:
 
 
 class LogFollower:
-    """Reader of a log file and of the log file of its twin, also while they grow."""
+    """Reader of a log file and, optionally, of the twin's log file; both files may still grow."""
 
     def __init__(self, file: os.PathLike[str] | str, truth: os.PathLike[str] | str | None = None) -> None:
         """Open the log and the log of the twin."""
@@ -218,7 +218,7 @@ class LogFollower:
         return self._reader.log.robot
 
     def more(self) -> PlayedLog | None:
-        """Read new cycles; returns the whole log, or None without new cycles."""
+        """Read new cycles; returns the whole log, or None if there are no new cycles."""
         grown = self._reader.more()
         if self._truth is not None and self._truth.more():
             grown = True

@@ -49,11 +49,11 @@ def chords(robot: Robot, pose: Pose, exits: Array | None = None) -> Array:
 
 
 def dead_runs(robot: Robot) -> tuple[Array, NDArray[np.bool_]]:
-    """Dead lengths as vertical lines below the frame anchors, because only their lengths and rises are known.
+    """Dead lengths as vertical lines below the frame anchors; only their lengths and rises are known, not their paths.
 
     Returns:
-        Frame anchors and the points lower by the rises [m], shape (m, 2, 3); and True for each one that is vertical
-        according to its length and rise, shape (m,).
+        Frame anchors, and the points below them at the distance of the rises [m], shape (m, 2, 3). True for each dead
+        length that is vertical, because its length is equal to its rise, shape (m,).
     """
     winches = robot.winches
     low = robot.frame_anchors.copy()
@@ -158,7 +158,7 @@ def size_of(robot: Robot) -> float:
 
 
 def frame_solid(robot: Robot) -> Solid:
-    """The twelve beams of the robot's box, dashed where the box is assumed."""
+    """The twelve beams of the robot's box; they are dashed if the box is assumed."""
     low, high = bounds(robot)
     corners = low + (_SIGNS + 0.5) * (high - low)
     edges = [(a, b) for a, b in combinations(range(8), 2) if np.count_nonzero(_SIGNS[a] != _SIGNS[b]) == 1]

@@ -98,7 +98,7 @@ def picture_of(cut: Slice, scale: MarginScale, unit: ForceUnit) -> Picture:
 
 
 def _marks(lines: list[tuple[float, Array]], cut: Slice, unit: ForceUnit) -> list[tuple[str, Array]]:
-    """Labels of the lines, that of 0 first; each label is at the farthest point of its line in its own direction."""
+    """Labels of the lines, beginning with 0; each is at the farthest point of its line in a direction of its own."""
     apart = APART * max(float(np.ptp(cut.across)), float(np.ptp(cut.up)))
     marks: list[tuple[str, Array]] = []
     for k, (edge, segments) in enumerate(lines):

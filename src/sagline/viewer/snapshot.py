@@ -83,7 +83,7 @@ class Settings:
 
     @property
     def changes(self) -> tuple[float, float, float]:
-        """Key of the changes of the robot: mass, density and stiffness."""
+        """Key that identifies the changes of the robot: mass, density and stiffness."""
         return self.mass, self.density, self.stiffness
 
     def applied(self, robot: Robot) -> Robot:
@@ -182,7 +182,7 @@ def snapshot_at(
     previous: Plan | None,
     wrench: Array | None = None,
 ) -> Snapshot:
-    """Solution of a robot, already changed by the settings, at rest at a pose."""
+    """Solution at rest at a pose, for a robot to which the changes of the settings have already been applied."""
     reference = _remembered(previous, settings.tension)
     try:
         plan = inverse(robot, pose, settings.model, settings.tension, wrench, reference)

@@ -60,7 +60,7 @@ class TensionScale:
 
     @classmethod
     def of_pose(cls, tension: Array, otherwise: TensionScale) -> TensionScale:
-        """The scale between the tensions of one pose (m,); `otherwise` without positive tensions."""
+        """The scale between the smallest and largest tension of a pose (m,); `otherwise`, if no tension is positive."""
         known = tension[np.isfinite(tension) & (tension > 0.0)]
         if not known.size:
             return otherwise
@@ -82,7 +82,7 @@ class TensionScale:
         return np.where(known[..., None], np.rint(mixed).astype(np.uint8), GRAY)
 
     def linear_colors(self, tension: Array) -> Colors:
-        """The same colors before the sRGB curve, which viser's client applies to the colors of line ends."""
+        """The same colors without the sRGB curve, which viser's client applies to the colors of line ends."""
         return linear(self.colors(tension))
 
     def ticks(self) -> tuple[float, ...]:
@@ -131,7 +131,7 @@ def number_text(value: float, form: str) -> str:
 
 
 def force_unit(robot: Robot) -> ForceUnit:
-    """Unit of the forces of a robot, determined by its highest tension and the same at all poses."""
+    """Unit of the forces of a robot; its highest tension determines the unit, which is the same at all poses."""
     return ForceUnit.up_to(TensionScale.of(robot).high)
 
 
