@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -162,12 +163,8 @@ def simulate(
             output.draw(lambda: plot.simulation(simulation), lambda: plot.energy(simulation))
     summary = summary_of(simulation)
     assert summary is not None
-    output.report(
-        lambda: {"robot": robot.name, **summary.json, "events": [_record(event) for event in simulation.events]},
-        _verdict(simulation, summary),
-        lambda: _tell(simulation, summary),
-        as_json=as_json,
-    )
+    record = {"robot": robot.name, **summary.json, "events": [_record(event) for event in simulation.events]}
+    output.report(lambda: record, _verdict(simulation, summary), partial(_tell, simulation, summary), as_json=as_json)
     return 0
 
 

@@ -157,8 +157,7 @@ def vibrate(
         modes = listed_modes(found)
         _check_film(film, modes)
         if write_table:
-            rows = [["" if value is None else value for value in _numbers(mode)] for mode in modes]
-            output.table(TABLE, [[column.replace("_hz", " [Hz]") for column in COLUMNS], *rows])
+            output.table(TABLE, _rows(modes))
         if figures and found.status is VibrationStatus.SOLVED and found.frequency.size:
             from sagline import plot
 
@@ -168,16 +167,18 @@ def vibrate(
             from sagline import plot
 
             plot.film(found, film, output.file(reel), progress=line.stage(f"filming mode {film}"))
-    output.report(
-        lambda: _record(found, modes),
-        _verdict(found, modes),
-        lambda: _tell(found, modes, plan.state),
-        as_json=as_json,
-    )
+    tell = partial(_tell, found, modes, plan.state)
+    output.report(partial(_record, found, modes), _verdict(found, modes), tell, as_json=as_json)
     if found.status is VibrationStatus.FOLDED:
         slack = ", ".join(map(str, found.slack_cables))
         show_note(f"Cables {slack}: ", found.status.text, style="bold")
     return 0
+
+
+def _rows(modes: list[ListedMode]) -> list[list[object]]:
+    """Rows of the table of all modes; the first row has the names of the columns."""
+    rows = [["" if value is None else value for value in _numbers(mode)] for mode in modes]
+    return [[column.replace("_hz", " [Hz]") for column in COLUMNS], *rows]
 
 
 def _check_film(film: int | None, modes: list[ListedMode]) -> None:

@@ -51,8 +51,8 @@ LoadsOption = Annotated[
 ]
 
 
-def _criteria(robot: str, limits: dict[str, float | None], scene: str | None, *, in_frame: bool) -> list[Criterion]:
-    """The criteria that the options state; without --scene, the scene of the robot file is used."""
+def _criteria(robot: str, limits: Sequence[float | None], scene: str | None, *, in_frame: bool) -> list[Criterion]:
+    """The criteria that the options state, in the order of their limits; without --scene, the robot's scene is used."""
     from sagline.workspaces.criteria import (
         Clearance,
         InFrame,
@@ -62,14 +62,13 @@ def _criteria(robot: str, limits: dict[str, float | None], scene: str | None, *,
         MaximumSag,
     )
 
-    kinds: dict[str, Callable[[float], Criterion]] = {
-        "reserve": LeastMargin,
-        "max_sag": MaximumSag,
-        "min_stiffness": LeastStiffness,
-        "min_frequency": LeastFrequency,
-        "clearance": lambda limit: Clearance(limit, _obstacles(robot, scene)),
-    }
-    found = [kinds[name](limit) for name, limit in limits.items() if limit is not None]
+    def with_clearance(limit: float) -> Criterion:
+        return Clearance(limit, _obstacles(robot, scene))
+
+    kinds: tuple[Callable[[float], Criterion], ...] = (
+        LeastMargin, MaximumSag, LeastStiffness, LeastFrequency, with_clearance
+    )  # fmt: skip
+    found = [kind(limit) for kind, limit in zip(kinds, limits, strict=True) if limit is not None]
     return found + [InFrame()] * in_frame
 
 
@@ -187,13 +186,7 @@ def workspace(
     from sagline.workspaces.proof import ProofVerdict, prove
     from sagline.workspaces.workspace import workspace
 
-    limits = {
-        "reserve": reserve,
-        "max_sag": max_sag,
-        "min_stiffness": min_stiffness,
-        "min_frequency": min_frequency,
-        "clearance": clearance,
-    }
+    limits = (reserve, max_sag, min_stiffness, min_frequency, clearance)
     cable = model.build()
     if tilt > pi:  # a number without unit is in radians, but the user may have meant degrees
         step = "Give the angle with its unit, --tilt 10deg; it cannot be more than half a turn."
@@ -204,17 +197,8 @@ def workspace(
     parts, drawn = [space_file, mesh, *[limits_file] * table], ["-workspace", "-slice"] if figures else []
     output = Output(folder, file_stem(robot.name), parts, drawn, formats, style)
     with working(f"{robot.name}: workspace") as line:
-        space = workspace(
-            robot,
-            box,
-            loads,
-            orientations=Tilts(tilt),
-            criteria=criteria,
-            model=cable,
-            cells=cells,
-            hull=hull.value,
-            progress=line.progress,
-        )
+        how: dict[str, Any] = {"model": cable, "cells": cells, "hull": hull.value, "progress": line.progress}
+        space = workspace(robot, box, loads, orientations=Tilts(tilt), criteria=criteria, **how)
         proof = None
         if to_prove is not None:
             claim = PoseBox(to_prove.low, to_prove.high, tilt)
@@ -224,21 +208,33 @@ def workspace(
         if space.nearest is None:
             space.surface.export(output.file(mesh))
             if figures:
-                from sagline import plot
-
                 line.stage("drawing")
-                output.draw(lambda: plot.workspace(space))
-                if space.unit == "m³":  # for a plane, the first figure is the slice through the workspace
-                    output.draw(lambda: plot.slice(space))
+                _draw(space, output)
         if table:
-            rows = [[limit.criterion, "" if limit.cable < 0 else limit.cable, limit.share] for limit in space.limits]
-            output.table(limits_file, [["criterion", "cable", "share"], *rows])
+            output.table(limits_file, _rows_of_limits(space))
     verdict = str(space).partition("\n")[0]
     output.report(lambda: _record(space, proof), verdict, lambda: _tell(space, proof), as_json=as_json)
     if space.nearest is not None:
         show_note("Empty workspace: ", space.nearest.reason, style="bold red")
     proved = proof is None or proof.verdict is ProofVerdict.PROVED_INSIDE
     return 0 if space.nearest is None and proved else OUTSIDE
+
+
+def _draw(space: Workspace, output: Output) -> None:
+    """Draw the workspace, and a slice of it unless it is plane."""
+    from sagline import plot
+
+    output.draw(lambda: plot.workspace(space))
+    if space.unit == "m³":  # for a plane, the first figure is the slice through the workspace
+        output.draw(lambda: plot.slice(space))
+
+
+def _rows_of_limits(space: Workspace) -> list[list[object]]:
+    """Rows of the table of the criteria that limit the workspace; the first row has the names of the columns."""
+    rows: list[list[object]] = [
+        [limit.criterion, "" if limit.cable < 0 else limit.cable, limit.share] for limit in space.limits
+    ]
+    return [["criterion", "cable", "share"], *rows]
 
 
 def _tell(space: Workspace, proof: Proof | None) -> None:

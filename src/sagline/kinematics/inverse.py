@@ -18,7 +18,7 @@ from sagline.core.memory import check_poses
 from sagline.core.numbers import n
 from sagline.core.progress import Progress
 from sagline.kernels import codes
-from sagline.kinematics.inverse_rows import decide_rows, decide_stability, solve_inverse_rows
+from sagline.kinematics.inverse_rows import InverseRows, Verdicts, decide_rows, decide_stability, solve_inverse_rows
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
 from sagline.kinematics.underconstrained import Given, given_codes, solve_underconstrained_rows
@@ -116,19 +116,16 @@ def inverse(
     check_reach(shared, pose, "pose")
     check_plane(shared, pose, "pose")
     values = given_codes(shared, given)
-    options = None if values is not None else kernel_options(robots, model, method)
-    rows = pose_rows(pose)
-    count = len(rows)
-    check_poses(count, shared.cable_count, has_routing(robots))
-    load = external_wrench(wrench, count if pose.shape else None)
-    if isinstance(motion, Path):
-        load = locked(inertial_wrench(robots, pose, motion.twist, motion.twist_rate) + load)
+    options = kernel_options(robots, model, method) if values is None else None
+    rows, path = pose_rows(pose), motion if isinstance(motion, Path) else None
+    check_poses(len(rows), shared.cable_count, has_routing(robots))
+    load = external_wrench(wrench, len(rows) if pose.shape else None)
+    if path is not None:
+        load = locked(inertial_wrench(robots, pose, path.twist, path.twist_rate) + load)
     loads = np.atleast_2d(load)
     if options is None:
-        level, chained = number(level, "level", "N"), isinstance(motion, Path)
-        found, verdicts, rows = solve_underconstrained_rows(
-            robots, model, rows, loads, values, level, chained, progress
-        )
+        asked = values, number(level, "level", "N"), path is not None
+        found, verdicts, rows = solve_underconstrained_rows(robots, model, rows, loads, *asked, progress)
         pose = Pose.from_quaternion(rows[:, :3].reshape(*pose.shape, 3), rows[:, 3:].reshape(*pose.shape, 4))
     else:
         reference = _reference(shared, previous, tension.variable)
@@ -148,21 +145,29 @@ def inverse(
         state = equilibrium()
     if stability:
         decide_stability(robots, (model.code, *model.parameters), rows, found, verdicts)
-    plan = Plan(
-        state=state,
-        path=motion if isinstance(motion, Path) else None,
-        tension=tension,
-        status=locked(found.pose_status.reshape(pose.shape)),
-        shortfall=locked(verdicts.shortfall.reshape(pose.shape)),
-        wrench_residual=locked(found.residuals.reshape(*pose.shape, 2)),
-        blocking=locked(verdicts.blocking.reshape(*pose.shape, shared.cable_count)),
-        farkas=locked(_in_world(verdicts.farkas, shared).reshape(*pose.shape, 6)),
-        needed=locked(_in_world(found.needed, shared).reshape(*pose.shape, 6)),
-        bracket=locked(verdicts.brackets.reshape(*pose.shape, 2)),
-        relief=locked(np.ascontiguousarray(_in_world(verdicts.reliefs, shared)[:, :3]).reshape(*pose.shape, 3)),
-        at_border=locked(verdicts.at_border.reshape(pose.shape)),
-    )
+    plan = _plan_of(state, path, tension, found, verdicts)
     return plan if winding is None or turning is not None else _with_path_friction(plan)
+
+
+def _plan_of(
+    state: Equilibrium, path: Path | None, tension: TensionMethod, found: InverseRows, verdicts: Verdicts
+) -> Plan:
+    """Plan of solved rows, in the shape of the poses."""
+    shared, shape = first_of(state.robot), state.pose.shape
+    return Plan(
+        state=state,
+        path=path,
+        tension=tension,
+        status=locked(found.pose_status.reshape(shape)),
+        shortfall=locked(verdicts.shortfall.reshape(shape)),
+        wrench_residual=locked(found.residuals.reshape(*shape, 2)),
+        blocking=locked(verdicts.blocking.reshape(*shape, shared.cable_count)),
+        farkas=locked(_in_world(verdicts.farkas, shared).reshape(*shape, 6)),
+        needed=locked(_in_world(found.needed, shared).reshape(*shape, 6)),
+        bracket=locked(verdicts.brackets.reshape(*shape, 2)),
+        relief=locked(np.ascontiguousarray(_in_world(verdicts.reliefs, shared)[:, :3]).reshape(*shape, 3)),
+        at_border=locked(verdicts.at_border.reshape(shape)),
+    )
 
 
 def equilibrium_at(robot: Robot, pose: PoseLike) -> Equilibrium:

@@ -127,13 +127,8 @@ def _fill_tension_level(gram: Array, work: Array, along: Array) -> None:
     m = along.size
     for i in range(m):
         along[i] = (1.0 + 0.1 * i) * (1.0 if i % 2 == 0 else -1.0)
-    for _ in range(ITERATIONS):
-        square = 0.0
+    for _ in range(ITERATIONS):  # the vector grows by at most 1/RIDGE in each
         for i in range(m):
-            square += along[i] * along[i]
-        size = 1.0 / math.sqrt(square)
-        for i in range(m):
-            along[i] *= size
             for j in range(m):
                 work[i, j] = gram[i, j]
         solve_general(work, along)
