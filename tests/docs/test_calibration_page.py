@@ -71,7 +71,7 @@ def slopes(unknowns: tuple[str, ...]) -> tuple[Array, tuple[str, ...]]:
 
 @pytest.mark.parametrize(
     ("by", "words"),
-    [(("length_zero",), "zeros alone has {} %"), (("length_zero", "frame_anchors"), "together have {} %")],
+    [(("length_zero",), "zeros alone reproduces {} %"), (("length_zero", "frame_anchors"), "together reproduce {} %")],
 )
 def test_how_much_of_a_pulley_zeros_and_anchors_imitate(by: tuple[str, ...], words: str) -> None:
     matrix, names = slopes((*by, "pulley_radius"))
