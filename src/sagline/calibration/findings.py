@@ -104,6 +104,25 @@ class Criticism(Result):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class SensorDeviation(Result):
+    """Standard deviation of a kind of sensor, or of the sensor of a cable, from the residuals of a calibration.
+
+    Attributes:
+        quantity: "length", "load cell", "position" or "rotation".
+        cable: Index of the cable, or None for all cables.
+        stated: Standard deviation of `Sensors` [m, N or rad].
+        found: Standard deviation from the residuals; NaN if the readings do not determine it.
+        error: Standard error of `found`.
+    """
+
+    quantity: str
+    cable: int | None
+    stated: float
+    found: float
+    error: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class CrossValidation(Result):
     """Errors of predictions at poses that the calibration did not use.
 

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.cables.model import CableModel
-from sagline.calibration import summary
-from sagline.calibration.findings import Findings
+from sagline.calibration import scatter, summary
+from sagline.calibration.findings import Findings, SensorDeviation
 from sagline.calibration.log import Sensors
 from sagline.calibration.observations import unwhitened_slopes
 from sagline.calibration.parameters import Parameters
-from sagline.core.arguments import choice
+from sagline.core.arguments import choice, flag
 from sagline.core.arrays import Array, locked, numbers
 from sagline.core.numbers import counted, n
 from sagline.core.results import Result, Saved
@@ -232,6 +232,19 @@ class Calibration(Findings, Saved):
         motions = _common_motions(poses[part][there])[:, :3].reshape(-1, 4)
         right = by_values[there].reshape(-1, by_values.shape[-1])
         return np.asarray(np.linalg.lstsq(motions, right, rcond=None)[0])
+
+    def sensor_deviations(self, *, per_cable: bool = False) -> tuple[SensorDeviation, ...]:
+        """Standard deviations of the sensors from the residuals, by restricted maximum likelihood (REML).
+
+        They are estimates for `Sensors` if the model is right. A wrong model increases them.
+
+        Args:
+            per_cable: True for a deviation of each length sensor and each load cell.
+
+        Returns:
+            One deviation per kind of sensor, or per sensor; empty if lengths are the only readings.
+        """
+        return scatter.sensor_deviations(self, per_cable=flag(per_cable, "per_cable"))
 
     def table(self) -> str:
         """Every value with its standard error, its prior and its change, one per line."""

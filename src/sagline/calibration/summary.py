@@ -10,6 +10,7 @@ import numpy as np
 
 from sagline.calibration.findings import CalibrationStatus, Direction, Findings, Outlier
 from sagline.calibration.parameters import KINDS, Parameters, is_observed
+from sagline.calibration.scatter import sensor_deviations
 from sagline.core.arrays import Array, Indices
 from sagline.core.numbers import SPACE, counted, n, plus_minus
 
@@ -18,6 +19,7 @@ CLEARLY: Final = 4.0  # standard deviations by which chi squared is clearly belo
 MOST_OUTLIERS: Final = 12  # largest number of listed items; the number of further items is given
 MOST_ROWS: Final = 8  # largest number of listed rows of the log; the number of further rows is given
 UNITS: Final = {"length": "m", "load cell": "N", "position": "m", "rotation": "rad"}
+SMALL: Final = {"m": (1e3, "mm"), "N": (1.0, "N"), "rad": (1e3, "mrad")}  # units of deviations
 ANCHORS: Final[tuple[Anchors, ...]] = ("frame_anchors", "platform_anchors")
 
 
@@ -26,6 +28,7 @@ def calibration_text(found: Findings, width: int = WIDTH) -> str:
     parts = (
         _verdict(found, width),
         _rows(found, width),
+        _sensors(found, width),
         _criticisms(found, width),
         _values(found, width),
         _directions(found.gauge, "Unobservable; the values of the robot file are kept:", width),
@@ -124,6 +127,21 @@ def _rows(found: Findings, width: int) -> Iterator[str]:
     yield f"Rows: {len(found.rows):,} of {len(found.rows) + count:,} were used, {count:,} left out:"
     for reason, rows in left.items():
         yield from _wrapped(f"{reason.text}: {row_ranges(rows)}", width, "  ")
+
+
+def _sensors(found: Findings, width: int) -> Iterator[str]:
+    """Lines with the standard deviations of the sensors from the residuals."""
+    if found.status is CalibrationStatus.NOT_CONVERGED or not (deviations := sensor_deviations(found)):
+        return
+    parts = []
+    for one in deviations:
+        name, (scale, unit) = f"{one.quantity}s", SMALL[UNITS[one.quantity]]
+        stated = n(scale * one.stated, ".3g", unit)
+        now = plus_minus(scale * one.found, scale * one.error, prefixed=False)
+        scatter = f"{name} scatter by {now}{SPACE}{unit} ({stated} stated)"
+        parts.append(scatter if np.isfinite(one.found) else f"the log does not determine the scatter of {name}")
+    doubt = "; a wrong model also increases these values" if found.status is CalibrationStatus.DOUBTFUL else ""
+    yield from _wrapped(f"Sensors: {'; '.join(parts)}{doubt}", width)
 
 
 def _criticisms(found: Findings, width: int) -> Iterator[str]:
