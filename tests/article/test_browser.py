@@ -15,6 +15,7 @@ from playwright.sync_api import Browser, Locator, Page
 from sagline.article.report import ArticleReport
 from tests.chromium import NEEDED, PATIENCE, launched
 from tests.tiers import extended
+from tests.viewer.reach import broken_rules
 
 FLAGS = "--disable-quic --disable-gpu"
 WIDTHS, THEMES = (390, 768, 1440), ("light", "dark")
@@ -68,6 +69,7 @@ def test_every_text_can_be_read_and_the_page_does_not_scroll_sideways(
     page = opened(browser, report, width, theme)
     found = page.evaluate(CONTRASTS)
     assert len(found) > 500
+    assert broken_rules(page) == {}
     assert [(ratio, text) for ratio, text in found if ratio < 4.5] == []
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     page.close()

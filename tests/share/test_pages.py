@@ -19,6 +19,7 @@ from sagline.viewer.shapes import platform_solid
 from tests.chromium import NEEDED, launched
 from tests.share.opening import FLAGS, asking, opened
 from tests.tiers import extended
+from tests.viewer.reach import broken_rules
 
 CONTRAST = (Path(__file__).parents[1] / "viewer" / "contrast.js").read_text()
 SIZES = ((390, 640), (1000, 640), (1440, 900))
@@ -28,8 +29,6 @@ OVERFLOWING = """[...document.querySelectorAll("body *:not(.heard)")].filter((ea
 STATES = (
     "Object.fromEntries(Object.entries(it.course).map(([name, all]) => [name, all.map((each) => Array.from(each))]))"
 )
-NAMELESS = """[...document.querySelectorAll("button, input, select, canvas")]
-    .filter((each) => !(each.getAttribute("aria-label") || each.labels?.[0]?.innerText || each.innerText)).length"""
 
 pytestmark = [extended, NEEDED]
 
@@ -68,7 +67,7 @@ def check_look(page: Page) -> None:
     assert len(texts) > 20
     assert {(text["words"], round(text["ratio"], 2)) for text in texts if not text["ratio"] >= 4.5} == set()
     assert page.evaluate(OVERFLOWING) == []
-    assert page.evaluate(NAMELESS) == 0
+    assert broken_rules(page) == {}
 
 
 def pixels(page: Page) -> bytes:

@@ -30,6 +30,15 @@
     dangling: () => [...document.querySelectorAll("[aria-labelledby], [aria-describedby]")].filter(shown).filter((each) =>
       ["aria-labelledby", "aria-describedby"].some((key) => (each.getAttribute(key) ?? "").split(/\s+/).filter(Boolean)
         .some((id) => !document.getElementById(id)))).map(told),
+    // regions that scroll, but not by keys
+    scrolling: () => [...document.querySelectorAll("body *")].filter((each) => shown(each) && each.tabIndex < 0
+      && /auto|scroll/.test(getComputedStyle(each).overflowY) && each.scrollHeight > each.clientHeight + 1
+      && !reachable().some((one) => each.contains(one))).map(told),
+    twice: () => [...document.querySelectorAll("[id]")].map((each) => each.id)
+      .filter((id, k, all) => all.indexOf(id) < k),
+    page: () => Object.entries({ lang: document.documentElement.lang, title: document.title.trim(),
+      zoom: !/user-scalable=no|maximum-scale/.test(document.querySelector("meta[name=viewport]")?.content) })
+      .flatMap(([what, found]) => (found ? [] : [what])),
     // Tab from the start of the page: number the elements, and see that each shows that it has the focus
     begin: () => {
       const start = document.createElement("i"); // Tab goes on from the last focus: put it before everything

@@ -6,7 +6,7 @@ from typing import Final
 from playwright.sync_api import Page
 
 RULES: Final = Path(__file__).with_name("reach.js").read_text()
-CHECKED: Final = ("unnamed", "unreached", "nested", "pictures", "dangling")
+CHECKED: Final = ("unnamed", "unreached", "nested", "pictures", "dangling", "scrolling", "twice", "page")
 MOST_STOPS: Final = 400
 SILENT: Final = ("RootWebArea", "dialog", "generic")  # roles that may have the focus without being a control
 

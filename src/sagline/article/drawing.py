@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from html import escape
 from itertools import count
 from math import ceil
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
@@ -52,7 +53,8 @@ class Drawings:
         """Convert a figure to a drawing of the page; screen readers read the caption."""
         svg = svg_text(figure, 200, **{"svg.hashsalt": "sagline", "svg.fonttype": "path"})
         svg = _size.sub("", _remarks.sub("", svg).strip(), count=2)  # the page determines the size
-        return Panel(unique_names(svg.replace("<svg ", '<svg role="img" ', 1), next(self._names)), caption)
+        svg = svg.replace("<svg ", f'<svg role="img" aria-label="{escape(caption)}" ', 1)
+        return Panel(unique_names(svg, next(self._names)), caption)
 
 
 def axes(x: str, y: str, height: float = HEIGHT) -> tuple[Sheet, Axes]:
