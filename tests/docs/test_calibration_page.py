@@ -14,6 +14,7 @@ from sagline.core.arrays import Array
 from sagline.statics.tables import pose_rows
 from tests.calibration.synthetic import USUAL, log_of, true_robot, with_drums
 from tests.tiers import extended
+from tools.pages.snippets import blocks
 
 pytestmark = extended
 
@@ -55,7 +56,8 @@ def slopes(unknowns: tuple[str, ...]) -> tuple[Array, tuple[str, ...]]:
     """Whitened slopes of the page's readings over pulleys, and whose the columns are."""
     drawn = sl.load_robot("cogiro").replace(winches=sl.Winch(pulley_radius=0.03))
     names: dict[str, object] = {}
-    code = re.findall(r"^```python\n(.*?)^```$", (ROOT / "docs" / "calibration.md").read_text(), re.M | re.S)[0]
+    page = blocks((ROOT / "docs" / "calibration.md").read_text(encoding="utf-8"))
+    code = next(block.text for block in page if block.kind == "python")
     exec(code.partition("\n\ndef read")[0], names)  # the places where it stands
     poses, ways = names["poses"], names["ways"]
     assert isinstance(poses, sl.Pose)

@@ -9,7 +9,7 @@ import typer
 
 from tests.abuse.command_lines import commands
 from tests.tiers import extended
-from tools.pages.gallery import SHOWN, shown
+from tools.pages.gallery import SHOWN, command_reference, shown
 
 pytestmark = extended
 
@@ -24,6 +24,13 @@ def lines_of(text: str) -> list[list[str]]:
 
 def test_the_gallery_shows_every_command_and_no_other() -> None:
     assert {*SHOWN, "view"} == commands().keys()
+
+
+def test_the_page_of_the_command_shows_every_command_and_its_examples_as_code() -> None:
+    page = command_reference()
+    assert [name for name in commands() if f"\n\n{shown(name)}\n" not in page] == []
+    assert "\b" not in page  # the mark of click before examples
+    assert re.search(r"^    sagline track \w", page, re.MULTILINE)
 
 
 @pytest.mark.parametrize("name", sorted(commands()))

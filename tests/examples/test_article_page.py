@@ -6,13 +6,16 @@ from typing import Any
 
 import pytest
 
+from tools.pages.snippets import blocks
+
 PAGE = Path(__file__).parents[2] / "docs" / "article.md"
 
 
 def test_snippets_run_and_print_what_they_should(capsys: pytest.CaptureFixture[str]) -> None:
     names: dict[str, Any] = {}
-    for snippet in re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), flags=re.DOTALL):
-        exec(compile(snippet, str(PAGE), "exec"), names)
+    for block in blocks(PAGE.read_text(encoding="utf-8")):
+        if block.kind == "python":
+            exec(compile(block.text, str(PAGE), "exec"), names)
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "k_h = 4.878, k_p = 4.009"
     assert re.findall(r"[\d.]+ N", lines[1]) == ["100 N", "2.9 N"]

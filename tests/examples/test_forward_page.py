@@ -1,6 +1,5 @@
 """The snippets of docs/forward.md run as they stand, one after another."""
 
-import re
 from pathlib import Path
 from typing import Any
 
@@ -8,14 +7,16 @@ import numpy as np
 import pytest
 
 import sagline as sl
+from tools.pages.snippets import blocks
 
 PAGE = Path(__file__).parents[2] / "docs" / "forward.md"
 
 
 def test_snippets_run_and_say_what_the_page_says(capsys: pytest.CaptureFixture[str]) -> None:
     names: dict[str, Any] = {}
-    for snippet in re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), flags=re.DOTALL):
-        exec(compile(snippet, str(PAGE), "exec"), names)
+    for block in blocks(PAGE.read_text(encoding="utf-8")):
+        if block.kind == "python":
+            exec(compile(block.text, str(PAGE), "exec"), names)
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith("solved: ")
     assert lines[1] == "[ 1.  -0.5  2. ]"

@@ -97,7 +97,7 @@ def command_reference() -> str:
     """The help of `sagline` and of each of its commands, with figures."""
     text = ran(EXAMPLES, "-m", "typer", "sagline.cli.main", "utils", "docs", "--name", "sagline")
     lines = [f"- [`sagline {name}`](#sagline-{name}): {summary}" for name, summary in summaries().items()]
-    text = text.replace("# `sagline`\n", "# The command\n", 1)
+    text = text.replace("# `sagline`\n", "# The command\n", 1).replace("\b\n", "")  # examples are code
     text = re.sub(r"\*\*Commands\*\*:\n\n(?:\* .*\n)+", "**Commands**:\n\n" + "\n".join(lines) + "\n", text)
     text = re.sub(r"^```console\n\$ ", "```\n", text, flags=re.MULTILINE)
     text = re.sub(r"^\* `--help`: .*\n", "", text, flags=re.MULTILINE)
