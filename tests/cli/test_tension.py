@@ -71,7 +71,7 @@ def test_large_forces_have_a_prefix_and_ordinary_spaces(folder: FilePath) -> Non
     plan = sl.inverse(robot, sl.Pose([0, 0, 2], np.eye(3)), wrench=[0, 0, -30000, 0, 0, 0])
     assert f" {float(plan.shortfall) / 1e3:.4g} kN; " in result.stderr
     result = sagline("article-suspended", "--pose", "0,0,2", "--no-figures")
-    assert "balance: " in result.stdout
+    assert "margin: " in result.stdout
     assert "\u00a0" not in result.output
 
 

@@ -296,7 +296,8 @@ def test_another_robot_in_the_file(read: Reader, data: xr.Dataset) -> None:
                 "99 (without a meaning)",
                 (
                     "0 (solved), 1 (infeasible), 2 (singular), 3 (too_slack), 4 (not_converged), "
-                    "5 (no_chord), 6 (not_covered), 7 (unbounded), 100 (no_pose), 8 (borderline), 9 (unstable)"
+                    "5 (no_chord), 6 (not_covered), 7 (unbounded), 100 (no_pose), 8 (borderline), 9 (unstable), "
+                    "11 (no_equilibrium)"
                 ),
                 "Read it with a newer sagline.",
             ),

@@ -121,7 +121,7 @@ def test_what_frequency_response_found_is_drawn_where_it_was_asked_for(snapshot:
         np.testing.assert_allclose(np.asarray(line.get_ydata()), np.abs(answer[:0:-1, 0, 4]), rtol=1e-15)
     assert [line.get_label() for line in ax.get_lines()] == snapshot
     assert [ax.get_ylabel().replace("\n", " "), ax.get_title(loc="right")] == snapshot
-    with refused("frequency", "1 of them above 0 Hz", "two at least", kind=sl.InvalidValueError):
+    with refused("frequency", "1 of them above 0 Hz", "at least two", kind=sl.InvalidValueError):
         plot.response(sl.frequency_response(state, [0.0, 2.0]))
     with refused("motion", "'w'", DIRECTIONS, kind=sl.InvalidValueError):
         plot.response(found, "x", "w")
