@@ -55,4 +55,4 @@ def test_what_is_shown_is_of_that_command(name: str) -> None:
 
 def test_the_front_page_has_a_robot_to_drag() -> None:
     marks = re.findall(r"^<!-- shared .* -->$", (DOCS / "index.md").read_text(encoding="utf-8"), re.MULTILINE)
-    assert [lines_of(mark) for mark in marks] == [[["share", "cogiro"]]]
+    assert [lines_of(mark) for mark in marks] == [[["share", "article-mixed"]]]

@@ -21,6 +21,7 @@ SECTIONS = [  # in the order of the journal
     *("Summary", "Statement of need", "State of the field", "Software design", "Research impact statement"),
     *("AI usage disclosure", "References"),
 ]
+COUNTS = re.compile(r"(\d+) tension distribution methods .*? on (\d+) published")
 NUMBER = re.compile(r"\b\d+(?:\.\d+)?(?:e-?\d+)?\b")
 
 
@@ -78,6 +79,7 @@ def test_every_number_is_that_of_a_computation() -> None:
     assert count_of(sl.CableModel) == 5
     computed = [suspended, mixed, str(len(load_reference().group)), "90", "2e-15", "1e-12"]
     computed += [str(count_of(sl.TensionMethod)), str(len(sl.robot_names()))]
+    assert COUNTS.findall(README) == [tuple(computed[-2:])]
     found = NUMBER.findall(CITED.sub("", BODY))
     assert found == computed  # in the order of the text: each number once
 
