@@ -84,6 +84,16 @@ def late_cells(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> M
     return Mistake(shifted, (words,))
 
 
+def late_lengths(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> Mistake:
+    """All other columns stand beside the lengths of so many rows before."""
+    by = int(rng.integers(1, 4)) * int(rng.choice([-1, 1]))
+    n = len(log)
+    lengths = np.arange(max(0, -by), min(n, n - by))
+    shifted = log.rows(lengths + by).replace(**{_column(log): log.readings[lengths]})
+    words = f"seem to be {abs(by)} row{'s'[: abs(by) != 1]} {'late' if by > 0 else 'early'}"
+    return Mistake(shifted, (f"the {_column(log).removeprefix('unstrained_').removesuffix('s')}s {words}",))
+
+
 def far_zero(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> Mistake:
     i = int(rng.integers(log.readings.shape[1]))
     off = float(rng.uniform(4.0, 5.0))
@@ -141,6 +151,7 @@ MISTAKES: Final[tuple[Maker, ...]] = (
     swapped_cells,
     flipped_encoder,
     late_cells,
+    late_lengths,
     far_zero,
     millimeters,
     positions_in_millimeters,

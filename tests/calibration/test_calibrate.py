@@ -359,3 +359,34 @@ def test_an_unknown_that_is_none_is_refused_before_any_work(monkeypatch: pytest.
     )
     with refused("unknown", "'1e999'", kind=sl.InvalidValueError):
         sl.calibrate(robot, log, ["1e999"])
+
+
+@pytest.mark.parametrize(
+    ("matrix", "step"),
+    [
+        (np.diag([1.0, -1.0, 1.0]), "sign of column y"),
+        (np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), "exchange two"),
+    ],
+)
+@pytest.mark.parametrize("more", wide([[], ["measuring_frame"]]))
+def test_left_handed_axes_of_measured_positions_are_named(matrix: Array, step: str, more: list[str]) -> None:
+    sensors = usual_sensors(position_deviation=1e-3)
+    log = log_of(true_robot(COGIRO, ALL, 3, sensors), 40, 3, positions=12).log
+    assert log.position is not None
+    with refused("log", kind=InvalidValueError) as caught:
+        sl.calibrate(COGIRO, log.replace(position=log.position @ matrix), [*unknowns(ALL), *more], folds=0)
+    assert "left-handed" in caught.value.value
+    assert step in caught.value.next_step
+
+
+def test_measured_positions_that_no_axes_explain_have_an_unknown_cause() -> None:
+    sensors = usual_sensors(position_deviation=1e-3)
+    log = log_of(true_robot(COGIRO, ALL, 3, sensors), 40, 3, positions=12).log
+    assert log.position is not None
+    mixed = log.position.copy()
+    rows = np.flatnonzero(~np.isnan(mixed).any(axis=1))
+    mixed[rows] = mixed[np.random.default_rng(2).permutation(rows)]
+    with refused("log", kind=InvalidValueError) as caught:
+        sl.calibrate(COGIRO, log.replace(position=mixed), unknowns(ALL), folds=0)
+    assert "not known" in caught.value.value
+    assert "axes" not in caught.value.value

@@ -99,7 +99,7 @@ def test_the_units_of_readings_are_told() -> None:
     assert told_wrongly((customary_units,), range(2)) == []
 
 
-@pytest.mark.parametrize("make", wide(MISTAKES[:5]), ids=lambda make: make.__name__)
+@pytest.mark.parametrize("make", wide(MISTAKES[:6]), ids=lambda make: make.__name__)
 def test_a_mistake_is_told_by_what_it_is(make: Maker) -> None:
     assert told_wrongly((make,), range(1, 2)) == []
 

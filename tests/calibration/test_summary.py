@@ -8,9 +8,16 @@ import pytest
 
 import sagline as sl
 from sagline.calibration.findings import CrossValidation, Direction, Outlier
-from sagline.calibration.summary import anchor_covariance, calibration_text, relative_covariance, row_ranges
+from sagline.calibration.summary import (
+    anchor_covariance,
+    calibration_text,
+    faulty_sensors,
+    relative_covariance,
+    row_ranges,
+)
 from sagline.core.arrays import Array
 from tests.calibration.made_up import MOTIONS, STEP, made_up, motions, parameters
+from tests.calibration.synthetic import log_of, true_robot
 from tests.refusal import refused
 
 POWERS = {"n": 1e-9, "µ": 1e-6, "m": 1e-3, "": 1.0, "k": 1e3, "M": 1e6, "G": 1e9}
@@ -256,3 +263,20 @@ def test_that_poses_count_less_is_said_only_where_they_do(found: sl.Calibration)
     less = replace(odd, weights=np.where(np.arange(len(found.rows)) == 3, 0.1, 1.0))
     heads = [re.search(r"^ *Outliers, 1(.*):$", str(one), re.MULTILINE) for one in (less, odd_alone)]
     assert [head and "less" in head[1] for head in heads] == [True, False]
+
+
+def test_a_load_cell_that_is_off_in_many_rows_is_named_as_a_load_cell() -> None:
+    robot = sl.load_robot("cogiro")
+    log = log_of(true_robot(robot, {"mass": 0.03}, 4), 60, 4).log
+    cells = np.array(log.load_cells)
+    cells[::4, 3] *= 1.4
+    cells[7, 5] += 300.0
+    found = sl.calibrate(robot, log.replace(load_cells=cells), ("mass",), folds=0)
+    (name, own), *others = faulty_sensors(found).items()
+    assert name == ("load cell", 3)
+    assert not others
+    assert {one.row for one in own} <= set(range(0, 60, 4))
+    listed = re.findall(r"^  - (.*)", str(found), re.M)
+    assert [int(number) for number in re.findall(r"\d+", listed[0])[:3]] == [3, len(own), 60]
+    assert (7, 5) in {(one.row, one.cable) for one in found.outliers if one not in own}
+    assert len(listed) == 1 + len(found.outliers) - len(own)

@@ -14,7 +14,7 @@ from sagline.calibration.diagnostics import (
     STRANGE,
     diagnose_log,
     fits_without_measured_poses,
-    frame_mismatch,
+    measured_pose_mistakes,
     wrong_units,
 )
 from sagline.calibration.evaluation import calibration_of
@@ -126,7 +126,8 @@ def calibrate(
     if not found.fit.converged or misfit(found.fit.normal) > GOOD or departure > STRANGE:
         _refuse_mistakes(robot, log, fit_log, parameters, model)
     elif Omission.OTHER_EQUILIBRIUM in found.left_out:
-        _refuse(frame_mismatch(fit_log, found.left_out[Omission.OTHER_EQUILIBRIUM], parameters.names))
+        lost = found.left_out[Omission.OTHER_EQUILIBRIUM]
+        _refuse(measured_pose_mistakes(robot, fit_log, lost, parameters.names, model))
     validation = cross_validate(problem, found, folds, robust=robust, progress=progress) if folds else None
     return calibration_of(problem, asked, found, rows, left_out, log.source, validation)
 
@@ -160,7 +161,7 @@ def _refuse_mistakes(robot: Robot, log: WinchLog, fit_log: WinchLog, parameters:
         log = log.replace(position=None, rotation=None)  # the axes of the measuring system are not known yet
     _refuse(diagnose_log(robot, log, model))
     if fits_without_measured_poses(robot, fit_log, model):
-        _refuse(frame_mismatch(fit_log, np.arange(len(fit_log)), parameters.names))
+        _refuse(measured_pose_mistakes(robot, fit_log, np.arange(len(fit_log)), parameters.names, model))
 
 
 def _refuse(sentences: Iterable[str]) -> None:

@@ -14,9 +14,9 @@ from scipy.special import chdtrc
 from sagline.calibration.findings import Criticism
 from sagline.calibration.identifiability import OPEN, append_rows
 from sagline.calibration.least_squares import whitened_at
-from sagline.calibration.observations import BLOCK
+from sagline.calibration.observations import BLOCK, with_slopes
 from sagline.calibration.parameters import KINDS, OF_CELLS, Parameters, Unknown, parameters_of
-from sagline.calibration.problem import Fit, FitProblem, SearchState, machine_at, reported_lengths
+from sagline.calibration.problem import Fit, FitProblem, reported_lengths
 from sagline.core.arrays import Array, Indices
 from sagline.core.errors import InvalidValueError
 from sagline.core.progress import blocks
@@ -45,24 +45,38 @@ class FixedTerms(NamedTuple):
     misfit: Array
 
 
-def fixed_terms(problem: FitProblem, unknowns: Sequence[Unknown], fit: Fit) -> FixedTerms | None:
-    """Linear problem at the end of a fit, with all observable parameters as fixed ones; None if there are none."""
-    robot = _with_cells(problem)
-    parameters, others = problem.parameters, list(_other_kinds(problem, robot))
-    if not others:
-        return None
-    count = len(parameters.names)
-    wider = problem._replace(
-        robot=robot, parameters=parameters_of(robot, [*unknowns, *others], problem.sensors, counted=parameters.counted)
-    )
-    numbers = np.concatenate((fit.state.numbers, wider.prior[count:]))
-    state = SearchState(numbers, machine_at(wider, numbers), fit.state.lengths, fit.state.poses)
+def with_fixed_parameters(problem: FitProblem, unknowns: Sequence[Unknown]) -> FitProblem:
+    """Problem with all observable parameters; the parameters that were not estimated are the last ones."""
+    robot = problem.robot if problem.robot.winches is not None else problem.robot.replace(winches=Winch())
+    others = list(_other_kinds(problem, robot))
+    parameters = parameters_of(robot, [*unknowns, *others], problem.sensors, counted=problem.parameters.counted)
+    return problem._replace(robot=robot, parameters=parameters)
+
+
+def last_readings(problem: FitProblem, wider: FitProblem, fit: Fit) -> tuple[Array, Array]:
+    """Residuals and triangular factor at the end of a fit; wider: problem with fixed parameters.
+
+    The residuals have the shape (N, 2 m + 6) [m, N, m, rad]; they are NaN if missing. The columns of the factor are the
+    weighted whitened slopes by all P + F parameters, and the misfit: (at most P + F + 1, P + F + 1).
+    """
+    fitted = fit.state
+    machine = with_slopes(fitted.machine, wider.parameters)
+    numbers = np.concatenate((fitted.numbers, wider.prior[len(fitted.numbers) :]))
+    state, residuals = fitted._replace(numbers=numbers, machine=machine), []
     triangle = np.zeros((0, numbers.size + 1))
     for part in blocks(len(state.poses), BLOCK):
-        rows = whitened_at(wider, state, reported_lengths(wider, state.machine, part), part, free_of_noise=True)
+        reported = reported_lengths(problem, machine, part)
+        rows = whitened_at(wider, state, reported, part, free_of_noise=True)
+        residuals.append(np.hstack((reported - state.lengths[part], rows.residual)))
         columns = np.concatenate((rows.matrix, rows.misfit[..., None]), axis=-1)
         triangle = append_rows(triangle, columns * np.sqrt(fit.normal.weights[part])[:, None, None])
-    priors = np.zeros((count, numbers.size + 1))
+    return np.concatenate(residuals), triangle
+
+
+def fixed_terms(problem: FitProblem, wider: FitProblem, fit: Fit, triangle: Array) -> FixedTerms:
+    """Linear problem at the end of a fit, from the factor of `last_readings`."""
+    count = len(problem.parameters.names)
+    priors = np.zeros((count, triangle.shape[1]))
     priors[:, :count] = problem.prior_root
     priors[:, -1] = -problem.missed(fit.state.numbers)
     whole, scale = np.vstack((triangle, priors)), problem.scale
@@ -71,7 +85,7 @@ def fixed_terms(problem: FitProblem, unknowns: Sequence[Unknown], fit: Fit) -> F
     left, known_part = left[:, seen], left[:, seen].T @ whole[:, count:]
     rest = whole[:, count:] - left @ known_part
     steps = scale[:, None] * (right[seen].T / sizes[seen] @ known_part[:, :-1])
-    shifts = -state.machine.slopes[:count, None] * steps
+    shifts = -fit.state.machine.slopes[:, None] * steps
     return FixedTerms(wider.parameters, wider.prior_deviation[count:], shifts, rest[:, :-1], rest[:, -1])
 
 
@@ -113,11 +127,6 @@ def considered_covariance(terms: FixedTerms) -> Array:
     stated = np.flatnonzero(terms.parameters.stated[len(terms.shifts) :])
     effect = terms.shifts[:, stated] * terms.deviation[stated]
     return np.asarray(effect @ effect.T)
-
-
-def _with_cells(problem: FitProblem) -> Robot:
-    """Robot with winches, because tests need gains and biases of load cells."""
-    return problem.robot if problem.robot.winches is not None else problem.robot.replace(winches=Winch())
 
 
 def _other_kinds(problem: FitProblem, robot: Robot) -> Iterator[Unknown]:

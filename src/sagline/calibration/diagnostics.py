@@ -12,6 +12,7 @@ from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary, model_of
 from sagline.calibration.hypotheses import CELL_UNITS, LENGTH_UNITS, Hypothesis, Trial
 from sagline.calibration.log import WinchLog, load_cells_of
+from sagline.calibration.measuring_axes import frame_mismatch, left_handed
 from sagline.calibration.screening import screen
 from sagline.core.arguments import instance
 from sagline.core.arrays import Array, Flags, Indices
@@ -38,9 +39,9 @@ def diagnose_log(robot: Robot, log: WinchLog, model: CableModel | str = _CATENAR
     The first check compares the readings with their expected sizes. It detects lengths and positions in mm, and load
     cells in kN. Then a robot similar to the given robot is fitted to about 24 rows. If no such robot fits, corrections
     of single mistakes are tested: columns of two cables exchanged (encoders, load cells or both), an encoder that
-    counts backward, zeros with large errors, load cells up to five rows early or late, or units (kgf, lbf, ft, in). The
-    first correction that gives a fit is reported. Zeros with large errors, and lengths with the wrong sign, are found
-    only with commanded poses.
+    counts backward, zeros with large errors, load cells or lengths up to five rows early or late, or units (kgf, lbf,
+    ft, in). The first correction that gives a fit is reported. Zeros with large errors, lengths with the wrong sign,
+    and lengths that are early or late, are found only with commanded poses.
     """
     instance(robot, Robot, "robot")
     instance(log, WinchLog, "log")
@@ -105,20 +106,17 @@ def fits_without_measured_poses(robot: Robot, log: WinchLog, model: CableModel) 
     return Trial(robot, model, own, np.arange(len(log))).result(Hypothesis()).quality <= GOOD
 
 
-def frame_mismatch(log: WinchLog, left_out: Indices, asked: Collection[str]) -> Iterator[str]:
+def measured_pose_mistakes(
+    robot: Robot, log: WinchLog, left_out: Indices, asked: Collection[str], model: CableModel
+) -> Iterator[str]:
     """Sentence about measured poses (rows `left_out`) that disagree with the lengths while all other readings fit."""
-    measured = np.zeros(len(log), dtype=np.bool_)
-    for read in (log.position, log.rotation):
-        if read is not None:
-            measured |= ~np.isnan(read).all(axis=1)
-    lost, count = int(np.count_nonzero(measured[left_out])), int(np.count_nonzero(measured))
-    if 2 * lost <= count:
-        return
-    more = " and ".join(name for name in ("measuring_frame", "target") if name not in asked)
-    yield (
-        f"{lost} of {count} measured poses disagree with the lengths: they seem to have other axes; "
-        f"{f'add the unknowns {more}' if more else 'correct them'}, or write '# frame: ...' above the columns"
-    )
+    points = np.zeros((0, 3)), np.zeros((0, 3))
+    if log.position is not None:
+        placed = np.flatnonzero(~np.isnan(log.position).any(axis=1))
+        points = Trial(robot, model, log, placed).measured_points() if placed.size else points
+    sentence = left_handed(*points) or frame_mismatch(log, left_out, asked, points)
+    if sentence is not None:
+        yield sentence
 
 
 def _extent(robot: Robot) -> float:
@@ -190,7 +188,7 @@ def _length_changes(trial: Trial) -> Iterator[Hypothesis]:
 
 
 def _load_cell_changes(trial: Trial) -> Iterator[Hypothesis]:
-    """Possible mistakes in the load cells only."""
+    """Possible mistakes in the load cells, and lengths that are late or early."""
     if trial.log.load_cells is None:
         return
     yield from (Hypothesis(cell_unit=unit) for unit in CELL_UNITS if unit)
@@ -198,8 +196,9 @@ def _load_cell_changes(trial: Trial) -> Iterator[Hypothesis]:
         yield Hypothesis(cells=two)
     for late in range(1, SHIFTS + 1):
         if len(trial.log) > 2 * late:
-            yield Hypothesis(late=late)
-            yield Hypothesis(late=-late)
+            yield from (Hypothesis(late=late), Hypothesis(late=-late))
+            if trial.log.commanded is not None:
+                yield from (Hypothesis(behind=late), Hypothesis(behind=-late))
 
 
 def _usual(trial: Trial) -> Array:
@@ -245,9 +244,11 @@ def _change_text(change: Hypothesis, log: WinchLog) -> str:
     if change.flipped is not None:
         i = change.flipped
         return f"the encoder of cable {i} seems to count backward: change the sign of gear[{i}], or of {kind}_{i}"
-    rows = f"{abs(change.late)} row{'s'[: abs(change.late) != 1]}"
-    way, where = ("late", "up") if change.late > 0 else ("early", "down")
-    return f"the load cell readings seem to be {rows} {way}: move the columns of all load cells {where} by {rows}"
+    shift = change.late or change.behind
+    rows = f"{abs(shift)} row{'s'[: abs(shift) != 1]}"
+    way, where = ("late", "up") if shift > 0 else ("early", "down")
+    what, columns = ("load cell readings", "load cells") if change.late else (f"{kind}s", f"{kind}s")
+    return f"the {what} seem to be {rows} {way}: move the columns of all {columns} {where} by {rows}"
 
 
 def _misfit_text(quality: float) -> str:

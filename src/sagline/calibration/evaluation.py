@@ -10,19 +10,23 @@ from typing import Final
 import numpy as np
 from scipy.special import chdtr, chdtrc
 
-from sagline.calibration.criticism import considered_covariance, criticisms_of, fixed_terms
+from sagline.calibration.criticism import (
+    considered_covariance,
+    criticisms_of,
+    fixed_terms,
+    last_readings,
+    with_fixed_parameters,
+)
 from sagline.calibration.findings import CalibrationStatus, Criticism, CrossValidation, Omission
 from sagline.calibration.identifiability import OPEN, append_rows, gauge_of
-from sagline.calibration.least_squares import QUANTILE, exceeded_with, whitened_at
-from sagline.calibration.observations import BLOCK
+from sagline.calibration.least_squares import QUANTILE, exceeded_with
 from sagline.calibration.outliers import misfitting, outliers_in
 from sagline.calibration.parameters import KINDS, Parameters, Unknown, external
-from sagline.calibration.problem import Fit, FitProblem, reported_lengths
+from sagline.calibration.problem import FitProblem
 from sagline.calibration.result import Calibration
 from sagline.calibration.search import SearchResult
 from sagline.calibration.weak_identifiability import weak_directions
 from sagline.core.arrays import Array, Indices, locked
-from sagline.core.progress import blocks
 from sagline.robot.pose import Pose
 from sagline.robot.tolerances import UNCERTAIN, Provenance
 
@@ -47,13 +51,15 @@ def calibration_of(
     """Calibration from a search; rows: indices of the used rows of the log, (N,); left_out: omitted rows by reason."""
     fit, kept, parameters = found.fit, found.kept, problem.parameters
     numbers, machine, normal = fit.state.numbers, fit.state.machine, fit.normal
-    residuals, triangle = _final_readings(problem, fit)
+    wider, count = with_fixed_parameters(problem, unknowns), len(numbers)
+    residuals, factor = last_readings(problem, wider, fit)
+    triangle = factor[:count, :count]
     values = external(parameters, numbers)
     gauge = gauge_of(triangle, parameters, values, machine.robot, machine.sensors)
     covariance, rank = covariance_of(problem, triangle, machine.slopes)
-    fixed = fixed_terms(problem, unknowns, fit)
     criticisms: tuple[Criticism, ...] = ()
-    if fixed is not None:
+    if len(wider.parameters.names) > count:
+        fixed = fixed_terms(problem, wider, fit, factor)
         covariance = covariance + considered_covariance(fixed)
         criticisms = criticisms_of(fixed, np.sqrt(np.diagonal(covariance)))
     whole, missed = kept & (normal.weights == 1.0), problem.missed(numbers)
@@ -108,18 +114,6 @@ def _status(found: SearchResult, result: Calibration) -> CalibrationStatus:
     doubt = doubt or any(one.deviations > HARMLESS for one in result.criticisms)
     doubt = doubt or bool(odd > ODD * (np.count_nonzero(kept) + elsewhere))
     return CalibrationStatus.DOUBTFUL if doubt else CalibrationStatus.FOUND
-
-
-def _final_readings(problem: FitProblem, fit: Fit) -> tuple[Array, Array]:
-    """Residuals (N, 2 m + 6) [m, N, m, rad], NaN if missing, and triangular factor of the weighted whitened slopes."""
-    state, residuals = fit.state, []
-    triangle = np.zeros((0, len(state.numbers)))
-    for part in blocks(len(state.poses), BLOCK):
-        reported = reported_lengths(problem, state.machine, part)
-        rows = whitened_at(problem, state, reported, part, free_of_noise=True)
-        residuals.append(np.hstack((reported - state.lengths[part], rows.residual)))
-        triangle = append_rows(triangle, rows.matrix * np.sqrt(fit.normal.weights[part])[:, None, None])
-    return np.concatenate(residuals), triangle
 
 
 def covariance_of(problem: FitProblem, triangle: Array, slopes: Array) -> tuple[Array, int]:

@@ -57,6 +57,7 @@ class Hypothesis(NamedTuple):
         flipped: A cable with an encoder that counts backward, or None.
         moved: Cables with zeros that are computed from the commanded poses.
         late: Number of rows by which the load cells lag behind the encoders.
+        behind: Number of rows by which the encoders lag behind the load cells and the commanded poses.
         cell_unit: Unit of the load cells in `CELL_UNITS`; "" for newtons.
         length_unit: Unit of the lengths in `LENGTH_UNITS`; "" for meters.
     """
@@ -66,6 +67,7 @@ class Hypothesis(NamedTuple):
     flipped: int | None = None
     moved: tuple[int, ...] = ()
     late: int = 0
+    behind: int = 0
     cell_unit: str = ""
     length_unit: str = ""
 
@@ -143,13 +145,23 @@ class Trial:
         problem, poses, _ = self._problem(Hypothesis(), MOST_ROWS)
         return _offsets(problem, poses)
 
+    def measured_points(self) -> tuple[Array, Array]:
+        """Positions of the target at the commanded poses, or by the lengths, and measured positions, (N, 3) [m]."""
+        problem, poses, _ = self._problem(Hypothesis(), MOST_ROWS)
+        sensors, measured = self.log.sensors, problem.log.positions
+        if poses is None:
+            return measured[:0], measured[:0]
+        turned = poses.rotation.apply(np.array(sensors.target))
+        return poses.position + turned, sensors.frame.position + measured @ sensors.frame.matrix.T
+
     def _problem(self, change: Hypothesis, most: int) -> tuple[FitProblem, Pose | None, Array]:
         """Least-squares problem for some rows, their commanded poses, and the shifts of the zeros [m]."""
         log, late, m = self.log, change.late, self.robot.cable_count
-        rows = self.rows[(self.rows + late >= 0) & (self.rows + late < len(log))]
+        read_at = self.rows + late + change.behind  # one of them is zero
+        rows = self.rows[(read_at >= 0) & (read_at < len(log))]
         rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(most, len(rows))).round().astype(np.int64))]
         given = readings_table(log.rows(rows))
-        read = LENGTH_UNITS[change.length_unit] * _swap_columns(log.readings[rows], change.lengths)
+        read = LENGTH_UNITS[change.length_unit] * _swap_columns(log.readings[rows + change.behind], change.lengths)
         if log.load_cells is not None:
             cells = CELL_UNITS[change.cell_unit] * log.load_cells[rows + late]
             given = given._replace(cells=_swap_columns(cells, change.cells))

@@ -155,19 +155,25 @@ def machine_of(
     robot: Robot, model: CableModel, parameters: Parameters, sensors: Sensors, offset: Array
 ) -> MachineTerms:
     """A robot and its sensors in the form of the kernel; raises an error if drum data for counts are missing."""
-    # unknown pulley radii and dead lengths need slopes, although their values in the robot may be zero
-    routed = has_routing(robot) or bool((parameters.where[[kinds.RADIUS, kinds.DEAD]] >= 0).any())
-    return MachineTerms(
+    machine = MachineTerms(
         robot,
         sensors,
         offset,
         drums_of(robot) if parameters.counted else None,
-        (model.code, *model.parameters, routed or None),
+        (model.code, *model.parameters, has_routing(robot) or None),
         body_table(robot),
         cable_table(robot),
         _sensor_arrays(robot, sensors),
-        slopes_of_values(robot, parameters),
+        np.zeros(0),
     )
+    return with_slopes(machine, parameters)
+
+
+def with_slopes(machine: MachineTerms, parameters: Parameters) -> MachineTerms:
+    """The same machine for other parameters; unknown pulleys and dead lengths need routing, even with zero values."""
+    routed = machine.terms[-1] or bool((parameters.where[[kinds.RADIUS, kinds.DEAD]] >= 0).any())
+    terms = (*machine.terms[:-1], routed or None)
+    return machine._replace(terms=terms, slopes=slopes_of_values(machine.robot, parameters))
 
 
 def whitened_rows(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -279,6 +280,7 @@ def external(parameters: Parameters, numbers: Array) -> Array:
         return np.where(parameters.logarithmic, np.exp(numbers), numbers)
 
 
+@lru_cache(maxsize=8)  # a search asks many times for the root of the same parameters
 def prior_root(parameters: Parameters) -> Array:
     """Symmetric root of the inverse prior correlation, (P, P): the identity, except for kinds with a common share."""
     root = np.eye(len(parameters.names))
@@ -288,7 +290,7 @@ def prior_root(parameters: Parameters) -> Array:
             mean = np.full((m, m), 1.0 / m)
             alone, shared = (1.0 - kind.common) ** -0.5, (1.0 + (m - 1) * kind.common) ** -0.5
             root[np.ix_(which, which)] = alone * (np.eye(m) - mean) + shared * mean
-    return root
+    return locked(root)
 
 
 def slopes_of_values(robot: Robot, parameters: Parameters) -> Array:

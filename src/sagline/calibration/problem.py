@@ -193,7 +193,8 @@ def start_of(problem: FitProblem, commanded: Pose | None) -> SearchState:
     tension by 90 N. Reported lengths therefore do not determine the tensions as long as the anchors are inaccurate.
     """
     numbers = problem.prior
-    machine = machine_at(problem, numbers)
+    offset = offset_with(problem.robot, problem.parameters, problem.parameters.prior)
+    machine = machine_of(problem.robot, problem.model, problem.parameters, problem.sensors, offset)
     reported = reported_lengths(problem, machine, slice(None))
     poses = _poses(problem, machine, reported, commanded)
     lengths = held_lengths(problem, machine, poses, reported)

@@ -7,6 +7,7 @@ from textwrap import wrap
 from typing import Final, Literal
 
 import numpy as np
+from scipy.special import bdtrc
 
 from sagline.calibration.findings import CalibrationStatus, Direction, Findings, Outlier
 from sagline.calibration.parameters import KINDS, Parameters, is_observed
@@ -16,6 +17,8 @@ from sagline.core.numbers import SPACE, counted, n, plus_minus
 
 WIDTH: Final = 80
 CLEARLY: Final = 4.0  # standard deviations by which chi squared is clearly below its expected value
+MANY: Final = 4  # smallest number of outliers of a faulty sensor
+CHANCE: Final = 1e-3  # probability that the outliers of equal sensors gather on one sensor
 MOST_OUTLIERS: Final = 12  # largest number of listed items; the number of further items is given
 MOST_ROWS: Final = 8  # largest number of listed rows of the log; the number of further rows is given
 UNITS: Final = {"length": "m", "load cell": "N", "position": "m", "rotation": "rad"}
@@ -280,14 +283,33 @@ def _outliers(found: Findings, width: int) -> Iterator[str]:
     place = {int(row): k for k, row in enumerate(found.rows)}
     less = (found.weights < 1.0).any()  # no pose has less weight with robust=False
     yield f"Outliers, {len(found.outliers)}{'; their poses have less weight' if less else ''}:"
-    for outlier in found.outliers[:MOST_OUTLIERS]:
+    single = list(found.outliers)
+    for (quantity, cable), own in faulty_sensors(found).items():
+        single = [one for one in single if one not in own]
+        size = n(float(np.median([one.size for one in own])), ".3g", UNITS[quantity])
+        text = f"{quantity} {cable}, {len(own)} of {len(found.rows):,} rows: {size} off (median); check this sensor"
+        yield from _wrapped(f"- {text}, its cable and its column", width, "  ", "    ")
+    for outlier in single[:MOST_OUTLIERS]:
         at = ""
         if outlier.row in place:
             position = found.poses.position[place[outlier.row]]
             at = f", at ({', '.join(n(x, '.2f') for x in position)}) m".replace(" ", SPACE)
         yield from _wrapped(f"- {outlier_text(outlier)}{at}", width, "  ", "    ")
-    if len(found.outliers) > MOST_OUTLIERS:
-        yield f"  and {len(found.outliers) - MOST_OUTLIERS:,} more"
+    if len(single) > MOST_OUTLIERS:
+        yield f"  and {len(single) - MOST_OUTLIERS:,} more"
+
+
+def faulty_sensors(found: Findings) -> dict[tuple[str, int], list[Outlier]]:
+    """Outliers of each length sensor or load cell with more outliers than chance explains."""
+    groups: dict[tuple[str, int], list[Outlier]] = {}
+    for one in found.outliers:
+        if one.cable is not None:
+            groups.setdefault((one.quantity, one.cable), []).append(one)
+    share = 1.0 / (2 * found.robot.cable_count)  # of the outliers, if all sensors are equal
+    count = len(found.outliers)
+    return {
+        name: own for name, own in groups.items() if len(own) >= MANY and bdtrc(len(own) - 1, count, share) < CHANCE
+    }
 
 
 def _cross_validation(found: Findings, width: int) -> Iterator[str]:
