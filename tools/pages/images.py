@@ -267,6 +267,8 @@ def film(browser: Browser, file: Path, theme: str) -> bytes:
     tab.evaluate(CURSOR)
     tab.get_by_text("Feasible", exact=True).first.wait_for()
     tab.evaluate("document.querySelector('[data-part=home]').click()")  # the whole robot, in the new height
+    tab.mouse.move(SHARED[0] / 2, STAGE - 20)
+    tab.mouse.wheel(0, 110)  # and the numbers of the upper anchors
     tab.wait_for_timeout(1500)
     bottom = tab.locator("[data-part=ticks]").bounding_box()
     assert bottom is not None
@@ -312,7 +314,7 @@ GROUPS: Final[dict[str, tuple[list[str], Callable[[], dict[str, Any]], Callable[
         lambda: take_viewer("article-mixed", viewer_of_pose, lambda _: None, ("viewer.png", "light", WIDE)),
     ),
     "viewer-run": (
-        ["viewer-run.png", "viewer-run-dark.png", "viewer-run-phone.png"],
+        ["viewer-run.png", "viewer-run-dark.png", "viewer-run-phone.png", "viewer-run-phone-dark.png"],
         lambda: viewer_texts(viewer_of_run),
         lambda: take_viewer(
             "article-suspended",
@@ -321,6 +323,7 @@ GROUPS: Final[dict[str, tuple[list[str], Callable[[], dict[str, Any]], Callable[
             ("viewer-run.png", "light", WIDE),
             ("viewer-run-dark.png", "dark", WIDE),
             ("viewer-run-phone.png", "light", PHONE),
+            ("viewer-run-phone-dark.png", "dark", PHONE),
         ),
     ),
     "viewer-calibration": (
