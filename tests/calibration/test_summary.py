@@ -280,3 +280,16 @@ def test_a_load_cell_that_is_off_in_many_rows_is_named_as_a_load_cell() -> None:
     assert [int(number) for number in re.findall(r"\d+", listed[0])[:3]] == [3, len(own), 60]
     assert (7, 5) in {(one.row, one.cable) for one in found.outliers if one not in own}
     assert len(listed) == 1 + len(found.outliers) - len(own)
+
+
+def test_the_gain_of_a_load_cell_that_is_far_from_its_prior_is_named() -> None:
+    robot = sl.load_robot("cogiro")
+    truth = true_robot(robot, {"mass": 0.03}, 3)
+    log = log_of(truth, 40, 3).log
+    found = sl.calibrate(robot, log.replace(load_cells=log.load_cells * np.where(np.arange(8) == 3, 0.7, 1.0)), folds=0)
+    listed = re.findall(r"^  - (.*)", str(found).partition("Values")[0], re.M)
+    assert len(listed) == 1
+    assert listed[0].startswith("load_cell_gain[3]: 0.")
+    gain, error = found.value_of("load_cell_gain[3]")
+    assert abs(gain - 0.7) < 3.0 * error
+    assert "Far" not in str(sl.calibrate(robot, log, folds=0))

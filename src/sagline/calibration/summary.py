@@ -10,13 +10,15 @@ import numpy as np
 from scipy.special import bdtrc
 
 from sagline.calibration.findings import CalibrationStatus, Direction, Findings, Outlier
-from sagline.calibration.parameters import KINDS, Parameters, is_observed
+from sagline.calibration.identifiability import easiest_measurement
+from sagline.calibration.parameters import KINDS, Parameters, internal, is_observed, prior_root
 from sagline.calibration.scatter import sensor_deviations
 from sagline.core.arrays import Array, Indices
 from sagline.core.numbers import SPACE, counted, n, plus_minus
 
 WIDTH: Final = 80
 CLEARLY: Final = 4.0  # standard deviations by which chi squared is clearly below its expected value
+FAR: Final = 4.0  # departure of a value from its prior, in prior deviations
 MANY: Final = 4  # smallest number of outliers of a faulty sensor
 CHANCE: Final = 1e-3  # probability that the outliers of equal sensors gather on one sensor
 MOST_OUTLIERS: Final = 12  # largest number of listed items; the number of further items is given
@@ -33,6 +35,7 @@ def calibration_text(found: Findings, width: int = WIDTH) -> str:
         _rows(found, width),
         _sensors(found, width),
         _criticisms(found, width),
+        _departures(found, width),
         _values(found, width),
         _directions(found.gauge, "Unobservable; the values of the robot file are kept:", width),
         _directions(found.cannot_tell_apart, "Weakly identifiable:", width),
@@ -159,6 +162,21 @@ def _criticisms(found: Findings, width: int) -> Iterator[str]:
         )
         fall = f"chi squared would fall by {n(one.fall, ',.0f')} (probability by chance {n(one.chance, '.1g')})"
         text = f"- {one.name}: {fall}, and {change}; add {one.kind} to the unknowns, or correct it"
+        yield from _wrapped(text, width, "  ", "    ")
+
+
+def _departures(found: Findings, width: int) -> Iterator[str]:
+    """Lines of the values that are far from the robot file, in standard deviations of the prior."""
+    numbers = found.parameters
+    deviation = numbers.prior_deviation / np.where(numbers.logarithmic, numbers.prior, 1.0)
+    off = prior_root(numbers) @ ((internal(numbers, found.values) - internal(numbers, numbers.prior)) / deviation)
+    far = np.flatnonzero(np.abs(off) > FAR)
+    if far.size:
+        yield f"Far from the robot file, by more than {n(FAR, '.2g')} prior deviations:"
+    for k in far:
+        now = plus_minus(found.values[k], found.standard_error[k], numbers.units[k])
+        before = plus_minus(numbers.prior[k], numbers.prior_deviation[k], numbers.units[k])
+        text = f"- {numbers.labels[k]}: {now}, before {before}; {easiest_measurement([numbers.names[k]])}"
         yield from _wrapped(text, width, "  ", "    ")
 
 
