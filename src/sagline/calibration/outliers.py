@@ -161,7 +161,7 @@ def misfitting(squares: Array, readings: Indices) -> Indices:
 def outliers_in(
     problem: FitProblem, state: SearchState, which: Indices, rows: Indices, *, count: int
 ) -> tuple[Outlier, ...]:
-    """Causes of misfit at some poses of a search, in the order of the rows of the log.
+    """Causes of the misfit at the poses `which`, in the order of the log's rows.
 
     For every length, load cell, measured position or rotation of a pose, the best-fitting error is computed. The first
     error is the one that explains most of the misfit, the second error explains most of the remaining misfit. If

@@ -65,7 +65,7 @@ class CalibrationPoses(Result, Saved):
         unstrained_length: All cable off the drums [m], (N, m).
         expected_error: Standard error of each parameter, in its unit, (P,).
         random_error: Median standard errors of sets of equally many random poses, (P,).
-        share_of_random: Geometric mean ratio of the errors to the errors from random poses, in the observable
+        share_of_random: Errors divided by the errors of random poses, as a geometric mean over the observable
             directions. Errors of single parameters do not show this ratio if a direction is unobservable, such as a
             shift of the world.
         gain: Log det of the information from the first k chosen poses, (N,).

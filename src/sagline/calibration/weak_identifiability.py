@@ -89,7 +89,7 @@ def _little_observed(
 
 
 def _words(vector: Array, parameters: Parameters, groups: Groups, kinds: Indices, member: Array) -> tuple[str, ...]:
-    """Names of a direction (P,): kinds of parameters, or the axis or parameter with nearly all of the direction.
+    """Names for a direction (P,), one per main kind: the parameter or axis with nearly all of its share, or the kind.
 
     kinds: rank of each parameter's kind (P,); member: 1 if the group contains the parameter, otherwise 0, (g, P).
     """

@@ -141,7 +141,7 @@ def _at_ticks(path: Path, period: float) -> Path:
     if time[-1] - ticks[-1] > ON_TICK * period:
         chosen, ticks = np.append(chosen, len(time) - 1), np.append(ticks, [period * count])
     if len(ticks) < 2:
-        raise RefusedError("the path", f"it takes {time[-1]:g} s, less than a cycle", "Give a path with a motion.")
+        raise RefusedError("the path", f"it takes {time[-1]:g} s, less than a cycle", "Give a longer path.")
     return _path_at(path, chosen, ticks)
 
 

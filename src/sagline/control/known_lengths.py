@@ -53,7 +53,7 @@ def _at_pose(robot: Robot, state: Equilibrium, model: CableModel) -> Iterator[Ar
     stretch = 1.0 + winches.winding_tension / robot.cables.axial_stiffness
 
     def change(other: Robot, more: Array | float = 0.0) -> Array:
-        """Change of the lengths from homing per standard deviation, from a changed robot or changed readings [N]."""
+        """Change of homed lengths per standard deviation, for the robot `other` and readings higher by `more` [N]."""
         there, here = (
             _zeros(home(some, state.pose, read, model=model).winches)
             for some, read in ((other, reading + more), (robot, reading))

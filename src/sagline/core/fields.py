@@ -30,7 +30,7 @@ def if_known(value: ArrayLike | None) -> Array | None:
 
 
 def given_or_none(value: ArrayLike | None) -> Array:
-    """Return a value or None unchanged: the converter of a field whose check replaces None by a value."""
+    """Return a value or None unchanged: the converter of a field; its check then replaces None by a value."""
     return value  # type: ignore[return-value]
 
 

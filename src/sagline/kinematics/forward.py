@@ -218,10 +218,10 @@ def forward(
         ForwardSolution, single or with a leading axis N.
 
     Raises:
-        InvalidValueError: If a length is not positive, or not longer than the dead length, or only some lengths of a
-            sample are NaN (the message names the cable), several robots do not fit together (it names the property), an
-            argument has the wrong type or shape, the start is outside the motions of the robot's pattern, or the
-            samples need more memory than is free.
+        InvalidValueError: If an argument has the wrong type or shape. If a length is not positive, not longer than
+            the dead length, or NaN in a sample with other lengths; the message names the cable. If several robots do
+            not fit together; the message names the property. If the start is outside the motions of the robot's
+            pattern. If the samples need more memory than is free.
 
     Source:
         docs/model.md, section 6.

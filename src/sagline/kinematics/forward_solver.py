@@ -152,7 +152,7 @@ class ForwardSolver:
         )
 
     def _checked(self, unstrained_length: ArrayLike) -> Array:
-        """Lengths of shape (m,), positive and finite; the check of a list is fastest for few numbers."""
+        """Checked lengths (m,), positive and finite. For few numbers, it is fastest to check them as a list."""
         given, shape = unstrained_length, self._lengths.shape[1:]
         if type(given) is np.ndarray and given.dtype == np.float64 and given.shape == shape:
             values = given.tolist()

@@ -213,7 +213,7 @@ def _in_world(components: Array, robot: Robot) -> Array:
 
 
 def _reference(robot: Robot, previous: Plan | ArrayLike | None, variable: Variable) -> Array:
-    """Initial reference in the tension variable (m,): given, tensions of a plan's last feasible pose, or NaN."""
+    """Initial reference (m,): the given tensions, or those of the last solved pose of a plan; NaN if there are none."""
     if previous is None:
         return np.full(robot.cable_count, np.nan)
     if not isinstance(previous, Plan):

@@ -38,7 +38,7 @@ class Counts(NamedTuple):
     Attributes:
         feasible: Number of requests with tensions within the limits.
         infeasible: Number of requests with a proof that no such tensions exist.
-        unable: Number of requests that have no result for another reason, which the status states.
+        unable: Number of requests without a result for other reasons; the status states the reason.
         open: Number of requests that are too close to the boundary for a verdict.
         lost: Number of requests without a verdict.
     """

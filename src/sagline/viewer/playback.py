@@ -116,7 +116,7 @@ class PlayedPlan:
         return Track(self.time, (tension, length), infeasible_spans(plan, self.time, unit), (), paths)
 
     def traces(self, most: int, error_scale: float) -> tuple[Array, Array]:
-        """Desired and actual positions (n, 3), n <= most, with a scaled error; NaN in gaps."""
+        """Desired and actual positions (n, 3), n <= `most`, with a scaled error; NaN in gaps."""
         rows = np.unique(np.linspace(0, len(self.time) - 1, most).astype(np.intp))
         wanted = self.plan.state.pose.position[rows]
         return wanted, wanted + error_scale * self.confirmation.position_error[rows]
@@ -199,7 +199,7 @@ class PlayedSimulation:
         ]
 
     def traces(self, most: int, error_scale: float) -> tuple[Array, Array]:
-        """Actual positions (n, 3), n <= most, without desired positions."""
+        """Desired positions, which are NaN, and actual positions; both of shape (n, 3), n <= `most`."""
         rows = np.unique(np.linspace(0, self.time.size - 1, most).astype(np.intp))
         actual = self.simulation.pose.position[rows]
         return np.full_like(actual, np.nan), actual

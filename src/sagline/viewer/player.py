@@ -109,7 +109,7 @@ class Played(Protocol):
         """Lines of Python that reproduce the sample at a time [s]; `source` is an expression of the motion."""
 
     def traces(self, most: int, error_scale: float) -> tuple[Array, Array]:
-        """Desired and actual positions (n, 3), n <= most, with a scaled error; NaN in gaps."""
+        """Desired and actual positions (n, 3), n <= `most`, with a scaled error; NaN in gaps."""
 
     def track(self) -> Track:
         """Charts of the timeline."""

@@ -155,7 +155,7 @@ class PlayedLog:
         return Pose.from_quaternion(positions[k], quaternions[k])
 
     def traces(self, most: int, error_scale: float) -> tuple[Array, Array]:
-        """Planned and estimated positions (n, 3), n <= most."""
+        """Planned and estimated positions (n, 3), n <= `most`."""
         rows = np.unique(np.linspace(0, self.time.size - 1, most).astype(np.intp))
         planned, actual = self.planned[rows], self.position[rows]
         away = actual - planned

@@ -81,7 +81,7 @@ class Track:
         return slice(max(int(first) - 1, 0), int(stop) + 1)
 
     def step_from(self, time: float, steps: int) -> float:
-        """Time of the sample that is a number of steps after the sample at a time [s]."""
+        """Time of a sample [s]: `steps` samples after the sample at `time`."""
         now = int(np.searchsorted(self.time, time, side="right")) - 1
         return float(self.time[min(max(now + steps, 0), self.time.size - 1)])
 

@@ -147,7 +147,7 @@ class Levels:
         return Details(level, margin, criterion, cable, np.full(len(rows), rotation, dtype=np.int64), uncertainty)
 
     def _uncertainty(self, bracket: Bracket) -> Array:
-        """Distance from reserve to farther bound of the margin, in scales; 0 if the reserve is beyond both bounds."""
+        """Distance from the reserve to the farther margin bound, per scale; 0 if the reserve is beyond both bounds."""
         reserve = self.criteria[0].limit if isinstance(self.criteria[0], LeastMargin) else 0.0
         unsure = (bracket.low < reserve) & (reserve <= bracket.high)
         if reserve == 0.0:

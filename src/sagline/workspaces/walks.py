@@ -1,9 +1,9 @@
 """Walks between the components of a set on a grid: paths of positions in the set, closer together than nodes.
 
 A thin part of a set can be between the nodes of a grid; then the inside nodes form several components although the set
-is connected. A path of nodes with the highest values between two components follows such a part. Positions of the path
-that are outside the set are moved into it, across the path. The path is divided until all positions are in the set and
-close together.
+is connected. Such a part is found by a path from one component to another, along the nodes with the highest values.
+Positions of the path that are outside the set are moved into it, across the path. The path is divided until all
+positions are in the set and close together.
 """
 
 from __future__ import annotations

@@ -112,7 +112,7 @@ def exit_after(
 ) -> tuple[float, float]:
     """Sine and cosine of the wrap angle after one Newton step.
 
-    force: T_x and T_zA of a cable that leaves at the angle before the step. If the wrap angle grows by d, the free span
+    force: T_x and T_zA of the cable at the wrap angle before the step. If the wrap angle grows by d, the free span
     becomes shorter by R d/E_A, and T_zA grows by the weight of this length.
     """
     horizontal, vertical_a = force

@@ -89,7 +89,7 @@ def fill_length(space: CalibrationArrays, i: int, force: Triple, moment: Triple,
 
 @glue
 def add_motion(space: CalibrationArrays, slopes: Slopes) -> None:
-    """Add to the columns the changes of the readings due to the platform motion that wrench changes cause."""
+    """Add changes of readings to the columns: wrench changes move the platform, and this changes the readings."""
     for j in range(slopes.work.shape[0]):
         for k in range(6):
             share = space.moved[j, k]

@@ -105,7 +105,7 @@ def _narrow_range(curves: Curves, demand: Demand, range_: Array, direction: Arra
 def _narrow_free(
     curves: Curves, demand: Demand, range_: Array, change: TensionChange, tops: Array, memory: Memory
 ) -> bool:
-    """Narrow a range along directions in which only one cable between its limits contributes.
+    """Narrow a range along directions in which, of the cables that are not at a limit, only one contributes.
 
     Returns False if the range becomes empty.
     """

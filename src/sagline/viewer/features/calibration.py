@@ -54,7 +54,7 @@ def degrees_of_freedom(found: Calibration) -> Indices:
 
 
 def bands(found: Calibration) -> Indices:
-    """Band of chi squared of each pose, 0 for an expected value, shape (N,)."""
+    """Band of each pose, shape (N,): the number of limits that its chi squared exceeds."""
     limits = exceeded_with(1.0 - np.array(QUANTILES)[:, None], degrees_of_freedom(found))
     return np.asarray((found.chi_squared_of_pose > limits).sum(axis=0)).astype(np.int64)
 

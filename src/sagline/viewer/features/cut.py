@@ -186,7 +186,7 @@ class CutFeature(Feature):
         self._text.content = refused(message)
 
     def _play(self, number: int, simulation: Simulation, cable: int, before: Before) -> None:
-        """Play a part of a simulation, which includes the previous parts."""
+        """Play a simulation from its start to the end of its newest part."""
         if number != self._requested:
             return
         if self._playing == number:

@@ -80,7 +80,7 @@ class StateFeature(Feature):
         self.controls = LinkedControls(page.server.gui)
         self._view: View | None = None
         self._time = 0.0
-        self._requests: deque[tuple[Any, int]] = deque()  # requests for texts, and their clients
+        self._requests: deque[tuple[Any, int]] = deque()  # requests to copy a text, and their clients
         page.channel.on("pose", self._on_pose)
         page.channel.on("copy", lambda value, client: self._requests.append((value, client)))
         page.channel.on("link", self._on_link)
@@ -91,7 +91,7 @@ class StateFeature(Feature):
         self._channel.send("pose", _pose_text(view.snapshot.pose))
 
     def tick(self) -> None:
-        """Answer the requests for texts after earlier changes are shown."""
+        """Answer the requests to copy a text; earlier changes are already shown."""
         while self._requests:
             value, client = self._requests.popleft()
             self._answer(client, "copy-reply", value, partial(self._copy, client))
