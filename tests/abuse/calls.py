@@ -22,6 +22,7 @@ from tests.calibration.made_up import made_up
 from tests.calibration.synthetic import log_of, true_robot, with_drums
 from tests.control.rigs import HOME, at, prototype, rig
 from tests.files.simulations import a_simulation
+from tests.kinematics.test_underconstrained import suspended
 from tests.kinematics.winches import wound
 from tests.plot import made
 from tools.size import public_values
@@ -103,6 +104,7 @@ CRITERIA = ("Clearance", "Criterion", "InFrame", "LeastFrequency", "LeastMargin"
 TABULAR = (
     *("Confirmation", "Equilibria", "Equilibrium", "ForwardSolution", "FrequencyMap", "FrequencyResponse", "Margin"),
     *("Modes", "MovingAnchors", "Path", "Simulation", "TensionPolygon", "Vibration", "WinchRates", "control.Execution"),
+    *("Clearances", "WinchLog"),
 )
 INTERNAL = frozenset(
     {"TensionMethod.preference", "QuadraticProgram.preference", "twin.Machine.deliver"}
@@ -162,6 +164,7 @@ class _Given:
         self.cable = sl.Cable(0.067, 44e3)
         self.pose = sl.Pose.from_euler([1.0, 1.0, 2.0], 0.0, 0.0, 0.0)
         self.poses = sl.Pose.from_euler([[1.0, 1.0, 2.0], [0.0, 1.0, 2.0], [0.5, 1.0, 2.0]], 0.0, 0.0, 0.0)
+        self.suspended = suspended(4)
         self.plan = sl.inverse(self.robot, self.pose)
         self.path = sl.quintic_path([(0, 0, 1.5), (1, 1, 2)], durations=1.0, rate=4.0)
         self.run = sl.inverse(self.robot, self.path)
@@ -358,6 +361,10 @@ def _kinematics(given: _Given) -> dict[str, Call]:
                 stability=("flag", True),
                 progress=silent,
             ),
+        ),
+        "inverse: few cables": Call(
+            partial(sl.inverse, given.suspended, (0.2, 0.1, 1.0)),
+            _all(given=("words", ["x", "y", "z", "level"], True), level=("number", 2.0)),
         ),
         "inverse: a path": Call(sl.inverse, _all(robot=robot, motion=("motion", given.path), wrench=wrench)),
         "inverse: previous tensions": Call(
@@ -915,7 +922,7 @@ def _calibrations(given: _Given) -> dict[str, Call]:
             _all(
                 robot=("one", with_drums()),
                 log=("one", log),
-                unknowns=("one", ("mass",)),
+                unknowns=("one", ("mass",), True),
                 model=("one", sl.Catenary()),
                 folds=("whole", 2),
                 robust=("flag", True),
@@ -930,6 +937,7 @@ def _calibration_files(given: _Given) -> dict[str, Call]:
     found.save(given.folder / "found.nc")
     return {
         "Calibration.save": Call(found.save, _all(file=("file", str(given.folder / "saved.nc")))),
+        "Calibration.sensor_deviations": Call(found.sensor_deviations, _all(per_cable=("flag", True))),
         "Calibration.value_of": Call(found.value_of, _all(label=("word", "mass"))),
         "Calibration.pose_error": Call(found.pose_error, _all(pose=("one", found.poses))),
         "Calibration.forward": Call(
@@ -953,7 +961,7 @@ def _calibration_poses(given: _Given) -> dict[str, Call]:
             _all(
                 robot=("one", given.robot),
                 count=("whole", 2),
-                unknowns=("one", ("mass", "center_of_mass")),
+                unknowns=("one", ("mass", "center_of_mass"), True),
                 sensors=("one", sl.Sensors(tension_deviation=4.0), True),
                 box=("one", sl.PoseBox([0, 0, 1], [1, 1, 2], 0.125), True),
                 **few,

@@ -121,7 +121,7 @@ def test_curves_of_length_errors_are_the_errors_however_small(written: Written, 
 
 @extended
 def test_borders_of_the_sufficient_model_are_where_the_error_is_the_tolerance(written: Written) -> None:
-    ax = figure_of(written, "Over chord and tension.").axes[0]
+    ax = figure_of(written, "Error over chord and tension.").axes[0]
     bands = {
         matplotlib.colors.to_hex(np.asarray(band.get_facecolor())[0]): band.get_paths()[0]
         for band in ax.collections

@@ -31,7 +31,7 @@ def vertical_forces(tensions: Array) -> Array:
 
 @pytest.fixture(scope="module")
 def lines(either: Written) -> dict[str, Line2D]:
-    (figure,) = [figure for caption, figure in either.figures if caption.startswith("The difference")]
+    (figure,) = [figure for caption, figure in either.figures if caption.startswith("The difference: ")]
     return {str(line.get_label()): line for line in figure.axes[0].get_lines()}
 
 
