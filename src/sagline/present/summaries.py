@@ -172,6 +172,9 @@ def _(plan: Plan) -> Summary:
     if np.isfinite(stiffness := plan.stiffness_min).any():
         lines.append(f"least stiffness {n(np.nanmin(stiffness), '.3g', 'N/m')}")
     gaps = plan.gaps if feasible.size > 1 else ()
+    if feasible.size == 1 and plan.blocking.any():
+        short = f"short of {n(plan.shortfall.item(), '.4g', 'N')}; " if np.isfinite(plan.shortfall).all() else ""
+        lines.insert(0, f"{short}limits of cables {', '.join(map(str, np.flatnonzero(plan.blocking)))}")
     for gap in gaps[:MOST_GAPS]:
         why = PoseStatus(gap.status).text
         short = f", {n(gap.shortfall, '.3g', 'N')} short" if np.isfinite(gap.shortfall) and gap.shortfall > 0.0 else ""
