@@ -55,9 +55,9 @@ Start here:
     sagline run                         the article's test, with its figures
     sagline show cogiro                 all values of a robot
     sagline track cogiro                a plan of cable lengths along a path
-    sagline view cogiro                 a robot in the browser; its platform can be dragged
+    sagline view cogiro                 the robot in the browser, to be dragged
     sagline examples --out DIR          files to try all commands with
-    sagline new my_robot.yaml           a robot file of your own, from a few answers
+    sagline new my_robot.yaml           your own robot file
 """
 
 

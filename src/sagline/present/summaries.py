@@ -279,11 +279,13 @@ def cable_mass_text(cable_mass: str) -> str:
 def _(swings: Vibration) -> Summary:
     count = swings.frequency.size
     verdict = f"{count} modes below {n(swings.up_to, '.4g', 'Hz')}" + ("" if swings.complete else ", some are missing")
+    shown = np.sort(np.argsort(-swings.platform_share, kind="stable")[:MOST_MODES]).tolist()
     listed = [
-        f"{k + 1}: {frequency:.3f} Hz, platform {100.0 * share:.0f} %"
-        for k, (frequency, share) in enumerate(zip(swings.frequency, swings.platform_share, strict=True))
+        f"{k + 1}: {swings.frequency[k]:.3f} Hz, platform {100.0 * swings.platform_share[k]:.0f} %" for k in shown
     ]
-    return Summary(f"Vibration of {swings.state.one_robot.name}", verdict, swings.complete, tuple(listed[:MOST_MODES]))
+    if count > len(shown):
+        listed.append(f"not shown: {count - len(shown)} modes with a smaller share of the platform")
+    return Summary(f"Vibration of {swings.state.one_robot.name}", verdict, swings.complete, tuple(listed))
 
 
 @summary_of.register
