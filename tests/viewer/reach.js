@@ -26,7 +26,9 @@
       && each.querySelector("button, [role=button], input, select, textarea, a[href]")).map(told),
     pictures: () => [...document.querySelectorAll("svg, img, canvas")].filter((each) => shown(each)
       && !each.closest("[aria-hidden=true]") && !each.getAttribute("aria-label") && !each.hasAttribute("alt")
-      && !(each.closest("[aria-label]") ?? each).matches("[role=img], button, [role=button]")).map(told),
+      && !(each.closest("[aria-label]") ?? each).matches("[role=img], button, [role=button]")
+      && ![each.closest("button, [role=button]")].some((button) => button && each.matches("svg") && name(button))) // an icon
+      .map(told),
     dangling: () => [...document.querySelectorAll("[aria-labelledby], [aria-describedby]")].filter(shown).filter((each) =>
       ["aria-labelledby", "aria-describedby"].some((key) => (each.getAttribute(key) ?? "").split(/\s+/).filter(Boolean)
         .some((id) => !document.getElementById(id)))).map(told),
