@@ -14,6 +14,7 @@ from sagline import Calibration, plot
 from sagline.core.arrays import Array
 from sagline.plot.calibration import LINE, MOST_POSES, REACH, _apart
 from tests.calibration.made_up import NAMES, made_up
+from tests.plot.readable import drawn_texts, overlaps
 from tests.refusal import refused
 
 
@@ -87,6 +88,8 @@ def test_the_matrix_is_the_correlation_by_kinds(found: sl.Calibration) -> None:
     names = {text.get_text().replace(" ", "_"): text.xy[1] for text in ax.texts}  # type: ignore[attr-defined]
     assert names == dict(zip(NAMES, (11.5, 27.5, 32.0, 33.0, 35.0), strict=True))
     assert figure.axes[1].get_ylabel() == "correlation"
+    with plot.style("ieee"):
+        assert list(overlaps(drawn_texts(plot.calibration(found, "correlation")))) == []
 
 
 @pytest.mark.parametrize("seed", range(20))

@@ -37,7 +37,7 @@ MOST_NAMED: Final = 8  # largest number of outliers with a name
 POINTS: Final = 25  # number of points along each side of a map
 MARKS: Final = ("o", "s", "^", "D")
 PANEL, MATRIX, BESIDE, MAP = 1.3, 3.8, 1.2, 2.7  # heights of panel and matrix; extra height and width of a map [in]
-LINE: Final = 1.3 / 72.0 / (0.75 * MATRIX)  # height of a name in a font of 1 pt, as a share of the matrix's height
+LINE: Final = 1.3 / 72.0  # height of a name in a font of 1 pt [in]
 LEADER: Final[dict[str, Any]] = {"arrowstyle": "-", "linewidth": 0.5, "relpos": (1.0, 0.5), "shrinkB": 0.0}
 ROUND: Final = FuncFormatter(lambda value, _: f"{value:g}")
 PER_METER: Final = 1e3  # [mm]
@@ -183,7 +183,8 @@ def _correlation(figure: SubFigure, found: Calibration) -> None:
         ax.axvline(edge - 0.5, color="0.3", linewidth=0.6)
     ax.set_xticks([])
     ax.set_yticks([])
-    line = LINE * current().tick * len(names)
+    side = min(0.9 * figure.bbox.height, 0.5 * figure.bbox.width) / figure.dpi  # least side of the matrix [in]
+    line = LINE * current().tick * len(names) / side
     middles = np.array([0.5 * (start + end - 1) for start, end in zip(starts, ends, strict=True)])
     for start, middle, place in zip(starts, middles, _apart(middles, line, len(names)), strict=True):
         ax.annotate(
