@@ -69,7 +69,7 @@ class ActiveState(ABC):
         c.sender.follow(length, point.rate, point.drum_tension, point.enable)
 
     def settle(self, length: Array, status: ExecutionStatus, reason: str) -> ActiveState | None:
-        """Enter IDLE at the equilibrium for these lengths [m]; return None if no pose is found."""
+        """Enter IDLE at the equilibrium for the lengths `length` [m]. Return None if no pose is found."""
         self.context.end_run(status, reason)
         return idle_at(self.context, self.context.find_equilibrium(length), reason)
 
@@ -78,7 +78,7 @@ class Off(ActiveState):
     """OFF: the controller gives up the ownership of all groups, and then sends no commands."""
 
     def __init__(self, context: Context, reason: str = "", point: SetPoint | None = None) -> None:
-        """Begin to give up all groups. If the reason is empty, the controller owns no group yet."""
+        """Begin to give up all groups. If `reason` is empty, the controller owns no group yet."""
         super().__init__(context, point)
         self._cycles = 0
         if reason:
@@ -191,7 +191,7 @@ class HomingState(ActiveState):
         self._largest_tension = np.full(len(context.zero), np.inf)  # upper limits of the tensions during a jog [N]
 
     def jog(self, winch: int, by: float) -> None:
-        """Begin to jog one winch by a length [m]. The other winches have no power. Only tensions are monitored."""
+        """Jog winch `winch` by the length `by` [m]. The other winches have no power. Only tensions are monitored."""
         c = self.context
         if c.sample is None or self.source is not None:
             raise RefusedError("the jog", "another winch is being jogged", "Wait until it stops.")
@@ -254,7 +254,7 @@ class Following(ActiveState):
     def __init__(
         self, context: Context, state: State, text: str, point: SetPoint | None, source: SetPointSource
     ) -> None:
-        """Enter one of these states at the last set point that was sent."""
+        """Enter the state `state` at `point`, the last set point that was sent."""
         context.enter(state, text)
         super().__init__(context, point, source)
         self._followed = source
@@ -291,14 +291,14 @@ class Following(ActiveState):
 
 
 class Stopping(ActiveState):
-    """STOPPING: all rates decrease to zero in the same time, from the last set point that was sent.
+    """STOPPING: a ramp begins at the last set point that was sent. All rates reach zero at the same time.
 
     Attributes:
         after: State at the end of the ramp.
     """
 
     def __init__(self, before: ActiveState, after: State, status: ExecutionStatus, reason: str) -> None:
-        """Begin the ramp; status and reason are for the record of the motion."""
+        """Begin the ramp. The record of the motion receives `status` and `reason`."""
         c, point, source = before.context, before.point, before.source
         if point is not None:
             point = point._replace(done=False)
@@ -339,7 +339,7 @@ class Stopping(ActiveState):
 
 
 def idle_at(context: Context, found: Standing | ForwardStatus, reason: str) -> Following | None:
-    """Enter IDLE at an equilibrium. Without an equilibrium, forget the pose and return None."""
+    """Enter IDLE at the equilibrium `found`. If `found` is a status, forget the pose and return None."""
     context.previous_plan = None
     if isinstance(found, Standing):
         return Following(context, State.IDLE, reason, found.step(), found)

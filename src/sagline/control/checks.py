@@ -73,7 +73,7 @@ def plan_motion(
     method: TensionMethod,
     previous: Plan | Array | None = None,
 ) -> Motion:
-    """Plan a path for cycles of a period [s] and make all checks of the plan; previous: as in `inverse`."""
+    """Plan `path` for cycles of `period` [s], and make all checks of the plan; `previous`: as in `inverse`."""
     _check_rest(path)
     ticked = _at_ticks(path, period)
     plan = inverse(robot, ticked, model, method, previous=previous)
@@ -99,7 +99,7 @@ def plan_motion(
 
 
 def check_motion(motion: Motion, robot: Robot, period: float) -> None:
-    """Reject a motion whose plan is for another robot or another period [s]."""
+    """Reject `motion` if its plan is not for `robot`, or not for cycles of `period` [s]."""
     step = "Plan the path with this controller: control.plan(path)."
     if abs(motion.period - period) > ON_TICK * period:
         reason = f"its plan is for cycles of {1e3 * motion.period:g} ms; they take {1e3 * period:g} ms"
@@ -109,7 +109,7 @@ def check_motion(motion: Motion, robot: Robot, period: float) -> None:
 
 
 def check_lead(what: str, lead: Array) -> None:
-    """Reject a plan that begins too far from the lengths at rest; lead: difference of the lengths [m], (m,)."""
+    """Reject a plan with too large differences `lead` [m], (m,), between its first lengths and the lengths at rest."""
     i = int(np.argmax(np.abs(lead)))
     if not abs(lead[i]) <= LARGEST_LEAD:
         away, allowed = f"{1e3 * lead[i]:+.3g} mm", f"{1e3 * LARGEST_LEAD:g} mm"
@@ -118,7 +118,7 @@ def check_lead(what: str, lead: Array) -> None:
 
 
 def check_start(robot: Robot, here: Pose, start: Pose) -> None:
-    """Reject a motion that does not begin at the present pose."""
+    """Reject a motion whose first pose `start` is not the present pose `here`."""
     points = np.vstack((np.zeros(3), robot.platform_anchors))
     jump = float(np.linalg.norm(start.transform(points) - here.transform(points), axis=1).max())
     if not jump <= START:
@@ -128,7 +128,7 @@ def check_start(robot: Robot, here: Pose, start: Pose) -> None:
 
 
 def _at_ticks(path: Path, period: float) -> Path:
-    """Samples of a path at the ticks. The end pose is held until the next tick."""
+    """Samples of `path` at the ticks, one tick per `period` [s]. The end pose is held until the next tick."""
     time = path.time - path.time[0]
     count = int(np.floor(time[-1] / period + ON_TICK)) + 1
     ticks = np.asarray(period * np.arange(count), dtype=np.float64)
@@ -187,12 +187,12 @@ def _check_winches(robot: Robot, path: Path, length: Array, rate: Array, drum: A
 
 
 def _check_steps(time: Array, length: Array, rate: Array) -> None:
-    """Reject a path whose twists contradict its poses. The lengths would jump against their rates.
+    """Reject a path whose twists contradict its poses, because its lengths would not agree with their rates.
 
     Within a step h, the rate is assumed to be between the rates at both ends. The change of length then differs from h
-    times the mean rate by at most h/2 times the difference of the rates. The largest difference of the step and its
-    neighbors is used. A deviation above the allowed jump of an encoder is never accepted. The steps are those of the
-    path, because the path may end before a tick.
+    times the mean rate by at most h/2 times the difference of the rates. For this difference, the largest of the step
+    and its two neighbors is used. A deviation above the allowed jump of an encoder is never accepted. The steps are
+    between samples of the path, not between ticks, because the path may end before a tick.
     """
     h = np.diff(time)[:, None]
     off = np.abs(np.diff(length, axis=0) - 0.5 * h * (rate[1:] + rate[:-1]))

@@ -48,7 +48,7 @@ class Sender:
         self._disabled: Flags = ~self._enabled
 
     def follow(self, length: Array, rate: Array, tension: Array, enable: Flags | None) -> None:
-        """Command set points (m,): length [m], rate [m/s], tension at the drums [N], enable (None: all drives)."""
+        """Command `length` [m], `rate` [m/s], `tension` at the drums [N], each (m,). `enable`: None for all drives."""
         self._send(Mode.FOLLOW, length, rate, tension, self._enabled if enable is None else enable, claims=False)
 
     def rest(self, mode: Mode, *, enabled: bool, claims: bool = False) -> None:
@@ -61,7 +61,7 @@ class Sender:
         self.command = None
 
     def stand_at(self, sample: Sample | None, tension: Array | None = None) -> None:
-        """Set the lengths at rest to those of a sample, and the tensions to given or measured values [N], (m,)."""
+        """Store lengths of `sample`, and tensions at rest [N], (m,): `tension`, or filtered readings if it is None."""
         if sample is not None:
             self.length, self.tension = sample.length, sample.filtered if tension is None else tension
 
@@ -98,14 +98,14 @@ class Disagreement(NamedTuple):
     lasting: bool = False
 
     def refusal(self, what: str) -> RefusedError:
-        """Convert the reason to an error for a rejected request."""
+        """Convert the reason to an error for the rejected request `what`."""
         return RefusedError(what, self.reason, self.next_step)
 
 
 def disagreement(
     sample: Sample, owner: int, counter: int, groups: tuple[tuple[int, ...], ...], period: float = PERIOD
 ) -> Disagreement | None:
-    """First reason why a group does not agree, with general reasons before special ones; None if all agree.
+    """First reason why a group does not agree; None if all agree. General reasons are checked before special reasons.
 
     A group agrees if its sample is fresh, this controller owns it, its drives are ready, without fault and not locked,
     and it has accepted one of the last commands.
@@ -152,7 +152,7 @@ class Claim:
     def __init__(
         self, owner: int, groups: tuple[tuple[int, ...], ...], period: float, random: np.random.Generator
     ) -> None:
-        """Begin the claim for cycles of a period [s]."""
+        """Begin the claim for cycles of `period` [s]."""
         self._owner, self._groups, self._period, self._random = owner, groups, period, random
         self._silent = self._cycles = self._agreed = 0
         self._waiting = 0
@@ -187,7 +187,7 @@ class Claim:
         return self._cycles * self._period >= CLAIMING
 
     def _give_back(self) -> None:
-        """Give the groups up for a random time, because another controller may own the rest and wait for them."""
+        """Give the groups up for a random time. Another controller may own other groups, and wait for these groups."""
         self._tries += 1
         self.mode = Mode.LEAVE
         longest = LONGEST_WAIT / self._period

@@ -67,7 +67,7 @@ class Estimator:
         self.position, self.quaternion, self.status = pose.position, pose.quaternion, int(ForwardStatus.SOLVED)
 
     def locate(self, length: Array, wrench: Array | None) -> ForwardStatus | None:
-        """Estimate the pose from lengths [m] (m,) and a wrench (6,) or None; return the status if it is newly lost."""
+        """Estimate the pose from `length` [m] and `wrench` or None. Return the status if the pose is newly lost."""
         position, quaternion = np.empty(3), np.empty(4)
         status = self._solver.step_into(length, position, quaternion, wrench)
         lost = status not in STABLE and self.status in STABLE
@@ -174,7 +174,7 @@ class Context:
             self.say(EventKind.FAULT, "recording stopped", line)
 
     def enter(self, state: State, text: str) -> None:
-        """Change the state; raise an error if the table of transitions does not allow it."""
+        """Change to `state`; raise an error if the table of transitions does not allow this change."""
         check_transition(self.state, state, state.name)
         self.state = state
         self.say(EventKind.STATE, state.name, text)
@@ -182,7 +182,7 @@ class Context:
     # samples, faults and estimate
 
     def check_agreement(self, what: str) -> Sample:
-        """Return the newest sample; raise an error if a group does not agree to a request."""
+        """Return the newest sample; raise an error if a group does not agree to the request `what`."""
         if self.sample is None:
             raise RefusedError(what, "no group has answered", "Connect first.")
         why = disagreement(self.sample, self.owner, self.sender.counter, self.link.groups, self.period)
@@ -191,7 +191,7 @@ class Context:
         return self.sample
 
     def locate(self, sample: Sample, wrench: Array | None) -> str:
-        """Estimate the pose from the lengths without the tension loop's correction; return a message if it is lost."""
+        """Estimate the pose; the tension loop's correction is excluded. Return a message if the pose is lost."""
         length = sample.length + self.zero
         length -= self.correction
         lost = self.estimator.locate(length, wrench)
@@ -232,7 +232,7 @@ class Context:
         self.correction = np.zeros(m)
 
     def find_equilibrium(self, length: Array) -> Standing | ForwardStatus:
-        """Equilibrium at these lengths [m], (m,). The computation takes 1 ms, up to 10 ms if the pose is unknown."""
+        """Equilibrium at `length` [m], (m,). The computation takes 1 ms, or up to 10 ms if the pose is unknown."""
         return standing_at(self.robot, length, self.estimator.pose, self.model)
 
     # the running motion
@@ -294,7 +294,7 @@ def _check_link(link: object) -> None:
 
 
 def _check_period(link: Link, period: float) -> None:
-    """Reject PLCs with a different period than the controller."""
+    """Reject PLCs whose period is not `period`, the period of the controller."""
     own = number(link.period, "link.period", "s", above=0.0)
     if abs(own - period) > SAME * period:
         step = f"Give the machine period={period:g}, or the controller pace=Pace({own:g})."

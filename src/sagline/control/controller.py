@@ -60,8 +60,8 @@ class Controller(Preparation):
         Args:
             robot: Robot for planning. Its winches must have at least drum_radius.
             link: Connection to the machine.
-            pace: Pace of cycles in real time. None for lockstep: a cycle begins when the previous cycle ends, and the
-                machine with its clock waits for the controller.
+            pace: Pace of cycles in real time. None for lockstep. A cycle then begins when the previous cycle ends, and
+                the machine and its clock wait for the controller.
             model: Cable model; by default the elastic catenary.
             tension: Tension distribution method; the default is `Closest`.
             loop: Settings of the tension loop. A robot without redundancy has no tension loop.
@@ -71,7 +71,7 @@ class Controller(Preparation):
                 every controller.
 
         Raises:
-            InvalidValueError: If data of the winches are missing, the link is for another number of winches, or an
+            InvalidValueError: If data of the winches are missing, `link` is for another number of winches, or an
                 argument has the wrong type.
 
         Examples:
@@ -109,8 +109,8 @@ class Controller(Preparation):
         """Begin to follow a path.
 
         Args:
-            path: Path from rest to rest with a sample at every tick. It begins at the pose of the platform. Or a motion
-                of `plan`.
+            path: A motion of `plan`; or a path from rest to rest that has a sample at every tick and begins at the pose
+                of the platform.
 
         Raises:
             RefusedError: If the robot is not idle, a check fails, or the path begins at another pose.
@@ -198,7 +198,7 @@ class Controller(Preparation):
             by: Change of length [m], positive if cable is paid out.
 
         Raises:
-            RefusedError: If the robot is not idle and not in homing, or a tension would leave its limits.
+            RefusedError: If the robot is neither idle nor in homing, or a tension would leave its limits.
         """
         c = self._context
         chosen, far = checked_winch(c.robot, winch, by)
@@ -302,7 +302,7 @@ class Controller(Preparation):
     # shared by the methods above
 
     def _begin(self, state: State, source: SetPointSource, motion: Motion | None, text: str) -> None:
-        """Begin to follow a source of set points, and start the record of the motion."""
+        """Begin to follow the set points of `source`, and start the record of the motion."""
         self._context.begin_run(motion)
         self._follow(state, source, text)
 

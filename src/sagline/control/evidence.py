@@ -83,7 +83,7 @@ class Evidence:
         faulted: True if a PLC reports a fault.
         tripped: True if a drive reports a fault.
         states: Codes of the winches' states, as plain numbers.
-        low: Number of consecutive new readings of a slack cable that is taut in the plan, shape (m,).
+        low: Number of consecutive new readings at which the cable is slack, but taut in the plan, shape (m,).
         before_low: Last reading before the readings of a slack cable [N], shape (m,).
         steady: T_A minus the plan after the slow filter [N], shape (m,); constant while a cable is slack.
         quick: T_A minus the plan after the quick filter [N], shape (m,).
@@ -98,7 +98,7 @@ class Evidence:
         cell: tuple[float, float],
         largest: float,
     ) -> None:
-        """Begin without evidence; period: [s]; cell: deviation and bias [N]; largest: largest correction [m]."""
+        """Begin without evidence; `period` [s]; `cell`: deviation, bias [N]; `largest`: limit of a correction [m]."""
         m, winch = robot.cable_count, robot.winches
         self.group_of = np.zeros(m, dtype=np.int64)
         for g, members in enumerate(groups_of(m) if groups is None else groups):
@@ -167,7 +167,7 @@ class Evidence:
         self.stopped, self._still = True, 0
 
     def _wait(self, cycle: Cycle) -> None:
-        """Check if the winches have stopped, from the set points, or from new rates if there are no set points."""
+        """Check if the winches have stopped. The set points decide; without set points, new measured rates decide."""
         moves = cycle.moving if cycle.command is not None else largest(cycle.sample.rate * self.fresh) > MOVING
         self._still = 0 if moves else self._still + 1
         self.stopped = self._still <= self._settled
@@ -252,7 +252,7 @@ class Fault(ABC):
         within: Longest time until the fault is detected, as text.
         homing: True if the robot must be homed again after the fault, because a length is unreliable.
         lasting: True if the fault remains until a new set of rules is created; each faulty item is reported once.
-        quiet: Time after a report in which repeated faults are only counted [s].
+        quiet: Time after a report [s]. Repeated faults in this time are only counted.
         present: True if the condition holds. While another fault stops the winches, the value does not change.
         seen: Evidence that all rules of the set use.
     """
@@ -283,8 +283,8 @@ class Fault(ABC):
 
         Returns:
             Message for the operator in the cycle in which the fault begins: fault, item, value, limit, next step. None
-            in all other cycles. A fault that begins during the stop by another fault is reported after the stop, if it
-            persists.
+            in all other cycles. If a fault begins while another fault stops the winches, it is reported after the stop,
+            if it is still present.
         """
         if cycle is not self.seen.cycle:  # the first rule updates the evidence for all rules
             self.seen.at(cycle)
@@ -321,7 +321,7 @@ class Fault(ABC):
 
     @abstractmethod
     def found(self, cycle: Cycle) -> str | None:
-        """Message for the operator in every cycle in which the condition holds; lasting faults: only for new items.
+        """Message for the operator in each cycle with a true condition; for a lasting fault, only about new items.
 
         Args:
             cycle: Readings and set points of the cycle.

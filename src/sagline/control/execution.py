@@ -204,7 +204,7 @@ def execution_of(
     zero: Array,
     events: tuple[Event, ...],
 ) -> Execution:
-    """Create an execution from a table of cycles; period [s], zero [m] (m,)."""
+    """Create an execution from the cycles in `table`; `period` [s]; `zero` [m], (m,)."""
     arrays: dict[str, Any] = {name: locked(table.column(name)) for name in _COLUMNS}
     arrays |= {name: locked(table.column(name).astype(np.int8)) for name in ("state", "estimate", "mode")}
     return Execution(

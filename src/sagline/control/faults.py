@@ -62,7 +62,7 @@ class FaultRow(NamedTuple):
         rule: Condition of the fault.
         to: Name of the controller's reaction.
         within: Longest time until detection.
-        by: Part that detects it.
+        by: Part that detects the fault.
     """
 
     name: str
@@ -105,9 +105,9 @@ def faults_of(
         robot: Robot for planning.
         period: Period of a cycle [s], > 0.
         groups: Winches of each group, as in the link; None for groups of two neighboring winches.
-        cell_deviation: Standard deviation of a good load cell [N], > 0; None for the value of the robot's winches, or 1
-            N without such a value.
-        cell_bias: Largest bias of a good load cell [N], >= 0; None for the value of the winches, but at least 2 N.
+        cell_deviation: Standard deviation of a good load cell [N], > 0; None: the value of the robot's winches, or 1 N
+            if they have no value.
+        cell_bias: Largest bias of a good load cell [N], >= 0; None: the value of the robot's winches, and at least 2 N.
         largest_correction: Largest correction of a length by the tension loop [m], > 0.
 
     Returns:

@@ -123,7 +123,7 @@ class FollowingError(Fault):
     def _away(self, cycle: Cycle) -> Array:
         """Distance of each drum from the interval between the last two commands accepted by its PLC [m], (m,).
 
-        Groups with commands in transit and drives that are not enabled are excluded.
+        Drives that are not enabled are excluded, and so are groups whose commands are still in transit.
         """
         sent = {command.counter: k for k, command in enumerate(self._sent)}
         length = cycle.sample.length
@@ -186,7 +186,7 @@ class NotFollowing(Fault):
         return None
 
     def _idles(self, cycle: Cycle, group: int) -> int:
-        """Number of consecutive samples in which a group did not follow its accepted commands."""
+        """Number of consecutive samples in which the group `group` did not follow its accepted commands."""
         sample, before = cycle.sample, cycle.before
         assert self._first is not None
         echo = int(sample.echo[group])
@@ -222,7 +222,7 @@ class ServoSaturated(Fault):
 
 
 class CorrectionAtLimit(Fault):
-    """Correction of a length by the tension loop that is larger than the error of any good encoder."""
+    """Correction of a length by the tension loop. It is larger than the error of any good encoder."""
 
     name = "correction at its limit"
     rule = "the tension loop has changed a length by the allowed maximum, 5 mm by default"

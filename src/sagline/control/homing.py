@@ -39,13 +39,13 @@ class Homing:
         apart: Lengths of the machine minus lengths of the plan [m], shape (m,).
         zero: Offset added to the lengths of samples after homing [m], shape (m,).
         agrees: True if every tension is within 5 sigma.
-        confirmed: True if the operator has confirmed the pose in spite of different lengths of the machine.
+        confirmed: True if the operator has confirmed the pose although lengths of the machine differ from the plan.
     """
 
     def __init__(
         self, robot: Robot, pose: Pose, model: CableModel, method: TensionMethod, zero: Array | float = 0.0
     ) -> None:
-        """Plan the stated pose; zero: offset of the lengths from an earlier homing [m], (m,)."""
+        """Plan the stated pose `pose`; `zero`: offset from an earlier homing, added to lengths [m], (m,)."""
         self.plan = inverse(robot, pose, model, method)
         if not self.plan.solved:
             gap = self.plan.gaps[0]
@@ -129,7 +129,7 @@ class Homing:
         return place_of(self._robot, self.state.unstrained_length + self.apart, self._pose, self._model)
 
     def _conflict(self) -> RefusedError:
-        """Create the error for the length that differs most, with the pose from the lengths of the machine."""
+        """Create the error for the length that differs most. It states the pose for the lengths of the machine."""
         ratio = np.abs(self.apart) / self.tolerance
         i = int(np.argmax(np.where(np.isfinite(self.apart), ratio, np.inf)))
         there, planned = self.state.unstrained_length + self.apart, self.state.unstrained_length
@@ -155,7 +155,7 @@ class HomingJog:
     """Set points for a jog of one winch, while the pose of the platform is unknown."""
 
     def __init__(self, point: SetPoint, winch: int, by: float, period: float) -> None:
-        """Begin at the present lengths of the winches; by: change of length [m]; period [s]."""
+        """Begin at the present lengths of the winches; `by`: change of the length of `winch` [m]; `period` [s]."""
         self._lengths, self._rates = winch_lengths(point.length, winch, by, period)
         self._row, self._point = 0, point
         self._enable = np.zeros(len(point.length), dtype=np.bool_)
@@ -174,5 +174,5 @@ class HomingJog:
 
 
 def jog_tension_limits(homing: Homing, sample: Sample) -> Array:
-    """Tension limits of a jog [N], (m,): the larger of 1.2 times the planned tension and the present tension."""
+    """Tension limits of a jog [N], (m,): 1.2 times the planned tension, or the present tension if it is larger."""
     return np.maximum(MOST * homing.tension, sample.tension + 3.0 * homing.sigma)

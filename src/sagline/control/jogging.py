@@ -32,13 +32,13 @@ MOST_PLATFORM: Final = 0.2  # largest jog of the platform [m or rad]
 
 
 def checked_winch(robot: Robot, winch: int, by: float) -> tuple[int, float]:
-    """Check the index of a winch and the change of its length [m], which is positive if cable is paid out."""
+    """Check the index `winch`, and the change `by` of its length [m]. Paid-out cable is positive."""
     chosen = whole_number(winch, "winch", 0, robot.cable_count - 1)
     return chosen, _at_most(number(by, "by", "m"), "m", MOST_WINCH)
 
 
 def winch_lengths(length: Array, winch: int, by: float, period: float) -> tuple[Array, Array]:
-    """Lengths and rates (N, m) of a jog of one winch by a length [m], one row per cycle; period [s]."""
+    """Lengths and rates (N, m) of a jog from `length` [m]; `winch` changes by `by` [m]. One row per `period` [s]."""
     count = ceil(max(SHORTEST, 1.5 * abs(by) / WINCH_SPEED) / period)
     share = np.arange(count + 1) / count
     lengths, rates = np.repeat(length[None], count + 1, axis=0), np.zeros((count + 1, len(length)))
@@ -50,7 +50,7 @@ def winch_lengths(length: Array, winch: int, by: float, period: float) -> tuple[
 def winch_jog(
     robot: Robot, length: Array, here: Pose, winch: int, by: float, period: float, model: CableModel
 ) -> Motion:
-    """Plan and check a jog of one winch by a length [m], from lengths at rest (m,). The jog moves the platform."""
+    """Plan and check a jog of `winch` by `by` [m], from `length` at rest [m], (m,). The jog moves the platform."""
     lengths, rates = winch_lengths(length, winch, by, period)
     found = forward(robot, lengths, here, model)
     what, step = f"a jog of winch {winch} by {1e3 * by:+g} mm", "Jog it by less, or jog another winch."
@@ -94,7 +94,7 @@ class PlatformJog:
         model: CableModel,
         method: TensionMethod,
     ) -> None:
-        """Prepare the solver and check the last pose; by: displacement and rotation [m, rad], (6,); period [s]."""
+        """Prepare the solver and check the last pose; `by`: displacement, rotation [m, rad], (6,); `period` [s]."""
         self._robot, self._pose, self._by, self._period = robot, pose, by, period
         self._solver = InverseSolver(robot, model, method)
         move, turn = float(np.linalg.norm(by[:3])), float(np.linalg.norm(by[3:]))
@@ -114,7 +114,7 @@ class PlatformJog:
         self._fade = Fade(lead, period)
 
     def step(self) -> SetPoint:
-        """Set point of the next cycle. If its pose has no solution: the last set point, with the reason in `failed`."""
+        """Set point of the next cycle. If its pose has no solution: the last set point; `failed` is then the reason."""
         self._cycle = min(self._cycle + 1, self._count)
         share = self._cycle / self._count
         found = self._solver.step(*self._at(smooth(share)))
@@ -139,7 +139,7 @@ class PlatformJog:
         return self._point
 
     def _at(self, share: float) -> tuple[Array, Array]:
-        """Position and quaternion after a share of the displacement."""
+        """Position and quaternion after the share `share` of the displacement."""
         by = share * self._by
         half = 0.5 * float(np.linalg.norm(by[3:]))
         x, y, z = 0.5 * np.sinc(half / np.pi) * by[3:]
@@ -157,7 +157,7 @@ class PlatformJog:
 
 
 def checked_displacement(by: ArrayLike) -> Array:
-    """Check displacement and rotation vector of the platform, result (6,); by default no rotation."""
+    """Check `by`: a displacement, with or without a rotation vector. Return both, (6,); a missing rotation is zero."""
     given = checked(by, "by", "m or rad")
     if given.shape not in ((3,), (6,)):
         step = "Give a displacement, or a displacement and a rotation vector."

@@ -28,8 +28,8 @@ def length_tolerance(robot: Robot, state: Equilibrium, model: CableModel) -> Arr
     """Allowed difference between lengths of a machine and lengths from homing, 5 sigma [m], shape (m,).
 
     A difference is due to errors of the load cells, the resolution of the encoders, and errors of the robot's data. The
-    latter are the tolerances, or the standard errors of the calibration if they are smaller. Each error changes the
-    computed length at the pose of the state.
+    errors of the robot's data are its tolerances, or the standard errors of its calibration where these are smaller.
+    Each error changes the computed length at the pose of `state`.
     """
     winches = robot.winches
     assert winches is not None  # a controller needs the drums
@@ -46,7 +46,7 @@ def length_tolerance(robot: Robot, state: Equilibrium, model: CableModel) -> Arr
 
 
 def _at_pose(robot: Robot, state: Equilibrium, model: CableModel) -> Iterator[Array]:
-    """Standard deviations of the lengths at the pose [m], one array (m,) for each source."""
+    """Standard deviations of the lengths at the pose of `state` [m], one array (m,) for each source of error."""
     winches = robot.winches
     assert winches is not None
     reading = state.cables.frame_end_tension * winches.load_cell_gain + winches.load_cell_bias
@@ -79,7 +79,7 @@ def _zeros(winches: Winch | None) -> Array:
 
 
 def _standard_errors(robot: Robot) -> dict[str, Array]:
-    """Standard errors by name: the tolerances, or the errors of the calibration where they are smaller."""
+    """Standard errors by name: tolerances of the robot, or errors of its calibration where these are smaller."""
     errors = dict(robot.tolerances)
     for name, error in {} if robot.calibration is None else robot.calibration.standard_error.items():
         errors[name] = np.minimum(error, errors.get(name, np.where(np.isfinite(error), error, 0.0)))
@@ -87,7 +87,7 @@ def _standard_errors(robot: Robot) -> dict[str, Array]:
 
 
 def _varied(robot: Robot, name: str, change: Array) -> Robot:
-    """Copy of the robot with one changed quantity."""
+    """Copy of the robot in which `change` is added to the quantity `name`."""
     owner, _, field = UNCERTAIN[name].place.rpartition(".")
     part: Any = getattr(robot, owner) if owner else robot
     if getattr(part, field) is None:
@@ -97,7 +97,7 @@ def _varied(robot: Robot, name: str, change: Array) -> Robot:
 
 
 def place_of(robot: Robot, length: Array, stated: Pose, model: CableModel) -> str:
-    """Describe the pose for given lengths [m] (m,), and its distance from the stated pose."""
+    """Describe the pose for the lengths `length` [m], (m,), and the distance of this pose from `stated`."""
     found = forward(robot, length, start=stated, model=model)
     if not found.stable:
         return "at its lengths, the platform has no equilibrium near the stated pose"

@@ -82,10 +82,10 @@ class Command(NamedTuple):
         mode: Task of the drives.
         valid_for: Time for which a PLC may use the command [s].
         length: Set points of the unstrained lengths off the drums at the end of the cycle [m], shape (m,).
-        rate: Rates of these lengths [m/s], shape (m,). tension: Expected tensions at the drums, for the feedforward of
-            the motors [N], shape (m,).
+        rate: Rates of these lengths [m/s], shape (m,).
+        tension: Expected tensions at the drums, for the feedforward of the motors [N], shape (m,).
         enable: Drives that may move, shape (m,).
-        claims: True if the command claims groups of other owners; a command to leave claims no group.
+        claims: True if the command claims groups of other owners. A command to leave claims no group.
     """
 
     counter: int
@@ -132,8 +132,8 @@ class Sample(NamedTuple):
         state: Codes of `WinchState`, shape (m,).
         winch_fault: Fault codes of the drives, 0 for none, shape (m,).
         discarded: Number of invalid blocks of each group so far, shape (G,).
-        reasons: Reason of the last invalid block of each group, None without an invalid block; empty if the link gives
-            no reasons.
+        reasons: Reason of the last invalid block of each group; None for a group without an invalid block. Empty if the
+            link gives no reasons.
     """
 
     time: float
@@ -174,7 +174,7 @@ class Link(Protocol):
     """Connection to a machine.
 
     A sample is never older than the previous sample. Incomplete, foreign, repeated and out-of-order blocks are
-    discarded; the age of the group then increases.
+    discarded. The age of the group then increases.
     """
 
     @property
@@ -188,7 +188,8 @@ class Link(Protocol):
     def exchange(self, command: Command | None) -> Sample | Missing:
         """Send a command and return the newest sample, without waiting for an answer.
 
-        `sent_to` returns the message for each group. A group receives the command only if the command's sender owns it.
+        `sent_to` returns the message for each group. A group receives the command only if the command's sender owns the
+        group.
 
         Args:
             command: Command to send; None to read only.
@@ -207,19 +208,19 @@ class Sent(Enum):
 
 
 def sent_to(owner: int, command: Command) -> Sent:
-    """Message to a group that has this owner (0: none); None if nothing is sent to the group."""
+    """Message to a group whose owner is `owner` (0: no owner); `Sent.NOTHING` if nothing is sent to the group."""
     if owner == command.owner:
         return Sent.COMMAND
     return Sent.CLAIM if command.claims and command.mode != Mode.LEAVE else Sent.NOTHING
 
 
 def newer(counter: int, known: int) -> bool:
-    """True if a counter is ahead of another counter, by less than half of the range."""
+    """True if `counter` is ahead of `known` by less than half of the range of counters."""
     return 0 < (counter - known) % COUNTERS < COUNTERS // 2
 
 
 def no_news(counter: int, known: int) -> Refusal:
-    """Reason to discard a block whose counter is not ahead of the newest counter."""
+    """Reason to discard a block, because `counter` is not ahead of `known`, the newest counter."""
     if counter == known:
         step = "Check that its PLC runs, and that a scan takes less than a cycle"
         return Refusal(f"its counter {counter} is repeated", step)

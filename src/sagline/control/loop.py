@@ -140,7 +140,7 @@ class Loop:
 
 
 def _aged(known: Sample | None, missing: Missing) -> Sample | None:
-    """Previous sample with its increased age, in a cycle without a new sample; None without a previous sample."""
+    """Previous sample `known` with increased age, for a cycle without a new sample; None if `known` is None."""
     if known is None:
         return None
     return known._replace(time=missing.time, age=known.age + (missing.time - known.time))

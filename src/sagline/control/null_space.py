@@ -55,11 +55,13 @@ def parity(state: Equilibrium) -> Array:
     of the best-fitting error of cell i. The cell with the largest product is reported.
 
     Args:
-        state: One equilibrium or N equilibria; a plan or a solution; or a robot and its poses. Returns: Shape (..., m,
-            m); zero rows for cells whose errors are not visible, NaN if the state has no lengths.
+        state: An equilibrium, single or N of them. Also accepted: a plan, a solution, or two arguments: robot, poses.
+
+    Returns:
+        Shape (..., m, m); zero rows for cells whose errors are not visible, NaN if the state has no lengths.
 
     Raises:
-        InvalidValueError: If the state is not one of these.
+        InvalidValueError: If `state` has another type.
 
     Examples:
         >>> import sagline as sl
@@ -91,9 +93,9 @@ class NullSpace(NamedTuple):
     Attributes:
         projection: Pi = N_L N_L^T, projection of changes of length onto changes that do not move the platform, shape
             (..., m, m).
-        visible: K_A N_L G with G = (K_A N_L)^+, projection of tension errors onto errors that such changes of length
+        visible: K_A N_L G with G = (K_A N_L)^+, projection of tension errors onto errors that changes of length in N_L
             can correct, shape (..., m, m).
-        correction: N_L G, changes of length that correct such errors, shape (..., m, m) [m/N].
+        correction: N_L G, changes of length that correct these tension errors, shape (..., m, m) [m/N].
         parity: Parity matrix of the load cells, shape (..., m, m): see `parity`.
     """
 
@@ -111,14 +113,14 @@ def null_space(state: Equilibrium) -> NullSpace:
     due to a payload. Their correction would move the platform and is therefore excluded.
 
     Args:
-        state: An equilibrium, single or N of them; a plan or a solution; or a robot and its poses.
-            The robot has more cables than free motions.
+        state: An equilibrium, single or N of them. Also accepted: a plan, a solution, or two arguments (robot,
+            poses). The robot has more cables than free motions.
 
     Returns:
         Matrices for each equilibrium; NaN if the state has no lengths or its stiffness is singular.
 
     Raises:
-        InvalidValueError: If the state is not one of these.
+        InvalidValueError: If `state` has another type.
 
     Examples:
         >>> import sagline as sl
@@ -144,7 +146,7 @@ EVERY: Final = 0.5  # time between rows [s]; the platform moves 3 cm at the arti
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gains:
-    """Matrices of the tension loop at some poses of a plan.
+    """Matrices of the tension loop at R poses of a plan.
 
     Attributes:
         time: Times of the R poses [s], strictly increasing, shape (R,); 0 for a plan of a single pose.
@@ -176,7 +178,7 @@ def gains_along(plan: Plan, every: float = EVERY) -> Gains | None:
         tensions.
 
     Raises:
-        InvalidValueError: If the plan is of poses without a path, or has a pose without lengths.
+        InvalidValueError: If `plan` has several poses but no path, or has a pose without lengths.
 
     Examples:
         >>> import sagline as sl
@@ -213,7 +215,7 @@ def gains_along(plan: Plan, every: float = EVERY) -> Gains | None:
 
 
 def _nearest(time: Array, step: float) -> np.ndarray:
-    """Indices of the samples that are nearest to equally spaced times, and of the last sample."""
+    """Indices of the last sample, and of the samples of `time` that are nearest to times with the spacing `step`."""
     wanted = time[0] + step * np.arange(int((time[-1] - time[0]) / step) + 1)
     after = np.clip(np.searchsorted(time, wanted), 1, max(time.size - 1, 1))
     if time.size == 1:

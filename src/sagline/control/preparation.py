@@ -89,8 +89,8 @@ class Preparation(Monitor):
             pose: A single pose.
 
         Raises:
-            RefusedError: If the tensions do not agree (the message recommends a jog), or if only the lengths of the
-                machine do not agree. The state remains HOMING, and no length changes.
+            RefusedError: If the tensions do not agree; the message then recommends a jog. If only the lengths of the
+                machine do not agree. In both cases, the state remains HOMING, and no length changes.
         """
         self.begin_homing(pose)
         self._compare()
@@ -170,7 +170,7 @@ class Preparation(Monitor):
         return self.state is State.OFF and self._context.sender.command is not None
 
     def _run_while(self, condition: Callable[[], bool]) -> None:
-        """Run cycles while a condition holds; Ctrl-C stops the motion first."""
+        """Run cycles while a condition holds. Ctrl-C first stops the motion."""
         try:
             with interrupt_calls(self.stop):
                 while condition():

@@ -160,7 +160,7 @@ class Garbage:
 
 @contextmanager
 def interrupt_calls(stop: Callable[[], object]) -> Iterator[None]:
-    """Context of the main thread: the first Ctrl-C calls a function, and KeyboardInterrupt is raised at the end."""
+    """Context of the main thread. The first Ctrl-C calls `stop`, and KeyboardInterrupt is raised at the end."""
     before = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or not callable(before):
         yield
@@ -212,7 +212,7 @@ HEIGHTS = (0.25, 0.5, 0.1, 0.75)  # depths of the poses below the frame anchors,
 
 
 def load_kernels(robot: Robot, period: float, model: CableModel, method: TensionMethod) -> None:
-    """Load the kernels by homing, a path and jogs near the middle of a robot; refused requests are ignored."""
+    """Load the kernels by a homing, a path and jogs near the middle of `robot`. Refused requests are ignored."""
     middle, homing = _first_feasible(robot, model, method)
     beside = Pose.from_euler(middle.position + np.array([MOVE, 0.0, 0.0]), 0.0, 0.0, 0.0)
     path, by = septic_path([middle, beside], speed=0.1), np.full(6, 1e-3)
@@ -231,7 +231,7 @@ def load_kernels(robot: Robot, period: float, model: CableModel, method: Tension
 
 
 def _first_feasible(robot: Robot, model: CableModel, method: TensionMethod) -> tuple[Pose, Homing | None]:
-    """First position with feasible tensions, and its plan; without such a position, the middle and None."""
+    """First position with feasible tensions, and its plan. If no position is feasible: the middle, and None."""
     for place in _probable_positions(robot):
         pose = Pose.from_euler(place, 0.0, 0.0, 0.0)
         with suppress(SaglineError):

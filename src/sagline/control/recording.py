@@ -94,7 +94,7 @@ class Recorded(NamedTuple):
 
 @runtime_checkable
 class Recorder(Protocol):
-    """Receiver of cycles and events, for example a log. Its methods must return at once: the loop waits for them."""
+    """Receiver of cycles and events, for example a log. Its methods must return at once: the control loop waits."""
 
     @property
     def stopped(self) -> str:
@@ -126,7 +126,7 @@ class Recorder(Protocol):
         """Receive an event.
 
         Args:
-            event: Change of a state, fault or command.
+            event: Change of state, fault or note.
         """
 
 
@@ -183,7 +183,7 @@ class CycleTable:
         return self._numbers, self._codes
 
     def column(self, name: str) -> NDArray[Any]:
-        """Values of one quantity over the cycles, (N,) or (N, width), not copied."""
+        """Values of the quantity `name` over the cycles, (N,) or (N, width), not copied."""
         rows = slice(self._count)
         whole = name in self._whole
         found: NDArray[Any] = self._codes[rows, self._whole[name]] if whole else self._numbers[rows, self._real[name]]
@@ -227,7 +227,7 @@ class Journal:
         return self.tell(lambda record: record.event(event))
 
     def tell(self, what: Callable[[Recorder], object]) -> str:
-        """Call a method of the recorder. After an exception, remove the recorder and return a message; else ""."""
+        """Call a method of the recorder. Return "". After an exception, remove the recorder and return a message."""
         if self._record is None:
             return ""
         try:

@@ -94,7 +94,7 @@ class Standing:
 
 
 def standing_at(robot: Robot, length: Array, start: Pose | None, model: CableModel) -> Standing | ForwardStatus:
-    """Constant set point for lengths (m,) [m] and their pose; the status of forward kinematics without a pose."""
+    """Constant set point for `length` [m], (m,), and its pose. If no pose is found: the status of the search."""
     found = forward(robot, length, start, model)
     return Standing.at(found.state) if found.status in STABLE else ForwardStatus(int(found.status))
 
@@ -103,7 +103,7 @@ class Fade:
     """Smooth transition from the lengths at rest to the lengths of a plan."""
 
     def __init__(self, lead: Array, period: float) -> None:
-        """Begin with the whole difference lead [m], (m,); period [s]."""
+        """Begin with the whole difference `lead` [m], (m,); `period` [s]."""
         largest = float(np.abs(lead).max())
         self._lead, self._period = lead, period
         self._cycle, self._cycles = 0, ceil(max(RAMP, 1.5 * largest / LEAD_SPEED) / period) if largest > 0.0 else 0
@@ -127,7 +127,7 @@ class Along:
     """Set points along a motion, on a clock that can slow down and continue."""
 
     def __init__(self, motion: Motion, period: float, lead: Array) -> None:
-        """Begin at the first row. The offset lead [m], (m,), decreases to zero. Period in s."""
+        """Begin at the first row. The offset `lead` [m], (m,), decreases to zero. `period` is in s."""
         self.motion = motion
         self._period, self._last = period, len(motion) - 1
         self._row = 0.0
@@ -200,7 +200,7 @@ class Ramp:
     """Ramp that reduces all rates to zero in the same time: l' = l'_0 (1 - t/t_s). The direction is preserved."""
 
     def __init__(self, point: SetPoint, period: float) -> None:
-        """Begin at the last set point; period [s]."""
+        """Begin at `point`, the last set point; `period` [s]."""
         self._begin = point
         self._share, self._cycle = period / RAMP, 0
 

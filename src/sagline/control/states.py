@@ -111,7 +111,7 @@ class RefusedError(SaglineError):
 
 
 def check_transition(state: State, to: State, what: str) -> None:
-    """Reject a transition that is not in the table."""
+    """Reject the transition from `state` to `to` if it is not in the table."""
     _, exits = TABLE[state]
     if to in exits:
         return

@@ -100,8 +100,8 @@ class TensionLoop:
             tension: T_A, tension measured by the load cells [N], shape (m,).
             planned: Planned tension at the same time [N], shape (m,).
             row: Matrices of the tension loop at this time of the plan.
-            frozen: True if the tensions are old or doubtful. The correction is then adapted to the pose only; tensions
-                have no effect.
+            frozen: True if the tensions are old or doubtful. Tensions then have no effect, and the correction is
+                adapted only to the pose.
 
         Returns:
             Correction of the lengths of the plan [m], shape (m,), an array owned by the caller.

@@ -61,7 +61,7 @@ def export_c(
     Args:
         robot: The robot; its winches may have pulleys and dead lengths, but no guides.
         file: Path of the source, sagline.c; the other files are in the same folder. Existing files are replaced.
-        tension: Tension distribution method, or several methods; each call then selects one of them.
+        tension: Tension distribution method, or several methods. With several methods, each call selects one of them.
         forward: True to include the forward kinematics.
         single_precision: True for numbers of type `float`, for controllers with hardware for single precision only.
 
@@ -69,8 +69,8 @@ def export_c(
         Paths of the source, the header and the SCL text.
 
     Raises:
-        InvalidValueError: If the winches have guides, a method does not support the robot, or a number exceeds single
-            precision.
+        InvalidValueError: If the winches have guides. If a method does not support the robot. If a number exceeds
+            single precision.
         FileError: If the name does not end in .c, a file cannot be written, or the package was not built.
 
     Examples:
@@ -134,13 +134,13 @@ def _kernels() -> dict[str, Any]:
 
 
 def _evaluated(bounds: dict[str, list[tuple[int, int, int]]], robot: Robot) -> dict[str, int]:
-    """Bounds of a kernel for a robot, from polynomials in the degrees of freedom and in the redundancy."""
+    """Bounds of a kernel for `robot`. They are polynomials in the degrees of freedom and in the redundancy."""
     n, r = robot.degrees_of_freedom, robot.cable_count - robot.degrees_of_freedom
     return {name: sum(value * n**i * r**j for i, j, value in terms) for name, terms in bounds.items()}
 
 
 def _reached(parts: list[tuple[list[str], str]], asked: Sequence[str]) -> str:
-    """Select the parts that some entries need, in the order of the source."""
+    """Select the parts that the entries `asked` need, in the order of the source."""
     owner = {name: index for index, (names, _) in enumerate(parts) for name in names}
     waiting, reached = [owner[name] for name in asked], {index for index, (names, _) in enumerate(parts) if not names}
     while waiting:
@@ -198,7 +198,7 @@ def _method_names(methods: Sequence[TensionMethod]) -> list[str]:
 
 
 def _rule(options: Options, real: type[np.floating]) -> str:
-    """Data of a method as C text."""
+    """Data of a tension distribution method as C text."""
     code, parameter, variable, weights, targets = options.sharing
     numbers = (_constant(np.asarray(value), "tension", real) for value in (parameter, options.limits[1]))
     lists = (_constant(np.asarray(value), "tension", real) for value in (weights, targets))
@@ -215,7 +215,7 @@ def _statuses() -> str:
 
 
 def _constant(values: Array, name: str, real: type[np.floating]) -> str:
-    """Constant or list in braces as C text, from which C reads exactly the same numbers."""
+    """Constant or list in braces as C text. C reads exactly the same numbers from this text."""
     if values.ndim:
         separator = ", " if values.ndim == 1 else ",\n    "
         return f"{{{separator.join(_constant(value, name, real).strip('{}') for value in values)}}}"

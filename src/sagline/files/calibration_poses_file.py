@@ -34,7 +34,7 @@ _DIGITS: Final = 4  # significant digits of an expected error
 
 
 def save(plan: CalibrationPoses, file: os.PathLike[str] | str) -> None:
-    """Write poses, tensions and lengths, and expected errors, to a YAML file atomically."""
+    """Write the poses of `plan`, their tensions and lengths, and the expected errors to a YAML file atomically."""
     rows = {
         "position": plan.poses.position,
         "quaternion": plan.poses.quaternion,

@@ -149,7 +149,7 @@ def _platform(root: Element) -> tuple[dict[str, Any], list[str]]:
 
 
 def _inertia(element: Element, mass: float, center: Array) -> Array:
-    """Inertia about the center of mass. CASPR gives it about this center or about the joint (platform origin)."""
+    """Inertia about the center of mass. CASPR gives the inertia about this center or the joint (platform origin)."""
     xx, yy, zz, xy, xz, yz = (
         number_of_text(element.findtext(key), key, "kg m^2") for key in ("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
     )

@@ -140,7 +140,7 @@ def _scl_number(value: float) -> str:
 
 
 def checked_name(file: str | os.PathLike[str], ending: str, what: str, usual: str) -> Path:
-    """Check the path of a source file; raise FileError if the suffix is wrong."""
+    """Check the path `file` of a source file; raise FileError if its suffix is not `ending`."""
     path = file_path(file)
     if path.suffix != ending:
         raise FileError(

@@ -36,7 +36,7 @@ PLAN_GROUP: Final = "plan"
 
 
 def load_execution(file: os.PathLike[str] | str, plan: int | None = None) -> Execution:
-    """Read an execution from an MCAP log. The log may contain a whole session, or end early (killed process).
+    """Read an execution from an MCAP log. The log may contain a whole session, or end early (process killed).
 
     All numbers of a file that `Execution.save` wrote are restored exactly.
 
@@ -49,8 +49,8 @@ def load_execution(file: os.PathLike[str] | str, plan: int | None = None) -> Exe
         The execution. Its status is UNKNOWN if the log does not contain the end of the plan.
 
     Raises:
-        FileError: If the file is missing, not a log, of a newer format, damaged or cut off before its first cycle, or
-            if a package is missing.
+        FileError: If the file is missing, not a log, or of a newer format. If it is damaged, or cut off before its
+            first cycle. If a package is missing.
         InvalidValueError: If the log does not have this plan.
 
     Warns:
@@ -111,7 +111,7 @@ def _execution(log: RecordedLog, robot: Robot, blocks: list[dict[str, NDArray[An
 
 
 def plan_of_log(log: RecordedLog, number: int) -> Plan:
-    """Read a plan of a log."""
+    """Read the plan with the index `number` from a log."""
     data = unpack_dataset(log.plans[number])
     return plan_of_dataset(log.path, data, f"robot of plan {number}")
 
@@ -170,7 +170,7 @@ def save(execution: Execution, file: os.PathLike[str] | str) -> None:
 
 
 def save_execution(execution: Execution, file: os.PathLike[str] | str) -> None:
-    """Write an execution to a log in MCAP atomically, with plan, robot and all numbers without rounding."""
+    """Write an execution, its plan and its robot to an MCAP log atomically. No number is rounded."""
     done, target = instance(execution, Execution, "execution"), file_path(file)
     check_packages()
     with atomic_file(target) as partial_file, FileIO(partial_file, "wb") as stream:

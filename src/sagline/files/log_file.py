@@ -151,7 +151,7 @@ def _fields(table: CsvTable, cables: int) -> dict[str, Any]:
 
 
 def _stack_columns(table: CsvTable, names: Iterable[str], *, all_of_them: bool = True) -> Array | None:
-    """Matrix of the columns with given names. A missing column is NaN; None if all columns are missing."""
+    """Matrix of the columns `names`. A missing column is NaN. If all columns are missing: None."""
     names = list(names)
     found = [name for name in names if name in table.columns]
     if not found:
@@ -237,7 +237,7 @@ def load_log(file: os.PathLike[str] | str, sensors: Sensors | None = None) -> Wi
         The log; its source is the name of the file.
 
     Raises:
-        FileError: If the file cannot be read, a column, comment or number is wrong, or the deviation of a sensor is
+        FileError: If the file cannot be read. If a column, comment or number is wrong, or the deviation of a sensor is
             missing; the message names the line or the key.
         InvalidValueError: If `sensors` is not a `Sensors` object, or has another number of cables.
 

@@ -240,7 +240,7 @@ def _text(said: dict[str, Any]) -> bytes:
 
 
 def transform(stamp: int, position: Array, quaternion: Array) -> FrameTransform:
-    """Pose of the platform at a time [ns], as a message of Foxglove; position [m], quaternion scalar last."""
+    """Pose of the platform at `stamp` [ns], as a message of Foxglove; `position` [m], `quaternion` scalar last."""
     from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 
     found = FrameTransform(parent_frame_id=WORLD, child_frame_id=PLATFORM)
@@ -261,7 +261,7 @@ class Scene:
         self._body = _corners(robot.platform_anchors)
 
     def at(self, stamp: int, position: Array, quaternion: Array, tension: Array) -> SceneUpdate:
-        """Scene at a time [ns], from position [m], quaternion (scalar last) and tensions at the frame ends [N]."""
+        """Scene at `stamp` [ns]; `position` [m]; `quaternion` scalar last; `tension` at the frame ends [N]."""
         from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
         scene = SceneUpdate()
@@ -299,7 +299,7 @@ def _lines(entity: SceneEntity, stamp: int, name: str, frame: str, color: tuple[
 
 
 def _corners(points: Array) -> Array:
-    """Lines between pairs of neighboring points, (e, 2, 3): no third point is closer to both points of a pair."""
+    """Lines between pairs of points, (e, 2, 3), for pairs without a third point that is closer to both points."""
     distance = np.linalg.norm(points[:, None] - points[None], axis=2)
     near = [
         (i, j)

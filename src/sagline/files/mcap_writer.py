@@ -106,12 +106,12 @@ class McapFile:
         return number
 
     def end(self, number: int, status: str, reason: str) -> None:
-        """Attach the end of a plan."""
+        """Attach the end of the plan with the index `number`."""
         name = mcap_layout.END.format("none" if number == NONE else number)
         self._attach(name, mcap_layout.JSON, json.dumps({"status": status, "reason": reason}).encode())
 
     def block(self, columns: Mapping[str, NDArray[Any]], plan: int, zero: Array, rest: Callable[[], Any] = int) -> None:
-        """Write cycles of a plan (`NONE`: no plan) and the offset from homing [m]; call `rest` between messages."""
+        """Write cycles of `plan` (`NONE`: no plan) and the homing offset `zero` [m]; call `rest` between messages."""
         stamps = [self.stamp(value) for value in columns["time"].tolist()]
         kept = {**columns, "plan": np.array(plan), "zero": zero, "epoch": np.array(self.epoch)}
         for stamp, text in zip(stamps, mcap_layout.cycle_texts(kept), strict=True):
@@ -132,7 +132,7 @@ class McapFile:
         self._message(mcap_layout.EVENT, self.stamp(event.time), mcap_layout.event_message(event))
 
     def truth(self, time: float, position: Array, quaternion: Array) -> None:
-        """Write the true pose of the platform at a time [s]."""
+        """Write the true pose of the platform at the time `time` [s]."""
         self._message(mcap_layout.TRUTH, self.stamp(time), mcap_layout.truth_text(time, position, quaternion))
 
     def close_chunk(self) -> None:

@@ -36,8 +36,8 @@ def load_mesh(file: str | os.PathLike[str], unit: str = "m", name: str | None = 
     """Read a solid from a file: an obstacle around a robot, or a platform.
 
     Args:
-        file: STL, PLY, OBJ or GLB file with at most 200 MB and a million triangles. z points up. In a GLB file y points
-            up by its standard; it is rotated.
+        file: STL, PLY, OBJ or GLB file with at most 200 MB and a million triangles. z points up. In a GLB file, y
+            points up by the standard; the mesh is then rotated.
         unit: Unit of the coordinates, for example "mm"; files of these formats do not contain the unit.
         name: Name; None: the name of the file.
 
@@ -45,8 +45,8 @@ def load_mesh(file: str | os.PathLike[str], unit: str = "m", name: str | None = 
         Mesh, in meters.
 
     Raises:
-        FileError: If the file cannot be read, or the surface is not closed or crosses itself (checked for up to 20,000
-            triangles). The message gives the extent of the mesh.
+        FileError: If the file cannot be read. If the surface is not closed, or crosses itself (checked for up to 20,000
+            triangles); the message gives the extent of the mesh.
         SaglineError: If trimesh or python-fcl is missing; the message contains the command that installs it.
 
     Examples:
@@ -76,7 +76,7 @@ def load_mesh(file: str | os.PathLike[str], unit: str = "m", name: str | None = 
 
 
 def meters(unit: str, item: str) -> float:
-    """Length of a unit [m]; raise InvalidValueError if it is not a unit of length."""
+    """Length of `unit` [m]; raise InvalidValueError if `unit` is not a unit of length."""
     try:
         factor = in_si(f"1 {label(unit, item)}", "m", item)
     except InvalidValueError:
@@ -87,7 +87,7 @@ def meters(unit: str, item: str) -> float:
 
 
 def _triangles(path: Path, data: bytes, unit: float) -> tuple[Array, Indices]:
-    """Distinct vertices [m] and non-degenerate triangles of a file; unit: length of the file's unit [m]."""
+    """Distinct vertices [m] and non-degenerate triangles of a file; `unit`: length of the file's unit [m]."""
     try:
         import trimesh
     except ImportError:
@@ -114,7 +114,7 @@ def _triangles(path: Path, data: bytes, unit: float) -> tuple[Array, Indices]:
 
 
 def _check_vertices(path: Path, vertices: Array) -> None:
-    """Refuse vertices [m] that are not numbers, or too far away for any machine."""
+    """Refuse `vertices` [m] that are not numbers, or that are too far away for any machine."""
     if not np.isfinite(vertices).all():
         raise FileError(path, "contains coordinates that are not numbers", _MEANT)
     try:

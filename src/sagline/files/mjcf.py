@@ -2,7 +2,7 @@
 
 The cylinders do not swivel. The platform end of a cable moves perpendicular to the chord by small distances: by u in
 the vertical plane of the cable, and by v out of this plane. If the pulley swivels, the cable becomes longer by u^2/(2
-l) + v^2 cos phi/(2 s); l is the free length, and s is the distance of the end from the swivel axis. On a fixed
+l) + v^2 cos phi/(2 s). Here, l is the free length, and s is the distance of the end from the swivel axis. On a fixed
 cylinder, the cable unrolls to a straight line and becomes longer by v^2/(2 a); a is the length from the first point to
 the end. The tendon therefore starts at the point with a = s/cos phi. This point is R tan(psi/2) before the point at
 which the tendon leaves the cylinder. Force and stiffness are then the same as with a swiveling pulley.
@@ -130,8 +130,8 @@ def dump_mjcf(robot: Robot, pose: PoseLike, unstrained_length: ArrayLike | None 
         The XML text.
 
     Raises:
-        InvalidValueError: If the pose is a batch, a length is below 1e-6 m or at most the dead length, or no tensions
-            within the robot's limits hold the platform at the pose.
+        InvalidValueError: If `pose` is a batch. If a length is below 1e-6 m, or not longer than the dead length. If no
+            tensions within the robot's limits hold the platform at `pose`.
         CableGeometryError: If a platform end is inside its pulley.
 
     Examples:
@@ -253,7 +253,7 @@ def _add_platform(world: Element, robot: Robot, pose: Pose, radius: float, drag:
 
 
 def _inertia(robot: Robot, pose: Pose) -> Array:
-    """Inertia for MuJoCo. If it would refuse the robot's inertia: an inertia with equal effect on the free motions."""
+    """Inertia for MuJoCo. If MuJoCo refuses the robot's inertia: an inertia of equal effect on the free motions."""
     least, middle, most = np.linalg.eigvalsh(robot.inertia)
     missing = most - (least + middle) + _ROUNDING * most  # zero or less for a body, except for rounding
     if least > 0.0 and missing <= 0.0:

@@ -113,14 +113,14 @@ class Content:
         return f"is not a {self.name} of sagline: it has no {self.key}", "Check that this is the file you mean."
 
     def attributes(self, title: str) -> dict[str, Any]:
-        """Attributes of every file of this content."""
+        """Attributes that every file of this content has."""
         return {"title": title, "source": f"sagline {version('sagline')}", self.key: self.version}
 
 
 def labeled_dataset(
     variables: Mapping[str, Any], attributes: Mapping[str, Any], coordinates: Mapping[str, Any] | None = None
 ) -> Dataset:
-    """Make a data set without indexes for its dimensions; the reader makes the necessary indexes."""
+    """Make a data set without indexes for its dimensions. The reader makes the necessary indexes."""
     from xarray import Coordinates, Dataset
 
     parts = {dimension for dimensions, *_ in variables.values() for dimension in dimensions} & PARTS.keys()
@@ -129,7 +129,7 @@ def labeled_dataset(
 
 
 def index_coordinate(dimension: str, count: int) -> tuple[str, Any, dict[str, str]]:
-    """Coordinate with the numbers of cables or similar items, from 0."""
+    """Coordinate of `dimension`: the indices 0 to `count` - 1, for example of cables."""
     return dimension, np.arange(count), {"long_name": f"{dimension}, counted from 0"}
 
 
@@ -184,7 +184,7 @@ def file_errors(path: Path) -> Iterator[None]:
 
 
 def is_of(path: Path, content: Content) -> bool:
-    """True if a file has the attributes of this content; nothing else is checked."""
+    """True if a file has the attributes of `content`. Nothing else is checked."""
     from h5py import File
 
     try:
@@ -227,7 +227,7 @@ def _cause(path: Path, content: Content) -> tuple[str, str]:
 
 
 def attributes_with_units(source: Any, units: Mapping[str, str | None]) -> dict[str, Any]:
-    """Numeric attributes of an object. Each is followed by an attribute with its unit, unless the unit is None."""
+    """Numeric attributes of `source`. Each is followed by an attribute with its unit, unless the unit is None."""
     found: dict[str, Any] = {}
     for name, unit in units.items():
         found |= {name: float(getattr(source, name)), **({} if unit is None else {f"{name}_units": unit})}
@@ -245,7 +245,7 @@ def choice_attributes(key: str, choice: Any, choices: Mapping[str, type[Any]]) -
 def choice_of(
     path: Path, attributes: Mapping[str, Any], key: str, choices: Mapping[str, type[Choice]], **known: Any
 ) -> Choice:
-    """Restore an object from `choice_attributes`; raise FileError if its type or an option is unknown."""
+    """Restore an object from `choice_attributes`. Raise FileError if the type or an option of the object is unknown."""
     name = attributes[key]
     if name not in choices:
         refused = InvalidValueError(key, repr(name), ", ".join(choices), "Read it with a newer sagline.")
@@ -265,7 +265,7 @@ def _plain(value: Any) -> Any:
 
 
 def robot_of(path: Path, data: Dataset, item: str = "robot") -> Robot:
-    """Read the robot of a data set; raise FileError if it is invalid or has another number of cables."""
+    """Read the robot of a data set. Raise FileError if the robot is invalid or has another number of cables."""
     robot = parse_robot(str(data.attrs["robot"]), f"{path}, {item}")
     if data.sizes["cable"] != robot.cable_count:
         reason = f"has {data.sizes['cable']} cables, its robot {robot.cable_count}"

@@ -73,7 +73,7 @@ def pack(
 
 
 def unpack(data: bytes, most: int = 1 << 62) -> dict[str, NDArray[Any]]:
-    """Restore columns from data of `pack` exactly; most: largest allowed size of the columns [bytes]."""
+    """Restore columns from data of `pack` exactly; `most`: largest allowed size of the columns [bytes]."""
     from zstandard import ZstdDecompressor, ZstdError, get_frame_parameters
 
     try:
@@ -113,7 +113,7 @@ def _count(column: _Column) -> int:
 
 
 def _whole(values: NDArray[Any], decimals: int) -> tuple[NDArray[np.int64], int]:
-    """Values as integers, with the number of decimals of their scale (-1: integers, or bits of floats)."""
+    """Values as integers, and the number of decimals that scales them (-1: integers, or bits of floats)."""
     if values.dtype.name not in TYPES:
         raise TypeError(f"columns of {values.dtype} are not packed")
     if values.dtype != np.float64:
@@ -142,7 +142,7 @@ def _decimal(whole: NDArray[np.int64], decimals: int) -> NDArray[np.float64]:
 
 
 def _smallest(whole: NDArray[np.int64]) -> tuple[int, NDArray[np.uint64]]:
-    """Order of differences that needs the fewest bits, and the differences, with the sign in the lowest bit."""
+    """Order of differences that needs the fewest bits, and the differences. Their lowest bit is the sign."""
     best: tuple[float, int, NDArray[np.uint64]] | None = None
     for order in range(MOST_ORDER + 1):
         small = ((whole << 1) ^ (whole >> 63)).view(np.uint64)

@@ -198,8 +198,8 @@ def save_plan(plan: Plan, file: os.PathLike[str] | str) -> None:
         file: The file, for example "run.nc". An existing regular file is replaced; any other target is refused.
 
     Raises:
-        InvalidValueError: If the plan has several robots (one per pose), a cable model or a tension method that is not
-            part of sagline, or values that `inverse` never returns.
+        InvalidValueError: If `plan` has several robots (one per pose). If its cable model or tension method is not part
+            of sagline. If it has values that `inverse` never returns.
         FileError: If the file cannot be written; an existing file is then unchanged.
 
     Examples:
@@ -223,8 +223,8 @@ def load_plan(file: os.PathLike[str] | str) -> Plan:
         The plan; its proofs (`farkas` and the following fields) are None if an older file does not contain them.
 
     Raises:
-        FileError: If the file is missing, cut off, not a NetCDF file, not a plan, of a newer format, or changed
-            after it was written: its digest, shapes, units, status codes and signs are checked.
+        FileError: If the file is missing, cut off, not a NetCDF file, not a plan, or of a newer format. If it was
+            changed after it was written; digest, shapes, units, status codes and signs are checked.
 
     Examples:
         >>> import sagline as sl
@@ -261,7 +261,7 @@ def _attributes(plan: Plan) -> dict[str, Any]:
 
 
 def plan_of_dataset(path: FilePath, data: Dataset, item: str = "robot") -> Plan:
-    """Create a plan from a data set of `plan_dataset`; path and item are used in messages."""
+    """Create a plan from a data set of `plan_dataset`. Messages contain `path` and `item`."""
     robot = robot_of(path, data, item)
     _check_plan(data, robot.cable_count)
     behind = MACHINE[0].name in data.variables

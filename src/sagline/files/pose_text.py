@@ -23,7 +23,7 @@ UNITS_STEP: Final = "Check its unit: numbers are meters, millimeters are written
 
 
 def decimal_numbers(parts: Sequence[str], item: str, unit: str, largest: float) -> list[float]:
-    """Read plain decimal numbers from texts."""
+    """Read plain decimal numbers from the texts `parts`."""
     found = []
     for part in parts:
         number = plain_number(part)
@@ -68,7 +68,7 @@ class PoseEntry(YamlEntry):
 
 
 def pose_of_entry(entry: PoseEntry, item: str) -> Pose:
-    """Convert an entry to a pose; raise InvalidValueError if it is wrong, or too far away for any machine."""
+    """Convert `entry` to a pose; raise InvalidValueError if it is wrong, or too far away for any machine."""
     position = si_numbers(entry.position, 3, "m", f"{item}.position")
     if (far := float(np.abs(position).max())) > FARTHEST:
         raise InvalidValueError(f"{item}.position", f"{far:g} m away", f"up to {FARTHEST:g} m", UNITS_STEP)
@@ -90,7 +90,7 @@ def pose_of_entry(entry: PoseEntry, item: str) -> Pose:
 
 
 def si_numbers(value: Any, count: int, unit: str, item: str) -> Array:
-    """Convert a value of a file to numbers in SI, shape (count,)."""
+    """Convert `value` from a file to `count` numbers in SI, shape (count,)."""
     numbers = checked(in_si(value, unit, item), item, unit)
     if numbers.shape != (count,):
         raise InvalidValueError(item, f"of shape {numbers.shape}", f"a list of {count} numbers", f"Correct {item}.")

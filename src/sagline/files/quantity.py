@@ -57,7 +57,7 @@ def within_reach(number: float) -> bool:
 
 
 def in_si(value: object, unit: str, item: str) -> Nested:
-    """Convert a quantity, or nested lists of quantities, to numbers in an SI unit."""
+    """Convert a quantity, or nested lists of quantities, to numbers in the SI unit `unit`."""
     if isinstance(value, list | tuple):
         return [in_si(element, unit, f"{item}[{i}]") for i, element in enumerate(value)]
     number = _from_text(value, unit) if isinstance(value, str) else _from_number(value)
@@ -94,7 +94,7 @@ def _limit(number: float) -> float:
 
 @lru_cache(maxsize=1000)
 def _factor(given: str, wanted: str) -> float | None:
-    """Factor from a unit to the required unit; None if the units do not agree."""
+    """Factor that converts the unit `given` to the unit `wanted`; None if the units measure different quantities."""
     from pint.errors import PintError
 
     units = _registry()

@@ -124,7 +124,7 @@ def dump_robot(robot: Robot) -> str:
 
 
 def _deviations(found: Mapping[str, Array]) -> dict[str, Any]:
-    """Standard deviations for the file. A field with equal values becomes a single number."""
+    """Standard deviations `found`, for the file. A field with equal values becomes a single number."""
     return {name: (one.flat[0].item() if (one == one.flat[0]).all() else one.tolist()) for name, one in found.items()}
 
 
@@ -145,7 +145,7 @@ def _on_base(data: dict[Any, Any], origin: Path | str) -> dict[Any, Any]:
 
 
 def _winches(winches: Winch) -> dict[str, Any]:
-    """Keys of the winches' values, without the values of a winch that has only a pulley."""
+    """Keys of the winches' values. Values that belong to a winch with only a pulley are left out."""
     plain = Winch().per_cable(len(winches.pulley_radius)).known()
     data = {
         key: field.tolist()

@@ -92,7 +92,7 @@ class ObstacleEntry(YamlEntry):
         return kind
 
     def solid(self, item: str) -> Box | Capsule | Sphere | None:
-        """Box, capsule or sphere of the entry. For a mesh: None, after a check of the values, but not of the file."""
+        """Box, capsule or sphere of the entry. For a mesh: None; its values are checked, but its file is not read."""
         from sagline.files.mesh_file import meters  # imported here because most robot files have no scene
         from sagline.interference.obstacles import Box, Capsule, Sphere
 
@@ -125,12 +125,12 @@ class _RobotPart(YamlEntry):
     """Schema of a mapping in a robot file."""
 
     def given(self, key: str, within: str = "") -> Any:
-        """Value of a key in SI."""
+        """Value of the key `key` in SI."""
         item = within + key
         return in_si(getattr(self, key), _UNITS.get(item, "kg*m^2"), item)
 
     def only_way(self, item: str, ways: tuple[tuple[str, ...], ...], beside: tuple[str, ...]) -> tuple[str, ...]:
-        """Set of the given keys without the keys in `beside`; raise an error if it is not one of the `ways`."""
+        """Set of the given keys without the keys in `beside`. Raise an error if it is not one of the `ways`."""
         found = self.model_fields_set.difference(beside)
         for way in ways:
             if found == set(way):

@@ -52,7 +52,7 @@ def read_xml(path: Path) -> Element:
 
 
 def numbers_of_text(text: str | None, count: int, item: str, unit: str) -> Array:
-    """Read numbers between blanks, shape (count,); raise InvalidValueError with item and unit."""
+    """Read `count` numbers between blanks. Raise InvalidValueError with `item` and `unit` if one is wrong."""
     found = [plain_number(word) for word in (text or "").split()[: count + 1]]
     values = [number for number in found if number is not None and within_reach(number)]
     if len(found) != count or len(values) != count:
@@ -63,12 +63,12 @@ def numbers_of_text(text: str | None, count: int, item: str, unit: str) -> Array
 
 
 def number_of_text(text: str | None, item: str, unit: str) -> float:
-    """Read one finite number; raise InvalidValueError with item and unit."""
+    """Read one finite number. Raise InvalidValueError with `item` and `unit` if the number is wrong."""
     return float(numbers_of_text(text, 1, item, unit)[0])
 
 
 def only_child(parent: Element, tag: str, item: str) -> Element:
-    """Find the element with this tag inside another element."""
+    """Find the element with the tag `tag` inside the element `parent`."""
     found = parent.findall(tag)
     if len(found) != 1:
         raise InvalidValueError(
@@ -89,7 +89,7 @@ def cables_of_file(
 
 
 def vertical_axis(sideways: float, up: float) -> tuple[float, float, float] | None:
-    """Swivel axis, up or down, from the horizontal and vertical parts of its direction; None if it is inclined."""
+    """Swivel axis, up or down, from its horizontal part `sideways` and its vertical part `up`; None if inclined."""
     return None if not up or sideways > UPRIGHT * abs(up) else (0.0, 0.0, float(np.sign(up)))
 
 

@@ -155,7 +155,7 @@ def _check_events(data: Dataset, time: Array, cables: int) -> Array:
 
 
 def _check_gaps(name: str, values: Array, gone: Any) -> None:
-    """Refuse values of broken cables, and missing values of intact cables; gone: flags (samples, cables)."""
+    """Refuse values of broken cables, and missing values of intact cables; `gone`: flags (samples, cables)."""
     missing = np.isnan(values)
     gone = gone.reshape(gone.shape + (1,) * (values.ndim - 2))
     for index in np.argwhere(missing != gone)[:1].tolist():
@@ -185,8 +185,8 @@ def load_simulation(file: os.PathLike[str] | str) -> Simulation:
         The simulation.
 
     Raises:
-        FileError: If the file is missing, cut off, not a NetCDF file, not a simulation, of a newer format, or changed
-            after it was written: its digest, shapes, units and signs are checked.
+        FileError: If the file is missing, cut off, not a NetCDF file, not a simulation, or of a newer format. If it was
+            changed after it was written; digest, shapes, units and signs are checked.
 
     Examples:
         >>> import sagline as sl
@@ -201,7 +201,7 @@ def load_simulation(file: os.PathLike[str] | str) -> Simulation:
 
 
 def _pack(simulation: Simulation) -> Dataset:
-    """Create the data set of a simulation, with the dimensions time, cable, event, and node for cables with mass."""
+    """Create the data set of a simulation. Dimensions: time, cable and event; for cables with mass, node."""
     variables = variables_of_result(simulation, (*SAMPLES, NODES), (ROWS,)) | variables_of_result(
         simulation, (LARGEST,)
     )
@@ -230,7 +230,7 @@ def _attributes(simulation: Simulation) -> dict[str, Any]:
 
 
 def _unpack(path: FilePath, data: Dataset) -> Simulation:
-    """Create a simulation from a data set; the path is used in messages."""
+    """Create a simulation from a data set. Messages contain `path`."""
     robot = robot_of(path, data)
     _check_simulation(data, robot.cable_count)
     attributes, found = data.attrs, fields_of(data, (TIME, *SAMPLES, NODES, LARGEST))

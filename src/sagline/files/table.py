@@ -88,7 +88,7 @@ class CsvTable:
         return table
 
     def check_columns(self, names: Iterable[str], hint: str) -> None:
-        """Refuse a table in which one of the columns is missing; hint: end of the message."""
+        """Refuse a table in which one of the columns `names` is missing; `hint`: end of the message."""
         if missing := [name for name in names if name not in self.columns]:
             raise line_error(self.path, self.header, f"missing column {', '.join(missing)}{hint}")
 
@@ -98,14 +98,14 @@ class CsvTable:
             raise line_error(self.path, self.header, "no rows below the names of the columns; allowed: at least one")
 
     def refuse(self, wrong: NDArray[np.bool_], item: str, values: Array, unit: str, allowed: str) -> None:
-        """Refuse a table with wrong rows. The message gives line, value, unit and allowed values of the first one."""
+        """Refuse a table with wrong rows. The message gives line, value, unit and allowed values of the first."""
         if wrong.any():
             k = int(np.argmax(wrong))
             value = f"{values[k]:.12g} {unit}".rstrip()
             raise line_error(self.path, self.lines[k], f"{item} is {value}; allowed: {allowed}")
 
     def refuse_millimeters(self, name: str, size: Array | float, whole: str) -> None:
-        """Refuse lengths without a unit that exceed 100 times the size of the object [m], shape () or (rows,)."""
+        """Refuse lengths without a unit if they exceed 100 times the `size` of the object [m], shape () or (rows,)."""
         if name in self.plain:
             far = self.columns[name] > _TOO_LONG * size
             allowed = f"lengths like {whole}; if these are millimeters, call the column {name} [mm]"
@@ -113,7 +113,7 @@ class CsvTable:
 
 
 def separator_of(text: str) -> str:
-    """Separator of the columns of a CSV text: comma, or semicolon or tab if the first row has no comma."""
+    """Separator of the columns of a CSV text: a comma. If the first row has no comma: a semicolon or a tab."""
     header = re.sub(r"\[.*?\]", "", next((line for line in text.split("\n") if line.strip()), "")).strip()
     return next((mark for mark in ",;\t" if mark in header), ",")
 
@@ -174,7 +174,7 @@ def _numbers(path: FilePath, line: int, row: list[str], names: tuple[str, ...], 
 
 
 def line_error(path: FilePath, line: int, reason: str) -> FileError:
-    """Create the FileError with the number of the line."""
+    """Create the FileError for the line with the number `line`."""
     found = FileError(path, f"line {line}: {reason}", f"Correct line {line}.", item=f"line {line}")
     found.value, _, found.allowed = reason.partition("; allowed: ")
     return found

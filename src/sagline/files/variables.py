@@ -104,7 +104,7 @@ def record_variables(records: Sequence[Any], quantities: Iterable[Quantity], wid
 
 
 def values_of(data: Dataset, name: str) -> Any:
-    """Values of a variable as a write-locked array in C order."""
+    """Values of the variable `name` as a write-locked array in C order."""
     return locked(np.asarray(data[name].values, order="C"))
 
 
@@ -122,7 +122,7 @@ def fields_of(data: Dataset, quantities: Iterable[Quantity]) -> dict[str, Any]:
 
 
 def records_of(data: Dataset, quantities: Iterable[Quantity]) -> list[dict[str, Any]]:
-    """Restore records from variables of `record_variables`; integers with values SOMEWHERE may be None."""
+    """Restore records from variables of `record_variables`. Integers that have values only SOMEWHERE may be None."""
     columns: dict[str, list[Any]] = {}
     for one in quantities:
         values = data[one.name].values
@@ -162,7 +162,7 @@ def check_variables(
 
 
 def check_indices(data: Dataset, ranges: Mapping[str, tuple[int, int]]) -> None:
-    """Refuse indices out of range. A range includes its first number, but not its second."""
+    """Refuse indices out of range. Each of the `ranges` includes its first number, but not its second number."""
     for name, (low, high) in ranges.items():
         values = data.variables[name].values
         wrong = (values < low) | (values >= high)
@@ -188,7 +188,7 @@ def _shape(sizes: Mapping[str, int]) -> str:
 
 
 def _check_codes(quantity: Quantity, variable: Variable) -> None:
-    """Refuse codes that are unknown, or have another meaning in the file."""
+    """Refuse codes that are unknown, or that have another meaning in the file."""
     assert quantity.codes is not None
     ours = {code.value: code.name.lower() for code in quantity.codes}
     values = np.atleast_1d(variable.attrs.get("flag_values", ())).tolist()

@@ -44,8 +44,7 @@ def load_wirex(source: str | os.PathLike[str], cables: Cable | None = None) -> I
 
     Args:
         source: The `.wcrfx` file.
-        cables: The cables' material; None for the material of the file, or a 4 mm steel rope if the file has no
-            material.
+        cables: The cables' material. None: the material of the file, or a 4 mm steel rope if the file has no material.
 
     Returns:
         Imported: the robot, and the lost data.
@@ -118,7 +117,7 @@ def _robot(root: Element, name: str, cables: Cable | None) -> Imported:
 
 
 def _optional(element: Element | None, key: str, item: str, unit: str) -> float | None:
-    """Number in an attribute; None if it is missing, empty or infinite. Some programs write infinity for unknown."""
+    """Number in the attribute `key`; None if missing, empty or infinite. Some programs write infinity for unknown."""
     text = "" if element is None else element.get(key, "").strip()
     if not text or _INFINITE.fullmatch(text):
         return None
@@ -136,7 +135,7 @@ def _point(chain: Element, tag: str, k: int) -> list[float]:
 
 
 def _material(root: Element, chain: Element, k: int) -> Element:
-    """The <cable> whose number, from 1, is the cable_id of a chain; the first without an id; empty if none exists."""
+    """The <cable> whose number (from 1) is the cable_id of `chain`. No id: the first. Empty if none exists."""
     known = root.findall("cable")
     text = chain.get("cable_id", "1")
     if not known:

@@ -102,7 +102,7 @@ def _check_workspace(data: Dataset, cables: int) -> None:
 
 
 def _criteria_attributes(criteria: Sequence[Criterion]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Attributes of criteria, and variables of their obstacles; raises InvalidValueError for unknown criteria."""
+    """Attributes of criteria, and variables of their obstacles. Raises InvalidValueError for unknown criteria."""
     attributes: dict[str, Any] = {}
     variables: dict[str, Any] = {}
     for k, one in enumerate(criteria):
@@ -122,7 +122,7 @@ def _criteria_attributes(criteria: Sequence[Criterion]) -> tuple[dict[str, Any],
 
 
 def _criteria_of(path: Path, data: Dataset) -> tuple[Criterion, ...]:
-    """Restore criteria from `_criteria_attributes`, in the same order; the path is used in messages."""
+    """Restore criteria from `_criteria_attributes`, in the same order. Messages contain `path`."""
     found: list[Criterion] = []
     while (key := f"criterion_{len(found)}") in data.attrs:
         known: dict[str, Any] = {}
@@ -168,8 +168,8 @@ def load_workspace(file: os.PathLike[str] | str) -> Workspace:
         The workspace.
 
     Raises:
-        FileError: If the file is missing, cut off, not a NetCDF file, not a workspace, of a newer format, or changed
-            after it was written: its digest, shapes and units are checked.
+        FileError: If the file is missing, cut off, not a NetCDF file, not a workspace, or of a newer format. If it was
+            changed after it was written; digest, shapes and units are checked.
 
     Examples:
         >>> import sagline as sl
@@ -211,7 +211,7 @@ def _attributes(space: Workspace) -> dict[str, Any]:
 
 
 def _unpack(path: FilePath, data: Dataset) -> Workspace:
-    """Create a workspace from a data set; the path is used in messages."""
+    """Create a workspace from a data set. Messages contain `path`."""
     robot = parse_robot(str(data.attrs["robot"]), f"{path}, robot")
     if "component_separate" not in data.variables:  # a file of an older sagline, without proofs
         data = data.assign(component_separate=("component", np.zeros(data.sizes["component"], dtype=np.bool_)))

@@ -109,7 +109,7 @@ def _open_lock(place: Path) -> int:
 
 
 def try_lock(lock: int, *, if_unknown: bool) -> bool:
-    """True if an open file could be locked. On systems without locks, the value `if_unknown`."""
+    """True if an open file could be locked. On systems without locks, `if_unknown` is returned."""
     if sys.platform == "win32":
         return if_unknown
     import fcntl
@@ -224,7 +224,7 @@ def check_folder(folder: os.PathLike[str] | str) -> None:
 
 
 def create_folder(folder: os.PathLike[str] | str, *, parents: bool = True) -> Path:
-    """Create the folder if it is missing; raise an error if parent folders are missing, except with `parents`."""
+    """Create the folder if it is missing. Unless `parents` is True, raise an error if parent folders are missing."""
     path = Path(folder)
     try:
         path.mkdir(parents=parents, exist_ok=True)
@@ -251,7 +251,7 @@ def _finish(part: Path, target: Path) -> None:
 
 
 def _target_of(error: OSError, targets: Sequence[Path]) -> Path:
-    """Find the target to which an error belongs, from the temporary file in it; the first target if unknown."""
+    """Find the target to which an error belongs, from the temporary file in the error. Unknown: the first target."""
     name = Path(str(error.filename)).name.removesuffix(SUFFIX)
     return targets[int(name)] if name.isdecimal() and int(name) < len(targets) else targets[0]
 

@@ -116,7 +116,7 @@ def dump_mapping(data: Mapping[str, Any]) -> str:
 
 
 def _cause(error: yaml.MarkedYAMLError, text: str) -> tuple[str, str]:
-    """Reason why a text is not YAML, from a message of PyYAML if it is clear, and the next step."""
+    """Reason why a text is not YAML, and the next step. If the message of PyYAML is clear, the reason contains it."""
     mark, problem = error.problem_mark or error.context_mark, str(error.problem or error.context)
     index, place = (len(text), "") if mark is None else (mark.index, f"line {mark.line + 1}: ")
     if isinstance(error, yaml.scanner.ScannerError | yaml.parser.ParserError):
@@ -208,7 +208,7 @@ def _tag_of(kind: type[yaml.Node], value: str | None, implicit: Any) -> str:
 
 
 def _extent(node: yaml.Node, known: dict[int, tuple[int, int] | None]) -> tuple[int, int]:
-    """Numbers of values and levels of a node whose aliases are expanded; known: cache of these numbers."""
+    """Numbers of values and levels of a node whose aliases are expanded; `known`: cache of these numbers."""
     if id(node) in known:
         found = known[id(node)]
         if found is None:

@@ -20,7 +20,7 @@ WHOLE: Final = slice(None)
 
 
 def copy_in(memory: Any, given: Any, item: str, unit: str) -> None:
-    """Copy a caller's numbers into a work array; the solver checks that they are finite.
+    """Copy a caller's numbers into a work array. The solver checks that the numbers are finite.
 
     memory: a `memoryview` of float64 numbers, shape (k,).
     """

@@ -78,16 +78,16 @@ def confirm(plan: Plan, *, progress: Progress | None = None) -> Confirmation:
     Inertia and external wrench are taken from the plan. The search starts at the planned poses.
 
     Args:
-        plan: A plan of any cable model. The cable model of the plan causes the pose errors; with the exact model they
-            are only rounding errors.
-        progress: Function that is called about ten times per second with the number of confirmed poses and of all
-            poses.
+        plan: A plan of any cable model. The cable model of the plan causes the pose errors. With the exact model, the
+            pose errors are only rounding errors.
+        progress: Function that is called about ten times per second. Its arguments are the number of confirmed poses
+            and the number of all poses.
 
     Returns:
         The plan with its exact equilibrium poses.
 
     Raises:
-        InvalidValueError: If plan is not a Plan.
+        InvalidValueError: If `plan` is not a Plan.
 
     Examples:
         >>> import numpy as np
@@ -113,7 +113,7 @@ def confirm(plan: Plan, *, progress: Progress | None = None) -> Confirmation:
 
 
 def _forward(state: Equilibrium, progress: Progress | None) -> ForwardSolution:
-    """Forward kinematics for the lengths of a state, with the friction of the state."""
+    """Forward kinematics for the lengths and the friction of `state`."""
     robot, winding = state.robot, None if state.contact is None else state.contact.winding
     if not differs(robot, winding):
         return forward(robot, state.unstrained_length, state.pose, wrench=state.wrench, progress=progress)
@@ -125,5 +125,5 @@ def _forward(state: Equilibrium, progress: Progress | None) -> ForwardSolution:
 
 
 def _from(first: int, count: int, progress: Progress) -> Progress:
-    """Progress callback for a part of the poses; it also counts the poses before this part."""
+    """Progress callback for a part of the poses. It also counts the `first` poses before this part."""
     return lambda done, _: progress(first + done, count)

@@ -71,14 +71,14 @@ def equilibria(
     """Stable equilibria of a robot at given lengths, found by a search over orientations.
 
     For a fixed orientation the energy is convex in the position. Therefore only orientations are searched. The
-    orientations of the starts are uniformly random. The position of a start is the equilibrium position for its
-    orientation, of which there is only one. A robot without rotations has exactly one equilibrium. For other robots the
-    list can be incomplete, because no start may reach an equilibrium.
+    orientations of the starts are uniformly random. Each orientation has only one equilibrium position, at which its
+    start is placed. A robot without rotations has exactly one equilibrium. For other robots the list can be incomplete,
+    because no start may reach an equilibrium.
 
     Args:
         robot: The robot, with m cables.
         unstrained_length: L [m], > 0, shape (m,).
-        model: Cable model. The shallow models have no energy; their equilibria are sorted by the number of starts. For
+        model: Cable model. The shallow models have no energy. Their equilibria are sorted by the number of starts. For
             straight cables, the results are local least-squares fits, sorted by their sum of squares.
         wrench: External plus inertial wrench about the center of mass, world axes [N, N m], shape (6,); None for zero.
         starts: Number of initial orientations, >= 1.
@@ -88,8 +88,8 @@ def equilibria(
         Equilibria.
 
     Raises:
-        InvalidValueError: If a length is wrong (the message names the cable), starts is below 1 or exceeds the memory,
-            or an argument has the wrong type.
+        InvalidValueError: If a length is wrong; the message names the cable. If `starts` is below 1 or needs too much
+            memory. If an argument has the wrong type.
 
     Examples:
         >>> import sagline as sl

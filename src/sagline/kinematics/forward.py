@@ -55,11 +55,11 @@ def search(
     With a fixed orientation the platform has a single equilibrium, because the energy is convex in the position. Any
     start leads to this equilibrium. The search over all motions then starts there. The first start orientation is
     level. If no stable equilibrium within the tension limits is found, the search is repeated from tilted starts. The
-    results are compared first by status, then by the number of cables outside their limits, then by energy; the best
+    results are compared first by status, then by the number of cables outside their limits, then by energy. The best
     result is kept.
 
     lengths: unstrained lengths (N, m), rows of NaN are skipped; wrenches: external plus inertial wrenches (1 or N, 6);
-    progress: called after each block with the number of finished samples and the total number.
+    progress: called after each block with the number of finished samples and the number of all samples.
     """
     count, m = lengths.shape
     found = ForwardRows.empty(count, m, has_routing(robot))
@@ -108,7 +108,7 @@ def from_orientations(
 def starting_positions(robot: Robots, lengths: Array, quaternion: Array) -> Array:
     """Positions slightly below the center of the frame ends, within the free motions of the platform.
 
-    The center is not suitable: the two ends of a single cable would coincide.
+    The center itself is not suitable, because the two ends of a single cable would coincide there.
 
     lengths: unstrained lengths (N, m); quaternion: orientation of the platform, shape (4,) or (N, 4). Returns positions
     of the platform origin [m], shape (N, 3).
@@ -195,8 +195,8 @@ def forward(
     Args:
         robot: The robot, with m cables; or a sequence of N robots, one per sample. The robots must have the same number
             of cables, motion pattern, plane normal, type of tension limits and gravity; all other data may differ.
-        unstrained_length: L [m], > 0, shape (m,) for one sample or (N, m). A row of NaN, as in a plan at an infeasible
-            pose, gets the status NO_LENGTHS.
+        unstrained_length: L [m], > 0, shape (m,) for one sample or (N, m). A row of NaN gets the status NO_LENGTHS; a
+            plan has such a row at an infeasible pose.
         start: Initial pose. With a batch of N poses, each sample has its own start. With a single pose and N samples,
             the samples are a trajectory: the first sample starts at this pose, and each following sample at the
             previous result. With None, every sample is searched independently from the level platform. If several
@@ -205,23 +205,24 @@ def forward(
         model: Cable model; the default is exact.
         wrench: External plus inertial wrench on the platform about its center of mass in world axes, without gravity:
             force [N], then moment [N m], shape (6,) or (N, 6). None for zero.
-        tension_measured: Load cell data, or None. With load cell data, lengths and tensions count as measured values
-            with standard deviations. The result is the least-squares fit to both, with the covariance of the pose.
+        tension_measured: Load cell data, or None. With load cell data, lengths and tensions are measured values with
+            standard deviations. The result is then the least-squares fit to lengths and tensions, and contains the
+            covariance of the pose.
         winding: Last direction of each drum, which determines the friction of pulleys and guides: +1 winding in, -1
             paying out, 0 at rest, shape (m,) or (N, m). None: no friction. Friction and guides change the lengths; an
             iteration computes this change. With load cell data, the change is computed only once, at the measured
             lengths. With high friction and soft cables, several nearby poses can be equilibria.
-        progress: Function that is called about ten times per second with the number of solved samples and of all
-            samples.
+        progress: Function that is called about ten times per second. Its arguments are the number of solved samples and
+            the number of all samples.
 
     Returns:
         ForwardSolution, single or with a leading axis N.
 
     Raises:
-        InvalidValueError: If an argument has the wrong type or shape. If a length is not positive, not longer than
-            the dead length, or NaN in a sample with other lengths; the message names the cable. If several robots do
-            not fit together; the message names the property. If the start is outside the motions of the robot's
-            pattern. If the samples need more memory than is free.
+        InvalidValueError: If an argument has the wrong type or shape. If a length is not positive, not longer than the
+            dead length, or NaN beside other lengths; the message names the cable. If several robots do not fit
+            together; the message names the property. If `start` is outside the motions of the robot's pattern. If the
+            samples need more memory than is free.
 
     Source:
         docs/model.md, section 6.
@@ -264,10 +265,10 @@ def forward(
 
 
 def checked_lengths(robot: Robots, lengths: ArrayLike) -> Array:
-    """Lengths of a caller, shape (m,) or (N, m), positive and longer than the dead length, or whole rows of NaN.
+    """Lengths of a caller, shape (m,) or (N, m). They are positive and exceed the dead length, or whole rows are NaN.
 
-    robot: the robot of all samples, or one robot per sample; lengths: the caller's
-    lengths [m]. Returns write-locked array of shape (m,) or (N, m).
+    robot: the robot of all samples, or one robot per sample; lengths: the caller's lengths [m]. Returns a write-locked
+    array of shape (m,) or (N, m).
     """
     array = numbers(lengths, "unstrained_length", "m")
     shared, dead = first_of(robot), dead_cable(robot)

@@ -111,7 +111,7 @@ class ForwardRows(NamedTuple):
     pose_status: Codes
 
     def keep(self, samples: Indices | slice, other: ForwardRows, which: Indices | slice = slice(None)) -> None:
-        """Replace the results of some samples (k,) by results of another batch (k,)."""
+        """Replace the results of the samples `which` (k,) of the batch by the results of `other` (k,)."""
         self.poses[samples] = other.poses[which]
         self.results[:, samples] = other.results[:, which]
         self.cable_status[samples] = other.cable_status[which]
@@ -129,7 +129,7 @@ class ForwardRows(NamedTuple):
         )
 
     def last_pose(self, before: Array) -> Array:
-        """Last pose row with a result, (1, POSE_COLUMNS); the given previous row if no sample has a result."""
+        """Last pose row with a result, (1, POSE_COLUMNS). If no sample has a result: `before`."""
         found = ~np.isin(self.pose_status, (codes.FORWARD_NOT_CONVERGED, codes.FORWARD_NO_LENGTHS))
         which = np.flatnonzero(found)[-1:]
         return locked(self.poses[which]) if which.size else before
@@ -141,7 +141,7 @@ class ForwardRows(NamedTuple):
 
     @classmethod
     def empty(cls, count: int, cables: int, behind: bool | None) -> ForwardRows:
-        """Empty arrays for a batch; behind: True if any cable has a pulley or a dead length."""
+        """Empty arrays for a batch; `behind`: True if any cable has a pulley or a dead length."""
         return cls(
             np.empty((count, tables.POSE_COLUMNS)),
             np.empty((tables.RESULT_ROWS if behind else tables.BARE_ROWS, count, cables)),
@@ -197,9 +197,9 @@ def solve_forward_rows(
     """Run the kernel over samples, in blocks.
 
     lengths: unstrained lengths (N, m); starts: pose rows (1 or N, POSE_COLUMNS); wrenches: external plus inertial
-    wrenches (1 or N, 6); chained: True if each sample starts at the result of the previous one; freedom: free motions
-    (n, 6); None for the free motions of the robot; progress: called after each block with the number of finished
-    samples and the total number.
+    wrenches (1 or N, 6); chained: True if each sample starts at the result of the previous sample; freedom: free
+    motions (n, 6); None for the free motions of the robot; progress: called after each block with the number of
+    finished samples and the number of all samples.
     """
     count, m = lengths.shape
     allowed = first_of(robot).freedom if freedom is None else freedom
@@ -221,7 +221,7 @@ def solve_forward_rows(
 
 
 def new_chain(cables: int, freedoms: int) -> LastEquilibriumArrays:
-    """Arrays that pass the last equilibrium of a chain to the next sample; at the start of the chain they are NaN."""
+    """Arrays that pass the last equilibrium of a chain to the next sample. At the start of the chain, all are NaN."""
     return (
         np.full((CABLE_ROWS, cables), np.nan),
         np.full((freedoms, freedoms), np.nan),

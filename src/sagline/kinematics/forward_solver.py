@@ -67,8 +67,8 @@ class ForwardSolver:
                 microseconds.
 
         Raises:
-            InvalidValueError: If the model is Straight, which has no forces, start is a batch, the robot's winches have
-                guides, or an argument has the wrong type.
+            InvalidValueError: If `model` is Straight, which has no forces. If `start` is a batch. If the robot's
+                winches have guides. If an argument has the wrong type.
         """
         self._robot = without_guides(instance(robot, Robot, "robot"), "ForwardSolver", "forward")
         self._model = Catenary() if model is None else model_of(model)
@@ -113,7 +113,7 @@ class ForwardSolver:
             start: Initial pose of the next step; with None, the next step searches its pose.
 
         Raises:
-            InvalidValueError: If start is a batch, or not a pose.
+            InvalidValueError: If `start` is a batch, or not a pose.
         """
         self._lost = start is None
         if start is not None:
@@ -131,8 +131,8 @@ class ForwardSolver:
             A new result whose arrays belong to the caller.
 
         Raises:
-            InvalidValueError: If a length is not positive, or not longer than its dead length (the message names the
-                cable), or a shape is wrong.
+            InvalidValueError: If a length is not positive, or not longer than its dead length; the message names the
+                cable. If a shape is wrong.
         """
         lengths = self._checked(unstrained_length)
         if self._dead is not None and not (lengths > self._dead).all():

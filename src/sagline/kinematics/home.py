@@ -55,9 +55,9 @@ def home(
         The robot with new `count_zero` and `length_zero` of its winches.
 
     Raises:
-        InvalidValueError: If the robot has no winches, or they have guides, the pose is a batch or has the wrong type,
-            a measured value is beyond load_cell_range, a tension is too small or too large for its cable at this pose,
-            or the length off a drum exceeds its cable_length; the message names the cable.
+        InvalidValueError: If the robot has no winches, or its winches have guides. If `pose` is a batch or has the
+            wrong type. If a value exceeds load_cell_range, a tension is too small or too large for its cable at this
+            pose, or a length off a drum exceeds cable_length; the message names the cable.
         CableGeometryError: If the ends of a cable coincide at this pose, or its platform end is inside its pulley.
 
     Examples:
@@ -94,7 +94,7 @@ def home(
 
 
 def _tensions(robot: Robot, winches: Winch, reading: Array) -> Array:
-    """Tensions from load cell values; refuses impossible tensions."""
+    """Tensions from the load cell values `reading`; refuses impossible tensions."""
     bias, gain, most = winches.load_cell_bias, winches.load_cell_gain, winches.load_cell_range
     if most is not None:
         _check_readings(
@@ -110,7 +110,7 @@ def _tensions(robot: Robot, winches: Winch, reading: Array) -> Array:
 
 
 def _lengths(robot: Robot, pose: Pose, tension: Array, model: CableModel) -> Array:
-    """Unstrained lengths off the drums at a pose, with given tensions at the frame ends."""
+    """Unstrained lengths off the drums at `pose`, with the tensions `tension` at the frame ends."""
     length, held = _lengths_and_reached(robot, pose, tension, model)
     if not (missed := ~held).any():
         return length
@@ -124,7 +124,7 @@ def _lengths(robot: Robot, pose: Pose, tension: Array, model: CableModel) -> Arr
 
 
 def _cell_reading(robot: Robot, cable: int, tension: float) -> float:
-    """Measured value of a load cell at a given tension."""
+    """Measured value of the load cell of cable `cable` at the tension `tension`."""
     if robot.winches is None:
         return tension
     return float(tension * robot.winches.load_cell_gain[cable] + robot.winches.load_cell_bias[cable])
@@ -141,7 +141,7 @@ def _lengths_and_reached(robot: Robot, pose: Pose, tension: Array, model: CableM
 
 
 def _least_tension(robot: Robot, pose: Pose, model: CableModel, cable: int, low: float) -> float | None:
-    """Smallest tension >= `low` that a cable can have at a pose, or None."""
+    """Smallest tension >= `low` that cable `cable` can have at `pose`; None if there is none."""
     high = LARGEST_STRAIN * float(robot.cables.axial_stiffness[cable])
 
     def can(tension: float) -> bool:

@@ -76,11 +76,12 @@ def inverse(
             UNSTABLE is then not used.
         given: The m values of an underconstrained platform: names of "x", "y", "z" (position of the platform origin),
             "yaw" (angle about z) and "level" (tension level). None: x, y, z with three cables, also level with four.
-            The other values of the pose are only the start. Along a path, each sample starts at the sample before.
+            The other values of the pose are only the start of the search. Along a path, each search starts at the
+            previous sample.
         level: Tension level of an underconstrained platform [N]: component of the chord tensions along the unit vector
             of the tensions that have the least effect on the platform.
-        progress: Function that is called several times per second with the number of finished poses and of all poses. A
-            pose is finished if it is solved, or infeasible for a known reason.
+        progress: Function that is called several times per second. Its arguments are the number of finished poses and
+            the number of all poses. A pose is finished if it is solved, or infeasible for a known reason.
 
     Returns:
         Plan with fields of shape (m,) for a single pose, (N, m) otherwise. At a pose without a solution, feasible is
@@ -88,10 +89,10 @@ def inverse(
         UNSTABLE.
 
     Raises:
-        InvalidValueError: If `given` does not fit a robot with fewer cables than degrees of freedom, the tension
-            distribution method does not support the number of cables, several robots do not fit together (the message
-            names the property), winding is "path" for poses without times, an argument has the wrong type or shape, a
-            pose is outside the motions of the robot's pattern, or the poses need more memory than is free.
+        InvalidValueError: If `given` does not fit a robot with fewer cables than degrees of freedom. If `tension` does
+            not support the number of cables. If several robots do not fit together; the message names the property. If
+            `winding` is "path" for poses without times. If an argument has the wrong type or shape. If a pose is
+            outside the motions of the robot's pattern. If the poses need more memory than is free.
         CableGeometryError: If a cable has no chord at some pose, because its ends coincide or its platform end is
             inside its pulley.
 
@@ -171,7 +172,7 @@ def _plan_of(
 
 
 def equilibrium_at(robot: Robot, pose: PoseLike) -> Equilibrium:
-    """Equilibrium at one pose or at a batch; raises an error with the shortfall if a single pose is infeasible."""
+    """Equilibrium at a pose or a batch `pose`. If a single pose is infeasible, raises an error with the shortfall."""
     plan = inverse(robot, pose)
     if not plan.state.pose.shape and not plan.feasible:
         why, short = PoseStatus(int(plan.status)), float(plan.shortfall)
@@ -181,7 +182,7 @@ def equilibrium_at(robot: Robot, pose: PoseLike) -> Equilibrium:
 
 
 def _given_winding(winding: Winding | None, motion: Path | Pose) -> ArrayLike | None:
-    """Checked winding directions of the caller; None if the caller gives none, or "path"."""
+    """Checked winding directions of the caller; None if `winding` is None or "path"."""
     if not isinstance(winding, str):
         return winding
     if choice(winding, "winding", ("path",)) and isinstance(motion, Path):
@@ -213,7 +214,7 @@ def _in_world(components: Array, robot: Robot) -> Array:
 
 
 def _reference(robot: Robot, previous: Plan | ArrayLike | None, variable: Variable) -> Array:
-    """Initial reference (m,): the given tensions, or those of the last solved pose of a plan; NaN if there are none."""
+    """Initial reference (m,): the tensions `previous`, or those of its last solved pose; NaN if there are none."""
     if previous is None:
         return np.full(robot.cable_count, np.nan)
     if not isinstance(previous, Plan):
@@ -231,7 +232,7 @@ def _reference(robot: Robot, previous: Plan | ArrayLike | None, variable: Variab
 
 
 def last_tensions(plan: Plan, variable: Variable) -> Array | None:
-    """Tensions of the last pose that the distribution method solved in a plan, (m,) [N]; None without such a pose."""
+    """Tensions of the last pose of `plan` that the distribution method solved, (m,) [N]; None without such a pose."""
     at_border = np.zeros_like(plan.feasible) if plan.at_border is None else plan.at_border
     feasible = np.flatnonzero(np.atleast_1d(plan.feasible & ~at_border))
     if not feasible.size:

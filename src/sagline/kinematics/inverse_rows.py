@@ -35,7 +35,7 @@ class InverseRows(NamedTuple):
 
     @classmethod
     def empty(cls, count: int, cables: int, freedoms: int, behind: bool) -> InverseRows:
-        """Empty arrays for a batch; behind: True if any cable has a pulley or a dead length."""
+        """Empty arrays for a batch; `behind`: True if any cable has a pulley or a dead length."""
         return cls(
             np.empty((tables.RESULT_ROWS if behind else tables.BARE_ROWS, count, cables)),
             np.empty((count, cables), dtype=np.int8),
@@ -45,7 +45,7 @@ class InverseRows(NamedTuple):
         )
 
     def reject_slack(self, verdicts: Verdicts, lengths: Array) -> bool:
-        """Mark solved poses as TOO_SLACK if lengths (N, m) between guides are NaN; returns True if any is marked."""
+        """Mark solved poses as TOO_SLACK if `lengths` (N, m) between guides are NaN. True if a pose is marked."""
         slack = np.isnan(np.atleast_2d(lengths)) & np.isfinite(self.results[tables.LENGTH])
         lost = np.isin(self.pose_status, SOLVED) & slack.any(axis=-1)
         if not lost.any():
@@ -141,7 +141,7 @@ def covers_all(method: int, redundant: int) -> bool:
 def decide_rows(
     terms: RobotTerms, options: Options, rows: Array, loads: Array, found: InverseRows, progress: Progress | None = None
 ) -> Verdicts:
-    """Decide the feasibility of poses without a result from the iterations, and fill the results of feasible poses.
+    """Decide the feasibility of poses for which the iterations gave no result. Fill the results of feasible poses.
 
     terms: from `robot_terms`; rows: pose rows (N, POSE_COLUMNS); loads: external plus inertial wrenches (1 or N,
     6); progress: called after each block with the number of all finished poses, which includes feasible poses, and the
@@ -165,7 +165,7 @@ def decide_rows(
 
 
 def decide_stability(robot: Robots, model: ModelTerms, rows: Array, found: InverseRows, verdicts: Verdicts) -> None:
-    """Decide the stability of solved poses without a proof; unstable poses get the status UNSTABLE.
+    """Decide the stability of solved poses that have no proof of stability. Unstable poses get the status UNSTABLE.
 
     model: code and constants of the cable model; rows: pose rows (N, POSE_COLUMNS).
     """

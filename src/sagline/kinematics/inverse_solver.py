@@ -90,8 +90,8 @@ class InverseSolver:
                 the status UNSTABLE is then not used.
 
         Raises:
-            InvalidValueError: If the robot has too few cables, its winches have guides, the method does not support its
-                number of cables, or an argument has the wrong type.
+            InvalidValueError: If the robot has too few cables, or its winches have guides. If `tension` does not
+                support the number of cables. If an argument has the wrong type.
         """
         without_guides(instance(robot, Robot, "robot"), "InverseSolver", "inverse")
         m, n = robot.cable_count, robot.degrees_of_freedom
@@ -168,7 +168,7 @@ class InverseSolver:
     def step_into(
         self, position: ArrayLike, quaternion: ArrayLike, out: Array, wrench: ArrayLike | None = None
     ) -> PoseStatus:
-        """Solve one pose and fill a given array, without allocation; the status reports wrong numbers.
+        """Solve one pose and fill the array `out`, without allocation. The status reports wrong numbers.
 
         Args:
             position: Position of the platform origin [m], shape (3,).

@@ -53,13 +53,13 @@ class MeasuredTension(Result):
 def fit_measurements(
     robot: Robots, model: CableModel, found: ForwardRows, loads: Array, measured: MeasuredTension
 ) -> Array:
-    """Replace equilibria at measured lengths by best fits to lengths and tensions; returns covariances of the poses.
+    """Replace equilibria at measured lengths by best fits to lengths and tensions. Returns covariances of the poses.
 
     For each sample, Gauss-Newton iterations find the lengths L_true with the smallest sum ((L_true - L)/sigma_L)^2 +
     sum ((T_A - reading)/sigma_T)^2. The platform is in equilibrium at L_true.
 
-    found: equilibria at the measured lengths (N samples), where the search starts; the fits overwrite them; loads:
-    external plus inertial wrenches (1 or N, 6). Returns the covariances of (displacement of the center of mass,
+    found: equilibria at the measured lengths (N samples); the search starts at them, and the fits overwrite them;
+    loads: external plus inertial wrenches (1 or N, 6). Returns the covariances of (displacement of the center of mass,
     rotation vector), (N, 6, 6); they are NaN for a sample without a solution.
     """
     if model.code == codes.STRAIGHT:
@@ -127,14 +127,14 @@ class _Fit(NamedTuple):
         return found, covariance
 
     def misfit(self, found: ForwardRows) -> Array:
-        """Lengths and tensions minus their measured values, in standard deviations."""
+        """Lengths and tensions of `found` minus the measured values, in standard deviations."""
         state = found.solution(self.robot, self.model, self.load, ()).state
         tensions = (state.cables.frame_end_tension - self.readings) / self.tension_deviation
         lengths = (state.unstrained_length - self.lengths) / self.length_deviation
         return np.concatenate((lengths, tensions[~np.isnan(tensions)]))
 
     def moved(self, found: ForwardRows, step: Array) -> ForwardRows | None:
-        """Equilibrium after a step that is halved until the fit improves; None if the fit does not improve."""
+        """Equilibrium after `step`, which is halved until the fit improves; None if the fit does not improve."""
         lengths = found.results[tables.LENGTH]
         now = self.misfit(found)
         for _ in range(_HALVINGS):

@@ -60,13 +60,13 @@ class Plan(Result, Saved, Tabular):
             shape (2,) or (N, 2).
         blocking: True for cables at a limit that opposes the needed wrench, shape (m,) or (N, m); a wider limit would
             reduce the shortfall.
-        farkas: Proof of each infeasible pose, shape (6,) or (N, 6), NaN at other poses. Let y = farkas, J the structure
-            matrix, s_i(tau_i) the sag force of cable i, and G_i s_i its wrench. Along y, the cables supply the sum of y
-            . (J_i tau_i - G_i s_i(tau_i)). For all chord tensions within their limits, this sum is less than y .
-            (needed without its sag forces). The proof uses exact catenaries. It excludes tensions below a tenth of the
-            cable's weight, and, for a cable without an upper limit, tensions that stretch it to more than twice its
-            length. The force part of y has length 1, so that the difference is in newtons. NaN if the proof needs more
-            than one direction. None for a plan from an old file.
+        farkas: Proof of each infeasible pose, shape (6,) or (N, 6), NaN at other poses. Let y = farkas. J is the
+            structure matrix, s_i(tau_i) is the sag force of cable i, and G_i s_i is its wrench. Along y, the cables
+            supply the sum of y . (J_i tau_i - G_i s_i(tau_i)). For all chord tensions within their limits, this sum is
+            less than y . (needed without its sag forces). The proof uses exact catenaries. It excludes tensions below a
+            tenth of the cable's weight, and, for a cable without an upper limit, tensions that stretch it to more than
+            twice its length. The force part of y has length 1, so that the difference is in newtons. NaN if the proof
+            needs more than one direction. None for a plan from an old file.
         needed: The wrench J tau that the chord tensions must supply, shape (6,) or (N, 6), due to weight, given wrench,
             and the sag forces T_z - tau sin phi. Without a solution, the sag forces belong to the tensions with the
             smallest unbalanced wrench. None for a plan from an old file.
@@ -182,7 +182,7 @@ class Plan(Result, Saved, Tabular):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Warnings about rotations that are not free, poses near infeasibility, and a model outside its validity."""
+        """Warnings: rotations that are not free, nearly infeasible poses, a cable model outside its validity."""
         return (*self._turned_away(), *self._at_the_border(), *self._below_validity())
 
     def _turned_away(self) -> tuple[str, ...]:

@@ -49,8 +49,8 @@ def tension_polygon(
         The polygon, without vertices if the pose is not feasible.
 
     Raises:
-        InvalidValueError: If pose is not a single pose, the structure matrix is rank-deficient, a cable is too slack,
-            or the robot has too few or too many cables.
+        InvalidValueError: If `pose` is not a single pose. If the structure matrix is rank-deficient, or a cable is too
+            slack. If the robot has too few or too many cables.
 
     Source:
         Gia Luan & Truong Thinh 2020, (53)-(55); Gouttefarde et al. 2015; docs/model.md, section 5.
@@ -133,7 +133,7 @@ def _sides_of(
 
 
 def _limit_at(end: float, row: Array, origin: Array, low: Array, high: Array) -> Side | None:
-    """Tension limit at one end of the feasible interval."""
+    """Tension limit at the end `end` of the feasible interval."""
     if not np.isfinite(end):
         return None
     there = origin + row * end

@@ -48,7 +48,7 @@ class _Instants(NamedTuple):
 
 
 def _instants(robot: Robots, path: Path, wrench: Array) -> _Instants:
-    """Poses and wrenches one step before and after each sample of a path; the step depends on the speed.
+    """Poses and wrenches one step before and after each sample of `path`. The step depends on the speed.
 
     path: the path; if its jerk is unknown, a spline through its accelerations supplies the jerk; wrench: external plus
     inertial wrench at the samples (N, 6); the external part is interpolated by a spline.
@@ -81,7 +81,7 @@ def _step(path: Path, jerk: Array) -> float:
 
 
 def _poses_later(path: Path, jerk: Array, h: float) -> Pose:
-    """Poses after a time h: third order in position, second order in orientation (third if its axis is fixed)."""
+    """Poses after the time `h`: third order in position, second order in orientation (third for a fixed axis)."""
     from scipy.spatial.transform import Rotation  # this import takes a third of the load time of sagline
 
     move = h * (path.twist + 0.5 * h * (path.twist_rate + h / 3.0 * jerk))
@@ -108,7 +108,7 @@ class _PlacedCables(NamedTuple):
 
 
 def _cables_at(state: Equilibrium, pose: Pose, chord_tension: Array) -> _PlacedCables:
-    """The cables of a batch of N at other poses and chord tensions [N], (N, m)."""
+    """Cables of the batch `state` at the other poses `pose`, with other chord tensions `chord_tension` [N], (N, m)."""
     anchors, body, shared = anchors_of(state.robot), bodies_of(state.robot), first_of(state.robot)
     turn = np.swapaxes(pose.matrix, -1, -2)
     reach = pose.position[:, None] + anchors.platform @ turn - anchors.frame
@@ -199,7 +199,7 @@ class _RateConditions(NamedTuple):
 
 
 def _smallest_rates(conditions: _RateConditions, at_limit: Flags) -> Array:
-    """Smallest rates that cross no limit; cables that would cross a limit are held one by one, the fastest first."""
+    """Smallest rates that cross no limit. Cables that would cross a limit are held one by one, the fastest first."""
     _, n, m = conditions.matrix.shape
     held = np.zeros_like(at_limit)
     rates = conditions.solved(held)
@@ -216,7 +216,7 @@ def _smallest_rates(conditions: _RateConditions, at_limit: Flags) -> Array:
 
 
 def _variable_tension(cables: CableState, method: TensionMethod) -> Array:
-    """Tensions in the variable of the tension distribution method."""
+    """Tensions of `cables` in the variable of the tension distribution method."""
     if method.variable == "frame_end":
         return cables.frame_end_tension
     return cables.horizontal_tension if method.variable == "horizontal" else cables.chord_tension

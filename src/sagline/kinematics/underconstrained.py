@@ -30,8 +30,8 @@ def given_codes(robot: Robot, given: Sequence[Given] | None) -> Indices | None:
     """Codes of the given values of an underconstrained platform, (m,); None if the robot has enough cables.
 
     Raises:
-        InvalidValueError: If the number of names is not m, a name is unknown or occurs twice, or m is 1; if names are
-            given for a robot with enough cables.
+        InvalidValueError: If the number of names is not m, or m is 1. If a name is unknown or occurs twice. If names
+            are given for a robot with enough cables.
     """
     m = robot.cable_count
     if m >= robot.degrees_of_freedom:

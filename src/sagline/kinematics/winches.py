@@ -42,8 +42,8 @@ def encoder_counts(
         Whole counts, shape (m,) or (N, m), as floats; NaN where the plan has no solution.
 
     Raises:
-        InvalidValueError: If required data of winches or cables are missing (the message names them), the remaining
-            cable does not fit on a drum or is too short, or creep is given for a plan without a path.
+        InvalidValueError: If required data of winches or cables are missing; the message names them. If the remaining
+            cable does not fit on a drum or is too short. If `creep` is given for a plan without a path.
 
     Examples:
         >>> import sagline as sl
@@ -106,8 +106,8 @@ def lengths_from_counts(
         `Creep.strain` of the plan's times and `chord_tension`.
 
     Raises:
-        InvalidValueError: If required data of winches or cables are missing (the message names them), counts are beyond
-            the end of a drum or have the wrong shape, or tensions are missing.
+        InvalidValueError: If required data of winches or cables are missing; the message names them. If `counts` are
+            beyond the end of a drum or have the wrong shape. If `drum_tension` is missing.
 
     Examples:
         >>> import sagline as sl
@@ -250,7 +250,7 @@ def winch_rates(plan: Plan) -> WinchRates:
         Speeds and torques of the winches at every sample.
 
     Raises:
-        InvalidValueError: If the plan has no path, data are missing (the message names them), or the remaining cable
+        InvalidValueError: If `plan` has no path. If data are missing; the message names them. If the remaining cable
             does not fit on a drum.
 
     Examples:

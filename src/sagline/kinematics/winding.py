@@ -48,7 +48,7 @@ def checked_winding(winding: ArrayLike, shape: tuple[int, ...], cables: int) -> 
 
 
 def without_guides(robot: Robot, solver: str, instead: str) -> Robot:
-    """Return the robot unchanged, but refuse a robot with guides.
+    """Return `robot` unchanged, but refuse a robot with guides.
 
     solver: name of the function that does not support guides, for the message.
     """

@@ -73,7 +73,7 @@ class GroupThread(Thread):
     """
 
     def __init__(self, number: int, winches: int, wire: Wire, clock: Callable[[], float]) -> None:
-        """Prepare the thread; clock: clock of the link [s]."""
+        """Prepare the thread; `clock`: clock of the link [s]."""
         super().__init__(name=f"sagline group {number}", daemon=True)
         self.number = number
         self.newest: _Newest | None = None
@@ -89,7 +89,7 @@ class GroupThread(Thread):
         self._ending = Event()
 
     def hand_over(self, block: Block, data: bytes) -> None:
-        """Queue a block for writing, and read the PLC's block afterwards. A block already in the queue is replaced."""
+        """Queue `block` for writing, and read the PLC's block afterwards. It replaces a block in the queue."""
         self._outgoing.append(_Outgoing(block, data, self._clock()))
         self._kick.set()
 
@@ -108,7 +108,7 @@ class GroupThread(Thread):
         self._wire.abort()
 
     def silence(self, waited: float) -> Refusal:
-        """Reason, and next step, why a PLC has not answered for a time [s]."""
+        """Reason why a PLC has not answered for the time `waited` [s], and the next step."""
         if self._wire.reached():
             return Refusal(f"the port is open, but there was no response for {waited:g} s", "Check the port")
         return Refusal(f"no response for {waited:g} s", "Check address and cables, and that the PLC or the twin runs")
@@ -190,7 +190,7 @@ class BlockLink:
     """Link (`sagline.control.link.Link`) with one connection per group; base class of `S7Link` and `ModbusLink`."""
 
     def __init__(self, addresses: Sequence[Address], robot: Robot | int, wires: Sequence[Wire], timeout: float) -> None:
-        """Connect to all groups at the same time; timeout: longest wait for the first answers [s]."""
+        """Connect to all groups at the same time; `timeout`: longest wait for the first answers [s]."""
         patience = number(timeout, "timeout", "s", above=0.0)
         if patience > LONGEST:
             raise InvalidValueError(
@@ -225,7 +225,7 @@ class BlockLink:
     def exchange(self, command: Command | None) -> Sample | Missing:
         """Pass a command to the threads of the groups and return the newest data, without waiting.
 
-        A group that another controller owns receives the claim instead of the command, if `command.claims` is True.
+        If `command.claims` is True, a group that another controller owns receives the claim instead of the command.
 
         Args:
             command: Set points of all winches; None to read only.

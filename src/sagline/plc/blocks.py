@@ -95,7 +95,7 @@ class Block:
         return self.packer.pack(*[known.get(name, 0) for name in self.names])
 
     def read(self, data: bytes) -> dict[str, Any] | Refusal:
-        """Unpack the values of the rows, by name; or return the reason why the bytes are not this block."""
+        """Unpack the values of the rows, by name. If the bytes are not this block, return the reason."""
         block = f"DB{self.number}"
         if len(data) != self.size:
             return Refusal(f"{block} has {len(data)} bytes instead of {self.size}", LOAD)
@@ -234,7 +234,7 @@ def sample_of(
     discarded: Whole,
     reasons: tuple[Refusal | None, ...] = (),
 ) -> Sample:
-    """Create a sample from valid blocks of all groups; time [s], age [s] (G,), discarded and reasons (G,)."""
+    """Create a sample from valid blocks of all groups; `time` [s]; `age` [s], `discarded` and `reasons`: (G,)."""
     heads = ("counter", "owner", "echo", "status", "fault")
     columns: dict[str, Any] = {name: np.array([group[name] for group in groups], dtype=np.int64) for name in heads}
     for name in ("length", "rate", "torque", "tension", "filtered", "counts", "state", "winch_fault"):

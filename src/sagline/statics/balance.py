@@ -32,7 +32,7 @@ def inertial_wrench(robot: Robot | Sequence[Robot], pose: PoseLike, twist: Array
         Force -M p_c'' [N] and moment -(Gamma w' + w x Gamma w) [N m] about the center of mass, shape (N, 6).
 
     Raises:
-        InvalidValueError: If robot is a sequence whose length is not N or whose robots do not fit together, or if the
+        InvalidValueError: If `robot` is a sequence whose length is not N, or whose robots do not fit together. If the
             numbers of poses, twists and twist rates differ.
 
     Examples:
@@ -89,7 +89,7 @@ class ArticleBalance(NamedTuple):
 
 
 def _geometry(robot: Robots, pose: Pose) -> Array:
-    """Geometry rows of every pose, shape (N, GEOMETRY_ROWS, m); refuses a pose at which a cable has no chord."""
+    """Geometry rows of every pose, shape (N, GEOMETRY_ROWS, m). Refuses a pose at which a cable has no chord."""
     geometry = chord_geometry(robot, pose)
     refuse_missing_chords(robot, pose, geometry)
     return geometry
@@ -107,7 +107,7 @@ def structure_matrix(robot: Robot | Sequence[Robot], pose: PoseLike) -> Array:
 
     Raises:
         InvalidValueError: If robot is a sequence whose length is not N, or whose robots do not fit together.
-        CableGeometryError: If both ends of a cable coincide, or its platform end is inside its pulley; the message
+        CableGeometryError: If both ends of a cable coincide, or its platform end is inside its pulley. The message
             names pose and cable.
 
     Examples:
@@ -146,8 +146,8 @@ def article_balance(robot: Robot, pose: PoseLike, k_h: float = 4.845) -> Article
 
     Raises:
         InvalidValueError: If robot or pose has the wrong type, or k_h is not a number.
-        CableGeometryError: If both ends of a cable coincide, or one is inside its pulley; the message names pose and
-            cable.
+        CableGeometryError: If both ends of a cable coincide, or its platform end is inside its pulley. The message
+            names pose and cable.
 
     Examples:
         >>> import sagline as sl

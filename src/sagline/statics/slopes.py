@@ -149,7 +149,7 @@ def _at_anchors(state: Equilibrium, slopes: CableSlopes, forces: Array) -> Array
 
 
 def _leaving(state: Equilibrium, slopes: CableSlopes, forces: Array, ends: Array) -> Array:
-    """Derivatives of the tension if there are pulleys, from H = T + T^2/(2 EA) - w z, which is constant along a cable.
+    """Derivatives of the tension if there are pulleys. H = T + T^2/(2 EA) - w z is constant along a cable.
 
     Shapes: forces (..., m, 7, 3).
     """

@@ -32,8 +32,9 @@ class Stiffness(Result):
 
     Attributes:
         state: Equilibrium to which the stiffness belongs.
-        matrix: -d(wrench of the cables)/d(motion) at fixed lengths, shape (..., 6, 6): elastic, sag and geometric
-            stiffness. Its skew part is half the given moment, because this moment does not rotate with the platform.
+        matrix: -d(wrench of the cables)/d(motion) at fixed lengths, shape (..., 6, 6): the sum of elastic, sag and
+            geometric stiffness. Its skew part is half the given moment, because this moment does not rotate with the
+            platform.
         compliance: d(motion)/d(wrench on the platform), shape (..., 6, 6).
         length_sensitivity: d(motion)/dL of each cable, shape (..., 6, m) [m/m, rad/m].
         density_sensitivity: d(motion)/d(linear density) of each cable, shape (..., 6, m) [m^2/kg, rad m/kg].
@@ -104,13 +105,13 @@ def stiffness(state: Equilibrium) -> Stiffness:
     """Stiffness of the platform at fixed unstrained lengths, and sensitivities of the pose, from analytic derivatives.
 
     Args:
-        state: An equilibrium, single or N of them; a plan or a solution; or a robot and its poses.
+        state: An equilibrium, single or N of them. Also accepted: a plan, a solution, or two arguments: robot, poses.
 
     Returns:
-        Stiffness; NaN if the state has no lengths, or the cables are straight, because their stiffness is undefined.
+        Stiffness; NaN if `state` has no lengths. Also NaN for straight cables, whose stiffness is undefined.
 
     Raises:
-        InvalidValueError: If the state has another type.
+        InvalidValueError: If `state` has another type.
 
     Examples:
         Change of the platform height due to an upward force of 100 N, and due to 1 mm more length of cable 0:
@@ -188,14 +189,14 @@ def modes(state: Equilibrium) -> Modes:
     """Natural frequencies and mode shapes of the platform on its cables; cables are massless.
 
     Args:
-        state: An equilibrium, single or N of them; a plan or a solution; or a robot and its poses.
+        state: An equilibrium, single or N of them. Also accepted: a plan, a solution, or two arguments: robot, poses.
             The free motions must have mass; rotations require an inertia.
 
     Returns:
         Modes; NaN if the state has no lengths.
 
     Raises:
-        InvalidValueError: If the state has another type.
+        InvalidValueError: If `state` has another type.
 
     Examples:
         >>> import numpy as np
@@ -252,7 +253,7 @@ def _check_state(state: Equilibrium, cable_bytes: float) -> None:
 
 
 def compliance_of(freedom: Array, matrix: Array) -> Array:
-    """Inverse of a stiffness for the free motions (n, 6), zero for other motions; NaN if the stiffness is singular."""
+    """Inverse of the stiffness `matrix` for the motions `freedom` (n, 6), zero for other motions; NaN if singular."""
     return freedom.T @ _inverse(freedom @ matrix @ freedom.T) @ freedom
 
 

@@ -63,7 +63,7 @@ def strings_of(state: Equilibrium) -> Strings:
 
 
 def strings_below(strings: Strings, frequency: Array) -> Indices:
-    """Number (N, F, m) of natural frequencies below `frequency` (N, F) [Hz], for cables with both ends fixed."""
+    """Number of natural frequencies below `frequency` (N, F) [Hz], for cables with both ends fixed, (N, F, m)."""
     below = np.zeros((*frequency.shape, strings.taut.shape[1]), dtype=np.int64)
     waves, room = undamped(frequency), np.empty(collocation.ROOM)
     for row, taut in enumerate(strings.taut):
@@ -101,7 +101,7 @@ def _axes(state: Equilibrium) -> Array:
 
 
 def taut_of(table: Array) -> Flags:
-    """True for cables that have linear vibrations: neither folded nor slack, (N, m); table: (N, m, STRING_COLUMNS)."""
+    """True for cables with linear vibrations: neither folded nor slack, (N, m); `table`: (N, m, STRING_COLUMNS)."""
     top = table[..., columns.VERTICAL]
     hanging = table[..., columns.WEIGHT] * table[..., columns.LENGTH]
     vertical = np.maximum(np.maximum(top - hanging, -top), 0.0)

@@ -21,14 +21,14 @@ def limit_margin(state: Equilibrium) -> Array:
     """Distance between the tensions of each pose and their nearest limit.
 
     Args:
-        state: An equilibrium, single or N of them; a plan or a solution; or a robot and its poses.
+        state: An equilibrium, single or N of them. Also accepted: a plan, a solution, or two arguments: robot, poses.
 
     Returns:
         Smallest distance [N] between the tension of a cable and its limits, shape () or (N,); 0 if a cable is at its
         limit, NaN for a pose without tensions. The distance depends on the tension distribution.
 
     Raises:
-        InvalidValueError: If the state has another type.
+        InvalidValueError: If `state` has another type.
 
     Examples:
         >>> import sagline as sl
@@ -57,14 +57,14 @@ def capacity_margin(state: Equilibrium) -> Array:
     binomial coefficient of m over n - 1. For eight cables, 56 faces take about twenty microseconds per pose.
 
     Args:
-        state: An equilibrium, single or N of them; a plan or a solution; or a robot and its poses.
+        state: An equilibrium, single or N of them. Also accepted: a plan, a solution, or two arguments: robot, poses.
 
     Returns:
         Force [N], shape () or (N,), independent of the tension distribution; infinite if no additional force makes the
         pose infeasible, NaN for a pose without tensions.
 
     Raises:
-        InvalidValueError: If the state has another type.
+        InvalidValueError: If `state` has another type.
 
     Examples:
         >>> import sagline as sl

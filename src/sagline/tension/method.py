@@ -31,7 +31,7 @@ PREFERENCE_ROWS = 2
 
 @dataclass(frozen=True, slots=True)
 class TensionMethod:
-    """Rule that selects one tension per cable among all feasible tensions. It has a code for the kernels, and options.
+    """Rule that selects one tension per cable among all feasible tensions. The rule has options, and a kernel code.
 
     Attributes:
         code: Code of the method in the kernels (`sagline.kernels.codes`).
@@ -144,12 +144,12 @@ def kernel_options(robot: Robots, model: CableModel, tension: TensionMethod) -> 
 
 
 def takes_default_kernel(tension: TensionMethod) -> bool:
-    """True if the method minimizes the distance to a reference in a linear variable; a shorter kernel does this."""
+    """True if `tension` minimizes the distance to a reference in a linear variable. A shorter kernel does this."""
     return tension.code <= codes.QUADRATIC_PROGRAM and tension.variable_code != codes.FRAME_END_TENSION
 
 
 def check_sharing(robot: Robot, tension: TensionMethod, name: str | None = None) -> None:
-    """Refuse a robot for which a tension distribution method is not defined."""
+    """Refuse `robot` if the tension distribution method `tension` is not defined for it."""
     n, m = robot.degrees_of_freedom, robot.cable_count
     called = name or robot.name
     item = f"{called}: number of cables"

@@ -87,7 +87,7 @@ class QuadraticProgram(TensionMethod):
             Array of shape (PREFERENCE_ROWS, m).
 
         Raises:
-            InvalidValueError: If weights or targets are given for another number of cables.
+            InvalidValueError: If `weights` or `target` are given for another number of cables.
         """
         rows = np.empty((PREFERENCE_ROWS, cables))
         for row, name, values in (

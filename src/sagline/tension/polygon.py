@@ -43,7 +43,7 @@ class TensionPolygon(Result, Tabular):
             infinity.
         bounded: True if no side is at infinity.
         basis: Orthonormal basis of the null space, shape (r, m).
-        origin: The minimum-norm tensions that balance the wrench if there were no limits [N], shape (m,).
+        origin: Minimum-norm tensions that balance the wrench without regard to the limits [N], shape (m,).
         scale: Factor of each cable in the equation `tension variable = scale * chord tension + offset`, shape (m,). It
             is 1 for the chord tension and cos phi for the horizontal tension. For the frame-end tension it is the
             derivative with respect to the chord tension.

@@ -37,10 +37,10 @@ def unresisted_motion(robot: Robot, pose: PoseLike) -> UnresistedMotion:
         pose: One pose.
 
     Returns:
-        UnresistedMotion: the twist, the resistance of the cables to it, and a description in words.
+        UnresistedMotion: the twist, the resistance of the cables to this twist, and a description in words.
 
     Raises:
-        InvalidValueError: If pose is not a single pose.
+        InvalidValueError: If `pose` is not a single pose.
         CableGeometryError: If both ends of a cable coincide.
 
     Examples:

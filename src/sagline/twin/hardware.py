@@ -29,7 +29,7 @@ class Hardware:
     """
 
     def __init__(self, robot: Robot, begin: Start, damping: Damping, step: float, period: float, seed: int) -> None:
-        """Begin with brakes on; step: step of the plant [s]; period: period of the PLCs [s]."""
+        """Begin with brakes on; `step`: step of the plant [s]; `period`: period of the PLCs [s]."""
         self._simulator = Simulator(robot, begin.state, winches="robot", step=step, damping=damping, seed=seed)
         self._simulator.hold()
         self._nominal, self._true, self._period = begin.nominal, begin.true, period
@@ -54,7 +54,7 @@ class Hardware:
         return self._simulator.reading
 
     def simulate_period(self, length: list[float], tension: list[float], powered: list[bool]) -> None:
-        """Simulate a period in which the set points change linearly to new values: length [m], tension [N]."""
+        """Simulate a period. The set points change linearly to `length` [m] and `tension` [N]."""
         if powered != self._powered:
             self._switch(powered)
         counts = np.rint(self._nominal.counts(np.array(length)))
@@ -106,13 +106,13 @@ class Hardware:
         self._simulator.cut(cable)
 
     def shift_encoder(self, winch: int, length: float) -> None:
-        """Shift the count of an encoder by a length of cable [m]. The drive then moves the cable by this length."""
+        """Shift the count of an encoder by `length` of cable [m]. The drive then moves the cable by this length."""
         slip = np.rint(length * self._nominal.per_meter[winch])
         self._slip[winch] += slip
         self._simulator.shift(-slip / self._true.per_meter[winch], winch)
 
     def limit_force(self, winch: int, force: float) -> None:
-        """Limit the cable force of a drive [N]."""
+        """Limit the cable force of the drive of `winch` to `force` [N]."""
         self._simulator.limit_force(force, winch)
 
     def add_load(self, mass: float) -> None:

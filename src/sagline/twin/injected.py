@@ -196,7 +196,7 @@ class Schedule:
         heappush(self._due, (time, self._planned, begins, what))
 
     def due(self, now: float) -> list[tuple[bool, Injected]]:
-        """Faults that start (True) or end (False) up to a time [s], in order of time."""
+        """Faults that start (True) or end (False) up to the time `now` [s], in order of time."""
         found = []
         while self._due and self._due[0][0] <= now + TINY:
             _, _, begins, what = heappop(self._due)

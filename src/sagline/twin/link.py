@@ -25,7 +25,7 @@ class Network:
     """
 
     def __init__(self, delay: float, jitter: float, loss: float, seed: int) -> None:
-        """Check the arguments delay [s], jitter [s] and loss (a share)."""
+        """Check the arguments `delay` [s], `jitter` [s] and `loss` (a share)."""
         self._delay = number(delay, "delay", "s", low=0.0)
         self._jitter = number(jitter, "jitter", "s", low=0.0)
         self._loss = number(loss, "loss", "", low=0.0)
@@ -51,7 +51,7 @@ class DelayLine:
         self._messages: list[tuple[float, int, Any]] = []
 
     def send(self, now: float, message: Any) -> None:
-        """Send a message; now: time [s]."""
+        """Send a message; `now`: time [s]."""
         if (arrival := self._network.arrival(now)) is not None:
             self._sent += 1
             heappush(self._messages, (arrival, self._sent, message))
@@ -231,14 +231,14 @@ class MachineLink:
                 self._outbound[group].send(now, message)
 
     def before(self, now: float) -> None:
-        """Deliver the messages that have arrived by the beginning of a scan [s]."""
+        """Deliver the messages that have arrived by `now`, the time of the beginning of a scan [s]."""
         if not self._network.ideal:
             for group, way in enumerate(self._outbound):
                 for _, message in way.arrived(now):
                     self._machine.deliver(group, message)
 
     def after(self, now: float, snapshot: PlcBlocks, spoiled: dict[int, str]) -> None:
-        """Send the blocks of the PLCs after a scan; now: time [s]."""
+        """Send the blocks of the PLCs after a scan; `now`: time [s]."""
         if self._network.ideal and not spoiled:
             self._newest, self._owner = [snapshot] * len(self._groups), list(snapshot.owners)
             self._arrival.fill(now)

@@ -76,7 +76,7 @@ class Program:
     """
 
     def __init__(self, limits: PlcLimits, period: float) -> None:
-        """Begin with brakes on and without an owner; period: period of a scan [s]."""
+        """Begin with brakes on and without an owner; `period`: period of a scan [s]."""
         self.limits, self.period = limits, period
         count = len(limits.least)
         self.winches = range(count)
@@ -97,7 +97,7 @@ class Program:
         self._mode = _LEAVE
 
     def claim(self, owner: int, now: float) -> None:
-        """Set an owner if there is none, or if its counter is unchanged for OWNER_TIMEOUT; now: time [s]."""
+        """Set an owner if there is none, or if the owner's counter is unchanged for OWNER_TIMEOUT; `now`: time [s]."""
         if owner > 0 and owner != self.owner and (not self.owner or now - self._moved >= OWNER_TIMEOUT - TINY):
             self.seize(owner, now)
 
@@ -109,7 +109,7 @@ class Program:
             self._stop(GroupFault.HEARTBEAT)
 
     def take(self, order: Order) -> None:
-        """Accept a command that is from the owner and newer than the last command."""
+        """Accept the command `order` if it is from the owner, and newer than the last command."""
         if self.owner and order.owner == self.owner and (not self.echo or newer(order.counter, self.echo)):
             self.echo, self._order, self._fresh = order.counter, order, True
 
@@ -132,7 +132,7 @@ class Program:
         self._stop(GroupFault.DRIVE)
 
     def scan(self, now: float, encoder: list[float], cell: list[float]) -> None:
-        """Set the drives for the next period; now: time [s], encoder [m], cell [N]."""
+        """Set the drives for the next period; `now`: time [s]; `encoder` [m]; `cell` [N]."""
         order, fresh, waited, self._now = self._order, self._fresh, now - self._moved, now
         self.emergency = self.emergency or not self.contact
         if fresh and order is not None:
@@ -186,7 +186,7 @@ class Program:
         return True
 
     def _move_to_drives(self, encoder: list[float], cell: list[float]) -> None:
-        """Replace set points that are too far from their drives by the positions and cell tensions of the drives."""
+        """Replace each set point that is too far from its drive. The drive's position and cell tension are used."""
         read = self._valid_tensions([max(reading, 0.0) for reading in cell])
         self.length, self._rate, self.tension = list(self.length), list(self._rate), list(self.tension)
         for i in self.winches:
@@ -337,7 +337,7 @@ class Program:
         return ready | _FOLLOWING if self._mode == _FOLLOW else ready
 
     def states(self, saturated: list[float]) -> tuple[list[int], list[int]]:
-        """Codes of `WinchState`, from flags of drives at a limit and from the drives' fault codes."""
+        """Codes of `WinchState`, from the drives' fault codes and from `saturated`, the flags of drives at a limit."""
         states = [WinchState.SATURATED if full else WinchState.ENABLED for full in saturated]
         for i in self.winches:
             if self.drive_fault[i]:

@@ -139,7 +139,7 @@ class Server:
 
 
 def check_first_port(port: int, robot: Robot) -> None:
-    """Refuse a first port with too few ports after it for the groups of a robot. 0 means any free ports."""
+    """Refuse a first port after which there are too few ports for all groups of a robot. 0 means any free ports."""
     count = len(groups_of(robot.cable_count))
     last = LAST_PORT + 1 - count
     if port > last:
@@ -210,7 +210,7 @@ def machine_in_process(robot: Robot, nominal: Robot, start: Pose, *, seed: int =
 
 
 def _receive_addresses(pipe: Connection) -> tuple[str, ...]:
-    """Wait for the addresses from the other process, or raise the error of this process."""
+    """Wait for the addresses from the other process; raise an error that the other process reports."""
     answer: tuple[str, ...] | SaglineError | None = None
     with suppress(EOFError):
         answer = pipe.recv() if pipe.poll(SWITCHING_ON) else None

@@ -25,7 +25,7 @@ from sagline.twin.plc_program import LEFT, PlcLimits
 
 
 class _EncoderScale:
-    """Conversion between lengths and encoder counts: by the turns on known drums, or with a constant radius.
+    """Conversion between lengths and encoder counts. Known drums: by their turns. Otherwise: with a constant radius.
 
     Attributes:
         per_meter: Counts per meter of unstrained paid-out cable, at the reference lengths, (m,).
@@ -131,7 +131,7 @@ def winch_limits(robot: Robot, scale: _EncoderScale) -> PlcLimits:
 
 
 def check_step(robot: Robot, state: Equilibrium, step: float, period: float) -> None:
-    """Refuse a step [s] that is too long for the robot's modes, and a period [s] out of range.
+    """Refuse a `step` [s] that is too long for the robot's modes, and a `period` [s] out of range.
 
     The period must be a whole multiple of the step, and at most the heartbeat.
     """
