@@ -44,7 +44,7 @@ FIGURES: Final = (".png", ".svg", ".pdf")
 
 
 class _Request(NamedTuple):
-    """Options of the fit and of the choice of poses; `deviations`: standard deviations that options give, by sensor."""
+    """Options of the fit and of the choice of poses. `deviations`: standard deviations from options, by sensor."""
 
     robot: str
     unknowns: tuple[str, ...] | None

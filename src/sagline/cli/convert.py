@@ -135,7 +135,7 @@ def _material(density: float | None, stiffness: float | None) -> Cable | None:
 
 
 def _mjcf(robot: Robot, at: list[float] | None) -> tuple[str, str]:
-    """The MuJoCo model, and the position error that results because its tendons have no sag and no weight."""
+    """The MuJoCo model of `robot`, and its position error, which results from tendons without sag and weight."""
     from sagline.cables.models import Elastic
     from sagline.files.mjcf import dump_mjcf
     from sagline.kinematics.confirm import confirm

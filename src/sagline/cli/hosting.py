@@ -49,7 +49,7 @@ def serve(
     meanwhile: Callable[[Page], AbstractContextManager[None]] = lambda _: nullcontext(),
     **page: Any,
 ) -> int:
-    """Serve a page until Ctrl-C, inside the context `meanwhile`; returns the exit code. `page` goes to `Page`."""
+    """Serve a page until Ctrl-C, inside the context `meanwhile`; returns the exit code. `page`: arguments of `Page`."""
     from sagline.viewer import server as web
     from sagline.viewer.features import FEATURES
     from sagline.viewer.page import Page
@@ -77,5 +77,5 @@ def serve(
 
 
 def _has_display() -> bool:
-    """True if a browser can open a window; over SSH, it would open in the terminal."""
+    """True if a browser can open a window. Over SSH, the browser would open in the terminal."""
     return sys.platform in ("win32", "darwin") or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))

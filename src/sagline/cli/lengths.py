@@ -91,7 +91,7 @@ def encoder(
 
 
 def write_rows(plan: Plan, name: str, rows: Sequence[Sequence[float]], out: Path | None) -> int:
-    """Write the rows of solved samples with their times; returns the exit code. `name` formats a column's head."""
+    """Write `rows` of solved samples, each with its time; returns the exit code. `name` formats a column's head."""
     from sagline.core.table import csv_text
 
     kept = np.atleast_1d(plan.solved)
@@ -118,7 +118,7 @@ def write_rows(plan: Plan, name: str, rows: Sequence[Sequence[float]], out: Path
 
 
 def _plan_of(file: Path, out: Path | None) -> Plan:
-    """The plan in the file of a run; FileError if no sample is feasible, or if the output would replace this file."""
+    """The plan in the file of a run. FileError if no sample is feasible, or if the output would replace this file."""
     from sagline.files.plan_file import load_plan
 
     if out is not None and out.exists() and out.resolve() == file.resolve():

@@ -87,7 +87,7 @@ class _Command(TyperCommand):
     conditions: Mapping[str, Sequence[Condition]]
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parse the arguments; reject empty texts, because an empty path would mean the current folder."""
+        """Parse `args`. Empty texts are rejected, because an empty path would mean the current folder."""
         former = FORMER.get(self.name or "", {})
         args = [former.get(name, name) + sign + value for name, sign, value in (arg.partition("=") for arg in args)]
         if not ctx.resilient_parsing:  # resilient parsing is used for completion in the shell
@@ -121,7 +121,7 @@ class _Command(TyperCommand):
 
 
 class _Commands(Mapping[str, _Command]):
-    """The subcommands by name; the module of a subcommand is imported when it is read here."""
+    """The subcommands by name. The module of a subcommand is imported when the subcommand is read here."""
 
     def __getitem__(self, name: str) -> _Command:
         """The subcommand of a name."""

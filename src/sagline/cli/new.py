@@ -107,7 +107,7 @@ def _check_file(file: Path, *, force: bool) -> None:
 
 
 def _answered(name: str, answers: dict[str, str | None]) -> tuple[Design, dict[str, str]]:
-    """The design and the answers that define it; on a terminal, a question with an invalid answer is repeated."""
+    """The design and the answers that define it. On a terminal, a question is repeated after an invalid answer."""
     asks = sys.stdin is not None and sys.stdin.isatty() and sys.stderr.isatty()
     said: dict[str, str] = {}
     for key, (question, default) in QUESTIONS.items():
@@ -187,7 +187,7 @@ def _edges(text: str, item: str) -> Array:
 
 
 def _boxed(design: Design) -> tuple[Robot, Plan]:
-    """The robot with its test box, the largest with enough feasible poses, and the plan in the middle of the frame."""
+    """The robot with the largest test box that has enough feasible poses, and the plan in the middle of the frame."""
     from sagline.kinematics.inverse import inverse
 
     robot = design.robot()

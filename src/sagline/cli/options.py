@@ -123,7 +123,7 @@ def converted_option(metavar: str, text: str, function: str, *names: str, **argu
 
 
 def quantity_option(metavar: str, text: str, unit: str, *names: str, **limits: float) -> Any:
-    """An option for a number, in SI or with a unit; the number is at least `low` and greater than `above`."""
+    """An option for a number, in SI or with a unit. The number must be at least `low` and greater than `above`."""
     return converted_option(metavar, text, "quantity", *names, unit=unit, **limits)
 
 
@@ -175,7 +175,7 @@ def only_without(other: str) -> Condition:
 
 
 def _unchanged(value: Any) -> Any:
-    """The unchanged text; a callback converts it, because typer would change the error message of a parser."""
+    """The unchanged text. A callback converts the text, because typer would change the error message of a parser."""
     return value
 
 

@@ -61,7 +61,7 @@ class TextTable:
         return pieces
 
     def _filled(self, console: Console, width: int) -> list[range]:
-        """Columns of each piece: as many consecutive columns as fit, and at least one."""
+        """Columns of each piece: as many consecutive columns as fit into `width`, and at least one."""
         parts, first, count = [], self.keys, len(self.heads)
         while first < count:
             end = first + 1
@@ -197,7 +197,7 @@ class Output:
     def report(
         self, record: Callable[[], Mapping[str, object]], verdict: str, tell: Callable[[], None], *, as_json: bool
     ) -> None:
-        """Print a record and the files as JSON; or print the verdict, the text that `tell` prints, and the files."""
+        """Print `record` and files as JSON. Without `as_json`, print `verdict`, the lines of `tell`, and files."""
         if as_json:
             show_json({**record(), "files": self.files})
         else:

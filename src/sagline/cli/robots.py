@@ -151,7 +151,7 @@ def _short(robot: Robot) -> dict[str, Any]:
 
 
 def _frame(robot: Robot) -> Array:
-    """Edge lengths of the frame, or, without a frame, of the box around the anchors and down to the floor."""
+    """Edge lengths of the frame. Without a frame, those of the box around the anchors and down to the floor."""
     if robot.frame_size is not None:
         return robot.frame_size
     low, high = robot.frame_anchors.min(axis=0), robot.frame_anchors.max(axis=0)
@@ -160,7 +160,7 @@ def _frame(robot: Robot) -> Array:
 
 
 def _platform(robot: Robot) -> Array:
-    """Edge lengths of the platform, or, if they are not given, of the box that encloses its anchors."""
+    """Edge lengths of the platform. If they are not given, edge lengths of the box that encloses its anchors."""
     extent: Array = np.ptp(robot.platform_anchors, axis=0)
     return extent if robot.platform_size is None else robot.platform_size
 

@@ -96,7 +96,7 @@ class OperatorSession:
     """Session that reads lines, runs the cycles of the controller, and prints events."""
 
     def __init__(self, controller: Controller, *, alone: bool, shadow: bool) -> None:
-        """Prepare a session; `alone`: a line waits until the previous one is done; `shadow`: nothing is sent."""
+        """Prepare a session. With `alone`, a line waits for the previous line. With `shadow`, nothing is sent."""
         control = controller
         self.control, self._alone, self._shadow = controller, alone, shadow
         self._event_count = 0
@@ -212,7 +212,7 @@ class OperatorSession:
         self._line.update(self._status)
 
     def _next_line(self) -> _Line | None:
-        """The next line: an operator's line immediately, a line of a pipe only when the platform is at rest."""
+        """The next line. An operator's line is returned immediately, a line of a pipe when the platform is at rest."""
         if self._wait or (self._alone and self.control.moving):
             return None
         if self._alone and self.control.state in (State.FAULT, State.EMERGENCY):
@@ -224,7 +224,7 @@ class OperatorSession:
             return None
 
     def _carry_out(self, line: _Line) -> None:
-        """Carry out a line; an error of an operator's line is printed, an error in a pipe ends the session."""
+        """Carry out a line. An error of an operator's line is printed. An error in a pipe ends the session."""
         if self._alone and line.text:
             show_text(f"{PROMPT}{line.text}", whole=True)
         try:
@@ -315,7 +315,7 @@ def _pose(item: str, text: str) -> Pose:
 
 
 def _tensions(filtered: Array) -> str:
-    """Text of the smallest and largest tension, and of the load cells without a reading; filtered: [N], (m,)."""
+    """Text of the smallest and largest tension, and of the load cells without a reading; `filtered` (m,) [N]."""
     read = np.isfinite(filtered)
     lost = [f"no reading of cell {cell}" for cell in np.flatnonzero(~read)]
     known = [f"{filtered[read].min():.0f} to {filtered[read].max():.0f} N"] if read.any() else []

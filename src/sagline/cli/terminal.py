@@ -66,7 +66,7 @@ def show_note(head: str, text: str, style: str = "") -> None:
 
 
 def show_text(what: str, indent: int = 0, style: str = "", *, whole: bool = False) -> None:
-    """Print a part of the result; long lines are broken between words; `whole` keeps a line, for paths to copy."""
+    """Print a part of the result. Long lines are broken between words; with `whole`, they are not (for paths)."""
     if whole:
         _emit(Text(printable(what), style))
     else:
@@ -75,7 +75,7 @@ def show_text(what: str, indent: int = 0, style: str = "", *, whole: bool = Fals
 
 
 def show_pieces(pieces: Callable[[Console, int], Iterable[tuple[RenderableType, int]]]) -> None:
-    """Print parts of the result; `pieces` makes them for a width, each with its smallest width."""
+    """Print parts of the result. `pieces` makes them for a width, and gives the smallest width of each part."""
     console = _out if _out.is_terminal else _wide
     for piece, least in pieces(console, console.width):
         _emit(piece, max(console.width, least))
@@ -123,7 +123,7 @@ def _write(text: str) -> None:
 
 @contextmanager
 def _refused() -> Iterator[None]:
-    """Convert the system's errors of stdout to FileError; a BrokenPipeError (no reader) is not converted."""
+    """Convert the system's errors of stdout to FileError, except for BrokenPipeError (no reader)."""
     try:
         if sys.stdout is None:
             raise OSError(errno.EBADF, "it is closed")

@@ -67,7 +67,7 @@ def formats_of(text: str, item: str, known: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def middle_pose(robot: Robot) -> Pose:
-    """Level pose in the middle of a robot's test box; InvalidValueError if the robot has no test box."""
+    """Level pose in the middle of a robot's test box. InvalidValueError if the robot has no test box."""
     if robot.test_box is None:
         raise InvalidValueError("--pose", "missing", "X,Y,Z or X,Y,Z,A,B,C", "This robot has no test box.")
     return Pose((robot.test_box.low + robot.test_box.high) / 2, np.eye(3))
@@ -134,7 +134,7 @@ def points_of(text: str, item: str) -> tuple[int, ...]:
 
 
 def box_of(text: str, item: str) -> PoseBox:
-    """A box of level poses from "-2..2, -1..1, 1..3 m"; one number instead of a span makes it a plane."""
+    """A box of level poses from "-2..2, -1..1, 1..3 m". One number instead of a span makes the box a plane."""
     step = f'Give x, y and z, each from..to: {item} "-2..2, -1..1, 1..3 m".'
     parts = text.replace("−", "-").split(",")
     if len(parts) != 3 or len(text) > _LONGEST:

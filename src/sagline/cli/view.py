@@ -241,7 +241,7 @@ def played_in(robot: Robot, file: Path) -> Played:
 
 
 def played_beside(robot: Robot, first: Path, second: Path) -> Beside:
-    """The second run of a robot, to be played together with the first; the names of both are those of their files."""
+    """The second run of a robot, which is played together with the first. Both runs have the names of their files."""
     from sagline.viewer.player import Beside
 
     names = (first.name, second.name) if first.name != second.name else (str(first), str(second))
@@ -249,14 +249,14 @@ def played_beside(robot: Robot, first: Path, second: Path) -> Beside:
 
 
 def _check_robot(file: Path, kind: str, made_for: Robot, robot: Robot, *, alone: bool = False) -> None:
-    """Raise FileError for a file of another robot; the next step is the command that views this file."""
+    """Raise FileError if `file` belongs to another robot. Its next step is the command that views `file`."""
     if made_for.name != robot.name:
         step = f"View it as: sagline view {file if alone else f'{made_for.name} {file}'}"
         raise FileError(file, f"is a {kind} of {made_for.name}, not of {robot.name}", step)
 
 
 def _first_session(follower: LogFollower, logs: list[Path], *, live: bool) -> PlayedLog:
-    """Cycles in a log; for a growing log, waits until all logs exist and contain a cycle."""
+    """Cycles in a log. With `live`, the function waits until all `logs` exist and contain a cycle."""
     from sagline.files.mcap_reader import has_begun
 
     while live and not all(map(has_begun, logs)):
@@ -271,7 +271,7 @@ def _first_session(follower: LogFollower, logs: list[Path], *, live: bool) -> Pl
 
 @contextmanager
 def _following(follower: LogFollower, viewer: Page) -> Iterator[None]:
-    """Show new cycles of the log on the page while inside."""
+    """Show new cycles of the log on the page inside the `with` block."""
     over = threading.Event()
 
     def look() -> None:
@@ -319,7 +319,7 @@ def _mode(text: str | None) -> str:
 
 
 def _check_mode(robot: Robot, pose: Pose | None, mode: str, wrench: Any) -> None:
-    """Reject a mode that the list at the first pose lacks; if there is no list, the page states the reason."""
+    """Reject `mode` if it is not in the list of modes at `pose`. If there is no list, the page states the reason."""
     from sagline.dynamics.vibration.vibration import VibrationStatus, vibration
     from sagline.kinematics.inverse import inverse
     from sagline.robot.reach import home_pose

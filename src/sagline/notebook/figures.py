@@ -115,7 +115,7 @@ def _(path: Path) -> Figure | None:
 
 @figure_of.register
 def _(space: Workspace) -> Figure | None:
-    """Draw the boundary of a workspace at some heights, seen from above; a flat workspace, in its own plane."""
+    """Draw the boundary of a workspace at some heights, seen from above. A flat workspace is drawn in its own plane."""
     sides = [k for k, axis in enumerate(space.axes) if axis.size > 1]
     if space.volume <= 0.0 or len(sides) < 2:
         return None
@@ -178,7 +178,7 @@ def _whole(ax: object) -> Figure | None:
 
 
 def _html(figure: Figure, description: str) -> str:
-    """The figure as SVG, or as PNG if the PNG is smaller; "" if both are too large."""
+    """The figure as SVG, or as PNG if the PNG is smaller. "" if both are too large."""
     lines = [line for ax in figure.findobj(lambda each: hasattr(each, "get_lines")) for line in ax.get_lines()]  # type: ignore[attr-defined]
     if sum(len(line.get_xdata()) for line in lines if line.get_marker() not in ("None", None)) > MOST_MARKS:
         for line in lines:

@@ -195,7 +195,7 @@ def _correlation(figure: SubFigure, found: Calibration) -> None:
 
 
 def _apart(places: Array, least: float, end: float) -> Array:
-    """Ascending positions between 0 and `end`, moved apart so that they keep a minimum distance."""
+    """Ascending `places` between 0 and `end`, moved apart so that their distances are at least `least`."""
     moved = np.array(places)
     for k in range(1, len(moved)):
         moved[k] = max(moved[k], moved[k - 1] + least)
@@ -251,7 +251,7 @@ def _before(found: Calibration) -> Calibration:
 
 
 def _slice(found: Calibration, at: float | None) -> tuple[Array, Array, float]:
-    """Coordinates of a level grid over the robot's test box, or over the poses of the log."""
+    """Coordinates of a level grid at the height `at`, over the robot's test box or over the poses of the log."""
     low, high = found.poses.position.min(axis=0), found.poses.position.max(axis=0)
     box = found.robot.test_box
     if box is not None:

@@ -109,7 +109,7 @@ def drawing(
 
 
 def draw_at_rest(robot: Robot, where: Pose, plan: Plan | None, view: Array = USUAL, ax: Axes | None = None) -> Axes:
-    """Draw the robot at a pose; the cables have the colors of their tensions if these are known."""
+    """Draw `robot` at the pose `where`. Cables of a feasible `plan` have the colors of their tensions."""
     held, scale = plan is not None and bool(plan.feasible), TensionScale.of(robot)
     tension = plan.chord_tension if plan is not None else np.full(len(robot.frame_anchors), np.nan)
     courses = catenary_points(robot, where, plan) if plan is not None and held else straight_points(robot, where)
@@ -217,7 +217,7 @@ def _seen_from_outside(face: Array) -> bool:
 
 
 def _number_positions(cables: Sequence[Array], courses: Sequence[Array], size: float) -> list[Array]:
-    """Positions of the cables' numbers: on the cable, or next to the cable if another cable is too close."""
+    """Positions of the cables' numbers. A number is on its cable, or next to it if another cable is too close."""
     starts = np.concatenate([course[:-1] for course in courses])
     steps = np.concatenate([course[1:] for course in courses]) - starts
     owners = np.repeat(np.arange(len(courses)), [len(course) - 1 for course in courses])
@@ -242,7 +242,7 @@ def _number_positions(cables: Sequence[Array], courses: Sequence[Array], size: f
 
 
 def _distances(points: Array, starts: Array, steps: Array) -> Array:
-    """Distances from points (n, 2) to the nearest of segments (S, 2), shape (n,)."""
+    """Distances (n,) from `points` (n, 2) to their nearest segments; `starts`, `steps`: the S segments (S, 2)."""
     square = np.einsum("sc,sc->s", steps, steps)
     away = points[:, None] - starts
     share = np.einsum("nsc,sc->ns", away, steps) / np.where(square > 0.0, square, 1.0)

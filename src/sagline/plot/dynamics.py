@@ -128,7 +128,7 @@ def frequencies(
         The axes.
 
     Raises:
-        InvalidValueError: If there are fewer than two vibrations, or if the number of times is not the same.
+        InvalidValueError: If there are fewer than two vibrations, or if `time` has another number of values.
 
     Examples:
         >>> import sagline as sl
@@ -161,7 +161,7 @@ def frequencies(
 
 
 def _swinging(states: tuple[Vibration, ...], clock: Array) -> LineCollection:
-    """Segments between neighboring states, each with the mean share of its two ends."""
+    """Segments between neighboring `states`. The share of a segment is the mean share of its two ends."""
     pieces, shares = [], []
     for (first, one), (second, other) in pairwise(zip(clock, states, strict=True)):
         count = min(one.frequency.size, other.frequency.size)
@@ -233,7 +233,7 @@ def frequency_map(found: FrequencyMap, quantity: str = "frequency") -> Figure:
         The figure; cells without a solution are hatched.
 
     Raises:
-        InvalidValueError: If the quantity does not exist, or the poses are not on a grid.
+        InvalidValueError: If `quantity` does not exist, or if the poses are not on a grid.
 
     Examples:
         >>> import sagline as sl

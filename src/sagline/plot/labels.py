@@ -65,7 +65,7 @@ def figure_legend(figure: FigureBase, panels: Iterable[Axes], place: Any = "outs
 
 
 def legend_above(ax: Axes, labels: Sequence[str], title: str = "") -> dict[str, Any]:
-    """Arguments for a legend above the axes, in as many columns as fit."""
+    """Arguments for a legend above the axes `ax`, in as many columns as fit."""
     look = current()
     width = cast(Figure, ax.get_figure(root=True)).get_figwidth()
     columns = legend_columns([*labels, title], 0.85 * width, look.tick)
@@ -118,14 +118,14 @@ class _End(NamedTuple):
 
 
 def _is_line(handle: Artist) -> bool:
-    """True for a line with more than two points; False for a mark across the axes and for a set of points."""
+    """True for a line with more than two points. False for a mark across the axes, and for a set of points."""
     if not isinstance(handle, Line2D) or handle.get_linestyle() in ("None", "", " "):
         return False
     return np.size(np.asarray(handle.get_xdata())) > 2
 
 
 def _ends(ax: Axes, handles: Sequence[Artist], labels: Sequence[str]) -> list[_End]:
-    """Ends of the lines; empty if an end is not at the right side, or if the names are too many or too long."""
+    """Ends of the lines. Empty if an end is not at the right side, or if there are too many or too long names."""
     figure, look = cast(Figure, ax.get_figure(root=True)), current()
     longest = max((len(label) for handle, label in zip(handles, labels, strict=True) if _is_line(handle)), default=0)
     if longest * WIDE[look.font] * look.tick * POINT > MOST * figure.get_figwidth():
@@ -154,7 +154,7 @@ def _spacing(ax: Axes) -> float:
 
 
 def _write(ax: Axes, ends: Sequence[_End], title: str) -> None:
-    """Write the names without overlap next to the ends of the lines; a common prefix is written above them."""
+    """Write names next to the ends of lines, without overlap. A common prefix is written above all names."""
     look, names = current(), [end.name for end in ends]
     if not title and len(names) > 1 and len({name.rpartition(" ")[0] for name in names}) == 1:
         title, names = names[0].rpartition(" ")[0], [name.rpartition(" ")[2] for name in names]
@@ -179,7 +179,7 @@ def _points(ax: Axes) -> float:
 
 
 def spread_heights(heights: Array, spacing: float) -> Array:
-    """Heights of names in order, with a minimum distance; the squared distances from the line ends are minimal."""
+    """`heights` of names in order, moved apart to distances of at least `spacing` by the least squared movements."""
     order = np.argsort(heights, kind="stable")
     steps = spacing * np.arange(heights.size)
     placed = np.asarray(isotonic_regression(heights[order] - steps).x)

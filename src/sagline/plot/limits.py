@@ -16,9 +16,8 @@ Find = Callable[[Array], Indices]
 def cut_at_limits(points: Array, triangles: Indices, limit: Indices, find: Find) -> tuple[Array, Indices]:
     """Divide triangles so that each part has a single limit.
 
-    points: (V, d); triangles: (T, 3); limit: code of the limit at each point (V,); find: function that gives the codes
-    of points (n, d).
-    Returns the corners (U, 3, d) and the codes (U,).
+    `points`: (V, d); `triangles`: (T, 3); `limit`: code of the limit at each point (V,); `find`: function that gives
+    the codes of points (n, d). Returns the corners (U, 3, d) and the codes (U,).
     """
     codes = limit[triangles]
     mixed = (codes != codes[:, :1]).any(axis=1)
@@ -35,7 +34,7 @@ def cut_at_limits(points: Array, triangles: Indices, limit: Indices, find: Find)
 
 
 def _borders(ends: Array, codes: Indices, find: Find) -> Array:
-    """Points of edges (E, 2, d) at which the limit changes, by bisection; middles of edges without a change."""
+    """Points of the edges `ends` (E, 2, d) at which the limit changes, by bisection; middles of all other edges."""
     ends = ends.copy()
     change = np.flatnonzero(codes[:, 0] != codes[:, 1])
     for _ in range(BISECTIONS):

@@ -110,7 +110,7 @@ def _rest(spans: Array) -> list[tuple[float, float]]:
 
 
 def _hidden(starts: Array, ends: Array, owners: Indices, covers: _Covers) -> list[Array]:
-    """Hidden spans (n, 2) of each of S segments; 0 is the start of a segment and 1 is its end."""
+    """Hidden spans (n, 2) of each of S segments, from 0 at the start of a segment to 1 at its end."""
     if not len(covers.owners):
         return [np.empty((0, 2)) for _ in starts]
     at_once = max(1, CHUNK // covers.offsets.size)
@@ -122,7 +122,7 @@ def _hidden(starts: Array, ends: Array, owners: Indices, covers: _Covers) -> lis
 
 
 def _hidden_at_once(starts: Array, ends: Array, owners: Indices, covers: _Covers) -> list[Array]:
-    """Spans in which all k + 1 linear functions along a segment are <= 0: within all limits and behind the plane."""
+    """Spans of a segment within all limits and behind the plane: all k + 1 linear functions along it are <= 0."""
     steps = ends - starts
     outside = np.einsum("sc,rkc->srk", starts[:, :2], covers.normals) - covers.offsets
     rise = np.einsum("sc,rkc->srk", steps[:, :2], covers.normals)
@@ -142,7 +142,7 @@ def _hidden_at_once(starts: Array, ends: Array, owners: Indices, covers: _Covers
 def _covers(
     lines: Sequence[FlatLine], surfaces: Sequence[Array], crossings: Sequence[_Crossing], size: float
 ) -> _Covers:
-    """All pieces: the surfaces, and strips along the lines, which are wider at crossings."""
+    """All pieces: the surfaces, strips along the lines, and wider strips at crossings."""
     corners, behind, owners, hides = [], [], [], []
     for number, line in enumerate(lines):
         long = np.linalg.norm(np.diff(line.points[:, :2], axis=0), axis=1) > FLAT * size
@@ -206,7 +206,7 @@ def _cross(one: Array, other: Array) -> Array:
 
 
 def _strip(start: Array, end: Array, half_width: float) -> Array:
-    """Corners (4, 3), counter-clockwise, of a strip between two points; its depth does not change across the strip."""
+    """Corners (4, 3), counter-clockwise, of a strip from `start` to `end`. The depth is constant across the strip."""
     along = (end - start)[:2]
     across = half_width / float(np.hypot(*along)) * np.array([-along[1], along[0], 0.0])
     return np.stack((start - across, end - across, end + across, start + across))

@@ -140,7 +140,7 @@ def abscissa(plan: Plan) -> tuple[Array, str]:
 
 
 def _values(plan: Plan, quantity: str, table: dict[str, tuple[str, float]]) -> tuple[Array, str]:
-    """A quantity of the cables, shape (N, m), in the unit of its axis label, and this label."""
+    """Values (N, m) of `quantity` in the unit of its axis label, and this label."""
     label, scale = table[choice(quantity, "quantity", table)]
     return scale * np.atleast_2d(getattr(instance(plan, Plan, "plan").state.cables, quantity)), label
 
@@ -248,8 +248,8 @@ def _write_flat_error(ax: Axes, confirmation: Confirmation) -> None:
 def small_multiples(plan: Plan, quantity: str = "chord_tension") -> Figure:
     """One quantity over time, with one panel per cable and equal scales; the other cables are gray in the background.
 
-    This is easier to read than a single panel with many crossing lines, also in print without color. Dotted lines are
-    the robot's limits of this quantity, if they are in the range of the axis.
+    Such panels are easier to read than a single panel with many crossing lines, also in print without color. Dotted
+    lines are the robot's limits of this quantity, if they are in the range of the axis.
 
     Args:
         plan: The plan; without a path, the abscissa is the index of the pose.
@@ -359,7 +359,7 @@ def velocity(path: Path, ax: Axes | None = None) -> Axes:
 
 
 def _arrow_samples(path: Path) -> list[int]:
-    """Samples of the arrows, before the middle of each motion between two rests; an even selection of many motions."""
+    """Samples of the arrows, before the middle of each motion between two rests; of many motions, an even selection."""
     speed = np.linalg.norm(path.twist[:, :2], axis=1)
     moving = np.concatenate(([False], speed > 1e-3 * speed.max(initial=0.0), [False]))
     edges = np.flatnonzero(np.diff(moving.astype(np.int8))).reshape(-1, 2)

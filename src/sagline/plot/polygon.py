@@ -49,7 +49,7 @@ def polygon(shape: TensionPolygon, points: Mapping[str, ArrayLike] | None = None
         The axes.
 
     Raises:
-        InvalidValueError: If the polygon is empty, or if points are not tensions of its cables.
+        InvalidValueError: If the polygon `shape` is empty, or if `points` are not tensions of its cables.
 
     Examples:
         >>> import sagline as sl
@@ -117,7 +117,7 @@ def _draw_places(ax: Axes, groups: Sequence[tuple[Array, list[str]]]) -> None:
 
 
 def _equal_places(places: Mapping[str, Array], least: float) -> list[tuple[Array, list[str]]]:
-    """Marks that are farther apart than a least distance, each with the names of all marks that are closer to it."""
+    """Marks of `places` that are farther apart than `least`, each with the names of all marks that are closer to it."""
     groups: list[tuple[Array, list[str]]] = []
     for name, place in places.items():
         if np.isfinite(place).all():
@@ -166,7 +166,7 @@ def _name_sides(ax: Axes, shape: TensionPolygon, corners: Array) -> None:
 
 
 def _names(shape: TensionPolygon, corners: Array, scale: float) -> list[_Name]:
-    """Place each name outside its side, where a convex polygon has no lines; overlapping names are moved outward."""
+    """Place each name outside of its side, where a convex polygon has no lines. Overlapping names are moved outward."""
     names: list[_Name] = []
     size = current().tick
     normals = _normals(corners)
@@ -187,7 +187,7 @@ def _names(shape: TensionPolygon, corners: Array, scale: float) -> list[_Name]:
 
 
 def _normals(corners: Array) -> Array:
-    """Outward directions of the sides (h, 2); a side of zero length has the mean direction of its neighbors."""
+    """Outward directions (h, 2) of the sides. A side of zero length has the mean direction of its neighbors."""
     along = np.roll(corners, -1, axis=0) - corners
     lengths = np.linalg.norm(along, axis=1)
     long = np.flatnonzero(lengths > SHORT * lengths.max())

@@ -47,7 +47,7 @@ LABEL_DISTANCE = 0.045  # distance of a label outward from its anchor, as a shar
 
 
 def drawn_pose(robot: Robot, pose: PoseLike | None) -> Pose:
-    """The given pose, or the middle of the robot's test box; InvalidValueError for a batch, or if both are missing."""
+    """`pose`, or the middle of the robot's test box. InvalidValueError for a batch, or if both are missing."""
     if pose is not None:
         return single_pose(pose)
     if robot.test_box is None:
@@ -57,7 +57,7 @@ def drawn_pose(robot: Robot, pose: PoseLike | None) -> Pose:
 
 
 def catenary_points(robot: Robot, pose: Pose, plan: Plan) -> Array:
-    """Points of the cables in the world [m], shape (m, points, 3), from a feasible plan of the pose."""
+    """Points of the cables in the world [m], shape (m, points, 3), computed from a feasible `plan` of `pose`."""
     contact = plan.state.contact
     wraps = shapes.wraps(robot, pose, None if contact is None else contact.wrap_angle)
     free = shapes.catenaries(shapes.chords(robot, pose, wraps[:, -1]), plan.state.cables, 1.0)
@@ -71,7 +71,7 @@ def straight_points(robot: Robot, pose: Pose) -> Array:
 
 
 def pulleys_and_drums(robot: Robot, pose: Pose) -> tuple[list[Array], list[tuple[Array, bool]]]:
-    """Circles of pulleys and known drums; cables between drum and pulley, and True for those that are vertical."""
+    """Circles of pulleys and known drums; cables between drum and pulley, and True for each vertical cable of them."""
     turn = np.linspace(0.0, 2.0 * np.pi, POINTS)[:, None]
     pulleys = np.swapaxes(points_on_pulleys(robot, pose, turn), 0, 1)[pulleys_of(robot).radius > 0.0]
     known = None if robot.winches is None else robot.winches.drum_radius
@@ -83,7 +83,7 @@ def pulleys_and_drums(robot: Robot, pose: Pose) -> tuple[list[Array], list[tuple
 
 
 def _rims(ends: Array, radius: float) -> Array:
-    """Both rims of a horizontal drum as one line; the end points of the drum's axis are (2, 3)."""
+    """Both rims of a horizontal drum as one line; `ends` (2, 3) are the end points of the drum's axis."""
     axis = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
     turn = np.linspace(0.0, 2.0 * np.pi, POINTS)[:, None]
     rim = radius * (np.cos(turn) * np.cross(axis, [0.0, 0.0, 1.0]) + np.sin(turn) * [0.0, 0.0, 1.0])
@@ -239,7 +239,7 @@ def tension_bar(ax: Axes, scale: TensionScale, tension: Array, place: Literal["l
 
 
 def fit_space(ax: Axes3D, low: Array, high: Array) -> Array:
-    """Limit axes to a box whose sides are at least a tenth of its longest side; returns the lengths of the sides."""
+    """Limit `ax` to a box whose sides are at least a tenth of its longest side; returns the lengths of the sides."""
     size: Array = np.maximum(high - low, 0.1 * np.max(high - low))
     middle = 0.5 * (low + high)
     ax.set(**{f"{name}lim": (m - 0.5 * s, m + 0.5 * s) for name, m, s in zip("xyz", middle, size, strict=True)})
@@ -247,7 +247,7 @@ def fit_space(ax: Axes3D, low: Array, high: Array) -> Array:
 
 
 def format_space_axes(ax: Axes3D, points: Array, title: str) -> None:
-    """Write the labels; set ticks so that their numbers do not overlap, but none where two axes meet."""
+    """Write labels, and set ticks so that their numbers do not overlap. There is no tick where two axes meet."""
     ax.set_title(title, fontsize=current().label, y=0.97)
     low, high = points.min(axis=0), points.max(axis=0)
     low[2] = min(0.0, low[2])

@@ -65,7 +65,7 @@ class Sheet(Figure):
         self._fitted = False
 
     def draw(self, renderer: Any) -> None:
-        """Draw in the style of the figure, which then also holds for objects that Matplotlib makes while it draws."""
+        """Draw in the style of the figure. Objects that Matplotlib makes while it draws then also have this style."""
         with Using(self.style):
             if not self._fitted:
                 self._fitted = True  # the figure has not been drawn yet
@@ -103,7 +103,7 @@ def _thicken(figure: Figure, factor: float) -> None:
 
 
 def axes_or_new(ax: Axes | None, height: float = 3.0) -> Axes:
-    """The given Axes, or those of a new figure; InvalidValueError for other objects or for 3D axes."""
+    """The Axes `ax`, or the Axes of a new figure. InvalidValueError for other objects and for 3D axes."""
     optional(ax, Axes, "ax")
     if ax is None:
         return sheet(height).add_subplot()
@@ -134,7 +134,7 @@ def format_clock(ax: Axes, clock: Array, label: str, axis: str = TIME) -> None:
 
 
 def hide_shared_labels(ax: Axes) -> None:
-    """Hide numbers and labels that other axes of the grid repeat, at the left if y is shared, below if x is shared."""
+    """Hide repeated numbers and labels in a grid of axes: at the left if y is shared, below if x is shared."""
     place: Any = ax.get_subplotspec()
     if ax.get_shared_x_axes().get_siblings(ax) != [ax] and not place.is_last_row():
         ax.tick_params(axis="x", which="both", labelbottom=False)
@@ -174,7 +174,7 @@ def color_bar(shown: ScalarMappable, axes: Any, label: str, **look: Any) -> Colo
 
 
 def mark_event(ax: Axes, time: float, name: str, color: str, zorder: float) -> None:
-    """Draw a vertical line at a time, with a name above the axes; "" for none."""
+    """Draw a vertical line at `time`, with `name` above the axes; no name for ""."""
     ax.axvline(time, color=color, linewidth=1.0, zorder=zorder)
     if name:
         ax.annotate(
@@ -220,7 +220,7 @@ def true_runs(flags: Flags) -> list[tuple[int, int]]:
 def shade_spans(
     ax: Axes, clock: Array, spans: Iterable[tuple[int, int]], label: str, color: str = GAP_COLOR, alpha: float = 0.5
 ) -> None:
-    """Shade spans of samples (first, last), each extended halfway to the neighboring samples."""
+    """Shade `spans` of samples (first, last). Each span is extended halfway to the neighboring samples."""
     if clock.size > 1:
         middles = [0.5 * (before + after) for before, after in pairwise(clock)]
         edges = np.array([clock[0], *middles, clock[-1]])
@@ -232,7 +232,7 @@ def shade_spans(
 
 
 def svg_text(figure: Figure, dots: int, **settings: str) -> str:
-    """A figure as an SVG element for a page; date and creator are left out, so that each call gives the same text."""
+    """A figure as an SVG element for a page. Date and creator are left out, so that each call gives the same text."""
     written = BytesIO()
     with matplotlib.rc_context(cast(Any, settings)):
         figure.savefig(written, format="svg", dpi=dots, metadata={"Date": None, "Creator": None}, transparent=True)
@@ -241,7 +241,7 @@ def svg_text(figure: Figure, dots: int, **settings: str) -> str:
 
 
 def unique_names(svg: str, prefix: str) -> str:
-    """A drawing whose identifiers begin with a prefix, so that a page can have several; unused ones are removed."""
+    """`svg` with identifiers that begin with `prefix`, for several drawings in a page. Others are removed."""
     used = {found[1] for found in _reference.findall(svg)}
     svg = _name.sub(lambda found: f' id="{prefix}{found[1]}"' if found[1] in used else "", svg)
     return _reference.sub(lambda found: f"{found[1]}{prefix}{found[2]}", svg)

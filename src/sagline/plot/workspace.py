@@ -107,7 +107,7 @@ def slice(space: Workspace, normal: str = "z", at: float | None = None, ax: Axes
 
 
 def _plane(space: Workspace, normal: str, at: float | None) -> Plane:
-    """The plane of a slice; InvalidValueError if it is not in the box of the workspace."""
+    """The plane of a slice. InvalidValueError if the plane is not in the box of the workspace."""
     axis = AXES.index(choice(normal, "normal", AXES))
     low, high = float(space.box.low[axis]), float(space.box.high[axis])
     flat = flat_axis(space.box)
@@ -126,7 +126,7 @@ def _plane(space: Workspace, normal: str, at: float | None) -> Plane:
 
 
 def _limit_name(key: Key, space: Workspace) -> str:
-    """Name of a limit; if the limit is the margin, only the name of the cable."""
+    """Name of the limit `key`. If the limit is the margin, it is the name of the cable."""
     which, cable = key
     named = [space.criteria[which].title] if which > 0 or cable < 0 else []
     return ", ".join(named + [f"cable {cable}"] * (cable >= 0))
@@ -141,7 +141,7 @@ def limit_colors(space: Workspace) -> dict[Key, Color]:
 
 
 def limit_finder(space: Workspace, keys: Sequence[Key]) -> Find:
-    """Function that gives, for positions (N, 3) [m], the indices of their limits in `keys`."""
+    """Function of positions (N, 3) [m] that gives the index of each position's limit in `keys`."""
     details, index = space.levels().details, {key: k for k, key in enumerate(keys)}
 
     def find(positions: Array) -> Indices:
@@ -158,7 +158,7 @@ def _shade(color: tuple[int, int, int]) -> Color:
 
 
 def _draw_regions(ax: Axes, cut: Slice, space: Workspace, levels: Array, numbers: Sequence[Text]) -> None:
-    """Fill the region of each limit with a pale color, and write its name beside the numbers; gray outside."""
+    """Fill the region of each limit with a pale color, and write the limit's name beside `numbers`. Gray outside."""
     ax.set_facecolor(OUTSIDE)
     inside = ax.contourf(cut.across, cut.up, cut.level, levels=[0.0, np.inf], colors=["white"], zorder=0.8)
     shades, codes = limit_colors(space), np.stack((cut.criterion, cut.cable), axis=-1)
@@ -184,7 +184,7 @@ def _draw_regions(ax: Axes, cut: Slice, space: Workspace, levels: Array, numbers
 
 
 def _triangles_at_borders(cut: Slice, region: Indices, find: Find) -> tuple[Array, Indices]:
-    """Triangles (U, 3, 2) of the cells with several limits, divided where the limit changes, and their limits (U,)."""
+    """Triangles (U, 3, 2) of cells with several limits, divided where the limit changes; the triangles' limits (U,)."""
     rows, columns = region.shape
     place = np.arange(region.size).reshape(rows, columns)
     cells = np.stack((place[:-1, :-1], place[:-1, 1:], place[1:, 1:], place[1:, :-1]), axis=-1).reshape(-1, 4)
@@ -213,7 +213,7 @@ def _on_lines(margin: Array, levels: Array) -> Flags:
 def _name_region(
     ax: Axes, cut: Slice, within: Flags, free: Flags, name: str, boxes: Sequence[BboxBase]
 ) -> list[BboxBase]:
-    """Write the name in the middle of each large part of a region: between lines if possible, and over no other text.
+    """Write `name` in the middle of each large part of a region, between lines if possible, and over no other text.
 
     Returns the boxes around the written names.
     """
@@ -349,7 +349,7 @@ def _draw_hull(ax: Axes3D, space: Workspace, colors: dict[Key, tuple[float, floa
 
 
 def _coarser(vertices: Array, faces: Indices) -> tuple[Indices, Indices]:
-    """A simplified mesh for print: indices of the kept corners, one for each cell of a grid, and faces between them."""
+    """A simplified mesh for print: indices of the kept corners, one corner per cell of a grid, and the new faces."""
     if not len(faces):
         return np.empty(0, dtype=np.int64), faces
     low = vertices.min(axis=0)

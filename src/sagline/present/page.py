@@ -153,7 +153,7 @@ def page(
 
 
 def write_page(folder: Path | str, names: tuple[str, str], text: str, numbers: dict[str, Any]) -> tuple[Path, Path]:
-    """Write a page, and its numbers as JSON, to a folder (created if missing). Either both files are written or none.
+    """Write a page, and its `numbers` as JSON, to `folder` (created if missing). Both files are written, or no file.
 
     Raises:
         FileError: If the folder cannot be written.

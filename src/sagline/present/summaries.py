@@ -111,7 +111,7 @@ def _summary_of_fields(thing: Any) -> Summary:
 
 
 def _extent(values: NDArray[Any], units: list[str]) -> str:
-    """Range of numbers as text, with their unit, or with the units of their parts in brackets."""
+    """Range of `values` as text, with one unit for all, or with the units of their parts in brackets."""
     if values.dtype.kind == "b":
         return f"{np.count_nonzero(values)} of {values.size} true"
     unit = ", ".join(units)
@@ -156,7 +156,7 @@ def _(robot: Robot) -> Summary:
 
 
 def middle_plan(robot: Robot) -> Plan | None:
-    """Plan the pose at the middle of a robot's test box; None without a test box."""
+    """Plan of the pose in the middle of a robot's test box; None without a test box."""
     box = robot.test_box
     if box is None or robot.cable_count < robot.degrees_of_freedom:
         return None

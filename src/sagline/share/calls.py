@@ -37,8 +37,8 @@ def module_text() -> str:
 def described_calls(calls: Mapping[str, Call], names: Mapping[str, AnyArray]) -> dict[str, Any]:
     """Describe calls: addresses of all arrays, contents of write-protected arrays, and arguments in C.
 
-    calls: calls by the name of the function in the page. names: arrays or contiguous views that the page reads or
-        writes. Arrays that are not write-protected contain zeros at the start.
+    `calls`: calls by the name of the function in the page. `names`: arrays or contiguous views that the page uses.
+    Arrays that are not write-protected contain zeros at the start.
     """
     places: dict[int, int] = {}  # addresses of the arrays that own memory, by identity
     filled: dict[int, str] = {}
@@ -74,7 +74,7 @@ def described_calls(calls: Mapping[str, Call], names: Mapping[str, AnyArray]) ->
 
 
 def _leaves(value: Any) -> Iterator[Any]:
-    """Arrays and numbers of nested tuples, in order. None is omitted, because it is not an argument in C."""
+    """Arrays and numbers of nested tuples, in order. None is omitted, because None is not an argument in C."""
     if isinstance(value, tuple):
         for each in value:
             yield from _leaves(each)

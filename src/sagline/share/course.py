@@ -128,7 +128,7 @@ def of_simulation(simulation: Simulation) -> SharedMotion:
 
 
 def chord_tension(robot: Robot, pose: Pose, length: Array) -> Array:
-    """Chord tensions (N, m) of catenaries at rest with these lengths off the drum; NaN for NaN or too short lengths.
+    """Chord tensions (N, m) of catenaries at rest; `length`: lengths off the drum. NaN for NaN or too short lengths.
 
     Cables leave their pulleys along the chord.
     """
@@ -143,7 +143,7 @@ def chord_tension(robot: Robot, pose: Pose, length: Array) -> Array:
 
 
 def of_session(session: PlayedLog) -> SharedMotion:
-    """Samples of a log of the controller: at planned poses, or at estimated poses if there is no plan."""
+    """Samples of a log of the controller, at planned poses. Without a plan, the samples are at estimated poses."""
     from sagline.viewer.session import WRONG
 
     planned = np.isfinite(session.planned).all(axis=1, keepdims=True)

@@ -162,7 +162,7 @@ def courses_at(robot: Robot, pose: Pose, tension: Array) -> Array:
 
 
 def _draw_arguments(robot: Robot, terms: tuple[Array, Array, Array], pose: Array, tension: Array) -> tuple[Any, ...]:
-    """Arguments of `cable_courses`, with the points as the last argument; pose: a pose row."""
+    """Arguments of `cable_courses`, with the points as the last argument; `pose` is a pose row."""
     m, points = robot.cable_count, shapes.points_per_cable(robot)
     work = np.empty((3, 3)), np.empty((GEOMETRY_ROWS, m)), np.empty((m, points, 3))
     return terms[2][0], terms[1][0], pose, tension, points - shapes.POINTS, *work

@@ -44,7 +44,7 @@ def encode_columns(channels: Sequence[PackedColumn]) -> tuple[dict[str, object],
 
 
 def _codes(channel: PackedColumn, values: Array) -> tuple[Codes, int | None]:
-    """Round values to whole numbers of steps; also return the code of a missing value (None if not needed)."""
+    """Round values to whole numbers of steps. The code of a missing value is also returned (None if not needed)."""
     known = np.isfinite(values)
     if channel.scale == "relative":
         known &= values > 0.0
@@ -59,7 +59,7 @@ def _codes(channel: PackedColumn, values: Array) -> tuple[Codes, int | None]:
 
 
 def _least(column: Codes) -> tuple[int, int, Codes]:
-    """Order with the smallest differences, their size [bytes], and the differences with the sign in the lowest bit."""
+    """Order with the smallest differences, their size [bytes], and the differences with the signs in the lowest bit."""
     found = []
     for order in _ORDERS:
         rest = column

@@ -1,7 +1,8 @@
 """Access to a page: the hosts and origins of requests, the token of the address, and limits for clients.
 
-A page of another site in the browser of a user can send requests to this computer. The browser names that site in the
-header Origin. If the domain of that site leads to this computer (DNS rebinding), the header Host contains the domain.
+A page of another site in the browser of a user can send requests to this computer. The browser names the other site in
+the header Origin. If the domain of the other site leads to this computer (DNS rebinding), the header Host contains this
+domain.
 """
 
 from __future__ import annotations
@@ -136,7 +137,7 @@ class Access:
         return scheme in ("http", "https") and (place == host.lower() or _host_of(place) in self._allowed)
 
     def _report(self, error: InvalidValueError) -> None:
-        """Print a line about a rejection, unless the same kind of rejection was reported a short time ago."""
+        """Print a line about `error`, a rejection, unless a rejection of the same kind was printed a short time ago."""
         now = time.monotonic()
         if now - self._reported.get(error.item, -QUIET) >= QUIET:
             self._reported[error.item] = now
@@ -150,7 +151,7 @@ def bracketed(host: str) -> str:
 
 
 def _host_of(text: str) -> str | None:
-    """Name or address in a header, in lower case without port; None if it is invalid."""
+    """Name or address in `text`, a header, in lower case without port; None if `text` is invalid."""
     match = _HOST.fullmatch(text.lower())
     if match is None or (match[1] and not _is_address(match[1])):
         return None

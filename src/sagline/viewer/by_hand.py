@@ -116,7 +116,7 @@ def _extent(polygon: TensionPolygon, dot: Array) -> tuple[Array, Array]:
 def _clipped(
     corners: Array, sides: tuple[Side | None, ...], low: Array, high: Array
 ) -> tuple[Array, tuple[Side | None, ...]]:
-    """Part of a polygon that is within a box; the sides of the box do not count as limits."""
+    """Part of a polygon within the box from `low` to `high`. The sides of the box do not count as limits."""
     if corners.shape[1] == 1:
         return np.clip(corners, low, high), sides
     for axis, sign, end in ((0, 1.0, high[0]), (0, -1.0, -low[0]), (1, 1.0, high[1]), (1, -1.0, -low[1])):

@@ -62,7 +62,7 @@ def camera_of(server: viser.ViserServer, client: int) -> Camera | None:
 
 
 def ray_distance(solid: Solid, start: Array, direction: Array) -> float | None:
-    """Distance along a ray to a surface, in lengths of its direction; None without an intersection.
+    """Distance along a ray to the surface `solid`, in lengths of `direction`; None without an intersection.
 
     Source:
         Moeller & Trumbore, J. Graphics Tools 2, 1997.
@@ -81,7 +81,7 @@ def ray_distance(solid: Solid, start: Array, direction: Array) -> float | None:
 
 
 def nearest_line(camera: Camera, at: tuple[float, float], lines: Array, within: float) -> int | None:
-    """The line nearest to the viewer within a distance [px] of a point of the picture; None without such a line."""
+    """Of all `lines` within `within` [px] of the picture point `at`, the line nearest to the viewer; or None."""
     places, deep = camera.project(lines)
     pixel = np.asarray(at) * camera.pixels
     start, run = places[:, :-1] - pixel, np.diff(places, axis=1)
@@ -179,7 +179,7 @@ class Framing:
             self._follow(known.camera)
 
     def pan(self, before: Array, after: Array) -> None:
-        """After a jump of a point (3,), move the cameras that have lost sight of it by the same displacement."""
+        """After a jump of a point from `before` to `after`, move cameras that have lost sight of it by this vector."""
         for client, known in self._server.get_clients().items():
             camera = Camera.of(known.camera)
             if camera is not None and camera.sees(before) and not camera.sees(after):
@@ -210,7 +210,7 @@ class Framing:
             self._directed.discard(client.client_id)
 
     def _follow(self, camera: viser.CameraHandle) -> None:
-        """Frame the box again if the proportions of the picture change, unless the user has moved the camera."""
+        """Frame the box again if the picture's proportions change, except for a camera that the user has moved."""
         try:
             shape = np.array([camera.image_width, camera.image_height, camera.fov], dtype=np.float64)
             place = np.array(camera.position, dtype=np.float64).reshape(3)

@@ -91,7 +91,7 @@ class LinkedControls:
     """All controls of a page; later controls are included."""
 
     def __init__(self, gui: viser.GuiApi) -> None:
-        """Store the present values as defaults; links contain only values that differ from the defaults."""
+        """Store the present values as defaults. Links contain only values that differ from the defaults."""
         self._gui = gui
         self._defaults = self.values()
 
@@ -111,7 +111,7 @@ class LinkedControls:
         return {name: _text(each) for name, each in known if name not in defaults or defaults[name] != each.value}
 
     def read(self, texts: dict[str, str]) -> Callable[[], None]:
-        """Function that sets the controls to the values of a link, and all others to their defaults."""
+        """Function that sets controls to the values `texts` of a link, and all other controls to their defaults."""
         handles = self._handles()
         unknown = next((name for name in texts if name not in handles), None)
         if unknown is not None:

@@ -83,7 +83,7 @@ def missing_of(snapshot: Snapshot) -> MissingWrench | None:
 
 
 def _step(plan: Plan) -> Array:
-    """Smallest sufficient force [N, N m], shape (6,); if no force is sufficient, the smallest wrench."""
+    """Wrench (6,) [N, N m] of the smallest sufficient force. If no force is sufficient, the smallest wrench."""
     if plan.relief is not None and np.isfinite(plan.relief).all():
         return np.concatenate((plan.relief, np.zeros(3)))
     robot = plan.state.one_robot
@@ -100,7 +100,7 @@ def _step(plan: Plan) -> Array:
 
 
 def _limits(plan: Plan, held: Plan) -> tuple[_AtLimit, ...]:
-    """Cables at limits: the plan's blocking cables if a force is sufficient, otherwise those at limits in `held`."""
+    """Cables at limits. If a force is sufficient, these are the plan's blocking cables, otherwise those of `held`."""
     robot, tension = plan.state.one_robot, held.state.limited_tension
     to_lower, to_upper = tension - robot.tension_min, robot.tension_max - tension
     which = plan.blocking
@@ -171,7 +171,7 @@ class _Search:
         return self._inside(start, best)
 
     def _refined(self, start: Array, best: Array, step: Array) -> Array:
-        """The nearest feasible position; the search starts at a feasible position and uses finer and finer grids."""
+        """The feasible position nearest to `start`, by a search from the feasible `best` on finer and finer grids."""
         ways = np.linspace(-1.0, 1.0, 2 * AROUND + 1)
         offsets = np.stack(np.meshgrid(*[ways] * len(step), indexing="ij"), axis=-1).reshape(-1, len(step))
         for _ in range(ITERATIONS):

@@ -62,7 +62,7 @@ class Shot(NamedTuple):
 
     @classmethod
     def of(cls, camera: viser.CameraHandle, low: Array, high: Array, width: int, height: int = 0) -> Shot:
-        """Picture of the visible part of a box in a client's window, for any proportions of the window."""
+        """Picture of the visible part of the box from `low` to `high`, for any proportions of the client's window."""
         right, up, far, forward = _seen(camera, low, high)
         rows = height or round(width / float(np.clip(right / up, *SHAPES)))
         slope = BORDER * max(up, right * rows / width)

@@ -49,7 +49,7 @@ class Source(NamedTuple):
 
     @classmethod
     def of_robot(cls, name_or_path: str | PathLike[str], mass: float | None = None) -> Source:
-        """Expression of a robot from its name or its file, with another mass [kg] if one is given."""
+        """Expression of a robot from its name or its file, with another `mass` [kg] if `mass` is given."""
         return cls(f"sl.load_robot({fspath(name_or_path)!r})", mass)
 
     @classmethod
@@ -102,7 +102,7 @@ class Page:
         source: Source | None = None,
         beside: Beside | None = None,
     ) -> None:
-        """Build the page; `beside` is a second run of the robot with the same clock. Other arguments: see the class."""
+        """Build the page. `beside` is a second run of the robot with the same clock. Other arguments: see the class."""
         self.server, self.robot, self.wrench = server, robot, wrench
         self.mode, self.found, self.source = mode, found, source or Source()
         self._wake, self._stopping = threading.Event(), threading.Event()
@@ -181,11 +181,11 @@ class Page:
         return None if self.view is None else self.view.state
 
     def feature(self, kind: type[F]) -> F:
-        """The feature with a given type."""
+        """The feature of the type `kind`."""
         return next(each for each in self.features if isinstance(each, kind))
 
     def go(self, pose: Pose) -> None:
-        """Move the platform to a pose; cameras that would lose sight of the platform follow it."""
+        """Move the platform to a pose. Cameras that would lose sight of the platform follow it."""
         self.player.leave()
         self.framing.pan(np.asarray(self.scene.gizmo.position), pose.position)
         self.scene.place(pose)
@@ -303,7 +303,7 @@ def _readings(view: View) -> tuple[str, str]:
 
 
 def _largest_sag(snapshot: Configuration) -> float:
-    """Largest sag of the cables of a feasible pose [m]; 0 if there is none, or if cables are in motion."""
+    """Largest sag of the cables at a feasible pose [m]. 0 if the pose is not feasible, or if cables are in motion."""
     if isinstance(snapshot, InMotion) or snapshot.plan is None or not snapshot.feasible:
         return 0.0
     return float(np.max(snapshot.plan.state.cables.sag))

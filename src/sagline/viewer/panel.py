@@ -101,7 +101,7 @@ class ControlPanel:
         return METHODS[self._method_name]
 
     def show_what_if(self, reason: str) -> None:
-        """Show the controls that change the robot; or the reason why a played motion does not allow changes."""
+        """Show the controls that change the robot, or the reason why a played motion does not allow changes."""
         shown = not reason
         factors = (self._sliders[each.label] for each in (self._density, self._stiffness))
         for handle in (self._mass, *factors, self._model, self._method):

@@ -199,7 +199,7 @@ class PlayedSimulation:
         ]
 
     def traces(self, most: int, error_scale: float) -> tuple[Array, Array]:
-        """Desired positions, which are NaN, and actual positions; both of shape (n, 3), n <= `most`."""
+        """Desired positions, all NaN, and actual positions, both of shape (n, 3) with n <= `most`."""
         rows = np.unique(np.linspace(0, self.time.size - 1, most).astype(np.intp))
         actual = self.simulation.pose.position[rows]
         return np.full_like(actual, np.nan), actual

@@ -60,7 +60,7 @@ class InMotion:
         return courses
 
     def _catenaries(self, sag_scale: float) -> Array:
-        """Points of catenaries with the given lengths; their exit points are those of the chords."""
+        """Points of catenaries with the cables' lengths. The exit points are the same as for chords."""
         robot, pose = self.robot, self.pose
         wraps = shapes.wraps(robot, pose, None)
         ends = shapes.chords(robot, pose, wraps[:, -1])
@@ -138,12 +138,12 @@ class Timeline:
         return Timeline(self.duration, min(time, self.duration), time < self.duration)
 
     def extended(self, duration: float) -> Timeline:
-        """Clock with a later end [s]; a paused clock at the former end moves to the new end."""
+        """Clock with the later end `duration` [s]. A paused clock at the former end moves to the new end."""
         time = duration if self.time >= self.duration and not self.playing else self.time
         return Timeline(duration, time, self.playing)
 
     def toggled(self) -> Timeline:
-        """Clock after the play button: paused if this clock runs; otherwise running, at its end from the start."""
+        """Clock after the play button. A running clock is paused. A paused clock runs; at its end, it starts again."""
         time = 0.0 if not self.playing and self.time >= self.duration else self.time
         return Timeline(self.duration, time, not self.playing)
 
@@ -178,7 +178,7 @@ class Player:
         put_on: Callable[[Played | None], None],
         beside: Beside | None = None,
     ) -> None:
-        """Play a motion, or None; `put_on` is called whenever another motion is played."""
+        """Play the motion `original`, or no motion for None. `put_on` is called whenever another motion is played."""
         self._put_on, self._original, self._beside = put_on, original, beside
         self.speed, self.number = 1.0, 0
         self.play(original)
@@ -202,7 +202,7 @@ class Player:
         self._put_on(played)
 
     def extend(self, played: Played) -> None:
-        """Replace the original motion by a longer version; a clock at the former end moves to the new end."""
+        """Replace the original motion by `played`, a longer version. A clock at the former end moves to the new end."""
         shown = self.is_original  # otherwise the simulation of a cut is shown
         self._original = played
         if shown:
@@ -210,7 +210,7 @@ class Player:
             self.clock = self.clock.extended(self._duration())
 
     def grow(self, played: Played) -> None:
-        """Replace the simulation of a cut by a longer version; a clock at the former end continues."""
+        """Replace the simulation of a cut by `played`, a longer version. A clock at the former end continues."""
         waits = self.clock.time >= self.clock.duration
         self.played = played
         self.clock = Timeline(self._duration(), self.clock.time, self.clock.playing or waits)
@@ -220,7 +220,7 @@ class Player:
         return PlayerState(self.played, self.is_original, self.clock, self.following)
 
     def restore(self, kept: PlayerState) -> None:
-        """Return to a stored state; the original motion keeps its later extensions."""
+        """Return to the stored state `kept`. The original motion keeps its later extensions."""
         self.play(self._original if kept.original else kept.played)
         self.clock = self.clock.scrubbed(kept.clock.time)
         if kept.clock.playing:

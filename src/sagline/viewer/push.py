@@ -38,7 +38,7 @@ class Push(NamedTuple):
         return np.concatenate((self.force, np.cross(lever, self.force)))
 
     def wrench(self, state: Equilibrium, factor: Array | float = 1.0) -> Array:
-        """Wrench on the platform at an equilibrium, with the force multiplied by factors, shape (..., 6)."""
+        """Wrench (..., 6) on the platform at the equilibrium `state`, with the force multiplied by `factor`."""
         return np.asarray(state.wrench + np.multiply.outer(factor, self.load(state.one_robot, state.pose)))
 
 
@@ -81,7 +81,7 @@ class PushResponse:
         return np.asarray((self.loaded.pose.rotation * self.state.pose.rotation.inv()).as_rotvec())
 
     def scaled_pose(self, factor: float) -> Pose | None:
-        """Pose with the force, with its motion multiplied by a factor."""
+        """Pose with the force; the motion from the pose without the force is multiplied by a factor."""
         if self.loaded is None:
             return None
         rest, rotation = self.state.pose, Rotation.from_rotvec(factor * self.rotation) * self.state.pose.rotation
@@ -168,7 +168,7 @@ def _bracket(is_exceeded: Callable[[Array], Flags], largest: float) -> tuple[flo
 
 
 def _upper_bound(state: Equilibrium) -> float:
-    """A force that is larger than the cables of the robot can balance [N]."""
+    """Upper bound of the forces that the cables of the robot can balance [N]."""
     robot = state.one_robot
     weight = robot.mass * robot.gravity
     if np.isfinite(robot.tension_max).all():

@@ -79,7 +79,7 @@ def numbers_html(
 
 
 def legend(scale: TensionScale, robot: Robot, ends: str = "") -> str:
-    """Colors of the tensions, as a bar with round numbers below; `ends` names its ends, by default the limits."""
+    """Colors of the tensions, as a bar with round numbers below. `ends` names the bar's ends, by default the limits."""
     stops = np.linspace(0.0, 1.0, 12)
     values = scale.low * (scale.high / scale.low) ** stops
     colors = ",".join(
@@ -100,7 +100,7 @@ def legend(scale: TensionScale, robot: Robot, ends: str = "") -> str:
 
 
 def verdict_box(kind: str, head: str, text: str) -> str:
-    """A verdict in a box of a class: "good", "bad" or "quiet"."""
+    """A verdict in a box of the class `kind`: "good", "bad" or "quiet"."""
     return (
         f'<div class="sagline sagline-verdict {kind}"><h2>{head}</h2>'
         f'<div style="color:var(--sagline-text)">{text}</div></div>'
@@ -114,7 +114,7 @@ def definitions(rows: Iterable[tuple[str, str]], kind: str = "") -> str:
 
 
 def factor_slider(label: str, low: float, high: float, least: float, hint: str) -> str:
-    """HTML of a logarithmic slider of a factor with a field of its value; see browser/factors.js."""
+    """HTML of a logarithmic slider for a factor, and of a field for the factor's value; see browser/factors.js."""
     names = {least if mark == low else mark: log(mark / low) / log(high / low) for mark in sorted({low, 1.0, high})}
     marks = "".join(f'<span style="--at:{100.0 * place:.4g}%">{mark:g}</span>' for mark, place in names.items())
     return html_block(
@@ -183,7 +183,7 @@ def _ends(robot: Robot) -> str:
 
 
 def _nearest_limit(snapshot: Snapshot, unit: ForceUnit) -> str:
-    """Text of the tension nearest to its limit, with the limit and the distance; or of all tensions at their limits."""
+    """Text of the tension nearest to its limit, with limit and distance, or text of all tensions at their limits."""
     margin, robot = snapshot.margin, snapshot.robot
     reach = _ALONE * float(np.nanmax(np.where(np.isfinite(robot.tension_max), robot.tension_max, margin.max())))
     at = np.flatnonzero(margin <= reach)
@@ -258,7 +258,7 @@ def _listed(frequencies: Array | None) -> str:
 
 
 def _pressed(mode: int, frequency: float) -> str:
-    """A frequency [Hz]; if it has a mode, it is a button that animates the mode."""
+    """A frequency [Hz]. If the frequency has a mode, it is a button that animates the mode."""
     text = number_text(frequency, ".2f")
     if not frequency > 0.0:  # also excludes NaN
         return text

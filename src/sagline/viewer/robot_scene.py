@@ -65,7 +65,7 @@ class Nodes:
         )
 
     def arrows(self, name: str, ends: Array, color: Any, shaft: float, head: float, length: float) -> None:
-        """Draw arrows (k, 2, 3); radii of shaft and head, and length of the head [m]."""
+        """Draw arrows from `ends` (k, 2, 3); `shaft` and `head`: radii, `length`: length of the head [m]."""
         self.draw(
             name,
             self.scene.add_arrows,
@@ -108,7 +108,7 @@ class Nodes:
                 self._made[name].visible = False
 
     def keep_first(self, name: str, count: int) -> None:
-        """Remove the numbered nodes below a name, starting with a given number."""
+        """Keep the first `count` numbered nodes below `name`, and remove the others."""
         while f"{name}/{count}" in self._made:
             self.remove(f"{name}/{count}")
             count += 1
@@ -337,7 +337,7 @@ class RobotScene:
 
 
 def _move(frame: Any, pose: Pose, other: Pose | None, error_scale: float) -> None:
-    """Move a frame to another pose, with its distance scaled by a factor; hide it if the pose is unknown."""
+    """Move a frame to the pose `other`, with its distance from `pose` scaled; hide the frame if `other` is unknown."""
     frame.visible = other is not None and bool(np.isfinite(other.position).all())
     if frame.visible and other is not None:
         frame.position = scaled_position(pose, other, error_scale)
@@ -345,7 +345,7 @@ def _move(frame: Any, pose: Pose, other: Pose | None, error_scale: float) -> Non
 
 
 def _without_rounding(values: Array) -> Array:
-    """Values, in which 0 replaces a browser's rounding errors; these would tilt a level platform by 1e-48."""
+    """`values`, with 0 instead of a browser's rounding errors, which would tilt a level platform by 1e-48."""
     return np.where(np.abs(values) < ROUNDING, 0.0, values)
 
 
@@ -360,7 +360,7 @@ def cable_segments(drawn: Configuration, sag_scale: float) -> Array:
 
 
 def chord_segments(drawn: Configuration, sag_scale: float, apart: float) -> Array:
-    """Segments of the chords; zero length where the cable is closer to its chord than a distance [m]."""
+    """Segments of the chords, with zero length where the cable is closer to its chord than `apart` [m]."""
     free = drawn.courses(sag_scale)[:, -shapes.POINTS :]
     chords = shapes.straight(free[:, [0, -1]])
     return shapes.segments(chords, dashed=False, shown=np.linalg.norm(free - chords, axis=2) > apart)

@@ -86,7 +86,7 @@ def page_html(html: str, title: str) -> str:
 
 @contextmanager
 def _serving_our_page(title: str, access: Access) -> Iterator[None]:
-    """Context manager; a viser server that is created in it serves the changed page and checks requests."""
+    """Context manager. A viser server that is created inside serves the changed page and checks requests."""
 
     class PageServer(_STOCK):
         def __init__(self, **options: Any) -> None:
@@ -158,8 +158,8 @@ def start_server(
 
     Raises:
         InvalidValueError: If the port is in use or the address does not belong to this computer; viser itself would
-            take the next port or wait forever. Also if another argument is not allowed, or the installed
-            viser does not permit the check of requests.
+            take the next port or wait forever. Also if another argument is not allowed, or if the installed viser does
+            not permit the check of requests.
     """
     _check(host, port)
     access = Access(host, token=token, clients=clients, allow_host=allow_host)

@@ -66,7 +66,7 @@ class PlayedLog:
     unchanged = "A log keeps its robot and loads; drag the platform to change them."
 
     def __post_init__(self) -> None:
-        """Determine, for each cycle, the cycle whose position is shown instead if its own is unknown."""
+        """Determine, for each cycle with an unknown position, the cycle whose position is shown instead."""
         known = np.flatnonzero(np.isfinite(self.position[:, 0]))
         last = np.searchsorted(known, np.arange(len(self.time)), side="right") - 1
         rows = known[np.maximum(last, 0)] if known.size else np.full(len(self.time), -1)
@@ -83,7 +83,7 @@ class PlayedLog:
         return float(self.time[-1])
 
     def pose_at(self, index: int) -> Pose:
-        """Planned pose of a cycle; without a plan, its estimated pose or the last known one."""
+        """Planned pose of the cycle `index`. Without a plan, its estimated pose, or the last known pose."""
         if np.isfinite(self.planned[index]).all():
             return Pose.from_quaternion(self.planned[index], self.planned_quaternion[index])
         row = int(self.shown[index])
@@ -218,7 +218,7 @@ class LogFollower:
         return self._reader.log.robot
 
     def more(self) -> PlayedLog | None:
-        """Read new cycles; returns the whole log, or None if there are no new cycles."""
+        """Read new cycles. Returns the whole log, or None if there are no new cycles."""
         grown = self._reader.more()
         if self._truth is not None and self._truth.more():
             grown = True

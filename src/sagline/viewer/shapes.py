@@ -90,7 +90,7 @@ def straight(ends: Array) -> Array:
 
 
 def catenaries(ends: Array, cables: CableState, sag_scale: float) -> Array:
-    """Points along catenaries (m, POINTS, 3), with the sag below the chord scaled by a factor."""
+    """Points along catenaries (m, POINTS, 3), with the sag below the chord scaled by `sag_scale`."""
     run = ends[:, 1] - ends[:, 0]
     span = np.hypot(run[:, 0], run[:, 1])
     level = np.divide(run[:, :2], span[:, None], out=np.zeros((len(run), 2)), where=span[:, None] > 0.0)
@@ -114,7 +114,7 @@ def courses(robot: Robot, pose: Pose, state: Equilibrium | None, sag_scale: floa
 
 
 def resampled(points: Array, count: int) -> Array:
-    """Points (m, P, 3) interpolated at a number of equal steps, shape (m, count, 3)."""
+    """`points` (m, P, 3), interpolated at `count` equal steps, shape (m, count, 3)."""
     place = np.linspace(0.0, points.shape[1] - 1.0, count)
     first = np.minimum(place.astype(np.intp), points.shape[1] - 2)
     rest = (place - first)[:, None]
@@ -179,7 +179,7 @@ def round_below(length: float) -> float:
 
 
 def _beams(start: Array, end: Array, thick: float, dash: float) -> list[Solid]:
-    """A beam along an axis; or dashes and gaps of about a given length, with a dash at each end."""
+    """A beam from `start` to `end`, or dashes and gaps with lengths of about `dash`, with a dash at each end."""
     pieces = 2 * round(0.5 * float(np.linalg.norm(end - start)) / dash) + 1
     cuts = start + np.linspace(0.0, 1.0, pieces + 1)[:, None] * (end - start)
     return [cuboid(0.5 * (a + b), np.abs(b - a) + thick) for a, b in zip(cuts[:-1:2], cuts[1::2], strict=True)]
@@ -223,7 +223,7 @@ def pulley_rotations(robot: Robot, pose: Pose) -> Array:
 
 
 def rod(ends: Array, radius: float) -> Solid:
-    """A cylinder from one point to another, shape (2, 3)."""
+    """A cylinder between the two points `ends`, shape (2, 3)."""
     along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
     left = np.cross(along, [1.0, 0.0, 0.0] if abs(along[0]) < 0.9 else [0.0, 1.0, 0.0])
     left /= np.linalg.norm(left)
@@ -263,7 +263,7 @@ def drum(middle: Array, radius: float) -> Solid:
 
 
 def tube(points: Array, radius: float, sides: int = 6) -> Solid:
-    """A thin tube along a line of points (P, 3), open at its ends; repeated points are omitted."""
+    """A thin tube along a line of `points` (P, 3), open at its ends. Repeated points are omitted."""
     new = np.concatenate(([True], np.linalg.norm(np.diff(points, axis=0), axis=1) > 0.0))
     points = points[new] if new.sum() > 1 else points
     forward = np.gradient(points, axis=0)

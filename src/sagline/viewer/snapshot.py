@@ -146,7 +146,7 @@ class Snapshot:
 
     @property
     def margin(self) -> Array:
-        """Distance of each limited tension to its nearer limit [N], shape (m,); NaN without a solution."""
+        """Distance (m,) [N] from each limited tension to the nearer limit of its cable; NaN without a solution."""
         return self.tension if self.plan is None else cable_margins(self.plan.state)
 
     def nearer_limit(self, cable: int) -> str:
@@ -194,7 +194,7 @@ def snapshot_at(
 
 
 def _remembered(previous: Plan | None, tension: TensionMethod) -> Array | None:
-    """Previous tensions of a method, in its variable [N], shape (m,); None without them."""
+    """Previous tensions (m,) [N] in the variable of the method `tension`; None if there are no previous tensions."""
     if previous is None or not depends_on_history(tension) or not previous.feasible or previous.at_border:
         return None
     return shared_tension(previous.state, tension.variable)

@@ -60,7 +60,7 @@ class TensionScale:
 
     @classmethod
     def of_pose(cls, tension: Array, otherwise: TensionScale) -> TensionScale:
-        """The scale between the smallest and largest tension of a pose (m,); `otherwise`, if no tension is positive."""
+        """The scale between the smallest and largest tension of a pose (m,). If no tension is positive, `otherwise`."""
         known = tension[np.isfinite(tension) & (tension > 0.0)]
         if not known.size:
             return otherwise
@@ -123,7 +123,7 @@ class ForceUnit(NamedTuple):
 
 
 def number_text(value: float, form: str) -> str:
-    """Text of a number, or a dash if it is not finite; a number that rounds to zero does not have a sign."""
+    """Text of `value`, or a dash if it is not finite. A number that is rounded to zero does not have a sign."""
     if not isfinite(value):
         return _NONE
     text = f"{value:{form}}"

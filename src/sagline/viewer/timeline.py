@@ -92,7 +92,7 @@ def cable_names(robot: Robot) -> tuple[str, ...]:
 
 
 def chart_limits(robot: Robot, newtons: float, *, at: str) -> tuple[ChartLimit, ...]:
-    """The tension limits; if they differ between cables, the tightest ones."""
+    """The tension limits. If cables have different limits, the tightest limits."""
     low, high = float(robot.tension_min.max()), float(robot.tension_max.min())
     other = "" if at == robot.tension_limits_of else f", of {_ENDS[robot.tension_limits_of]}"
     lower = (ChartLimit(low / newtons, f"lowest allowed{other}", upper=False),) if low > 0.0 else ()
@@ -104,7 +104,7 @@ MOST_SPANS: Final = 400  # largest number of spans on a timeline; close ones are
 
 
 def spans_of(time: Array, wrong: NDArray[np.bool_], why: Callable[[slice], str]) -> tuple[Span, ...]:
-    """Spans of consecutive flagged samples; a sample lasts until the next sample."""
+    """Spans of consecutive samples with the flag `wrong`. A sample lasts until the next sample."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], wrong, [False])).astype(np.int8))).reshape(-1, 2)
     if not edges.size:
         return ()
@@ -179,7 +179,7 @@ class _Columns(NamedTuple):
 
 
 def columns(time: Array, values: Array, most: int = MOST_COLUMNS) -> _Columns:
-    """Columns with equal numbers of samples (N,) with values (N, k), at most `most`."""
+    """At most `most` columns with equal numbers of samples; the samples have `time` (N,) and `values` (N, k)."""
     if time.size <= most:
         return _Columns(time, values, values)
     starts = (np.arange(most) * time.size) // most
@@ -243,7 +243,7 @@ def _track_message(
 
 
 def _most_important(track: Track) -> list[Any]:
-    """Marks of a track; if there are too many, the faults and the last of the other marks."""
+    """Marks of a track. If there are too many marks, the faults and the last of the other marks."""
     bad = [mark for mark in track.marks if mark.bad][-MOST_MARKS:]
     rest = [mark for mark in track.marks if not mark.bad]
     return sorted(bad + rest[len(rest) - (MOST_MARKS - len(bad)) :] if len(track.marks) > MOST_MARKS else track.marks)

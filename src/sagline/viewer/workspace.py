@@ -48,7 +48,7 @@ class Patch(NamedTuple):
 
 
 def draw_patches(nodes: Nodes, name: str, patches: list[Patch], side: str = "double") -> None:
-    """Draw patches below a name instead of the previous ones; `atomic` changes corners and faces together."""
+    """Draw `patches` below `name`, instead of the previous patches."""
     for k, patch in enumerate(patches):
         nodes.draw(
             f"{name}/{k}",
@@ -144,7 +144,7 @@ class Hull:
 
 
 def region_in(query: WorkspaceQuery, rough: bool) -> Region:
-    """The region to search, with as many cells as a cube of `CELLS` along each edge; rough: an eighth as many."""
+    """The region to search, with as many cells as a cube of `CELLS` along each edge; `rough`: half of it per edge."""
     box = region_of(query.robot, None, CELLS)
     cells = max(_cells_of(box.high - box.low)) if box.flat is None else MOST_CELLS
     return region_of(query.robot, None, cells // ROUGH if rough else cells)
@@ -171,7 +171,7 @@ def region_hull(query: WorkspaceQuery, rough: bool, progress: Callable[[int, int
 
 
 def _around(found: Outline, region: Region) -> Region | None:
-    """The box of a region plus one cell, if the region fills only a small part of the searched box; else None."""
+    """The box of `found` plus one cell, if `found` fills only a small part of the searched `region`; otherwise None."""
     if not len(found.surface.faces) or region.flat is not None:
         return None
     cell = found.grid.step
@@ -206,7 +206,7 @@ def _hull_text(found: Outline, query: WorkspaceQuery, region: Region) -> str:
 
 
 def _empty_text(found: Outline, query: WorkspaceQuery, region: Region, rough: bool) -> str:
-    """HTML for an empty region, with the best position; for a rough search, with the remark that it continues."""
+    """HTML for an empty region, with the best position. With `rough`, a remark states that the search continues."""
     if rough:
         return "<b>Region</b> none found on the coarse grid"
     empty = f"<b>Region</b> empty, {escape(str(query.wrenches))}{query.without}"
@@ -216,7 +216,7 @@ def _empty_text(found: Outline, query: WorkspaceQuery, region: Region, rough: bo
 
 
 def _majority(cables: Indices) -> Indices:
-    """The cable of most corners of each face; the first one if all three differ."""
+    """The cable of most corners of each face. If all three cables differ, the first of them."""
     return np.where(cables[:, 1] == cables[:, 2], cables[:, 1], cables[:, 0])
 
 
@@ -227,7 +227,7 @@ _OPACITIES: Final = (0.6, 0.35, 0.15)  # opacity in each ring; two patches lie b
 
 
 def near_patches(hull: Hull, position: Array, reach: float) -> list[Patch]:
-    """Patches of a wall within a distance, in the colors of the limiting cables; nearer patches are more opaque.
+    """Patches of the wall within `reach`, in the colors of the limiting cables. Nearer patches are more opaque.
 
     The faces of the robot's box are not a wall.
     """
@@ -254,7 +254,7 @@ def margin_text(margin: float, cable: int, unit: ForceUnit) -> str:
 
 
 def _on_both_sides(corners: Array, distance: float) -> Array:
-    """Each triangle (F, 3, 3) twice, displaced by a distance [m] to both sides."""
+    """Each triangle of `corners` (F, 3, 3) twice, displaced by `distance` [m] to both sides."""
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     away = distance * (normal / np.maximum(length, np.finfo(np.float64).tiny))[:, None]
@@ -302,7 +302,7 @@ def free_directions(robot: Robot, flat: int | None) -> Indices:
 
 
 def free_travel(find: Find, start: Array, which: Indices, low: Array, high: Array) -> FreeTravel:
-    """Distances along directions to the sign change of the margin, by a scan and bisection."""
+    """Distances from `start` along the directions `which` to the sign change of the margin, by a scan and bisection."""
     ways = DIRECTIONS[which]
     with np.errstate(divide="ignore", invalid="ignore"):
         distances = np.where(ways > 0.0, (high - start) / ways, np.where(ways < 0.0, (low - start) / ways, np.inf))

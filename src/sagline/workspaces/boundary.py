@@ -40,15 +40,15 @@ class Boundary(Result):
     """Result of `boundary`.
 
     Attributes:
-        surface: The boundary, closed along the faces of the box. All other vertices are on the boundary, with an error
-            of at most 1e-10 of a cell.
+        surface: The boundary, closed along the faces of the box. Vertices that are not on a face of the box are on the
+            boundary, with an error of at most 1e-10 of a cell.
         volume: Volume of the set within the box [m^3]. It is the volume that the surface encloses, plus the volume
             between the flat triangles and the curved boundary.
         volume_error: Error bound of the volume [m^3]. The bound neglects parts and gaps that are thinner than two cells
             of the finest grid.
         grid: Values of the function at the nodes of the grid before refinement.
         components: Components of the set. Two parts are one component if a walk between them was found.
-        open_faces: Faces of the box that the set reaches, for example "x low"; the set may continue beyond them.
+        open_faces: Faces of the box that the set reaches, for example "x low". The set may continue beyond these faces.
         evaluations: Number of positions at which the function was evaluated.
     """
 
@@ -80,13 +80,13 @@ def boundary(
     cells: int | tuple[int, int, int] = 32,
     refine: bool | int = True,
 ) -> Boundary:
-    """Boundary, within a box [m], of the set where a function of positions (N, 3) [m] is nonnegative.
+    """Boundary, in a box [m], of the set in which `level`, a function of positions (N, 3) [m], is nonnegative.
 
-    The function may have jumps and infinite values, but not NaN. It is evaluated at the nodes of a grid; `cells` is the
+    `level` may have jumps and infinite values, but not NaN. It is evaluated at the nodes of a grid. `cells` is the
     number of cells along the longest side, or along each axis. Cells that the boundary crosses are then halved `refine`
     times. The method of marching cubes gives a closed net of triangles from the signs at the nodes. The vertices of the
-    net are on the edges of the grid. The distances of the triangles' centers from the boundary give the volume between
-    net and boundary, and the error bound.
+    net are on the edges of the grid. The volume between net and boundary, and the error bound, are computed from the
+    distances of the triangles' centers to the boundary.
     """
     corners = exactly(low, "low", "m", (3,)), exactly(high, "high", "m", (3,))
     for name, a, b in zip("xyz", *corners, strict=True):
@@ -193,7 +193,7 @@ FLAT: Final = 1e-6  # distances that are smaller, relative to the reach of the s
 
 
 def _bulge_volumes(level: Level, vertices: Array, faces: Indices, slope: Array, grid: Grid) -> tuple[Array, Array]:
-    """Volume between each triangle and the boundary, (F,) [m^3], negative inward, and its error bar, (F,) [m^3]."""
+    """Volumes between triangles and boundary [m^3], negative inward, and error bars of these volumes, both (F,)."""
     normals = normals_of(vertices, faces)
     area = np.linalg.norm(normals, axis=1)
     normals = normals / np.maximum(area, np.finfo(np.float64).tiny)[:, None]
@@ -209,7 +209,7 @@ def _bulge_volumes(level: Level, vertices: Array, faces: Indices, slope: Array, 
 def _distances_to_boundary(
     level: Level, points: Array, normals: Array, slope: Array, outward: Array, inward: Array
 ) -> Array:
-    """Distances (N,) [m] of points (N, 3) from the boundary along normals, to a few percent; NaN beyond the reach."""
+    """Distances (N,) [m] from `points` (N, 3) to the boundary along `normals`, to a few percent; NaN out of reach."""
     at_points = level_values(level, points)
     reach = np.where(at_points >= 0.0, outward, inward)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -226,7 +226,7 @@ def _distances_to_boundary(
 
 
 def _between(level: Level, ends: Brackets) -> Array:
-    """Position of the sign change in a bracket, by interpolation; by iteration if an end has an infinite value."""
+    """Position of the sign change between `ends`, by interpolation, or by iteration if an end value is infinite."""
     inner, outer, at_inner, at_outer = (part[ends.k] for part in ends[:4])
     with np.errstate(invalid="ignore"):
         share = at_inner / (at_inner - at_outer)
@@ -273,7 +273,7 @@ class Outline(Result):
 
 
 def outline(levels: Levels, region: Region) -> Outline:
-    """Boundary of the set of positions with a nonnegative level, from the nodes of the region's grid."""
+    """Boundary of the set in which `levels` is nonnegative, computed from the nodes of the grid of `region`."""
     grid = sample_grid(levels, region.low, region.high, region.cells)
     net, vertices, _ = _place_vertices(triangulate(grid.inside), grid, levels, precision=PRECISE, narrow=PRECISE)
     surface = Surface(locked(vertices), locked(net.faces))

@@ -119,7 +119,7 @@ class PositionError(Criterion):
         return f"{super(PositionError, self).__str__()} with {type(self.model).__name__}"
 
     def judge(self, given: Given) -> Judged:
-        """Limit minus position error [m]; NaN if the model has no lengths, or these give no equilibrium."""
+        """Limit minus position error [m]; NaN if the model has no lengths, or if its lengths give no equilibrium."""
         found = confirm(given.planned(self.model))
         error = np.where(found.held, np.linalg.norm(found.position_error, axis=1), np.nan)
         return Judged(given.spread(self.limit - error))
@@ -216,7 +216,7 @@ class Clearance(Criterion):
         return Judged(given.spread(value - self.limit), given.spread_cables(cables[pair]))
 
     def excluded(self, robot: Robot, pose: Pose, half: Array) -> Flags:
-        """True for boxes of positions if an obstacle is nearer than the limit at every position of the box."""
+        """True for each box in which, at every position, an obstacle is nearer than the limit."""
         return np.asarray(_clearance_rows(robot, self.obstacles).of_platform(pose, half) < self.limit)
 
 
@@ -224,8 +224,8 @@ class Clearance(Criterion):
 class InFrame(Criterion):
     """The platform's box and anchors keep a distance from the faces of the frame.
 
-    The frame is the robot's frame_size; a robot without frame_size has the box around its anchors and the floor. For a
-    planar robot, only distances along its plane count.
+    The frame is the box of the robot's frame_size. Without frame_size, it is the box around its anchors and the floor.
+    For a planar robot, only distances along its plane count.
 
     Attributes:
         limit: Smallest allowed distance from the faces [m], >= 0.
@@ -258,7 +258,7 @@ class InFrame(Criterion):
 
 @lru_cache(maxsize=4)
 def _clearance_rows(robot: Robot, obstacles: Obstacle | Sequence[Obstacle]) -> ClearanceRows:
-    """Function that measures the clearance; its data are prepared once for all poses of the robot."""
+    """Function that measures clearances of `robot` and `obstacles`. Its data are prepared once for all poses."""
     return ClearanceRows(robot, check_obstacles(obstacles, robot), precision=_PRECISION)
 
 
@@ -270,7 +270,7 @@ def _cable_of(pair: tuple[str, str]) -> int:
 def _least_stiffness(freedom: Array, matrix: Array) -> Array:
     """Stiffness against a force on the center of mass, in the softest direction [N/m], (N,); 0 if unstable.
 
-    Arguments: free motions (n, 6), and stiffness matrices of the platform in world axes (N, 6, 6), which may be NaN.
+    Arguments: `freedom`, free motions (n, 6); `matrix`, stiffnesses of the platform in world axes (N, 6, 6), or NaN.
     """
     lost = np.asarray(np.isnan(matrix).any(axis=(1, 2)))
     own = freedom @ np.where(lost[:, None, None], np.eye(6), matrix) @ freedom.T

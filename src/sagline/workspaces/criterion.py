@@ -145,7 +145,7 @@ class Criterion:
         raise NotImplementedError
 
     def scale(self, robot: Robot) -> float:
-        """Scale that makes the values of different criteria comparable by division; by default the limit.
+        """Scale by which values are divided to make different criteria comparable. The default is the limit.
 
         Args:
             robot: The robot.
@@ -169,7 +169,7 @@ class Criterion:
         """
 
     def excluded(self, robot: Robot, pose: Pose, half: Array) -> Flags:
-        """Proofs for boxes of positions: at no position of the box do any tensions meet the criterion.
+        """Proofs that no tensions meet the criterion at any position of a box.
 
         Args:
             robot: The robot.
@@ -204,7 +204,7 @@ class Criterion:
 
 
 def check_continuous(method: TensionMethod, criteria: Sequence[Criterion]) -> None:
-    """Reject a criterion on tensions if the method's tensions can jump, or depend on the previous pose."""
+    """Reject `criteria` on tensions if tensions of `method` can jump, or if they depend on the previous pose."""
     jumps = not method.continuous or (isinstance(method, PolygonWalk) and method.optimum == "1-norm")
     first = next((one for one in criteria if one.needs_tensions), None)
     if first is None or not (jumps or isinstance(method, Closest)):

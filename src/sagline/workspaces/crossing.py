@@ -41,7 +41,7 @@ class Brackets(NamedTuple):
 def brackets(
     level: Level, points: Array, outward: Array, at_points: Array, step: Array, outer_limit: Array, inner_limit: Array
 ) -> Brackets:
-    """Search along rays from points (N, 3) [m]: outward from inside points, inward from others; each step triples."""
+    """Search along rays from `points` (N, 3) [m], outward from inside points, otherwise inward. Each step triples."""
     is_inside = at_points >= 0.0
     limit = np.where(is_inside, outer_limit, inner_limit)
     away = np.where(is_inside, 1.0, -1.0)[:, None] * outward
@@ -89,7 +89,7 @@ def crossings_of(
     precision: float = 1e-10,
     narrow: float = 1e-12,
 ) -> Array:
-    """Share of each of V lines that is inside, (V,), by regula falsi; an end that does not move has a reduced weight.
+    """Inside shares (V,) of V lines, by regula falsi. The weight of an end is reduced while the end does not move.
 
     `values` has two arguments, indices of lines and one position on each line, and returns the function of each line. A
     bracket is bisected if an end value is infinite. It is bisected several times if regula falsi is slower than
@@ -135,11 +135,11 @@ class _BisectionSchedule:
         self._next = np.ones(count, dtype=np.int64)
 
     def due(self, k: Indices) -> NDArray[np.bool_]:
-        """True for brackets k if the next step is a bisection."""
+        """True for each bracket of `k` whose next step is a bisection."""
         return np.asarray(self._due[k] > 0)
 
     def update(self, k: Indices, halved: NDArray[np.bool_], width: Array) -> None:
-        """Update the counters of brackets k after a step."""
+        """Update the counters of the brackets `k` after a step."""
         self._due[k] = np.maximum(self._due[k] - halved, 0)
         self._steps[k] = np.where(halved, 0, self._steps[k] + 1)
         over = self._steps[k] == TRIAL
@@ -151,7 +151,7 @@ class _BisectionSchedule:
 
 
 def distance_to_box(points: Array, directions: Array, low: Array, high: Array) -> Array:
-    """Distances (N,) [m] of the box surface from positions (3,) or (N, 3) in the box, along unit directions (N, 3)."""
+    """Distances (N,) [m] from `points` (3,) or (N, 3) in a box to its surface, along unit `directions` (N, 3)."""
     walls = np.where(directions > 0.0, high - points, low - points)
     with np.errstate(divide="ignore", invalid="ignore"):
         lengths: Array = np.where(directions != 0.0, walls / directions, np.inf).min(axis=1)

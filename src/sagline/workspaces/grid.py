@@ -82,7 +82,7 @@ def level_values(level: Level, positions: Array) -> Array:
 
 
 def sample_grid(level: Level, low: Array, high: Array, cells: tuple[int, int, int]) -> Grid:
-    """Values of a function at all nodes of a grid of cells in a box; low, high: corners of the box [m], shape (3,)."""
+    """Values of `level` at all nodes of a grid of `cells` in a box; `low`, `high`: corners of the box (3,) [m]."""
     axes = [np.linspace(a, b, n + 1) for a, b, n in zip(low, high, cells, strict=True)]
     positions = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     shape = tuple(n + 1 for n in cells)
@@ -90,7 +90,7 @@ def sample_grid(level: Level, low: Array, high: Array, cells: tuple[int, int, in
 
 
 def refine_grid(grid: Grid, level: Level) -> Grid:
-    """Grid with half the step; it is evaluated only in cells that the boundary crosses on the old or the new grid."""
+    """Grid with half the step of `grid`, evaluated only in cells that the boundary crosses on the old or new grid."""
     axes = [np.interp(np.arange(2 * len(a) - 1) / 2.0, np.arange(len(a)), a) for a in grid.axes]
     nearest = np.ix_(*(np.arange(len(axis)) // 2 for axis in axes))
     fine = _grid(axes, grid.values[nearest], np.zeros([len(axis) for axis in axes], dtype=np.bool_), lock=False)
@@ -116,7 +116,7 @@ def _crossed_cells(inside: Mask, nodes: tuple[tuple[int, ...], ...] = _CELL, str
 
 
 def _views(nodes: Mask, offsets: tuple[tuple[int, ...], ...], stride: int) -> list[Mask]:
-    """For each of a cell's eight nodes, a view of a mask of nodes that has the value at this node for all cells."""
+    """Eight views of the mask `nodes`, one for each corner of a cell: the values at this corner of all cells."""
     count = [(n - 1) // stride for n in nodes.shape]
     return [
         nodes[tuple(slice(a, a + stride * (n - 1) + 1, stride) for a, n in zip(offset, count, strict=True))]
@@ -169,7 +169,7 @@ def triangulate(inside: Mask) -> Net:
 
 
 def merge_vertices(inner: Indices, outer: Indices, faces: Indices, shape: tuple[int, ...]) -> Net:
-    """Net with at most one vertex per edge or node of the grid; triangles that become degenerate are removed."""
+    """Net in which an edge or node of the grid has at most one vertex. Degenerate triangles are removed."""
     node = np.ravel_multi_index(tuple(np.minimum(inner, outer).T), shape)
     direction = np.abs(outer - inner) @ np.array([1, 2, 3])
     _, first, place = np.unique(4 * node.astype(np.int64) + direction, return_index=True, return_inverse=True)

@@ -111,7 +111,7 @@ class Levels:
         return flat
 
     def margins_of(self, wrenches: WrenchSet, positions: Array, rotation: Indices) -> Array:
-        """Margins (N,) [N] of another wrench set at positions (N, 3) [m]; `rotation`: index of the rotation, (N,)."""
+        """Margins (N,) [N] of `wrenches` at `positions` (N, 3) [m]; `rotation`: indices of the rotations, (N,)."""
         rows = np.hstack((self.in_plane(positions), self.orientations.quaternion[rotation]))
         return MarginRows(self.robot, wrenches, self.model, self.moment_arm).rows(rows).value
 
@@ -147,7 +147,7 @@ class Levels:
         return Details(level, margin, criterion, cable, np.full(len(rows), rotation, dtype=np.int64), uncertainty)
 
     def _uncertainty(self, bracket: Bracket) -> Array:
-        """Distance from the reserve to the farther margin bound, per scale; 0 if the reserve is beyond both bounds."""
+        """Distance from the reserve to the farther margin bound, divided by the scale; 0 outside `bracket`."""
         reserve = self.criteria[0].limit if isinstance(self.criteria[0], LeastMargin) else 0.0
         unsure = (bracket.low < reserve) & (reserve <= bracket.high)
         if reserve == 0.0:

@@ -141,7 +141,7 @@ def margin(
 ) -> Margin:
     """Signed margin of a set of loads at each pose, with a bracket for the cables' sag.
 
-    Poses without a tension distribution have a margin, too. The bracket from `low` to `high` is proved for the sag
+    A pose without a tension distribution also has a margin. The bracket from `low` to `high` is proved for the sag
     forces of all tensions. If low >= 0, every load of the set can be balanced within the limits. If high < 0, at least
     one load cannot be balanced. If zero is within the bracket, `inverse` can decide on a single load. The admissible
     tensions are the same as in `inverse`: a sagging cable is at most fifteen times as long as its chord, and a cable
@@ -153,7 +153,7 @@ def margin(
         wrenches: The set of loads; None for the weight alone.
         model: Cable model; with `Straight()` both ends of the bracket are equal to the value.
         moment_arm: Lever arm [m], >= 0; a moment counts as a force at this arm. None: the mean distance of the platform
-            anchors from the center of mass. 0: only additional forces count, as in `capacity_margin`; then the value is
+            anchors from the center of mass. 0: only additional forces count, as in `capacity_margin`. The value is then
             -infinite if the moments alone are infeasible.
         progress: Function that is called from time to time with the number of finished poses and of all poses.
 
@@ -161,8 +161,8 @@ def margin(
         Margin.
 
     Raises:
-        InvalidValueError: If an argument is of the wrong kind, the robot has fewer cables than degrees of freedom, or
-            its motion pattern does not allow the motion from the first pose to another pose.
+        InvalidValueError: If an argument is of the wrong kind. If the robot has fewer cables than degrees of freedom.
+            If its motion pattern does not allow the motion from the first pose to another pose.
 
     Examples:
         >>> import sagline as sl

@@ -51,7 +51,7 @@ class MarginRows:
     """Margins of pose rows, for one robot or for robots with the same motion pattern, gravity and number of cables.
 
     All pose-independent data are prepared once. A call of `rows` then takes a few microseconds, plus a few microseconds
-    per pose. Several threads may call it at the same time.
+    per pose. Several threads may call `rows` at the same time.
     """
 
     __slots__ = ("_given", "cable_count", "robot_count")
@@ -66,7 +66,7 @@ class MarginRows:
     ) -> None:
         """Prepare one robot or R robots; `moment_arm` [m] has the meaning that it has in `margin`.
 
-        If `cables` is given, the R robots are copies of one robot with these tables of cables (R, m, CABLE_COLUMNS).
+        If `cables` (R, m, CABLE_COLUMNS) is given, the R robots are copies of `robot` with these tables of cables.
         """
         robots = together(robot)
         shared = first_of(robots)
@@ -104,7 +104,7 @@ class MarginRows:
         return moved
 
     def rows(self, poses: NDArray[np.float64], progress: Progress | None = None) -> Bracket:
-        """Margins at unchecked pose rows (N, 7), N/R rows per robot; the status of a row with NaN is NO_CHORD."""
+        """Margins at the unchecked rows `poses` (N, 7), N/R rows per robot. A row with NaN has the status NO_CHORD."""
         rows = np.ascontiguousarray(poses, dtype=np.float64).view()
         count = len(rows)
         if count % self.robot_count:
@@ -133,7 +133,7 @@ class MarginRows:
 
 
 def mean_arms(table: Array, bodies: Array) -> Array:
-    """Mean distance of the platform anchors from the center of mass [m], (R,), from cable and body tables."""
+    """Mean distance (R,) [m] between platform anchors and center of mass; `table`: cables, `bodies`: bodies."""
     anchors = table[:, :, tables.PLATFORM_X : tables.PLATFORM_Z + 1]
     centers = bodies[:, None, tables.CENTER_X : tables.CENTER_Z + 1]
     return np.asarray(np.linalg.norm(anchors - centers, axis=-1).mean(axis=-1))

@@ -51,7 +51,7 @@ class Nearest(Result):
 
 
 def nearest_to(levels: Levels, grid: Grid, low: Array, high: Array) -> Nearest:
-    """Pose with the largest level, by simplex searches from the best nodes of a grid; low, high: box corners [m]."""
+    """Pose with the largest level, by simplex searches from the best nodes of `grid`; `low`, `high`: corners [m]."""
     nodes = np.stack(np.unravel_index(np.arange(grid.values.size), grid.values.shape), axis=1)
     positions = np.clip(grid.positions(nodes), low, high)
     values = _merit(levels, positions)
@@ -70,7 +70,7 @@ def nearest_to(levels: Levels, grid: Grid, low: Array, high: Array) -> Nearest:
 
 
 def _merit(levels: Levels, positions: Array) -> Array:
-    """Finite merit of positions: the level, or for infeasible loads a value from their feasible fraction.
+    """Finite merit of `positions`: the level, or, for infeasible loads, a value computed from the feasible fraction.
 
     Margins alone would lead to singular poses, where all margins have a small absolute value.
     """
@@ -85,12 +85,12 @@ def _merit(levels: Levels, positions: Array) -> Array:
 
 
 def _share(bare: Array, margin: Array) -> Array:
-    """Lower bound of the feasible fraction of the load, because margins are concave in the load."""
+    """Lower bound of the feasible fraction of the load. It is a bound because margins are concave in the load."""
     return np.asarray(bare / (bare - margin))
 
 
 def _simplex_search(levels: Levels, start: Array, low: Array, high: Array) -> tuple[Array, float]:
-    """Position of a local maximum of the merit, by a simplex search, and its merit."""
+    """Position of a local maximum of the merit, found by a simplex search from `start`, and the merit there."""
     from scipy.optimize import minimize  # the import takes a quarter of a second
 
     free = np.flatnonzero(high > low)

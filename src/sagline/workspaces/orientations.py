@@ -155,7 +155,7 @@ def _level() -> Orientations:
 
 
 def check_tilt(robot: Robot, angle: float, item: str) -> None:
-    """Reject a tilt by an angle [rad] if the platform's motion pattern has no rotation; `item` is for messages."""
+    """Reject a tilt by `angle` [rad] if the platform of `robot` cannot rotate; `item` names the tilt in messages."""
     if angle > 0.0 and robot.motion_pattern not in ROTATING:
         value, step = f"{np.degrees(angle):.4g} deg", "Leave out the tilt."
         allowed = f"none, because a platform with motion_pattern {robot.motion_pattern} cannot rotate"
@@ -163,7 +163,7 @@ def check_tilt(robot: Robot, angle: float, item: str) -> None:
 
 
 def orientations_of(robot: Robot, given: Any, tilt: float) -> Orientations:
-    """Orientations for a robot, checked: from the argument of `workspace`, or from the tilt of the box [rad]."""
+    """Checked orientations for `robot`: `given`, the argument of `workspace`, or all rotations up to `tilt` [rad]."""
     if given is not None and tilt > 0.0:
         step = "Give the tilt of the box, or orientations."
         value = f"given with a box of tilt {np.degrees(tilt):.4g} deg"
@@ -180,7 +180,7 @@ def orientations_of(robot: Robot, given: Any, tilt: float) -> Orientations:
 
 
 def _check_turns(robot: Robot, given: Orientations) -> None:
-    """Reject rotations that the robot's motion pattern does not allow."""
+    """Reject rotations of `given` that the motion pattern of `robot` does not allow."""
     turns = forbidden_turn(robot, Pose.from_quaternion(np.zeros(3), given.quaternion), LEVEL)
     wrong = np.flatnonzero(np.linalg.norm(turns, axis=1) > ROUNDING)
     if wrong.size:

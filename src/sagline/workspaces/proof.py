@@ -79,7 +79,7 @@ class Prover:
         precision: tuple[float, float] = PRECISION,
         progress: Progress | None = None,
     ) -> None:
-        """Prepare the proofs for a robot without pulleys; `precise` is for tests."""
+        """Prepare the proofs for a robot without pulleys; `precision` is for tests."""
         limits = (LIMITS_OF[robot.tension_limits_of], np.nan)
         self._given = (
             (model.code, *model.parameters), limits, robot_terms(robot), _load_terms(wrenches, robot), precision,
@@ -93,8 +93,8 @@ class Prover:
     def verdicts(self, middle: Array, half: Array, rotations: Array | None = None, turns: Array | float = 0.0) -> Codes:
         """Verdicts (N,) of boxes of poses, block by block; OPEN after the deadline.
 
-        Arguments: centers (N, 3) and half edges (3,) of the boxes [m]; rotation vectors (N, 3), None for level; and the
-            largest angle between an orientation of the box and its rotation vector [rad], () or (N,).
+        Arguments: `middle` (N, 3) and `half` (3,), centers and half edges of the boxes [m]; `rotations` (N, 3), None
+            for level; `turns`, () or (N,), largest angle between an orientation of a box and its rotation vector [rad].
         """
         boxes = np.zeros((len(middle), BOX_COLUMNS))
         boxes[:, :3] = middle
@@ -123,7 +123,7 @@ class Prover:
 
 
 def _bisect(prover: Prover, box: PoseBox, smallest: float) -> Cells:
-    """Divide a box breadth-first until all cells are proved, they have the smallest edge [m], or the time is over."""
+    """Divide `box` breadth-first until all cells are proved or have the edge `smallest` [m], or the time is over."""
     half = 0.5 * (box.high - box.low)
     waiting = (box.low + half)[None]
     done: list[tuple[Array, Array, Codes]] = []
@@ -144,13 +144,13 @@ def _bisect(prover: Prover, box: PoseBox, smallest: float) -> Cells:
 
 
 def _decide(prover: Prover, middle: Array, half: Array, tilt: float) -> Codes:
-    """Verdicts of cells of positions, for level poses or for all tilts up to a largest tilt.
+    """Verdicts of cells of positions, for level poses or for all tilts up to `tilt`.
 
     Tilts are rotation vectors in a ball, which cubes cover. For a planar robot, tilts are rotations about the normal of
     its plane, and intervals cover their range. The angle between two rotations of a cube is at most the length of the
     difference of their rotation vectors. A cell is outside if one orientation is infeasible, and inside if all
-    orientations are feasible. Cubes are divided until they are smaller than the angle by which the directions of the
-    cables vary within a cell, which is the cell's size divided by the length of a chord.
+    orientations are feasible. Within a cell, the directions of the cables vary by an angle of about the cell's size
+    divided by the length of a chord. Cubes are divided until they are smaller than this angle.
     """
     if tilt == 0.0:
         return prover.verdicts(middle, half)
@@ -178,7 +178,7 @@ def _decide(prover: Prover, middle: Array, half: Array, tilt: float) -> Codes:
 
 
 def _smaller_cubes(cells: Indices, vectors: Array, edges: Array, parts: int, more: int) -> tuple[Indices, Array]:
-    """Parts of each cube that intersect the ball of tilts, and the cells they belong to."""
+    """Parts of each cube that intersect the ball of tilts, and the cells to which these parts belong."""
     count = more // parts
     steps = (2.0 * np.arange(count) + 1.0 - count) / more
     places = np.stack(np.meshgrid(*[steps] * len(edges), indexing="ij"), axis=-1).reshape(-1, len(edges))
@@ -197,7 +197,7 @@ def _children(half: Array) -> tuple[Array, Array]:
 
 
 def _load_terms(wrenches: WrenchSet, robot: Robot) -> tuple[Any, ...]:
-    """Wrench set in the form of the kernel: corners relative to their mean, inertial loads of a level platform."""
+    """`wrenches` in the form for the kernel: corners minus their mean, and inertial loads of a level platform."""
     center, corners, first = wrenches.center.copy(), wrenches.corners.copy(), 0
     for size in wrenches.sizes:
         mean = corners[first : first + size].mean(axis=0)
@@ -284,7 +284,7 @@ def prove(
     smallest: float | None = None,
     progress: Progress | None = None,
 ) -> Proof:
-    """Prove that every pose of a box is feasible, or that none is, or do so for each cell of the divided box.
+    """Prove that every pose of a box is feasible, or that no pose is feasible; or prove this for cells of the box.
 
     Without a tilt of the box, poses are level. With a tilt, the orientations of a position are all rotations by at most
     this angle about any axis (for a planar platform, about the normal of its plane). A position is inside if all its
@@ -298,7 +298,7 @@ def prove(
         wrenches: Set of loads; the cables must balance all of them. None for the weight alone.
         budget: Time limit for the proofs [s], > 0.
         model: Cable model.
-        smallest: Smallest length of a cell's longest edge [m]; a division that goes below it is not made. None: only
+        smallest: Smallest length of a cell's longest edge [m]. A division into smaller cells is not made. None: only
             the budget is a limit.
         progress: Function that is called from time to time with the number of finished cells and of known cells.
 
@@ -306,8 +306,8 @@ def prove(
         Proof.
 
     Raises:
-        InvalidValueError: If an argument is of the wrong kind, the robot has pulleys, or fewer cables than degrees of
-            freedom, or the box has a tilt but the platform cannot rotate.
+        InvalidValueError: If an argument is of the wrong kind. If the robot has pulleys, or fewer cables than degrees
+            of freedom. If the box has a tilt but the platform cannot rotate.
 
     Examples:
         >>> import sagline as sl

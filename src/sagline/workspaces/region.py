@@ -47,7 +47,7 @@ class Region(NamedTuple):
 
 
 def region_of(robot: Robot, box: PoseBox | None, cells: int) -> Region:
-    """Region of a box; the default box encloses the frame and the test box, and is flat for a planar robot."""
+    """Region of `box`. The default box encloses the frame and the test box; for a planar robot, it is flat."""
     plane = _plane_axis(robot)
     optional(box, PoseBox, "box")
     if box is None:
@@ -165,7 +165,7 @@ class Slice:
 
 
 def slice_of(find: Find, plane: Plane, low: Array, high: Array, shape: tuple[int, int]) -> Slice:
-    """Slice through a function of positions, such as `Levels.details`; low, high: corners of the box (3,) [m]."""
+    """Slice through `find`, a function of positions such as `Levels.details`; `low`, `high`: box corners (3,) [m]."""
     first, second = plane.axes
     across, up = np.linspace(low[first], high[first], shape[0]), np.linspace(low[second], high[second], shape[1])
     found = find(plane.positions(across, up))

@@ -45,7 +45,7 @@ def separated(components: Components, exclude: Exclude | None) -> Flags:
 
 
 class _Search:
-    """Searches that start at components; the largest number of boxes holds for all searches together."""
+    """Searches that start at components. The limit on the number of boxes counts the boxes of all searches."""
 
     def __init__(self, components: Components, exclude: Exclude) -> None:
         self._components, self._exclude = components, exclude
@@ -65,7 +65,7 @@ class _Search:
         )
 
     def _on_line(self, start: Indices, end: Indices, parts: int) -> Indices:
-        """Cells (K, 3) that the line between two nodes crosses."""
+        """Cells (K, 3) that the line between the nodes `start` and `end` crosses."""
         shares = np.linspace(0.0, 1.0, 2 + 2 * parts * int(np.abs(end - start).max()))[1:-1, None]
         cells = np.floor(parts * (start + shares * (end - start))).astype(np.int64)
         return np.asarray(np.minimum(cells, parts * (np.array(self._components.nodes.shape) - 1) - 1))
@@ -93,7 +93,7 @@ class _Search:
 
 
 def _beside(cells: Indices, asked: Flags) -> Indices:
-    """Neighbors (K, 3) of some cells across faces, edges and corners; cells of a mask are left out."""
+    """Neighbors (K, 3) of `cells` across faces, edges and corners, without the cells of the mask `asked`."""
     near = (cells[:, None] + _AROUND).reshape(-1, 3)
     near = near[((near >= 0) & (near < asked.shape)).all(axis=1)]
     near = near[~asked[tuple(near.T)]]

@@ -136,8 +136,8 @@ class Components(Result):
             position: Positions [m], shape (..., 3), each in the set.
 
         Returns:
-            Index of the component, shape (...,). It is that of the nearest node of the cell that is in a component, or
-            -1 if no node of the cell is in a component.
+            Index of the component, shape (...,). The nearest node of the cell that is in a component gives the index.
+            The index is -1 if no node of the cell is in a component.
 
         Raises:
             InvalidValueError: If the positions have another shape.
@@ -161,8 +161,8 @@ class Components(Result):
 def components_of(grid: Grid, nodes: NDArray[np.int32], inner: Indices, faces: Indices, volumes: Array) -> Components:
     """Components of a set; their separation is not proved.
 
-    Arguments: the grid; the labels of its nodes, 1 and higher in the set; the inner nodes and the triangles of the
-    set's net; and the volumes (F,) [m^3] of the triangles.
+    Arguments: `grid`; `nodes`, the labels of its nodes, 1 and higher in the set; `inner` and `faces`, the inner nodes
+        and the triangles of the set's net; `volumes` (F,) [m^3] of the triangles.
     """
     count = int(nodes.max())
     vertices = nodes[tuple(inner.T)] - 1

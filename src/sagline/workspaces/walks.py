@@ -59,7 +59,7 @@ def labels_of(level: Level, grid: Grid) -> tuple[Labels, int, tuple[Array, ...]]
 
 
 def _widest_path(values: Array, labels: Labels, start: Indices, ends: Indices) -> Indices | None:
-    """Path of nodes (K, 3) from `start` to another component whose lowest value is the highest; None if not found."""
+    """Path (K, 3) from node `start` to another component, with the highest possible lowest value; None if not found."""
     shape, others = values.shape, set(ends.tolist()) - {0}
     before: dict[_Node, _Node | None] = dict.fromkeys((x, y, z) for x, y, z in start.tolist())
     waiting: list[tuple[float, _Node]] = [(-np.inf, node) for node in before]
@@ -82,7 +82,7 @@ def _widest_path(values: Array, labels: Labels, start: Indices, ends: Indices) -
 
 
 def _walk(level: Level, path: Array, step: Array) -> Array | None:
-    """Positions (K, 3) in the set, close together, along a path whose ends are in the set; None if not found."""
+    """Closely spaced positions (K, 3) in the set along `path`. The ends of `path` are in the set. None if not found."""
     turn = np.random.default_rng(0)
     path, at = path.copy(), level_values(level, path).copy()
     if len(path) > 2:
@@ -106,7 +106,7 @@ def _walk(level: Level, path: Array, step: Array) -> Array | None:
 def _moved_inside(
     level: Level, points: Array, at_points: Array, along: Array, turn: np.random.Generator
 ) -> tuple[Array, Array]:
-    """Positions (N, 3) after moving across directions (N, 3) until the function is nonnegative, and its values (N,)."""
+    """`points` (N, 3), moved across the directions `along` (N, 3) until `level` is nonnegative; values (N,) there."""
     points, at_points = points.copy(), at_points.copy()
     size = np.linalg.norm(along, axis=1)
     unit = along / np.maximum(size, np.finfo(np.float64).tiny)[:, None]

@@ -58,7 +58,8 @@ def workspace(
     that are thinner than a cell can be missed; only `prove` is certain for a whole box.
 
     Args:
-        robot: The robot. The workspace of a planar robot is an area; its plane_normal must be along x, y or z.
+        robot: The robot. The workspace of a planar robot is an area. The plane_normal of this robot must be along x, y
+            or z.
         box: Box of positions; a box without extent along an axis is a part of a plane. Its tilt has the meaning of
             `Tilts`. None: the whole frame of the robot, or the box of its anchors down to the floor.
         wrenches: Loads on the platform in addition to its weight; None for the weight alone.
@@ -78,8 +79,9 @@ def workspace(
         Workspace.
 
     Raises:
-        InvalidValueError: If an argument is of the wrong kind, box and orientations both have a tilt, the platform
-            cannot rotate in this way, or a criterion needs continuous tensions that the method does not give.
+        InvalidValueError: If an argument is of the wrong kind. If `box` and `orientations` both have a tilt, or if the
+            platform cannot rotate in this way. If a criterion needs continuous tensions, but `tension` does not give
+            them.
         FileError: If a package of the extra "workspace" is not installed.
 
     Examples:

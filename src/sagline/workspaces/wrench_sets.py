@@ -26,7 +26,7 @@ def _wrench(wrench: Array) -> str:
 
 
 def _segments(segments: Array) -> str:
-    """Text of segments: the sizes of those along axes, and the number of all others."""
+    """Text of segments: the sizes of the segments along axes, and the number of the other segments."""
     along = np.count_nonzero(segments, axis=1) == 1
     sizes = np.abs(segments[along]).sum(axis=0)
     parts = [f"±{_each(own, unit)}" for own, unit in ((sizes[:3], "N"), (sizes[3:], "N m")) if own.any()]

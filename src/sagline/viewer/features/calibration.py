@@ -113,7 +113,7 @@ def _outliers_text(found: Calibration, chosen: int | None) -> str:
 
 
 def pose_residuals(found: Calibration, number: int) -> str:
-    """HTML of the residuals at a pose, beside the standard deviations of the sensors."""
+    """HTML of the residuals at the pose `number`, beside the standard deviations of the sensors."""
     m, row = found.robot.cable_count, found.residuals[number]
     spread = reading_deviations(found.sensors, found.robot.cable_count)
     lines = "".join(
@@ -224,7 +224,7 @@ class CalibrationFeature(Feature):
         self._field.value = "" if str(row) == self._typed else str(row)
 
     def _anchors(self, which: Anchors, *, relative: bool) -> Ellipsoids:
-        """Ellipsoids of the anchors of frame or platform; none if they were not calibrated."""
+        """Ellipsoids of the anchors `which`, of frame or platform; none if these anchors were not calibrated."""
         points = getattr(self._found.robot, which)
         covariance = anchor_covariance(self._found.parameters, self._found.covariance, which)
         if covariance is None:
@@ -234,7 +234,7 @@ class CalibrationFeature(Feature):
         return Ellipsoids.of(points, np.einsum("kikj->kij", covariance))
 
     def _displacement(self, which: Anchors, *, relative: bool) -> Array:
-        """Change of the anchors by the calibration [m], shape (m, 3)."""
+        """Change of the anchors `which` by the calibration [m], shape (m, 3)."""
         points = getattr(self._found.robot, which)
         moved = points - getattr(self._found.before, which)
         if relative:
@@ -274,7 +274,7 @@ class CalibrationFeature(Feature):
         self._nodes.lines(f"{parent}/moves", ends, TRUTH, TRACE_WIDTH)
 
     def _draw_balls(self, name: str, places: Array, turns: Array, scales: Array, colors: Any, **looks: Any) -> Any:
-        """Draw balls at positions (k, 3), with quaternions (k, 4) and scales (k,) or (k, 3)."""
+        """Draw balls at `places` (k, 3), with quaternions `turns` (k, 4) and `scales` (k,) or (k, 3)."""
         return self._nodes.draw(
             name,
             self._nodes.scene.add_batched_meshes_simple,

@@ -40,7 +40,7 @@ NEAR: Final = 14.0  # largest distance of a click, or of a finger, from a cable 
 
 
 def simulate_cut(state: Equilibrium, cable: int, cable_mass: str) -> Iterator[Simulation]:
-    """Simulation of the break of a cable with constant other lengths; each part continues the previous one."""
+    """Simulation of the break of `cable`; the other lengths are constant. Each part continues the previous part."""
     given = initial_conditions(state, None, None, DURATION)
     elements = ELEMENTS if cable_mass == "lumped" else 0
     losses = losses_after_break(given, elements)
@@ -50,7 +50,7 @@ def simulate_cut(state: Equilibrium, cable: int, cable_mass: str) -> Iterator[Si
 
 
 def peak_of(simulation: Simulation, cut: int) -> tuple[int, float, float]:
-    """Cable, tension at its frame end [N] and time after the cut [s] of the highest tension of the other cables."""
+    """Highest tension of the other cables: its cable, its value at the frame end [N] and its time after the cut [s]."""
     highest = simulation.tensions.max(axis=0) if simulation.largest_tension is None else simulation.largest_tension
     others = np.where(np.arange(len(highest)) == cut, -np.inf, highest)
     cable = int(np.argmax(others))
@@ -173,7 +173,7 @@ class CutFeature(Feature):
         return self._before
 
     def put(self, before: tuple[Before, ...]) -> None:
-        """Set the states before the cuts; the results of a simulation that is still running are ignored."""
+        """Set the states before the cuts. The results of a simulation that is still running are ignored."""
         self._requested += 1
         self._before, self._undo.visible, self._text.content = before, bool(before), HELP
 

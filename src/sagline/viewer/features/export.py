@@ -201,7 +201,7 @@ class ExportFeature(Feature):
         return None
 
     def put_on(self, played: Played | None) -> None:
-        """Show the controls of a film if a motion is played."""
+        """Show the controls for a film if a motion is played."""
         self._film.visible = played is not None
         self._film.label = f"Film of the {None if played is None else played.name}"
 
@@ -238,7 +238,7 @@ class ExportFeature(Feature):
         return "sagline" if view is None else file_stem(view.snapshot.robot.name)
 
     def _export(self, send: Send, event: viser.GuiEvent[Any]) -> None:
-        """Export for the client of an event; nothing if the client has disconnected or does not send a picture."""
+        """Export for the client of an event. No export if the client has disconnected or does not send a picture."""
         client = event.client
         if client is None:
             return

@@ -99,13 +99,13 @@ class KeyboardFeature(Feature):
 
 
 def nudged(pose: Pose, displacement: Array, turn: Array) -> Pose:
-    """A pose displaced by a vector [m], and rotated about its origin by a rotation vector in world axes [rad]."""
+    """`pose`, displaced by `displacement` [m] and rotated about its origin by the rotation vector `turn` [rad]."""
     rotation = Rotation.from_rotvec(turn) * pose.rotation if turn.any() else pose.rotation
     return Pose(pose.position + displacement, rotation)
 
 
 def _steps(value: Any) -> Array | None:
-    """Six valid numbers of steps from a message; None for invalid data."""
+    """Six numbers of steps from `value`, the data of a message; None for invalid data."""
     if not isinstance(value, list) or len(value) != 6:
         return None
     if not all(isinstance(each, int | float) and abs(each) <= MOST for each in value):  # also excludes NaN

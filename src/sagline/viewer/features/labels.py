@@ -56,7 +56,7 @@ def visible_labels(scene: viser.SceneApi) -> list[Label]:
 
 
 def covered(labels: list[Label], camera: Camera) -> frozenset[str]:
-    """Names of the labels that are not drawn, because a label of a higher rank or a nearer one covers them."""
+    """Names of the labels that are not drawn, because a label of higher rank or a nearer label covers them."""
     if not labels:
         return frozenset()
     places, depths = camera.project(np.stack([each.position for each in labels]))

@@ -129,7 +129,7 @@ class MissingFeature(Feature):
         return self._task.busy
 
     def follow(self, view: View) -> None:
-        """Explain an infeasible pose; remove the explanation at a feasible pose."""
+        """Explain an infeasible pose. At a feasible pose, remove the explanation."""
         snapshot = view.snapshot
         if not isinstance(snapshot, Snapshot) or snapshot.feasible:
             if self._key:
@@ -164,7 +164,7 @@ class MissingFeature(Feature):
         )
 
     def _explain(self) -> None:
-        """Write the explanation, and draw the nearest feasible pose (the previous one until it is computed)."""
+        """Write the explanation, and draw the nearest feasible pose; until it is computed, draw the previous one."""
         assert self._shown is not None
         (snapshot, view), nearest = self._shown, self._found[1] if self._found[0] else None
         searching = self._found[0] != self._key

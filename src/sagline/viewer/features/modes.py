@@ -101,7 +101,7 @@ TOPIC: Final = "mode"  # topic of the messages with the name of a clicked mode
 
 
 def range_of_modes(vibration: Vibration) -> str:
-    """First and last name of each kind in the list, "1 to 4 and massless 1 to 6"; "none" if it is empty."""
+    """First and last mode of each kind in the list, "1 to 4 and massless 1 to 6"; "none" if the list is empty."""
     counts = vibration.frequency.size, int(np.isfinite(vibration.massless_frequency).sum())
     there = [f"{word}1 to {count}" for word, count in zip(("", "massless "), counts, strict=True) if count]
     return " and ".join(there) or "none"

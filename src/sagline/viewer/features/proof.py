@@ -110,7 +110,7 @@ def force_polygon_figure(state: Equilibrium, missing: Array | None = None) -> st
 
 
 def _projection(axes: str, points: Array, forces: tuple[_PlatformForce, ...], scale: float) -> str:
-    """SVG of a force polygon on two axes; its k sides are the forces between corners (k + 1, 2) [N]."""
+    """SVG of a force polygon on two `axes`; its k sides are `forces` between the corners `points` (k + 1, 2) [N]."""
     low, high = points.min(axis=0), points.max(axis=0)
     height = scale * float(high[1] - low[1]) + 2.0 * BORDER
     left = 0.5 * (WIDTH - scale * float(high[0] - low[0]))
@@ -129,7 +129,7 @@ def _projection(axes: str, points: Array, forces: tuple[_PlatformForce, ...], sc
 
 
 def _arrow(force: _PlatformForce, start: Array, end: Array, labels: list[Label]) -> str:
-    """An arrow with its name, which avoids previous labels; the missing force is dashed."""
+    """An arrow with its name. The name avoids `labels`, the previous labels. The missing force is dashed."""
     way = end - start
     length = float(np.hypot(*way))
     if length < 0.5:
@@ -153,7 +153,7 @@ def _arrow(force: _PlatformForce, start: Array, end: Array, labels: list[Label])
 
 
 def _label(name: str, start: Array, way: Array, normal: Array, labels: list[Label]) -> Label:
-    """Label of an arrow: the first free position beside it, or the one with the least overlap."""
+    """Label of an arrow, at the first free position beside the arrow, or at the position with the least overlap."""
     across, up = 0.5 * LETTER[0] * len(name), 0.5 * LETTER[1]
     (x, y), (along, down) = start.tolist(), way.tolist()
     right, below = ((BESIDE + abs(normal[0]) * across + abs(normal[1]) * up) * normal).tolist()

@@ -38,7 +38,7 @@ LONGEST: Final = 0.6  # longest arrow of a typed force, as a share of the robot'
 
 
 def response_text(response: PushResponse, drawn_for: float | None) -> str:
-    """HTML of a response; `drawn_for` is the force of the drawn ellipsoid [N], None without an ellipsoid."""
+    """HTML of a response. `drawn_for` is the force of the drawn ellipsoid [N]; None without an ellipsoid."""
     unit = force_unit(response.state.one_robot)
     rows = [
         ("Force", unit.written(response.force)),
@@ -273,7 +273,7 @@ class PushFeature(Feature):
 
 
 def _drag(camera: Camera, at: tuple[float, float], start: Array) -> Array:
-    """Vector from a point in the world to the point of the picture at the same depth [m], shape (3,)."""
+    """Vector (3,) [m] from `start`, a point in the world, to the picture point `at` at the same depth."""
     depth = float((start - camera.place) @ camera.axes[:, 2])
     return np.asarray(camera.place + depth * camera.ray(at) - start)
 
@@ -289,7 +289,7 @@ def _ellipsoid(axes: Array) -> tuple[Array, tuple[float, float, float]]:
 
 
 def _numbers(value: Any, count: int, item: str, allowed: str) -> Array:
-    """Finite numbers of a field, whose value viser does not check."""
+    """`count` finite numbers from `value`, the value of a field, which viser does not check."""
     try:
         found = np.asarray(value, dtype=np.float64).reshape(-1)
     except (TypeError, ValueError, OverflowError):

@@ -178,7 +178,7 @@ class RegionFeature(Feature):
         self._hull_html.content, self._margin_html.content = refused(message), ""
 
     def _query_of(self, view: View) -> WorkspaceQuery:
-        """Robot, model, loads and broken cables of a view, with the push of the user."""
+        """Robot, model, loads and broken cables of a view; the loads include the force of the user."""
         snapshot, model, wrench = view.snapshot, view.settings.model, view.wrench
         broken: tuple[int, ...] = ()
         if isinstance(snapshot, InMotion):  # its cables are exact
@@ -204,7 +204,7 @@ class RegionFeature(Feature):
         return self._levels, self._region
 
     def _show_hull(self, patches: list[Patch], *, opened: bool = False) -> None:
-        """Draw the hull; if it is opened, without its front faces."""
+        """Draw the hull. With `opened`, its front faces are not drawn."""
         with self._server.atomic():
             draw_patches(self._nodes, "/hull", patches, "back" if opened else "double")
 
@@ -323,7 +323,7 @@ class RegionFeature(Feature):
         self._travel_html.content = travel_text(travel, force_unit(robot), self._without)
 
     def _draw_travel(self, travel: FreeTravel) -> None:
-        """Draw an arrow in each direction, with its length if it ends at the boundary."""
+        """Draw an arrow in each direction. An arrow that ends at the boundary has its length as text."""
         ends = np.stack((np.broadcast_to(travel.start, travel.ends.shape), travel.ends), axis=1)
         self._nodes.arrows("/travel", ends, OUTWARD if travel.inside else INWARD, *(_ARROW * self._size))
         for k, which in enumerate(travel.which):

@@ -115,7 +115,7 @@ class StateFeature(Feature):
         self._answer(client, "link-reply", value, follow)
 
     def _answer(self, client: int, topic: str, value: Any, reply: Callable[[str], dict[str, str]]) -> None:
-        """Handle a request [name, text] of a page, and send the answer {"to": name, ...} to it alone."""
+        """Handle `value`, a request [name, text] of a page. The answer {"to": name, ...} is sent to this page alone."""
         if not isinstance(value, list) or len(value) != 2 or not all(isinstance(each, str) for each in value):
             return
         name, text = value
@@ -162,7 +162,7 @@ class StateFeature(Feature):
         return link_text({**parts, **controls})
 
     def _open_link(self, text: str, client: int) -> None:
-        """Bring the page, and the camera of a client, to the state of a link; an invalid link changes nothing."""
+        """Bring the page and the camera of `client` to the state of a link. An invalid link changes nothing."""
         parts = parts_of(text)
         check_robot(parts.pop("robot"), self._robot)
         place, framing = self._place(parts), self._page.framing

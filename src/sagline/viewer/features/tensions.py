@@ -69,7 +69,7 @@ class MethodMarks:
 
 
 def grouped(marks: tuple[_MethodMark, ...], field: DotField) -> list[tuple[tuple[float, float], list[_MethodMark]]]:
-    """Groups of marks at the same position, and the positions [px]; only methods with a result have a mark."""
+    """Groups of `marks` at the same position, and these positions [px]. Only methods with a result have a mark."""
     groups: list[tuple[tuple[float, float], list[_MethodMark]]] = []
     for mark in marks:
         if mark.missing:
@@ -137,7 +137,7 @@ def _why_not_drawn(snapshot: Snapshot) -> str:
 
 
 def dot_field_of(snapshot: Snapshot, before: DotField | None = None) -> DotField | None:
-    """Feasible tensions of a pose, with the sag forces of its cables; None without feasible tensions."""
+    """Feasible tensions at the pose of `snapshot`, with the sag forces of the cables; None if there are none."""
     polygon = _polygon(snapshot)
     if polygon is None or not len(polygon.vertices):
         return None
@@ -251,7 +251,7 @@ def _key(snapshot: Snapshot, marks: tuple[_MethodMark, ...], back: str) -> str:
 
 
 def _side(field: DotField, k: int, start: tuple[float, float], end: tuple[float, float]) -> str:
-    """Name of a side, drawn outside of it; "" for a short side or a side that is not a limit."""
+    """Name of side `k`, drawn outside of the polygon; "" for a short side, and for a side that is not a limit."""
     side = field.sides[k]
     if side is None or np.hypot(end[0] - start[0], end[1] - start[1]) < 22.0:
         return ""
@@ -264,7 +264,7 @@ def _side(field: DotField, k: int, start: tuple[float, float], end: tuple[float,
 
 
 def _end(field: DotField, k: int, at: tuple[float, float], other: tuple[float, float]) -> str:
-    """Name of an end of an interval, drawn below it; an arrow head if the end is unbounded."""
+    """Name of the end `k` of an interval, drawn below the end; an arrow head if the end is unbounded."""
     side, (x, y) = field.sides[k], at
     if side is None:
         back = 8.0 if other[0] > x else -8.0
@@ -313,7 +313,7 @@ class TensionsFeature(Feature):
             self._panel.show_polygon(polygon_figure(snapshot, marks, self._field, self._panel.method_name))
 
     def _on_dot(self, value: Any, _: int) -> None:
-        """Move the dot by a drag or a step; invalid and late messages are ignored."""
+        """Move the dot by a drag or a step. Invalid and late messages are ignored."""
         field = self._field
         if field is None or not isinstance(value, dict):
             return
@@ -338,7 +338,7 @@ class TensionsFeature(Feature):
 
 
 def _numbers(value: Any, count: int) -> Array | None:
-    """A given number of finite numbers from a message; None for invalid data."""
+    """`count` finite numbers from `value`, the data of a message; None for invalid data."""
     if not isinstance(value, list) or len(value) < count:
         return None
     if not all(type(part) in (int, float) and abs(part) < 1e12 for part in value):

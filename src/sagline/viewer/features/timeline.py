@@ -102,7 +102,7 @@ class TimelineFeature(Feature):
         self._played, self._number = played, self._player.number
 
     def _move_window(self) -> None:
-        """Move the window after the clock has left it; without delay if the clock has reached its end."""
+        """Move the window after the clock has left the window; without delay if the clock has reached its end."""
         clock = self._player.clock
         ended, self._was_playing = self._was_playing and clock.time >= clock.duration, clock.playing
         if self._window is None or not (clock.playing or ended):
