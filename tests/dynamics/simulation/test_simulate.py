@@ -102,7 +102,7 @@ def test_the_work_of_moving_winches_is_that_of_h_and_not_of_the_tension() -> Non
     by_tension, by_whole = (np.cumsum(-(pull * wound).sum(axis=1)) for pull in (tension, whole))
     missed = np.abs(total[1:] - total[0] - by_tension).max()
     told = f"For a lift of {moved:.0f} J, the residual of this balance is ${1e5 * error:.0f} \\cdot 10^{{-5}}$ J. "
-    told += f"With the tension at the frame end in place of $H$, the residual is {missed:.1f} J."
+    told += f"If the tension at the frame end replaces $H$, the residual is {missed:.1f} J."
     assert told in " ".join(MODEL.read_text(encoding="utf-8").split())
     assert np.abs(total[1:] - total[0] - by_whole).max() < 1e-3  # of the trapezoidal rule
 
