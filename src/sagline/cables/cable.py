@@ -26,7 +26,7 @@ class Cable:
         expansion: Coefficient of thermal expansion [1/K], shape (...), negative for most fibers; None if not known.
 
     Raises:
-        InvalidValueError: If a density is negative, a stiffness or diameter is not positive, or the shapes do not
+        InvalidValueError: If a density is negative. If a stiffness or diameter is not positive. If the shapes do not
             broadcast.
 
     Examples:
@@ -75,8 +75,8 @@ class Cable:
 
         Args:
             linear_density: Mass per unstrained length [kg/m], >= 0.
-            youngs_modulus: Young's modulus E of the whole rope [Pa], > 0; the modulus of its fibers or wires is larger.
-            section_area: Section area A to which E refers [m^2], > 0; for a rope, this is usually only the area of its
+            youngs_modulus: Young's modulus E of the whole rope [Pa], > 0. The modulus of the fibers or wires is larger.
+            section_area: Section area A to which E refers [m^2], > 0. For a rope, A is usually only the area of its
                 fibers or wires.
             diameter: Diameter of the rope [m], > 0; None if unknown. The section area cannot be computed from the
                 diameter.
@@ -86,8 +86,8 @@ class Cable:
             Cable of axial stiffness EA.
 
         Raises:
-            InvalidValueError: If a density is negative, a modulus, area or diameter is not positive, or the shapes do
-                not broadcast.
+            InvalidValueError: If a density is negative. If a modulus, area or diameter is not positive. If the shapes
+                do not broadcast.
 
         Examples:
             >>> import sagline as sl
@@ -103,13 +103,13 @@ class Cable:
         return cls(linear_density, modulus * area, diameter=diameter, expansion=expansion)
 
     def replace(self, **changes: Any) -> Cable:
-        """A cable with some fields changed, checked like a new one.
+        """A cable with the changed fields `changes`, which are checked as for a new cable.
 
         Args:
             changes: Fields of `Cable` and their new values.
 
         Returns:
-            A new cable; this one remains unchanged.
+            A new cable. The original cable remains unchanged.
 
         Raises:
             InvalidValueError: If a field does not exist, or the constructor does not accept the new values.
@@ -134,7 +134,7 @@ class Cable:
         return {name: value for name in self.__slots__ if (value := getattr(self, name)) is not None}
 
     def _part(self, index: int | slice | NDArray[Any], shape: tuple[int, ...]) -> Cable:
-        """Material at an index of a batch of the given shape; the same object if all poses have one material."""
+        """Material at `index` of a batch of shape `shape`. The same object if all poses have one material."""
         own = self.linear_density.shape
         if len(own) < len(shape):
             return self

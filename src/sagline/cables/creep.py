@@ -76,7 +76,7 @@ class Creep:
             settled: True if the first tension has acted for a long time; if False, the strain starts at zero.
 
         Returns:
-            Strain, of the shape of tension; NaN where the tension is NaN.
+            Strain, of the shape of `tension`; NaN where the tension is NaN.
 
         Raises:
             InvalidValueError: If the times do not increase, or the shapes do not fit.

@@ -85,14 +85,14 @@ class CableModel:
             Code, k_h, k_p and gravity.
 
         Raises:
-            InvalidValueError: If gravity is negative or not a number.
+            InvalidValueError: If `gravity` is negative or not a number.
         """
         return self.code, *self.parameters, number(gravity, "gravity", "m/s^2", low=0.0)
 
     def from_tension(
         self, cable: Cable, span: ArrayLike, rise: ArrayLike, chord_tension: ArrayLike, gravity: float = 9.81
     ) -> CableState:
-        """Length and forces of cables with given chord tensions.
+        """Lengths and forces of cables with the chord tensions `chord_tension`.
 
         All arguments broadcast to one shape (...).
 
@@ -107,8 +107,8 @@ class CableModel:
             State with fields of shape (...).
 
         Raises:
-            CableGeometryError: If span is negative, or span and rise are both zero.
-            InvalidValueError: If a tension or gravity is negative or not finite, or shapes do not broadcast.
+            CableGeometryError: If `span` is negative, or `span` and `rise` are both zero. InvalidValueError: If a
+                tension or `gravity` is negative or not finite. If the shapes do not broadcast.
 
         Examples:
             The state of a cable at one tension, then at three tensions:
@@ -139,7 +139,7 @@ class CableModel:
     def from_length(
         self, cable: Cable, span: ArrayLike, rise: ArrayLike, unstrained_length: ArrayLike, gravity: float = 9.81
     ) -> CableState:
-        """Forces of cables with given unstrained lengths.
+        """Forces of cables with the unstrained lengths `unstrained_length`.
 
         All arguments broadcast to one shape (...).
 
@@ -154,8 +154,8 @@ class CableModel:
             State with fields of shape (...).
 
         Raises:
-            CableGeometryError: If span is negative, or span and rise are both zero.
-            InvalidValueError: If a length is not positive, gravity is negative, or shapes do not broadcast.
+            CableGeometryError: If `span` is negative, or `span` and `rise` are both zero. InvalidValueError: If a
+                length is not positive. If `gravity` is negative. If the shapes do not broadcast.
 
         Source:
             Irvine 1981, ch. 2; docs/model.md, sections 2 (P2) and 3.
@@ -203,7 +203,7 @@ class CableModel:
             Horizontal and vertical coordinates relative to the frame end [m], shape (..., points, 2).
 
         Raises:
-            InvalidValueError: If points is less than two, or cable or state has the wrong type.
+            InvalidValueError: If `points` is less than two. If `cable` or `state` has the wrong type.
         """
         placed = replace(instance(state, CableState, "state"), model=self, cable=instance(cable, Cable, "cable"))
         return placed.points(whole_number(points, "points", 2))
@@ -251,7 +251,7 @@ class CableState(Result):
         return batch_length(self.shape, "state of a single cable")
 
     def __getitem__(self, index: int | slice | NDArray[Any]) -> CableState:
-        """State of the cables that an index along the first axis selects.
+        """State of the cables that `index` selects along the first axis.
 
         Args:
             index: A number (negative: from the end), a slice, or an array of numbers or booleans.
@@ -297,14 +297,14 @@ class CableState(Result):
 
     @property
     def sag(self) -> Array:
-        """Largest vertical distance of the cable below its chord [m]; below its lower end if the chord is vertical."""
+        """Largest vertical distance of the cable below its chord [m]. Below its lower end if the chord is vertical."""
         out = np.empty(self.unstrained_length.size)
         batch.largest_sags(self.model.terms(self.gravity), *self._columns(), out)
         return out.reshape(self.shape)
 
     @property
     def closure_residual(self) -> Array:
-        """Closure error of the state [m]: error with which the state satisfies the equations of its cable model."""
+        """Closure error [m]: the error of the state in the equations of its cable model."""
         out = np.empty(self.unstrained_length.size)
         batch.closures(self.model.terms(self.gravity), *self._columns(), out)
         return out.reshape(self.shape)
@@ -319,7 +319,7 @@ class CableState(Result):
             Horizontal and vertical coordinates [m], frame end first, shape (..., count, 2).
 
         Raises:
-            InvalidValueError: If count is less than two, or the points do not fit into memory.
+            InvalidValueError: If `count` is less than two, or the points do not fit into memory.
         """
         whole_number(count, "points", 2)
         check_memory("points", 16.0 * self.unstrained_length.size * count, "Choose fewer points.")

@@ -107,5 +107,5 @@ MODELS: dict[str, type[CableModel]] = {
 
 
 def model_of(value: CableModel | str, item: str = "model") -> CableModel:
-    """Return a cable model unchanged; convert a name such as "elastic" to a cable model."""
+    """Return a cable model unchanged. A name such as "elastic" is converted to a cable model."""
     return named(value, CableModel, MODELS, item)

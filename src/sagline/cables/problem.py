@@ -1,4 +1,4 @@
-"""A batch of cables to solve: operands are checked and flattened; results get the shape of the arguments."""
+"""A batch of cables to solve. Operands are checked and flattened, and results get the shape of the arguments."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Problem(NamedTuple):
 
     @classmethod
     def of(cls, cable: Cable, span: ArrayLike, rise: ArrayLike, given: Array, gravity: float) -> Self:
-        """Check geometry and gravity and broadcast all operands to one shape.
+        """Check geometry and gravity, and broadcast all operands to one shape.
 
         Units: span [m]; rise [m]; given: chord tension [N] or unstrained length [m]; gravity [m/s^2].
         """
@@ -53,7 +53,7 @@ class Problem(NamedTuple):
         return np.empty(size), np.empty(size), np.empty(size), np.empty(size, dtype=np.int8)
 
     def shaped(self, field: Array) -> Array:
-        """Write-locked result or operand in the shape of the batch, (...)."""
+        """The result or operand `field` in the shape of the batch, (...), write-locked."""
         whole = field.size == math.prod(self.shape)
         return locked(field.reshape(self.shape) if whole else np.broadcast_to(field, self.shape))
 
@@ -66,5 +66,5 @@ def _checked_span(span: ArrayLike) -> Array:
 
 
 def _flat(field: Array, shape: tuple[int, ...]) -> Array:
-    """Flatten an operand to one axis: one value per cable of the batch, or a single value for all cables."""
+    """Flatten the operand `field` to one axis. It has one value per cable of the batch, or a single value."""
     return field.reshape(1) if field.size == 1 else kernel_input(field, shape).reshape(-1)

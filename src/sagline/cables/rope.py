@@ -35,12 +35,12 @@ class Rope:
     assumed: str
 
     def cable(self, diameter: float) -> Cable:
-        """A cable of this rope, from the diameter [m]."""
+        """A cable of this rope with the diameter `diameter` [m]."""
         square = float(checked(diameter, "diameter", "m", shape=(), above=0.0)) ** 2
         return Cable(self.density_factor * square, self.stiffness_factor * square, diameter=diameter)
 
     def breaking_force(self, diameter: float) -> float:
-        """Minimum breaking force [N] of a new rope, from the diameter [m]."""
+        """Minimum breaking force [N] of a new rope with the diameter `diameter` [m]."""
         return self.strength_factor * diameter**2
 
 

@@ -64,7 +64,7 @@ _PARTS = ("state", "pose", "robot", "plan", "path", "cables", "cable", "model", 
 
 
 class _Brief(Repr):
-    """Short text of a value for a message, or its type if the text would be too long."""
+    """Short text of `value` for a message. If the text would be too long: the type of `value`."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -96,7 +96,7 @@ def brief(value: object) -> str:
 
 
 def instance(value: object, kind: type[T], item: str) -> T:
-    """Return an argument unchanged after a check of its type."""
+    """Return `value` unchanged after the check that its type is `kind`."""
     if isinstance(value, kind):
         return value
     raise InvalidValueError(item, brief(value), _a(kind.__name__), _step_to(value, kind))
@@ -108,7 +108,7 @@ def optional(value: object, kind: type[T], item: str) -> T | None:
 
 
 def choice(value: Any, item: str, allowed: Iterable[str]) -> Any:
-    """Check that a value is one of the allowed words."""
+    """Check that `value` is one of the words `allowed`."""
     words = tuple(allowed)
     if isinstance(value, str) and value in words:
         return str(value)  # numpy has its own string type
@@ -118,12 +118,12 @@ def choice(value: Any, item: str, allowed: Iterable[str]) -> Any:
 
 
 def word_of(name: str) -> str:
-    """Name of a class on the command line: "minimum-norm" for MinimumNorm."""
+    """Word for the class `name` on the command line: "minimum-norm" for "MinimumNorm"."""
     return re.sub("(?<!^)(?=[A-Z])", "-", name).lower()
 
 
 def named(value: str | T, kind: type[T], kinds: Mapping[str, type[T]], item: str) -> T:
-    """Return an object of the type unchanged; a name such as "minimum-norm" becomes an object with default options."""
+    """Return an object of type `kind` unchanged. A name such as "minimum-norm" gives an object with default options."""
     if not isinstance(value, str):
         return instance(value, kind, item)
     words = {word_of(name): kind for name, kind in kinds.items()}
@@ -131,7 +131,7 @@ def named(value: str | T, kind: type[T], kinds: Mapping[str, type[T]], item: str
 
 
 def text(value: Any, item: str) -> str:
-    """Check a text, possibly of several lines, that a terminal can display."""
+    """Check that `value` is a text that a terminal can display. It may have several lines."""
     if not isinstance(value, str):
         raise InvalidValueError(item, brief(value), "a text", f'Put {item} between quotes: "...".')
     if (flat := value.replace("\n", " ").replace("\t", " ")) != printable(flat):
@@ -140,7 +140,7 @@ def text(value: Any, item: str) -> str:
 
 
 def label(value: Any, item: str) -> str:
-    """Check a name: one line of text that a terminal, a figure and a file name can contain."""
+    """Check that `value` is a name: one line of text for a terminal, a figure or a file name."""
     if isinstance(value, str) and not value.strip():
         raise InvalidValueError(item, "empty" if not value else "blank", "a non-empty text", f"Give a {item}.")
     if not isinstance(value, str) or len(value) > LONGEST_TITLE or value != printable(value):
@@ -150,7 +150,7 @@ def label(value: Any, item: str) -> str:
 
 
 def integer(value: Any) -> int | None:
-    """Value as an integer; a Boolean or an array, even with one element, is not accepted.
+    """The integer `value`. Booleans and arrays are not accepted, even if an array has one element.
 
     Returns the integer, or None if the value is not an integer.
     """
@@ -163,10 +163,9 @@ def integer(value: Any) -> int | None:
 
 
 def whole_number(value: Any, item: str, low: int, high: int = sys.maxsize) -> int:
-    """Check a whole number.
+    """Check that `value` is a whole number from `low` to `high`.
 
-    value: integer of Python or numpy, not a Boolean; high: largest allowed number, by default the largest size of a
-    Python container.
+    value: integer of Python or numpy, not a Boolean; high: by default the largest size of a Python container.
     """
     number = integer(value)
     if number is not None and low <= number <= high:
@@ -178,7 +177,7 @@ def whole_number(value: Any, item: str, low: int, high: int = sys.maxsize) -> in
 
 
 def flag(value: Any, item: str) -> bool:
-    """Check a Boolean of Python or numpy."""
+    """Check that `value` is a Boolean of Python or numpy."""
     if isinstance(value, bool | np.bool_):
         return bool(value)
     raise InvalidValueError(item, brief(value), "True or False", f"Correct {item}.")
@@ -187,7 +186,7 @@ def flag(value: Any, item: str) -> bool:
 def elements(
     value: Any, single: Any, item: str, step: str, allowed: str = "one or several in a list"
 ) -> tuple[Any, ...]:
-    """Elements of an iterable; one object of the type `single` counts as one element.
+    """Elements of the iterable `value`. One object of the type `single` counts as one element.
 
     A text, a mapping or an array without axes is one object, although Python can iterate over a text and a mapping.
     """
@@ -199,7 +198,7 @@ def elements(
 
 
 def listed(value: Any, kind: type[T], item: str) -> tuple[T, ...]:
-    """Check objects of one type, one or several in an iterable, and return them as a tuple."""
+    """Check one object of type `kind`, or an iterable of several. Returns the objects as a tuple."""
     allowed, step = f"{_a(kind.__name__)}, or several in a list", _step_to(value, kind)
     given = elements(value, kind, item, step, allowed)
     if not given:
@@ -208,7 +207,7 @@ def listed(value: Any, kind: type[T], item: str) -> tuple[T, ...]:
 
 
 def callback(value: Any, item: str) -> Any:
-    """Check a callback: a function, or None."""
+    """Check that the callback `value` is a function or None."""
     if value is None or (callable(value) and not isinstance(value, type)):
         return value
     raise InvalidValueError(
@@ -245,7 +244,7 @@ def _a(name: str) -> str:
 
 
 def _step_to(value: object, kind: type) -> str:
-    """Next step in a message: how to get an object of the required type from the given value."""
+    """Next step in a message: how to get an object of type `kind` from `value`."""
     if isinstance(value, type) and issubclass(value, kind):
         return f"Add parentheses to create one: {value.__name__}()."
     if type(value).__module__.startswith("sagline"):

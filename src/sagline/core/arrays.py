@@ -45,7 +45,7 @@ def checked(
     infinite: bool = False,
     missing: bool = False,
 ) -> Array:
-    """Locked float64 copy of a caller's value; raises an error that names the problem.
+    """Locked float64 copy of `value`. If `value` is not allowed, the error names the problem.
 
     unit: unit of the value, for the message; "" if dimensionless; shape: required trailing axes, with None for any
     length; leading axes are arbitrary; None (default) accepts every shape; above: limit that every value must exceed;
@@ -86,7 +86,7 @@ def numbers(value: ArrayLike, item: str, unit: str) -> Array:
 
 
 def number(value: Any, item: str, unit: str, *, low: float = -np.inf, above: float = -np.inf) -> float:
-    """A single finite number.
+    """The single finite number `value`.
 
     above: limit that the value must exceed.
     """
@@ -94,7 +94,7 @@ def number(value: Any, item: str, unit: str, *, low: float = -np.inf, above: flo
 
 
 def exactly(value: ArrayLike, item: str, unit: str, shape: tuple[int, ...], **limits: Any) -> Array:
-    """Check that an array has exactly the given shape; batch axes are not allowed."""
+    """Check that the array `value` has exactly the shape `shape`. Batch axes are not allowed."""
     array = checked(value, item, unit, **limits)
     if array.shape != shape:
         raise InvalidValueError(
@@ -104,7 +104,7 @@ def exactly(value: ArrayLike, item: str, unit: str, shape: tuple[int, ...], **li
 
 
 def kernel_input(value: ArrayLike, shape: tuple[int, ...]) -> Array:
-    """Broadcast an array to a shape in the memory layout of the kernels; copy only if necessary."""
+    """Broadcast `value` to `shape` in the memory layout of the kernels. A copy is made only if necessary."""
     array = np.asarray(value, dtype=np.float64, order="C")
     if array.shape != shape:
         array = np.asarray(np.broadcast_to(array, shape), order="C")
@@ -112,7 +112,7 @@ def kernel_input(value: ArrayLike, shape: tuple[int, ...]) -> Array:
 
 
 def spread(array: Array, shape: tuple[int, ...]) -> Array:
-    """Write-locked array from `checked`, broadcast to the given shape."""
+    """Array from `checked`, broadcast to `shape` and write-locked."""
     return array if array.shape == shape else locked(np.array(np.broadcast_to(array, shape), order="C"))
 
 
@@ -142,7 +142,7 @@ def _is_immutable(value: ArrayLike) -> TypeGuard[Array]:
 
 
 def _refuse_masked_or_with_unit(value: Any, item: str, unit: str) -> None:
-    """Refuse masked arrays and quantities with units, because numpy would remove mask and unit silently."""
+    """Refuse masked arrays and quantities with units. numpy would silently remove the mask or the unit."""
     if type(value) in (np.ndarray, int, list, tuple):
         return
     if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
@@ -179,7 +179,7 @@ def _is_real(entry: object) -> bool:
 
 
 def _is_within(array: Array, *, low: float, above: float) -> bool:
-    """True if all values are finite and in range; minimum and maximum suffice, because they propagate NaN."""
+    """True if all values are finite and in range. The tests of minimum and maximum suffice, because NaN propagates."""
     if array.size == 0:
         return True
     smallest, largest = float(array.min()), float(array.max())

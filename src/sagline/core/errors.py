@@ -157,7 +157,7 @@ def nearest(word: str, known: Iterable[str]) -> str | None:
 
 
 def shortened(parts: Sequence[str], room: int) -> list[str]:
-    """Shorten texts to one line in total: escape invisible characters, and omit the middle of the longest text."""
+    """Shorten `parts` to `room` characters by omitting the middle of the longest; escape invisible characters."""
     texts = [printable(part) for part in parts]
     while (excess := sum(map(len, texts)) - room) > 0:
         k = max(range(len(texts)), key=lambda k: len(texts[k]))

@@ -30,7 +30,7 @@ def if_known(value: ArrayLike | None) -> Array | None:
 
 
 def given_or_none(value: ArrayLike | None) -> Array:
-    """Return a value or None unchanged: the converter of a field; its check then replaces None by a value."""
+    """Return a value or None unchanged: the converter of a field whose check then replaces None by a value."""
     return value  # type: ignore[return-value]
 
 
@@ -50,7 +50,7 @@ def checked_by(check: Callable[..., Any], *arguments: Any, **limits: Any) -> dic
 
 
 def check_fields(made: Any) -> None:
-    """Check each field of a new object with its `checked_by`; None is allowed if None is the default."""
+    """Check each field of the new object `made` with its `checked_by`. None is allowed if None is the default."""
     for about in fields(type(made)):
         value = getattr(made, about.name)
         if "check" in about.metadata and not (value is None and about.default is None):
@@ -88,5 +88,5 @@ def _constructed(kind: type[Any], values: dict[str, Any]) -> Any:
 
 
 def units(kind: type[Any]) -> dict[str, str]:
-    """Unit of each field of an input type, "" if dimensionless."""
+    """Unit of each field of the input type `kind`, "" if dimensionless."""
     return {field.name: field.metadata["unit"] for field in fields(kind)}

@@ -19,10 +19,10 @@ _GROUPS: Final = (  # files with the memory limit and the used memory of a conta
 
 
 def check_memory(item: str, size: float, next_step: str) -> None:
-    """Refuse an allocation that does not fit into memory.
+    """Refuse an allocation of `size` bytes that does not fit into memory.
 
-    item: purpose of the memory, for the message, such as "a path of 2e+08 samples"; size: peak memory [bytes], not
-    checked below 64 MB.
+    item: purpose of the memory, for the message, such as "a path of 2e+08 samples"; size: peak memory. A size below 64
+        MB is not checked.
     """
     if size > UNASKED and size > (free := free_memory()):
         # the two numbers must differ in the message
@@ -32,9 +32,9 @@ def check_memory(item: str, size: float, next_step: str) -> None:
 
 
 def check_poses(count: int, cable_count: int, behind: bool) -> None:
-    """Refuse forward or inverse kinematics of a batch that does not fit into memory.
+    """Refuse forward or inverse kinematics of `count` poses that do not fit into memory.
 
-    cable_count: number of cables m of the robot.
+    cable_count: number of cables m of the robot; behind: True with pulleys or dead lengths.
     """
     cable = _CABLE_BYTES + (_BEHIND_BYTES if behind else 0.0)
     check_memory(
@@ -43,7 +43,7 @@ def check_poses(count: int, cable_count: int, behind: bool) -> None:
 
 
 def free_memory() -> float:
-    """Memory that is still available to this process [bytes]; infinite if the system does not report it.
+    """Memory that is still available to this process [bytes]. Infinite if the system does not report it.
 
     Returns the smallest of three free memories: of the computer, of its container, and of this process.
     """

@@ -78,7 +78,7 @@ def plus_minus(value: SupportsFloat, error: SupportsFloat, unit: str = "", *, pr
 
 
 def counted(count: int, noun: str) -> str:
-    """Count with its noun, "1 pose" or "1,200 poses".
+    """The number `count` with its noun, "1 pose" or "1,200 poses".
 
     noun: noun in the singular; its plural is formed with s or es.
     """
@@ -116,7 +116,7 @@ def _digits(number: float, form: str) -> str:
 
 
 def _with_uncertainty(number: float, error: float) -> str:
-    """Value rounded to the last digit of its uncertainty (two digits), followed by the uncertainty."""
+    """`number`, rounded to the last of two digits of its uncertainty `error`, then the uncertainty."""
     places = 1 - int(f"{error:.1e}".partition("e")[2])
     if places <= 0:
         shown = f"({round(error, places):.0f})"

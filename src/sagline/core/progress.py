@@ -12,7 +12,7 @@ Progress: TypeAlias = Callable[[int, int], None]
 
 
 def blocks(count: int, size: int, progress: Progress | None = None) -> Iterator[slice]:
-    """Slices that divide `count` rows into blocks of at most `size` rows; reports progress after each block."""
+    """Slices that divide `count` rows into blocks of at most `size` rows. Progress is reported after each block."""
     for first in range(0, count, size):
         part = slice(first, min(first + size, count))
         yield part
@@ -21,5 +21,5 @@ def blocks(count: int, size: int, progress: Progress | None = None) -> Iterator[
 
 
 def rows_of(array: Array, part: slice) -> Array:
-    """Rows of a block; an array with a single row, which applies to all entries, is returned unchanged."""
+    """Rows `part` of `array`. An array with a single row applies to all entries and is returned unchanged."""
     return array if len(array) == 1 else array[part]

@@ -27,7 +27,7 @@ def formats() -> Any:
 
 
 def documented_units(kind: type[Any], name: str) -> list[str]:
-    """Units in the documentation of a class attribute, in order: "force [N], moment [N m]" gives N and N m."""
+    """Units in the documentation of the attribute `name` of `kind`: "force [N], moment [N m]" gives N and N m."""
     own = getattr(kind, name, None)
     text = own.__doc__ if isinstance(own, property) else None
     if text is None:
@@ -37,7 +37,7 @@ def documented_units(kind: type[Any], name: str) -> list[str]:
 
 
 def set_fields(target: object, **values: Any) -> None:
-    """Set the fields of a frozen object under construction."""
+    """Set the fields `values` of the frozen object `target` during its construction."""
     for name, value in values.items():
         object.__setattr__(target, name, value)
 
@@ -56,7 +56,7 @@ class Shown:
         return text
 
     def _repr_html_(self) -> str | None:
-        """Summary and figure as HTML; with None, Jupyter displays the plain text instead."""
+        """Summary and figure as HTML. If the result is None, Jupyter displays the plain text instead."""
         with suppress(Exception):  # an error in the display must not make a successful cell of the notebook fail
             shown: str | None = import_module(_PAGES).html_of(self)
             return shown
@@ -107,9 +107,9 @@ class Saved:
                 is raised.
 
         Raises:
-            InvalidValueError: If the result cannot be read back: a plan of several robots, or a cable model, tension
-                method or criterion of your own.
-            FileError: If the suffix is wrong, a package is missing or the file cannot be written; an existing file
+            InvalidValueError: If the result cannot be read back. This is true for a plan of several robots, and for a
+                cable model, tension method or criterion of your own.
+            FileError: If the suffix is wrong, a package is missing or the file cannot be written. An existing file
                 remains unchanged.
         """
         formats().save(self, file)

@@ -16,7 +16,7 @@ _LINE = re.compile(r"^from (\.\S*) import (?:(\w+) as \2|\*)$", re.MULTILINE)
 
 @cache
 def public_names(package: str, *, listed: bool = False) -> dict[str, str]:
-    """Public names of a package and the modules that contain them; listed: True to omit the names from `import *`."""
+    """Public names of `package`, and the modules that contain them; `listed`: True to omit names from `import *`."""
     stub = Path(__file__).parents[1].joinpath(*package.split(".")[1:], "__init__.pyi")
     found: dict[str, str] = {}
     for place, name in _LINE.findall(stub.read_text(encoding="utf-8")):
@@ -52,7 +52,7 @@ class Group(ModuleType):
         return value
 
     def __setattr__(self, name: str, value: object) -> None:
-        """Set an attribute, but keep a public name when the import system binds a module with the same name."""
+        """Set the attribute `name`. A public name is kept when the import system binds a module with the same name."""
         if not isinstance(value, ModuleType) or public_names(self.__name__).get(name, self.__name__) == self.__name__:
             super().__setattr__(name, value)
 

@@ -29,7 +29,7 @@ Columns = tuple[str | tuple[str, type[Any]], ...]
 
 
 def csv_text(rows: Iterable[Sequence[object]]) -> str:
-    """The text of a CSV file: names of the columns with units in brackets, then rows; floats keep their last bit."""
+    """The text of a CSV file: column names with units in brackets, then rows. Floats are written without rounding."""
     text = StringIO()
     csv.writer(text, lineterminator="\n").writerows(rows)
     return text.getvalue()
@@ -54,7 +54,7 @@ class Table:
         return len(next(iter(self.columns.values()), ()))
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        """A column."""
+        """The column `name`."""
         return self.columns[name]
 
     @property
@@ -205,13 +205,13 @@ def _columns_of(result: Tabular) -> Iterator[tuple[str, NDArray[Any], str]]:
 
 
 def _spread(names: Any, values: NDArray[Any], unit: str) -> Iterator[tuple[str, NDArray[Any], str]]:
-    """One column for each entry along the last axis."""
+    """One column for each entry of `values` along the last axis, with its name from `names`."""
     for k, name in enumerate(names):
         yield name, np.atleast_1d(values[..., k]), unit
 
 
 def _found(result: Any, place: str) -> tuple[Any, list[str]]:
-    """Value of an attribute such as "pose.position", or None if a part is missing; and its documented units."""
+    """Value and documented units of the attribute `place`, such as "pose.position". None if a part is missing."""
     units: list[str] = []
     for name in place.split("."):
         if result is None:

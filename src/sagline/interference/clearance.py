@@ -77,7 +77,7 @@ class ClearanceRows:
             self._meshed = Meshed(self.pairs, (self._platform, *obstacles), precision)
 
     def distances(self, state: Equilibrium, *, together: bool = False) -> _Distances:
-        """Distance of every pair at every pose; with `together`, only the smallest distance of each pose is exact."""
+        """Distance of every pair at every pose. With `together`, only the smallest distance of each pose is exact."""
         single = not state.pose.shape
         count, several = 1 if single else len(state), len(self.pairs.names)
         out = _Distances(np.empty((count, several)), np.empty((count, several)), np.empty((count, several, 2, 3)))
@@ -99,7 +99,7 @@ class ClearanceRows:
         return out
 
     def least(self, state: Equilibrium) -> tuple[Array, Indices]:
-        """Smallest distance (N,) [m], and index of its pair; NaN without tensions; faster than `distances`."""
+        """Smallest distance (N,) [m], NaN without tensions, and the index of its pair. Faster than `distances`."""
         lost = np.asarray(np.isnan(np.atleast_2d(state.free_length)).any(axis=1))
         found = np.nan_to_num(self.distances(state, together=True).value, nan=np.inf)
         if not found.shape[1]:
@@ -128,7 +128,7 @@ class ClearanceRows:
         return np.asarray(out[0].min(axis=1) + beyond)
 
     def _moving(self, state: Equilibrium) -> Array:
-        """Rows of the moving bodies: parts of cables, and the platform; a mesh or no platform gets a placeholder."""
+        """Rows of the moving bodies: parts of cables, and the platform. A mesh or no platform gets a placeholder."""
         diameter = state.cables.cable.diameter
         known = np.zeros(1) if diameter is None else 0.5 * diameter
         cables = cable_rows(state, known if self._radius is None else self._radius)
@@ -140,12 +140,12 @@ class ClearanceRows:
 
 
 def _box_row(one: Box | Mesh) -> Array:
-    """Row of a box. A mesh gets a placeholder row, so that the indices of the obstacles do not change."""
+    """Row of the obstacle `one`. A mesh gets a placeholder row, so that the indices of the obstacles do not change."""
     return box_rows(one if isinstance(one, Box) else Box(np.ones(3)))
 
 
 def _platform_of(robot: Robots) -> Box | None:
-    """Box of the platform's size around its anchors; None if the size is unknown; refuses robots that differ."""
+    """Box of the platform's size around its anchors. None if the size is unknown. Different platforms are refused."""
     one = first_of(robot)
     for other in () if isinstance(robot, Robot) else robot[1:]:
         if not all(_alike(getattr(one, name), getattr(other, name)) for name in ("platform_size", "platform_anchors")):
@@ -176,7 +176,7 @@ class Clearances(Result, Tabular):
     Attributes:
         pairs: P pairs of names of measured bodies.
         pair_distance: Least distance of each pair [m], minus known cable radii, shape (P,) or (N, P). A value <= 0
-            means contact; the depth of penetration is not measured. NaN if a pose has no tensions.
+            means contact. The depth of penetration is not measured. NaN if a pose has no tensions.
         pair_low: Proved lower bound of each distance [m], of the same shape.
         nearest: Nearest points of each pair, on the center lines of cables and rods [m], shape (P, 2, 3) or (N, P, 2,
             3).
@@ -205,7 +205,7 @@ class Clearances(Result, Tabular):
 
     @property
     def between(self) -> Any:
-        """Names of the nearest pair, or of the nearest pair at each of N poses; a sentence if no distance is known."""
+        """Names of the nearest pair, or of the nearest pair at each of N poses. If no distance is known: a sentence."""
         return self._between(self.pair_distance) if self._single else tuple(map(self._between, self.pair_distance))
 
     def __str__(self) -> str:
@@ -280,7 +280,7 @@ def clearance(
         Clearances.
 
     Raises:
-        InvalidValueError: If an argument has the wrong type, or a mesh is 100 times larger than the robot.
+        InvalidValueError: If an argument has the wrong type. If a mesh is 100 times larger than the robot.
         SaglineError: If an obstacle is a mesh and python-fcl is missing.
 
     Examples:
@@ -311,7 +311,7 @@ def clearance(
 
 
 def check_obstacles(given: Any, robot: Robot) -> tuple[Obstacle, ...]:
-    """Checked obstacles as a tuple; refuses a mesh that is 100 times larger than the robot."""
+    """The checked obstacles `given` as a tuple. A mesh that is 100 times larger than `robot` is refused."""
     found = obstacles_of(given, "obstacles")
     for one in found:
         if isinstance(one, Mesh):
@@ -320,7 +320,7 @@ def check_obstacles(given: Any, robot: Robot) -> tuple[Obstacle, ...]:
 
 
 def obstacles_of(given: Any, item: str) -> tuple[Obstacle, ...]:
-    """One or several obstacles, checked, as a tuple."""
+    """The obstacle or obstacles `given`, checked, as a tuple."""
     some = (given,) if isinstance(given, Obstacle) else given
     several = isinstance(some, Sequence) and not isinstance(some, str)
     wrong = [one for one in some if not isinstance(one, Obstacle)] if several else [given]
@@ -331,7 +331,7 @@ def obstacles_of(given: Any, item: str) -> tuple[Obstacle, ...]:
 
 
 def _check_size(mesh: Mesh, robot: Robot) -> None:
-    """Refuse a very large mesh, whose unit is probably wrong."""
+    """Refuse `mesh` if it is much larger than `robot`, because its unit is then probably wrong."""
     own, size = np.ptp(mesh.bounds, axis=0).max(), np.subtract(*reversed(bounds(robot))).max()
     if own > _TOO_LARGE * size:
         value = f"{extent_text(mesh.bounds)} large, and the robot {size:.4g} m"

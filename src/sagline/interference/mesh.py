@@ -40,8 +40,8 @@ class Mesh(Result):
         name: Name in messages and results.
 
     Raises:
-        InvalidValueError: If a face has an invalid corner index, the number of faces is below 4 or above a million, or
-            the surface is not closed; the message gives the extent.
+        InvalidValueError: If a face has an invalid corner index. If the number of faces is below 4 or above a million.
+            If the surface is not closed; the message gives its extent.
 
     Examples:
         >>> import sagline as sl
@@ -143,7 +143,7 @@ def _faces(given: Any, corners: int) -> Indices:
 
 
 def _open_edges(faces: Indices) -> int:
-    """Number of edges that no neighboring triangle has in the opposite direction."""
+    """Number of edges of `faces` without a neighboring triangle that has the same edge in the opposite direction."""
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     count = int(faces.max()) + 1
     ways = np.concatenate((start * count + end, end * count + start))
@@ -153,14 +153,14 @@ def _open_edges(faces: Indices) -> int:
 
 
 def check_coordinates(corners: Array) -> None:
-    """Refuse corners [m] with larger coordinates than on any machine."""
+    """Refuse corners [m] whose coordinates are larger than on any machine."""
     if (far := float(np.abs(corners).max(initial=0.0))) > FARTHEST:
         step = "Correct them, or the unit of their file."
         raise InvalidValueError("vertices", f"up to {far:g} m away", f"up to {FARTHEST:g} m", step)
 
 
 def extent_text(corners: Array) -> str:
-    """Extent as text for a message."""
+    """Extent of `corners` as text for a message."""
     edges = " x ".join(f"{edge:.4g}" for edge in np.ptp(corners, axis=0))
     return f"{edges} m"
 

@@ -63,10 +63,10 @@ class _Nearest(NamedTuple):
 
 
 class Meshed:
-    """Pairs of bodies with at least one mesh; the bodies are prepared only once."""
+    """Pairs of two bodies, at least one of which is a mesh. The bodies are prepared only once."""
 
     def __init__(self, pairs: Pairs, forms: tuple[Form | None, ...], precision: float) -> None:
-        """Prepare the bodies: the platform, or None, and the obstacles in the order of their indices."""
+        """Prepare the bodies `forms`: the platform, or None, then the obstacles in the order of their indices."""
         self._fcl = package()
         self._pairs, self._precision, self._parts = pairs, precision, len(pairs.parts)
         taking_part = {int(number) for number in pairs.with_mesh.ravel() if number >= self._parts}
@@ -74,7 +74,7 @@ class Meshed:
         self._known: dict[tuple[int, bytes], bool] = {}
 
     def measure(self, pose: Pose, moving: Array, least: Array | None, out: tuple[Array, Array, Array]) -> None:
-        """Fill the distances of all pairs at every pose; pairs farther than `least` (N,) [m] may be skipped."""
+        """Fill the distances of all pairs at every pose. Pairs beyond the distance `least` (N,) [m] may be skipped."""
         turns, places = pose.matrix.reshape(-1, 3, 3), np.atleast_2d(pose.position)
         value, low, nearest = out
         for n in range(len(moving)):
@@ -112,7 +112,7 @@ class Meshed:
         return self._fcl.CollisionObject(solid.geometry, self._fcl.Transform(*at.get(number, solid.place)))
 
     def _apart(self, one: Any, other: Any) -> tuple[float, Array, Array]:
-        """Distance of two bodies [m], 0 for contact, and their nearest points; the point on a mesh comes first."""
+        """Distance of two bodies [m], 0 for contact, and their nearest points, first the point on a mesh."""
         request, result = self._fcl.DistanceRequest(True), self._fcl.DistanceResult()
         distance = max(float(self._fcl.distance(one, other, request, result)), 0.0)
         return distance, *result.nearest_points
@@ -126,7 +126,7 @@ class Meshed:
         return _Nearest(distance - radii, _proved(distance, distance, a) - radii, a, b)
 
     def _within(self, point: Array, of: int, number: int, at: dict[int, tuple[Array, Array]]) -> bool:
-        """True if a point of a body, in the frame of the body, is inside another solid body."""
+        """True if `point` of the body `of`, in the frame of that body, is inside the solid body `number`."""
         mesh = self._solids[number].mesh
         if mesh is None:
             return False
@@ -142,7 +142,7 @@ class Meshed:
         return self._known[key]
 
     def _of_cable(self, row: Array, number: int, at: dict[int, tuple[Array, Array]], enough: float) -> _Nearest:
-        """Distance of a cable, by branch and bound over its pieces."""
+        """Distance of a cable from the body `number`, by branch and bound over the pieces of the cable."""
         body, radius = self._object(number, at), float(row[shapes.RADIUS])
         enough += radius
         nearest = (inf, 0.0, np.zeros(3), np.zeros(3))  # points along the centerline of the cable
@@ -187,7 +187,7 @@ class Meshed:
 
 
 def package() -> ModuleType:
-    """Module python-fcl, loaded at the first use; the error names the command that installs it."""
+    """Module python-fcl, loaded at the first use. If it is missing, the error names the command that installs it."""
     try:
         import fcl
     except ImportError:
@@ -203,7 +203,7 @@ def _pieces(row: Array, ranges: list[tuple[float, float]]) -> Array:
 
 
 def _along(start: Array, end: Array) -> tuple[tuple[Array, Array], float]:
-    """Placement of an fcl capsule (along z around its middle) between two points, and length of the capsule."""
+    """Placement of an fcl capsule (along z around its middle) from `start` to `end`, and the length of the capsule."""
     run = end - start
     length = sqrt(float(run @ run))
     x, y, z = (run / length).tolist() if length > 0.0 else (0.0, 0.0, 1.0)
@@ -212,7 +212,7 @@ def _along(start: Array, end: Array) -> tuple[tuple[Array, Array], float]:
 
 
 def _proved(low: float, value: float, place: Array) -> float:
-    """Lower bound, reduced by the possible rounding error, >= 0."""
+    """The lower bound `low`, reduced by the possible rounding error, >= 0."""
     return max(min(low, value) - ROUNDING * (1.0 + value + float(np.abs(place).max())), 0.0)
 
 
@@ -221,7 +221,7 @@ def _polished(
     nearest: tuple[float, float, Array, Array],
     row: Array,
 ) -> tuple[float, float, Array, Array]:
-    """Nearest point of a cable, searched from a start point by golden sections and parabolas (Brent's method)."""
+    """Nearest point of a cable. The search starts at `nearest`, with golden sections and parabolas (Brent's method)."""
     from scipy.optimize import minimize_scalar
 
     reach = 0.02 * float(row[shapes.LAST] - row[shapes.FIRST])

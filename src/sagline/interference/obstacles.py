@@ -22,7 +22,7 @@ ROUNDING: Final = 1e-14  # tolerance for products of unit vectors
 
 
 def _rotation(value: ArrayLike, item: str) -> Array:
-    """Checked rotation matrix; a matrix with more than rounding errors is replaced by the nearest rotation matrix."""
+    """The checked rotation matrix `value`. If its errors exceed rounding, the nearest rotation matrix replaces it."""
     matrix = exactly(value, item, "", (3, 3))
     nearest = Pose(np.zeros(3), matrix).matrix
     return matrix if np.abs(matrix.T @ matrix - np.eye(3)).max() < ROUNDING else nearest
@@ -39,7 +39,7 @@ class Box(Result):
         name: Name in messages and results.
 
     Raises:
-        InvalidValueError: If an edge is not positive, or orientation is not a rotation.
+        InvalidValueError: If an edge is not positive, or `orientation` is not a rotation.
 
     Examples:
         >>> import sagline as sl
@@ -127,9 +127,9 @@ class Sphere(Result):
 def frame_beams(robot: Robot, radius: float) -> tuple[Capsule, ...]:
     """Twelve beams with round ends at the edges of a robot's frame.
 
-    The frame is the same as in drawings: a box with the robot's frame_size, whose top is at the highest anchors; if
-    frame_size is unknown, the box around the anchors, down to the floor. Frame anchors are on the frame or near it.
-    Therefore exclude the first part of each cable with the argument `from_anchor` of `clearance`.
+    The frame is the same as in drawings: a box with the robot's frame_size, whose top is at the highest anchors. If
+    frame_size is unknown, the frame is the box around the anchors and down to the floor. Frame anchors are on the frame
+    or near it. Therefore exclude the first part of each cable with the argument `from_anchor` of `clearance`.
 
     Args:
         robot: The robot.
@@ -139,7 +139,7 @@ def frame_beams(robot: Robot, radius: float) -> tuple[Capsule, ...]:
         Twelve capsules; their names describe their positions.
 
     Raises:
-        InvalidValueError: If radius is negative.
+        InvalidValueError: If `radius` is negative.
 
     Examples:
         >>> import sagline as sl

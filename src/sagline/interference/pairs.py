@@ -19,7 +19,7 @@ from sagline.robot.pose import Pose
 
 
 class _CablePart(NamedTuple):
-    """Measured part of a cable: the whole cable, or the cable without a length at one end or at both ends."""
+    """Measured part of a cable: the whole cable, or the cable without a part at one end or at both ends."""
 
     cable: int
     off_frame: bool = False
@@ -27,7 +27,7 @@ class _CablePart(NamedTuple):
 
 
 def cable_rows(state: Equilibrium, radius: Array) -> Array:
-    """Rows of cables from their exit points on; radius: (m,) or (N, m) [m]; NaN for a cable without tension."""
+    """Rows of cables that start at their exit points, NaN for a cable without tension. `radius`: (m,) or (N, m) [m]."""
     cables, ends = state.cables, _platform_ends(state)
     exits = state.exit_point
     out = np.zeros((*cables.shape, shapes.COLUMNS))
@@ -62,7 +62,7 @@ def _platform_ends(state: Equilibrium) -> Array:
 
 
 def rows_of_parts(cables: Array, lengths: Array, parts: tuple[_CablePart, ...], left_out: float) -> Array:
-    """Rows (N, len(parts), COLUMNS) of parts of cables; `left_out` is the omitted unstrained length at an end [m]."""
+    """Rows (N, len(parts), COLUMNS) of `parts` of the cables; `left_out`: omitted unstrained length at an end [m]."""
     out = cables[:, [part.cable for part in parts]]
     for k, part in enumerate(parts):
         share = np.minimum(left_out / lengths[:, part.cable], 0.5 if part.off_frame and part.off_platform else 1.0)
@@ -74,7 +74,7 @@ def rows_of_parts(cables: Array, lengths: Array, parts: tuple[_CablePart, ...], 
 
 
 def rod_row(rod: Capsule | Sphere) -> Array:
-    """Row of a capsule or sphere, shape (COLUMNS,)."""
+    """Row of the capsule or sphere `rod`, shape (COLUMNS,)."""
     start, end = (rod.start, rod.end) if isinstance(rod, Capsule) else (rod.center, rod.center)
     out = np.zeros(shapes.COLUMNS)
     run = end - start
@@ -129,7 +129,7 @@ Body = _CablePart | int  # part of a cable, -1 for the platform, or number of an
 def pairs_of(
     robot: Robots, obstacles: tuple[Obstacle, ...], platform: Box | Mesh | None, *, from_anchor: bool
 ) -> Pairs:
-    """All pairs of a robot and its obstacles; without `from_anchor`, pairs with a common anchor are omitted."""
+    """All pairs of a robot and its obstacles. Without `from_anchor`, pairs with a common anchor are omitted."""
     at_frame, at_platform = (_together(anchors) for anchors in anchors_of(robot))
     cables = range(len(at_frame))
     found: list[tuple[Body, Body]] = []  # part of a cable, -1 for the platform, or number of an obstacle

@@ -72,7 +72,7 @@ def _library() -> Library:
 
 
 def entry(function: F) -> F:
-    """A kernel that Python calls; it runs without Python's global lock."""
+    """A kernel that Python calls. It runs without Python's global lock."""
     if backend() == "c":
         found = _library().entry(function)
         if found is not None:
@@ -100,7 +100,7 @@ def glue(function: F) -> F:
 
 
 def _compiled(function: F, kind: str) -> F:
-    """The function for the back end; unchanged if the back end is the compiled library, which contains the kernels."""
+    """`function` for the back end. Unchanged if the back end is the compiled library, which contains the kernels."""
     if backend() == "numba":
         from sagline.kernels.with_numba import compiled
 

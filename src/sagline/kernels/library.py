@@ -80,7 +80,7 @@ class Entry:
     """A compiled kernel that Python calls, with one version per set of argument types."""
 
     def __init__(self, function: Callable[..., object], rows: list[_Row], library: ctypes.PyDLL, python: Any) -> None:
-        """Store the rows of the function; for `library` and `python` see `Library`."""
+        """Store `rows`, the rows of the function; for `library` and `python` see `Library`."""
         self.__wrapped__, self.__name__, self.__doc__ = function, function.__name__, function.__doc__
         self.__module__ = function.__module__
         self._rows = [(row, ctypes.addressof(row)) for row in rows]
@@ -99,7 +99,7 @@ class Entry:
         raise self._wrong_types()
 
     def bind(self, arguments: tuple[object, ...], numbers: int) -> Bound:
-        """Kernel with these arguments, which it keeps alive; the last numbers may change at each call."""
+        """Kernel with these arguments, which it keeps alive. The last `numbers` arguments may change at each call."""
         for row, address in self._rows:
             slots = (Slot * row.slots)()
             if self._fill(self._python, address, arguments, slots) == 0:
@@ -140,7 +140,7 @@ def value_of(slot: Slot, kind: bytes) -> object:
 
 
 def short_memory(name: str) -> ValueError:
-    """Error of an entry whose work arrays are too small."""
+    """Error of the entry `name` if its work arrays are too small."""
     return ValueError(f"work arrays of {name} are too small for the sizes of its other arguments")
 
 
@@ -188,7 +188,7 @@ class Library:
         return library
 
     def entry(self, function: Callable[..., object]) -> Entry | None:
-        """The compiled version of a function; None if the library has none."""
+        """The compiled version of a function. None if the library has no such version."""
         rows = self._rows.get(function.__name__)
         if rows is None or not function.__module__.startswith("sagline.kernels."):
             return None

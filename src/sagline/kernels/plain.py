@@ -1,6 +1,6 @@
 """Kernels as plain Python functions with the same results as the compiled code.
 
-At a division by zero, the root of a negative number or an overflow, Python raises an exception, but compiled code gives
+For a division by zero, the root of a negative number or an overflow, Python raises an exception. Compiled code gives
 inf, NaN or 0. `plain` replaces these operations in the source of a kernel. Compiled code does not detect an index
 outside an array, or the conversion of inf or NaN to an integer. In plain Python both raise an exception.
 """
@@ -56,7 +56,7 @@ class _Compiled(ast.NodeTransformer):
     """Transformer that replaces the operations in which Python and compiled code differ."""
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
-        """Remove the decorator; an entry also accepts numbers of NumPy."""
+        """Remove the decorator. An entry also accepts numbers of NumPy."""
         is_entry = any(getattr(each, "id", "") == ENTRY for each in node.decorator_list)
         node.decorator_list = []
         self.generic_visit(node)
@@ -96,7 +96,7 @@ class _Compiled(ast.NodeTransformer):
 
 
 def _call(name: str, *arguments: ast.expr) -> ast.Call:
-    """A call of a replacement, at the position of its first argument."""
+    """A call of the replacement `name`, at the position of its first argument."""
     return ast.copy_location(ast.Call(ast.Name(name, ast.Load()), list(arguments), []), arguments[0])
 
 
@@ -106,7 +106,7 @@ def _argument(value: Any) -> Any:
 
 
 def _number(value: Any) -> Any:
-    """Convert a number of NumPy to a number of Python; return other values unchanged."""
+    """Convert a number of NumPy to a number of Python. Other values are returned unchanged."""
     return value.item() if isinstance(value, np.generic) else value
 
 

@@ -35,7 +35,7 @@ FOLDER = base_folder()
 
 
 def digest(folder: Path, sources: Iterable[Path]) -> str:
-    """Digest of files below a folder: their names and contents."""
+    """Digest of the files `sources` below `folder`: their names and contents."""
     found = hashlib.sha256()
     for source in sorted(sources):
         found.update(source.relative_to(folder).as_posix().encode() + b"\0" + source.read_bytes())
@@ -44,7 +44,7 @@ def digest(folder: Path, sources: Iterable[Path]) -> str:
 
 @cache
 def digest_of_kernels() -> str:
-    """Digest of all kernels and of the module that loads their library; the other back ends are not included."""
+    """Digest of all kernels and of the module that loads their library. The other back ends are not included."""
     return digest(SOURCES, set(SOURCES.rglob("*.py")) - BACK_ENDS | {SOURCES / "library.py"})
 
 
@@ -54,7 +54,7 @@ def is_whole(content: bytes) -> bool:
 
 
 def sources_of(module: str, sources: Path) -> frozenset[Path]:
-    """Source files on which a kernel's machine code depends, below the folder of the kernels."""
+    """Source files below the folder of the kernels on which the machine code of `module` depends."""
     waiting, found = {module, "with_numba"}, set[Path]()
     while waiting:
         name = waiting.pop()
@@ -67,7 +67,7 @@ def sources_of(module: str, sources: Path) -> frozenset[Path]:
 
 @cache
 def _imported(source: str) -> frozenset[str]:
-    """Names that a file imports from the kernels: modules, and names in modules."""
+    """Names that the file `source` imports from the kernels: modules, and names in modules."""
     names = set()
     for match in IMPORT.finditer(source):
         package = match[1]
@@ -90,5 +90,5 @@ def folder_of(function_module: str) -> Path:
 
 @cache
 def say_once(line: str) -> None:
-    """Write a line to standard error; each line is written only once per process."""
+    """Write a line to standard error. Each line is written only once per process."""
     print(line, file=sys.stderr, flush=True)

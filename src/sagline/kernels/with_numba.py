@@ -54,7 +54,7 @@ class KernelCache:
             file.unlink(missing_ok=True)
 
     def load_overload(self, signature: object, target_context: Any) -> Any:
-        """Machine code for argument types; None if no usable file exists."""
+        """Machine code for the argument types `signature`. None if no usable file exists."""
         if not self._enabled:
             return None
         target_context.refresh()
@@ -74,7 +74,7 @@ class KernelCache:
         return _result._rebuild(target_context, *pickle.loads(content[DIGEST:]))
 
     def save_overload(self, signature: object, compiled: Any) -> None:
-        """Write the machine code for argument types; if this is not possible, report the cause."""
+        """Write the machine code for the argument types `signature`. If this is not possible, the cause is reported."""
         if not self._enabled or compiled.lifted or compiled.library.has_dynamic_globals:
             return
         payload = _dumps(compiled._reduce())
@@ -110,7 +110,7 @@ OPTIONS: Final[dict[str, dict[str, Any]]] = {
 
 
 def compiled(function: F, kind: str) -> F:
-    """A kernel whose machine code is kept on disk; a division by zero gives inf or NaN, as in NumPy.
+    """A kernel whose machine code is kept on disk. A division by zero gives inf or NaN, as in NumPy.
 
     Kernels allocate no memory (`sagline.kernels.memory`). Reference counting (_nrt) is therefore off; for arrays in
     NamedTuples it would take a quarter of the time.

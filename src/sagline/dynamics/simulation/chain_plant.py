@@ -54,7 +54,7 @@ class LoadedPlatform:
         return levers
 
     def state(self, place: Array, turning: Array, velocity: Array, spin: Array) -> Array:
-        """Compute the state row of the whole body from the pose and velocity of the platform."""
+        """State row of the whole body, computed from pose and velocity of the platform."""
         # shapes: place (3,) [m]; turning (3, 3); velocity (3,) [m/s]; spin (3,) [rad/s]
         lever, axes = turning @ self.center, turning @ self.axes
         moments = np.where(np.isinf(self.inertia[1:]), 0.0, self.inertia[1:])
@@ -78,7 +78,7 @@ class LoadedPlatform:
 
 
 def _about(masses: Array, places: Array) -> Array:
-    """Inertia of point masses (m,) at positions (m, 3) about the origin."""
+    """Inertia about the origin of the point masses `masses` (m,) at `places` (m, 3)."""
     squares = (places * places).sum(axis=1)
     inertia: Array = (masses * squares).sum() * np.eye(3) - (masses[:, None] * places).T @ places
     return inertia
@@ -93,10 +93,10 @@ STRETCH: Final = 1.1  # memory for nodes, relative to the longest required lengt
 
 
 class _ChainRecords(Records):
-    """Records of N steps from the kernel, with the shapes of the cables."""
+    """Records of N steps, which the kernel fills, with the shapes of the cables."""
 
     def __init__(self, count: int, cables: int, points: int) -> None:
-        """Allocate the arrays for a number of steps."""
+        """Allocate the arrays for `count` steps."""
         super().__init__(count, cables)
         self.points = np.full((count, cables, points, 3), np.nan)
 
@@ -121,7 +121,7 @@ class ChainPlant(Plant):
     cable_mass: ClassVar[str] = "lumped"
 
     def __init__(self, given: InitialConditions, data: Array, nodes: int, losses: Damping) -> None:
-        """Create the chains of a robot that rests or moves at the speed of its path; data (DATA_ROWS, m)."""
+        """Create the chains of a robot at rest, or in motion at the speed of its path; `data` (DATA_ROWS, m)."""
         state, robot = given.state, given.robot
         rest = chains_at_rest(state, nodes)
         super().__init__(robot, given.model, rest.pose, given.twist, state.unstrained_length, data)
@@ -185,7 +185,7 @@ class ChainPlant(Plant):
         )
 
     def records(self, count: int) -> _ChainRecords:
-        """Allocate records for a number of steps."""
+        """Allocate records for `count` steps."""
         return _ChainRecords(count, len(self.cables), self.nodes + 1)
 
     def platform_states(self, states: Array) -> Array:
@@ -199,7 +199,7 @@ class ChainPlant(Plant):
         self._chains = [np.delete(array, place, axis=0) for array in self._chains]
 
     def with_mass(self, mass: float, *, at_rest: bool) -> None:
-        """Change the platform's mass [kg] and its inertia in proportion; the cable masses at its ends are unchanged."""
+        """Set the platform's mass to `mass` [kg], its inertia in proportion. Cable masses at its ends are unchanged."""
         before, state = self._carrier, self.state
         spin = before.spin(state)
         moving = np.concatenate((state[: body.MOMENTUM], spin))
@@ -215,7 +215,7 @@ class ChainPlant(Plant):
             self.state[body.MOMENTUM :] = state[body.MOMENTUM :] + np.cross(arm, momentum)
 
     def failure(self, time: float, step: float) -> InvalidValueError:
-        """Create the error that explains why the kernel stopped."""
+        """Create the error for a kernel that stopped at `time` [s]. It explains the cause."""
         cable, how = int(self.cables[int(self.counters[FAILED]) - 1]), self.counters[ends.ENDED]
         if how == ends.GROWN:
             return super().failure(time, step)
@@ -243,12 +243,12 @@ def _chain_table(given: InitialConditions, place: Array, nodes: int, losses: Dam
 
 
 def checked_nodes(nodes: Any) -> int:
-    """Checked number of elements per cable."""
+    """The checked number `nodes` of elements per cable."""
     return whole_number(nodes, "nodes", FEWEST, MOST)
 
 
 def check_lumped(given: InitialConditions) -> None:
-    """Reject cables for which the lumped model is not valid."""
+    """Reject initial conditions `given` with cables for which the lumped model is not valid."""
     if given.model.code != codes.CATENARY:
         name, step = f"{type(given.model).__name__}()", 'Plan with Catenary(), or give cable_mass="none".'
         raise InvalidValueError("start: model", name, 'Catenary() where cable_mass="lumped"', step)
@@ -259,7 +259,7 @@ def check_lumped(given: InitialConditions) -> None:
 
 
 def wave_frequency(given: InitialConditions, nodes: int) -> float:
-    """Highest angular frequency of chains [rad/s], with the shortest element that can occur."""
+    """Highest angular frequency of chains [rad/s], computed for the shortest element that can occur."""
     material = given.robot.cables
     element = given.state.free_length / nodes
     return float((2.0 / SHORTEST / element * np.sqrt(material.axial_stiffness / material.linear_density)).max())

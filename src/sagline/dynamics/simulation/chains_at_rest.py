@@ -62,7 +62,7 @@ class _LumpedCables(NamedTuple):
 
 
 def chains_at_rest(state: Equilibrium, nodes: int) -> _ChainsAtRest:
-    """Compute the chains at rest that have the cable lengths of an equilibrium."""
+    """Compute the chains at rest with the cable lengths of the equilibrium `state`."""
     # The force in an element is the force of the exact cable at the center of the element. The end of the chain
     # therefore follows from the midpoint rule, and pose and forces have errors of the order nodes^-2. The wrench is
     # balanced to rounding. Source: docs/model.md, section 11
@@ -107,7 +107,7 @@ def _no_rest(item: str, value: str) -> InvalidValueError:
 
 
 def _solve_chains(chains: _LumpedCables, chord: Array, force: Array) -> Array:
-    """Forces on the platform ends of chains with given chords (m, 3), from nearby initial forces."""
+    """Forces on the platform ends of chains with chords (m, 3). The iteration starts from nearby initial forces."""
     near = False
     for _ in range(STEPS):
         missing = chord - chains.steps(force).sum(axis=1)
@@ -127,7 +127,7 @@ def _size(levers: Array) -> float:
 
 
 def _balancing_motion(unbalance: Array, stiffness: Array, freedom: Array, size: float) -> Array:
-    """Motion of the platform after which the wrench is balanced; zero in directions without stiffness."""
+    """Motion of the platform that removes `unbalance`. It is zero in directions without stiffness."""
     # example: for the rotation of a pendulum about its cable, stiffness and unbalance are zero, except for rounding
     units = np.array([1.0, 1.0, 1.0, size, size, size])
     slope = freedom @ (stiffness / np.outer(units, units)) @ freedom.T
@@ -150,7 +150,7 @@ def _platform_stiffness(blocks: Array, levers: Array, force: Array) -> Array:
 
 
 def _cross_matrix(vectors: Array) -> Array:
-    """Matrices (m, 3, 3) of the cross product with r."""
+    """Matrices (m, 3, 3) that turn a vector v into r x v, for the rows r of `vectors`."""
     matrix = np.zeros((len(vectors), 3, 3))
     x, y, z = vectors.T
     matrix[:, 0, 1], matrix[:, 0, 2], matrix[:, 1, 2] = -z, y, -x

@@ -39,19 +39,19 @@ class TimeTable:
 
     @classmethod
     def constant(cls, value: Array) -> TimeTable:
-        """Time table of constant numbers (n,)."""
+        """Time table of the constant numbers `value` (n,)."""
         none = np.empty((0, value.size))
         return cls(np.zeros(1), np.array(value[None]), none, none)
 
     @classmethod
     def linear(cls, time: Array, value: Array) -> TimeTable:
-        """Time table with linear interpolation between rows (K, n)."""
+        """Time table with linear interpolation between the rows of `value` (K, n)."""
         slope = np.diff(value, axis=0) / np.diff(time)[:, None]
         return cls(time, value, slope, slope)
 
     @classmethod
     def cubic(cls, time: Array, value: Array, rate: Array) -> TimeTable:
-        """Time table with cubic interpolation between rows (K, n) with known rates."""
+        """Time table with cubic interpolation between the rows of `value` (K, n), whose rates are `rate`."""
         return cls(time, value, np.ascontiguousarray(rate[:-1]), np.ascontiguousarray(rate[1:]))
 
     @property
@@ -64,16 +64,16 @@ class TimeTable:
         return time, value, begin, end
 
     def columns(self, columns: Any) -> TimeTable:
-        """Time table with a selection of the numbers."""
+        """Time table with only the numbers that `columns` selects."""
         return TimeTable(self.time, self.value[:, columns], self.begin[:, columns], self.end[:, columns])
 
     def joined_columns(self, other: TimeTable) -> TimeTable:
-        """Append the numbers of another time table that has the same instants."""
+        """Append the numbers of `other`, a time table with the same instants."""
         pairs = ((self.value, other.value), (self.begin, other.begin), (self.end, other.end))
         return TimeTable(self.time, *(np.concatenate(pair, axis=1) for pair in pairs))
 
     def at(self, time: float | Array) -> tuple[Array, Array]:
-        """Values and rates (..., n) at times (...). At a jump of the rate, the rate is the later one."""
+        """Values and rates (..., n) at the times `time` (...). At a jump of a rate, the later rate is returned."""
         at = np.asarray(time)
         if len(self.time) == 1:
             value = np.zeros((*at.shape, 1)) + self.value[0]
@@ -91,7 +91,7 @@ class TimeTable:
         return value, np.where(within[..., None], rate, 0.0)
 
     def with_instant(self, time: float) -> TimeTable:
-        """Insert one instant into the time table."""
+        """Insert the instant `time` into the time table."""
         if time in self.time:
             return self
         k = int(np.searchsorted(self.time, time))
@@ -108,7 +108,7 @@ class TimeTable:
         return TimeTable(times, values, begin, end)
 
     def with_stop(self, time: float, duration: float, columns: Any) -> TimeTable:
-        """Reduce some rates linearly to zero, from a given time on, during a duration [s]."""
+        """Reduce the rates of `columns` linearly to zero, from `time` on, within `duration` [s]."""
         table = self.with_instant(time).with_instant(time + duration)
         (start, rate), stop = table.at(time), time + duration
         later = np.flatnonzero(table.time >= time)
@@ -125,7 +125,7 @@ class TimeTable:
 
 
 def checked_time_table(given: Any, item: str, unit: str, columns: int, begin: float) -> TimeTable:
-    """Convert the argument of a caller to a time table: one constant row, or times and rows (linear in between)."""
+    """Convert `given` to a time table. It is one constant row, or times and rows with linear interpolation."""
     # shapes: given (n,) [s]; begin [s]
     if not (isinstance(given, tuple | list) and len(given) == 2):
         return TimeTable.constant(exactly(given, item, unit, (columns,)))
@@ -168,7 +168,7 @@ class InitialConditions:
 def initial_conditions(
     start: Any, unstrained_length: Any, wrench: Any, duration: Any, pose: PoseLike | None = None
 ) -> InitialConditions:
-    """Check the initial conditions and inputs of `simulate`; duration in s."""
+    """Check the initial conditions and inputs of `simulate`; `duration` in s."""
     if isinstance(start, Plan) and (start.path is not None or start.state.pose.shape):
         if unstrained_length is not None:
             step = "Give plan.state[0] to simulate lengths that differ from the plan."
@@ -265,7 +265,7 @@ def _check_robot(robot: Robot, model: CableModel) -> None:
 
 
 def check_set_points(robot: Robot, lengths: TimeTable) -> None:
-    """Reject lengths [m] that do not exceed the dead length."""
+    """Reject `lengths` [m] that do not exceed the dead lengths of `robot`."""
     checked(lengths.value, "unstrained_length", "m")
     least, dead = lengths.value.min(axis=0), dead_cable(robot)
     if (short := least <= dead).any():

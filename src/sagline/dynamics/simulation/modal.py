@@ -49,7 +49,7 @@ class _ModalMotion(NamedTuple):
 
 
 def modal_model(state: Equilibrium, damping: Damping) -> _ModalModel:
-    """Compute the modal model of a state."""
+    """Compute the modal model of `state`."""
     # source: docs/model.md, section 11
     found = vibration(state, up_to=UP_TO * float(np.nanmax(modes(state).frequency)), damping=damping)
     if found.status is not VibrationStatus.SOLVED:
@@ -123,7 +123,7 @@ def modal_response(frequency: Array, ratio: Array, force: Array, step: float) ->
 
 
 def modal_simulation(given: InitialConditions, damping: Damping, step: Any, record: float) -> Simulation:
-    """Simulate the small motion of a robot about its initial equilibrium; step and record in s."""
+    """Simulate the small motion of a robot about its initial equilibrium; `step` and `record` in s."""
     state = given.state
     _check(given)
     model = modal_model(state, damping)
@@ -173,14 +173,14 @@ def modal_simulation(given: InitialConditions, damping: Damping, step: Any, reco
 
 
 def check_modal_arguments(others: list[str]) -> None:
-    """Reject arguments that the modal model does not support."""
+    """Reject the arguments `others` that the modal model does not support."""
     if others:
         step = 'Omit it, or give cable_mass="lumped".'
         raise InvalidValueError(others[0], "given", 'not given for cable_mass="modal"', step)
 
 
 def _check(given: InitialConditions) -> None:
-    """Reject initial conditions for which modes do not exist."""
+    """Reject initial conditions `given` for which modes do not exist."""
     if given.state.contact is not None:
         step = 'Remove the winches of the robot, or give cable_mass="lumped".'
         raise InvalidValueError("start", "a robot with pulleys or dead length", 'none for cable_mass="modal"', step)

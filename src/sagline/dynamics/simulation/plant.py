@@ -30,7 +30,7 @@ NOTES: Final = 1000  # number of recorded unscheduled events after which a run p
 
 
 class Records:
-    """Records of N steps from the kernel.
+    """Records of N steps, which the kernel fills.
 
     Attributes:
         states: Center of mass, quaternion of the principal axes, velocity and angular velocity, (N, 13).
@@ -85,7 +85,7 @@ class Plant:
     cable_mass: ClassVar[str] = "none"
 
     def __init__(self, robot: Robot, model: CableModel, pose: Pose, twist: Array, length: Array, data: Array) -> None:
-        """Create the state of a robot at a pose; twist (6,); length (m,) [m]; data (DATA_ROWS, m)."""
+        """Create the state of `robot` at `pose`; `twist` (6,); `length` (m,) [m]; `data` (DATA_ROWS, m)."""
         m = robot.cable_count
         self.robot, self.model, self.data = robot, model, data
         moments, self.axes = _principal_axes(robot, pose)
@@ -115,7 +115,7 @@ class Plant:
     def arguments(
         self, rules: tuple[int, int, int, int, int], numbers: tuple[float, float, float, float], inputs: Any
     ) -> Any:
-        """First arguments of the kernel, without records and step counts. They change with a break or a new mass."""
+        """First arguments of the kernel, without records and step counts. A break or a new mass changes them."""
         lengths, wrenches, winds = inputs
         wide = lengths.value.shape[1]
         needed = 6 * 6 + 3 * body.STATE_COLUMNS + 4 * len(self.cables) + 2 * wide + 9
@@ -137,11 +137,11 @@ class Plant:
         return states
 
     def failure(self, time: float, step: float) -> InvalidValueError:
-        """Create the error for a kernel that stopped at a time [s], with a step [s]."""
+        """Create the error for a kernel that stopped at `time` [s]; `step`: time step [s]."""
         return energy_error(step, time, int(self.cables[int(self.counters[k.FAILED]) - 1]))
 
     def remove_cable(self, cable: int) -> None:
-        """Remove a cable; its index counts the cables of the original robot."""
+        """Remove the cable with the index `cable` in the original robot."""
         place = int(np.flatnonzero(self.cables == cable)[0])
         self.cables = np.delete(self.cables, place)
         self._table = np.delete(self._table, place, axis=0)
@@ -149,19 +149,19 @@ class Plant:
         self.rows, self.now, self.data = (np.delete(array, place, axis=1) for array in (self.rows, self.now, self.data))
 
     def cut(self, places: Any) -> None:
-        """Break cables during a run; the indices count the present cables, and the arrays keep their size."""
+        """Break the cables `places` during a run (indices of the present cables). The arrays keep their size."""
         # one factor reduces stiffness and weight, so that the cable keeps its shape at nearly zero force
         for column in (tables.STIFFNESS, tables.DENSITY):
             self._table[places, column] *= BROKEN
         self.counters[k.READY] = 0  # compute all forces and energies again
 
     def lock_winches(self, places: Any) -> None:
-        """Lock winches; the indices count the present cables. The kinetic energy of the winches is lost at once."""
+        """Lock the winches `places` (indices of the present cables). Their kinetic energy is lost at once."""
         self.now[d.HELD, places] = 1.0
         self.now[d.RATE, places] = 0.0
 
     def with_mass(self, mass: float, *, at_rest: bool) -> None:
-        """Change the mass [kg], and the inertia in proportion. The momentum is unchanged for a picked-up mass."""
+        """Set the mass to `mass` [kg], the inertia in proportion. With `at_rest` (pick-up), the momentum is kept."""
         factor = mass / self.inertia[0]
         self.inertia = self.inertia * factor
         if at_rest:
@@ -206,6 +206,6 @@ def _principal_axes(robot: Robot, pose: Pose) -> tuple[Array, Array]:
 
 
 def energy_error(step: float, time: float, cable: int) -> InvalidValueError:
-    """Create the error for a run whose energy drifts; step and time in s."""
+    """Create the error for a run whose energy drifts; `step` and `time` in s."""
     value = f"{step:g} s, which changes the energy without a cause: at {time:.6g} s, mostly in cable {cable}"
     return InvalidValueError("step", value, "a step that conserves the energy", f"Give step={0.2 * step:.3g}.")

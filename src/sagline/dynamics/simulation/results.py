@@ -99,12 +99,12 @@ KINDS = {Break: "break", Stall: "stall", Brake: "brake", Drop: "drop", PickUp: "
 
 
 def event_cable(event: Event) -> int | None:
-    """Index of the cable or winch to which an event applies; None for the platform or all winches."""
+    """Index of the cable or winch to which `event` applies. None for the platform or all winches."""
     return event.cable if isinstance(event, Break) else getattr(event, "winch", None)
 
 
 def checked_events(events: Any, robot: Robot, begin: float, end: float) -> tuple[Event, ...]:
-    """Check events between begin and end [s], and sort them by time."""
+    """Check that `events` are between `begin` and `end` [s], and sort them by time."""
     found: list[Event] = []
     for k, event in enumerate(elements(events, Event, "events", "Give sl.Break(cable=3, time=2.5), or several.")):
         if not isinstance(event, Event):
@@ -244,7 +244,7 @@ def energy_balance(kinetic: Array, potential: Array, supplied: Array, lost: Arra
 
 
 def displaced_pose(pose: Pose, robot: Robot, motion: Array) -> Pose:
-    """Pose after a displacement of the center of mass and a rotation about it, (..., 6) [m, rad]."""
+    """Pose after `motion` (..., 6): displacement of the center of mass [m], and rotation about this point [rad]."""
     center = pose.matrix @ robot.center_of_mass
     turned = Rotation.from_rotvec(motion[..., 3:])
     place = pose.position + center + motion[..., :3] - turned.as_matrix() @ center

@@ -70,7 +70,7 @@ class SimulationRun:
         return float(self.plant.audit[d.BEGIN] + step * self.step)
 
     def _advance(self, last: int) -> None:
-        """Integrate up to a given step, and record the motion."""
+        """Integrate up to the step `last`, and record the motion."""
         plant, first = self.plant, int(self.plant.counters[k.STEPS])
         row = first // self.every + 1 if plant.counters[k.READY] else 0
         records = plant.records(last // self.every + 1 - row)
@@ -93,7 +93,7 @@ class SimulationRun:
             self._store_records(self._record_now(), last // self.every + 1)
 
     def _store_records(self, records: Records, row: int) -> None:
-        """Copy kernel records into the complete record, starting at a row."""
+        """Copy the kernel's `records` into the complete record, from its row `row` on."""
         plant = self.plant
         rows = slice(row, row + int(plant.counters[k.RECORDS]))
         kept = slice(0, rows.stop - rows.start)
@@ -123,7 +123,7 @@ class SimulationRun:
         return here
 
     def apply_event(self, event: Event) -> None:
-        """Integrate up to an event and apply it at the first step at or after its time."""
+        """Integrate up to `event`, and apply `event` at the first step at or after its time."""
         plant = self.plant
         self._advance(self._step_of(event))
         time, before = self._time(int(plant.counters[k.STEPS])), _energy(self._record_now())
@@ -176,7 +176,7 @@ class SimulationRun:
         return self.until(math.inf)
 
     def until(self, time: float) -> Simulation:
-        """Continue to a time [s], and return the simulation up to this time."""
+        """Continue to `time` [s], and return the simulation up to this time."""
         ahead = (time - float(self.plant.audit[d.BEGIN])) / self.step
         records = math.ceil(min(ahead, self.steps) / self.every - 1e-9)
         last = max(min(records * self.every, self.steps), int(self.plant.counters[k.STEPS]))
@@ -187,11 +187,11 @@ class SimulationRun:
         return self._result(-(-last // self.every) + 1)
 
     def _step_of(self, event: Event) -> int:
-        """The first step at or after the time of an event."""
+        """The first step at or after the time of `event`."""
         return math.ceil((event.time - float(self.plant.audit[d.BEGIN])) / self.step - 1e-9)
 
     def _result(self, count: int) -> Simulation:
-        """Create the result from the present records."""
+        """Create the result from the first `count` records."""
         plant, states, removed = self.plant, self._record.states[:count], self._removed[:count]
         kinetic, potential, supplied, lost = (column.copy() for column in self._record.energies[:count].T)
         steps = np.minimum(self.every * np.arange(count), self.steps)
@@ -214,5 +214,5 @@ class SimulationRun:
 
 
 def _energy(here: Records) -> float:
-    """Kinetic and potential energy of the first record [J]."""
+    """Sum of kinetic and potential energy of the first record of `here` [J]."""
     return float(here.energies[0, k.KINETIC] + here.energies[0, k.POTENTIAL])

@@ -106,9 +106,9 @@ def simulate(
         Simulation. Its events include the times at which a cable became slack or a winch reached a limit.
 
     Raises:
-        InvalidValueError: If a plan has samples without a solution (the message names the first), the step exceeds the
-            stability limit, the energy grows without input (the message names time and cable), an event has a wrong
-            cable index, the robot lacks data of its winches, or an argument has the wrong type.
+        InvalidValueError: If a plan has samples without a solution: the message names the first. If the step exceeds
+            the stability limit. If the energy grows without input: the message names time and cable. If an event has a
+            wrong cable index, or the robot lacks data of its winches. If an argument has the wrong type.
 
     Examples:
         A downward gust on the platform, and its work:
@@ -150,7 +150,7 @@ def simulate(
 
 
 def losses_after_break(given: InitialConditions, elements: int = 0) -> Damping:
-    """Energy losses of the cables after a break, assumed if no losses are given."""
+    """Energy losses of the cables after a break. They are assumed if the caller gives no losses."""
     if elements:  # the damping of waves in stiff cables does not require smaller steps than the waves
         return Damping(loss_time=min(LOSS_TIME, 2.0 / wave_frequency(given, elements)))
     return Damping(loss_time=LOSS_TIME)
@@ -194,7 +194,7 @@ def started_run(
 
 
 def _set_points(given: InitialConditions, plant: Plant, kind: int) -> TimeTable:
-    """Set points of the drives: lengths, or, for drums, tensions and lengths along the winding path."""
+    """Set points of the drives: lengths. For drums: lengths along the winding path, then expected tensions."""
     if kind != d.DRUMS:
         return given.lengths
     stretch, table = 1.0 + plant.data[d.WINDING_STRAIN], given.lengths
@@ -219,7 +219,7 @@ def initial_plant(
 
 
 def checked_damping(damping: Damping | None) -> Damping:
-    """Damping of a simulation; no damping for None."""
+    """The checked damping of a simulation. None gives no damping."""
     found = optional(damping, Damping, "damping") or Damping()
     if found.modal_damping > 0.0:
         step = "Give loss_time or air_damping; modal damping needs modes."
@@ -250,7 +250,7 @@ def time_step(
     events: Any,
     waves: float = 0.0,
 ) -> float:
-    """Check the step [s] for the smallest platform mass of the run; waves: highest cable frequency [rad/s].
+    """Check `step` [s] for the smallest platform mass of the run; `waves`: highest angular frequency of cables [rad/s].
 
     Losses limit the step only for massless cables. For cables with mass, losses are integrated implicitly.
     """
@@ -261,7 +261,7 @@ def time_step(
 
 
 def _lightness(mass: float, events: tuple[Event, ...]) -> float:
-    """Largest factor by which dropped loads increase the platform frequency."""
+    """Largest factor by which drops among `events` increase the platform frequency."""
     least = now = mass
     for event in events:
         now += event.mass if isinstance(event, PickUp) else -event.mass if isinstance(event, Drop) else 0.0
@@ -277,7 +277,7 @@ def load_bits(losses: Damping, wrench: TimeTable, with_wind: bool) -> int:
 
 
 def _every(record: Any, step: float) -> int:
-    """Convert the interval between records [s] to a number of steps."""
+    """Convert the interval `record` between records [s] to a number of steps."""
     given = RECORD if record is None else number(record, "record", "s", above=0.0)
     if record is not None and given < 0.999 * step:
         raise InvalidValueError("record", f"{given:g} s", f">= {step:g} s, the step", "Increase it, or reduce step.")
@@ -285,7 +285,7 @@ def _every(record: Any, step: float) -> int:
 
 
 def _count(given: InitialConditions, step: float) -> int:
-    """Number of steps from begin to end."""
+    """Number of steps from the begin to the end of the simulation."""
     count = np.ceil((given.end - given.begin) / step - 1e-9)
     if not count <= MOST_STEPS:
         longest, advice = f"<= {MOST_STEPS * step:g} s, {MOST_STEPS:.0e} steps", "Simulate a shorter time."

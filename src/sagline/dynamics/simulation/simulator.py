@@ -97,8 +97,8 @@ class Simulator:
 
         Args:
             robot: The simulated robot, which may differ from the robot of the plan.
-            start: A pose, at which the robot rests with the tensions of `inverse`; or a single equilibrium with pose,
-                lengths off the drums and wrench.
+            start: A pose, at which the robot rests with the tensions of `inverse`. Or a single equilibrium, which gives
+                pose, lengths off the drums and wrench.
             winches: Same as in `simulate`.
             winding: Same as in `simulate`.
             integrator: Same as in `simulate`.
@@ -108,7 +108,7 @@ class Simulator:
             seed: Seed of the load cell noise.
 
         Raises:
-            InvalidValueError: If the robot lacks data of its winches, the step exceeds the stability limit, or an
+            InvalidValueError: If the robot lacks data of its winches. If the step exceeds the stability limit. If an
                 argument has the wrong type.
 
         Examples:
@@ -151,7 +151,7 @@ class Simulator:
         self._read()
 
     def _set_up_course(self, given: InitialConditions, m: int) -> None:
-        """Create the time table that connects the last set points to the next."""
+        """Create the time table that connects the last set points to the next set points."""
         drums = self._kind == d.DRUMS
         stretch = 1.0 + self._plant.data[d.WINDING_STRAIN] if drums else np.ones(m)
         lengths = np.repeat(given.lengths.value, 2, axis=0)
@@ -208,8 +208,8 @@ class Simulator:
 
         Raises:
             InvalidValueError: If the period is not a whole number of steps, a length is not longer than its dead
-                length, or an argument has the wrong type or shape. In these cases the state is unchanged. Also if the
-                energy grows without input.
+                length, or an argument has the wrong type or shape: the state is then unchanged. If the energy grows
+                without input.
         """
         count = self._count(dt)
         copy_in(self._asked, unstrained_length, "unstrained_length", "m")
@@ -243,7 +243,7 @@ class Simulator:
         raise AssertionError("a period that could not begin")
 
     def _count(self, dt: float) -> int:
-        """Number of steps in a period."""
+        """Number of steps in the period `dt`."""
         period = dt if type(dt) is float and 0.0 < dt < MOST_STEPS else number(dt, "dt", "s", above=0.0)
         parts = period / self._step
         count = round(min(parts, 2.0 * MOST_STEPS))
@@ -291,7 +291,7 @@ class Simulator:
             winches: Indices of the winches, from 0; none for all.
 
         Raises:
-            InvalidValueError: If a winch does not exist, or the length is not a number.
+            InvalidValueError: If a winch does not exist, or `length` is not a number.
         """
         chosen, by = self._chosen(winches), number(length, "length", "m")
         drums = self._kind == d.DRUMS
@@ -318,7 +318,8 @@ class Simulator:
             winches: Indices of the winches, from 0; none for all.
 
         Raises:
-            InvalidValueError: If a winch does not exist, the force is not a number >= 0, or the winches have no motors.
+            InvalidValueError: If a winch does not exist, or the winches have no motors. If `force` is not a number >=
+                0.
         """
         if self._kind != d.DRUMS:
             step = "Omit it: these winches have no motors."

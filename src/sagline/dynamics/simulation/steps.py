@@ -23,7 +23,7 @@ LONGEST: Final = 1e-3  # s
 
 
 def platform_frequency(robot: Robot, poses: Pose, lengths: Array) -> float:
-    """Highest angular frequency of the platform with all cables taut [rad/s]; sag reduces it."""
+    """Highest angular frequency of the platform with all cables taut [rad/s]. Sag reduces this frequency."""
     # shapes: lengths (K, m) [m]
     rotation, freedom = poses.matrix, robot.freedom
     levers = (robot.platform_anchors - robot.center_of_mass) @ np.swapaxes(rotation, 1, 2)
@@ -49,7 +49,7 @@ def platform_frequency(robot: Robot, poses: Pose, lengths: Array) -> float:
 def checked_step(
     step: float | None, integrator: int, highest: float, damping: Damping, stride: bool, waves: float = 0.0
 ) -> float:
-    """Check the step of a run [s]; highest and waves are angular frequencies [rad/s]."""
+    """Check the time step `step` [s] of a run. `highest` and `waves` are angular frequencies [rad/s]."""
     limit = _limit(integrator, max(highest, waves), damping)
     if step is None:
         usual = min(SHARE / LIMIT[integrator] * _limit(integrator, highest, damping), LONGEST)
@@ -69,7 +69,7 @@ def checked_step(
 
 
 def _limit(integrator: int, highest: float, damping: Damping) -> float:
-    """Longest stable step at an angular frequency [s]."""
+    """Longest stable step [s] at the angular frequency `highest`."""
     ratio = 0.5 * damping.loss_time * highest  # damping ratio at the highest frequency
     slower = math.sqrt(1.0 + ratio * ratio) - ratio
     return LIMIT[integrator] * slower / highest if highest > 0.0 else math.inf

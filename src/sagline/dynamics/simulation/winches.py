@@ -55,7 +55,7 @@ def winch_kind(winches: Any) -> int:
 
 
 def checked_winding(winding: Any, kind: int) -> Winding:
-    """Check the option winding; "remembered" is rejected for winches without drums."""
+    """Check the option `winding`. "remembered" is rejected for winches without drums."""
     found: Winding = choice(winding, "winding", get_args(Winding))
     if found == "remembered" and kind != d.DRUMS:
         step = 'Add winches="robot", or omit winding.'
@@ -64,7 +64,7 @@ def checked_winding(winding: Any, kind: int) -> Winding:
 
 
 def drive_data(robot: Robot, winches: Winches, length: Array, with_wind: bool) -> Array:
-    """Data of the drives for the kernels, (DATA_ROWS, m), at lengths (m,) [m]."""
+    """Data of the drives for the kernels, (DATA_ROWS, m), at the lengths `length` (m,) [m]."""
     data = np.zeros((d.DATA_ROWS, robot.cable_count))
     if isinstance(winches, SecondOrder):
         data[d.BANDWIDTH] = 2.0 * np.pi * winches.bandwidth
@@ -116,7 +116,7 @@ class Encoders:
     """
 
     def __init__(self, robot: Robot, wound: Array, stretch: Array) -> None:
-        """Create the encoders of a robot with complete drum data; wound (m,) [m]; stretch (m,)."""
+        """Create the encoders of a robot with complete drum data; `wound` (m,) [m]; `stretch` (m,)."""
         drums, m = drums_of(robot), robot.cable_count
         zero, rate = drums.zero_and_rate()
         self.counts = np.empty(m)
@@ -126,7 +126,7 @@ class Encoders:
 
     @staticmethod
     def are_on(robot: Robot) -> bool:
-        """True if a robot has all data for the computation of encoder counts."""
+        """True if `robot` has all data that the computation of encoder counts needs."""
         winch = robot.winches
         known = winch is not None and all(getattr(winch, name) is not None for name in COUNTED)
         return known and robot.cables.diameter is not None
@@ -145,7 +145,7 @@ class LoadCells:
     """
 
     def __init__(self, robot: Robot, seed: int, tension: Array) -> None:
-        """Create the load cells of a robot. If the robot has no winches, they measure the true tensions."""
+        """Create the load cells of `robot`. If the robot has no winches, the load cells measure the true tensions."""
         # shapes: tension (m,) [N]
         m, winch = robot.cable_count, robot.winches
         cells = np.array([np.ones(m), np.zeros(m), np.zeros(m), np.full(m, np.inf)])

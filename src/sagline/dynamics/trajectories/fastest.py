@@ -49,7 +49,7 @@ class _TimedSegment:
         return self.motion.duration * self.slower
 
     def at(self, time: Array) -> tuple[Pose, Array]:
-        """Poses, and twist with its first and second derivatives (3, N, 6)."""
+        """Poses at the times `time`, and the twists with their first and second derivatives (3, N, 6)."""
         values = self.motion.at(np.clip(time / self.slower, 0.0, self.motion.duration))
         jet = self.curve.at(np.clip(values[0], 0.0, 1.0))
         return jet.pose, jet.twists(values / self.slower ** np.arange(4)[:, None])
@@ -86,8 +86,8 @@ def fastest(
         Path at the sample rate of the given path. Its jerk is None without a jerk bound.
 
     Raises:
-        InvalidValueError: If the path is in motion at an end or reverses in the middle of a curve, the robot cannot
-            hold a pose at rest with this margin (the message names the pose), an argument is out of its range, or
+        InvalidValueError: If the path is in motion at an end or reverses in the middle of a curve. If the robot cannot
+            hold a pose at rest with this margin: the message names the pose. If an argument is out of its range. If
             winches with a speed_limit have no drum_radius.
 
     Source:
@@ -168,7 +168,7 @@ def _fastest_segment(
 
 
 def _checked(robot: Robot, timed: _TimedSegment, limits: tuple[float, float]) -> _TimedSegment:
-    """Slow the segment down slightly if it violates a limit between the positions."""
+    """Slow the segment `timed` down slightly if it violates a limit between the positions."""
     for again in range(_TRIES):
         pose, twists = timed.at(np.linspace(0.0, timed.duration, _INSTANTS))
         plan = inverse(robot, pose, wrench=inertial_wrench(robot, pose, twists[0], twists[1]))
@@ -200,7 +200,7 @@ def _has_speed_limits(robot: Robot) -> bool:
 
 
 def _winch_speed_bounds(robot: Robot, curve: Curve, place: Array, rest: Plan) -> Bounds:
-    """Bounds on the squared speed of the parameter, from the speed limits of the winches."""
+    """Bounds on the squared speed of the curve parameter that follow from the speed limits of the winches."""
     if not _has_speed_limits(robot):
         return lambda parameter: HalfPlanes(np.zeros((parameter.size, 0, 2)), np.zeros((parameter.size, 0)))
     fastest_cable = _fastest_rates(robot, rest.unstrained_length)
@@ -218,7 +218,7 @@ def _winch_speed_bounds(robot: Robot, curve: Curve, place: Array, rest: Plan) ->
 
 
 def _fastest_rates(robot: Robot, length: Array) -> Array:
-    """Largest length rates of the winches [m/s], at lengths (N, m)."""
+    """Largest length rates of the winches [m/s], at the lengths `length` (N, m)."""
     winch = robot.winches
     assert winch is not None
     assert winch.speed_limit is not None
@@ -228,7 +228,7 @@ def _fastest_rates(robot: Robot, length: Array) -> Array:
 
 
 def _speed_excess(plan: Plan) -> float:
-    """Largest ratio of a winch speed to its limit, at least 1."""
+    """Largest ratio of a winch speed in `plan` to its limit, at least 1."""
     assert plan.length_rate is not None
     limits = _fastest_rates(plan.state.one_robot, plan.unstrained_length)
     ratio = float(np.nanmax(np.abs(plan.length_rate) / limits))
@@ -238,7 +238,7 @@ def _speed_excess(plan: Plan) -> float:
 def _joined(
     path: Path, segments: Sequence[RestToRestSegment], timed: Sequence[_TimedSegment | None], bounded: bool
 ) -> Path:
-    """Create the path from the segments with their new motions."""
+    """Create the path from `segments`, which move as in `timed`."""
 
     def motion(k: int, time: Array) -> tuple[Pose, Array]:
         one = timed[k]

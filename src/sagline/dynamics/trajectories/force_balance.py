@@ -29,7 +29,7 @@ class HalfPlanes:
     bound: Array  # shape (K, R); infinite for a row without effect
 
     def joined(self, other: HalfPlanes) -> HalfPlanes:
-        """Combine two sets of half planes."""
+        """These half planes and those of `other` in one set."""
         return HalfPlanes(np.hstack((self.rates, other.rates)), np.hstack((self.bound, other.bound)))
 
 
@@ -52,7 +52,7 @@ class ForceBalance:
 
     @classmethod
     def at(cls, robot: Robot, jet: Jet, plan: Plan) -> ForceBalance:
-        """Force balance at positions, from a plan that is at rest at these positions."""
+        """Force balance at the positions of `jet`. The plan is at rest at these positions."""
         nothing = np.zeros(plan.chord_tension.shape)
         freedoms = robot.degrees_of_freedom
         one = np.zeros((len(nothing), 1, freedoms))
@@ -60,7 +60,7 @@ class ForceBalance:
         return new.at_poses(jet).with_sag_of(plan, np.zeros((len(jet.pose), 2)))
 
     def at_poses(self, jet: Jet) -> ForceBalance:
-        """Force balance at other poses close to these, with unchanged sag forces."""
+        """Force balance at the poses of `jet`, which are close to the present poses. The sag forces are unchanged."""
         robot, (first, second, _) = self.robot, jet.rates
         by_rate = inertial_wrench(robot, jet.pose, np.zeros_like(first), first)
         by_speed = inertial_wrench(robot, jet.pose, first, second)
@@ -73,7 +73,7 @@ class ForceBalance:
         return replace(self, jet=jet, wrenches=wrenches, normals=normals / size, gains=gains / size)
 
     def wrench(self, motion: Array) -> Array:
-        """Inertial wrench of accelerations and squared speeds (K, 2), shape (K, 6)."""
+        """Inertial wrench (K, 6) of `motion` (K, 2): accelerations and squared speeds."""
         total: Array = np.einsum("ck,cki->ki", motion.T, self.wrenches)
         return total
 
@@ -92,7 +92,7 @@ class ForceBalance:
         )
 
     def near_motion(self, motion: Array) -> ForceBalance:
-        """Update the sag forces for motions (K, 2) that are on the border of the tension limits or slightly outside."""
+        """Update the sag forces for motions (K, 2) on the border of the tension limits, or slightly outside."""
         # on the border the tensions are nearly unique, and rounding may make the pose infeasible; the smallest
         # extension of the limits with a solution is therefore used
         found, wrench = self, self.wrench(motion)
@@ -112,7 +112,7 @@ class ForceBalance:
 
 
 def _normals(matrix: Array) -> Iterator[Array]:
-    """Both normals of every plane that n - 1 columns of a matrix (n, m) span; input (K, n, m), result (K, 2 S, n)."""
+    """Both normals (K, 2 S, n) of every plane that n - 1 columns of a matrix span; `matrix` (K, n, m)."""
     # these include the normals of all facets of the zonotope; for dependent columns any normal gives a valid bound
     n, m = matrix.shape[1:]
     sets = np.array(list(combinations(range(m), n - 1)), dtype=np.intp).reshape(-1, n - 1)
@@ -136,7 +136,7 @@ class SpeedProfile:
 
     @classmethod
     def of(cls, place: Array, square: Array) -> SpeedProfile:
-        """Create a profile; its times follow from the squared speeds."""
+        """Create a profile whose times follow from the squared speeds `square`."""
         speed = np.sqrt(square)
         return cls(place, square, np.append(0.0, np.cumsum(2.0 * np.diff(place) / (speed[1:] + speed[:-1]))))
 
@@ -166,7 +166,7 @@ class SpeedProfile:
 
 
 def fastest_speed_profile(place: Array, planes: HalfPlanes) -> SpeedProfile | None:
-    """Rest-to-rest profile with the largest feasible speed at each position; place (K,)."""
+    """Rest-to-rest profile with the largest feasible speed at each position `place` (K,)."""
     # The backward pass computes the squared speeds from which the end can be reached. The forward pass uses the largest
     # acceleration within these speeds. A bound that is satisfied at both ends of a step is also satisfied within the
     # step, except for a small error due to the curvature of the bound. Source: Pham & Pham, A new approach to
@@ -190,7 +190,7 @@ def fastest_speed_profile(place: Array, planes: HalfPlanes) -> SpeedProfile | No
 
 
 def _rows(planes: HalfPlanes, i: int, step: float, reach: Array) -> tuple[Array, Array]:
-    """Bounds on (acceleration, squared speed) at position i, from positions i and i + 1 and from reachability."""
+    """Bounds on (acceleration, squared speed) at position i: those of the positions i and i + 1, and reachability."""
     sheared = planes.rates[i + 1].copy()
     sheared[:, 0] += 2.0 * step * sheared[:, 1]  # the squared speed grows by 2 step times the acceleration
     ahead = np.array([[2.0 * step, 1.0], [-2.0 * step, -1.0], [0.0, -1.0]])

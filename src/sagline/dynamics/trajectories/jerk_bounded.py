@@ -63,7 +63,7 @@ def _integration_matrices(pieces: int) -> Array:
 def fastest_jerk_profile(
     curve: Curve, robot: Robot, speeds: Bounds, limits: tuple[float, float], least: float
 ) -> JerkProfile | None:
-    """Fastest rest-to-rest profile found within tension limits and jerk bounds."""
+    """The fastest rest-to-rest profile that was found within tension limits and jerk bounds."""
     # The problem is linear in the jerk and in the squared time, except for three quantities: the position at each share
     # of the time, the squared speed at this position, and the third power of the time. Each iteration updates these
     # quantities and solves a linear program. Units: limits [m/s^3]; least [s]
@@ -114,7 +114,7 @@ def _first(curve: Curve, limits: tuple[float, float], least: float) -> JerkProfi
 
 
 def _within(planes: HalfPlanes, state: Array, speed: Array) -> tuple[Array, Array]:
-    """Rows of the linear program for the half planes at each knot; unknowns: jerks, squared time; (K r, P + 1)."""
+    """Rows (K r, P + 1) of the linear program for `planes` at each knot. Unknowns: the jerks, the squared time."""
     by_rate, by_square = (planes.rates[..., k, None] for k in range(2))
     left = by_rate * state[2][:, None] + by_square * 2.0 * speed[:, None, None] * state[1][:, None]
     rows = np.concatenate((left, -planes.bound[..., None]), axis=-1).reshape(-1, PIECES + 1)
@@ -125,7 +125,7 @@ def _within(planes: HalfPlanes, state: Array, speed: Array) -> tuple[Array, Arra
 
 
 def _jerk_rows(rates: Array, state: Array, course: JerkProfile, limit: float) -> tuple[Array, Array]:
-    """Rows of the linear program that limit the jerk R1 s''' + 3 R2 s' s'' + R3 s'^3 in some directions at knots."""
+    """Rows of the linear program: limits of the jerk R1 s''' + 3 R2 s' s'' + R3 s'^3 in some directions at knots."""
     # directions along the curve, across the curve and along the present jerk limit the magnitude of the final jerk;
     # shapes: rates (3, P + 1, 3)
     _, speed, rate = (values[:, None] for values in state @ course.jerk)
@@ -153,7 +153,7 @@ def _unit(vectors: Array) -> Array:
 
 
 def _without_redundant(planes: HalfPlanes) -> HalfPlanes:
-    """Select the half planes that bound the polygon in a sampled direction; all contain the origin."""
+    """Select the half planes that bound the polygon in a sampled direction. All half planes contain the origin."""
     normed = planes.rates / np.maximum(planes.bound, _NOTHING)[..., None]  # 0 for an infinite bound
     scale = np.maximum(np.abs(normed).max(axis=1, keepdims=True), _NOTHING)
     angle = np.linspace(-0.5 * np.pi, 0.5 * np.pi, _SIDES)

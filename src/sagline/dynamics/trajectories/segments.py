@@ -154,7 +154,7 @@ def _vector(a: Array, b: Array) -> Array:
 
 
 def piecewise(knots: Array, values: Array, at_end: int) -> Any:
-    """Piecewise polynomial from derivatives at both ends of each piece; four derivatives per end give degree 7."""
+    """Piecewise polynomial with the derivatives `values` at `knots`. Four derivatives per knot give degree 7."""
     # shapes: knots (n,); values (K, n)
     from scipy.interpolate import PPoly  # this import takes longer than the rest of motion
 
@@ -254,7 +254,7 @@ def _standing(path: Path) -> Array:
 
 
 def _segment(path: Path, begin: float, end: float) -> RestToRestSegment:
-    """Segment between two rests. If a rest is between samples, the adjacent polynomial is extended to it."""
+    """Segment from the rest `begin` to the rest `end`. If a rest is between samples, a polynomial is extended to it."""
     near = _SAME_TIME * max(path.duration, abs(begin))
     first, last = np.searchsorted(path.time, (begin - near, end + near))
     part = slice(int(first), int(last))
@@ -285,7 +285,7 @@ def _segment(path: Path, begin: float, end: float) -> RestToRestSegment:
 
 
 def _parametrized(time: Array, pose: Pose, rates: list[Array]) -> tuple[Curve, Array]:
-    """Curve through samples; parameter at each sample with its derivatives, shape (K, n)."""
+    """Curve through samples, and the parameter at each sample with its derivatives, shape (K, n)."""
     line = _LineCurve.between(pose)
     if line.moves:
         parameter, square = line.parameter(pose), float(line.direction @ line.direction)
@@ -304,7 +304,7 @@ def _parametrized(time: Array, pose: Pose, rates: list[Array]) -> tuple[Curve, A
 
 
 def sample_time(path: Path) -> float:
-    """Typical time between samples [s]. If the sample rate is nearly a whole number, it is rounded."""
+    """Typical time between samples [s]. A sample rate that is nearly a whole number is rounded to this number."""
     if len(path) < 2:
         raise InvalidValueError("path", "of one sample", "two or more, from rest to rest", "Give a longer path.")
     rate = 1.0 / float(np.median(np.diff(path.time)))
@@ -319,7 +319,7 @@ def joined_path(
     *,
     with_jerk: bool,
 ) -> Path:
-    """Segments of a path with new durations [s], at the sample rate of the path."""
+    """Path from `segments` with the new `durations` [s], at the sample rate of `path`."""
     # The arguments of `motion` are the index of a moving segment and times since its start. It returns poses, and
     # twists with their first two derivatives, (3, N, 6).
     ends = np.cumsum(durations)

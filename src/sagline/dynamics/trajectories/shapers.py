@@ -50,7 +50,7 @@ class Shaper(Result):
             frequency: Design frequencies [Hz], > 0, shape (F,).
 
         Raises:
-            InvalidValueError: If times, amplitudes or frequencies do not satisfy these conditions.
+            InvalidValueError: If `time`, `amplitude` or `frequency` does not satisfy these conditions.
 
         Examples:
             >>> import sagline as sl
@@ -79,11 +79,11 @@ class Shaper(Result):
             other: A shaper.
 
         Returns:
-            Shaper of both. It has one impulse for every impulse of this shaper combined with every impulse of the other
-            shaper; impulses at the same time are merged.
+            Shaper of both. It has one impulse for every pair of an impulse of this shaper and an impulse of `other`.
+            Impulses at the same time are merged.
 
         Raises:
-            InvalidValueError: If other is not a shaper, or the product would have more than 10,000 impulses.
+            InvalidValueError: If `other` is not a shaper, or the product would have more than 10,000 impulses.
         """
         theirs = instance(other, Shaper, "the other factor")
         if (count := self.time.size * theirs.time.size) > MOST_IMPULSES:
@@ -199,7 +199,7 @@ def EI(frequency: ArrayLike, tolerance: ArrayLike = 0.05) -> Shaper:  # noqa: N8
 
 
 def _several(frequency: ArrayLike, option: ArrayLike, name: str, make: Callable[[float, float], Shaper]) -> Shaper:
-    """Multiply one shaper per frequency; each option is a number >= 0 and < 1."""
+    """Product of one shaper per frequency. Each value of `option` is a number >= 0 and < 1."""
     frequencies, options = checked(frequency, "frequency", "Hz", above=0.0), checked(option, name, "", low=0.0)
     if (options >= 1.0).any():
         raise InvalidValueError(name, f"{options.max():g}", ">= 0, < 1", "Give a share, 0.05 for 5 %.")
@@ -271,7 +271,7 @@ def shaped(path: Path, shaper: Shaper) -> Path:
         Path at the same sample rate. Each segment is longer by the duration of the shaper.
 
     Raises:
-        InvalidValueError: If the path is in motion at an end or reverses in the middle of a curve, or a frequency of
+        InvalidValueError: If the path is in motion at an end or reverses in the middle of a curve. If a frequency of
             the shaper is above half the path's sample rate.
 
     Source:
@@ -305,7 +305,7 @@ def shaped(path: Path, shaper: Shaper) -> Path:
 
 
 def _shaped_parameter(segment: RestToRestSegment, shaper: Shaper, time: Array) -> Array:
-    """Parameter of a shaped segment and its first three derivatives at times since its start, shape (4, N)."""
+    """Parameter of the shaped segment and its first three derivatives, (4, N), at `time` since the segment's start."""
     motion = np.zeros((4, time.size))
     for delay, share in zip(shaper.time, shaper.amplitude, strict=True):
         motion += share * segment.rates(time - delay)

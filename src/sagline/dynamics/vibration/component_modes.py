@@ -40,7 +40,7 @@ def _lobatto() -> Lobatto:
 
 
 def _slopes(nodes: Array, last: Array) -> Array:
-    """Derivatives of the Lagrange polynomials at the nodes, from the highest Legendre polynomial there (`last`)."""
+    """Derivatives of the Lagrange polynomials at the nodes; `last`: values of the highest Legendre polynomial there."""
     apart = nodes[:, None] - nodes
     np.fill_diagonal(apart, 1.0)
     slopes = last[:, None] / last / apart
@@ -137,7 +137,7 @@ class PlaneModes(NamedTuple):
 
 
 def component_modes(strings: Strings, row: int, up_to: float) -> CableComponents:
-    """Cable modes of one state. Modes up to a frequency are accurate; higher modes only complete the basis."""
+    """Cable modes of one state. Modes up to `up_to` [Hz] are accurate. Higher modes only complete the basis."""
     # units: up_to [Hz]
     omega = 2.0 * np.pi * up_to
     taut = np.flatnonzero(strings.taut[row])
@@ -177,7 +177,7 @@ def _motions(matrix: Array, rest: Array, free: Flags, first: int) -> PlaneModes:
 def _still(mass: Array, axes: Array, taut: Indices, count: int) -> Array:
     """Mass matrices of all cables in world axes, (m, 3, 3), zero for slack cables.
 
-    mass: elements xx, xz, zz, yy of the mass matrix of each taut cable, in the axes of the cable.
+    mass: elements xx, xz, zz, yy of each taut cable's mass matrix, in the axes of the cable.
     """
     own = np.zeros((taut.size, 3, 3))
     own[:, 0, 0], own[:, 0, 2], own[:, 2, 0], own[:, 2, 2], own[:, 1, 1] = mass[:, [0, 1, 1, 2, 3]].T
@@ -187,7 +187,7 @@ def _still(mass: Array, axes: Array, taut: Indices, count: int) -> Array:
 
 
 def _node_motion(components: CableComponents, ends: Array, amplitudes: Array) -> tuple[Array, Array]:
-    """Displacements of the nodes in the cables' planes and normal to them, times the root of the node's mass."""
+    """Displacements of the nodes in the cables' planes, then normal to them, both times the root of the node's mass."""
     # shapes: ends (m, 3, K); amplitudes (T, K); returns (t, 2 nodes, K)
     plane, normal = (
         motions.rest @ end + motions.shape @ given for motions, end, given in components.planes(ends, amplitudes)
@@ -222,7 +222,7 @@ def stretch_energy(components: CableComponents, ends: Array, amplitudes: Array) 
 
 
 def stretch_stiffness(components: CableComponents) -> Array:
-    """Stretch stiffness between quasi-static displacements of the platform end and the in-plane modes."""
+    """Stretch stiffness matrix of the quasi-static displacements of the platform end and the in-plane modes."""
     # returns (t, 2 + k, 2 + k)
     motions = components.plane
     basis = np.concatenate((motions.rest, motions.shape), axis=2)

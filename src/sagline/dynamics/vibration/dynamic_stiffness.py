@@ -102,7 +102,7 @@ def dynamic_stiffness(state: Equilibrium, frequency: ArrayLike, damping: Damping
 
 
 def single_state(state: Equilibrium) -> Equilibrium:
-    """Check a single equilibrium and return it unchanged."""
+    """Check that `state` is a single equilibrium, and return it unchanged."""
     if state.pose.shape:
         step = "Select a single pose: state[i]."
         raise InvalidValueError("state", f"a batch of {len(state)}", "a single state", step)
@@ -110,7 +110,7 @@ def single_state(state: Equilibrium) -> Equilibrium:
 
 
 def check_solved(state: Equilibrium) -> None:
-    """Reject a state without lengths."""
+    """Reject `state` if it has no lengths."""
     if np.isnan(state.unstrained_length).any():
         raise InvalidValueError(
             "state", "a state without lengths", "a state that was solved", "See the status of the plan."
@@ -118,7 +118,7 @@ def check_solved(state: Equilibrium) -> None:
 
 
 def check_model(state: Equilibrium) -> None:
-    """Reject cable models without vibrations: shallow cables have no potential energy, straight cables no stretch."""
+    """Reject cable models without vibrations. Shallow cables have no potential energy, straight cables no stretch."""
     model = state.cables.model
     if model.code not in (codes.CATENARY, codes.ELASTIC):
         step = "Solve the pose with Catenary(), the default."
@@ -144,7 +144,7 @@ def moving_stiffness(strings: Strings, frequency: Array, damping: Damping | None
 
 
 def check_counts(counts: NDArray[np.int64], frequency: Array) -> None:
-    """Reject a frequency at which a cable would need too many elements, or has no solution."""
+    """Reject `frequency` if a cable would need too many elements, or has no solution, at one of its values."""
     # shapes: counts (1, F, m, 2); frequency (F,) [Hz]
     high = np.flatnonzero((counts == collocation.TOO_MANY).any(axis=(0, 2, 3)))
     if high.size:
@@ -171,7 +171,7 @@ def in_world(found: NDArray[np.float64] | Complex, axes: Array) -> Complex:
 
 
 def waves_of(frequency: Array, damping: Damping | None) -> Complex:
-    """Array of frequencies and damping for the kernels."""
+    """Array for the kernels that contains `frequency` and `damping`."""
     # shapes: frequency (F,) [Hz]; returns (1, F, WAVE_COLUMNS)
     omega = 2.0 * np.pi * frequency
     waves = np.zeros((1, frequency.size, collocation.WAVE_COLUMNS), dtype=np.complex128)

@@ -53,7 +53,7 @@ class _CatenaryState(NamedTuple):
 
 
 def flexibility(state: Equilibrium, force: Array) -> Flexibility:
-    """Compute the derivatives of the flexibility of the free spans."""
+    """Compute the flexibility derivatives of the free spans."""
     # shapes: force (..., m, 3) [N]
     cables = state.cables
     length = cables.unstrained_length
@@ -135,7 +135,7 @@ def _turned(hung: _CatenaryState) -> Array:
 
 
 def _by_weight(hung: _CatenaryState) -> Array:
-    """Derivative with respect to the weight per length at fixed platform-end force, (..., 3, 3)."""
+    """Derivative (..., 3, 3) with respect to the weight per length, at a constant force on the platform end."""
     h, product = hung.h, hung.product
     lifted = -hung.length * hung.slope / product
     turned = _turned(hung)
@@ -188,7 +188,7 @@ def _plane_of(along: Array, across: Array, mixed: Array, up: Array) -> Array:
 
 
 def _symmetric(parts: dict[tuple[int, int, int], Array]) -> Array:
-    """Tensor that is symmetric in all three axes, from its independent elements."""
+    """Tensor that is symmetric in all three axes, with the independent elements `parts`."""
     whole = np.zeros((*next(iter(parts.values())).shape, 3, 3, 3))
     for place, values in parts.items():
         for turned in permutations(place):

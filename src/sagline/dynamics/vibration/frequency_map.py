@@ -43,7 +43,7 @@ class FrequencyMap(Result, Saved, Tabular):
     """Result of `frequency_map` at N poses.
 
     Values are numbers for the statuses SOLVED and FOLDED, otherwise NaN. Frequencies are also NaN if no mode is below
-    up_to.
+    `up_to`.
 
     Attributes:
         robot: The robot.
@@ -93,7 +93,7 @@ def frequency_map(
 ) -> FrequencyMap:
     """Lowest frequency and largest receptance of a robot at many poses, with cable mass.
 
-    At each pose, all modes below up_to are computed as in `vibration`. An exact count confirms the number of modes.
+    At each pose, all modes below `up_to` are computed as in `vibration`. An exact count confirms the number of modes.
 
     Args:
         robot: The robot.
@@ -107,7 +107,8 @@ def frequency_map(
         FrequencyMap.
 
     Raises:
-        InvalidValueError: If an argument has the wrong type, up_to is not positive, or too many modes are below it.
+        InvalidValueError: If an argument has the wrong type. If `up_to` is not positive, or too many modes are below
+            it.
         SaglineError: If the number of modes differs from the exact count; the message names the pose.
 
     Examples:
@@ -150,7 +151,7 @@ def frequency_map(
 
 
 def _status(model: VibrationModel, row: int) -> tuple[VibrationStatus, float]:
-    """Status of a pose, and the lowest frequency with massless cables [Hz]."""
+    """Status of the pose `row`, and the lowest frequency with massless cables [Hz]."""
     if np.isnan(model.stiffness[row]).any():
         return VibrationStatus.NO_LENGTHS, np.nan
     frequency, leaving = massless_modes(model, row)
@@ -163,7 +164,7 @@ def _status(model: VibrationModel, row: int) -> tuple[VibrationStatus, float]:
 def _numbers_of_pose(
     state: Equilibrium, model: VibrationModel, row: int, up_to: float, damping: Damping, lowest: float
 ) -> tuple[float, ...]:
-    """Compute the values of one pose, in the order of `FrequencyMap`; lowest: lowest massless frequency [Hz]."""
+    """Compute the values of one pose, in the order of `FrequencyMap`; `lowest`: lowest massless frequency [Hz]."""
     freedom = model.freedom
     rest = compliance_of(freedom, model.stiffness[row])[:3, :3]
     found = state_modes(model, row, up_to)

@@ -76,17 +76,17 @@ def frequency_slopes(state: Equilibrium | HasState, together: float = 1e-6) -> F
     """Analytic derivatives of every natural frequency with respect to the robot's data, pose and wrench.
 
     Args:
-        state: For the massless frequencies of `modes`: a single equilibrium, a plan of a single pose, or a robot and
-            then a pose. For frequencies with cable mass: a vibration. Cables are exact or weightless, without pulleys
-            and dead lengths.
+        state: For the massless frequencies of `modes`: a single equilibrium; a plan of a single pose; or a robot and a
+            pose. For frequencies with cable mass: a vibration. Cables are exact or weightless, without pulleys and dead
+            lengths.
         together: Largest relative difference of adjacent frequencies that count as equal.
 
     Returns:
         FrequencySlopes; NaN where a frequency is NaN.
 
     Raises:
-        InvalidValueError: If the state has another type, is a batch, has no lengths, or has shallow cables, pulleys or
-            dead lengths; if the vibration was not solved.
+        InvalidValueError: If the state has another type, is a batch, or has no lengths. If it has shallow cables,
+            pulleys or dead lengths. If the vibration was not solved.
 
     Examples:
         The cable whose axial stiffness has the largest effect on the first massless frequency, and the effect of the
@@ -136,7 +136,7 @@ def _rest(state: Equilibrium) -> StateSlopes:
 
 
 def _groups(frequency: Array, together: float) -> Iterator[Indices]:
-    """Index groups of adjacent frequencies that count as equal; the frequencies are ascending."""
+    """Groups of the indices of adjacent frequencies that count as equal. `frequency` is ascending."""
     apart = ~(np.diff(frequency) <= together * frequency[1:])
     borders = [0, *(np.flatnonzero(apart) + 1).tolist(), len(frequency)]
     for first, last in pairwise(borders):
@@ -182,7 +182,7 @@ def _result(
 
 
 def _parting(form: Array, frequency: Array) -> Array:
-    """Derivatives of a group's frequencies (g, ...), from those of the squared angular frequency (..., g, g)."""
+    """Derivatives (g, ...) of a group's frequencies from `form` (..., g, g), those of the squared angular frequency."""
     known: Flags = np.asarray(np.isfinite(form).all(axis=(-1, -2)))
     squares = np.linalg.eigvalsh(np.where(known[..., None, None], form, 0.0))
     squares = np.where(known[..., None], squares, np.nan)

@@ -104,9 +104,9 @@ def linearized(state: Equilibrium, damping: Damping | None = None, inputs: Input
         The system.
 
     Raises:
-        InvalidValueError: If the state has another type, is a batch, or has no lengths; for `air_damping`, which acts
-            only on cables with mass; for `loss_time` with "lengths" as inputs, because the tensions then depend on
-            winch speeds.
+        InvalidValueError: If the state has another type, is a batch, or has no lengths. If `damping` has `air_damping`,
+            which acts only on cables with mass. If it has `loss_time` and `inputs` is "lengths", because the tensions
+            then depend on winch speeds.
 
     Examples:
         Static displacement of the platform due to 1 mm of cable 0 that is wound in:
@@ -238,7 +238,7 @@ def _stretch_loss(state: Equilibrium, slopes: CableSlopes, loss_time: float) -> 
 
 
 def _modal_drag(state: Equilibrium, ratio: float) -> Array:
-    """Damping matrix of the platform with the same damping ratio for every stable massless mode, shape (6, 6)."""
+    """Damping matrix (6, 6) of the platform that gives every stable massless mode the damping ratio `ratio`."""
     found, mass = modes(state), mass_matrix(state)
     momenta = mass @ found.shape
     drag: Array = momenta * (2.0 * ratio * 2.0 * np.pi * np.nan_to_num(found.frequency)) @ momenta.T

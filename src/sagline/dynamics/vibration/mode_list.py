@@ -21,7 +21,7 @@ _TINY = np.finfo(float).tiny
 
 
 def end_displacements(state: Equilibrium, shape: Array) -> Array:
-    """Displacements (m, 3, n) of the platform ends due to motions (6, n) of the platform."""
+    """Displacements (m, 3, n) of the platform ends due to the platform motions `shape` (6, n)."""
     robot = state.one_robot
     return motions_of_ends((robot.platform_anchors - robot.center_of_mass) @ state.pose.matrix.T) @ shape
 
@@ -44,7 +44,7 @@ def stretch_losses(state: Equilibrium, platform: Modes, loss_time: float) -> Arr
 
 
 def quasi_static_displacements(state: Equilibrium, ends: Array, count: int) -> Array:
-    """Quasi-static displacement of the cables due to displacements of their platform ends, to first order."""
+    """Quasi-static displacement of the cables, to first order, if their platform ends move by `ends`."""
     # shapes: ends (m, 3); returns (m, count, 3)
     middles = (np.arange(count - 1) + 0.5) / (count - 1)
     tangent, sag, stretch = _along(state, middles)
@@ -60,13 +60,13 @@ def quasi_static_displacements(state: Equilibrium, ends: Array, count: int) -> A
 
 
 def _behind(strings: Strings) -> Array:
-    """Motion of each exit point that the routing allows: its direction times the root of the compliance, (m, 3)."""
+    """Motion (m, 3) that the routing allows each exit point: its direction times the root of the compliance."""
     table, axes = strings.table[0], strings.axes[0]
     return np.asarray(table[:, columns.BEHIND_X, None] * axes[:, 0] + table[:, columns.BEHIND_Z, None] * axes[:, 2])
 
 
 def _along(state: Equilibrium, place: Array) -> tuple[Array, Array, Array]:
-    """Unit tangents (m, s, 3) at shares of the length (s,), and flexibilities across and along the cable."""
+    """Unit tangents (m, s, 3) at the length shares `place` (s,), and flexibilities across and along the cable."""
     # The flexibility of a cable is L (1/N + 1/EA) across its tangent and L/EA along it [m/N]
     cables, robot = state.cables, state.one_robot
     length = cables.unstrained_length[:, None]

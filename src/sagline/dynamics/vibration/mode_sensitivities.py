@@ -61,7 +61,7 @@ def state_slopes(state: Equilibrium) -> StateSlopes:
 
 
 def square_derivatives(rest: StateSlopes, swings: ModeGroup) -> SquareDerivatives:
-    """Derivatives of a squared angular frequency, including the motion of the platform to its new equilibrium."""
+    """Derivatives of a squared angular frequency. They include the motion of the platform to its new equilibrium."""
     robot, pose = rest.state.one_robot, _by_pose(rest, swings)
     turns = rest.state.pose.matrix.T @ swings.motion[3:]
     spins = np.einsum("ia,jb->ijab", turns, turns)
@@ -142,7 +142,7 @@ class _Waves(NamedTuple):
 
 
 def string_data(rest: StateSlopes) -> tuple[StringData, ...]:
-    """String data of the cables of a state."""
+    """String data of the cables of the state `rest`."""
     cables = rest.state.cables
     gravity = 0.0 if cables.model.weightless else cables.gravity
     density, stiffness = (
@@ -155,7 +155,7 @@ def string_data(rest: StateSlopes) -> tuple[StringData, ...]:
 
 
 def mode_group(rest: StateSlopes, cables: tuple[StringData, ...], frequency: Array) -> ModeGroup:
-    """Modes of adjacent frequencies [Hz], which count as equal."""
+    """Modes of the adjacent frequencies `frequency` [Hz], which count as equal."""
     omega, group = 2.0 * np.pi * float(frequency.mean()), len(frequency)
     omega *= 1.0 + _correction(rest, cables, omega, group)  # this step multiplies the error by the factor CLOSE
     waves = [_waves(cable, omega) for cable in cables]
@@ -248,7 +248,7 @@ def _edges(cable: StringData, omega: float) -> Array:
 
 
 def _longest(cable: StringData, omega: float, start: Array, end: Array) -> Array:
-    """Largest allowed element lengths [m] in parts of a cable."""
+    """Largest allowed element lengths [m] in the parts of a cable from `start` to `end`."""
     low, high = (cable.force[2] - cable.weight * (cable.length - s) for s in (start, end))
     least = np.hypot(np.hypot(*cable.force[:2]), np.maximum(np.maximum(low, -high), 0.0)) + TINY
     slowness = np.sqrt(cable.density * (1.0 / least + 1.0 / cable.stiffness))
@@ -277,7 +277,7 @@ def _forms(
 
 
 def _turned(force: Array, pulled: Array) -> Array:
-    """Derivatives of f^T dC f with respect to the static force, for each pair of modes, (P, g, g, 3)."""
+    """Derivatives (P, g, g, 3) of f^T dC f with respect to the static force, for each pair of modes."""
     size = np.linalg.norm(force, axis=-1)[:, None, None]
     along = np.einsum("pi,pig->pg", force, pulled)
     both = np.einsum("pia,pib->pab", pulled, pulled)

@@ -33,12 +33,12 @@ class Receptance(NamedTuple):
     damping: Damping  # energy losses
 
     def fixed_end_modes(self, up_to: float) -> FixedEndModes:
-        """Fixed-end modes of the cables up to a frequency [Hz]."""
+        """Fixed-end modes of the cables up to the frequency `up_to` [Hz]."""
         components = component_modes(self.model.strings, 0, max(TAKEN * up_to, LOWEST))
         return components, stretch_stiffness(components) if self.damping.loss_time > 0.0 else None
 
     def by_modes(self, frequency: Array, held: FixedEndModes) -> tuple[Complex, Complex]:
-        """Compliance with cable mass, from the modes of the cables, and compliance with massless cables."""
+        """Two compliances: with cable mass, computed from the modes of the cables, and with massless cables."""
         # shapes: frequency (F,) [Hz]; returns (F, 6, 6)
         found = np.empty((2, frequency.size, 6, 6), dtype=np.complex128)
         for part in blocks(frequency.size, BLOCK):
@@ -48,7 +48,7 @@ class Receptance(NamedTuple):
         return found[0], found[1]
 
     def exact(self, frequency: Array) -> Complex:
-        """Compliance from the exact dynamic stiffness of the cables; frequency (F,) [Hz]; returns (F, 6, 6)."""
+        """Compliance (F, 6, 6), computed from the exact dynamic stiffness of the cables; `frequency` (F,) [Hz]."""
         strings = self.model.strings
         moving = moving_stiffness(strings, frequency, self.damping)
         moving -= 2j * self.damping.modal_damping * self.cables  # the whole stiffness already includes modal damping
@@ -56,7 +56,7 @@ class Receptance(NamedTuple):
         return self._compliance(frequency, moving)
 
     def _compliance(self, frequency: Array, moving: Complex) -> Complex:
-        """Compliance: inverse of the dynamic stiffness. moving: dynamic part of the cables' stiffness, (F, m, 3, 3)."""
+        """Compliance: inverse of the dynamic stiffness. `moving` (F, m, 3, 3): dynamic part of cables' stiffness."""
         model, omega = self.model, 2.0 * np.pi * frequency[:, None, None]
         ends, freedom = model.ends[0], model.freedom
         on_platform = np.einsum("mai,fmab,mbj->fij", ends, moving, ends, optimize=True)
@@ -100,7 +100,7 @@ def _driven_stiffness(motions: PlaneModes, square: Complex, loss: complex) -> Co
 def _driven_stiffness_with_loss(
     motions: PlaneModes, square: Complex, loss: complex, lost: Array, scaled: Complex
 ) -> tuple[Complex, Complex]:
-    """Contribution of the fixed-end modes to the platform-end stiffness, with stretch loss; lost (t, d + k, d + k)."""
+    """Contribution of fixed-end modes to the platform-end stiffness, with stretch loss; `lost` (t, d + k, d + k)."""
     d, factor = motions.drive.shape[2], scaled[None, :, None, None]
     by_end = -square[..., None, None] * motions.drive[:, None] + factor * lost[:, None, d:, :d]
     alone = loss * motions.square[:, None] - square[..., None]
@@ -124,7 +124,7 @@ WIDTHS: Final = np.linspace(-3.0, 3.0, 7)  # search points about a mode, in unit
 
 
 def modal_receptance(found: StateModes, rest: Array, ratio: float) -> ForceReceptance:
-    """Receptance from the modes of a robot, which a common loss factor of the whole stiffness does not couple."""
+    """Receptance from the modes of a robot. A common loss factor of the whole stiffness does not couple these modes."""
     # shapes: rest (3, 3)
     natural = (2.0 * np.pi * found.frequency) ** 2
     products = (found.platform[:3, None] * found.platform[None, :3]).reshape(9, -1)
@@ -139,7 +139,7 @@ def modal_receptance(found: StateModes, rest: Array, ratio: float) -> ForceRecep
 
 
 def coupled_receptance(receptance: Receptance, up_to: float) -> ForceReceptance:
-    """Function that computes the receptance up to a frequency [Hz], with losses that couple the modes."""
+    """Function that computes the receptance up to the frequency `up_to` [Hz], for losses that couple the modes."""
     held = receptance.fixed_end_modes(up_to)
     return lambda frequency: receptance.by_modes(frequency, held)[0][:, :3, :3]
 
@@ -168,7 +168,7 @@ def peak_receptance(
 
 
 def _parabola_peak(frequency: Array, norms: Array) -> tuple[float, float]:
-    """Height and place of a peak from three values, by a parabola through their inverse squares."""
+    """Height and place of a peak from three values of `norms`, by a parabola through their inverse squares."""
     (before, after), flat = np.diff(frequency), norms**-2.0
     left, right = np.diff(flat) / (before, after)
     bend = (right - left) / (before + after)

@@ -73,7 +73,7 @@ def frequency_response(state: Equilibrium, frequency: ArrayLike, damping: Dampin
         FrequencyResponse.
 
     Raises:
-        InvalidValueError: If the state is not a single Equilibrium with lengths and with exact or elastic cables; if a
+        InvalidValueError: If the state is not a single Equilibrium with lengths and with exact or elastic cables. If a
             frequency is negative, or more than 2,000 modes are below it.
 
     Examples:
@@ -131,7 +131,7 @@ class ResponseCurves(NamedTuple):
 
 
 def response_curves(vibration: Vibration, force: str = "x", motion: str | None = None) -> ResponseCurves:
-    """Motion of the platform per force at its center of mass, for frequencies up to the limit of the modes."""
+    """Component `motion` of the platform's motion per `force` at the center of mass, up to the limit of the modes."""
     # Both curves are from `frequency_response`. The massless curve has no air damping, which acts only on cables with
     # mass
     state = instance(vibration, Vibration, "vibration").state
@@ -167,7 +167,7 @@ def _places(force: str, motion: str | None) -> tuple[int, int]:
 
 
 def _grid(natural: Array, highest: float) -> Array:
-    """Frequencies with logarithmic spacing, and additional frequencies close to each peak."""
+    """Frequencies with logarithmic spacing, and additional frequencies close to the peaks at `natural`."""
     even = np.geomspace(natural.min() / BELOW, highest, SAMPLES)
     near = (natural[:, None] * (1.0 + BESIDE * NEAR)).ravel()
     return np.unique(np.concatenate((even, near[(near > even[0]) & (near < highest)])))

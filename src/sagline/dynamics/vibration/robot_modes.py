@@ -36,7 +36,7 @@ class VibrationModel(NamedTuple):
     freedom: Array  # matrix that selects the free motions, shape (n, 6)
 
     def at(self, row: int) -> VibrationModel:
-        """Select the model of one state, with a leading axis of length 1."""
+        """The model of the state `row`, with a leading axis of length 1."""
         part = slice(row, row + 1)
         strings = Strings(self.strings.table[part], self.strings.axes[part], self.strings.taut[part])
         return VibrationModel(strings, self.ends[part], self.stiffness[part], self.mass[part], self.freedom)
@@ -64,7 +64,7 @@ class _ReducedModel(NamedTuple):
 
 
 def vibration_model(state: Equilibrium) -> VibrationModel:
-    """Vibration model of one equilibrium or N equilibria; arrays have a leading axis in both cases."""
+    """Vibration model of one equilibrium or of N equilibria. The arrays have a leading axis in both cases."""
     slopes = cable_slopes(state)
     matrix = slopes.matrix.reshape(-1, 6, 6)
     levers = slopes.levers.reshape(len(matrix), -1, 3)
@@ -78,7 +78,7 @@ def vibration_model(state: Equilibrium) -> VibrationModel:
 
 
 def reduced_model(model: VibrationModel, row: int, up_to: float) -> _ReducedModel:
-    """Eigenproblem of one state for its modes below a frequency [Hz]."""
+    """Eigenproblem of the state `row` for its modes below `up_to` [Hz]."""
     # The unknowns are the modes of the cables up to slightly above this frequency. A few joint motions represent the
     # response of the higher modes to slow platform motions; they match the first moments (Krylov). Amplitudes are
     # relative to the frame. The mass of the platform unknowns is the platform mass plus the remaining quasi-static mass
@@ -136,7 +136,7 @@ def _on_platform(of_cables: Array, ends: Array) -> Array:
 
 
 def modes_below(model: VibrationModel, row: int, frequency: float) -> int:
-    """Number of modes of the robot with cable mass below a frequency [Hz]."""
+    """Number of the robot's modes with cable mass below `frequency` [Hz]."""
     # Wittrick-Williams count: number of fixed-end modes of the taut cables, plus number of negative eigenvalues of the
     # platform's dynamic stiffness
     taut = np.flatnonzero(model.strings.taut[row])
@@ -188,7 +188,7 @@ class StateModes:
 
 
 def state_modes(model: VibrationModel, row: int, up_to: float) -> StateModes:
-    """Compute the modes of one state below a frequency [Hz]. The exact count checks the number of modes."""
+    """Compute the modes of the state `row` below `up_to` [Hz]. The exact count checks the number of modes."""
     check_string_count(model.strings, row, up_to, "up_to")
     count = modes_below(model, row, up_to)
     check_mode_count(count, up_to, "up_to")
@@ -208,7 +208,7 @@ def state_modes(model: VibrationModel, row: int, up_to: float) -> StateModes:
 
 
 def check_string_count(strings: Strings, row: int, frequency: float, item: str) -> None:
-    """Reject a frequency [Hz] below which the cables have far too many modes, before the exact count.
+    """Reject `frequency` [Hz] before the exact count if the cables have far too many modes below it.
 
     In each of two directions, N half waves of a cable have the phase pi N. This phase is the integral of omega
     sqrt(rho/T) along the cable. The tension is T_x cosh(q) at the point with the vertical force T_x sinh(q).
@@ -229,7 +229,7 @@ def check_string_count(strings: Strings, row: int, frequency: float, item: str) 
 
 
 def check_mode_count(count: int, frequency: float, item: str) -> None:
-    """Reject a frequency [Hz] with too many modes below it."""
+    """Reject `frequency` [Hz] if the number `count` of modes below it is too large."""
     if count > MOST_MODES:
         value = f"{frequency:g} Hz, below which the robot has {count:,} modes"
         raise InvalidValueError(item, value, f"a frequency with up to {MOST_MODES:,} modes below it", "Lower it.")

@@ -58,7 +58,7 @@ _INSTANTS: Final = 2000  # number of instants of a segment for its inertial wren
 
 
 def _most_excited(state: Equilibrium, frequency: Array, shape: Array, path: Path) -> Array:
-    """Natural frequencies that a path excites most: one or two, as `to_shape`."""
+    """One or two natural frequencies that `path` excites most, as in `to_shape`."""
     # shapes: frequency (K,) [Hz]; shape (6, K); returns (1,) or (2,) [Hz]
     segments = [segment for segment in segments_of(instance(path, Path, "path")) if segment.curve is not None]
     known = np.flatnonzero(frequency > 0.0)
@@ -75,7 +75,7 @@ def _most_excited(state: Equilibrium, frequency: Array, shape: Array, path: Path
 
 
 def excitation(robot: Robot, segment: RestToRestSegment, frequency: Array, shape: Array) -> Array:
-    """Excitation of each mode by a segment of a path, times the size of the platform motion in the mode."""
+    """Excitation of each mode by `segment`, times the size of the platform motion in the mode."""
     # shapes: frequency (K,) [Hz]; shape (6, K); returns (K,)
     time = np.linspace(0.0, segment.duration, _INSTANTS + 1)
     assert segment.curve is not None
@@ -109,8 +109,8 @@ class Vibration(Result, Tabular):
             (K, m, P, 3) [m/sqrt(kg)].
         loss: Damping ratio of each mode, to first order in the damping, shape (K,).
         massless_frequency: Natural frequencies of the platform with massless cables [Hz], as in `modes`, shape (n,).
-        count: Number of modes below up_to, from the exact count. It does not use the computed modes, and is K if all
-            modes are found.
+        count: Number of modes below `up_to`, from the exact count. The count does not use the computed modes. It is K
+            if all modes are found.
         negative_directions: Unstable motions of the platform, one per column, shape (6, d); d = 0 at a stable
             equilibrium.
         slack_cables: Indices of the cables without linear vibrations.
@@ -139,7 +139,7 @@ class Vibration(Result, Tabular):
         return self.status is VibrationStatus.SOLVED and self.count == self.frequency.size
 
     def to_shape(self, path: Path) -> Array:
-        """Natural frequencies that a path excites most, as input for a shaper; see `sagline.to_shape`.
+        """Natural frequencies that `path` excites most, as input for a shaper; see `sagline.to_shape`.
 
         Args:
             path: Path from rest to rest. It preferably ends at the pose at which the modes were computed.
@@ -174,7 +174,7 @@ def vibration(state: Equilibrium, *, up_to: float = UP_TO, damping: Damping | No
         no linear vibrations; the modes do not include them.
 
     Raises:
-        InvalidValueError: If the state is not a single Equilibrium with exact or elastic cables; if up_to is not
+        InvalidValueError: If the state is not a single Equilibrium with exact or elastic cables. If `up_to` is not
             positive, or more than 2,000 modes are below it.
         SaglineError: If the number of modes differs from the exact count.
 
@@ -243,8 +243,8 @@ def to_shape(modes: Modes | Vibration, path: Path) -> Array:
         Frequencies [Hz], shape (1,) or (2,), in order of decreasing excitation.
 
     Raises:
-        InvalidValueError: If the modes are of several states, no mode has a frequency, or the path is in motion at an
-            end or does not move.
+        InvalidValueError: If the modes are of several states, or no mode has a frequency. If the path is in motion at
+            an end, or does not move.
 
     Source:
         docs/howto/without-vibration.md.

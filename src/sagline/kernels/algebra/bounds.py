@@ -20,7 +20,7 @@ TOLERANCE = 1e-12  # relative to the largest bound; a smaller violation does not
 
 @formula
 def largest_bound(bounds: Array) -> float:
-    """Largest finite bound, to which tolerances are relative."""
+    """Largest finite number in `bounds`. Tolerances are relative to this number."""
     start = low = high = 0.0  # three independent maxima, which the processor computes in parallel
     for i in range(bounds.shape[1]):
         start = max(start, abs(bounds[START, i]))
@@ -31,7 +31,7 @@ def largest_bound(bounds: Array) -> float:
 
 @kernel
 def box_radius(largest: float, bounds: Array) -> float:
-    """Half width of a box that contains all points within two-sided bounds; for one-sided bounds, a large number."""
+    """Half width of a box that contains all points within two-sided bounds. For one-sided bounds: a large number."""
     for i in range(bounds.shape[1]):
         if bounds[HIGH, i] == math.inf:
             return 1e4 * largest
@@ -40,20 +40,20 @@ def box_radius(largest: float, bounds: Array) -> float:
 
 @formula
 def inward(label: int) -> float:
-    """Sign that turns the column of a bound into the inward normal of the given side."""
+    """Sign that turns the column of a bound into the inward normal of the side `label`."""
     return 1.0 if label % 2 == 0 else -1.0
 
 
 @formula
 def side_of(bounds: Array, label: int) -> float:
-    """Lower limit of normal . x on a side."""
+    """Lower limit of normal . x on the side `label`."""
     i = label // 2
     return bounds[LOW, i] - bounds[START, i] if label % 2 == 0 else bounds[START, i] - bounds[HIGH, i]
 
 
 @formula
 def most_violated_bound(rows: Array, bounds: Array, point: Array, slack: float, first: bool) -> int:
-    """Label of the most violated side, or of the first violated side; -1 if no violation exceeds the slack."""
+    """Label of the most violated side; with `first`, of the first violated side. -1 if no violation exceeds `slack`."""
     d, k = rows.shape
     worst = slack
     label = -1

@@ -13,7 +13,7 @@ STILL = 1e-16  # relative to the largest eigenvalue; a shorter step is smaller t
 
 @formula
 def _tridiagonalize(matrix: Array, diagonal: Array, beside: Array, vector: Array) -> None:
-    """Reduce a matrix to tridiagonal form (Householder): fill diagonal and beside, (n,); overwrites matrix."""
+    """Reduce `matrix` to tridiagonal form (Householder). Fills `diagonal` and `beside`, (n,); overwrites `matrix`."""
     n = matrix.shape[0]
     product = diagonal  # used as work memory; the diagonal is filled at the end
     for k in range(n - 2):
@@ -50,7 +50,7 @@ def _tridiagonalize(matrix: Array, diagonal: Array, beside: Array, vector: Array
 
 @formula
 def _gershgorin_bound(diagonal: Array, beside: Array, sign: float) -> float:
-    """Lower bound of the eigenvalues of sign T, by Gershgorin's circles; T is tridiagonal."""
+    """Lower bound of the eigenvalues of `sign` T, by Gershgorin's circles. T is tridiagonal."""
     low = math.inf
     before = 0.0
     for k in range(diagonal.shape[0]):
@@ -62,7 +62,7 @@ def _gershgorin_bound(diagonal: Array, beside: Array, sign: float) -> float:
 
 @kernel
 def _lowest_eigenvalue(diagonal: Array, beside: Array, sign: float) -> float:
-    """Smallest eigenvalue of sign T, by Laguerre's iteration from below; T is tridiagonal.
+    """Smallest eigenvalue of `sign` T, by Laguerre's iteration from below. T is tridiagonal.
 
     The product of the pivots q of the shifted matrix is its characteristic polynomial. All pivots are positive below
     the smallest root. The iteration never passes this root.
@@ -92,10 +92,10 @@ def _lowest_eigenvalue(diagonal: Array, beside: Array, sign: float) -> float:
 
 @kernel
 def extreme_eigenvalues(matrix: Array, diagonal: Array, beside: Array, work: Array, flat: float) -> tuple[float, float]:
-    """Smallest and largest eigenvalue of a symmetric matrix (n, n); all arrays are overwritten.
+    """Smallest and largest eigenvalue of a symmetric matrix (n, n). All arrays are overwritten.
 
-    The largest eigenvalue has an upper bound, which is at most three times as large. If |smallest| exceeds flat times
-    this bound, the bound is returned instead of the largest eigenvalue, which takes less time.
+    The largest eigenvalue has an upper bound, which is at most three times as large. If |smallest| exceeds `flat` times
+    this bound, the bound is returned instead of the largest eigenvalue. This takes less time.
     """
     _tridiagonalize(matrix, diagonal, beside, work)
     low = _lowest_eigenvalue(diagonal, beside, 1.0)

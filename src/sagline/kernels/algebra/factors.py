@@ -17,9 +17,9 @@ LEAST_PIVOT = 1e-15  # relative to the original diagonal element; a smaller pivo
 
 @kernel
 def factor_positive(matrix: Array, shift: float, factor: Array) -> bool:
-    """Fill the lower triangle of the factor L of matrix + shift 1, (n, n); False if the sum is not positive definite.
+    """Fill the lower triangle of the factor L of `matrix` + `shift` 1, (n, n). False if not positive definite.
 
-    Only the lower triangle of the matrix is used; factor may be the matrix itself.
+    Only the lower triangle of `matrix` is used. `factor` may be the same array as `matrix`.
     """
     n = matrix.shape[0]
     for j in range(n):
@@ -42,7 +42,7 @@ def factor_positive(matrix: Array, shift: float, factor: Array) -> bool:
 
 @kernel
 def solve_lower(factor: Array, vector: Array) -> None:
-    """Replace a vector (n,) by x with L x = vector."""
+    """Replace `vector` (n,) by the solution x of L x = `vector`."""
     for k in range(vector.size):
         for j in range(k):
             vector[k] -= factor[k, j] * vector[j]
@@ -51,7 +51,7 @@ def solve_lower(factor: Array, vector: Array) -> None:
 
 @kernel
 def solve_upper(factor: Array, vector: Array) -> None:
-    """Replace a vector (n,) by x with L^T x = vector."""
+    """Replace `vector` (n,) by the solution x of L^T x = `vector`."""
     for k in range(vector.size - 1, -1, -1):
         for j in range(k + 1, vector.size):
             vector[k] -= factor[j, k] * vector[j]
@@ -60,7 +60,7 @@ def solve_upper(factor: Array, vector: Array) -> None:
 
 @kernel
 def solve_general(matrix: Array, right: Array) -> bool:
-    """Gauss elimination with partial pivoting; matrix is destroyed, right becomes the solution; False if singular."""
+    """Gauss elimination with partial pivoting. Destroys `matrix`; `right` becomes the solution. False if singular."""
     n = matrix.shape[0]
     for k in range(n):
         best = k
@@ -113,7 +113,7 @@ def orthogonalize_row(frame: Array, count: int, triangle: Array) -> float:
 
 @formula
 def normalize_row(frame: Array, count: int, triangle: Array, square: float) -> None:
-    """Scale row `count` of the frame to unit length; square is the result of `orthogonalize_row`."""
+    """Scale row `count` of the frame to unit length. `square` is the result of `orthogonalize_row`."""
     length = math.sqrt(square)
     triangle[count, count] = length
     for k in range(frame.shape[1]):
@@ -161,7 +161,7 @@ def factorize(reduced: Array, diagonals: Array) -> bool:
 
 @formula
 def orthogonal_factor(reduced: Array, diagonals: Array, q: Array) -> None:
-    """Fill Q (m, m) from its reflections; row m of q is a work row."""
+    """Fill Q (m, m) from its reflections. Row m of `q` is a work row."""
     n, m = reduced.shape
     for i in range(m):
         for j in range(m):
@@ -196,7 +196,7 @@ def pseudo_inverse(reduced: Array, diagonals: Array, q: Array, inverse: Array) -
 
 @formula
 def minimum_norm(inverse: Array, right: Array, solution: Array) -> None:
-    """Fill the minimum-norm solution (m,) of the equations matrix . solution = right (n,)."""
+    """Fill the minimum-norm `solution` (m,) of the equations matrix . solution = `right` (n,)."""
     n, m = inverse.shape
     for i in range(m):
         solution[i] = 0.0

@@ -136,7 +136,7 @@ def _arctangent_ratio(y: float) -> float:
 
 @formula
 def angle(sine: float, cosine: float) -> float:
-    """Angle with this sine and cosine, 0 to pi [rad]; sine >= 0. A positive factor of both has no effect."""
+    """Angle from 0 to pi [rad] with the given sine >= 0 and cosine. A common positive factor of both has no effect."""
     level = abs(cosine)
     steep = sine > MORE * level
     middle = sine > LESS * level

@@ -47,7 +47,7 @@ def new_basis(memory: Memory, d: int) -> tuple[Basis, Memory]:
 
 @formula
 def _growth_along_edge(rows: Array, label: int, inverse: Array, j: int) -> float:
-    """Growth of normal . x along edge j of the present basis, for the normal of a bound."""
+    """Growth of normal . x along edge `j` of the present basis, for the normal of the side `label`."""
     total = 0.0
     for i in range(inverse.shape[0]):
         total += rows[i, label // 2] * inverse[i, j]
@@ -56,7 +56,7 @@ def _growth_along_edge(rows: Array, label: int, inverse: Array, j: int) -> float
 
 @formula
 def _violation(rows: Array, bounds: Array, label: int, radius: float, cost: Array, point: Array) -> float:
-    """Violation of a side by a point; labels from 2k on are sides of the box."""
+    """Violation of the side `label` by `point`. Labels from 2k on are sides of the box."""
     box = label - 2 * rows.shape[1]
     if box >= 0:
         return -radius - (point[box] if cost[box] >= 0.0 else -point[box])
@@ -83,7 +83,7 @@ def _start_at_box_corner(rows: Array, cost: Array, radius: float, basis: Basis, 
 
 @glue
 def _exchange_sides(rows: Array, entering: int, leaving: int, miss: float, basis: Basis, point: Array) -> None:
-    """Replace a side of the basis by a side that the point violates, and move to the new point."""
+    """Replace the side `leaving` of the basis by `entering`, which the point violates, and move to the new point."""
     labels, weights, inverse = basis
     d = point.size
     pivot = _growth_along_edge(rows, entering, inverse, leaving)
@@ -104,7 +104,7 @@ def _exchange_sides(rows: Array, entering: int, leaving: int, miss: float, basis
 
 @glue
 def _move_to_vertex(rows: Array, bounds: Array, cost: Array, radius: float, basis: Basis, point: Array) -> None:
-    """Move the point to the intersection of the sides of the basis, with two steps of iterative refinement."""
+    """Move `point` to the intersection of the sides of the basis, with two steps of iterative refinement."""
     d = point.size
     for _ in range(3):
         for j in range(d):
@@ -115,7 +115,7 @@ def _move_to_vertex(rows: Array, bounds: Array, cost: Array, radius: float, basi
 
 @kernel
 def lowest_point(rows: Array, bounds: Array, cost: Array, slack: float, basis: Basis, point: Array) -> int:
-    """Fill the point (d,) with the least cost . x among the points within all bounds; returns the outcome.
+    """Fill `point` (d,) with the point of least cost . x within all bounds. Returns the outcome.
 
     Bounds may be violated by `slack`; 0 means the usual tolerance. A program with a solution on the box is unbounded.
     """

@@ -48,7 +48,7 @@ def new_active_set(memory: Memory, d: int) -> tuple[ActiveSet, Memory]:
 
 @glue
 def _point_on_active_sides(rows: Array, bounds: Array, held: ActiveSet, target: Array, point: Array) -> bool:
-    """Fill the point nearest to the target on all active sides; False if this point is not optimal."""
+    """Fill the point on all active sides that is nearest to `target`. False if this point is not optimal."""
     labels, frame, triangle, pushes = held
     count, d = labels[0], point.size
     for k in range(d):
@@ -82,7 +82,7 @@ def _point_on_active_sides(rows: Array, bounds: Array, held: ActiveSet, target: 
 
 @glue
 def _drop_side(rows: Array, held: ActiveSet, leaving: int) -> None:
-    """Release the active side at an index, and update the frame of the remaining sides."""
+    """Release the active side with the index `leaving`, and update the frame of the remaining sides."""
     labels, frame, triangle, pushes = held
     count = labels[0] - 1
     labels[0] = count
@@ -97,10 +97,10 @@ def _drop_side(rows: Array, held: ActiveSet, leaving: int) -> None:
 
 @kernel
 def nearest_point(rows: Array, bounds: Array, target: Array, slack: float, held: ActiveSet, point: Array) -> bool:
-    """Fill the point (d,) within all bounds, up to a slack, that is nearest to a target (d,); False if none exists.
+    """Fill the point (d,) within all bounds (up to `slack`) that is nearest to `target` (d,). False if none exists.
 
-    held: active sides of a similar problem, or labels[0] = 0 if there is none; overwritten with the active sides of the
-    point.
+    held: active sides of a similar problem, or labels[0] = 0 if there is none. They are overwritten with the active
+        sides of the point.
     """
     labels, frame, triangle, pushes = held
     d = target.size

@@ -14,14 +14,14 @@ Triple = tuple[float, float, float]
 
 @kernel
 def step_pose(free: Array, body: Array, pose: Array, step: Array, motion: Array, moved: Array) -> None:
-    """Fill the pose after a step (n,) along the free motions, and the motion (6,) of this step."""
+    """Fill the pose `moved` after `step` (n,) along the free motions, and the `motion` (6,) of this step."""
     fill_motion_of_components(free, step, motion)
     moved_pose(body, pose, motion, moved)
 
 
 @formula
 def moved_pose(body: Array, pose: Array, motion: Array, moved: Array) -> None:
-    """Fill the pose after a motion (6,): displacement of the center of mass, and rotation about the center of mass."""
+    """Fill the pose `moved` after `motion` (6,): displacement of the center of mass, and rotation about this point."""
     angle2 = motion[3] * motion[3] + motion[4] * motion[4] + motion[5] * motion[5]
     angle = math.sqrt(angle2)
     w = math.cos(0.5 * angle)
@@ -44,7 +44,7 @@ def moved_pose(body: Array, pose: Array, motion: Array, moved: Array) -> None:
 
 @formula
 def turned(pose: Array, x: float, y: float, z: float) -> Triple:
-    """Convert a vector from the platform frame to world axes."""
+    """Convert the vector (x, y, z) from the platform frame to world axes."""
     qx, qy, qz, qw = pose[3], pose[4], pose[5], pose[6]
     tx = 2.0 * (qy * z - qz * y)
     ty = 2.0 * (qz * x - qx * z)

@@ -93,7 +93,7 @@ def set_pose(
     cables: Cables,
     balance: Balance,
 ) -> int:
-    """Fill cables and balance of one pose, with first-order sag forces; returns POSE_SOLVED or a status of failure.
+    """Fill `cables` and `balance` of one pose, with first-order sag forces. Returns POSE_SOLVED or a status of failure.
 
     weight: root weights of the cables in the distribution's variable, (m,).
     """
@@ -108,7 +108,7 @@ def set_pose(
 
 @glue
 def place_cables(model: Model, limits: TensionLimits, robot: Array, geometry: Array, cables: Cables) -> bool:
-    """Fill chords, material, first-order sag forces and admissible tensions; False if a cable has no chord."""
+    """Fill chords, material, first-order sag forces and admissible tensions. False if a cable has no chord."""
     for i in range(robot.shape[0]):
         chord, sine = geometry[g.CHORD, i], geometry[g.SINE, i]
         if not chord >= SHORTEST_CHORD:
@@ -150,7 +150,7 @@ def _choose_variable(variable: int, weight: Array, cables: Cables, balance: Bala
 
 @glue
 def scale_limits(cables: Cables, balance: Balance, i: int) -> None:
-    """Fill the limits of one cable in the distribution's variable; the limit of the strain is not included."""
+    """Fill the limits of cable `i` in the distribution's variable. The limit of the strain is not included."""
     limited = cables.high[i] < math.inf and not is_limited_by_strain(cables, i)
     balance.bounds[LOW, i] = cables.low[i] * balance.scale[i]
     balance.bounds[HIGH, i] = cables.high[i] * balance.scale[i] if limited else math.inf
@@ -158,7 +158,7 @@ def scale_limits(cables: Cables, balance: Balance, i: int) -> None:
 
 @glue
 def factor_balance(balance: Balance) -> bool:
-    """Fill pseudo-inverse and null space for the distribution's variable; False if the rank is not full."""
+    """Fill pseudo-inverse and null space for the distribution's variable. False if the rank is not full."""
     n, m = balance.matrix.shape
     matrix, reduced, q = balance.matrix, balance.reduced, balance.q
     for i in range(m):

@@ -24,13 +24,13 @@ def translation_count(freedom: Array) -> int:
 
 @formula
 def is_rotation(freedom: Array, k: int) -> bool:
-    """True if free motion k of the platform is a rotation; the translations are listed first."""
+    """True if free motion `k` of the platform is a rotation. The translations are listed first."""
     return freedom[k, 3] * freedom[k, 3] + freedom[k, 4] * freedom[k, 4] + freedom[k, 5] * freedom[k, 5] > 0.5
 
 
 @kernel
 def symmetric_part(free: Array, full: Array, matrix: Array) -> None:
-    """Fill the symmetric part of the product free K free^T, (n, n)."""
+    """Fill `matrix` (n, n) with the symmetric part of free K free^T, where K is `full`."""
     matrix_along(free, full, matrix)
     for j in range(matrix.shape[0]):
         for k in range(j):
@@ -41,7 +41,7 @@ def symmetric_part(free: Array, full: Array, matrix: Array) -> None:
 
 @formula
 def matrix_along(free: Array, full: Array, matrix: Array) -> None:
-    """Fill the product free K free^T, (n, n)."""
+    """Fill `matrix` (n, n) with free K free^T, where K is `full`."""
     n = free.shape[0]
     for j in range(n):
         for k in range(n):
@@ -57,7 +57,7 @@ def matrix_along(free: Array, full: Array, matrix: Array) -> None:
 
 @kernel
 def components_along(free: Array, full: Array, part: Array) -> float:
-    """Fill the components (n,) of a wrench (6,) along the free motions; returns their norm."""
+    """Fill the components `part` (n,) of the wrench `full` (6,) along the free motions. Returns their norm."""
     square = 0.0
     for j in range(free.shape[0]):
         total = 0.0
@@ -70,7 +70,7 @@ def components_along(free: Array, full: Array, part: Array) -> float:
 
 @formula
 def fill_motion_of_components(free: Array, part: Array, motion: Array) -> None:
-    """Fill the motion (6,) from its components (n,) along the free motions."""
+    """Fill `motion` (6,) from its components `part` (n,) along the free motions."""
     for a in range(6):
         motion[a] = 0.0
     for j in range(free.shape[0]):
@@ -80,7 +80,7 @@ def fill_motion_of_components(free: Array, part: Array, motion: Array) -> None:
 
 @formula
 def norm(vector: Array) -> float:
-    """Euclidean length."""
+    """Euclidean length of `vector`."""
     total = 0.0
     for k in range(vector.shape[0]):
         total += vector[k] * vector[k]
@@ -128,7 +128,7 @@ def needed_wrench(geometry: Array, body: Array, wrench: Array, sag_force: Array,
 
 @formula
 def along_freedom(freedom: Array, full: Array, part: Array) -> None:
-    """Fill the components (n,) of a wrench (6,) along the platform's free motions (n, 6)."""
+    """Fill the components `part` (n,) of the wrench `full` (6,) along the platform's free motions (n, 6)."""
     n = freedom.shape[0]
     for k in range(n):
         if n == 6:  # all motions are free
@@ -141,7 +141,7 @@ def along_freedom(freedom: Array, full: Array, part: Array) -> None:
 
 @formula
 def rows_along_freedom(freedom: Array, full: Array, part: Array) -> None:
-    """Fill the rows (n, m) of a structure matrix (6, m) along the platform's free motions (n, 6)."""
+    """Fill the rows `part` (n, m) of the structure matrix `full` (6, m) along the platform's free motions (n, 6)."""
     n = freedom.shape[0]
     for k in range(n):
         for i in range(full.shape[1]):

@@ -37,7 +37,7 @@ class TensionLimits(NamedTuple):
 
 @formula
 def sags(model: Model, half_weight: float) -> bool:
-    """True if a cable sags, so that its length is infinite at zero tension; half_weight: wD/2 [N]."""
+    """True if a cable sags. Its length is then infinite at zero tension. `half_weight`: wD/2 [N]."""
     return half_weight > 0.0 and model.code != codes.STRAIGHT and model.code != codes.ELASTIC
 
 
@@ -57,7 +57,7 @@ def largest_of_strain(model: Model, stiffness: float) -> float:
 
 @formula
 def is_limited_by_strain(cables: Cables, i: int) -> bool:
-    """True if the largest strain determines the largest admissible tension of a cable."""
+    """True if the largest strain determines the largest admissible tension of cable `i`."""
     return cables.high[i] == LARGEST_STRAIN * cables.stiffness[i]
 
 
@@ -77,9 +77,9 @@ def cable_without_tension(cables: Cables) -> int:
 def fill_admissible_tensions(
     model: Model, limits: TensionLimits, low: float, high: float, cables: Cables, i: int
 ) -> None:
-    """Fill the smallest and largest admissible chord tension of a cable; smallest > largest if none is admissible.
+    """Fill the smallest and largest admissible chord tension of cable `i`. If none is admissible: smallest > largest.
 
-    low, high: limits of the robot [N]; the upper one may be infinite.
+    low, high: limits of the robot [N]; the upper limit may be infinite.
     """
     half_weight = cables.half_weight[i]
     # the free span of a slack cable over a pulley can be longer than the tangent by one diameter

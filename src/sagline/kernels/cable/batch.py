@@ -24,7 +24,7 @@ BUFFERS = 11
 
 @kernel
 def _copy_chunk(source: Array, start: int, stop: int, target: Array) -> None:
-    """Copy a chunk of an operand, or repeat its one value."""
+    """Copy the entries `start` to `stop` - 1 of `source` to `target`, or repeat the only value of `source`."""
     if source.shape[0] == 1:
         for i in range(stop - start):
             target[i] = source[0]
@@ -51,7 +51,7 @@ def batch_from_tension(
 
     Loops without branches solve all cables of a chunk as ordinary catenaries. The other cables are then solved again,
     one by one. Each loop computes one result, because the compiler does not vectorize loops with several results.
-    buffer is a work array, (BUFFERS, CHUNK).
+    `buffer` is a work array, (BUFFERS, CHUNK).
     """
     model = model_of(terms)
     count = length_out.shape[0]
@@ -132,7 +132,7 @@ def batch_from_length(
 def batch_end(
     horizontal: Array, vertical: Array, length: Array, weight: Array, stiffness: Array, x_out: Array, z_out: Array
 ) -> None:
-    """Platform ends of exact catenaries with the given forces and lengths; all operands have one entry per cable."""
+    """Platform ends of exact catenaries with given forces and lengths. All operands have one entry per cable."""
     for i in range(x_out.shape[0]):
         x_out[i], z_out[i] = catenary_end(horizontal[i], vertical[i], length[i], weight[i], stiffness[i])
 
@@ -141,7 +141,7 @@ def batch_end(
 def catenary_point(
     fraction: float, horizontal: float, vertical: float, length: float, weight: float, stiffness: float
 ) -> tuple[float, float]:
-    """Point at a fraction of the unstrained length from the frame end."""
+    """Point at the share `fraction` of the unstrained length, measured from the frame end."""
     part = fraction * length
     return catenary_end(horizontal, vertical - weight * (length - part), part, weight, stiffness)
 
@@ -159,7 +159,7 @@ def shape_points(
     tension: Array,
     points_out: Array,
 ) -> None:
-    """Points (cables, points, 2) at equal steps of unstrained length; parabolas for the shallow models."""
+    """Points (cables, points, 2) at equal steps of unstrained length. Shallow models give parabolas."""
     model = model_of(terms)
     count = points_out.shape[1]
     for i in range(points_out.shape[0]):
@@ -178,7 +178,7 @@ def shape_points(
 
 @kernel
 def _shallow_drop(t: float, model: Model, span: float, rise: float, vertical: float, tension: float) -> float:
-    """Vertical distance below the chord [m] at a fraction t of the chord: b D t (1 - t)/tau with the sag force b."""
+    """Vertical distance below the chord [m] at the share `t` of the chord: b D t (1 - t)/tau with the sag force b."""
     if model.code == codes.STRAIGHT or model.code == codes.ELASTIC or tension == 0.0:
         return 0.0
     chord = math.hypot(span, rise)
@@ -190,7 +190,7 @@ def _shallow_drop(t: float, model: Model, span: float, rise: float, vertical: fl
 def _catenary_sag(
     span: float, rise: float, length: float, horizontal: float, vertical: float, weight: float, stiffness: float
 ) -> float:
-    """Largest vertical distance of a cable below its chord [m]; below its lower end if the chord is vertical."""
+    """Largest vertical distance of a cable below its chord [m]. Below its lower end if the chord is vertical."""
     slope = rise / span if span > 0.0 else 0.0
     # length from the frame end to the point whose tangent is parallel to the chord, or to the turning point if the
     # chord is vertical
@@ -267,9 +267,9 @@ def closures(
 def creep_strains(
     time: Array, tension: Array, stiffness: Array, delay: Array, settled: Flags, strain_out: Array
 ) -> None:
-    """Sum of the delayed strains of elements, each a spring parallel to a damper; exact for piecewise linear tensions.
+    """Sum of the delayed strains of elements (spring parallel to damper). It is exact for piecewise linear tensions.
 
-    Samples whose tension is NaN are omitted; the tension is then linear in time between their neighbors.
+    Samples whose tension is NaN are omitted. The tension is then linear in time between their neighbors.
 
     Args:
         time: Times of the samples [s], increasing, (N,).

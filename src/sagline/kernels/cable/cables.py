@@ -63,23 +63,23 @@ def new_cables(memory: Memory, m: int, machine: bool) -> tuple[Cables, Memory]:
 
 @glue
 def chord_of(cables: Cables, i: int) -> Chord:
-    """The chord of one cable."""
+    """The chord of cable `i`."""
     return Chord(cables.chord[i], cables.sine[i], cables.cosine[i])
 
 
 @glue
 def free_chord_of(cables: Cables, i: int) -> Chord:
-    """The chord of one cable's free span."""
+    """The chord of the free span of cable `i`."""
     return Chord(cables.free_chord[i], cables.free_sine[i], cables.free_cosine[i])
 
 
 @glue
 def pulley_of(cables: Cables, i: int) -> Pulley:
-    """Pulley and dead length of one cable."""
+    """Pulley and dead length of cable `i`."""
     return Pulley(cables.radius[i], cables.entry[i], cables.dead[i], cables.rise[i])
 
 
 @glue
 def material_of(cables: Cables, i: int) -> Material:
-    """Material of one cable."""
+    """Material of cable `i`."""
     return Material(cables.density[i], cables.stiffness[i])

@@ -104,7 +104,7 @@ def ordinary_length_ratio(half_weight: float, sine: float, cosine: float, strain
 
 @formula
 def ordinary_length_ratio_near(half_weight: float, sine: float, cosine: float, strain: float, ratio: float) -> float:
-    """One Newton step from an approximate ratio: the ratio at a similar tension, or the result of two steps."""
+    """One Newton step from the approximate `ratio`: the ratio at a similar tension, or the result of two steps."""
     return _ordinary_newton_step(ratio, half_weight * half_weight, cosine * cosine, sine * sine, strain)
 
 
@@ -257,7 +257,7 @@ def _catenary_parameter(xi: float, zeta: float, kappa: float, excess: float) -> 
 
 @formula
 def _vertical_from_length(rise: float, length: float, weight: float, stiffness: float) -> tuple[float, float, int]:
-    """P2 on a vertical chord, in closed form: returns vertical force, chord tension and a status."""
+    """P2 on a vertical chord, in closed form. Returns vertical force, chord tension and a status."""
     height = abs(rise)
     kappa = 0.5 * weight * length / stiffness
     stretch = (height - length) / length  # exact difference for a taut cable
@@ -273,7 +273,7 @@ def _vertical_from_length(rise: float, length: float, weight: float, stiffness: 
 
 @kernel
 def catenary_from_length(span: float, rise: float, length: float, weight: float, stiffness: float) -> tuple[Force, int]:
-    """P2: force on the platform end and a status; weight > 0."""
+    """P2: force on the platform end, and a status. `weight` must be > 0."""
     if span == 0.0:
         vertical, tension, status = _vertical_from_length(rise, length, weight, stiffness)
         return Force(0.0, vertical, tension), status

@@ -28,7 +28,7 @@ def cable_courses(
         body: Row of the body_table.
         pose: Pose row.
         tension: Chord tensions [N], (m,); NaN for a cable without a tension.
-        wraps: Number of points on each pulley, 0 or at least 2; if a cable has no pulley, all are at its frame anchor.
+        wraps: Number of points on each pulley, 0 or at least 2. Without a pulley, all are at the frame anchor.
         rotation: Work array, (3, 3).
         geometry: Work array, (GEOMETRY_ROWS, m).
         points: Filled with the points in world axes [m], (m, points, 3).
@@ -68,7 +68,7 @@ def cable_courses(
 
 @glue
 def _write_point(cables: Array, geometry: Array, i: int, x: float, z: float, points: Array, k: int) -> None:
-    """Write a point in world axes [m]; its coordinates in a cable's vertical plane are relative to the frame anchor."""
+    """Write point `k` of cable `i` in world axes [m]; `x`, `z`: position in its plane, relative to the frame anchor."""
     points[i, k, 0] = cables[i, tables.FRAME_X] + geometry[AZIMUTH_X, i] * x
     points[i, k, 1] = cables[i, tables.FRAME_Y] + geometry[AZIMUTH_Y, i] * x
     points[i, k, 2] = cables[i, tables.FRAME_Z] + z

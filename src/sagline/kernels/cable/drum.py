@@ -26,13 +26,13 @@ SETTLED = 1e-8
 
 @formula
 def _slant_length(distance: float, offset: float) -> float:
-    """Extra length [m] of the slanted cable between drum and pulley; zero at infinite distance."""
+    """Extra length [m] of the slanted cable between drum and pulley. It is zero if `distance` is infinite."""
     return offset * offset / (math.sqrt(distance * distance + offset * offset) + distance)
 
 
 @formula
 def _turn_length(drum: Array, layer: int) -> float:
-    """Length of one turn of a layer, a helix [m]."""
+    """Length of one turn of `layer`, a helix [m]."""
     circle = 2.0 * math.pi * (drum[PITCH_RADIUS] + layer * drum[LAYER_RISE])
     return math.sqrt(circle * circle + drum[GROOVE_PITCH] * drum[GROOVE_PITCH])
 
@@ -47,7 +47,7 @@ def _exit_position(drum: Array, layer: int, turns: float) -> tuple[float, float]
 
 @formula
 def _wound_length(drum: Array, layer: int, turns: float) -> float:
-    """Cable length [m] that the first turns of a layer take up; a convex and increasing function of the turns."""
+    """Cable length [m] that the first `turns` of `layer` take up: a convex and increasing function of the turns."""
     first, _ = _exit_position(drum, layer, 0.0)
     place, _ = _exit_position(drum, layer, turns)
     distance = drum[DISTANCE]
@@ -56,7 +56,7 @@ def _wound_length(drum: Array, layer: int, turns: float) -> float:
 
 @entry
 def turns_of_lengths(drums: Array, starts: Array, length: Array, turns_out: Array, travel_out: Array) -> None:
-    """Turns on each drum, and change of length per turn [m], at given lengths off the drum.
+    """Turns on each drum, and change of length per turn [m], at the lengths `length` off the drum.
 
     Turns are negative beyond the empty drum, and exceed the drum's capacity beyond its last layer.
 
@@ -94,7 +94,7 @@ def turns_of_lengths(drums: Array, starts: Array, length: Array, turns_out: Arra
 
 @entry
 def lengths_of_turns(drums: Array, starts: Array, turns: Array, length_out: Array) -> None:
-    """Lengths off the drum for given numbers of turns; arguments as in `turns_of_lengths`."""
+    """Lengths off the drum for the numbers of turns `turns`; arguments as in `turns_of_lengths`."""
     for p in range(turns.shape[0]):
         for i in range(turns.shape[1]):
             drum = drums[i]

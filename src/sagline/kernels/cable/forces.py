@@ -67,7 +67,7 @@ class _EquivalentCables(NamedTuple):
 
 @glue
 def _two_halley_steps(gravity: float, cables: Array, asked: _EquivalentCables, rows: Array) -> None:
-    """Two Halley steps for every cable from the stored parameter; the loop has one result, so that it vectorizes."""
+    """Two Halley steps for every cable from the stored parameter. The loop has one result, so that it vectorizes."""
     m = cables.shape[0]
     for i in range(m):
         rows[g.KAPPA, i] = 0.5 * cables[i, tables.DENSITY] * gravity * asked.length[i] / asked.stiffness[i]
@@ -85,7 +85,7 @@ def _two_halley_steps(gravity: float, cables: Array, asked: _EquivalentCables, r
 
 @formula
 def _has_converged(rows: Array, i: int) -> bool:
-    """True if the second step has full precision; False for NaN."""
+    """True if the second step of cable `i` has full precision. False for NaN."""
     first, second, kappa = rows[g.FIRST, i], rows[g.SECOND, i], rows[g.KAPPA, i]
     near = abs(first - rows[g.PARAMETER, i]) <= CLOSE * (first + kappa)
     return near and abs(second - first) <= SMALL_HALLEY_STEP * (second + kappa) and 0.0 < second < ORDINARY
@@ -99,8 +99,8 @@ def forces_from_lengths(model: Model, cables: Array, rows: Array, behind: bool |
     the replacement; docs/model.md, section 10.
 
     cables: rows of the cable_table, (m, CABLE_COLUMNS); rows: as in `sagline.kernels.cable.geometry`, (CABLE_ROWS, m);
-    behind: `Model.behind` as a separate argument: None if no cable has a pulley, so that the code for pulleys is not
-    compiled.
+        behind: `Model.behind` as a separate argument. If no cable has a pulley, it is None, and the code for pulleys is
+        not compiled.
     """
     if behind is None:
         bare = _EquivalentCables(rows[g.SPAN], rows[g.RISE], rows[g.LENGTH], cables[:, tables.STIFFNESS])

@@ -20,7 +20,7 @@ GEOMETRY_ROWS = 10
 
 @formula
 def _rotation_matrix(pose: Array, rotation: Array) -> None:
-    """Fill the 3 x 3 rotation platform -> world of a pose row."""
+    """Fill `rotation` (3, 3), platform -> world, of the pose row `pose`."""
     x, y, z, w = pose[3], pose[4], pose[5], pose[6]
     rotation[0, 0] = 1.0 - 2.0 * (y * y + z * z)
     rotation[0, 1] = 2.0 * (x * y - z * w)
@@ -35,12 +35,12 @@ def _rotation_matrix(pose: Array, rotation: Array) -> None:
 
 @formula
 def tangent(radius: float, entry: float, span: float, rise: float) -> tuple[float, float, float]:
-    """Length, sin phi and cos phi of the tangent from a pulley to a point; NaN if no tangent exists.
+    """Length, sin phi and cos phi of the tangent from a pulley to a point. NaN if no tangent exists.
 
     The pulley is in the cable's vertical plane. Span and rise are measured from the point where the cable enters the
-    pulley. entry is +1 for a cable that enters from below. There is no tangent from a point inside the pulley or on its
-    near side. After half a turn on the pulley, the cable is vertical, and exit and entry are two radii apart. The point
-    is then exactly below the exit, or above the exit if the cable enters from above.
+    pulley. `entry` is +1 for a cable that enters from below. There is no tangent from a point inside the pulley or on
+    its near side. After half a turn on the pulley, the cable is vertical, and exit and entry are two radii apart. The
+    point is then exactly below the exit, or above the exit if the cable enters from above.
     """
     across = span - radius
     along = entry * rise
@@ -54,9 +54,9 @@ def tangent(radius: float, entry: float, span: float, rise: float) -> tuple[floa
 
 @formula
 def cable_geometry(cables: Array, body: Array, pose: Array, rotation: Array, geometry: Array) -> None:
-    """Fill the geometry rows (GEOMETRY_ROWS, m) of one pose; a vertical cable gets azimuth 0.
+    """Fill the geometry rows (GEOMETRY_ROWS, m) of one pose. A vertical cable gets azimuth 0.
 
-    The chord of a cable over a pulley is the tangent from its platform end to the pulley; NaN if no tangent exists.
+    The chord of a cable over a pulley is the tangent from its platform end to the pulley. NaN if no tangent exists.
     """
     _rotation_matrix(pose, rotation)
     for i in range(cables.shape[0]):

@@ -24,7 +24,7 @@ STEPS = 60
 
 @kernel
 def stretching_tension(tension: float, sine: float, cosine: float, sag_force: float) -> float:
-    """Magnitude of the force on the platform end [N]; if the sag force is 0, this is the chord tension."""
+    """Magnitude of the force on the platform end [N]. If `sag_force` is 0, this is the chord tension."""
     return math.hypot(tension * cosine, tension * sine + sag_force)
 
 
@@ -32,7 +32,7 @@ def stretching_tension(tension: float, sine: float, cosine: float, sag_force: fl
 def shallow_length_ratio(
     tension: float, sine: float, cosine: float, sag_force: float, sag: float, stiffness: float
 ) -> float:
-    """Ratio L/D. sag: k (rho D cos phi)^2 [N^2]; sag_force: b [N] if it is part of the stretching tension, else 0."""
+    """Ratio L/D. `sag`: k (rho D cos phi)^2 [N^2]; `sag_force`: b [N] if it is part of the stretching tension, or 0."""
     return (1.0 + sag / (tension * tension)) / (1.0 + stretching_tension(tension, sine, cosine, sag_force) / stiffness)
 
 
@@ -40,7 +40,7 @@ def shallow_length_ratio(
 def shallow_tension(
     chord: float, sine: float, cosine: float, sag_force: float, sag: float, stiffness: float, length: float
 ) -> tuple[float, bool]:
-    """Chord tension of a shallow cable from its length, and True if it was found.
+    """Chord tension of a shallow cable of the length `length`, and True if this tension was found.
 
     The first Newton steps use the cubic equation of the parabolic model and start above its root. The other steps use
     the length of the cable model and stay within two bounds. A cable without sag that is longer than its chord has no
@@ -93,14 +93,14 @@ def shallow_sag_force(model: Model, chord: float, density: float) -> float:
 
 @kernel
 def sag_of_shallow(model: Model, line: float) -> float:
-    """The product k (rho D cos phi)^2 [N^2] of the shallow models, from rho D cos phi [kg]."""
+    """The product k (rho D cos phi)^2 [N^2] of the shallow models; `line`: rho D cos phi [kg]."""
     k = model.k_p if model.code == codes.EMPIRICAL else model.gravity * model.gravity / 24.0
     return k * line * line
 
 
 @kernel
 def from_tension(model: Model, chord: Chord, material: Material, tension: float) -> tuple[float, float, int]:
-    """Unstrained length [m], sag force T_z - tau sin phi [N] and status of a cable at a chord tension."""
+    """Unstrained length [m], sag force T_z - tau sin phi [N] and status of a cable at the chord tension `tension`."""
     if model.code == codes.STRAIGHT:
         return chord.length, 0.0, codes.CABLE_SOLVED
     strain = tension / material.stiffness
@@ -124,7 +124,7 @@ def from_tension(model: Model, chord: Chord, material: Material, tension: float)
 
 @kernel
 def from_length(model: Model, span: float, rise: float, material: Material, length: float) -> tuple[Force, int]:
-    """Force on the platform end, and status, of a cable with a given length."""
+    """Force on the platform end, and status, of a cable of the length `length`."""
     if model.code == codes.STRAIGHT:
         return Force(math.nan, math.nan, math.nan), codes.CABLE_NO_TENSION
     weight = material.density * model.gravity

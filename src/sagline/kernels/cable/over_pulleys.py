@@ -39,25 +39,25 @@ ORDINARY_END = math.sqrt(EXCESS_LIMIT)  # largest u = wL/(T_A + T_B) for which t
 
 @formula
 def material_at(cables: Array, i: int) -> Material:
-    """Material of one cable of the cable_table."""
+    """Material of cable `i` of the cable_table."""
     return Material(cables[i, tables.DENSITY], cables[i, tables.STIFFNESS])
 
 
 @formula
 def chord_at(rows: Array, i: int) -> Chord:
-    """Chord of a cable at a pose."""
+    """Chord of cable `i` at a pose."""
     return Chord(rows[g.CHORD, i], rows[g.SINE, i], rows[g.COSINE, i])
 
 
 @formula
 def _wrap_at(rows: Array, i: int) -> Wrap:
-    """Wrap of one cable on its pulley, after `update_from_equivalent_cables`."""
+    """Wrap of cable `i` on its pulley, after `update_from_equivalent_cables`."""
     return Wrap(rows[g.WRAP_SINE, i], rows[g.WRAP_COSINE, i], rows[g.WRAP, i])
 
 
 @glue
 def start_passes(cables: Array, rows: Array) -> None:
-    """Fill the cable lengths between chords and drums; reset the corrections of cables without a previous parameter."""
+    """Fill the cable lengths between chords and drums. Reset the corrections of cables without a previous parameter."""
     for i in range(rows.shape[1]):
         rows[g.BEHIND, i] = straight_behind(pulley_at(cables, i), chord_at(rows, i))
     for i in range(rows.shape[1]):
@@ -92,7 +92,7 @@ def fill_equivalent_cables(model: Model, cables: Array, rows: Array) -> None:
 
 @glue
 def update_from_equivalent_cables(model: Model, cables: Array, rows: Array) -> float:
-    """Fill forces and free spans from the equivalent cables; returns the largest error, relative to the cable length.
+    """Fill forces and free spans from the equivalent cables. Returns the largest error, relative to the cable length.
 
     This error corrects the equivalent cables in the next pass. For the exact cable it is the error of the platform end,
     and for the shallow cables it is the error of the length.
@@ -166,7 +166,7 @@ def _larger(one: float, other: float) -> float:
 
 @glue
 def _end_errors(rows: Array) -> float:
-    """Correct the equivalent cables by the platform-end errors; returns the largest error relative to the length."""
+    """Correct the equivalent cables by the platform-end errors. Returns the largest error relative to the length."""
     largest = 0.0
     for i in range(rows.shape[1]):
         x, z = rows[g.FREE_SPAN, i] - rows[g.END_X, i], rows[g.FREE_RISE, i] - rows[g.END_Z, i]
@@ -178,7 +178,7 @@ def _end_errors(rows: Array) -> float:
 
 @glue
 def _length_errors(model: Model, cables: Array, rows: Array) -> float:
-    """`_end_errors` for shallow and weightless cables, which leave along the chord; 0 for weightless cables."""
+    """`_end_errors` for shallow and weightless cables, which leave along the chord. 0 for weightless cables."""
     largest = 0.0
     for i in range(rows.shape[1]):
         material, pulley, chord = material_at(cables, i), pulley_at(cables, i), chord_at(rows, i)
@@ -214,7 +214,7 @@ def behind_at(model: Model, cables: Array, rows: Array, i: int) -> Behind:
 
 @formula
 def end_motion_per_length(model: Model, cables: Array, rows: Array, i: int) -> tuple[float, float, float]:
-    """Motion of the platform end at a fixed force: x and z per meter of cable; equivalent cable length per newton of H.
+    """Motion of the platform end at a fixed force, x and z per meter of cable; then equivalent length per newton of H.
 
     An increase of H stretches the part between P and the drum. The platform end then moves as if cable were paid out.
     The third value is the length of this cable per newton of H.
@@ -235,7 +235,7 @@ def end_motion_per_length(model: Model, cables: Array, rows: Array, i: int) -> t
 
 @formula
 def stiffness_in_series(model: Model, cables: Array, rows: Array, i: int, plane: PlaneStiffness) -> PlaneStiffness:
-    """In-plane stiffness of a cable: its free span in series with the part between P and the drum."""
+    """In-plane stiffness of cable `i`: its free span in series with the part between P and the drum."""
     if not rows[g.LEAVING, i] > 0.0:
         return plane
     x, z, gives = end_motion_per_length(model, cables, rows, i)
@@ -252,7 +252,7 @@ def stiffness_in_series(model: Model, cables: Array, rows: Array, i: int, plane:
 
 @formula
 def across_pulley(cables: Array, rows: Array, i: int) -> float:
-    """Stiffness of a cable normal to its plane [N/m]; the whole plane turns about the swivel axis."""
+    """Stiffness of cable `i` normal to its plane [N/m]. The whole plane turns about the swivel axis."""
     pulley = pulley_at(cables, i)
     if pulley.radius == 0.0:
         return rows[g.TENSION, i] / rows[g.CHORD, i]

@@ -64,7 +64,7 @@ class EndMotion(NamedTuple):
 
 @formula
 def pulley_at(cables: Array, i: int) -> Pulley:
-    """Pulley and dead length of one cable of the cable_table."""
+    """Pulley and dead length of cable `i` of the cable_table."""
     return Pulley(
         cables[i, tables.PULLEY_RADIUS],
         cables[i, tables.ENTRY],
@@ -102,7 +102,7 @@ def free_span(pulley: Pulley, chord: Chord, cosine: float) -> float:
 
 @formula
 def free_rise(pulley: Pulley, chord: Chord, sine: float) -> float:
-    """Height of the platform end above the exit point [m]; sine: sin psi."""
+    """Height of the platform end above the exit point [m]; `sine`: sin psi."""
     return chord.length * chord.sine + pulley.radius * (pulley.entry * (chord.cosine - sine))
 
 
@@ -143,7 +143,7 @@ def from_axis(pulley: Pulley, chord: Chord) -> float:
 def _strains(
     pulley: Pulley, weight: float, stiffness: float, tension: float, sine: float
 ) -> tuple[float, float, float]:
-    """Stretch E = 1 + e at P, at the entry of the pulley, and at the drum; sine: sin psi."""
+    """Stretch E = 1 + e at P, at the entry of the pulley, and at the drum; `sine`: sin psi."""
     leaving = 1.0 + tension / stiffness
     entering = math.sqrt(leaving * leaving - 2.0 * pulley.entry * weight * pulley.radius / stiffness * sine)
     return leaving, entering, math.sqrt(entering * entering - 2.0 * weight * pulley.rise / stiffness)
@@ -151,7 +151,7 @@ def _strains(
 
 @formula
 def behind(pulley: Pulley, weight: float, stiffness: float, tension: float, wrap: Wrap) -> Behind:
-    """Unstrained lengths on the pulley and between drum and pulley, from the tension at P; weight: per length [N/m]."""
+    """Unstrained lengths on the pulley and between drum and pulley; `tension` at P [N]; `weight` per length [N/m]."""
     strained, first, last = _strains(pulley, weight, stiffness, tension, wrap.sine)
     beta = weight * pulley.radius / stiffness
     falls = pulley.entry * beta * (1.0 - wrap.cosine - wrap.angle * wrap.sine)
@@ -170,7 +170,7 @@ def behind_cable(model: Model, material: Material, pulley: Pulley, tension: floa
 
 @formula
 def softness(pulley: Pulley, weight: float, stiffness: float, tension: float, wrap: Wrap) -> float:
-    """Compliance S [m/N]: unstrained length that the part beyond P releases per newton of H; P moves by E_A^2 S."""
+    """Compliance S [m/N]: unstrained length that the part beyond P releases per newton of H. P moves by E_A^2 S."""
     strained, first, last = _strains(pulley, weight, stiffness, tension, wrap.sine)
     on_pulley = pulley.radius * wrap.angle / (strained * strained * strained)
     return (on_pulley + 2.0 * pulley.dead / ((first + last) * first * last)) / stiffness

@@ -58,7 +58,7 @@ def new_curves(model: Model, cables: Cables, statuses: Codes, memory: Memory) ->
 
 @kernel
 def sag_forces_at(curves: Curves, tau: Array, sag_force: Array) -> None:
-    """Fill the sag forces (m,) at chord tensions (m,), and store both in the cables."""
+    """Fill the sag forces (m,) at the chord tensions `tau` (m,), and store both in the cables."""
     for i in range(tau.size):
         curves.cables.tau[i] = tau[i]
     change = 0.0
@@ -78,7 +78,7 @@ def sag_forces_at(curves: Curves, tau: Array, sag_force: Array) -> None:
 
 @kernel
 def slopes_at(curves: Curves, tau: Array, slope: Array, bend: Array) -> None:
-    """Fill slopes (m,) and curvatures (m,) [1/N] of the sag forces over the tensions, from central differences."""
+    """Fill `slope` (m,) and curvature `bend` (m,) [1/N] of the sag forces over `tau`, by central differences."""
     cables = curves.cables
     if curves.model.code != codes.CATENARY:
         for i in range(tau.size):
@@ -101,7 +101,7 @@ def slopes_at(curves: Curves, tau: Array, slope: Array, bend: Array) -> None:
 
 @kernel
 def sag_force_at(curves: Curves, i: int, tau: float) -> float:
-    """Sag force of one cable at a chord tension [N]; zero at an infinite tension, because the length is then zero."""
+    """Sag force of cable `i` at the chord tension `tau` [N]. Zero at an infinite tension, which means no length."""
     cables = curves.cables
     if curves.model.code != codes.CATENARY:
         return shallow_sag_force(curves.model, cables.chord[i], cables.density[i])
@@ -115,7 +115,7 @@ def sag_force_at(curves: Curves, i: int, tau: float) -> float:
 
 @glue
 def sag_force_range(curves: Curves, i: int, section: Section) -> tuple[float, float]:
-    """Least and largest sag force of cable i on a range of its chord tensions."""
+    """Least and largest sag force of cable `i` in the range `section` of its chord tensions."""
     turns = curves.turns
     beyond = TURN_ERROR * curves.cables.half_weight[i]
     least, most = min(section.at_low, section.at_high), max(section.at_low, section.at_high)
@@ -130,8 +130,8 @@ def sag_force_range(curves: Curves, i: int, section: Section) -> tuple[float, fl
 def most_along(curves: Curves, i: int, section: Section, along: float, hanging: float) -> float:
     """Upper bound of along * tau - b * sag_force(tau) on a section [N]; exact if the maximum is at an end.
 
-    From the value at one end and the range of the sag force follows the largest distance to a better tension. The
-    section is shortened to this distance, and the step is repeated.
+    The value at one end and the range of the sag force give the largest distance to a better tension. The section is
+    shortened to this distance, and the step is repeated.
 
     section: range of chord tensions, whose upper end may be infinite; along, b: factors of chord tension and sag force.
     """
@@ -193,7 +193,7 @@ def _growths(curves: Curves, tau: Array, growth: Array) -> None:
 
 @formula
 def _growth_of(curves: Curves, i: int, tau: float) -> float:
-    """Growth of the sag force of cable i [N]: derivative with respect to the logarithm of its chord tension."""
+    """Growth of the sag force of cable `i` [N]: derivative with respect to the logarithm of its chord tension."""
     above, below = sag_force_at(curves, i, tau * (1.0 + SLOPE_STEP)), sag_force_at(curves, i, tau * (1.0 - SLOPE_STEP))
     return (above - below) / (2.0 * SLOPE_STEP)
 
@@ -210,7 +210,7 @@ def _first_order_growth(curves: Curves, i: int, tau: float) -> tuple[float, floa
 
 @kernel
 def _rising_tension_between(curves: Curves, i: int, low: float, high: float) -> float:
-    """Chord tension at which the sag force rises, between two tensions at which it falls; NaN if it never rises.
+    """Chord tension between `low` and `high`, where the sag force falls, at which it rises. NaN if it never rises.
 
     The growth of the sag force has one peak, which golden sections find.
     """
@@ -235,7 +235,7 @@ def _rising_tension_between(curves: Curves, i: int, low: float, high: float) -> 
 
 @glue
 def _find_rises(curves: Curves, work: Array) -> None:
-    """Fill row RISEN with a tension between A and B at which the sag force of a cable rises; NaN if it never rises."""
+    """Fill row RISEN with a tension between A and B at which the sag force of a cable rises. NaN if it never rises."""
     cables = curves.cables
     for i in range(work.shape[1]):
         best = 1.5 * cables.half_weight[i] * cables.cosine[i] * cables.cosine[i] / abs(cables.sine[i])
@@ -304,7 +304,7 @@ def _find_extremum(curves: Curves, rising: bool, work: Array, tensions: Array, s
 
 @kernel
 def find_extrema(curves: Curves, low: Array, high: Array, memory: Memory) -> None:
-    """Fill the extrema of the cables' sag forces between finite chord tensions low and high, (m,) each."""
+    """Fill the extrema of the cables' sag forces between the finite chord tensions `low` and `high`, (m,) each."""
     cables, turns = curves.cables, curves.turns
     m = cables.low.size
     work, memory = block(memory, ROWS, m)

@@ -39,7 +39,7 @@ class _MachineSlopes(NamedTuple):
 
 @formula
 def force_change(plane: PlaneStiffness, end: PlaneVector) -> PlaneVector:
-    """Change of the force if the platform end cannot move: minus the stiffness times the motion that it would make."""
+    """Change of the force if the platform end is fixed: minus the stiffness `plane` times the free motion `end`."""
     return PlaneVector(-(plane.xx * end.x + plane.xz * end.z), -(plane.zx * end.x + plane.zz * end.z))
 
 
@@ -81,7 +81,7 @@ def _catenary_by_weight(
 def force_by_length(
     model: Model, span: float, rise: float, material: Material, length: float, force: Force, plane: PlaneStiffness
 ) -> PlaneVector:
-    """dT/dL [N/m] of a cable of the exact or the weightless model; zero for a slack weightless cable."""
+    """dT/dL [N/m] of a cable of the exact or the weightless model. Zero for a slack weightless cable."""
     weight = material.density * model.gravity
     if model.code == codes.CATENARY and weight > 0.0:
         end = _catenary_by_length(force.horizontal, force.vertical, length, weight, material.stiffness)

@@ -39,9 +39,9 @@ TAUT = 1.25  # chord tension in units of wD/2 that is larger than the chord tens
 def _fill_exit_points(model: Model, cables: Cables, fresh: bool) -> float:
     """Fill the free spans and their tensions; the forces at the pulleys determine the exit points.
 
-    The forces follow from the last lengths and sag forces at the present chord tensions; if these do not exist yet
-    (fresh), first-order values are used. Cables of the shallow models leave along their chord. Returns the largest
-    change of a direction.
+    The forces follow from the last lengths and sag forces at the present chord tensions. If `fresh` is true, these do
+    not exist yet, and first-order values are used. Cables of the shallow models leave along their chord. Returns the
+    largest change of a direction.
     """
     exact = model.code == codes.CATENARY
     change = 0.0
@@ -131,7 +131,7 @@ def solve_cable_states(model: Model, cables: Cables, fresh: bool, near: bool, st
 def solve_cable_state(
     model: Model, chord: Chord, material: Material, pulley: Pulley, tau: float
 ) -> tuple[float, float, int]:
-    """Free unstrained length [m], sag force T_z - tau sin phi [N] and status of one cable at a chord tension."""
+    """Free unstrained length [m], sag force T_z - tau sin phi [N] and status of a cable at the chord tension `tau`."""
     length, sag_force, status = from_tension(model, chord, material, tau)
     if pulley.radius > 0.0 and model.code == codes.CATENARY:
         horizontal, weight = tau * chord.cosine, material.density * model.gravity
@@ -151,7 +151,7 @@ def solve_cable_state(
 
 @kernel
 def frame_end_tension(model: Model, chord: Chord, material: Material, pulley: Pulley, tau: float) -> float:
-    """Tension [N] at the frame end of the free span of a cable, from its chord tension."""
+    """Tension [N] at the frame end of a cable's free span, at the chord tension `tau`."""
     if model.code == codes.STRAIGHT or model.code == codes.ELASTIC:
         return tau
     length, sag_force, _status = solve_cable_state(model, chord, material, pulley, tau)
@@ -212,7 +212,7 @@ class _CableAtTension(NamedTuple):
 
 @kernel
 def hold_cable(model: Model, chord: Chord, material: Material, pulley: Pulley, tau: float) -> _CableAtTension:
-    """State of a cable at a chord tension, including the cable on its pulley and the dead length."""
+    """State of a cable at the chord tension `tau`. It includes the cable on the pulley and the dead length."""
     weightless = model.code == codes.STRAIGHT or model.code == codes.ELASTIC
     weight = 0.0 if weightless else material.density * model.gravity
     length, sag_force, _status = solve_cable_state(model, chord, material, pulley, tau)

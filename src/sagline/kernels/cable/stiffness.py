@@ -34,7 +34,7 @@ class _ShallowSlopes(NamedTuple):
 
 @formula
 def force_of(rows: Array, i: int) -> Force:
-    """Force on the platform end of one cable of a pose."""
+    """Force on the platform end of cable `i`."""
     return Force(rows[g.HORIZONTAL, i], rows[g.VERTICAL, i], rows[g.TENSION, i])
 
 
@@ -42,7 +42,7 @@ def force_of(rows: Array, i: int) -> Force:
 def series_excess(
     horizontal: float, vertical_a: float, vertical: float, tension_a: float, tension_b: float, weight_length: float
 ) -> float:
-    """Value of atanh(u)/u - 1 of P1; infinite for a folded cable."""
+    """Value of atanh(u)/u - 1 of P1. Infinite for a folded cable."""
     u = weight_length / (tension_a + tension_b)
     if u <= 0.5:
         return atanhc_excess(u)
@@ -88,7 +88,7 @@ def catenary_stiffness(
 
 @formula
 def _elastic_stiffness(span: float, rise: float, length: float, tension: float, stiffness: float) -> PlaneStiffness:
-    """In-plane stiffness of the weightless cable; zero if it is slack."""
+    """In-plane stiffness of the weightless cable. Zero if the cable is slack."""
     if tension == 0.0:
         return PlaneStiffness(0.0, 0.0, 0.0, 0.0)
     chord = math.sqrt(span * span + rise * rise)
@@ -140,7 +140,7 @@ def shallow_slopes(
 def _shallow_stiffness(
     model: Model, span: float, rise: float, material: Material, length: float, tension: float
 ) -> PlaneStiffness:
-    """In-plane stiffness of a shallow cable; not symmetric, because its forces are not a gradient."""
+    """In-plane stiffness of a shallow cable. It is not symmetric, because the forces are not a gradient."""
     slopes = shallow_slopes(model, span, rise, material, length, tension)
     chord = math.sqrt(span * span + rise * rise)
     cosine = span / chord
@@ -159,7 +159,7 @@ def _shallow_stiffness(
 def cable_stiffness(
     model: Model, span: float, rise: float, material: Material, length: float, force: Force
 ) -> PlaneStiffness:
-    """In-plane stiffness of a cable of any model; NaN for the straight cable."""
+    """In-plane stiffness of a cable of any model. NaN for the straight cable."""
     if model.code == codes.STRAIGHT:
         return PlaneStiffness(math.nan, math.nan, math.nan, math.nan)
     weight = material.density * model.gravity
@@ -191,13 +191,13 @@ def stiffnesses_in_plane(model: Model, cables: Array, rows: Array, behind: bool 
 
 @formula
 def plane_of(rows: Array, i: int) -> PlaneStiffness:
-    """In-plane stiffness of one cable of a pose."""
+    """In-plane stiffness of cable `i`."""
     return PlaneStiffness(rows[g.XX, i], rows[g.XZ, i], rows[g.ZX, i], rows[g.ZZ, i])
 
 
 @formula
 def catenary_energy(span: float, rise: float, length: float, force: Force, weight: float, stiffness: float) -> float:
-    """Energy V = T.B - C(T) [J] of strain and weight of the exact cable; the frame end has height 0."""
+    """Energy V = T.B - C(T) [J] of strain and weight of the exact cable. The frame end has height 0."""
     horizontal, vertical, _ = force
     weight_length = weight * length
     vertical_a = vertical - weight_length
@@ -221,7 +221,7 @@ def elastic_energy(chord: float, length: float, tension: float, stiffness: float
 
 @formula
 def _cable_energy(model: Model, span: float, rise: float, material: Material, length: float, force: Force) -> float:
-    """Energy [J] of a cable with the exact or a weightless model; NaN for other models."""
+    """Energy [J] of a cable with the exact or a weightless model. NaN for other models."""
     weight = material.density * model.gravity
     if model.code == codes.CATENARY and weight > 0.0:
         return catenary_energy(span, rise, length, force, weight, material.stiffness)
@@ -235,8 +235,8 @@ def energy_of_cables(model: Model, cables: Array, rows: Array, behind: bool | No
     """Energy [J] of all cables of a pose, and the sum of the magnitudes of its terms.
 
     cables: rows of the cable_table, (m, CABLE_COLUMNS); rows: as in `sagline.kernels.cable.geometry`, (CABLE_ROWS, m),
-    after `cable_forces`; behind: `Model.behind` as a separate argument: None if no cable has a pulley, so that the code
-    for pulleys is not compiled.
+    after `cable_forces`; behind: `Model.behind` as a separate argument. If no cable has a pulley, it is None, and the
+    code for pulleys is not compiled.
     """
     x = g.SPAN if behind is None else g.FREE_SPAN
     z = g.RISE if behind is None else g.FREE_RISE

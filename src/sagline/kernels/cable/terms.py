@@ -26,7 +26,7 @@ class Model(NamedTuple):
 
 @glue
 def model_of(terms: Terms) -> Model:
-    """Convert the plain tuple from Python to a `Model`."""
+    """Convert the plain tuple `terms` from Python to a `Model`."""
     return Model(terms[0], terms[1], terms[2], terms[3], None)
 
 

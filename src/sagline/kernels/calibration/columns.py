@@ -33,7 +33,7 @@ def unit_vector(axis: int) -> Triple:
 
 @formula
 def column_of(matrix: Array, k: int) -> Triple:
-    """Column k of a matrix (3, 3)."""
+    """Column `k` of a matrix (3, 3)."""
     return matrix[0, k], matrix[1, k], matrix[2, k]
 
 
@@ -67,7 +67,7 @@ def scaled(factor: float, vector: Triple) -> Triple:
 
 @glue
 def fill_motion_by_wrench(free: Array, wrench: Array, space: CalibrationArrays, motion: Array) -> None:
-    """Fill the motion of the platform due to a wrench on it; requires the factored stiffness."""
+    """Fill the `motion` of the platform due to `wrench` on the platform. The stiffness must be factored."""
     components_along(free, wrench, space.part)
     solve_lower(space.factor, space.part)
     solve_upper(space.factor, space.part)
@@ -76,7 +76,7 @@ def fill_motion_by_wrench(free: Array, wrench: Array, space: CalibrationArrays, 
 
 @formula
 def fill_length(space: CalibrationArrays, i: int, force: Triple, moment: Triple, direct: float) -> None:
-    """Fill the derivatives of the wrench on the platform and of all readings with respect to the length of cable i."""
+    """Fill the derivatives, with respect to the length of cable `i`, of the wrench on the platform and all readings."""
     for k in range(3):
         space.by_wrench[i, k], space.by_wrench[i, 3 + k] = force[k], moment[k]
     for j in range(space.moved.shape[0]):
@@ -89,7 +89,7 @@ def fill_length(space: CalibrationArrays, i: int, force: Triple, moment: Triple,
 
 @glue
 def add_motion(space: CalibrationArrays, slopes: Slopes) -> None:
-    """Add changes of readings to the columns: wrench changes move the platform, and this changes the readings."""
+    """Add changes of readings to the columns. Wrench changes move the platform, which changes the readings."""
     for j in range(slopes.work.shape[0]):
         for k in range(6):
             share = space.moved[j, k]
@@ -111,20 +111,20 @@ def fill_motion(free: Array, space: CalibrationArrays, slopes: Slopes, motion: A
 
 @formula
 def _lever_of(rows: Array, i: int) -> Triple:
-    """Lever from the center of mass to a platform end."""
+    """Lever from the center of mass to the platform end of cable `i`."""
     return rows[g.LEVER_X, i], rows[g.LEVER_Y, i], rows[g.LEVER_Z, i]
 
 
 @formula
 def _force_at(rows: Array, i: int) -> Triple:
-    """Force T on a cable at its platform end, world axes."""
+    """Force T on cable `i` at its platform end, world axes."""
     x = rows[g.HORIZONTAL, i]
     return x * rows[g.AZIMUTH_X, i], x * rows[g.AZIMUTH_Y, i], rows[g.VERTICAL, i]
 
 
 @formula
 def _force_by_motion(ends: Array, i: int, vector: Triple) -> Triple:
-    """Change of a cable's force due to a motion of its platform end."""
+    """Change of the force of cable `i` due to the motion `vector` of its platform end."""
     return (
         ends[i, 0] * vector[0] + ends[i, 1] * vector[1] + ends[i, 2] * vector[2],
         ends[i, 3] * vector[0] + ends[i, 4] * vector[1] + ends[i, 5] * vector[2],
@@ -151,7 +151,7 @@ def _tension_by_force(shares: Array, i: int, force: Triple) -> float:
 
 @formula
 def _in_world_axes(rows: Array, i: int, pair: PlaneVector) -> Triple:
-    """Convert a vector in a cable's plane to world axes."""
+    """Convert `pair`, a vector in the plane of cable `i`, to world axes."""
     return pair.x * rows[g.AZIMUTH_X, i], pair.x * rows[g.AZIMUTH_Y, i], pair.z
 
 
@@ -206,7 +206,7 @@ def fill_ends(model: Model, cables: Array, space: CalibrationArrays) -> None:
 
 @glue
 def fill_readings_by_wrench(sensing: Sensing, free: Array, m: int, reach: Triple, space: CalibrationArrays) -> None:
-    """Fill the change of every reading due to the motion under a unit wrench; requires the factored stiffness."""
+    """Fill the change of every reading due to the motion under a unit wrench. The stiffness must be factored."""
     for j in range(space.moved.shape[0]):
         six = space.six
         if j < m:
@@ -228,7 +228,7 @@ def fill_readings_by_wrench(sensing: Sensing, free: Array, m: int, reach: Triple
 def fill_cable(
     model: Model, cables: Array, gain: float, sought: Unknowns, p: int, i: int, space: CalibrationArrays, slopes: Slopes
 ) -> None:
-    """Add the unknowns of cable i to the columns, and fill the derivatives with respect to its length."""
+    """Add the unknowns of cable `i` to the columns, and fill the derivatives with respect to the cable's length."""
     where, scale, rows, ends, shares = sought.where, sought.scale, space.rows, space.ends, space.shares
     lever, force = _lever_of(rows, i), _force_at(rows, i)
     for axis in range(3):
@@ -274,7 +274,7 @@ def fill_cable(
 
 @formula
 def _free_displacement(free: Array, vector: Triple) -> Triple:
-    """The part of a displacement that the platform's free motions allow."""
+    """The part of the displacement `vector` that the platform's free motions allow."""
     x, y, z = 0.0, 0.0, 0.0
     for k in range(free.shape[0]):
         if not is_rotation(free, k):

@@ -1,4 +1,4 @@
-"""Rows of the table of unknowns (KIND_ROWS, m): for each robot parameter, the index of its unknown, or -1 if known.
+"""Rows of the table of unknowns (KIND_ROWS, m). An entry is the index of a parameter's unknown, or -1 if known.
 
 Rows for the platform or the measuring system use only the column of the first cable.
 """

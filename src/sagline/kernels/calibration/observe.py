@@ -1,7 +1,7 @@
 """Whitened residuals and derivatives of readings at equilibria; docs/model.md, section 14.
 
-The true lengths at every pose are also unknown. They are eliminated pose by pose: the errors of the measured lengths
-are treated as noise of the residual. The covariance of the residual is then diag(sigma^2) + sigma_L^2 A A^T.
+The true lengths at every pose are also unknown. They are eliminated pose by pose, because the errors of the measured
+lengths are treated as noise of the residual. The covariance of the residual is then diag(sigma^2) + sigma_L^2 A A^T.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def whiten(sensing: Sensing, residual: Array, space: CalibrationArrays, work: Ar
 def store_linearization(
     sensing: Sensing, answer: Linearization, p: int, reading_arrays: Array, lengths: Array, space: CalibrationArrays
 ) -> None:
-    """Store the linearization of one pose."""
+    """Store the linearization of pose `p`."""
     residual, matrix, whole = answer.residual[p], answer.matrix[p], space.whole
     readings, m = matrix.shape[0], lengths.size
     for j in range(readings):
@@ -113,7 +113,7 @@ def store_linearization(
 
 @formula
 def _rotation_between(reading_arrays: Array, pose: Array, frame: Array) -> Triple:
-    """Rotation vector between predicted and measured rotation of the platform, in the measuring system's axes."""
+    """Rotation vector from the predicted to the measured platform rotation, in the measuring system's axes."""
     # predicted rotation reading: conj(frame) * pose
     fx, fy, fz, fw = -frame[3], -frame[4], -frame[5], frame[6]
     ax = fw * pose[3] + fx * pose[6] + fy * pose[5] - fz * pose[4]

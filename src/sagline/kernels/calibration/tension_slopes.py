@@ -30,7 +30,7 @@ class _FrameEndSlopes(NamedTuple):
 
 @formula
 def frame_end_slopes(model: Model, cables: Array, rows: Array, i: int) -> _FrameEndSlopes:
-    """Slopes of cable i, whose forces must be known; zero if the force at the frame end is zero."""
+    """Slopes of cable `i`, whose forces must be known. They are zero if the force at the frame end is zero."""
     material = material_at(cables, i)
     gravity = model.gravity if model.code == codes.CATENARY else 0.0
     weight = material.density * gravity
@@ -70,5 +70,5 @@ def frame_end_slopes(model: Model, cables: Array, rows: Array, i: int) -> _Frame
 
 @formula
 def in_world_axes(rows: Array, i: int, along: float, up: float) -> tuple[float, float, float]:
-    """Derivatives with respect to the force on the platform end in world axes."""
+    """Derivatives with respect to the force on the platform end, in world axes."""
     return along * rows[g.AZIMUTH_X, i], along * rows[g.AZIMUTH_Y, i], up

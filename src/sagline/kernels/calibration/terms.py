@@ -94,7 +94,7 @@ class CalibrationArrays(NamedTuple):
 
 @glue
 def new_calibration_arrays(memory: Memory, m: int, n: int, readings: int) -> CalibrationArrays:
-    """Work arrays for m cables, n free motions and the given number of readings."""
+    """Work arrays for `m` cables, `n` free motions and the number `readings` of readings."""
     rows, memory = block(memory, CABLE_ROWS, m)
     rotation, memory = block(memory, 3, 3)
     axes, memory = block(memory, 3, 3)

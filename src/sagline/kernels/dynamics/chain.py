@@ -46,7 +46,7 @@ TINY = 1e-300
 
 @formula
 def fill_element_forces(place: Array, speed: Array, count: int, row: Array, pulls: Array) -> float:
-    """Fill the ratio force/length of every element [N/m]; returns the power lost in the elements [W].
+    """Fill the ratio force/length of every element [N/m]. Returns the power lost in the elements [W].
 
     place: positions of the nodes [m], (3, nodes), node 0 at the platform and node count + 1 at the frame; speed:
     velocities of the nodes [m/s], used if the elements have damping; pulls: filled, followed by two work rows, (3
@@ -69,13 +69,13 @@ def fill_element_forces(place: Array, speed: Array, count: int, row: Array, pull
 
 @formula
 def _strain_at_exit(row: Array, distance: float) -> float:
-    """Strain of the element at the frame, and of the cable between it and the drum, which slides freely."""
+    """Strain of the element at the frame, and of the freely sliding cable between this element and the drum."""
     return (distance + row[RUN]) / (row[REST] + row[BEHIND]) - 1.0
 
 
 @formula
 def _element_distance(place: Array, j: int) -> float:
-    """Length of the element between node j and the next node toward the frame [m]."""
+    """Length of the element between node `j` and the next node toward the frame [m]."""
     x = place[0, j + 1] - place[0, j]
     y = place[1, j + 1] - place[1, j]
     z = place[2, j + 1] - place[2, j]
@@ -84,7 +84,7 @@ def _element_distance(place: Array, j: int) -> float:
 
 @formula
 def _element_direction(place: Array, j: int) -> tuple[float, float, float, float]:
-    """Unit vector from node j to the next node toward the frame, and their distance [m]."""
+    """Unit vector from node `j` to the next node toward the frame, and the distance of both nodes [m]."""
     x, y, z = place[0, j + 1] - place[0, j], place[1, j + 1] - place[1, j], place[2, j + 1] - place[2, j]
     distance = math.sqrt(x * x + y * y + z * z + TINY)
     return x / distance, y / distance, z / distance, distance
@@ -92,14 +92,14 @@ def _element_direction(place: Array, j: int) -> tuple[float, float, float, float
 
 @formula
 def _opening_speed(speed: Array, j: int, x: float, y: float, z: float) -> float:
-    """Speed [m/s], along a unit vector, of the next node toward the frame relative to node j."""
+    """Speed [m/s] along the unit vector (x, y, z) of the next node toward the frame, relative to node `j`."""
     vx, vy, vz = speed[0, j + 1] - speed[0, j], speed[1, j + 1] - speed[1, j], speed[2, j + 1] - speed[2, j]
     return x * vx + y * vy + z * vz
 
 
 @kernel
 def _add_damping(place: Array, speed: Array, count: int, row: Array, pulls: Array) -> float:
-    """Add damping forces to taut elements; the sum is never a compression. Returns the power lost [W].
+    """Add damping forces to taut elements. The total force is never a compression. Returns the power lost [W].
 
     The forces follow from the speeds after the step (implicit Euler), so that damping does not limit the time step.
     Each force changes the speeds of the element's two nodes, so that the forces solve a tridiagonal system. The
@@ -163,7 +163,7 @@ def fill_frame_node_velocity(place: Array, speed: Array, count: int, row: Array)
 
 @formula
 def kick_nodes(place: Array, speed: Array, count: int, row: Array, pulls: Array, h: float) -> None:
-    """Update the nodes' velocities from element forces, gravity, and the momentum of entering cable, during h [s]."""
+    """Update the nodes' velocities by element forces, gravity and the momentum of entering cable, during `h` [s]."""
     share = h / (row[DENSITY] * row[ELEMENT])
     last = h / (0.5 * row[DENSITY] * (row[ELEMENT] + row[REST]))
     for c in range(3):
@@ -180,7 +180,7 @@ def kick_nodes(place: Array, speed: Array, count: int, row: Array, pulls: Array,
 
 @formula
 def drift_nodes(place: Array, speed: Array, count: int, row: Array, before: float, h: float) -> None:
-    """Move the nodes for h [s]; the node next to the frame keeps its momentum while its mass changes.
+    """Move the nodes for `h` [s]. The node next to the frame keeps its momentum while its mass changes.
 
     place: positions of the nodes [m]; speed: their velocities [m/s]; before: unstrained length of the element at the
     frame before the motion [m]; row: row of the cable, with this length after the motion; h: time [s].
@@ -197,7 +197,7 @@ def drift_nodes(place: Array, speed: Array, count: int, row: Array, before: floa
 
 @kernel
 def slow_by_air(speed: Array, count: int, row: Array, h: float) -> float:
-    """Apply the damping of the air to the nodes for h [s]; returns the energy lost [J]."""
+    """Apply the damping of the air to the nodes for `h` [s]. Returns the energy lost [J]."""
     if row[AIR_RATE] == 0.0:
         return 0.0
     factor = math.exp(-row[AIR_RATE] * h)
@@ -287,7 +287,7 @@ def mean_tension(pulls: Array, count: int, row: Array) -> float:
 
 @kernel
 def insert_node(place: Array, speed: Array, count: int, row: Array) -> None:
-    """Insert a node in the element at the frame, one element length from its free end; updates count and rest.
+    """Insert a node in the element at the frame, one element length from its free end. Updates count and rest.
 
     Tension, mass and momentum, including the half element at the frame, do not change. If there is no cable between
     exit point and drum, position and velocity are linear along the element, and the center of mass does not change.
@@ -307,10 +307,10 @@ def insert_node(place: Array, speed: Array, count: int, row: Array) -> None:
 
 @kernel
 def merge_nodes(place: Array, speed: Array, count: int, row: Array) -> None:
-    """Merge the element at the frame with its neighbor, and remove the node between them; updates count and rest.
+    """Merge the element at the frame with its neighbor, and remove the node between both. Updates count and rest.
 
-    The next node takes the momentum of the removed node. The half element at the frame moves with the entering cable;
-    its momentum is subtracted.
+    The next node takes the momentum of the removed node. The half element at the frame moves with the entering cable,
+    so that its momentum is subtracted.
     """
     element, rest, rate = row[ELEMENT], row[REST], row[RATE]
     whole = element + rest
@@ -333,7 +333,7 @@ def wind_on_element(place: Array, j: int, k: int, drag: float, wind: Array) -> t
 
 @kernel
 def add_wind_on_nodes(place: Array, speed: Array, count: int, row: Array, wind: Array, h: float) -> float:
-    """Update the nodes' velocities from the wind across the cable during h [s]; returns its work [J]."""
+    """Update the nodes' velocities by the wind across the cable, during `h` [s]. Returns the work of the wind [J]."""
     work = 0.0
     for j in range(1, count + 1):
         length = row[ELEMENT] if j < count else 0.5 * (row[ELEMENT] + row[REST])

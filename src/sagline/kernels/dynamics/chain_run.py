@@ -101,7 +101,7 @@ def _fill_last_elements(run: ChainRun) -> None:
 
 @kernel
 def follow_time_tables(run: ChainRun, now: float, shift: float) -> None:
-    """Fill the set points of the winches and the given wrench and wind at a time."""
+    """Fill the set points of the winches, and the given wrench and wind, at the time `now`."""
     at = run.at
     at[progress.LENGTH_AT] = progress.interpolate_table(
         run.lengths, at[progress.LENGTH_AT], now, shift, run.targets, run.target_rates
@@ -116,7 +116,7 @@ def follow_time_tables(run: ChainRun, now: float, shift: float) -> None:
 
 @kernel
 def fill_platform_force(run: ChainRun) -> float:
-    """Fill the force on the platform and the tensions at the winches; returns the power lost [W]."""
+    """Fill the force on the platform and the tensions at the winches. Returns the power lost [W]."""
     chains, drives, state, rows = run.chains, run.drives, run.state, run.rows
     ends = run.cables[:, tables.PLATFORM_X : tables.PLATFORM_Z + 1]
     lost = 0.0
@@ -172,7 +172,7 @@ def power_of_given_wrench(run: ChainRun) -> float:
 
 @kernel
 def kick_chains(run: ChainRun, h: float, begins: bool) -> None:
-    """Update the nodes' velocities by forces, wind and air during a time; at the start of a step, in reverse order."""
+    """Update the nodes' velocities by forces, air and wind during `h`. At the start of a step, forces come last."""
     chains, audit = run.chains, run.drives.audit
     blows = run.wind[0] != 0.0 or run.wind[1] != 0.0 or run.wind[2] != 0.0
     for i in range(chains.counts.shape[0]):

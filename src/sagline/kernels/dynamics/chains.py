@@ -57,7 +57,7 @@ GROWTH = 0.5
 
 @glue
 def _energy_of(run: ChainRun, i: int) -> tuple[float, float]:
-    """Energy of a chain including its half element at the exit, and energy of this half element [J]."""
+    """Energy of chain `i` with its half element at the exit, and energy of this half element [J]."""
     chains, n, row = run.chains, run.chains.counts[i], run.chains.table[i]
     strain, raised = c.potential(chains.place[i], n, row)
     entering = c.kinetic_at_exit(chains.speed[i], n, row)
@@ -66,7 +66,7 @@ def _energy_of(run: ChainRun, i: int) -> tuple[float, float]:
 
 @kernel
 def change_node_count(run: ChainRun, i: int) -> None:
-    """Add or remove one node of a chain at the frame, and add the energy change to the audit."""
+    """Add or remove one node of chain `i` at the frame, and add the energy change to the audit."""
     chains, audit = run.chains, run.drives.audit
     row, place, speed, n = chains.table[i], chains.place[i], chains.speed[i], chains.counts[i]
     more = 1 if row[c.REST] > row[c.ELEMENT] else -1
@@ -146,7 +146,7 @@ def record_chain_step(run: ChainRun, records: Records, stock: Array) -> None:
 
 @glue
 def _split_step(run: ChainRun, now: float) -> None:
-    """One step that starts at a time; the stored forces belong to the state before the step, then after it."""
+    """One step that starts at `now`. The stored forces belong to the state before the step, then to the new state."""
     h, half, drives, rows, chains = run.step, 0.5 * run.step, run.drives, run.rows, run.chains
     drives.audit[d.SUPPLIED] += half * power_of_given_wrench(run)
     kick_body(run.state, run.inertia, run.force, half)
@@ -192,7 +192,7 @@ def run_chains(
     steps: int,
     every: int,
 ) -> None:
-    """Integrate some steps. Several calls give bitwise the same result as one call with all steps.
+    """Integrate `steps` steps. Several calls give bitwise the same result as one call with all steps.
 
     Args:
         rules: See `Rules`; `stride` is the number of steps per control period of drums.
@@ -208,7 +208,7 @@ def run_chains(
         stock: Initial energies that can become motion, (2,); NaN before the first call, which fills them.
         records: Filled as in `motion.run_massless`; also filled with points of the cables (R, m, points, 3) at equal
             material steps, starting at the exit point.
-        steps: Largest number of steps; the run ends earlier if the records are full. With 0, only the present state is
+        steps: Largest number of steps. The run ends earlier if the records are full. With 0, only the present state is
             recorded.
         every: Number of steps between records; the first record is the initial state.
     """

@@ -105,7 +105,7 @@ def _fill_stages(c: Numbers, mu: Any, size: float, d: int, system: Numbers) -> N
 
 @glue
 def _solve_in_place(system: Numbers, n: int, columns: int) -> None:
-    """Solve n equations in place; the right sides are the columns after the matrix."""
+    """Solve `n` equations in place. The right sides are the columns after the matrix."""
     for k in range(n):
         best = k
         for i in range(k + 1, n):
@@ -208,7 +208,7 @@ def _stiffness_from_transfer(moved: Numbers, d: int, k: Numbers) -> None:
 
 @glue
 def _negative_pivots(phi: Numbers, d: int, clear: float, moved: Numbers) -> int:
-    """Number of negative eigenvalues of the pivot, the symmetric matrix Phi_uf^-1 moved; SINGULAR if almost singular.
+    """Number of negative eigenvalues of the pivot, the symmetric Phi_uf^-1 `moved`. SINGULAR if almost singular.
 
     At zero frequency, the determinant of the matrix `moved` is at least one. It is zero if the joint is at a vibration
     node of the cable between frame end and joint.
@@ -245,7 +245,7 @@ def _negative_spring_pivots(phi: Numbers, d: int, give: Numbers) -> int:
 def _cable_stiffness_at(
     string: String, wave: Wave, omega: float, phase: float, d: int, give: Numbers, room: Numbers, found: Numbers
 ) -> int:
-    """Fill K(omega) - K(0) of a cable's platform end, (d, d); returns the number of held frequencies below omega.
+    """Fill K(omega) - K(0) of a cable's platform end, (d, d). Returns the number of held frequencies below `omega`.
 
     A held frequency is a natural frequency of the cable with a fixed platform end. The result is SINGULAR if a joint is
     close to a vibration node, and TOO_MANY if the number of elements is too large.

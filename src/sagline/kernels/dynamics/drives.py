@@ -19,7 +19,7 @@ BIN = 0.005  # length of a bin [m]: a piece of the cable on the drum that has a 
 
 @kernel
 def wind_in(layer: Array, place: float, step: float, strain: float, stiffness: float) -> float:
-    """Wind cable of a given strain onto a drum; returns the energy [J] that is lost because a bin has a single strain.
+    """Wind cable onto a drum. Returns the energy [J] that is lost because a bin has a single strain.
 
     The strained and the unstrained length of the cable in a bin do not change when its strain is averaged.
 
@@ -64,7 +64,7 @@ def pay_out(layer: Array, place: float, step: float, stiffness: float) -> tuple[
 
 @formula
 def _bin_of(layer: Array, place: float) -> int:
-    """Index of the bin at a position [m] along the cable."""
+    """Index of the bin at the position `place` [m] along the cable."""
     return min(max(int(place / BIN), 0), layer.shape[0] - 1)
 
 
@@ -121,7 +121,7 @@ class Drives(NamedTuple):
 
 @formula
 def _kick_lagging(drives: Drives, rows: Array, targets: Array, time: float, begins: bool) -> None:
-    """Update the rates of second-order winches: explicitly at the start of a step, by the adjoint method at its end."""
+    """Update the rates of second-order winches, at a step's start explicitly, at its end by the adjoint method."""
     for i in range(rows.shape[1]):
         omega, ratio = drives.data[BANDWIDTH, i], drives.data[RATIO, i]
         push = omega * omega * (targets[i] - rows[g.LENGTH, i])
@@ -135,7 +135,7 @@ def _kick_lagging(drives: Drives, rows: Array, targets: Array, time: float, begi
 
 @formula
 def _kick_drums(drives: Drives, time: float) -> None:
-    """Update the speeds of the drums by motor, cable and friction; friction can hold a drum at rest."""
+    """Update the speeds of the drums by motor, cable and friction. Friction can hold a drum at rest."""
     for i in range(drives.now.shape[1]):
         inertia, before = drives.data[INERTIA, i], drives.now[SPEED, i]
         if drives.now[HELD, i] > 0.0:
@@ -171,7 +171,7 @@ def _fill_stored_strain(drives: Drives, cables: Array, time: float) -> None:
 
 @formula
 def turn_drums(drives: Drives, cables: Array, rows: Array, gravity: float, time: float) -> None:
-    """Pay out or wind in cable for a time, and update the energy of the cable on the drums."""
+    """Pay out or wind in cable for `time`, and update the energy of the cable on the drums."""
     _fill_stored_strain(drives, cables, time)
     for i in range(cables.shape[0]):
         step, strain = time * drives.now[SPEED, i], drives.now[STORED, i]
@@ -186,7 +186,7 @@ def turn_drums(drives: Drives, cables: Array, rows: Array, gravity: float, time:
 
 @formula
 def _add_slip_energy(drives: Drives, cables: Array, time: float) -> None:
-    """Add to the audit the strain change of the cable that leaves its drum; requires the RATE of the step."""
+    """Add to the audit the strain change of the cable that leaves its drum. The RATE of the step must be known."""
     for i in range(cables.shape[0]):
         stiffness = cables[i, tables.STIFFNESS]
         wound = stiffness * drives.now[STORED, i]
@@ -218,7 +218,7 @@ def close_loops(drives: Drives, targets: Array, rates: Array, period: float) -> 
 
 @formula
 def tension_at_drum(whole: float, lifted: float, stiffness: float) -> float:
-    """Tension at the drum [N], from H at the frame end minus the weight of the cable between drum and frame end."""
+    """Tension at the drum [N]; `whole`: H at the frame end; `lifted`: weight of cable between drum and frame end."""
     fallen = whole - lifted
     return 2.0 * fallen / (1.0 + math.sqrt(max(1.0 + 2.0 * fallen / stiffness, 0.0)))
 
@@ -236,7 +236,7 @@ def keep_set_points(drives: Drives, rows: Array, targets: Array, rates: Array) -
 
 @glue
 def kick_winches(drives: Drives, rows: Array, targets: Array, time: float, begins: bool) -> None:
-    """Update the winches' speeds from forces that act for a time; see `_kick_lagging`."""
+    """Update the winches' speeds by forces that act for `time`; see `_kick_lagging`."""
     if drives.kind == DRUMS:
         _kick_drums(drives, time)
     elif drives.kind == SECOND_ORDER:
@@ -254,7 +254,7 @@ def store_step_start(drives: Drives, rows: Array) -> None:
 
 @glue
 def turn_winches(drives: Drives, cables: Array, rows: Array, gravity: float, time: float) -> None:
-    """Pay out or wind in cable for a time, except with ideal winches, which follow their set points."""
+    """Pay out or wind in cable for `time`. Ideal winches are excepted, because they follow their set points."""
     if drives.kind == DRUMS:
         turn_drums(drives, cables, rows, gravity, time)
     elif drives.kind == SECOND_ORDER:
@@ -275,6 +275,6 @@ def add_winch_energy(drives: Drives, cables: Array, rows: Array, time: float) ->
 
 @glue
 def filter_tensions(drives: Drives, share: float) -> None:
-    """Update the filtered tensions; share: weight of the new reading."""
+    """Update the filtered tensions; `share`: weight of the new reading."""
     for i in range(drives.now.shape[1]):
         drives.now[FILTERED, i] += share * (drives.now[AT_FRAME, i] - drives.now[FILTERED, i])

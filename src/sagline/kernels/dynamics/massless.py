@@ -105,7 +105,7 @@ def cable_gravity(run: MasslessRun) -> float:
 
 @kernel
 def add_wind_on_cables(cables: Array, drag: Array, rows: Array, wind: Array, given: Array) -> None:
-    """Add to a wrench (6,) half of the wind force on every cable; this force is normal to the chord."""
+    """Add half of the wind force on every cable to the wrench `given` (6,). The force is normal to the chord."""
     for i in range(cables.shape[0]):
         x = rows[g.AZIMUTH_X, i] * rows[g.COSINE, i]
         y = rows[g.AZIMUTH_Y, i] * rows[g.COSINE, i]
@@ -117,7 +117,7 @@ def add_wind_on_cables(cables: Array, drag: Array, rows: Array, wind: Array, giv
 
 @kernel
 def _add_at_end(rows: Array, i: int, x: float, y: float, z: float, wrench: Array) -> None:
-    """Add a force at the platform end of a cable to a wrench (6,)."""
+    """Add the force (x, y, z) at the platform end of cable `i` to `wrench` (6,)."""
     rx, ry, rz = rows[g.LEVER_X, i], rows[g.LEVER_Y, i], rows[g.LEVER_Z, i]
     wrench[0] += x
     wrench[1] += y
@@ -129,7 +129,7 @@ def _add_at_end(rows: Array, i: int, x: float, y: float, z: float, wrench: Array
 
 @glue
 def project_on_freedom(freedom: Array, wrench: Array, part: Array) -> None:
-    """Remove the part of a wrench that acts along motions that the platform cannot make."""
+    """Remove the part of `wrench` that acts along motions that the platform cannot make."""
     if freedom.shape[0] < 6:
         components_along(freedom, wrench, part)
         fill_motion_of_components(freedom, part, wrench)
@@ -165,7 +165,7 @@ def damp_cables(
     wrench: Array,
     behind: bool | None,
 ) -> float:
-    """Fill the damping wrench (6,) of the cables; returns the power lost.
+    """Fill the damping wrench (6,) of the cables. Returns the power lost.
 
     The strain rate is the same along a whole cable, including the part between exit point and drum. Cable that is paid
     out lengthens the span by its strained length. The rate of the chord minus the rate of this length is the rate at
@@ -205,7 +205,7 @@ def damp_cables(
 
 @kernel
 def fill_set_points(run: MasslessRun, now: float, shift: float) -> None:
-    """Fill the set points at a time, and the lengths of ideal winches."""
+    """Fill the set points at the time `now`, and the lengths of ideal winches."""
     at = run.at
     at[progress.LENGTH_AT] = progress.interpolate_table(
         run.lengths, at[progress.LENGTH_AT], now, shift, run.targets, run.target_rates
@@ -215,7 +215,7 @@ def fill_set_points(run: MasslessRun, now: float, shift: float) -> None:
 
 @kernel
 def fill_forces(run: MasslessRun, now: float) -> None:
-    """Fill the force on the platform (-gradient), the given wrench, and the cable tensions at a time."""
+    """Fill the force on the platform (-gradient), the given wrench, and the cable tensions at the time `now`."""
     at, drives, rows, state = run.at, run.drives, run.rows, run.state
     fill_set_points(run, now, -progress.MOMENT * run.step)
     if run.work & LOADED:
@@ -256,7 +256,7 @@ def fill_damping(run: MasslessRun) -> None:
 
 @glue
 def add_powers(drives: Drives, time: float) -> None:
-    """Add the work of the powers during a time to the audit; cable damping acts on ideal and second-order winches."""
+    """Add the work of the powers during `time` to the audit. Cable damping acts on ideal and second-order winches."""
     power = drives.audit[d.GIVEN_POWER]
     if drives.kind != d.DRUMS:
         for i in range(drives.now.shape[1]):

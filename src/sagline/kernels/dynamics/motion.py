@@ -97,7 +97,7 @@ def record_step(run: MasslessRun, records: Records) -> None:
 
 @glue
 def runge_kutta_step(run: MasslessRun, now: float) -> None:
-    """One step of the classical Runge-Kutta method; it replaces the forces at its start by the forces at its end."""
+    """One step of the classical Runge-Kutta method. The forces at its end replace the forces at its start."""
     h, drives, rows, state = run.step, run.drives, run.rows, run.state
     m, lagging = rows.shape[1], drives.kind == d.SECOND_ORDER
     supplied, lost = 0.0, 0.0
@@ -147,7 +147,7 @@ def runge_kutta_step(run: MasslessRun, now: float) -> None:
 
 @glue
 def splitting_step(run: MasslessRun, now: float) -> None:
-    """One step of the splitting from a given time; it replaces the forces at its start by the forces at its end."""
+    """One step of the splitting from the time `now`. The forces at its end replace the forces at its start."""
     h, half, drives, rows = run.step, 0.5 * run.step, run.drives, run.rows
     fill_damping(run)
     add_powers(drives, half)
@@ -206,7 +206,7 @@ def run_massless(
     steps: int,
     every: int,
 ) -> None:
-    """Integrate some steps. Several calls give bitwise the same result as one call with all steps.
+    """Integrate `steps` steps. Several calls give bitwise the same result as one call with all steps.
 
     Args:
         model: See `ModelTerms`.
@@ -220,9 +220,9 @@ def run_massless(
         kept: State of a run before the steps, which is overwritten with the state after them; and work arrays.
         records: Filled with states with angular velocity instead of angular momentum, frame-end tensions, lengths,
             energies, notes.
-        steps: Largest number of steps; the run ends earlier if the records are full. With 0, only the initial state is
+        steps: Largest number of steps. The run ends earlier if the records are full. With 0, only the initial state is
             evaluated.
-        every: Number of steps between records; the first record is the initial state. With 0, only the last step is
+        every: Number of steps between records. The first record is the initial state. With 0, only the last step is
             recorded.
     """
     integrator, kind, _remembered, _work, stride = rules

@@ -27,7 +27,7 @@ class CubicTable(NamedTuple):
 
 @formula
 def interpolate_table(course: CubicTable, at: int, now: float, shift: float, value: Array, rate: Array) -> int:
-    """Fill values and rates (n,) of a table at a time; returns the interval of this time. The search starts at `at`.
+    """Fill values and rates (n,) of `course` at the time `now`. Returns the interval; its search starts at `at`.
 
     shift: small time offset. At an instant of the table, a negative shift selects the interval that ends there, and a
     positive shift selects the interval that starts there.
@@ -56,7 +56,7 @@ def interpolate_table(course: CubicTable, at: int, now: float, shift: float, val
 
 @glue
 def interval_ends(course: CubicTable, at: int, moment: float) -> bool:
-    """True if the current interval ends at or before a time and another interval follows."""
+    """True if the current interval `at` ends at or before `moment`, and another interval follows."""
     return at < course.time.shape[0] - 1 and moment >= course.time[at + 1]
 
 
@@ -78,7 +78,7 @@ ROUNDING = 1e-9  # tolerance of the energy, relative to the sum of all its parts
 def note_events(
     drives: Drives, rows: Array, cables: Array, at: Indices, now: float, weight_of: float, notes: Array
 ) -> None:
-    """Update the largest tensions, and record new events: a cable becomes slack, or a drive reaches its limit."""
+    """Update the largest tensions. Record new events: a cable becomes slack, or a drive reaches its limit."""
     largest = 0.0
     for i in range(rows.shape[1]):
         tension = drives.now[d.AT_FRAME, i]

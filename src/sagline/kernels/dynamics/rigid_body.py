@@ -26,7 +26,7 @@ Six = tuple[float, float, float, float, float, float]
 
 @formula
 def kick_body(state: Array, inertia: Array, wrench: Array, time: float) -> None:
-    """Update velocity and angular momentum from a wrench (6,) that acts for a time [s]."""
+    """Update velocity and angular momentum by `wrench` (6,), which acts for `time` [s]."""
     for k in range(3):
         state[VELOCITY + k] += time * wrench[k] / inertia[MASS]
         state[MOMENTUM + k] += time * wrench[3 + k]
@@ -34,14 +34,14 @@ def kick_body(state: Array, inertia: Array, wrench: Array, time: float) -> None:
 
 @formula
 def drift_body(state: Array, time: float) -> None:
-    """Move the center of mass at its velocity for a time [s]."""
+    """Move the center of mass at its velocity for `time` [s]."""
     for k in range(3):
         state[CENTER + k] += time * state[VELOCITY + k]
 
 
 @formula
 def _into_body(state: Array, x: float, y: float, z: float) -> Triple:
-    """Components of a world vector in the body's axes."""
+    """Components of the world vector (x, y, z) in the body's axes."""
     qx, qy, qz, qw = -state[TURN], -state[TURN + 1], -state[TURN + 2], state[TURN + 3]
     tx, ty, tz = 2.0 * (qy * z - qz * y), 2.0 * (qz * x - qx * z), 2.0 * (qx * y - qy * x)
     return x + qw * tx + qy * tz - qz * ty, y + qw * ty + qz * tx - qx * tz, z + qw * tz + qx * ty - qy * tx
@@ -49,7 +49,7 @@ def _into_body(state: Array, x: float, y: float, z: float) -> Triple:
 
 @formula
 def _turn_about(a: float, b: float, c: float, w: float, pa: float, pb: float, pc: float, share: float) -> Six:
-    """Rotate by the angle share * pa [rad] about the first axis; the three axes are in cyclic order.
+    """Rotate by the angle `share` * `pa` [rad] about the first axis. The three axes are in cyclic order.
 
     The arguments are the vector part of the quaternion, its scalar part, and the angular momentum, each along these
     axes. The results are the new quaternion, and the angular momentum along the second and third axis.
@@ -69,7 +69,7 @@ def _turn_about(a: float, b: float, c: float, w: float, pa: float, pb: float, pc
 
 @formula
 def free_turn(state: Array, inertia: Array, time: float) -> None:
-    """Rotate the body for a time without a moment: a symmetric sequence of exact rotations about principal axes."""
+    """Rotate the body for `time` without a moment, by a symmetric sequence of exact rotations about principal axes."""
     x, y, z, w = state[TURN], state[TURN + 1], state[TURN + 2], state[TURN + 3]
     px, py, pz = _into_body(state, state[MOMENTUM], state[MOMENTUM + 1], state[MOMENTUM + 2])
     by_x, by_y = 0.5 * time / inertia[MOMENTS], 0.5 * time / inertia[MOMENTS + 1]
@@ -102,7 +102,7 @@ def kinetic_energy(state: Array, inertia: Array) -> float:
 
 @formula
 def power_of(wrench: Array, state: Array, spinning: Triple) -> float:
-    """Power of a wrench (6,) on the body [W]."""
+    """Power of `wrench` (6,) on the body [W]."""
     power = wrench[3] * spinning[0] + wrench[4] * spinning[1] + wrench[5] * spinning[2]
     for k in range(3):
         power += wrench[k] * state[VELOCITY + k]

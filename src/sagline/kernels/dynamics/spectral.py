@@ -53,7 +53,7 @@ class _Element(NamedTuple):
 
 @formula
 def element_from(string: String, omega: float, start: float, first: int) -> _Element:
-    """The element that starts at a given material point and node."""
+    """The element that starts at the material point `start` and the node `first`."""
     size = element_length(string, start, omega, MOST_PHASE)
     vertical = vertical_at(string, start + 0.5 * size)
     force = math.sqrt(string.horizontal * string.horizontal + vertical * vertical)
@@ -64,7 +64,7 @@ def element_from(string: String, omega: float, start: float, first: int) -> _Ele
 
 @formula
 def _element_flexibility(string: String, s: float) -> tuple[float, float, float, float, float, float, float]:
-    """Matrices C^-1 and C at a material point: the entries xx, xz, zz of each, and C normal to the plane."""
+    """Entries xx, xz, zz of C^-1, then those of C, at the material point `s`, and C normal to the plane."""
     vertical = vertical_at(string, s)
     square = string.horizontal * string.horizontal + vertical * vertical
     across = 1.0 / math.sqrt(square) + 1.0 / string.stiffness
@@ -141,7 +141,7 @@ def add_stretch(string: String, part: _Element, lobatto: Lobatto, plane: Array) 
 
 @formula
 def lagrange(lobatto: Lobatto, degree: int, place: float, values: Array) -> None:
-    """Fill the values of the Lagrange polynomials at a point in [-1, 1], with barycentric weights."""
+    """Fill the values of the Lagrange polynomials at `place` in [-1, 1], with barycentric weights."""
     total = 0.0
     sign = 1.0
     for i in range(degree + 1):
@@ -160,7 +160,7 @@ def lagrange(lobatto: Lobatto, degree: int, place: float, values: Array) -> None
 
 @entry
 def node_counts(strings: Array, omega: float, counts: Indices) -> None:
-    """Fill the number of nodes (m,) that each cable needs for angular frequencies up to omega [rad/s]."""
+    """Fill the number of nodes (m,) that each cable needs for angular frequencies up to `omega` [rad/s]."""
     for i in range(strings.shape[0]):
         string = string_at(strings, i)
         start, nodes = 0.0, 0
@@ -204,7 +204,7 @@ def _constrain_unknown(matrix: Array, unknown: int, stiffness: float) -> None:
 
 @formula
 def _scale_by_masses(matrix: Array, points: Array, used: int, each: int) -> None:
-    """Divide a stiffness by the square roots of the masses of its unknowns; each: unknowns per node."""
+    """Divide a stiffness by the square roots of the masses of its unknowns; `each`: unknowns per node."""
     for i in range(used):
         first = 1.0 / math.sqrt(points[i // each, 1])
         for j in range(used):

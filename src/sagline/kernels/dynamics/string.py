@@ -52,13 +52,13 @@ def string_at(strings: Array, i: int) -> String:
 
 @formula
 def vertical_at(string: String, s: float) -> float:
-    """Vertical part of the force in the cable [N] at a material point; s is the length from the frame end."""
+    """Vertical part of the force in the cable [N] at the length `s` from the frame end."""
     return string.vertical - string.weight * (string.length - s)
 
 
 @formula
 def _least_force(string: String, start: float, end: float) -> float:
-    """Least force between two material points [N]."""
+    """Least force between the material points `start` and `end` [N]."""
     low, high = vertical_at(string, start), vertical_at(string, end)
     vertical = max(low, -high, 0.0)
     return math.sqrt(string.horizontal * string.horizontal + vertical * vertical)
@@ -66,7 +66,7 @@ def _least_force(string: String, start: float, end: float) -> float:
 
 @formula
 def slowness(string: String, force: float) -> float:
-    """Travel time of a transverse wave per meter of unstrained cable [s/m] under a force."""
+    """Travel time of a transverse wave per meter of unstrained cable [s/m] under the force `force`."""
     return math.sqrt(string.density * (1.0 / (force + TINY) + 1.0 / string.stiffness))
 
 
@@ -93,7 +93,7 @@ def is_at_end(string: String, s: float) -> bool:
 
 @formula
 def element_length(string: String, start: float, omega: float, phase: float) -> float:
-    """Length of the element that begins at a material point [m]."""
+    """Length of the element that begins at the material point `start` [m]."""
     size = string.length - start
     for _ in range(2000):
         allowed = _longest_element(string, start, start + size, omega, phase)

@@ -56,7 +56,7 @@ def _straight_length(cables: Array, rows: Array, i: int) -> float:
 
 @kernel
 def _half_square_error(cables: Array, body: Array, lengths: Array, pose: Array, rotation: Array, rows: Array) -> float:
-    """Half the sum of squared length errors [m^2] at a pose; fills the geometry of the pose."""
+    """Half the sum of squared length errors [m^2] at `pose`. Fills the geometry of this pose."""
     cable_geometry(cables, body, pose, rotation, rows)
     total = 0.0
     for i in range(lengths.shape[0]):
@@ -89,7 +89,7 @@ def _normal_equations(free: Array, cables: Array, lengths: Array, space: Forward
 
 @glue
 def _fit_pose(problem: PoseProblem, lengths: Array, pose: Array, space: ForwardArrays) -> tuple[float, int, bool]:
-    """Move a pose to the best fit; returns half the sum of squares [m^2], number of steps, and True on success."""
+    """Move `pose` to the best fit. Returns half the sum of squares [m^2], number of steps, and True on success."""
     cables, body, free = problem.cables, problem.body, problem.free
     rotation, rows = space.rotation, space.rows
     cost = _half_square_error(cables, body, lengths, pose, rotation, rows)

@@ -50,7 +50,7 @@ PREDICTION, FROM_START, DOWNHILL = 0, 1, 2  # methods for finding the equilibriu
 
 @glue
 def _stability(low: float, high: float) -> int:
-    """Stability of an equilibrium from its smallest and largest stiffness."""
+    """Stability of an equilibrium with the smallest stiffness `low` and the largest stiffness `high`."""
     if low < -FLAT * high:
         return codes.FORWARD_UNSTABLE
     return codes.FORWARD_SOLVED if low > FLAT * high else codes.FORWARD_SINGULAR
@@ -58,7 +58,7 @@ def _stability(low: float, high: float) -> int:
 
 @glue
 def _support_status(model: Model, cables: Array, rows: Array, needed: int) -> int:
-    """Status of a stable platform: held by enough taut cables or not; needed: required number of taut cables."""
+    """Status of a stable platform: held by enough taut cables or not; `needed`: required number of taut cables."""
     taut = 0
     strain = 0.0
     for i in range(cables.shape[0]):
@@ -98,11 +98,11 @@ def _find_pose(
     space: ForwardArrays,
     pose: Array,
 ) -> tuple[int, float]:
-    """Find the equilibrium by the first method that succeeds; returns the number of steps and the sum of tensions.
+    """Find the equilibrium by the first method that succeeds. Returns the number of steps and the sum of tensions.
 
-    On return, space contains unbalance, stiffness and factor of the stiffness at the pose. The first number of the
-    factor is NaN if there is no factor. exact: a model with an energy, whose equilibrium is the start for the model of
-    the problem.
+    On return, `space` contains unbalance, stiffness and factor of the stiffness at the pose. The first number of the
+    factor is NaN if there is no factor. `exact`: a model with an energy, whose equilibrium is the start for the model
+    of `problem`.
     """
     model, cables, body, wrench, free = problem.model, problem.cables, problem.body, problem.wrench, problem.free
     steps, size, known = 0, 0.0, 0.0
@@ -136,7 +136,7 @@ def _find_pose(
 def _fill_stability(
     problem: PoseProblem, pose: Array, arcs: Array, size: float, space: ForwardArrays, numbers: Array
 ) -> int:
-    """Fill the numbers of the pose in the work arrays, except residuals and steps; returns the status."""
+    """Fill `numbers` for the pose in the work arrays, except residuals and steps. Returns the status."""
     model, cables, body = problem.model, problem.cables, problem.body
     numbers[ENERGY] = platform_energy(model, cables, body, problem.wrench, pose, space.rotation, space.rows)[0]
     symmetric_part(arcs, space.stiffness, space.matrix)
@@ -152,7 +152,7 @@ def _fill_stability(
 
 @glue
 def _store_chain(chain: LastEquilibrium, pose: Array, wrench: Array) -> None:
-    """Store a pose and its factored stiffness as the last equilibrium."""
+    """Store `pose` and its factored stiffness as the last equilibrium."""
     if not math.isnan(chain.factor[0, 0]):
         copy_pose(pose, chain.last)
         for k in range(6):
@@ -161,7 +161,7 @@ def _store_chain(chain: LastEquilibrium, pose: Array, wrench: Array) -> None:
 
 @glue
 def _store_sample(problem: PoseProblem, rows: Array, p: int, results: Array, statuses: Codes) -> None:
-    """Write one sample's cables."""
+    """Write the cables of sample `p`."""
     for i in range(rows.shape[1]):
         statuses[p, i] = int(rows[g.STATUS, i])
         results[tables.SPAN, p, i] = rows[g.SPAN, i]

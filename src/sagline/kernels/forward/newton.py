@@ -25,7 +25,7 @@ from sagline.kernels.jit import glue, kernel
 
 @kernel
 def trust_step(matrix: Array, gradient: Array, radius: float, factor: Array, work: Array, step: Array) -> float:
-    """Fill the step that minimizes g.s + s.H s/2 within |s| <= radius; returns the shift mu.
+    """Fill the step s that minimizes g.s + s.H s/2 within |s| <= `radius`. Returns the shift mu.
 
     The method of More and Sorensen solves (H + mu 1) s = -g with the smallest mu for which the matrix is positive
     definite and the step is short enough. mu = 0 is an ordinary Newton step.
@@ -84,7 +84,7 @@ LAST_DIGIT = 1e-15  # a shorter step is only a rounding error
 
 @glue
 def _add_length_change(model: Model, cables: Array, lengths: Array, rows: Array, wrench: Array) -> None:
-    """Add to a wrench (6,) the first-order change of the cable forces due to new lengths (m,)."""
+    """Add to `wrench` (6,) the first-order change of the cable forces due to the new `lengths` (m,)."""
     for i in range(cables.shape[0]):
         span, rise, length = rows[g.SPAN, i], rows[g.RISE, i], rows[g.LENGTH, i]
         if model.behind is not None:
@@ -99,7 +99,7 @@ def _add_length_change(model: Model, cables: Array, lengths: Array, rows: Array,
 
 @kernel
 def solve_step(factor: Array, part: Array, step: Array) -> float:
-    """Fill the step (n,) that removes an unbalance (n,), from the factored stiffness; returns the step length."""
+    """Fill `step` (n,), which removes the unbalance `part` (n,), by the factored stiffness. Returns its length."""
     for j in range(part.shape[0]):
         step[j] = -part[j]
     solve_lower(factor, step)
@@ -109,7 +109,7 @@ def solve_step(factor: Array, part: Array, step: Array) -> float:
 
 @glue
 def predict(problem: PoseProblem, lengths: Array, start: Array, last: Array, space: ForwardArrays, pose: Array) -> bool:
-    """Fill the first-order change due to new lengths and wrench; False if no equilibrium is stored for the start.
+    """Fill the first-order change due to new lengths and wrench. False if no equilibrium is stored for `start`.
 
     Afterwards the rows contain the new lengths.
     """
@@ -131,7 +131,7 @@ def predict(problem: PoseProblem, lengths: Array, start: Array, last: Array, spa
 
 @glue
 def newton_from(problem: PoseProblem, pose: Array, space: ForwardArrays) -> tuple[int, float]:
-    """Full Newton steps with the symmetric stiffness; returns the number of steps and the last sum of tensions.
+    """Full Newton steps with the symmetric stiffness. Returns the number of steps and the last sum of tensions.
 
     The number is 0 if the stiffness is not positive definite or the first step is too long. The pose is then unchanged,
     and matrix is its stiffness. The number is -1 if the steps do not decrease fast enough. On return, all arrays of
@@ -181,7 +181,7 @@ def newton_from(problem: PoseProblem, pose: Array, space: ForwardArrays) -> tupl
 def _newton_steps(
     problem: PoseProblem, pose: Array, space: ForwardArrays, best: float, good: float
 ) -> tuple[float, float]:
-    """One Newton step for the force balance, shortened until the unbalance is below `best`; requires the stiffness.
+    """One Newton step for the force balance, shortened until the unbalance is below `best`. Needs the stiffness.
 
     Returns the new unbalance and the length of the step. If no step is better, the length is 0 and the pose is
     unchanged. If the unbalance is below `good`, only the full step is tried, because rounding can make it worse.
@@ -217,7 +217,7 @@ def _newton_steps(
 
 @glue
 def polish(problem: PoseProblem, pose: Array, space: ForwardArrays, good: float) -> int:
-    """Newton steps for the force balance until the unbalance no longer decreases; returns the number of steps.
+    """Newton steps for the force balance until the unbalance no longer decreases. Returns the number of steps.
 
     good: an unbalance below this counts as zero. The work arrays belong to the initial pose before the steps, and to
     the final pose after the steps. The stiffness may belong to a pose that differs by rounding errors.

@@ -23,7 +23,7 @@ Six = tuple[float, float, float, float, float, float]
 def unbalance(
     model: Model, cables: Array, body: Array, wrench: Array, pose: Array, rotation: Array, rows: Array, gradient: Array
 ) -> float:
-    """Fill rotation, geometry, cable forces, statuses and unbalance (6,), which is the energy's gradient, at a pose.
+    """Fill rotation, geometry, cable forces, statuses and unbalance (6,) at `pose`. It is the energy's gradient.
 
     The rows must contain the lengths. Returns the sum of the tensions and the platform's weight [N], to which the
     unbalance is relative.
@@ -43,7 +43,7 @@ def unbalance(
 
 @formula
 def add_force(rows: Array, i: int, horizontal: float, vertical: float, wrench: Array) -> None:
-    """Add to a wrench (6,) a force in the plane of cable i at its platform end."""
+    """Add to `wrench` (6,) a force at the platform end of cable `i`, in the cable's plane."""
     x = horizontal * rows[g.AZIMUTH_X, i]
     y = horizontal * rows[g.AZIMUTH_Y, i]
     rx, ry, rz = rows[g.LEVER_X, i], rows[g.LEVER_Y, i], rows[g.LEVER_Z, i]
@@ -62,7 +62,7 @@ def platform_energy(
     """Energy [J] after `unbalance` at the pose, and the sum of the magnitudes of its terms (a measure of rounding).
 
     The terms are the energies of cables, weight and given force. The result is NaN if the cable model has no energy. A
-    given moment, which is constant in world axes, has no potential energy; it is therefore not included.
+    given moment, which is constant in world axes, has no potential energy. It is therefore not included.
     """
     energy, size = energy_of_cables(model, cables, rows, model.behind)
     for k in range(3):
@@ -77,7 +77,7 @@ def platform_energy(
 
 @formula
 def end_stiffness(rows: Array, i: int) -> tuple[Triple, Triple, Triple]:
-    """Stiffness of cable i against displacements of its platform end in world axes [N/m]: nine numbers, row by row."""
+    """Stiffness of cable `i` at its platform end in world axes [N/m]: nine numbers, row by row."""
     xx, xz, zx, zz = plane_of(rows, i)
     across = rows[g.ACROSS, i]
     c, s = rows[g.AZIMUTH_X, i], rows[g.AZIMUTH_Y, i]
@@ -91,7 +91,7 @@ def end_stiffness(rows: Array, i: int) -> tuple[Triple, Triple, Triple]:
 
 @formula
 def _add_row(target: Array, share: float, row: Six) -> None:
-    """Add a multiple of six numbers to a row (6,)."""
+    """Add `share` times the six numbers `row` to `target` (6,)."""
     target[0] += share * row[0]
     target[1] += share * row[1]
     target[2] += share * row[2]

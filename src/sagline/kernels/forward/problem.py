@@ -115,7 +115,7 @@ def row_of(array: Array, p: int) -> Array:
 
 @glue
 def problem_at(model: Model, given: ForwardSamples, p: int, free: Array, arcs: Array) -> PoseProblem:
-    """Problem of sample p of a batch; its model has the gravity of its robot. Fills the free motions."""
+    """Problem of sample `p` of a batch. Its model has the gravity of its robot. Fills the free motions."""
     body, cables = row_of(given.bodies, p), row_of(given.robots, p)
     placed = Model(model.code, model.k_h, model.k_p, body[tables.GRAVITY], model.behind)
     unit = _fill_free(given.freedom, given.lengths[p], free)
@@ -125,7 +125,7 @@ def problem_at(model: Model, given: ForwardSamples, p: int, free: Array, arcs: A
 
 @kernel
 def _fill_free(freedom: Array, lengths: Array, free: Array) -> float:
-    """Fill the free motions in the units of steps, (n, 6); returns the norm of these units."""
+    """Fill the free motions in the units of steps, (n, 6). Returns the norm of these units."""
     m = lengths.shape[0]
     total = 0.0
     for i in range(m):
@@ -161,14 +161,14 @@ def fill_arcs(freedom: Array, cables: Array, body: Array, arcs: Array) -> None:
 
 @kernel
 def copy_pose(source: Array, target: Array) -> None:
-    """Fill a pose row."""
+    """Copy the pose row `source` to `target`."""
     for k in range(tables.POSE_COLUMNS):
         target[k] = source[k]
 
 
 @glue
 def clear_solution(found: Solutions, p: int, status: int, cable_status: int) -> None:
-    """Fill the arrays for a sample without a result: NaN as values, zero iterations, and the statuses."""
+    """Fill the arrays for sample `p` without a result: NaN as values, zero iterations, and the statuses."""
     for k in range(tables.POSE_COLUMNS):
         found.poses[p, k] = math.nan
     for i in range(found.statuses.shape[1]):

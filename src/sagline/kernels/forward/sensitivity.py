@@ -25,7 +25,7 @@ DATA = 5
 
 @formula
 def _fill_in_world_axes(pair: PlaneVector, rows: Array, i: int, vector: Array) -> None:
-    """Fill a vector (3,) in world axes from its components in a cable's plane."""
+    """Fill `vector` (3,) in world axes from its components `pair` in the plane of cable `i`."""
     vector[0] = pair.x * rows[g.AZIMUTH_X, i]
     vector[1] = pair.x * rows[g.AZIMUTH_Y, i]
     vector[2] = pair.z
@@ -35,7 +35,7 @@ def _fill_in_world_axes(pair: PlaneVector, rows: Array, i: int, vector: Array) -
 def _describe_cable(
     model: Model, cables: Array, rows: Array, i: int, block: Array, slopes: Array, lever: Array
 ) -> None:
-    """Fill block (3, 3), slopes (DATA, m, 3) and lever (3,) of cable i, after `platform_stiffness`."""
+    """Fill `block` (3, 3), `slopes` (DATA, m, 3) and `lever` (3,) of cable `i`, after `platform_stiffness`."""
     across = end_stiffness(rows, i)
     for j in range(3):
         block[0, j] = across[0][j]

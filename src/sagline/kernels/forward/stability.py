@@ -22,7 +22,7 @@ from sagline.kernels.memory import Memory, block
 
 @glue
 def _fill_rows(model: Model, cables: Array, results: Array, p: int, rows: Array) -> None:
-    """Fill lengths and forces of the cables of pose p of a plan, after `cable_geometry`."""
+    """Fill lengths and forces of the cables at pose `p` of a plan, after `cable_geometry`."""
     for k in range(tables.WRAP - tables.LENGTH):  # length and forces have the same order in both arrays
         for i in range(rows.shape[1]):
             rows[g.LENGTH + k, i] = results[tables.LENGTH + k, p, i]

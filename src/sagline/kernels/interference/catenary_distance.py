@@ -58,7 +58,7 @@ def work_arrays_for_pieces() -> tuple[Array, Array]:
 
 @kernel
 def _set_piece(piece: Array, row: Array, first: float, last: float) -> None:
-    """Set range and bulge of a piece from its ends."""
+    """Set range and bulge of `piece`, which has the ends `first` and `last`."""
     dx, dy, dz = piece[3] - piece[0], piece[4] - piece[1], piece[5] - piece[2]
     piece[BULGE] = bulge(row, first, last, dx * dx + dy * dy + dz * dz)
     piece[BEGIN] = first
@@ -98,7 +98,7 @@ def _split_piece(pieces: Array, index: int, row: Array) -> None:
 
 @kernel
 def _chord_distance(pieces: Array, i: int, j: int, box: Array, to_a_box: bool) -> tuple[float, float, float, float]:
-    """Distance of two pieces' chords [m], lower bound for the pieces, and shares at the nearest points."""
+    """Distance of the chords of the pieces `i` and `j` [m], lower bound for the pieces, shares of nearest points."""
     one = pieces[i]
     if to_a_box:
         square, low, s = to_box(one, box)
@@ -115,7 +115,7 @@ def _chord_distance(pieces: Array, i: int, j: int, box: Array, to_a_box: bool) -
 
 @kernel
 def _refined_distance(one: Array, other: Array, to_a_box: bool, s: float, t: float) -> tuple[float, float, float]:
-    """Local minimum of the distance of a pair [m], searched from two points, and the points of the minimum."""
+    """Local minimum of the distance of a pair [m], and its two shares. The search starts at the shares `s` and `t`."""
     if to_a_box:
         square, s = nearest_to_box(one, other, s)
     else:
@@ -189,7 +189,7 @@ def _least_of_pair(
 
 @kernel
 def _edge_of(box: Array, axis: int, corner: int, edge: Array) -> None:
-    """One of the four edges of a box along an axis."""
+    """Fill `edge` with one of the four edges of `box` along `axis`."""
     for k in range(3):
         middle = box[PLACE + k]
         along = box[AXES + 3 * k + axis] * box[HALF + axis]
@@ -203,7 +203,7 @@ def _edge_of(box: Array, axis: int, corner: int, edge: Array) -> None:
 
 @kernel
 def _edges_to_box(box: Array, other: Array, edge: Array, nearest: Array, best: float) -> float:
-    """Least of a known distance [m] and the distances of a box's edges from another box; fills the nearest points."""
+    """Least of the distance `best` [m] and the distances of the edges of `box` from `other`. Fills `nearest`."""
     for axis in range(3):
         for corner in range(4):
             _edge_of(box, axis, corner, edge)

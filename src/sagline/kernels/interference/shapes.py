@@ -38,7 +38,7 @@ FOLD = 1e-12  # largest distance from the turning point that counts as zero, rel
 
 @kernel
 def point(row: Array, share: float) -> tuple[float, float, float]:
-    """Point of a cable or rod at a share of its unstrained length [m]."""
+    """Point [m] of a cable or rod at `share` of its unstrained length."""
     if row[KIND] == HANGING:
         x, z = catenary_point(share, row[HORIZONTAL], row[VERTICAL], row[LENGTH], row[WEIGHT], row[STIFFNESS])
     else:
@@ -70,7 +70,7 @@ def slopes(row: Array, share: float) -> tuple[float, float, float, float]:
 
 @kernel
 def level_point(row: Array) -> float:
-    """Position of a catenary's horizontal tangent as a fraction of its length; it can be beyond an end of the cable."""
+    """Position of a catenary's horizontal tangent as a fraction of its length. It can be beyond an end of the cable."""
     if row[KIND] != HANGING:
         return -1.0
     return 1.0 - row[VERTICAL] / (row[WEIGHT] * row[LENGTH])
@@ -141,7 +141,7 @@ def between_segments(one: Array, other: Array) -> tuple[float, float, float, flo
 
 @kernel
 def in_box_axes(box: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """Convert a vector to a box's axes."""
+    """Convert the vector (x, y, z) to the axes of `box`."""
     return (
         box[AXES] * x + box[AXES + 3] * y + box[AXES + 6] * z,
         box[AXES + 1] * x + box[AXES + 4] * y + box[AXES + 7] * z,
@@ -151,7 +151,7 @@ def in_box_axes(box: Array, x: float, y: float, z: float) -> tuple[float, float,
 
 @kernel
 def outside(coordinate: float, half: float) -> float:
-    """Signed distance of a coordinate from the nearer face of a box; 0 between the two faces."""
+    """Signed distance of `coordinate` from the nearer face of a box. 0 between the two faces."""
     return coordinate - min(max(coordinate, -half), half)
 
 
@@ -195,7 +195,7 @@ def to_box(segment: Array, box: Array) -> tuple[float, float, float]:
 
 @kernel
 def nearest_in_box(box: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """Point of a box nearest to a given point [m]."""
+    """Point of `box` that is nearest to the point (x, y, z) [m]."""
     px, py, pz = in_box_axes(box, x - box[PLACE], y - box[PLACE + 1], z - box[PLACE + 2])
     ex, ey, ez = outside(px, box[HALF]), outside(py, box[HALF + 1]), outside(pz, box[HALF + 2])
     return (

@@ -153,7 +153,7 @@ class DemandArrays(NamedTuple):
 
 @glue
 def new_demand(memory: Memory, m: int, freedom: Array) -> tuple[DemandArrays, Memory]:
-    """Work arrays for m cables and the free motions (n, 6), and the remaining memory."""
+    """Work arrays for `m` cables and the free motions `freedom` (n, 6), and the remaining memory."""
     n = freedom.shape[0]
     rows, memory = block(memory, 2 * n + 3, m)
     vectors, memory = block(memory, 3, n)
@@ -220,7 +220,7 @@ def _write_proof(demand: Demand, change: TensionChange, lever: float, farkas: Ar
 
 @glue
 def _block_cables(cables: Cables, demand: Demand, change: TensionChange, blocking: Flags) -> None:
-    """Fill blocking (m,): True for cables at a limit that opposes the least change."""
+    """Fill `blocking` (m,): True for cables at a limit that opposes the least change."""
     largest = 0.0
     for i in range(blocking.size):
         largest = max(largest, abs(component_along(demand.matrix, change.direction, i)))
@@ -242,7 +242,7 @@ def polygon_of_pose(
     memory: tuple[Array, Indices],
     polygon: tuple[Array, Array, Array, Array, Array, Indices],
 ) -> int:
-    """Fill the set of feasible tensions of one pose at fixed sag forces; returns the number of its corners.
+    """Fill the set of feasible tensions of one pose at fixed sag forces. Returns the number of corners of the set.
 
     Args:
         model_terms: Same as in `inverse_poses`.
@@ -251,7 +251,7 @@ def polygon_of_pose(
         robot_terms: Same as in `inverse_poses`, of one robot.
         pose: Row (POSE_COLUMNS,).
         wrench: External plus inertial wrench about the center of mass, (6,).
-        carried: Chord tensions and sag forces of the cables, (m,) each; if they are NaN, first-order sag forces are
+        carried: Chord tensions and sag forces of the cables, (m,) each. If they are NaN, first-order sag forces are
             used.
         memory: Work arrays from `memory_for`, for the number of cables.
         polygon: Filled with scale and offset of the variable, (m,) each; minimum-norm tensions and limits, (3, m); null
@@ -303,7 +303,7 @@ def margins_of_poses(
     memory: tuple[Array, Indices],
     margins: Array,
 ) -> None:
-    """Fill the capacity margins [N] (N,) of poses with given sag forces (N, m); NaN where the sag forces are NaN."""
+    """Fill the capacity margins (N,) [N] of poses with `sag_forces` (N, m). NaN where the sag forces are NaN."""
     limits = TensionLimits(*limit_terms)
     freedom, _bodies, robots = robot_terms
     count, m = sag_forces.shape

@@ -30,7 +30,7 @@ SLOPE_STEP = 1e-4  # relative step of the central difference of the frame-end te
 
 @kernel
 def linearize_ends(model: Model, distribution: Distribution, cables: Cables, balance: Balance) -> bool:
-    """Linearize the frame-end tensions at the present chord tensions and factor the balance; False if singular."""
+    """Linearize the frame-end tensions at the present chord tensions, and factor the balance. False if singular."""
     for i in range(cables.tau.size):
         tau = cables.tau[i]
         chord, material, pulley = chord_of(cables, i), material_of(cables, i), pulley_of(cables, i)
@@ -55,11 +55,11 @@ def distribute_and_solve_cables(
     model: Model, distribution: Distribution, platform: Platform, cables: Cables, balance: Balance,
     near: ReferencePoint, work: WorkArrays | None, statuses: Codes,
 ) -> int:  # fmt: skip
-    """Distribute tensions and solve the cables, repeatedly, until the sag forces converge; returns the pose's status.
+    """Distribute tensions and solve the cables until the sag forces converge. Returns the pose's status.
 
     cables: the cables from `set_pose`, with tensions, ratios and sag forces to be filled; work: work arrays for
-    frame-end tensions and for methods that are not projections, or None so that both are not compiled; statuses: filled
-    with the status of each cable, (m,).
+    frame-end tensions and for methods that are not projections. With None, the code of both is not compiled. statuses:
+    filled with the status of each cable, (m,).
     """
     near.held.labels[0] = 0
     if work is not None:
@@ -134,7 +134,7 @@ def fix_reference(balance: Balance, near: ReferencePoint) -> None:
 
 @glue
 def take_tensions(cables: Cables, balance: Balance) -> tuple[float, float]:
-    """Copy the distributed tensions to the cables; returns the largest relative change and the largest tension [N]."""
+    """Copy the distributed tensions to the cables. Returns the largest relative change and the largest tension [N]."""
     largest = 0.0
     moved = 0.0
     for i in range(cables.tau.size):

@@ -37,7 +37,7 @@ Answers = tuple[Array, Codes, Array, Array, Codes]  # results, statuses, residua
 
 @glue
 def platform_at(robots: Robots, poses: Array, wrenches: Array, p: int) -> Platform:
-    """Platform at pose p; robots and wrenches have a single row for all poses, or one row per pose."""
+    """Platform at pose `p`. Robots and wrenches have a single row for all poses, or one row per pose."""
     freedom, bodies, cables = robots
     body, cable_rows = bodies[min(p, bodies.shape[0] - 1)], cables[min(p, cables.shape[0] - 1)]
     return Platform(freedom, body, cable_rows, poses[p], wrenches[min(p, wrenches.shape[0] - 1)])
@@ -45,7 +45,7 @@ def platform_at(robots: Robots, poses: Array, wrenches: Array, p: int) -> Platfo
 
 @glue
 def model_at(terms: ModelTerms, body: Array) -> Model:
-    """Cable model with the gravity of a row of the body_table."""
+    """Cable model `terms` with the gravity of `body`, a row of the body_table."""
     return Model(terms[0], terms[1], terms[2], body[tables.GRAVITY], None)
 
 
@@ -65,7 +65,7 @@ def inverse_poses(
     first: int,
     last: int,
 ) -> None:
-    """Solve part of a batch, pose by pose; with CLOSEST, each feasible pose gives the next reference tensions.
+    """Solve part of a batch, pose by pose. With CLOSEST, each feasible pose gives the next reference tensions.
 
     Args:
         model_terms: Cable model: code, k_h, k_p.
@@ -148,7 +148,7 @@ def measure_balance(platform: Platform, cables: Cables, balance: Balance, residu
 
 @glue
 def write_solution(solved: bool, model: Model, cables: Cables, balance: Balance, results: Array, p: int) -> None:
-    """Write the results of one pose; if it has no solution, all rows except span and rise become NaN."""
+    """Write the results of pose `p`. If it has no solution, all rows except span and rise become NaN."""
     for i in range(cables.tau.size):
         tension = cables.tau[i] if solved else math.nan
         results[tables.SPAN, p, i] = balance.geometry[g.SPAN, i]
@@ -163,7 +163,7 @@ def write_solution(solved: bool, model: Model, cables: Cables, balance: Balance,
 
 @glue
 def _write_behind(solved: bool, model: Model, cables: Cables, results: Array, p: int) -> None:
-    """Write the free spans; add the cable on the pulleys and the dead lengths to the unstrained lengths."""
+    """Write the free spans. Add the cable on the pulleys and the dead lengths to the unstrained lengths."""
     m = cables.tau.size
     for i in range(m):
         if not solved:

@@ -27,7 +27,7 @@ ROUNDING = 0.01  # a proof with a smaller margin is not valid
 
 
 class StabilityArrays(NamedTuple):
-    """Work arrays of the proof, for m cables and k free rotations."""
+    """Work arrays of the proof, for `m` cables and `k` free rotations."""
 
     compliance: Array  # compliance of the platform ends along their chords [m/N], (m,)
     torque: Array  # sum of r T^T, T the force on a cable at its platform end [N m], (3, 3)

@@ -86,7 +86,7 @@ def new_underconstrained_arrays(memory: Memory, m: int, n: int) -> tuple[Underco
 def _place(
     model: Model, limits: TensionLimits, platform: Platform, pose: Array, cables: Cables, balance: Balance
 ) -> bool:
-    """Fill cables, geometry and structure matrix at a pose; False if a cable has no chord."""
+    """Fill cables, geometry and structure matrix at `pose`. False if a cable has no chord."""
     cable_geometry(platform.robot, platform.body, pose, balance.rotation, balance.geometry)
     if not place_cables(model, limits, platform.robot, balance.geometry, cables):
         return False
@@ -97,7 +97,7 @@ def _place(
 
 @glue
 def _mean_lever(geometry: Array) -> float:
-    """Root mean square distance of the platform ends from the center of mass; 1 m if all ends are there."""
+    """Root mean square distance of the platform ends from the center of mass. 1 m if all ends are at this center."""
     square = 0.0
     for i in range(geometry.shape[1]):
         x, y, z = geometry[g.LEVER_X, i], geometry[g.LEVER_Y, i], geometry[g.LEVER_Z, i]
@@ -123,7 +123,7 @@ def _fill_gram(freedom: Array, matrix: Array, lever: float, gram: Array) -> None
 
 @glue
 def _fill_tension_level(gram: Array, work: Array, along: Array) -> None:
-    """Fill the unit vector of the tensions with the smallest wrench (m,); its first large entry is positive."""
+    """Fill the unit vector (m,) of the tensions with the smallest wrench. The first large entry is positive."""
     m = along.size
     for i in range(m):
         along[i] = (1.0 + 0.1 * i) * (1.0 if i % 2 == 0 else -1.0)
@@ -145,7 +145,7 @@ def _fill_tension_level(gram: Array, work: Array, along: Array) -> None:
 
 @glue
 def _fill_first_tensions(freedom: Array, lever: float, balance: Balance, gram: Array, tau: Array) -> None:
-    """Fill tensions whose wrench is close to the needed wrench, at least a small part of the load each."""
+    """Fill tensions whose wrench is close to the needed wrench. Each tension is at least a small part of the load."""
     m = tau.size
     square = 0.0
     for i in range(m):
@@ -261,7 +261,7 @@ def _take_step(
     tau: Array,
     blocking: Flags,
 ) -> tuple[float, bool]:
-    """Move pose and tensions by the shortened step; returns the size of the step, and True if a tension is too small.
+    """Move pose and tensions by the shortened step. Returns the step size, and True if a tension is too small.
 
     blocking: filled; True for the cables that the step would take below their smallest admissible tension.
     """
@@ -297,9 +297,10 @@ def _find_equilibrium(
     cables: Cables, balance: Balance, space: UnderconstrainedArrays, tau: Array, blocking: Flags, statuses: Codes,
     memory: Memory,
 ) -> int:  # fmt: skip
-    """Take Newton steps until the balance holds; returns POSE_SOLVED or the failure.
+    """Take Newton steps until the balance holds. Returns POSE_SOLVED or the failure.
 
-    pose: initial pose, replaced by the pose of the equilibrium; tau: initial tensions (m,), replaced by the last ones;
+    pose: initial pose, replaced by the pose of the equilibrium; tau: initial tensions (m,), replaced by the last
+        tensions;
     blocking: filled; True for cables whose limits the equilibrium violates, (m,).
     """
     curves, memory = new_curves(model, cables, statuses, memory)

@@ -43,13 +43,13 @@ RANGE_ROWS = 4
 
 @glue
 def _section_of(range_: Array, i: int) -> Section:
-    """The tensions of cable i in a range."""
+    """The tensions of cable `i` in `range_`."""
     return Section(range_[LEAST, i], range_[LARGEST, i], range_[AT_LEAST, i], range_[AT_LARGEST, i])
 
 
 @formula
 def component_along(columns: Array, direction: Array, i: int) -> float:
-    """Component of a column of a matrix along a direction."""
+    """Component of column `i` of a matrix along `direction`."""
     total = 0.0
     for k in range(direction.size):
         total += direction[k] * columns[k, i]
@@ -58,7 +58,7 @@ def component_along(columns: Array, direction: Array, i: int) -> float:
 
 @kernel
 def _spare_capacity(curves: Curves, demand: Demand, range_: Array, direction: Array, tops: Array) -> float:
-    """Capacity of the cables along a direction minus the demand [N]; a negative value proves infeasibility.
+    """Capacity of the cables along `direction`, minus the demand [N]. A negative value proves infeasibility.
 
     The value is an upper bound that includes rounding errors. tops: filled with the largest contribution of each cable,
     (m,).
@@ -78,7 +78,7 @@ def _spare_capacity(curves: Curves, demand: Demand, range_: Array, direction: Ar
 
 @kernel
 def _narrow_range(curves: Curves, demand: Demand, range_: Array, direction: Array, spare: float, tops: Array) -> bool:
-    """Remove from a range the tensions at which a cable is below its largest contribution by more than `spare`.
+    """Remove from `range_` the tensions at which a cable is below its largest contribution by more than `spare`.
 
     Returns False if the range becomes empty.
     """
@@ -142,7 +142,7 @@ def _narrow_free(
 
 @glue
 def _least_certain(curves: Curves, range_: Array) -> tuple[int, float]:
-    """Cable with the most uncertain sag force in a range, and sum of the uncertainties of all sag forces [N]."""
+    """Cable with the most uncertain sag force in `range_`, and sum of the uncertainties of all sag forces [N]."""
     worst = -1
     largest = 0.0
     total = 0.0
@@ -156,7 +156,7 @@ def _least_certain(curves: Curves, range_: Array) -> tuple[int, float]:
 
 @glue
 def _split_range(curves: Curves, waiting: Array, top: int, i: int, tau: float) -> None:
-    """Split the tension range of a cable in two; the half with its present tension is examined next."""
+    """Split the tension range of cable `i` in two. The half with the present tension is examined next."""
     for row in range(RANGE_ROWS):
         for j in range(waiting.shape[2]):
             waiting[top + 1, row, j] = waiting[top, row, j]
@@ -188,7 +188,7 @@ def _first_range(curves: Curves, size: float, range_: Array) -> None:
 def _approach_demand(
     curves: Curves, demand: Demand, range_: Array, trial: TensionChange, memory: Memory
 ) -> tuple[float, bool]:
-    """Compute the tensions in a range whose wrench is closest to the demand.
+    """Compute the tensions in `range_` whose wrench is closest to `demand`.
 
     Returns the residual force [N], and True if the moments balance. If the moments cannot balance, the force is
     infinite, and the direction has only a moment part.
@@ -214,7 +214,7 @@ def _approach_demand(
 def decide_feasibility(
     curves: Curves, demand: Demand, nodes: int, change: TensionChange, memory: Memory
 ) -> tuple[int, float, float, bool]:
-    """Feasibility of a demand with tensions within the cables' limits.
+    """Feasibility of `demand` with tensions within the cables' limits.
 
     nodes: largest number of examined ranges; change: initial tensions, overwritten with the tensions of least residual,
     this residual and its direction. Returns POSE_SOLVED, POSE_INFEASIBLE, POSE_BORDERLINE, or POSE_NOT_CONVERGED after

@@ -22,7 +22,7 @@ CENTERED = 1e-18  # square of the Newton decrement at which the search ends
 
 @kernel
 def share_at_center(bounds: Array, null: Array, point: Array, work: WorkArrays) -> int:
-    """Move the point (r,) to the analytic center; the search starts from the previous center if there is one."""
+    """Move the point (r,) to the analytic center. The search starts from the previous center if there is one."""
     corners, labels, known = work.corners, work.labels, work.known
     if known[0] > 0 and keeps_limits_inside(bounds, null, point) and _analytic_center(bounds, null, work.rest, point):
         return codes.POSE_SOLVED
@@ -51,7 +51,7 @@ def share_at_center(bounds: Array, null: Array, point: Array, work: WorkArrays) 
 
 @kernel
 def keeps_limits_inside(bounds: Array, null: Array, point: Array) -> bool:
-    """True if the distance of a point from all limits exceeds the smallest thickness."""
+    """True if the distance of `point` from every limit exceeds the smallest thickness."""
     slack = THIN * largest_bound(bounds)
     for i in range(null.shape[1]):
         tension = bounds[START, i]
@@ -64,7 +64,7 @@ def keeps_limits_inside(bounds: Array, null: Array, point: Array) -> bool:
 
 @kernel
 def deepest_point(bounds: Array, null: Array, work: WorkArrays, point: Array) -> int:
-    """Fill the point (r,) whose tensions are farthest from their nearest limits; returns the pose's status."""
+    """Fill the point (r,) whose tensions are farthest from their nearest limits. Returns the pose's status."""
     r, m = null.shape
     rows, memory = block(work.rest, r + 1, 2 * m)
     # one bound per limit; the distance from all limits is an additional unknown, by which the bounds are narrowed

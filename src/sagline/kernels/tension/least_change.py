@@ -103,7 +103,7 @@ def _new_tangents(memory: Memory, n: int, m: int, hard: int) -> tuple[_Tangents,
 
 @glue
 def _fill_residual(curves: Curves, demand: Demand, tau: Array, sag_force: Array, residual: Array) -> None:
-    """Fill the sag forces (m,) at tensions (m,), and the residual of the demand (n,)."""
+    """Fill the sag forces (m,) at the tensions `tau` (m,), and the residual of the demand (n,)."""
     sag_forces_at(curves, tau, sag_force)
     for k in range(residual.size):
         residual[k] = demand.right[k]
@@ -113,7 +113,7 @@ def _fill_residual(curves: Curves, demand: Demand, tau: Array, sag_force: Array,
 
 @formula
 def norm_of_part(vector: Array, first: int, last: int) -> float:
-    """Euclidean length of part of a vector."""
+    """Euclidean length of the entries `first` to `last` - 1 of `vector`."""
     total = 0.0
     for k in range(first, last):
         total += vector[k] * vector[k]
@@ -122,7 +122,7 @@ def norm_of_part(vector: Array, first: int, last: int) -> float:
 
 @glue
 def _set_tangents(curves: Curves, demand: Demand, tau: Array, multipliers: Array, step: _Tangents) -> bool:
-    """Fill the tangents at given tensions, and the normal matrix; False if the hard rows are linearly dependent.
+    """Fill the tangents at `tau`, and the normal matrix. False if the hard rows are linearly dependent.
 
     The normal matrix includes the second derivatives of the curves, times the multipliers (n,) of the previous step, if
     they make the matrix more positive definite. Steps without the curvature would oscillate about the minimum.
@@ -161,7 +161,7 @@ def _set_tangents(curves: Curves, demand: Demand, tau: Array, multipliers: Array
 
 @glue
 def _find_step(demand: Demand, ranges: Array, change: TensionChange, step: _Tangents) -> bool:
-    """Fill tensions of a full step and multipliers of the limits; False if hard rows and limits are contradictory."""
+    """Fill tensions of a full step and multipliers of the limits. False if hard rows and limits are contradictory."""
     n, m = step.matrix.shape
     soft = demand.soft
     hard = n - soft
@@ -211,7 +211,7 @@ def _find_step(demand: Demand, ranges: Array, change: TensionChange, step: _Tang
 
 @glue
 def _point_along(soft: int, change: TensionChange, step: _Tangents) -> float:
-    """Fill the direction of the step's residual; its soft rows have length 1.
+    """Fill the direction of the step's residual. The soft rows of the direction have length 1.
 
     Returns the length of the soft rows before this scaling [N].
 
@@ -241,7 +241,7 @@ def _point_along(soft: int, change: TensionChange, step: _Tangents) -> float:
 
 @glue
 def _line_search(curves: Curves, demand: Demand, rest: float, change: TensionChange, step: _Tangents) -> bool:
-    """Halve a step until it gives the required decrease; False if no step does, or if the result is worse.
+    """Halve a step until it gives the required decrease. False if no step does, or if the result is worse.
 
     The weight of the hard residual exceeds the multipliers of the hard rows. A step therefore cannot decrease the soft
     residual by an increase of the hard residual.
@@ -281,7 +281,7 @@ def _line_search(curves: Curves, demand: Demand, rest: float, change: TensionCha
 
 @kernel
 def least_change(curves: Curves, demand: Demand, ranges: Array, change: TensionChange, memory: Memory) -> float:
-    """Change tensions within their ranges until the residual of the demand is least; returns the residual's length [N].
+    """Change tensions within their ranges until the residual of the demand is least. Returns its length [N].
 
     ranges: least and largest tensions, rows 0 and 1; change: start of the search, overwritten with the result. The
     returned length is that of the soft residual [N]. It is infinite if hard rows and ranges contradict each other on

@@ -27,7 +27,7 @@ DEPENDENT = 1e-20
 
 @glue
 def next_choice(chosen: Indices, m: int) -> int:
-    """Replace a combination by the next combination; returns the first changed position, or -1 after the last."""
+    """Replace the combination `chosen` by the next. Returns the first changed position, or -1 after the last."""
     count = chosen.size
     place = -1
     for k in range(count):
@@ -42,7 +42,7 @@ def next_choice(chosen: Indices, m: int) -> int:
 
 @glue
 def extend_frame(matrix: Array, chosen: Indices, first: int, frame: Array, triangle: Array) -> int:
-    """Add the chosen columns from a given position on to the orthonormal frame (n, n); returns its number of rows.
+    """Add the columns `chosen`, from the position `first` on, to the frame (n, n). Returns the frame's number of rows.
 
     The number is smaller than the number of columns if a column depends on the columns before it.
     """
@@ -80,7 +80,7 @@ def complete_frame(frame: Array, triangle: Array) -> None:
 
 @formula
 def zonotope_reach(matrix: Array, low: Array, high: Array, normal: Array) -> tuple[float, float]:
-    """Largest values of normal . J t and of -normal . J t for all tensions t within their limits; may be infinite."""
+    """Largest values of normal . J t and of -normal . J t for all tensions t within their limits. May be infinite."""
     n, m = matrix.shape
     forward = 0.0
     backward = 0.0
@@ -97,7 +97,7 @@ def zonotope_reach(matrix: Array, low: Array, high: Array, normal: Array) -> tup
 
 @kernel
 def zonotope_margin(matrix: Array, needed: Array, low: Array, high: Array, translations: int, memory: Memory) -> float:
-    """Largest force [N] that can be added to the needed wrench in any direction; negative if the wrench is infeasible.
+    """Largest force [N] that can be added to `needed` in every direction. Negative if `needed` is infeasible.
 
     Args:
         matrix: Structure matrix along the free motions, translations first, (n, m).

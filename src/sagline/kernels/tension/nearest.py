@@ -47,7 +47,7 @@ def new_reference_point(memory: Memory, previous: Array, r: int) -> tuple[Refere
 
 @glue
 def set_reference(distribution: Distribution, offset: Array, null: Array, near: ReferencePoint) -> None:
-    """Fill the reference point of the tension distribution in the null space.
+    """Fill the reference point of `distribution` in the null space.
 
     offset: offset of the distribution's variable (m,).
     """
@@ -61,7 +61,7 @@ def set_reference(distribution: Distribution, offset: Array, null: Array, near: 
 
 @formula
 def set_point(bounds: Array, null: Array, point: Array, tension: Array) -> None:
-    """Fill the tensions (m,) of a point in the null space."""
+    """Fill the tensions (m,) of `point` in the null space."""
     for i in range(tension.size):
         tension[i] = bounds[START, i]
     for k in range(point.size):
@@ -71,7 +71,7 @@ def set_point(bounds: Array, null: Array, point: Array, tension: Array) -> None:
 
 @formula
 def satisfies_limits(bounds: Array, tension: Array, slack: float) -> bool:
-    """True if every tension is within its limits up to a tolerance."""
+    """True if every tension is within its limits up to the tolerance `slack`."""
     for i in range(tension.size):
         if not bounds[LOW, i] - slack <= tension[i] <= bounds[HIGH, i] + slack:
             return False
@@ -80,7 +80,7 @@ def satisfies_limits(bounds: Array, tension: Array, slack: float) -> bool:
 
 @glue
 def share_nearest(bounds: Array, null: Array, near: ReferencePoint, tension: Array) -> int:
-    """Fill the tensions (m,) nearest to the reference; returns POSE_SOLVED or POSE_INFEASIBLE."""
+    """Fill the tensions (m,) nearest to the reference. Returns POSE_SOLVED or POSE_INFEASIBLE."""
     set_point(bounds, null, near.reference, tension)
     if satisfies_limits(bounds, tension, 0.0):
         near.held.labels[0] = 0
@@ -96,5 +96,5 @@ def share_nearest(bounds: Array, null: Array, near: ReferencePoint, tension: Arr
 
 @glue
 def is_nearest(distribution: Distribution) -> bool:
-    """True if a method gives the feasible tensions nearest to a reference."""
+    """True if `distribution` gives the feasible tensions nearest to a reference."""
     return distribution.method <= codes.QUADRATIC_PROGRAM

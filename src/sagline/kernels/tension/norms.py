@@ -83,7 +83,7 @@ def share_lowest_sum(bounds: Array, null: Array, near: ReferencePoint, basis: Ba
 def share_lowest_maximum(
     bounds: Array, offset: Array, null: Array, near: ReferencePoint, basis: Basis, memory: Memory
 ) -> int:
-    """Fill the point (r,) of `near` with the least maximum tension; among several, the point nearest to the reference.
+    """Fill the point (r,) of `near` with the least maximum tension. Among several points: the nearest to the reference.
 
     The program's last unknown is the largest tension.
     """
@@ -161,7 +161,7 @@ def share_by_norm(
 
 @formula
 def _tension_at(bounds: Array, null: Array, point: Array, i: int) -> float:
-    """Tension of cable i at a point of the null space, in the distribution's variable without its offset."""
+    """Tension of cable `i` at `point` of the null space, in the distribution's variable without its offset."""
     tension = bounds[START, i]
     for k in range(point.size):
         tension += null[k, i] * point[k]
@@ -236,7 +236,7 @@ def _change_metric(null: Array, curve: Array, target: Array, turned: Array, goal
 def _lowest_p_norm(
     first: float, p: float, bounds: Array, offset: Array, null: Array, near: ReferencePoint, memory: Memory
 ) -> bool:
-    """Move the feasible point (r,) of `near` to the point of least p-norm; returns True if it was found.
+    """Move the feasible point (r,) of `near` to the point of least p-norm. Returns True if this point was found.
 
     The exponent starts small and doubles whenever the steps become short, until it is p. Each Newton iteration thus
     starts near its solution.

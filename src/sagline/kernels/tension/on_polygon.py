@@ -60,7 +60,7 @@ def most_independent(null: Array) -> tuple[int, int]:
 
 @kernel
 def walk_polygon(bounds: Array, null: Array, memory: Memory, corners: Array, labels: Indices) -> int:
-    """Fill corners, counter-clockwise, and labels as in `feasible_polygon`; returns the number of corners.
+    """Fill corners, counter-clockwise, and labels as in `feasible_polygon`. Returns the number of corners.
 
     The number is 0 if the polygon is empty, and -1 if the walk failed. All limits must be finite.
     """
@@ -134,7 +134,7 @@ WALK_SUM, WALK_NORM, WALK_CENTROID = 0.0, 1.0, 2.0  # the optimum of the polygon
 def distribute_on_polygon(
     method: int, parameter: float, bounds: Array, null: Array, near: ReferencePoint, work: WorkArrays
 ) -> int:
-    """Fill the point (r,) of `near` by centroid or polygon walk; the sides of the last polygon are tried first."""
+    """Fill the point (r,) of `near` by centroid or polygon walk. The sides of the last polygon are tried first."""
     r, m = null.shape
     corners, labels, known = work.corners, work.labels, work.known
     count = known[0]
@@ -211,7 +211,7 @@ def feasible_corners(bounds: Array, null: Array, corners: Array, labels: Indices
 
 @kernel
 def centroid(corners: Array, count: int) -> tuple[float, float]:
-    """Centroid of a convex polygon; the mean of its corners if its area is zero."""
+    """Centroid of a convex polygon. If its area is zero: the mean of its corners."""
     x0 = corners[0, 0]
     y0 = corners[0, 1]
     area = 0.0
@@ -242,7 +242,7 @@ def centroid(corners: Array, count: int) -> tuple[float, float]:
 def lowest_corner(
     bounds: Array, null: Array, corners: Array, count: int, goal_x: float, goal_y: float
 ) -> tuple[float, float]:
-    """The point with the least sum of tensions; if a whole side has this sum, its point nearest to the goal."""
+    """The point with the least sum of tensions. If a whole side has this sum: its point nearest to the goal."""
     r, m = null.shape
     gx = 0.0
     gy = 0.0

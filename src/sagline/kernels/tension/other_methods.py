@@ -54,7 +54,7 @@ def share_near_middle(method: int, bounds: Array, null: Array, memory: Memory, t
 
 @glue
 def _hold_violated(bounds: Array, null: Array, slack: float, memory: Memory, tension: Array) -> bool:
-    """Fix the cable with the largest violation at its limit and distribute the rest again, until no limit is violated.
+    """Fix the cable with the largest violation at its limit and distribute the rest. Repeat while limits are violated.
 
     The tensions change in place, by orthogonal steps in the null space. A cable that was fixed remains fixed.
     """
@@ -117,7 +117,7 @@ def distribute_by_other_method(
     work: WorkArrays,
     tension: Array,
 ) -> int:
-    """Fill the tensions (m,) in the distribution's variable minus its offset; return POSE_SOLVED or the failure.
+    """Fill the tensions (m,) in the distribution's variable minus its offset. Returns POSE_SOLVED or the failure.
 
     Among several solutions, the solution nearest to the reference is selected.
     """

@@ -25,7 +25,7 @@ SPARE_CORNERS = 6  # corners in addition to two per cable: corners of the box, a
 def _cut_polygon(
     corners: Array, labels: Indices, count: int, x: float, y: float, side: float, label: int, slack: float
 ) -> int:
-    """Keep the part of the polygon where (x, y) . corner >= side; returns the number of remaining corners.
+    """Keep the part of the polygon where (x, y) . corner >= `side`. Returns the number of remaining corners.
 
     The corners change in place. The border of a half-plane crosses the border of a convex polygon at most twice.
     """
@@ -55,7 +55,7 @@ def _cut_polygon(
 
 @formula
 def _crossing(corners: Array, inside: int, outside: int, x: float, y: float, side: float) -> tuple[float, float]:
-    """Intersection of the line (x, y) . corner = side with the edge between two corners, one on each side."""
+    """Intersection of the line (x, y) . corner = `side` with the edge between the corners `inside` and `outside`."""
     px, py = corners[inside, 0], corners[inside, 1]
     qx, qy = corners[outside, 0], corners[outside, 1]
     depth = x * px + y * py - side
@@ -65,7 +65,7 @@ def _crossing(corners: Array, inside: int, outside: int, x: float, y: float, sid
 
 @kernel
 def _shift_corners(corners: Array, labels: Indices, count: int, leaving: int, entering: int, kept: int) -> int:
-    """Remove the corners outside and make space for the two ends of a new side; returns the index of the first end."""
+    """Remove the corners outside, and make space for the two ends of a new side. Returns the index of the first end."""
     if leaving >= entering:  # the corners inside lie between the two ends: move them to the front
         for k in range(kept):
             corners[k, 0], corners[k, 1] = corners[entering + k, 0], corners[entering + k, 1]
@@ -105,7 +105,7 @@ def widest_pair(null: Array) -> tuple[int, int, float]:
 
 @glue
 def _start_polygon(bounds: Array, null: Array, radius: float, corners: Array, labels: Indices) -> tuple[int, int]:
-    """Fill the four corners of the intersection of two bounds; an infinite limit is replaced by a box.
+    """Fill the four corners of the intersection of two bounds. A box replaces an infinite limit.
 
     Returns the two bounds.
     """
@@ -165,7 +165,7 @@ def feasible_polygon(bounds: Array, null: Array, corners: Array, labels: Indices
 
 @kernel
 def polygon_again(bounds: Array, null: Array, corners: Array, labels: Indices, count: int) -> bool:
-    """Fill the corners of the feasible polygon from its known sides; False if the polygon has other sides.
+    """Fill the corners of the feasible polygon from its known sides. False if the polygon has other sides.
 
     The known sides are correct if they follow each other in this order, and if no limit excludes a corner.
     """
@@ -203,7 +203,7 @@ def polygon_again(bounds: Array, null: Array, corners: Array, labels: Indices, c
 
 @formula
 def nearest_on_side(ax: float, ay: float, bx: float, by: float, x: float, y: float) -> tuple[float, float]:
-    """Point nearest to a given point, on the side between the corners a and b."""
+    """Point on the side between the corners a and b that is nearest to (x, y)."""
     ex = bx - ax
     ey = by - ay
     square = ex * ex + ey * ey
@@ -215,7 +215,7 @@ def nearest_on_side(ax: float, ay: float, bx: float, by: float, x: float, y: flo
 
 @kernel
 def nearest_corner_point(corners: Array, count: int, x: float, y: float) -> tuple[float, float]:
-    """Projection of an outer point onto a convex polygon."""
+    """Projection of the outer point (x, y) onto a convex polygon."""
     best = math.inf
     best_x = x
     best_y = y
@@ -242,7 +242,7 @@ class WorkArrays(NamedTuple):
 
 @glue
 def new_work_arrays(method: int, memory: Memory, m: int, r: int) -> WorkArrays:
-    """Work arrays for m cables and r redundant cables."""
+    """Work arrays for `m` cables and `r` redundant cables."""
     corner_count = 2 * m + SPARE_CORNERS
     corners, memory = block(memory, corner_count, 2)
     known, memory = counters(memory, 1)

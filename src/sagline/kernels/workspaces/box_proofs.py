@@ -39,7 +39,7 @@ def proves_inside(
     precision: Precision,
     memory: Memory,
 ) -> bool:
-    """True if the tensions tau + J^+ z are within the limits at all poses of a box; z: change of the demand.
+    """True if the tensions tau + J^+ z are within the limits at all poses of `box`; z is the change of the demand.
 
     centered.give is filled with the part of each tension change that is due to the set of wrenches [N].
     """
@@ -339,7 +339,7 @@ def _most_of_run(slope: float, rate: float, most: float, width: float) -> float:
 
 @kernel
 def _most_of_cable(place: CablesInBox, curves: Curves, ranges: Ranges, tau: float, i: int, rows: Array) -> float:
-    """Upper bound, in a box, of the increase of a cable's contribution along y if its tension differs from tau."""
+    """Upper bound, in a box, of the growth of the contribution of cable `i` along y if its tension is not `tau`."""
     low, high = ranges.lowest[i], ranges.highest[i]
     bend, spread, hanging = rows[BENT, i], rows[SPREAD, i], rows[HANGING, i]
     weight = abs(hanging)

@@ -58,7 +58,7 @@ def new_centered(memory: Memory, m: int, n: int) -> tuple[Centered, Memory]:
 
 @kernel
 def fill_imbalance(matrix: Array, centered: Centered) -> float:
-    """Fill the residual of the demand at the present tensions; returns the square of its length [N^2]."""
+    """Fill the residual of the demand at the present tensions. Returns the square of the residual's length [N^2]."""
     n, m = matrix.shape
     square = 0.0
     for k in range(n):
@@ -89,7 +89,7 @@ def _start_centering(matrix: Array, smoothing: float, centered: Centered) -> Non
 
 @kernel
 def factor_normal(matrix: Array, give: Array, unit: float, normal: Array) -> bool:
-    """Fill the factor of unit * 1 + matrix give matrix^T, (n, n); False if the sum is not positive definite."""
+    """Fill the factor of `unit` 1 + matrix give matrix^T, (n, n). False if this sum is not positive definite."""
     n, m = matrix.shape
     for k in range(n):
         for j in range(k + 1):
@@ -102,7 +102,7 @@ def factor_normal(matrix: Array, give: Array, unit: float, normal: Array) -> boo
 
 @kernel
 def find_center(matrix: Array, smoothing: float, centered: Centered) -> float:
-    """Move the tensions to the smoothed center; returns the square of the remaining residual [N^2].
+    """Move the tensions to the smoothed center. Returns the square of the remaining residual [N^2].
 
     matrix: structure matrix, all rows in newtons, (n, m); smoothing: [N^2], > 0; centered: contains limits and right
     side; the other fields are filled.
@@ -277,7 +277,7 @@ def spread_of_slopes(place: CablesInBox, box: PoseRange, centered: Centered, ran
 
 @formula
 def in_wrench_space(rows: Array, vector: Array, full: Array) -> None:
-    """Fill a direction of wrenches (6,) from a direction along the free motions (n,)."""
+    """Fill the direction `full` (6,) of wrenches from `vector` (n,), a direction along the free motions."""
     for a in range(6):
         full[a] = 0.0
         for k in range(vector.size):
@@ -309,7 +309,7 @@ def _fill_demand(
 
 @glue
 def _smoothing_of(place: CablesInBox, geometry: Array, tau: Array) -> float:
-    """Smoothing for a box [N^2], proportional to the square of the change in the box of the wrench of the tensions."""
+    """Smoothing for a box [N^2]. It is proportional to the square of the change of the tensions' wrench in the box."""
     square = 0.0
     for i in range(tau.size):
         change = tau[i] * max(place.way[i] / geometry[g.CHORD, i], LEAST_WAY)
@@ -338,7 +338,7 @@ def search_limits(ranges: Ranges, taken: Array, size: float, centered: Centered)
 def center_tensions(
     place: CablesInBox, curves: Curves, geometry: Array, body: Array, wrench: Array, centered: Centered, ranges: Ranges
 ) -> tuple[float, float]:
-    """Compute centered tensions within the limits of the search, and their sag forces, for a wrench (6,).
+    """Compute centered tensions within the limits of the search, and their sag forces, for `wrench` (6,).
 
     Returns the square of the residual [N^2], and the smoothing.
     """

@@ -61,7 +61,7 @@ def settle_margin(
     margin: Array,
     memory: Memory,
 ) -> int:
-    """Replace a margin (3,) by its value with exact sag forces; returns the status of the margin.
+    """Replace `margin` (3,) by its value with exact sag forces. Returns the status of the margin.
 
     platform: contains the least favorable wrench of the set.
     """
@@ -109,7 +109,7 @@ def settle_margin(
 
 @glue
 def _write_value(margin: Array, exact: float, error: float) -> None:
-    """Fill value and bounds from a margin with exact sag forces [N].
+    """Fill value and bounds of `margin` from `exact`, the margin with exact sag forces [N].
 
     The value has the sign of the exact margin. The value is continuous where the bounds begin to decide the sign.
     """
@@ -127,7 +127,7 @@ def _write_value(margin: Array, exact: float, error: float) -> None:
 
 @glue
 def _margin_in_facet(platform: Platform, facet: LimitingFacet, curves: Curves, load: Array, memory: Memory) -> float:
-    """Margin with exact sag forces, from the tensions at which the load meets the facet; NaN outside the facet.
+    """Margin with exact sag forces, from the tensions at which the load meets the facet. NaN outside the facet.
 
     The tensions follow from the secants. If the bounds are narrow, their errors have only a second-order effect.
     """
@@ -181,7 +181,7 @@ def _margin_in_facet(platform: Platform, facet: LimitingFacet, curves: Curves, l
 
 @glue
 def _component(freedom: Array, k: int, columns: Array, i: int) -> float:
-    """Component of a wrench, column i (6, m), along free motion k."""
+    """Component along free motion `k` of a wrench, column `i` of `columns` (6, m)."""
     total = 0.0
     for a in range(6):
         total += freedom[k, a] * columns[a, i]
@@ -204,7 +204,7 @@ def _fill_load(freedom: Array, facet: LimitingFacet, load: Array) -> None:
 def _largest_multiple(
     curves: Curves, demand: Demand, bands: Array, load: Array, above: float, tau: Array, memory: Memory
 ) -> float:
-    """Largest multiple of a load that the cables supply in addition to a demand; infinite or NaN if not found.
+    """Largest multiple of `load` that the cables supply in addition to `demand`. Infinite or NaN if not found.
 
     A reflection turns the load to the first component, which is the only soft component. The search starts beyond the
     upper bound.

@@ -62,7 +62,7 @@ def new_facets(memory: Memory, n: int, m: int) -> tuple[Facets, Memory]:
 
 @glue
 def choose_basis(facets: Facets, n: int, m: int, lever: float) -> bool:
-    """Eliminate in place, and fill the fields `basis` and `others`; False if the rank is not full."""
+    """Eliminate in place, and fill the fields `basis` and `others`. False if the rank is not full."""
     table, basis = facets.table, facets.basis
     first = 0.0
     for k in range(n):
@@ -103,28 +103,28 @@ def choose_basis(facets: Facets, n: int, m: int, lever: float) -> bool:
 
 @formula
 def _exchange_rows(table: Array, k: int, row: int) -> None:
-    """Exchange two rows."""
+    """Exchange the rows `k` and `row`."""
     for j in range(table.shape[1]):
         table[k, j], table[row, j] = table[row, j], table[k, j]
 
 
 @formula
 def _scale_row(row: Array, factor: float) -> None:
-    """Multiply a row."""
+    """Multiply `row` by `factor`."""
     for j in range(row.size):
         row[j] *= factor
 
 
 @formula
 def _subtract_row(row: Array, factor: float, other: Array) -> None:
-    """Subtract a multiple of another row from a row."""
+    """Subtract `factor` times the row `other` from `row`."""
     for j in range(row.size):
         row[j] -= factor * other[j]
 
 
 @glue
 def next_subset(facets: Facets, n: int, depth: int) -> int:
-    """Advance to the next subset of the other columns, and fill its minors; returns its size, or -1 after the last.
+    """Advance to the next subset of the other columns, and fill its minors. Returns its size, or -1 after the last.
 
     depth: size of the present subset; the first subset is empty.
     """

@@ -59,7 +59,7 @@ def new_cables_in_box(memory: Memory, m: int, n: int) -> tuple[CablesInBox, Memo
 def set_cables_in_box(
     freedom: Array, geometry: Array, rotation: Array, center: Array, box: PoseRange, place: CablesInBox
 ) -> bool:
-    """Fill `place` from the geometry of the cables; False if a platform end may meet its frame end in the box.
+    """Fill `place` from the geometry of the cables. False if a platform end may meet its frame end in the box.
 
     freedom: rows that select the free motions, (n, 6); geometry: rows of `cable_geometry` at the middle,
     (GEOMETRY_ROWS, m); rotation: platform -> world at the middle, (3, 3); center: center of mass in the platform frame
@@ -146,7 +146,7 @@ def _set_slopes(geometry: Array, rotation: Array, center: Array, box: PoseRange,
 
 @formula
 def norm3(x: float, y: float, z: float) -> float:
-    """Length of a vector in space."""
+    """Length of the vector (x, y, z)."""
     return math.sqrt(x * x + y * y + z * z)
 
 

@@ -28,7 +28,7 @@ BAND_ROWS = 7
 
 @glue
 def fill_bands(curves: Curves, bands: Array, memory: Memory) -> bool:
-    """Fill the bands of the cables of a pose; False if a cable is too slack at every tension."""
+    """Fill the bands of the cables of a pose. False if a cable is too slack at every tension."""
     cables = curves.cables
     m = cables.low.size
     for i in range(m):
@@ -84,19 +84,19 @@ SMALL = 1e-3  # X below which series are used
 
 @formula
 def _sinh_ratio(x: float) -> float:
-    """Upper bound of sinh(x)/x; exact except for small x."""
+    """Upper bound of sinh(x)/x. It is exact except for small x."""
     return math.sinh(x) / x if x > SMALL else 1.0 + x * x / 3.0
 
 
 @formula
 def _slack_rate(x: float) -> float:
-    """Upper bound of x cosh x - sinh x; exact except for small x."""
+    """Upper bound of x cosh x - sinh x. It is exact except for small x."""
     return x * math.cosh(x) - math.sinh(x) if x > 0.1 else 0.34 * x * x * x
 
 
 @formula
 def has_sag(curves: Curves, i: int) -> bool:
-    """True if a cable's sag force depends on its tension."""
+    """True if the sag force of cable `i` depends on its tension."""
     return curves.model.code == codes.CATENARY and curves.cables.half_weight[i] > 0.0
 
 
@@ -123,7 +123,7 @@ def sag_force_slope(curves: Curves, i: int, way: float, tension: float) -> float
 
 @kernel
 def largest_sag_force(curves: Curves, i: int, tension: float) -> float:
-    """Upper bound of a sag force [N] at all chord tensions from a given tension on."""
+    """Upper bound of the sag force of cable `i` [N] at all chord tensions >= `tension`."""
     cables = curves.cables
     if not has_sag(curves, i):
         return cables.sag_force[i]
@@ -133,7 +133,7 @@ def largest_sag_force(curves: Curves, i: int, tension: float) -> float:
 
 @kernel
 def fall_rate(curves: Curves, i: int, tension: float) -> float:
-    """Largest decrease of a sag force per newton of chord tension, above a given tension."""
+    """Largest decrease of the sag force of cable `i` per newton of chord tension, above `tension`."""
     if not has_sag(curves, i):
         return 0.0
     cables = curves.cables
@@ -146,7 +146,7 @@ def fall_rate(curves: Curves, i: int, tension: float) -> float:
 
 @kernel
 def rise_rate(curves: Curves, i: int, tension: float) -> float:
-    """Largest increase of a sag force per newton of chord tension, above a given tension."""
+    """Largest increase of the sag force of cable `i` per newton of chord tension, above `tension`."""
     if not has_sag(curves, i):
         return 0.0
     x = curves.cables.half_weight[i] / tension
@@ -155,7 +155,7 @@ def rise_rate(curves: Curves, i: int, tension: float) -> float:
 
 @kernel
 def fall(curves: Curves, i: int, low: float, high: float) -> float:
-    """Largest decrease of a sag force between a chord tension and a higher chord tension [N]."""
+    """Largest decrease [N] of the sag force of cable `i` from the chord tension `low` to the higher tension `high`."""
     if not has_sag(curves, i):
         return 0.0
     cables = curves.cables
@@ -167,7 +167,7 @@ def fall(curves: Curves, i: int, low: float, high: float) -> float:
 
 @kernel
 def rise(curves: Curves, i: int, low: float, high: float) -> float:
-    """Largest increase of a sag force between a chord tension and a higher chord tension [N]."""
+    """Largest increase [N] of the sag force of cable `i` from the chord tension `low` to the higher tension `high`."""
     if not has_sag(curves, i):
         return 0.0
     half = curves.cables.half_weight[i]

@@ -289,7 +289,7 @@ def _measure_all_facets(
 
 @formula
 def _add_normal(facets: Facets, depth: int, rows: int, m: int, measured: Array, b: int) -> bool:
-    """Fill the normal from a set of rows, one more than the present subset has columns; False if the normal is zero."""
+    """Fill the normal from `rows`, one more than the present subset has columns. False if the normal is zero."""
     minors = facets.minors[depth]
     x = y = z = u = v = w = 0.0
     sign = 1.0
@@ -437,7 +437,7 @@ def _write_normal(counts: _FacetWeights, measured: Array, normals: Array, b: int
 
 @glue
 def _limiting_cable(counts: _FacetWeights, direction: Array) -> int:
-    """Index of the cable with the largest contribution along a direction."""
+    """Index of the cable with the largest contribution along `direction`."""
     cable = -1
     most = 0.0
     for i in range(counts.rows.shape[1]):
@@ -452,7 +452,7 @@ def _limiting_cable(counts: _FacetWeights, direction: Array) -> int:
 
 @glue
 def _margin_status(margin: Array) -> int:
-    """Status from the bounds of a margin (3,)."""
+    """Status that follows from the bounds of `margin` (3,)."""
     if margin[BELOW] >= 0.0:
         return codes.MARGIN_FEASIBLE
     return codes.MARGIN_INFEASIBLE if margin[ABOVE] < 0.0 else codes.MARGIN_OPEN

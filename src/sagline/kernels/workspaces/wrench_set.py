@@ -32,7 +32,7 @@ def dot6(a: Array, b: Array) -> float:
 
 @formula
 def _reach_of_ellipsoid(axes: Array, against: Array) -> float:
-    """Extent of an ellipsoid from its center along a direction."""
+    """Extent of an ellipsoid from its center along the direction `against`."""
     square = 0.0
     for k in range(6):
         along = dot6(axes[k], against)
@@ -42,7 +42,7 @@ def _reach_of_ellipsoid(axes: Array, against: Array) -> float:
 
 @kernel
 def reach_of_loads(loads: Loads, against: Array) -> float:
-    """Largest value of -against . (w - center) for the wrenches w of the set."""
+    """Largest value of -`against` . (w - center) for the wrenches w of the set."""
     most = 0.0
     for s in range(loads.segments.shape[0]):
         most += abs(dot6(loads.segments[s], against))
@@ -60,7 +60,7 @@ def reach_of_loads(loads: Loads, against: Array) -> float:
 
 @kernel
 def farthest(loads: Loads, against: Array, wrench: Array) -> None:
-    """Fill the wrench of the set with the largest component against a direction, (6,)."""
+    """Fill `wrench` (6,), the wrench of the set with the largest component opposite to the direction `against`."""
     for a in range(6):
         wrench[a] = loads.center[a]
     for s in range(loads.segments.shape[0]):
@@ -151,7 +151,7 @@ def reach_of_set(
 
 @kernel
 def _add_segments(segments: Array, normals: Array, count: int, work: Array, total: Array) -> None:
-    """Add the extent of segments (S, 6) to both sides; segments of zero length are skipped."""
+    """Add the extent of `segments` (S, 6) to both sides. Segments of zero length are skipped."""
     for s in range(segments.shape[0]):
         if _multiply(segments[s], normals, count, work):
             for b in range(count):
@@ -194,7 +194,7 @@ def _add_polytopes(
 
 @kernel
 def _multiply(wrench: Array, normals: Array, count: int, out: Array) -> bool:
-    """Fill the scalar products of a wrench (6,) and normals (6, B); False without filling if the wrench is zero."""
+    """Fill the scalar products of `wrench` (6,) and `normals` (6, B). For a zero wrench: False, without filling."""
     some = False
     for k in range(6):
         part = wrench[k]
@@ -211,7 +211,7 @@ def _multiply(wrench: Array, normals: Array, count: int, out: Array) -> bool:
 
 @kernel
 def worst_wrench(center: Array, wrenches: WrenchSetArrays, direction: Array, wrench: Array) -> bool:
-    """Fill the wrench w of the set with the largest -direction . w, (6,); True if the set has no other wrench."""
+    """Fill the wrench w (6,) of the set with the largest -`direction` . w. True if the set has no other wrench."""
     farthest(Loads(center, wrenches.segments, wrenches.ellipsoids, wrenches.corners, wrenches.sizes), direction, wrench)
     single = wrenches.segments.shape[0] == 0 and wrenches.ellipsoids.shape[0] == 0
     for p in range(wrenches.sizes.size):
