@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 import sagline as sl
 from sagline.share.machine import courses_at
+from tests.kinematics.test_underconstrained import places, suspended
 from tests.record.poses import METHODS, MODELS
 
 POSES: Final = 4  # of a robot
@@ -243,6 +244,8 @@ def entries() -> None:
     slack = slack.replace(tension_min=1e-3 * slack.tension_min)
     unstable = sl.Pose(np.array([[-0.99, -1.58, 2.51], [1.44, -1.4, 1.13], [0.54, 0.0, 0.99]]), np.eye(3))
     sl.inverse(slack, unstable, tension=sl.MinimumNorm())
+    for radius in (None, 0.03):
+        sl.inverse(suspended(4, radius=radius), places(4, 4))
     cables()
     winches()
     meshes()
