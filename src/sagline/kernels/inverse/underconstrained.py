@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from sagline.core.arrays import Array, Codes, Flags, Indices
+from sagline.core.arrays import Array, Flags, Indices
 from sagline.kernels import codes, tables
 from sagline.kernels.algebra.factors import solve_general
 from sagline.kernels.balance.pose import step_pose, turned
@@ -22,7 +22,7 @@ from sagline.kernels.cable.admissible import TensionLimits
 from sagline.kernels.cable.cables import Cables, new_cables
 from sagline.kernels.cable.geometry import cable_geometry
 from sagline.kernels.cable.pulley import robots_have_machine
-from sagline.kernels.cable.sag_forces import new_curves, sag_forces_at
+from sagline.kernels.cable.sag_forces import Curves, new_curves, sag_forces_at
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.inverse.poses import (
     FORCE,
@@ -65,6 +65,21 @@ class UnderconstrainedArrays(NamedTuple):
     work: Array  # (m, m)
     motion: Array  # (6,)
     moved: Array  # (POSE_COLUMNS,)
+    tau: Array  # chord tensions [N], (m,)
+    given: Indices  # codes of the given values of the present search, (m,)
+
+
+class _Search(NamedTuple):
+    """Search for the equilibrium of one pose."""
+
+    limits: TensionLimits
+    platform: Platform  # its pose has the given values
+    curves: Curves
+    balance: Balance
+    level: float  # tension level [N]
+    lever: float  # mean lever arm of the platform ends [m]
+    pose: Array  # present pose, (POSE_COLUMNS,)
+    blocking: Flags  # True for cables whose limits the equilibrium violates, (m,)
 
 
 @glue
@@ -79,7 +94,11 @@ def new_underconstrained_arrays(memory: Memory, m: int, n: int) -> tuple[Underco
     work, memory = block(memory, m, m)
     motion, memory = vector(memory, 6)
     moved, memory = vector(memory, tables.POSE_COLUMNS)
-    return UnderconstrainedArrays(jacobian, step, stiffness, along, sag_force, gram, work, motion, moved), memory
+    tau, memory = vector(memory, m)
+    given, memory = counters(memory, m)
+    return UnderconstrainedArrays(
+        jacobian, step, stiffness, along, sag_force, gram, work, motion, moved, tau, given
+    ), memory
 
 
 @glue
@@ -193,11 +212,10 @@ def _fill_stiffness(cables: Cables, geometry: Array, stiffness: Array) -> None:
 
 
 @glue
-def _fill_system(
-    platform: Platform, given: Indices, level: float, start: Array, pose: Array, cables: Cables, balance: Balance,
-    space: UnderconstrainedArrays,
-) -> None:  # fmt: skip
+def _fill_system(search: _Search, space: UnderconstrainedArrays) -> None:
     """Fill Jacobian and residuals of the balance and of the given values."""
+    platform, balance, cables, given = search.platform, search.balance, search.curves.cables, space.given
+    pose, start, level = search.pose, platform.pose, search.level
     freedom, jacobian, step = platform.freedom, space.jacobian, space.step
     n, m = balance.matrix.shape
     _fill_stiffness(cables, balance.geometry, space.stiffness)
@@ -252,19 +270,12 @@ def _fill_system(
 
 
 @glue
-def _take_step(
-    platform: Platform,
-    lever: float,
-    cables: Cables,
-    pose: Array,
-    space: UnderconstrainedArrays,
-    tau: Array,
-    blocking: Flags,
-) -> tuple[float, bool]:
+def _take_step(search: _Search, space: UnderconstrainedArrays) -> tuple[float, bool]:
     """Move pose and tensions by the shortened step. Returns the step size, and True if a tension is too small.
 
-    blocking: filled; True for the cables that the step would take below their smallest admissible tension.
+    `search.blocking` is filled: True for the cables that the step would take below their smallest admissible tension.
     """
+    platform, cables, pose, tau = search.platform, search.curves.cables, search.pose, space.tau
     freedom, step, n = platform.freedom, space.step, platform.freedom.shape[0]
     turn = 0.0
     shift = 0.0
@@ -274,7 +285,7 @@ def _take_step(
         else:
             shift += step[k] * step[k]
     turn = math.sqrt(turn)
-    size = max(turn, math.sqrt(shift) / lever)
+    size = max(turn, math.sqrt(shift) / search.lever)
     share = TURN / turn if turn > TURN else 1.0
     for k in range(step.size):
         step[k] *= share
@@ -285,38 +296,33 @@ def _take_step(
     for i in range(tau.size):
         size = max(size, abs(step[n + i]) / tau[i])
         wanted = max(tau[i] + step[n + i], SHRINK * tau[i])
-        blocking[i] = wanted < cables.low[i] * (1.0 - WITHIN)
-        short = short or blocking[i]
+        search.blocking[i] = wanted < cables.low[i] * (1.0 - WITHIN)
+        short = short or search.blocking[i]
         tau[i] = max(wanted, cables.low[i])
     return size, short
 
 
 @glue
-def _find_equilibrium(
-    model: Model, limits: TensionLimits, platform: Platform, given: Indices, level: float, lever: float, pose: Array,
-    cables: Cables, balance: Balance, space: UnderconstrainedArrays, tau: Array, blocking: Flags, statuses: Codes,
-    memory: Memory,
-) -> int:  # fmt: skip
+def _find_equilibrium(search: _Search, space: UnderconstrainedArrays) -> int:
     """Take Newton steps until the balance holds. Returns POSE_SOLVED or the failure.
 
-    pose: initial pose, replaced by the pose of the equilibrium; tau: initial tensions (m,), replaced by the last
-        tensions;
-    blocking: filled; True for cables whose limits the equilibrium violates, (m,).
+    The pose of the search and the tensions of the work arrays are the initial values. They are replaced by the last
+    values.
     """
-    curves, memory = new_curves(model, cables, statuses, memory)
+    model, cables, tau = search.curves.model, search.curves.cables, space.tau
     status = codes.POSE_NO_EQUILIBRIUM
     waited = 0
     for step in range(STEPS):
-        if not _place(model, limits, platform, pose, cables, balance):
+        if not _place(model, search.limits, search.platform, search.pose, cables, search.balance):
             break
-        sag_forces_at(curves, tau, space.sag_force)
-        fill_needed_wrench(platform, cables, balance)
-        _fill_system(platform, given, level, platform.pose, pose, cables, balance, space)
+        sag_forces_at(search.curves, tau, space.sag_force)
+        fill_needed_wrench(search.platform, cables, search.balance)
+        _fill_system(search, space)
         if status == codes.POSE_SOLVED:  # the cables are those of the last step
             break
         if not solve_general(space.jacobian, space.step):
             return codes.POSE_SINGULAR
-        size, short = _take_step(platform, lever, cables, pose, space, tau, blocking)
+        size, short = _take_step(search, space)
         waited = waited + 1 if short else 0
         if waited == PATIENCE:
             return codes.POSE_INFEASIBLE
@@ -325,8 +331,8 @@ def _find_equilibrium(
         if size <= CONVERGED and step < STEPS - 1:
             status = codes.POSE_SOLVED
     for i in range(tau.size):
-        blocking[i] = status == codes.POSE_SOLVED and tau[i] > cables.high[i] * (1.0 + WITHIN)
-        if blocking[i]:
+        search.blocking[i] = status == codes.POSE_SOLVED and tau[i] > cables.high[i] * (1.0 + WITHIN)
+        if search.blocking[i]:
             status = codes.POSE_INFEASIBLE
     return status
 
@@ -374,8 +380,6 @@ def underconstrained_poses(
     cables, rest = new_cables(Memory(*memory), m, robots_have_machine(robots))
     balance, rest = new_balance(rest, m, n)
     space, rest = new_underconstrained_arrays(rest, m, n)
-    tau, rest = vector(rest, m)
-    held, rest = counters(rest, m)
     # Without a level, the tensions must turn the platform to its yaw. The search starts at the answer for level 0.
     turned_by_tensions = False
     for i in range(m):
@@ -400,18 +404,17 @@ def underconstrained_poses(
             follows = chained and p > 0 and pose_statuses[p - 1] == codes.POSE_SOLVED
             _fill_first_tensions(freedom, lever, balance, space.gram, space.sag_force)
             for i in range(m):
-                tau[i] = results[tables.TENSION, p - 1, i] if follows else space.sag_force[i]
+                space.tau[i] = results[tables.TENSION, p - 1, i] if follows else space.sag_force[i]
             for k in range(3 if follows else pose.size, pose.size):
                 pose[k] = poses[p - 1, k]
+            curves, _left = new_curves(model, cables, statuses[p], rest)
+            search = _Search(limits, platform, curves, balance, level, lever, pose, blocking[p])
             status = codes.POSE_SOLVED
             for stage in range(0 if turned_by_tensions else 1, 2):
                 if status == codes.POSE_SOLVED:
                     for i in range(m):
-                        held[i] = LEVEL if stage == 0 and given[i] == YAW else given[i]
-                    status = _find_equilibrium(
-                        model, limits, platform, held, level, lever, pose, cables, balance, space, tau, blocking[p],
-                        statuses[p], rest,
-                    )  # fmt: skip
+                        space.given[i] = LEVEL if stage == 0 and given[i] == YAW else given[i]
+                    status = _find_equilibrium(search, space)
         solved = status == codes.POSE_SOLVED
         if solved:
             measure_balance(platform, cables, balance, residuals[p])
