@@ -22,6 +22,7 @@ from sagline.calibration.problem import (
     start_of,
 )
 from sagline.core.arrays import Array, Indices
+from sagline.core.indices import evenly_spaced
 from sagline.robot.drum import drums_of
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
@@ -159,7 +160,7 @@ class Trial:
         log, late, m = self.log, change.late, self.robot.cable_count
         read_at = self.rows + late + change.behind  # one of them is zero
         rows = self.rows[(read_at >= 0) & (read_at < len(log))]
-        rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(most, len(rows))).round().astype(np.int64))]
+        rows = rows[evenly_spaced(len(rows), most)]
         given = readings_table(log.rows(rows))
         read = LENGTH_UNITS[change.length_unit] * _swap_columns(log.readings[rows + change.behind], change.lengths)
         if log.load_cells is not None:

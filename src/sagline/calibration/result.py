@@ -15,6 +15,7 @@ from sagline.calibration.observations import unwhitened_slopes
 from sagline.calibration.parameters import Parameters
 from sagline.core.arguments import choice, flag
 from sagline.core.arrays import Array, locked, numbers
+from sagline.core.indices import evenly_spaced
 from sagline.core.numbers import counted, n
 from sagline.core.results import Result, Saved
 from sagline.kinematics.forward import forward
@@ -226,7 +227,7 @@ class Calibration(Findings, Saved):
     def _common_motion(self) -> Array:
         """Derivatives (4, P) by the values: shift and vertical rotation that are common to all poses of the log."""
         poses = pose_rows(self.poses)
-        part = np.unique(np.linspace(0, len(poses) - 1, min(len(poses), MOST)).round().astype(np.int64))
+        part = evenly_spaced(len(poses), MOST)
         by_values = self._slopes(poses[part], np.atleast_2d(self.unstrained_length)[part])[0][:, :3]
         there = ~np.isnan(by_values).any(axis=(1, 2))
         motions = _common_motions(poses[part][there])[:, :3].reshape(-1, 4)

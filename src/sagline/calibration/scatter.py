@@ -16,6 +16,7 @@ from sagline.calibration.log import reading_deviations
 from sagline.calibration.observations import unwhitened_slopes
 from sagline.calibration.parameters import internal, prior_root, slopes_of_values
 from sagline.core.arrays import Array, Flags, Indices
+from sagline.core.indices import evenly_spaced
 from sagline.statics.tables import pose_rows
 
 QUANTITIES: Final = ("length", "load cell", "position", "rotation")
@@ -39,7 +40,8 @@ def sensor_deviations(found: Findings, *, per_cable: bool = False) -> tuple[Sens
     used = np.zeros(0, dtype=np.int64)
     for _ in range(ROUNDS):
         gross = [one.row for one in found.outliers if one.deviations > GROSS * ratios[one.quantity]]
-        before, used = used, _evenly(np.flatnonzero(~np.isin(found.rows, gross)))
+        before, kept = used, np.flatnonzero(~np.isin(found.rows, gross))
+        used = kept[evenly_spaced(len(kept), MOST)]
         read = ~np.isnan(found.residuals[used])
         groups = [group for group in _groups(m, per_cable=per_cable) if read[:, group[2]].any()]
         if len(groups) < 2:
@@ -56,11 +58,6 @@ def sensor_deviations(found: Findings, *, per_cable: bool = False) -> tuple[Sens
         now = given * float(np.sqrt(factor)) if known else np.nan
         deviations.append(SensorDeviation(quantity, cable, given, now, now * float(error)))
     return tuple(deviations)
-
-
-def _evenly(poses: Indices) -> Indices:
-    """At most `MOST` of some poses, evenly distributed."""
-    return poses[np.unique(np.linspace(0, max(len(poses) - 1, 0), min(len(poses), MOST)).round().astype(np.int64))]
 
 
 def _groups(m: int, *, per_cable: bool) -> list[tuple[str, int | None, Indices]]:

@@ -69,6 +69,7 @@ def tension(
     from sagline.files.writing import file_stem
     from sagline.kinematics.inverse import inverse
     from sagline.kinematics.polygon import tension_polygon
+    from sagline.robot.reach import is_underconstrained
     from sagline.tension.margin import capacity_margin
     from sagline.tension.methods import METHODS, MinimumNorm
 
@@ -80,7 +81,7 @@ def tension(
     least = inverse(
         robot, place, model.build(), MinimumNorm(variable.value), wrench
     )  # raises an error if no method is defined for the robot
-    fewer_cables = robot.cable_count < robot.degrees_of_freedom
+    fewer_cables = is_underconstrained(robot)
     plans: dict[str, Plan | None] = {"balance": least}
     if not fewer_cables:
         methods = {title: method for title, method in METHODS.items() if title not in LEFT_OUT}

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from sagline.viewer.session import LogFollower, PlayedLog
 
 LOG: Final = ".mcap"
+NO_PAGE: Final = "Draw its motion with sagline track, or record a simulation."  # with fewer cables than freedoms
 LOOK: Final = 0.5  # time between two checks of a growing file [s]
 
 
@@ -141,17 +142,11 @@ def view(
     return view_robot(machine, robot, address, None if payload is None else machine.mass, **start)
 
 
-def _check_cable_count(robot: Robot) -> None:
-    """Reject an underconstrained platform, for which the page would have no margin and no polygon."""
-    if robot.cable_count < robot.degrees_of_freedom:
-        allowed = f">= {robot.degrees_of_freedom} for {robot.motion_pattern}"
-        step = "Draw its motion with sagline track, or record a simulation."
-        raise InvalidValueError(f"{robot.name}: number of cables", robot.cable_count, allowed, step)
-
-
 def view_robot(robot: Robot, name: str | Path, address: ServerAddress, mass: float | None = None, **start: Any) -> int:
     """Serve a robot with a payload [kg] until Ctrl-C; returns the exit code."""
-    _check_cable_count(robot)
+    from sagline.robot.reach import check_cable_count
+
+    check_cable_count(robot, step=NO_PAGE)
     serve, Source = _viewer()
     if start.get("mode"):
         _check_mode(robot, **start)
@@ -162,9 +157,10 @@ def view_run(robot: Robot, file: Path, address: ServerAddress, beside: Path | No
     """Serve a run or a simulation of a robot, optionally with another run, until Ctrl-C; returns the exit code."""
     from sagline.files.netcdf import is_of
     from sagline.files.simulation_file import FORMAT
+    from sagline.robot.reach import check_cable_count
 
     serve, Source = _viewer()
-    _check_cable_count(robot)
+    check_cable_count(robot, step=NO_PAGE)
     played = played_in(robot, file)
     other = None if beside is None else played_beside(played.robot, file, beside)
     source = Source.of_file("simulation" if is_of(file, FORMAT) else "plan", file)

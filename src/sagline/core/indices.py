@@ -64,3 +64,9 @@ def _no_entry(index: object, size: int) -> NoSuchEntryError:
     if size == 0:
         allowed = "a slice, because the batch is empty"
     return NoSuchEntryError("index", brief(index), allowed, f"The batch has {size}; indices start at 0.")
+
+
+def evenly_spaced(count: int, most: int) -> NDArray[np.int64]:
+    """At most `most` of `count` indices, with equal steps except for rounding; the first and the last are included."""
+    places = np.linspace(0, max(count - 1, 0), min(count, most))
+    return np.unique(places.round().astype(np.int64))

@@ -18,7 +18,7 @@ from sagline.kinematics.status import BALANCED, PoseStatus
 from sagline.motion.path import Path
 from sagline.robot.batch import first_of
 from sagline.robot.equilibrium import Equilibrium
-from sagline.robot.reach import LEVEL, ROUNDING, forbidden_turn, turn_in_words
+from sagline.robot.reach import LEVEL, ROUNDING, forbidden_turn, is_underconstrained, turn_in_words
 from sagline.statics.stiffness import smallest_stiffness
 from sagline.tension.method import TensionMethod
 
@@ -113,8 +113,7 @@ class Plan(Result, Saved, Tabular):
     @property
     def method(self) -> str:
         """Name of the tension distribution method; "balance" for an underconstrained platform, which has no method."""
-        robot = first_of(self.state.robot)
-        return "balance" if robot.cable_count < robot.degrees_of_freedom else self.tension.title
+        return "balance" if is_underconstrained(first_of(self.state.robot)) else self.tension.title
 
     @property
     def unstrained_length(self) -> Array:

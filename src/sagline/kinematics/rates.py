@@ -16,6 +16,7 @@ from sagline.motion.sampled import spline_rates
 from sagline.robot.batch import Robots, anchors_of, bodies_of, first_of, has_routing, limits_of, robot_at
 from sagline.robot.equilibrium import Equilibrium, cables_of_results, limited_tension
 from sagline.robot.pose import Pose
+from sagline.robot.reach import is_underconstrained
 from sagline.robot.routing import with_routing
 from sagline.statics.balance import inertial_wrench
 from sagline.statics.tables import pose_rows
@@ -277,8 +278,7 @@ def length_rate(state: Equilibrium, path: Path, tension: TensionMethod, feasible
     """
     kept = np.flatnonzero(feasible)
     rates = np.full(state.cables.shape, np.nan)
-    robot = first_of(state.robot)
-    if robot.cable_count < robot.degrees_of_freedom:  # the platform also turns, and the path does not contain this turn
+    if is_underconstrained(first_of(state.robot)):  # the platform also turns, and the path does not contain this turn
         for part in np.split(kept, np.flatnonzero(np.diff(kept) > 1) + 1):
             if len(part) > 1:
                 rates[part] = spline_rates(path.time[part], state.unstrained_length[part])[0]

@@ -27,6 +27,7 @@ from sagline.motion.path import Path
 from sagline.robot.batch import first_of
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
+from sagline.robot.reach import is_underconstrained
 from sagline.robot.robot import Robot
 from sagline.workspaces.space import Workspace
 
@@ -158,7 +159,7 @@ def _(robot: Robot) -> Summary:
 def middle_plan(robot: Robot) -> Plan | None:
     """Plan of the pose in the middle of a robot's test box; None without a test box."""
     box = robot.test_box
-    if box is None or robot.cable_count < robot.degrees_of_freedom:
+    if box is None or is_underconstrained(robot):
         return None
     return inverse(robot, Pose(0.5 * (box.low + box.high), np.eye(3)))
 

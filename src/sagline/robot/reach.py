@@ -17,6 +17,19 @@ _HOME_DECIMALS: Final = 9  # decimals of the home position [m], which remove the
 LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
 # [rad] and [m]; smaller deviations count as zero, because they are the rounding errors of seven digits
 ROUNDING = 1e-6
+_FEWER_CABLES: Final = "Add cables, or use inverse, forward and vibration, which allow fewer."
+
+
+def is_underconstrained(robot: Robot) -> bool:
+    """True if the robot has fewer cables than degrees of freedom."""
+    return robot.cable_count < robot.degrees_of_freedom
+
+
+def check_cable_count(robot: Robot, name: str | None = None, step: str = _FEWER_CABLES) -> None:
+    """Refuse an underconstrained robot. `name` and `step` are its name and the next step in the message."""
+    if is_underconstrained(robot):
+        allowed = f">= {robot.degrees_of_freedom} for {robot.motion_pattern}"
+        raise InvalidValueError(f"{name or robot.name}: number of cables", robot.cable_count, allowed, step)
 
 
 def check_reach(robot: Robot, pose: Pose, item: str) -> None:

@@ -15,6 +15,7 @@ from sagline.kernels import codes
 from sagline.kernels.inverse.poses import DistributionTerms, LimitTerms, ModelTerms
 from sagline.robot.batch import Robots, first_of
 from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.reach import check_cable_count
 from sagline.robot.robot import Robot
 
 Variable = Literal["chord", "horizontal", "frame_end"]
@@ -152,15 +153,14 @@ def check_sharing(robot: Robot, tension: TensionMethod, name: str | None = None)
     """Refuse `robot` if the tension distribution method `tension` is not defined for it."""
     n, m = robot.degrees_of_freedom, robot.cable_count
     called = name or robot.name
-    item = f"{called}: number of cables"
-    if m < n:
-        step = "Add cables, or use inverse, forward and vibration, which allow fewer."
-        raise InvalidValueError(item, m, f">= {n} for {robot.motion_pattern}", step)
+    check_cable_count(robot, called)
     method = type(tension).__name__
     most = tension.most_redundant
     if most is not None and m > n + most:
         step = "Choose AnalyticCenter or MinimumNorm, which accept any number of cables."
-        raise InvalidValueError(item, m, f"{n} to {n + most} for {robot.motion_pattern} with {method}", step)
+        raise InvalidValueError(
+            f"{called}: number of cables", m, f"{n} to {n + most} for {robot.motion_pattern} with {method}", step
+        )
     unlimited = np.isinf(robot.tension_max)
     if tension.needs_upper_limits and unlimited.any():
         step = f"{method} needs an upper limit of every cable: give one, or choose MinimumNorm."

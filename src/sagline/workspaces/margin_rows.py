@@ -18,6 +18,7 @@ from sagline.kernels.memory import memory_for
 from sagline.kernels.workspaces.signed_margin import FACET_SIZE, signed_margins
 from sagline.kernels.workspaces.wrench_set import SetTerms
 from sagline.robot.batch import bodies_of, first_of, together
+from sagline.robot.reach import check_cable_count
 from sagline.robot.robot import Robot
 from sagline.statics.tables import robot_terms
 from sagline.tension.method import LIMITS_OF
@@ -158,11 +159,3 @@ def _set_terms(wrenches: WrenchSet, inertias: Array) -> SetTerms:
 
 def _locked(array: Array) -> Array:
     return locked(np.ascontiguousarray(array, dtype=np.float64).view())
-
-
-def check_cable_count(robot: Robot) -> None:
-    """Reject a robot with fewer cables than degrees of freedom."""
-    n, m = robot.degrees_of_freedom, robot.cable_count
-    if m < n:
-        step = "Add cables, or use inverse, forward and vibration, which allow fewer."
-        raise InvalidValueError(f"{robot.name}: number of cables", m, f">= {n} for {robot.motion_pattern}", step)

@@ -20,10 +20,10 @@ from sagline.core.results import Result
 from sagline.core.status import Status
 from sagline.kernels.workspaces.pose_box_proof import BOX_COLUMNS, INSIDE, OPEN, OUTSIDE, memory_for_proofs, prove_boxes
 from sagline.robot.pose import PoseBox
+from sagline.robot.reach import check_cable_count
 from sagline.robot.robot import Robot
 from sagline.statics.tables import robot_terms
 from sagline.tension.method import LIMITS_OF
-from sagline.workspaces.margin_rows import check_cable_count
 from sagline.workspaces.orientations import check_tilt
 from sagline.workspaces.wrench_sets import WrenchSet, load_of
 

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from sagline.core.arguments import choice, instance, optional
 from sagline.core.arrays import Array, checked, locked
 from sagline.core.errors import InvalidValueError
+from sagline.core.indices import evenly_spaced
 from sagline.core.memory import check_memory
 from sagline.core.results import Result
 from sagline.core.table import Columns, Tabular
@@ -106,7 +107,7 @@ def frequency_response(state: Equilibrium, frequency: ArrayLike, damping: Dampin
     slopes = cable_slopes(state)
     receptance = Receptance(model, slopes.matrix, slopes.blocks, known)
     compliance, still = receptance.by_modes(given, receptance.fixed_end_modes(float(given.max())))
-    some = np.unique(np.linspace(0, given.size - 1, CHECKS).round().astype(np.int64))
+    some = evenly_spaced(given.size, CHECKS)
     wanted = receptance.exact(given[some])
     off = np.linalg.norm(compliance[some] - wanted, axis=(1, 2)) / np.linalg.norm(wanted, axis=(1, 2))
     return FrequencyResponse(state, known, given, locked(compliance), locked(still), locked(given[some]), locked(off))
