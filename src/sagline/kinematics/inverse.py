@@ -125,7 +125,7 @@ def inverse(
         load = locked(inertial_wrench(robots, pose, path.twist, path.twist_rate) + load)
     loads = np.atleast_2d(load)
     if options is None:
-        asked = values, number(level, "level", "N"), path is not None
+        asked = values, number(level, "level", "N"), path is not None, stability
         found, verdicts, rows = solve_underconstrained_rows(robots, model, rows, loads, *asked, progress)
         pose = Pose.from_quaternion(rows[:, :3].reshape(*pose.shape, 3), rows[:, 3:].reshape(*pose.shape, 4))
     else:

@@ -169,9 +169,7 @@ def decide_stability(robot: Robots, model: ModelTerms, rows: Array, found: Inver
 
     model: code and constants of the cable model; rows: pose rows (N, POSE_COLUMNS).
     """
-    fewer_cables = found.cable_status.shape[1] < found.needed.shape[1]  # these solutions have no proof
-    open_ = np.isin(found.pose_status, SOLVED if fewer_cables else (codes.UNPROVED_STABILITY,))
-    which = locked(np.flatnonzero(open_ | verdicts.at_border))
+    which = locked(np.flatnonzero((found.pose_status == codes.UNPROVED_STABILITY) | verdicts.at_border))
     if not which.size:
         return
     given = ((*model, has_routing(robot) or None), robot_terms(robot), rows)

@@ -17,6 +17,7 @@ from sagline.kernels.inverse.underconstrained import LEVEL, YAW, underconstraine
 from sagline.kernels.memory import memory_for
 from sagline.kinematics.inverse_rows import BLOCK, InverseRows, Verdicts
 from sagline.robot.batch import Robots, first_of, has_routing
+from sagline.robot.reach import is_underconstrained
 from sagline.robot.robot import Robot
 from sagline.statics.tables import robot_terms
 from sagline.tension.method import LIMITS_OF
@@ -34,7 +35,7 @@ def given_codes(robot: Robot, given: Sequence[Given] | None) -> Indices | None:
             are given for a robot with enough cables.
     """
     m = robot.cable_count
-    if m >= robot.degrees_of_freedom:
+    if not is_underconstrained(robot):
         if given is not None:
             step = "Leave it out; the whole pose is given."
             raise InvalidValueError("given", brief(given), f"None for {m} cables and {robot.motion_pattern}", step)
@@ -59,12 +60,14 @@ def solve_underconstrained_rows(
     given: Indices | None,
     level: float,
     chained: bool,
+    stability: bool,
     progress: Progress | None = None,
 ) -> tuple[InverseRows, Verdicts, Array]:
     """Results, verdicts, and rows of the found poses (N, POSE_COLUMNS).
 
     rows: rows of the given poses; loads: external plus inertial wrenches (1 or N, 6); given: codes (m,); level: tension
-    level [N]; chained: True to start each pose at the pose before.
+    level [N]; chained: True to start each pose at the pose before; stability: True to mark solved poses as
+    UNPROVED_STABILITY.
     """
     assert given is not None  # checked by the caller
     shared = first_of(robot)
@@ -78,5 +81,8 @@ def solve_underconstrained_rows(
         underconstrained_poses(*terms, rows, loads, given, level, chained, memory, *arrays, part.start, part.stop)
         if progress is not None:
             progress(part.stop, len(rows))
-    verdicts.brackets[found.pose_status == codes.POSE_SOLVED] = 0.0
+    solved = found.pose_status == codes.POSE_SOLVED
+    verdicts.brackets[solved] = 0.0
+    if stability:
+        found.pose_status[solved] = codes.UNPROVED_STABILITY
     return found, verdicts, locked(poses)

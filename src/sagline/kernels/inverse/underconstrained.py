@@ -317,9 +317,9 @@ def _find_equilibrium(search: _Search, space: UnderconstrainedArrays) -> int:
             break
         sag_forces_at(search.curves, tau, space.sag_force)
         fill_needed_wrench(search.platform, cables, search.balance)
-        _fill_system(search, space)
         if status == codes.POSE_SOLVED:  # the cables are those of the last step
             break
+        _fill_system(search, space)
         if not solve_general(space.jacobian, space.step):
             return codes.POSE_SINGULAR
         size, short = _take_step(search, space)
@@ -381,11 +381,11 @@ def underconstrained_poses(
     balance, rest = new_balance(rest, m, n)
     space, rest = new_underconstrained_arrays(rest, m, n)
     # Without a level, the tensions must turn the platform to its yaw. The search starts at the answer for level 0.
-    turned_by_tensions = False
+    has_yaw = has_level = False
     for i in range(m):
-        turned_by_tensions = turned_by_tensions or given[i] == YAW
-    for i in range(m):
-        turned_by_tensions = turned_by_tensions and given[i] != LEVEL
+        has_yaw = has_yaw or given[i] == YAW
+        has_level = has_level or given[i] == LEVEL
+    turned_by_tensions = has_yaw and not has_level
     for p in range(first, last):
         platform = platform_at(robot_terms, starts, wrenches, p)
         model = model_at(model_terms, platform.body)
@@ -399,7 +399,8 @@ def underconstrained_poses(
         if _place(model, limits, platform, pose, cables, balance):
             lever = _mean_lever(balance.geometry)
             _fill_gram(freedom, balance.matrix, lever, space.gram)
-            _fill_tension_level(space.gram, space.work, space.along)
+            if has_yaw or has_level:
+                _fill_tension_level(space.gram, space.work, space.along)
             fill_needed_wrench(platform, cables, balance)
             follows = chained and p > 0 and pose_statuses[p - 1] == codes.POSE_SOLVED
             _fill_first_tensions(freedom, lever, balance, space.gram, space.sag_force)
