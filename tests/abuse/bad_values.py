@@ -1,4 +1,4 @@
-"""What somebody may give in place of a valid argument, by what the argument is, and what must come of it."""
+"""Invalid values in place of a valid argument, for each kind of argument, with the expected verdict."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ UNITS: pint.UnitRegistry[Any] = pint.UnitRegistry()
 
 
 class Bad(NamedTuple):
-    """A value and what must come of it."""
+    """A value and its expected verdict."""
 
     label: str
     value: Any
@@ -29,7 +29,7 @@ class Bad(NamedTuple):
 
 
 class Foreign:
-    """An array of another library, as numpy asks for it."""
+    """An array of another library, with the array protocol of NumPy."""
 
     def __init__(self, values: Any) -> None:
         self.values = np.asarray(values)
@@ -38,8 +38,8 @@ class Foreign:
         return np.array(self.values, dtype=dtype)
 
 
-class Stubborn:
-    """An object that answers no question."""
+class Unconvertible:
+    """An object that raises an error in every conversion."""
 
     def __array__(self, dtype: Any = None, copy: Any = None) -> Any:
         raise RuntimeError("these numbers are on another machine\nand stay there")
@@ -49,12 +49,12 @@ class Stubborn:
 
 
 def bad_values(kind: str, valid: Any, optional: bool) -> Iterator[Bad]:
-    """All of them for one argument.
+    """All values for one argument.
 
     Args:
-        kind: What the argument is: one of the functions below.
-        valid: A value that is taken.
-        optional: Whether None leaves the argument out.
+        kind: Kind of the argument: the name of one of the functions below.
+        valid: A valid value.
+        optional: True if the argument can be None.
 
     Yields:
         Values, each with its verdict.
@@ -62,7 +62,7 @@ def bad_values(kind: str, valid: Any, optional: bool) -> Iterator[Bad]:
     yield Bad("None", None, EITHER if optional else REFUSED)
     for label, value in (
         ("an object", object()),
-        ("a stubborn object", Stubborn()),
+        ("a stubborn object", Unconvertible()),
         ("bytes", b"1.0"),
         ("a number with an imaginary part", 1.0 + 2.0j),
         ("a class", sl.Straight),
@@ -80,7 +80,7 @@ def bad_values(kind: str, valid: Any, optional: bool) -> Iterator[Bad]:
 
 
 def _is_also_taken(value: Any, valid: Any) -> bool:
-    """True for positions in the place of poses, and for a result with a state in the place of an equilibrium."""
+    """True for positions in place of poses, and for a result with a state in place of an equilibrium."""
     if isinstance(valid, sl.Pose | sl.Path):
         return isinstance(value, list | tuple | np.ndarray)
     return isinstance(valid, sl.Equilibrium) and isinstance(getattr(value, "state", None), sl.Equilibrium)
@@ -142,13 +142,13 @@ def _array(valid: Any) -> Iterator[Bad]:
 
 
 def _tensions(valid: Any) -> Iterator[Bad]:
-    """Numbers that are not negative."""
+    """Nonnegative numbers."""
     for bad in _array(valid):
         yield bad._replace(verdict=REFUSED) if bad.label == "negative" else bad
 
 
 def _sample(valid: Any) -> Iterator[Bad]:
-    """Numbers of a control loop: what is out of range is told by a status."""
+    """Numbers of a control loop: a status reports values out of range."""
     for bad in _array(valid):
         if "inf" in bad.label or "1e" in bad.label:
             yield bad._replace(verdict=EITHER)
@@ -157,7 +157,7 @@ def _sample(valid: Any) -> Iterator[Bad]:
 
 
 def _number(valid: Any) -> Iterator[Bad]:
-    """One number, and no more."""
+    """A single number."""
     for bad in _array(valid):
         if bad.label in ("one axis more", "five axes more", "one entry more", "twice") or bad.label == "nan":
             yield bad._replace(verdict=REFUSED)
@@ -210,12 +210,12 @@ def _flag_or_whole(valid: Any) -> Iterator[Bad]:
 
 
 def _entry(valid: Any) -> Iterator[Bad]:
-    """A whole number, of which -1 is the last."""
+    """A whole number; -1 is the last entry."""
     yield from (bad for bad in _whole(valid) if bad.label != "-1")
 
 
 def _methods(valid: Any) -> Iterator[Bad]:
-    """A tension distribution method, or several of them."""
+    """One or several tension distribution methods."""
     yield from _object(valid)
     for other in ([valid, 3], [None], [[valid]], {0: valid}, [], ()):
         yield Bad(f"{other!r:.40}", other, REFUSED)
@@ -223,7 +223,7 @@ def _methods(valid: Any) -> Iterator[Bad]:
 
 
 def _wholes(valid: Any) -> Iterator[Bad]:
-    """As many whole numbers as this, all positive."""
+    """A given number of positive whole numbers."""
     first = list(valid)
     wrong: tuple[Any, ...] = (
         3, "9x7x5", np.array(3), [], first[:-1], [*first, 1], [-1, *first[1:]], [0, *first[1:]], [2.5, *first[1:]],
@@ -238,7 +238,7 @@ def _wholes(valid: Any) -> Iterator[Bad]:
 
 
 def _cables(valid: Any) -> Iterator[Bad]:
-    """Indices of cables, each once."""
+    """Indices of cables without repetition."""
     wrong: tuple[Any, ...] = (
         3,
         "0",
@@ -279,7 +279,7 @@ def _groups(valid: Any) -> Iterator[Bad]:
 
 
 def _several(valid: Any) -> Iterator[Bad]:
-    """Objects of one kind in a sequence."""
+    """A sequence of objects of one kind."""
     yield from (bad for bad in _object(list(valid)) if bad.label not in ("its class", "its name", "an empty list"))
     yield Bad("one", valid[0], EITHER)
     for other in ([*valid, 3], [None], [[valid[0]]], {0: valid[0]}, type(valid[0]), [type(valid[0])]):
@@ -288,7 +288,7 @@ def _several(valid: Any) -> Iterator[Bad]:
 
 
 def _texts(valid: Any) -> Iterator[Bad]:
-    """One text of a small language, or several."""
+    """One or several texts of a small language."""
     for value in (3, True, "nothing", [3], [None], {"a": 1}, [[valid]], np.array(3.0), [valid, "nothing"]):
         yield Bad(f"{value!r}", value, REFUSED)
 
@@ -300,7 +300,7 @@ def _address(_: Any) -> Iterator[Bad]:
 
 
 def _table(valid: Any) -> Iterator[Bad]:
-    """A table in time: instants and rows of values."""
+    """A table in time: times and rows of values."""
     time, rows = (np.asarray(part, dtype=np.float64) for part in valid)
     wrong: tuple[Any, ...] = (
         3.0, "a", np.array(3.0), (time,), (time, rows, rows), (rows, time), (time[::-1], rows), (time, rows[:-1]),
@@ -345,14 +345,14 @@ def _index(valid: Any) -> Iterator[Bad]:
 
 
 def _word(valid: Any) -> Iterator[Bad]:
-    """One of a few words."""
+    """One of a set of words."""
     for value in (3, "", valid.upper() + "x", [valid], (valid,), np.array([valid, valid]), valid.encode(), True):
         yield Bad(f"{value!r}", value, REFUSED)
     yield Bad("a text of numpy", np.str_(valid), SAME)
 
 
 def _words(valid: Any) -> Iterator[Bad]:
-    """Several of a few words, each once."""
+    """Several words of a set, without repetition."""
     for value in (3, [], list(valid) * 2, "linear_density", [3], [None], [[valid[0]]], ["mass"], {valid[0]: 1}):
         yield Bad(f"{value!r}", value, REFUSED)
     yield Bad("a tuple", tuple(valid), SAME)
@@ -368,7 +368,7 @@ def _text(valid: Any) -> Iterator[Bad]:
 
 
 def _file(valid: Any) -> Iterator[Bad]:
-    """A file's name."""
+    """The name of a file."""
     values: tuple[Any, ...] = (
         3,
         True,
@@ -388,18 +388,18 @@ def _file(valid: Any) -> Iterator[Bad]:
 
 
 def _folder(valid: Any) -> Iterator[Bad]:
-    """A folder's name; it is made with the folders above it."""
+    """The name of a folder; the folder and its parents are created."""
     yield from (bad for bad in _file(valid) if not isinstance(bad.value, Path) and "." not in bad.label)
 
 
 def _callback(_: Any) -> Iterator[Bad]:
-    """A function that is told of the progress."""
+    """A function that receives the progress."""
     for value in (True, 3, "print", [print], 0):
         yield Bad(f"{value!r}", value, REFUSED)
 
 
 def _mapping(valid: Any) -> Iterator[Bad]:
-    """Names and what belongs to them."""
+    """Names with their values."""
     key, value = next(iter(valid.items()))
     for wrong in (3, True, [(key, value)], {key: object()}, {key: b"a"}, [key]):
         yield Bad(f"{wrong!r:.40}", wrong, REFUSED)
@@ -407,7 +407,7 @@ def _mapping(valid: Any) -> Iterator[Bad]:
 
 
 def _object(valid: Any) -> Iterator[Bad]:
-    """An object of one of our kinds."""
+    """An object of a type of sagline."""
     kind = type(valid)
     yield Bad("its class", kind, REFUSED)
     yield Bad("its name", kind.__name__, REFUSED)
@@ -429,18 +429,18 @@ def _object(valid: Any) -> Iterator[Bad]:
 
 
 def _objects(valid: Any) -> Iterator[Bad]:
-    """One object, several, or none."""
+    """One object, several objects or none."""
     yield from (bad for bad in _object(valid) if bad.label != "an empty list")
 
 
 def _one(valid: Any) -> Iterator[Bad]:
-    """An object where a sequence of them is none."""
+    """An object; a sequence of objects is invalid."""
     yield from _object(valid)
     yield Bad("one in a list", [valid], REFUSED)
 
 
 def _place(valid: Any) -> Iterator[Bad]:
-    """A state where a pose may be."""
+    """A state in place of a pose."""
     yield from (bad for bad in _one(valid) if not isinstance(bad.value, sl.Pose))
 
 
@@ -450,7 +450,7 @@ def _motion(valid: Any) -> Iterator[Bad]:
 
 
 def _out(valid: Any) -> Iterator[Bad]:
-    """Memory to be filled."""
+    """An array for the results."""
     size = len(valid)
     locked = np.empty(size)
     locked.flags.writeable = False
@@ -477,7 +477,7 @@ def _ax(valid: Any) -> Iterator[Bad]:
 
 
 def _points(valid: Any) -> Iterator[Bad]:
-    """Names and the tensions of each."""
+    """Tensions by name."""
     name, tensions = next(iter(valid.items()))
     yield from (bad for bad in _mapping(valid))
     for label, value in (("too few", tensions[:3]), ("a batch", np.stack((tensions, tensions))), ("one number", 1.0)):
@@ -487,7 +487,7 @@ def _points(valid: Any) -> Iterator[Bad]:
 
 
 def strangers() -> list[Any]:
-    """One object of each of our kinds; made once."""
+    """One object of each type of sagline, created once."""
     if not _STRANGERS:
         robot = sl.load_robot("cogiro")
         pose = sl.Pose.from_euler([1.0, 1.0, 2.0], 0.0, 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""Every public function, class and method of sagline with arguments that it takes."""
+"""Valid arguments for every public function, class and method of sagline."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ from tests.kinematics.winches import wound
 from tests.plot import made
 from tools.size import public_values
 
-MAGIC = ("__getitem__",)  # of the methods with two underscores: those that a caller gives something
+MAGIC = ("__getitem__",)  # methods with two underscores that take an argument
 
 
 class Argument(NamedTuple):
-    """A valid value, and what kind of values there are: the name of a function of `bad_values`."""
+    """A valid value and its kind, the name of a function of `bad_values`."""
 
     kind: str
     value: Any
@@ -39,27 +39,27 @@ class Argument(NamedTuple):
 
 
 class Call(NamedTuple):
-    """What is called, by keywords, each of its arguments valid; a new object is made for each call of a method."""
+    """A callable with valid keyword arguments. Each call of a method uses a new object."""
 
     function: Callable[..., Any]
     arguments: dict[str, Argument]
 
-    def with_one(self, name: str, value: Any) -> Any:
-        """The result of the call with one argument replaced."""
+    def with_replaced(self, name: str, value: Any) -> Any:
+        """Result of the call with one argument replaced."""
         given = {key: argument.value for key, argument in self.arguments.items()}
         return self.function(**{**given, name: value} if name else given)
 
 
 def public_names() -> set[str]:
-    """Names of what a caller calls with arguments: functions, constructors, methods; `plot.tensions` and the like.
+    """Names of all callables with arguments: functions, constructors and methods, also `plot.tensions` and the like.
 
-    Left out are results, which sagline makes (their constructors check nothing), exceptions, and statuses.
+    Results made by sagline (their constructors check nothing), exceptions and statuses are excluded.
     """
     return {each for name, value in public_values().items() for each in _of_value(name, value)}
 
 
 def arguments_of(name: str) -> list[str]:
-    """Names of the arguments of a public callable; those of `**changes` are fields of the type, tried there."""
+    """Names of the arguments of a public callable. `**changes` is excluded; its fields are tested with the type."""
     value: Any = sl
     for part in name.split("."):
         value = getattr(value, part)
@@ -79,7 +79,7 @@ def _of_class(name: str, kind: type) -> set[str]:
     found = set() if name in RESULTS or not inspect.signature(kind).parameters else {name}
     private = [base for base in kind.__mro__[1:] if base.__name__ not in names_of("sagline") and base is not object]
     methods = {method: value for base in reversed([kind, *private]) for method, value in vars(base).items()}
-    for method, value in methods.items():  # those of a public base are called once, there
+    for method, value in methods.items():  # methods of a public base class are called once, with the base class
         function = value.__func__ if isinstance(value, classmethod) else value
         public = not method.startswith("_") or method in MAGIC
         if inspect.isfunction(function) and public and len(inspect.signature(function).parameters) > 1:
@@ -87,7 +87,7 @@ def _of_class(name: str, kind: type) -> set[str]:
     return found
 
 
-# made by sagline
+# results, made by sagline
 RESULTS = frozenset(
     {"CableFit", "CableState", "Confirmation", "EmpiricalFit", "Equilibria", "Equilibrium", "ForwardSolution"}
     | {"Clearances", "FrequencySlopes", "WinchDrive"}
@@ -97,10 +97,10 @@ RESULTS = frozenset(
     | {"FrequencyMap", "FrequencyResponse", "TensionPolygon", "Vibration", "WinchRates"}
     | {"Calibration", "CalibrationPoses", "PoseError"}
 )
-# need a machine at the other end, or are one: tests/plc/test_bad_arguments.py
+# require a machine at the other end, or are one: tests/plc/test_bad_arguments.py
 LINKS = frozenset({"plc.ModbusLink", "plc.S7Link", "twin.Server", "twin.Server.run"})
 CRITERIA = ("Clearance", "Criterion", "InFrame", "LeastFrequency", "LeastMargin", "LeastStiffness", "MaximumSag")
-# asked by sagline itself, with numbers of its own
+# called by sagline itself, with its own arguments
 TABULAR = (
     *("Confirmation", "Equilibria", "Equilibrium", "ForwardSolution", "FrequencyMap", "FrequencyResponse", "Margin"),
     *("Modes", "MovingAnchors", "Path", "Simulation", "TensionPolygon", "Vibration", "WinchRates", "control.Execution"),
@@ -112,7 +112,7 @@ INTERNAL = frozenset(
     | {"control.TensionLoop.step", "control.Gains.at", "control.Link", "control.Link.exchange", "control.Recorder"}
     | {"plc.ModbusLink.exchange", "plc.S7Link.exchange"}
     | {"Orientations.at", "Tilts.sampled"}
-    | {f"{name}.to_csv" for name in TABULAR}  # one method for all: see "Plan.to_csv"
+    | {f"{name}.to_csv" for name in TABULAR}  # one method for all types: see "Plan.to_csv"
     | {f"{name}.{method}" for name in (*CRITERIA, "PositionError") for method in ("check", "judge", "scale", "values")}
     | {"Clearance.excluded", "Criterion.excluded"}
     | {"AnchorErrors.added", "FreeAnchors.bound", "FreeCable.bound", "FreeLimit.bound", "Goal.values"}
@@ -122,7 +122,7 @@ INTERNAL = frozenset(
 
 @cache
 def calls(folder: Path) -> dict[str, Call]:
-    """The table; files are written to the folder."""
+    """The table of calls; files are written to the folder."""
     given = _Given(folder)
     table: dict[str, Call] = {}
     for part in (
@@ -156,7 +156,7 @@ def calls(folder: Path) -> dict[str, Call]:
 
 
 class _Given:
-    """Valid objects that calls share."""
+    """Valid objects that several calls use."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -483,7 +483,7 @@ def _solvers(given: _Given) -> dict[str, Call]:
 
         return call
 
-    def new() -> sl.ForwardSolver:  # its last equilibrium is forgotten by `reset`, not what it knows of it
+    def new() -> sl.ForwardSolver:  # `reset` discards the last equilibrium only
         return sl.ForwardSolver(given.robot, start=given.pose)
 
     return {
@@ -524,7 +524,7 @@ def _tensions(given: _Given) -> dict[str, Call]:
     each = ("array", np.ones(8))
     polygon = sl.tension_polygon(given.robot, given.pose)
     return table | {
-        "TensionMethod": Call(sl.MinimumNorm, _all(**common)),  # itself it is none
+        "TensionMethod": Call(sl.MinimumNorm, _all(**common)),  # an abstract base class
         "PNorm": Call(sl.PNorm, _all(**common, p=("number", 4.0))),
         "PolygonWalk": Call(sl.PolygonWalk, _all(**common, optimum=("word", "centroid"))),
         "QuadraticProgram": Call(sl.QuadraticProgram, _all(**common, weights=each, target=each)),

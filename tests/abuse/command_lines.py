@@ -1,4 +1,4 @@
-"""Bad command lines: every argument and option of every command, with every kind of bad value, from a seed."""
+"""Bad command lines: each argument and option of each command with each kind of bad value, in random order."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import typer.main
 
 from sagline.cli.main import app
 
-# a line of each command that works, as cheap as it can be; the files come from `sagline examples`
+# a short valid line of each command; `sagline examples` writes the files
 LINES = {
     "track": ["track", "cogiro", "short.yaml", "--no-figures"],
     "lengths": ["lengths", "run.nc"],
@@ -33,7 +33,7 @@ LINES = {
     "experiment": ["experiment", "article", "--in-process"],
     "export-scl": ["export-scl", "article-prototype"],
     "twin": ["twin", "article-prototype", "--port", "0"],
-    # nobody listens there
+    # a port without a server
     "control": ["control", "article-prototype", "--plc", "127.0.0.1:1,127.0.0.1:2,127.0.0.1:3,127.0.0.1:4"],
     "log": ["log", "run.mcap"],
     "cache": ["cache"],
@@ -42,8 +42,8 @@ LINES = {
     "share": ["share", "cogiro"],
 }
 
-DRAWING = ("track", "tension", "vibrate", "simulate", "workspace", "design")  # commands that draw
-WITH = {  # lines of options that have an effect only with, or without, something else
+DRAWING = ("track", "tension", "vibrate", "simulate", "workspace", "design")  # commands that draw figures
+WITH = {  # lines of options that require or exclude other options
     "workspace --scene": [*LINES["workspace"], "--clearance", "3 cm"],
     "workspace --budget": [*LINES["workspace"], "--prove", "0..1, 0..1, 1..2 m"],
     "view --truth": [*LINES["view"], "run.mcap"],
@@ -69,9 +69,9 @@ def line_of(name: str, option: str) -> list[str]:
 
 
 VALUES = (
-    # no text, or more than anybody reads
+    # empty or very long text
     "", " ", "\t", "\n", "x" * 300, "x" * 5000, "1" * 400, "é" * 200,
-    # numbers that are none, or too large, or of the wrong kind
+    # invalid numbers, numbers out of range, and numbers of another type
     "nan", "-nan", "inf", "-inf", "1e308", "-1e308", "1e999", "1e-400", "0x10", "010", "1_000", "1:30", "1,5", "1.5.2",
     "٣", "１", "½", "-1", "0", "-0", "1", "7", "True", "None", "+", "-", ".", "..", "e", "--",
     # lists
@@ -84,7 +84,7 @@ VALUES = (
     "missing.yaml", "missing.csv", "missing.nc", "own_robot.yaml", "cable.csv", "lengths.csv", "run.nc", "folder",
     "folder/", "folder.yaml", "own_robot.yaml/x", "../../evil", "/proc/nothere/x", "/", "~", "x/" * 200, "broken.nc",
     "pipe.yaml", "/dev/null", "/dev/zero", "/dev/full", "broken.yaml", "empty.csv", "link.yaml", "*", "con", "-x",
-    # what a terminal, a shell, a format or an encoding would take for something
+    # special characters of terminals, shells, formats and encodings
     "\x1b[31mred", "a\x1b]0;title\x07", "\x9b2J", "\u202eevil", "\udcff", "a\rb", "%s%n", "{}", "$(x)",
     "`x`", "[red]", ":smile:",
     # words
@@ -101,14 +101,14 @@ class Case(NamedTuple):
 
 
 def cases(seed: int, count: int | None) -> list[Case]:
-    """So many of all, shuffled from a seed; None for all of them."""
+    """A number of bad command lines in random order, or all of them if the number is None."""
     every = [*_options(), *_arguments(), *_others()]
     random.Random(seed).shuffle(every)
     return every[:count]
 
 
 def commands() -> dict[str, Any]:
-    """The commands by their names."""
+    """All commands by name."""
     whole: Any = typer.main.get_command(app)
     return dict(whole.commands)
 

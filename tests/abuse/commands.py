@@ -1,4 +1,4 @@
-"""The commands that write files, with small inputs, and what a folder holds."""
+"""Commands that write files, with small inputs, and the contents of a folder."""
 
 import hashlib
 import os
@@ -20,7 +20,7 @@ waypoints:
 durations: 1.0
 rate: 8
 """
-Written = Callable[[str], dict[str, str]]  # name of a command -> its files and what is in them
+Written = Callable[[str], dict[str, str]]  # name of a command -> its files and their contents
 ROBOT, MIXED = "article-suspended", "article-mixed"
 COMMANDS = {
     "track": ("track", ROBOT, "path.yaml", "--out", "out"),
@@ -37,7 +37,7 @@ COMMANDS = {
 
 
 def prepare(folder: Path) -> None:
-    """The inputs of the commands."""
+    """Write the inputs of the commands."""
     (folder / "path.yaml").write_text(PATH)
     plan = sl.inverse(sl.load_robot(ROBOT), sl.Pose([[0.0, 0.0, 1.5], [0.1, 0.0, 1.5]], np.stack([np.eye(3)] * 2)))
     head = ",".join(f"L{i} [m]" for i in range(plan.unstrained_length.shape[1]))
@@ -47,16 +47,16 @@ def prepare(folder: Path) -> None:
 
 
 def ended(*words: str) -> Result:
-    """A command, run here."""
+    """Result of a command in this process."""
     return CliRunner().invoke(app, words, input="\n" * 9)
 
 
 def tree(folder: Path) -> dict[str, str]:
-    """What is in a folder: each path with what it is, links not followed."""
-    return {str(place.relative_to(folder)): _what(place) for place in sorted(folder.rglob("*"))}
+    """Contents of a folder: each path with its kind and content; links are not followed."""
+    return {str(place.relative_to(folder)): _kind_and_content(place) for place in sorted(folder.rglob("*"))}
 
 
-def _what(place: Path) -> str:
+def _kind_and_content(place: Path) -> str:
     mode = os.lstat(place).st_mode
     if stat.S_ISLNK(mode):
         return f"link to {os.readlink(place)}"

@@ -7,7 +7,7 @@ from tests.abuse.commands import COMMANDS, Written, ended, prepare, tree
 
 @pytest.fixture(scope="session")
 def written(tmp_path_factory: pytest.TempPathFactory) -> Written:
-    """The files that a command writes, as it is found to write them where nothing is in its way."""
+    """Files that a command writes without a disturbance."""
 
     @cache
     def files(name: str) -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""What happens to files: flipped bits, holes, cuts, foreign pieces; and whether a reader notices."""
+"""Damage of files (flipped bits, holes, cuts, foreign bytes), and the check that a reader detects it."""
 
 import time
 import warnings
@@ -11,8 +11,8 @@ import numpy as np
 import sagline as sl
 from tests.effort import least_seconds
 
-SLOWEST = 2.0  # s of the processor of an ordinary machine
-LONGEST = 300  # letters of a message, which is one line
+SLOWEST = 2.0  # s of processor time of an ordinary machine
+LONGEST = 300  # characters of a message, which is one line
 Damage = Callable[[bytearray, np.random.Generator], None]
 Read = TypeVar("Read")
 
@@ -29,7 +29,7 @@ def overwrite(content: bytearray, rng: np.random.Generator) -> None:
 
 
 def blank(content: bytearray, rng: np.random.Generator) -> None:
-    """A sector that a disk has lost."""
+    """A lost sector of a disk."""
     first = int(rng.integers(len(content) // 512)) * 512
     content[first : first + 512] = bytes(min(512, len(content) - first))
 
@@ -49,7 +49,7 @@ def put_in(content: bytearray, rng: np.random.Generator) -> None:
 
 
 def swap(content: bytearray, rng: np.random.Generator) -> None:
-    """Two numbers that have changed places."""
+    """Exchange two numbers."""
     one, other = (8 * int(k) for k in rng.integers(len(content) // 8, size=2))
     content[one : one + 8], content[other : other + 8] = content[other : other + 8], content[one : one + 8]
 
@@ -57,7 +57,7 @@ def swap(content: bytearray, rng: np.random.Generator) -> None:
 DAMAGES: tuple[Damage, ...] = (flip, overwrite, blank, cut, take_out, put_in, swap)
 
 
-def unlike_after(
+def errors_after_damage(
     damage: Damage,
     count: int,
     content: bytes,
@@ -65,7 +65,7 @@ def unlike_after(
     load: Callable[[Path], Read],
     compare: Callable[[Read], None],
 ) -> list[str]:
-    """What goes wrong when a file is damaged so many times: nothing is to be read but what was written."""
+    """Errors of a reader after many damages of a file; it must return the original content or refuse the file."""
     rng = np.random.default_rng(20)
     unlike = []
     for k in range(count):
@@ -86,9 +86,9 @@ def unlike_after(
 
 
 def loaded_or_refused(load: Callable[[Path], Read], file: Path) -> Read | None:
-    """What is in the file, or None if there was one clear line instead."""
+    """Content of the file, or None if the reader refuses it with one clear line."""
     with warnings.catch_warnings():
-        warnings.simplefilter("error")  # nothing is only hinted at
+        warnings.simplefilter("error")  # warnings are errors
         try:
             return load(file)
         except sl.SaglineError as error:

@@ -1,4 +1,4 @@
-"""What every reader must do with every file: read it right, or refuse it in one line, at once, in little memory."""
+"""Rule of every reader for every file: read it correctly, or refuse it in one line, in limited time and memory."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from sagline.files.measurements import load_counts, load_lengths
 from sagline.files.pose_text import pose_of_text
 from tests.effort import least_seconds
 
-SECONDS: Final = 2.0  # of the processor of an ordinary machine
+SECONDS: Final = 2.0  # of processor time of an ordinary machine
 MEGABYTES: Final = 500.0
 
 
 @dataclass(frozen=True)
 class Reader:
-    """A kind of input: a good sample of it, and who reads it."""
+    """A kind of input: a valid sample and its reader."""
 
     name: str
     sample: str
     read: Callable[[Path], Any]
 
     def written(self, folder: Path, data: bytes) -> Path:
-        """A file of this kind."""
+        """A new file of this kind."""
         file = folder / self.name
         file.write_bytes(data)
         return file
@@ -186,14 +186,14 @@ READERS: Final = (
 
 
 def judged(call: Callable[[], Any], what: str) -> Any:
-    """What a call returns, or its error; whatever it is, it has kept the limits.
+    """Result of a call, or its error, after a check of the limits on time, memory and message.
 
     Args:
         call: The call.
-        what: Tells the case if it has not.
+        what: Name of the case for the message of a failure.
 
     Returns:
-        What came out, or the SaglineError.
+        The result, or the SaglineError.
     """
     before, start = _peak(), time.process_time()
     with warnings.catch_warnings():
@@ -216,7 +216,7 @@ def judged(call: Callable[[], Any], what: str) -> Any:
 
 
 def sound(found: Any, what: str) -> None:
-    """What was read can be worked with: finite numbers, and the solver has an answer or an error."""
+    """The result can be used: its numbers are finite, and the solver returns a solution or an error."""
     robot = getattr(found, "robot", found)
     if isinstance(robot, sl.Robot):
         lines = "\n".join((robot.name, robot.source, robot.notes, *robot.assumed.values())).split("\n")
@@ -238,5 +238,5 @@ def sound(found: Any, what: str) -> None:
 
 
 def _peak() -> float:
-    """Most memory that this process has had so far [MB]."""
+    """Largest memory of this process so far [MB]."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0

@@ -1,4 +1,4 @@
-"""Bad command lines end in one line and exit code 2, and write nothing; good ones among them answer."""
+"""Bad command lines end with one line and exit code 2, and write nothing. Valid ones among them succeed."""
 
 from __future__ import annotations
 
@@ -30,17 +30,17 @@ from tests.tiers import extended
 pytestmark = extended
 
 SHORT = "durations: 1\nrate: 4\nwaypoints: [{position: [0, 0, 1.5]}, {position: [1, 0, 1.5]}]\n"
-SHARE = 250  # of all, in make test
-SLOWEST = 2.0  # s of the processor of an ordinary machine
-START = 1.5  # s, that a process takes to load
+SHARE = 250  # share of all bad command lines in `make test`
+SLOWEST = 2.0  # s of processor time of an ordinary machine
+START = 1.5  # s of loading time of a process
 AGAIN = 3
 LARGEST = 500 * 1024  # kB
-ANSWERS = "\n" * 40  # to the questions of `new`: what it suggests
+ANSWERS = "\n" * 40  # answers to the questions of `new`: its suggestions
 
 
 @pytest.fixture(scope="module")
 def stocked(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the example files, a run, and files that are none."""
+    """A folder with the example files, a run, and invalid files."""
     folder = tmp_path_factory.mktemp("stocked")
     for file in example_files():
         if file.suffix != ".py":
@@ -59,8 +59,8 @@ def stocked(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(autouse=True)
-def short_of_work(stocked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Long commands stop once their arguments are accepted, or do a little of what they do."""
+def shortened_commands(stocked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Long commands end after the check of their arguments, or do a small part of their work."""
     short = sl.load_path(stocked / "short.yaml")
     monkeypatch.setattr("sagline.motion.rest_to_rest.article_path", lambda: short)
     monkeypatch.setattr("sagline.cli.run.FIGURES", ())
@@ -86,7 +86,7 @@ def short_of_work(stocked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def snapshot(folder: Path) -> dict[str, str]:
-    """Everything in a folder, and since when a file has been as it is."""
+    """All files of a folder with the times of their last changes."""
     found = {}
     for path in folder.rglob("*"):
         seen = os.lstat(path)
@@ -96,7 +96,7 @@ def snapshot(folder: Path) -> dict[str, str]:
 
 
 class Bench:
-    """A folder to run commands in, some levels down, watched from above."""
+    """A folder in which commands run, a few levels below a folder that is checked for new files."""
 
     def __init__(self, stock: Path, top: Path) -> None:
         self.stock, self.top, self.place = stock, top, top / "one" / "two" / "three"
@@ -117,7 +117,7 @@ class Bench:
         return CliRunner().invoke(app, case.words, input=ANSWERS)
 
     def faults(self, case: Case, codes: tuple[int, ...] = (0, 1, 2)) -> list[str]:
-        """What is wrong with how a command line ends, which may do so with some exit codes."""
+        """Errors in the end of a command line; `codes` are the allowed exit codes."""
         start = time.process_time()
         result = self.ended(case)
         seconds = time.process_time() - start
@@ -128,7 +128,7 @@ class Bench:
         if result.exception is not None and not isinstance(result.exception, SystemExit):
             found.append(f"raises {result.exception!r}")
         if result.exit_code == 2:
-            found += complaints(result.stdout, result.stderr)
+            found += errors_of_message(result.stdout, result.stderr)
             found += ["writes"] if written else []
         if result.exit_code not in codes:
             found.append(f"exit code {result.exit_code}")
@@ -141,8 +141,8 @@ class Bench:
         return [f"{case.name} {case.words[1:]!r}"[:300] + f": {fault}; {result.output[-200:]!r}" for fault in found]
 
 
-def complaints(stdout: str, stderr: str) -> list[str]:
-    """What is wrong with a refusal."""
+def errors_of_message(stdout: str, stderr: str) -> list[str]:
+    """Errors in a message of refusal."""
     found = [f"stdout {stdout[:80]!r}"] if stdout else []
     lines = stderr.rstrip("\n").split("\n")
     if len(lines) != 1 or not lines[0].startswith("Error: "):
@@ -164,7 +164,7 @@ def tried(stock: Path, top: Path, some: list[Case]) -> list[str]:
         os.chdir(here)
 
 
-def test_bad_command_lines_end_in_one_line_and_write_nothing(stocked: Path, tmp_path: Path) -> None:
+def test_bad_command_lines_print_one_line_and_write_nothing(stocked: Path, tmp_path: Path) -> None:
     assert tried(stocked, tmp_path, cases(10, SHARE)) == []
 
 
@@ -182,14 +182,14 @@ def test_every_command_and_option_is_tried(stocked: Path, tmp_path: Path) -> Non
     lines = [Case(name, words) for name, words in LINES.items()]
     bench, here = Bench(stocked, tmp_path), Path.cwd()
     try:
-        for case in lines:  # as they stand they work: what is refused above is refused for what was put in
+        for case in lines:  # valid lines succeed, so each refusal above is due to its bad value
             assert bench.faults(case, (0,)) == []
     finally:
         os.chdir(here)
 
 
 def memory_of(pid: int) -> int:
-    """Most memory a process had so far [kB]; `wait4` would count that of the process it was forked from."""
+    """Largest memory of a process so far [kB]; `wait4` would include the memory of its parent."""
     try:
         status = Path(f"/proc/{pid}/status").read_text()
     except OSError:
@@ -199,12 +199,12 @@ def memory_of(pid: int) -> int:
 
 
 class Ended(NamedTuple):
-    """How a process ended."""
+    """Exit code, outputs, time and memory of a process."""
 
     code: int
     printed: str
     errors: str
-    seconds: float  # of the processor
+    seconds: float  # of processor time
     memory: int  # kB
 
 
@@ -225,9 +225,9 @@ def in_a_process(words: list[str], place: Path) -> Ended:
 
 
 def takes_long(case: Case, place: Path) -> str:
-    """Whether a process takes much longer than one with the same command as it works, every time.
+    """True if a process repeatedly takes much longer than a valid one of the same command.
 
-    Other processes on the same cores double what one of them takes, for both alike.
+    Other processes on the same cores slow both of them in the same way.
     """
     told = ""
     for _ in range(AGAIN):
@@ -239,9 +239,9 @@ def takes_long(case: Case, place: Path) -> str:
 
 
 def faults_of_process(case: Case, place: Path) -> list[str]:
-    """What is wrong with how a real process ends, its time and its memory among it."""
+    """Errors in the end of a real process, its time and its memory."""
     ended = in_a_process(case.words, place)
-    found = complaints(ended.printed, ended.errors) if ended.code == 2 else []
+    found = errors_of_message(ended.printed, ended.errors) if ended.code == 2 else []
     if ended.code not in (0, 1, 2) or "Traceback" in ended.errors:
         found.append(f"exit code {ended.code}")
     if ended.seconds > SLOWEST + START and (told := takes_long(case, place)):
@@ -258,6 +258,6 @@ def test_real_processes_take_little_time_and_memory(count: int, stocked: Path, t
     os.mkfifo(place / "pipe.yaml")
     quick = (case for case in cases(11, None) if case.words[0] not in ("view", "article", "run"))
     some = [case for case, _ in zip(quick, range(count), strict=False)]
-    # once more where something is wrong: a small kernel that no test has needed yet may have been compiled
+    # repeat in case of an error: the first run may compile a small kernel
     again = [case for case in some if faults_of_process(case, place)]
     assert [fault for case in again for fault in faults_of_process(case, place)] == []

@@ -1,4 +1,4 @@
-"""Files of calibrations, damaged as those of plans are: an error or the same calibration, never other numbers."""
+"""Damaged calibration files: an error or the same calibration, never other numbers."""
 
 from functools import partial
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import sagline as sl
-from tests.abuse.damage import DAMAGES, Damage, unlike_after
+from tests.abuse.damage import DAMAGES, Damage, errors_after_damage
 from tests.calibration.made_up import made_up
 from tests.files.test_calibration_file import assert_same
 from tests.tiers import wide
@@ -23,4 +23,4 @@ def content(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 @pytest.mark.parametrize("damage", wide(DAMAGES), ids=lambda damage: damage.__name__)
 def test_damage_does_not_change_a_value_silently(content: bytes, tmp_path: Path, damage: Damage, count: int) -> None:
     same = partial(assert_same, made_up())
-    assert unlike_after(damage, count, content, tmp_path / "found.nc", sl.load_calibration, same) == []
+    assert errors_after_damage(damage, count, content, tmp_path / "found.nc", sl.load_calibration, same) == []

@@ -1,4 +1,4 @@
-"""Logs that are damaged, foreign or of another version: an error, or what was recorded, never other numbers."""
+"""Logs that are damaged, foreign or of another version: an error or the recorded data, never other numbers."""
 
 import json
 import struct
@@ -29,7 +29,7 @@ from tests.files.executions import execution
 from tests.files.test_mcap import assert_same
 from tests.tiers import extended, wide
 
-CUT = 20_000  # bytes of the log's end that a killed process does not write
+CUT = 20_000  # bytes at the end of the log that a killed process does not write
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +40,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 
 def read(file: Path) -> tuple[Execution | None, bool]:
-    """What is read, if it was not refused in a line, and whether it was said to be cut off."""
+    """Content of the file, if it is not refused in one line, and True if the reader reports a missing end."""
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         try:
@@ -55,7 +55,7 @@ def read(file: Path) -> tuple[Execution | None, bool]:
 
 
 def assert_begins(done: Execution) -> None:
-    """Whether it is what was recorded, up to some cycle."""
+    """The content is the beginning of the recorded data."""
     whole = columns_of(execution())
     for name, values in columns_of(done).items():
         assert values.tobytes() == whole[name][: len(done)].tobytes(), name
@@ -64,7 +64,7 @@ def assert_begins(done: Execution) -> None:
 @pytest.mark.parametrize("count", [12, pytest.param(3000, marks=pytest.mark.soak)])
 @pytest.mark.parametrize("killed", wide([False, True]))
 @pytest.mark.parametrize("damage", wide(DAMAGES), ids=lambda damage: damage.__name__)
-def test_damage_gives_an_error_or_what_was_recorded(
+def test_damage_gives_an_error_or_the_recorded_data(
     whole: bytes, tmp_path: Path, damage: Damage, killed: bool, count: int
 ) -> None:
     rng = np.random.default_rng(21)
@@ -86,21 +86,21 @@ def test_damage_gives_an_error_or_what_was_recorded(
 
 
 @extended
-def test_wherever_it_is_cut_what_is_whole_is_read(whole: bytes, tmp_path: Path) -> None:
+def test_all_whole_chunks_of_a_truncated_log_are_read(whole: bytes, tmp_path: Path) -> None:
     lengths = []
     for size in range(0, len(whole), 9001):
         (tmp_path / "run.mcap").write_bytes(whole[:size])
         done, was_cut = read(tmp_path / "run.mcap")
         if done is not None:
             assert_begins(done)
-            assert was_cut or len(done) == 201  # nothing but the index is missing
+            assert was_cut or len(done) == 201  # only the index is missing
         lengths.append(0 if done is None else len(done))
     assert lengths == sorted(lengths)
     assert set(lengths) >= {0, 100}
 
 
 def log_of(*attachments: tuple[str, bytes], topic: str = "", message: bytes = b"", **options: object) -> bytes:
-    """An MCAP file with what it should not have."""
+    """An MCAP file with invalid content."""
     stream = BytesIO()
     writer: Any = Writer(stream, **options)  # type: ignore[arg-type]  # Any: it is only partly typed
     writer.start()
@@ -147,7 +147,7 @@ FOREIGN = {
 
 
 @pytest.mark.parametrize("name", FOREIGN)
-def test_what_is_no_log_is_one_line(tmp_path: Path, name: str, snapshot: SnapshotAssertion) -> None:
+def test_a_file_that_is_no_log_is_refused_in_one_line(tmp_path: Path, name: str, snapshot: SnapshotAssertion) -> None:
     (tmp_path / "run.mcap").write_bytes(FOREIGN[name])
     with pytest.raises(sl.FileError) as caught:
         sl.load_execution(tmp_path / "run.mcap")
@@ -158,9 +158,9 @@ def test_what_is_no_log_is_one_line(tmp_path: Path, name: str, snapshot: Snapsho
 
 
 def chunks_of(content: bytes) -> list[tuple[int, int]]:
-    """Where its chunks begin and end."""
+    """Offsets of the beginnings and ends of the chunks."""
     places, place = [], 8
-    while content[place] != 0x0F:  # the end of the data
+    while content[place] != 0x0F:  # end of the data section
         end = place + 9 + int.from_bytes(content[place + 1 : place + 9], "little")
         places += [(place, end)] * (content[place] == 0x06)
         place = end
@@ -168,8 +168,8 @@ def chunks_of(content: bytes) -> list[tuple[int, int]]:
 
 
 @pytest.mark.parametrize("which", [1, -1])
-def test_a_missing_chunk_is_noticed(whole: bytes, tmp_path: Path, which: int) -> None:
-    """By the digest of a log with its end, and where that is missing by the numbers of the chunks."""
+def test_a_missing_chunk_is_detected(whole: bytes, tmp_path: Path, which: int) -> None:
+    """Detected by the digest of a complete log, and by the numbers of the chunks of a log without its end."""
     places = chunks_of(whole)
     first, end = places[which]
     (tmp_path / "run.mcap").write_bytes(whole[:first] + whole[end:])
@@ -191,9 +191,7 @@ SQUEEZERS: dict[str, Callable[[bytes], bytes]] = {"zstd": compress, "lz4": of_lz
 @extended
 @pytest.mark.parametrize("kind", ["zstd", "lz4"])
 @pytest.mark.parametrize("said", [3, 1 << 16, 1 << 28])
-def test_a_chunk_that_is_larger_than_its_bytes_allow_takes_no_memory(
-    whole: bytes, tmp_path: Path, said: int, kind: str
-) -> None:
+def test_an_impossible_chunk_size_allocates_no_memory(whole: bytes, tmp_path: Path, said: int, kind: str) -> None:
     assert_refused_at_once(whole, tmp_path, said, kind, SQUEEZERS[kind](bytes(1 << 28)))
 
 
@@ -203,12 +201,12 @@ ZEROS = bytes(1 << 20)
 
 @pytest.mark.parametrize("kind", wide(list(SQUEEZERS)))
 @pytest.mark.parametrize("content", [ZEROS, b"\x05" + ZEROS, MANY * 30_000, bytes(range(256)) * 4000], ids=range(4))
-def test_a_chunk_of_nothing_ends_at_once(whole: bytes, tmp_path: Path, kind: str, content: bytes) -> None:
+def test_an_empty_chunk_is_refused_at_once(whole: bytes, tmp_path: Path, kind: str, content: bytes) -> None:
     assert_refused_at_once(whole, tmp_path, len(content), kind, SQUEEZERS[kind](content))
 
 
 @extended
-def test_chunks_of_another_size_than_they_say_are_refused(whole: bytes, tmp_path: Path) -> None:
+def test_chunks_with_a_wrong_size_are_refused(whole: bytes, tmp_path: Path) -> None:
     @given(st.binary(max_size=300), st.integers(0, 1 << 40), st.sampled_from([*SQUEEZERS, "gzip"]))
     @settings(max_examples=60, deadline=None)
     def refused(content: bytes, said: int, kind: str) -> None:
@@ -219,10 +217,10 @@ def test_chunks_of_another_size_than_they_say_are_refused(whole: bytes, tmp_path
 
 
 def assert_refused_at_once(whole: bytes, tmp_path: Path, said: int, kind: str, data: bytes) -> None:
-    """Whether a log whose first chunk is replaced is refused, without much memory or time."""
+    """A log with a replaced first chunk is refused in limited time and memory."""
     head = struct.pack("<QQQII", 0, 1, said, 0, len(kind))
     body = head + kind.encode() + struct.pack("<Q", len(data)) + data
-    before = whole[: whole.index(b"plan-0.sagline") - 29]  # what stands before the plan's record
+    before = whole[: whole.index(b"plan-0.sagline") - 29]  # the bytes before the record of the plan
     (tmp_path / "run.mcap").write_bytes(before + b"\x06" + struct.pack("<Q", len(body)) + body)
     start = time.process_time()
     tracemalloc.start()

@@ -1,4 +1,4 @@
-"""Plan files with flipped bits, holes, cuts and foreign pieces: an error or the same plan, never other numbers."""
+"""Plan files with flipped bits, holes, cuts and foreign bytes: an error or the same plan, never other numbers."""
 
 from functools import partial
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import sagline as sl
-from tests.abuse.damage import DAMAGES, Damage, unlike_after
+from tests.abuse.damage import DAMAGES, Damage, errors_after_damage
 from tests.files.plans import a_plan, assert_same
 from tests.tiers import wide
 
@@ -29,4 +29,4 @@ def test_damage_does_not_change_a_value_silently(
     plan: sl.Plan, content: bytes, tmp_path: Path, damage: Damage, count: int
 ) -> None:
     same = partial(assert_same, plan)
-    assert unlike_after(damage, count, content, tmp_path / "run.nc", sl.load_plan, same) == []
+    assert errors_after_damage(damage, count, content, tmp_path / "run.nc", sl.load_plan, same) == []

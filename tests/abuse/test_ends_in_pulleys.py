@@ -1,4 +1,4 @@
-"""Platform ends in pulleys or past them, and lengths that end before the pulley: one line, or the right answer."""
+"""Platform ends inside or beyond pulleys, and lengths that end before the pulley: one line or the correct result."""
 
 import re
 
@@ -19,7 +19,7 @@ NUMBER = re.compile(r"[-+]?\d[.\d]*(?:e[-+]?\d+)?(?= m\b)")
 
 
 def over_pulleys(random: np.random.Generator) -> sl.Robot:
-    """A robot with pulleys of any size, some larger than any of its cables, entered from either side."""
+    """A robot with pulleys of any size, some larger than its longest cable, with either side of entry."""
     robot = sl.load_robot(str(random.choice(["article-suspended", "ipanema-2", "cogiro"])))
     radius = 10.0 ** random.uniform(-2.0, 1.0, robot.cable_count)
     radius[random.random(robot.cable_count) < 0.7] = 0.0
@@ -30,7 +30,7 @@ def over_pulleys(random: np.random.Generator) -> sl.Robot:
 
 
 def near_a_pulley(robot: sl.Robot, random: np.random.Generator) -> sl.Pose:
-    """A pose with a platform end within a few radii of where its cable enters the pulley."""
+    """A pose with a platform end within a few radii of the point at which its cable enters the pulley."""
     assert robot.winches is not None
     i = int(random.choice(np.flatnonzero(robot.winches.pulley_radius)))
     away = robot.winches.pulley_radius[i] * random.uniform(-3.0, 3.0, 3)
@@ -39,7 +39,7 @@ def near_a_pulley(robot: sl.Robot, random: np.random.Generator) -> sl.Pose:
 
 
 def wrong_cables(robot: sl.Robot, pose: sl.Pose) -> list[int]:
-    """Cables whose end no half turn of cable leads to, by rolling a tangent around the pulley."""
+    """Cables whose end is unreachable with up to half a turn, found with a tangent that rolls on the pulley."""
     assert robot.winches is not None
     reach = pose.transform(robot.platform_anchors) - robot.frame_anchors
     span, along = np.hypot(reach[:, 0], reach[:, 1]), robot.winches.swivel_axis[:, 2] * reach[:, 2]
@@ -48,7 +48,7 @@ def wrong_cables(robot: sl.Robot, pose: sl.Pose) -> list[int]:
         if not radius:
             continue
         angle = np.linspace(0.0, np.pi, 4001)
-        # of the end, seen from each point of the half turn: beside the tangent there, and ahead on it
+        # of the platform end seen from each point of the half turn: offset across the tangent and along it
         x, z = span[i] - radius * (1.0 - np.cos(angle)), along[i] - radius * np.sin(angle)
         beside = x * np.cos(angle) - z * np.sin(angle)
         ahead = x * np.sin(angle) + z * np.cos(angle)
@@ -59,7 +59,7 @@ def wrong_cables(robot: sl.Robot, pose: sl.Pose) -> list[int]:
 
 
 @pytest.mark.parametrize("count", FEW_AND_MANY)
-def test_ends_that_no_cable_reaches_are_named(count: int) -> None:
+def test_unreachable_platform_ends_are_named(count: int) -> None:
     random, outside = np.random.default_rng(5), 0
     for _ in range(count):
         robot = over_pulleys(random)
@@ -96,7 +96,7 @@ def robot_middle(robot: sl.Robot) -> np.ndarray:
 
 
 def check(robot: sl.Robot, pose: sl.Pose, wrong: list[int], error: sl.CableGeometryError) -> None:
-    """The numbers of an error are those of the cable that it names, and out of the range that it allows."""
+    """The numbers of an error are the numbers of the named cable, and they are outside the printed range."""
     assert robot.winches is not None
     cable = wrong[0]
     assert error.item.removeprefix("pose, ").startswith(f"cable {cable}: ")
@@ -116,7 +116,7 @@ def check(robot: sl.Robot, pose: sl.Pose, wrong: list[int], error: sl.CableGeome
     for limit, beyond in ((least, 1.0), (most, -1.0)):
         if limit is None:
             continue
-        # what the message allows is taken, what is next to it is not
+        # the limit in the message is accepted, and the next number beyond it is refused
         for side, taken in ((1e-4, True), (-1e-4, False)):
             place = (limit + beyond * side * robot.winches.pulley_radius[cable]) - np.hypot(reach[0], reach[1])
             there = sl.Pose(pose.position + np.array([*(place * level), 0.0]), pose.rotation)
@@ -125,7 +125,7 @@ def check(robot: sl.Robot, pose: sl.Pose, wrong: list[int], error: sl.CableGeome
 
 
 @pytest.mark.parametrize("count", FEW_AND_MANY)
-def test_lengths_within_the_dead_cable_are_named(count: int) -> None:
+def test_lengths_below_the_dead_length_are_named(count: int) -> None:
     random = np.random.default_rng(6)
     base = sl.load_robot("article-suspended")
     planned = sl.inverse(base, sl.Pose([0.5, 0.2, 2.0], np.eye(3))).unstrained_length
@@ -151,8 +151,8 @@ def test_lengths_within_the_dead_cable_are_named(count: int) -> None:
 
 
 @extended
-def test_what_the_inverse_plans_next_to_a_pulley_is_taken_back() -> None:
-    """Hardly wrapped cables are shorter off the drum than half a turn and the dead cable; none of them is refused."""
+def test_forward_accepts_the_lengths_of_inverse_near_a_pulley() -> None:
+    """Cables with a small wrap are shorter than half a turn plus the dead length. None of them is refused."""
     random, shorter = np.random.default_rng(7), 0
     base = sl.load_robot("article-suspended")
     robot = base.replace(winches=sl.Winch(pulley_radius=0.3, dead_cable=4.0, dead_rise=1.0))

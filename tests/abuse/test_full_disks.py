@@ -1,4 +1,4 @@
-"""Disks that are full at random places: what is there is whole, what is not is gone, and a line says so."""
+"""Disks that become full at random sizes: each file is whole or absent, and one line reports the error."""
 
 import resource
 from collections.abc import Callable, Iterator
@@ -15,13 +15,13 @@ from tests.abuse.commands import COMMANDS, Written, ended, prepare, tree
 from tests.files.plans import a_plan
 from tests.tiers import extended, wide
 
-LONGEST = 300  # letters of a line
-MOST = 2_000_000  # bytes: more than any of the files has
+LONGEST = 300  # characters of a line
+MOST = 2_000_000  # bytes: more than the size of each file
 
 
 @contextmanager
-def room(size: int) -> Iterator[None]:
-    """No file may grow beyond so many bytes."""
+def limited_file_size(size: int) -> Iterator[None]:
+    """Limit the size of all files, in bytes."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
     try:
@@ -37,7 +37,7 @@ def together(folder: Path) -> None:
 
 
 def drawn(file: Path) -> None:
-    figure = sheet(2.0)  # anew: drawing one a second time moves it a little
+    figure = sheet(2.0)  # a new figure each time: a second drawing of a figure moves it slightly
     figure.add_subplot().plot([1.0, 2.0])
     sl.plot.save(figure, file)
 
@@ -58,14 +58,14 @@ def writers() -> dict[str, Callable[[Path], None]]:
 
 @pytest.mark.parametrize("count", [6, pytest.param(300, marks=pytest.mark.soak)])
 @pytest.mark.parametrize("name", wide(["text", "plan", "together", "png", "svg", "eps", "pdf"], first=2))
-def test_a_file_is_whole_or_what_was_before(
+def test_a_file_is_whole_or_unchanged(
     tmp_path: Path,
     writers: dict[str, Callable[[Path], None]],
     monkeypatch: pytest.MonkeyPatch,
     name: str,
     count: int,
 ) -> None:
-    monkeypatch.setenv("SOURCE_DATE_EPOCH", "0")  # matplotlib writes the time of making into PDF and PostScript
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "0")  # matplotlib writes the creation time into PDF and PostScript
     writers[name](tmp_path)
     whole = tree(tmp_path)
     rng = np.random.default_rng(5)
@@ -77,14 +77,14 @@ def test_a_file_is_whole_or_what_was_before(
 def written_or_refused(
     folder: Path, write: Callable[[Path], None], whole: dict[str, str], limit: int, rng: np.random.Generator
 ) -> bool:
-    """Whether a full disk is told; what there is is what there was, and otherwise all of it."""
+    """True if the full disk is reported. Then the folder is unchanged; otherwise it contains the whole file."""
     for file in whole:
         (folder / file).unlink(missing_ok=True)
         if rng.random() < 0.5:
             (folder / file).write_text("before")
     before = tree(folder)
     try:
-        with room(limit):
+        with limited_file_size(limit):
             write(folder)
     except sl.SaglineError as error:
         line = str(error).replace(str(folder), "")
@@ -99,7 +99,7 @@ def written_or_refused(
 @extended
 @pytest.mark.parametrize("every", [False, pytest.param(True, marks=pytest.mark.soak)])
 @pytest.mark.parametrize("name", ["track", "article", "convert"])
-def test_a_command_names_what_was_finished_and_removes_the_rest(
+def test_a_command_names_its_finished_files_and_removes_the_others(
     tmp_path: Path, written: Written, monkeypatch: pytest.MonkeyPatch, name: str, every: bool
 ) -> None:
     whole = written(name)
@@ -110,7 +110,7 @@ def test_a_command_names_what_was_finished_and_removes_the_rest(
     for size in sizes if every else {max(sizes)}:
         for file in whole:
             Path(file).unlink(missing_ok=True)
-        with room(size - 1):
+        with limited_file_size(size - 1):
             result = ended(*COMMANDS[name])
         there = {path: what for path, what in tree(tmp_path).items() if path not in inputs}
         assert result.exit_code == 2, result.output

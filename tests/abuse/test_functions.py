@@ -1,6 +1,6 @@
-"""Every argument of every public function, class and method, replaced by what nobody should give.
+"""Each argument of each public function, class and method, replaced by invalid values.
 
-What comes of it is a `SaglineError` of one short line, or the right answer: no other exception, no warning, no waiting.
+The result is a `SaglineError` with one short line, or correct. No other exception, no warning and no delay occurs.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from tests.tiers import extended
 
 pytestmark = extended
 
-SLOWEST = 2.0  # s of the processor of an ordinary machine
+SLOWEST = 2.0  # s of processor time of an ordinary machine
 LONGEST = 300  # characters
 MOST_MEMORY = 500_000  # kB
-SHARE = 0.05  # of the cases that are tried each time; all of them in a long run
+SHARE = 0.05  # share of the cases in an ordinary run; a long run tests all
 SEED = 20260310
-REAL = "fiubU"  # kinds of numbers, and texts
+REAL = "fiubU"  # kinds of numbers and texts
 WITH_PHASES = (sl.dynamic_stiffness, sl.frequency_response)
 
 
@@ -43,8 +43,8 @@ def table(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Call]:
 
 @pytest.fixture(scope="module")
 def answers(table: dict[str, Call]) -> dict[str, Any]:
-    """What every call answers as it is: each is made once."""
-    return {name: call.with_one("", None) for name, call in table.items()}
+    """Result of each call with valid arguments, computed once."""
+    return {name: call.with_replaced("", None) for name, call in table.items()}
 
 
 def test_every_public_callable_is_in_the_table(table: dict[str, Call]) -> None:
@@ -63,11 +63,11 @@ def test_every_argument_is_in_the_table(table: dict[str, Call]) -> None:
     assert found == []
 
 
-def test_every_call_succeeds_as_it_is(answers: dict[str, Any], table: dict[str, Call]) -> None:
+def test_every_call_succeeds_with_valid_arguments(answers: dict[str, Any], table: dict[str, Call]) -> None:
     assert answers.keys() == table.keys()
 
 
-def test_answers_stay_locked_when_they_are_pickled_or_copied(answers: dict[str, Any]) -> None:
+def test_copied_and_pickled_results_are_read_only(answers: dict[str, Any]) -> None:
     looked_at, found = 0, []
     for name, answer in answers.items():
         if not _fields(answer):
@@ -81,12 +81,12 @@ def test_answers_stay_locked_when_they_are_pickled_or_copied(answers: dict[str, 
     assert looked_at > 500
 
 
-def test_there_are_a_thousand_cases_and_more(table: dict[str, Call]) -> None:
+def test_more_than_a_thousand_cases_exist(table: dict[str, Call]) -> None:
     assert sum(len(list(_cases(call))) for call in table.values()) > 1000
 
 
 @pytest.mark.parametrize("share", [SHARE, pytest.param(1.0, marks=pytest.mark.soak)])
-def test_what_nobody_should_give_is_refused_or_answered(
+def test_invalid_arguments_are_refused_or_give_a_correct_result(
     table: dict[str, Call], answers: dict[str, Any], share: float
 ) -> None:
     generator, used = np.random.default_rng(SEED), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
@@ -107,12 +107,12 @@ def _cases(call: Call) -> Iterator[tuple[str, Bad]]:
 
 
 def _fault(call: Call, argument: str, bad: Bad, right: Any) -> str:
-    """What is wrong with the outcome of a call; nothing where all is well."""
+    """Error in the outcome of a call, or ""."""
     begin, error, result = time.process_time(), None, None
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         try:
-            result = call.with_one(argument, bad.value)
+            result = call.with_replaced(argument, bad.value)
         except sl.SaglineError as refusal:
             error = refusal
         except Exception as other:
@@ -121,7 +121,7 @@ def _fault(call: Call, argument: str, bad: Bad, right: Any) -> str:
     if said:
         return f"a warning: {said[0].message}"
     if seconds > SLOWEST:
-        seconds = least_seconds(lambda: call.with_one(argument, bad.value), SLOWEST, seconds)
+        seconds = least_seconds(lambda: call.with_replaced(argument, bad.value), SLOWEST, seconds)
     if seconds > SLOWEST:
         return f"{seconds:.1f} s"
     if error is not None:
@@ -140,7 +140,7 @@ def _fault_of_text(text: str) -> str:
 
 
 def _fault_of_answer(result: Any, kinds: str) -> str:
-    """An answer holds real numbers, but for phases; it is not finite only where a status or a proof says why."""
+    """Results contain real numbers, except phases. They are finite unless a status or a proof gives the reason."""
     arrays = list(_arrays(result))
     if any(array.dtype.kind not in kinds for array in arrays):
         return "an answer of no such numbers"
@@ -153,7 +153,7 @@ def _fault_of_answer(result: Any, kinds: str) -> str:
 
 
 def _fields(value: Any) -> list[str]:
-    """Names of the fields of a dataclass or an attrs class, none of anything else."""
+    """Names of the fields of a dataclass or an attrs class; none for other types."""
     declared = attrs.fields(type(value)) if attrs.has(type(value)) else fields(value) if is_dataclass(value) else ()
     return [field.name for field in declared]
 

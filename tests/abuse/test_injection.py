@@ -1,4 +1,4 @@
-"""Markup in any text of a robot, run, log or calibration: every page has the elements of one with harmless texts."""
+"""Markup in any text of a robot, run, log or calibration: each page has the same elements as with harmless texts."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ KINDS: tuple[Literal["plan", "simulation", "execution", "calibration"], ...] = (
 
 
 class Elements(HTMLParser):
-    """Counts the elements of a page with the names of their attributes, and gathers its texts."""
+    """Counter of the elements of a page with the names of their attributes; collects the texts."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -71,7 +71,7 @@ def plain(text: str) -> str:
 
 
 def named(text: str) -> sl.Robot:
-    """A robot whose every text is this one."""
+    """A robot with the same given text in every text field."""
     robot = sl.load_robot("article-suspended")
     known = Provenance(text, "2026-01-01", {"mass": 0.1}, text)
     return robot.replace(name=text, source=text, notes=text, assumed={"mass": text}, calibration=known)
@@ -108,7 +108,7 @@ def test_notebooks(kind: str, text: str) -> None:
 
 
 def filled(value: Any, text: str) -> Any:
-    """A part of a report with this text in every field that is not a key or a drawing."""
+    """A part of a report with the given text in every field except keys and drawings."""
     if isinstance(value, str) and not isinstance(value, Verdict):
         return text
     if isinstance(value, Panel):
@@ -139,7 +139,7 @@ def test_reports(text: str) -> None:
         part = filled(Chapter("one", "title", "lead", findings), each)
         return page(each, each, each, [part], Panel("<svg></svg>", each), each)
 
-    check(lambda each: re.sub(r"</?sub>", "", report(each)), text)  # x_1 has its index
+    check(lambda each: re.sub(r"</?sub>", "", report(each)), text)  # x_1 is printed with an index
 
 
 @extended
@@ -157,7 +157,7 @@ def test_shared_pages(text: str, tmp_path: Path) -> None:
 
 
 def session(text: str, folder: Path) -> PlayedLog:
-    """A log whose robot and events have this text."""
+    """A log with the given text in its robot and its events."""
     done = execution()
     robot = done.robot.replace(name=text, source=text, notes=text)
     assert done.plan is not None
@@ -180,7 +180,7 @@ def test_viewer(text: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("text", HOSTILE, ids=range(len(HOSTILE)))
 def test_code_of_the_viewer(text: str) -> None:
-    """A name in "copy as code" is a constant and nothing else."""
+    """A name in "copy as code" is only a constant."""
     for source in (Source.of_robot(text, 2.0), *(Source.of_file(kind, Path(text)) for kind in KINDS)):
         code = ast.parse("\n".join(line for line in (source.robot, source.played) if line))
         constants = [node.value for node in ast.walk(code) if isinstance(node, ast.Constant)]

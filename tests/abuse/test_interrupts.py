@@ -1,6 +1,6 @@
-"""Signals at any moment: exit code 130, 143 or 129 after Ctrl-C, SIGTERM or SIGHUP, one line, and nothing half written.
+"""Signals at random moments: exit code 130, 143 or 129 after Ctrl-C, SIGTERM or SIGHUP, one line, no partial file.
 
-The moments are random, from a seed, over all that a command does: loading, solving, drawing, writing, ending.
+The moments cover all phases of a command: loading, solving, drawing, writing and ending.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from tests.tiers import extended
 pytestmark = extended
 
 Whole = Callable[[tuple[str, ...]], tuple[float, set[str]]]
-SHARE, ALL = 2, 200  # moments, over all commands
+SHARE, ALL = 2, 200  # number of moments of all commands
 TRACK = ("track", "cogiro", "own_path.yaml", "--csv", "--out", "out")
-COMMANDS: tuple[tuple[str, ...], ...] = (  # the last three test_killed_commands.py tries each time
+COMMANDS: tuple[tuple[str, ...], ...] = (  # test_killed_commands.py tests the last three in each run
     ("forward", "cogiro", "lengths.csv", "--out", "out"),
     (
         "new",
@@ -53,7 +53,7 @@ COMMANDS: tuple[tuple[str, ...], ...] = (  # the last three test_killed_commands
 )
 INTERRUPTED = "Interrupted. All written files are complete.\n"
 
-# Ctrl-C comes from a thread of the process itself, so that the moment is counted from where the command begins
+# a thread of the process itself sends Ctrl-C, so that the delay begins with the command
 HEARD = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 TIMED = """
 import faulthandler, os, signal, sys, threading, time
@@ -88,7 +88,7 @@ def started(
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Whole:
-    """How long a command takes where nobody disturbs it [s], and the files that it leaves."""
+    """Duration of a command without a signal [s], and the files that it writes."""
 
     @cache
     def found(words: tuple[str, ...]) -> tuple[float, set[str]]:
@@ -119,14 +119,14 @@ def check(
     printed, errors = process.communicate(timeout=300)
     what = f"{' '.join(words)} after {moment:.3f} s: {process.returncode}, {errors!r}"
     left = files(place) - before
-    if process.returncode == 0:  # it was over: all of it is there, and all of it was told
+    if process.returncode == 0:  # the command was finished: all files exist, and all lines are printed
         assert left == made, what
         assert printed or "new" not in words, what
         return
     if number == signal.SIGKILL:
         assert process.returncode == -signal.SIGKILL, what
         rest = subprocess.run([sys.executable, "-m", "sagline.cli", *words], cwd=place, capture_output=True, text=True)
-        assert rest.returncode == 0 or "exists" in rest.stderr, rest.stderr  # what was killed is in nobody's way
+        assert rest.returncode == 0 or "exists" in rest.stderr, rest.stderr  # no remains block the next run
         left = files(place) - before
         assert left == made, f"{what}: {left ^ made}"
     else:
@@ -135,7 +135,7 @@ def check(
         assert errors.endswith(INTERRUPTED), what
         told = errors.splitlines()
         assert told[-1] == INTERRUPTED.strip(), what
-        assert len(told) == 1 or (left == made and "Traceback" not in errors), what  # its last words, all being written
+        assert len(told) == 1 or (left == made and "Traceback" not in errors), what  # printed after all files
         assert left <= made, f"{what}: {left - made}"
         if any(name.endswith("article.json") for name in left):
             assert any(name.endswith("article.html") for name in left), what
@@ -163,7 +163,7 @@ def test_ctrl_c_and_kill_at_many_moments(number: int, whole: Whole, tmp_path: Pa
 
 @pytest.mark.soak
 def test_ctrl_c_in_track_never_crashes(whole: Whole, tmp_path: Path) -> None:
-    """500 moments, at random; once a process in `track` was killed by a segmentation fault after Ctrl-C."""
+    """500 random moments; a segmentation fault once killed a process in `track` after Ctrl-C."""
     seconds, made = whole(TRACK)
     draw = random.Random(500)
     for k in range(500):
@@ -174,15 +174,15 @@ def test_ctrl_c_in_track_never_crashes(whole: Whole, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP])
-def test_a_signal_that_the_shell_told_to_ignore_is_ignored(number: int) -> None:
-    """As of a command in the background, or behind nohup."""
+def test_a_signal_that_the_shell_ignores_is_ignored(number: int) -> None:
+    """The state of a command in the background, or of a command started with nohup."""
     code = TIMED.replace("threading.Thread", f"signal.signal({int(number)}, signal.SIG_IGN); threading.Thread", 1)
     words = [sys.executable, "-c", code, "0.3", str(int(number)), "robots"]
     done = subprocess.run(words, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_all_at_once_ends_at_once(tmp_path: Path) -> None:
+def test_many_signals_at_once_end_the_command_at_once(tmp_path: Path) -> None:
     """Ctrl-C held down: many signals, one line."""
     examples(tmp_path, force=False)
     process = started(tmp_path, 0.3, signal.SIGINT, TRACK, HELD)

@@ -1,4 +1,4 @@
-"""Commands that are killed or interrupted at random moments: what there is is whole, and what is left is cleaned up."""
+"""Commands that are killed or interrupted at random moments: each file is whole, and remains are removed."""
 
 import os
 import signal
@@ -19,7 +19,7 @@ pytestmark = extended
 
 NAMES = ("track", "article", "forward", "convert")
 PATIENCE = 120.0  # s
-INTERRUPTED = (130, -signal.SIGINT)  # a shell shows 130 for both: the second is Python's own, before and after ours
+INTERRUPTED = (130, -signal.SIGINT)  # a shell shows 130 for both; the second is from Python itself
 MODULE = (sys.executable, "-m", "sagline.cli")
 
 
@@ -31,7 +31,7 @@ def spawned(*words: str) -> "subprocess.Popen[str]":
 
 @pytest.mark.parametrize("count", [1, pytest.param(50, marks=pytest.mark.soak)])
 @pytest.mark.parametrize("name", NAMES)
-def test_nothing_is_half_written_and_nothing_is_left(
+def test_no_partial_file_and_no_temporary_file_remains(
     tmp_path: Path, written: Written, monkeypatch: pytest.MonkeyPatch, name: str, count: int
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -64,7 +64,7 @@ def test_nothing_is_half_written_and_nothing_is_left(
 def stopped(
     words: tuple[str, ...], number: signal.Signals, rng: np.random.Generator, duration: float
 ) -> tuple[int, str]:
-    """A command that gets a signal at a random moment: of all its time, or of the time in which it writes."""
+    """A command that receives a signal at a random moment of its whole run, or while it writes files."""
     process = spawned(*words)
     share = float(rng.random())
     try:

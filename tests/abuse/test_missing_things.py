@@ -1,4 +1,4 @@
-"""An argument or option that names something that does not exist ends the command: nothing is left out silently."""
+"""An argument or option that names a missing item ends the command; no name is ignored silently."""
 
 from __future__ import annotations
 
@@ -7,19 +7,17 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from tests.abuse.command_lines import LINES, Case, commands, line_of
-from tests.abuse.test_command_lines import Bench, short_of_work, stocked
+from tests.abuse.test_command_lines import Bench, shortened_commands, stocked
 from tests.tiers import extended
 
-__all__ = ["short_of_work", "stocked"]  # fixtures
+__all__ = ["shortened_commands", "stocked"]  # fixtures
 
 pytestmark = extended
 
 MISSING = ("nothere", "nothere.stl", "nothere.yaml", "nothere/nothere.nc", "folder", "folder.yaml", "/dev/null")
-WRITTEN = frozenset({"--out", "--plot", "--log", "--to"})  # name what is made
-ANY = frozenset(
-    {"new file", "view --host", "view --allow-host", "twin --host"}
-)  # a name to be given, and names of machines
-NUMBERED = (  # what is counted: one more than there are
+WRITTEN = frozenset({"--out", "--plot", "--log", "--to"})  # name the output
+ANY = frozenset({"new file", "view --host", "view --allow-host", "twin --host"})  # new names, and names of machines
+NUMBERED = (  # counts: one more than the robot has
     "simulate cogiro --after 0.1 --no-figures --break 8@0.05s",
     "vibrate cogiro --up-to 4 --no-figures --film 999",
     "view cogiro --no-browser --mode 999",
@@ -53,7 +51,7 @@ def cases() -> Iterator[Case]:
         yield Case(fault, [*LINES["twin"], "--fault", fault])
 
 
-def test_what_does_not_exist_is_refused(stocked: Path, tmp_path: Path) -> None:
+def test_names_of_missing_items_are_refused(stocked: Path, tmp_path: Path) -> None:
     bench, here = Bench(stocked, tmp_path), Path.cwd()
     every = list(cases())
     try:

@@ -1,4 +1,4 @@
-"""Files with other bytes in them: bits turned, pieces cut out, doubled and mixed, encodings, control characters."""
+"""Files with changed bytes: flipped bits, parts removed, doubled and mixed, encodings, control characters."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -105,7 +105,7 @@ CHANGES: tuple[Change, ...] = (
 
 
 @pytest.mark.parametrize("count", [270, pytest.param(10_000, marks=pytest.mark.soak)])
-def test_whatever_bytes_a_file_has(count: int, tmp_path: Path) -> None:
+def test_files_with_any_bytes(count: int, tmp_path: Path) -> None:
     rng = np.random.default_rng(20260111)
     read = 0
     for k in range(count):

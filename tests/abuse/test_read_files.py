@@ -1,4 +1,4 @@
-"""Files that are none, have no end, are too large, grow while they are read, or bear names that no file can have."""
+"""Special files: folders, pipes, endless, too large or growing files, and impossible file names."""
 
 import os
 from collections.abc import Callable, Iterator
@@ -37,7 +37,7 @@ def _dangling(path: Path) -> None:
 
 def _holes(path: Path) -> None:
     with path.open("wb") as file:
-        file.truncate(200_000_000_000)  # which take no room on the disk
+        file.truncate(200_000_000_000)  # a sparse file, which takes no space on the disk
 
 
 def _zeros(path: Path) -> None:
@@ -50,7 +50,7 @@ def _nothing(path: Path) -> None:
 
 @BY_FILE
 @pytest.mark.parametrize("make", [_pipe, _endless, _folder, _loop, _dangling, _holes, _zeros, _nothing])
-def test_what_is_no_file_to_read(reader: Reader, make: Callable[[Path], None], tmp_path: Path) -> None:
+def test_paths_of_unreadable_files_are_refused(reader: Reader, make: Callable[[Path], None], tmp_path: Path) -> None:
     file = tmp_path / reader.name
     make(file)
     found = judged(lambda: reader.read(file), f"{reader.name}, {make.__name__}")
@@ -103,13 +103,13 @@ def lines(head: str, line: str, size: int) -> tuple[str, str, int]:
     ),
 )
 @pytest.mark.parametrize("share", [0.2, pytest.param(1.0, marks=pytest.mark.soak)])
-def test_files_that_never_seem_to_end(name: str, text: tuple[str, str, int], share: float, tmp_path: Path) -> None:
+def test_files_without_end_are_refused(name: str, text: tuple[str, str, int], share: float, tmp_path: Path) -> None:
     reader = next(reader for reader in READERS if reader.name == name)
     head, line, count = text
     tail = f"</{head[1:].split()[0].rstrip('>')}>" if head.endswith(">") else ""
     data = (head + line * int(share * count) + tail).encode()
     found = judged(lambda: reader.read(reader.written(tmp_path, data)), f"{name}: {head[:40]!r} and many {line!r}")
-    # a few hundred kilobytes of remarks or of waypoints are read, a megabyte is not
+    # files of a few hundred kilobytes of comments or waypoints are read, a file of a megabyte is refused
     assert isinstance(found, SaglineError) or (share < 1.0 and name.endswith(".yaml"))
 
 
@@ -121,9 +121,9 @@ def unreadable(path: Path) -> Iterator[None]:
 
 
 @BY_FILE
-def test_a_file_of_somebody_else(reader: Reader, tmp_path: Path) -> None:
+def test_a_file_without_read_permission_is_refused(reader: Reader, tmp_path: Path) -> None:
     file = reader.written(tmp_path, reader.sample.encode())
     with unreadable(file):
         found = judged(lambda: reader.read(file), reader.name)
-    if os.geteuid() != 0:  # who may read everything
+    if os.geteuid() != 0:  # the superuser can read all files
         assert isinstance(found, SaglineError)

@@ -1,4 +1,4 @@
-"""Every number of every kind of file, written as no number should be: refused, or read as what it says."""
+"""Each number in each kind of file in unusual notations: refused, or read with the written value."""
 
 import re
 from pathlib import Path
@@ -37,7 +37,7 @@ NUMBERS = (
 
 
 def places(sample: str) -> list[tuple[int, int]]:
-    """Where a sample has numbers, those of names and of the head left out."""
+    """Positions of the numbers in a sample, except in names and in the header."""
     head = sample.index("\n") + 1 if sample.startswith("<?xml") else 0
     return [found.span() for found in NUMBER.finditer(sample, head)]
 
@@ -54,7 +54,7 @@ def cases(count: int, words: tuple[str, ...]) -> list[tuple[Reader, int, int, st
 
 
 def numbers_of(found: Any) -> set[float]:
-    """All numbers in what was read."""
+    """All numbers of a result."""
     robot = getattr(found, "robot", found)
     slots = getattr(robot, "__slots__", None)
     values = list(found) if isinstance(found, tuple) else [getattr(robot, name) for name in slots or ()]
@@ -68,7 +68,7 @@ def numbers_of(found: Any) -> set[float]:
 
 
 @pytest.mark.parametrize("count", [180, pytest.param(4000, marks=pytest.mark.soak)])
-def test_what_is_no_number_is_not_read_as_one(count: int, tmp_path: Path) -> None:
+def test_text_that_is_not_a_number_is_refused(count: int, tmp_path: Path) -> None:
     for reader, start, end, word in cases(count, NO_NUMBERS):
         text = reader.sample[:start] + word + reader.sample[end:]
         what = f"{reader.name} with {word[:40]!r} at {start} for {reader.sample[start:end]}"
@@ -80,7 +80,7 @@ def test_what_is_no_number_is_not_read_as_one(count: int, tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("count", [60, pytest.param(1000, marks=pytest.mark.soak)])
-def test_what_is_a_number_is_read_as_it_says(count: int, tmp_path: Path) -> None:
+def test_valid_notations_of_a_number_are_read_exactly(count: int, tmp_path: Path) -> None:
     for reader, start, end, word in cases(count, NUMBERS):
         text = reader.sample[:start] + word + reader.sample[end:]
         what = f"{reader.name} with {word!r} at {start} for {reader.sample[start:end]}"
@@ -89,7 +89,7 @@ def test_what_is_a_number_is_read_as_it_says(count: int, tmp_path: Path) -> None
             sound(found, what)
 
 
-def test_samples_are_good(tmp_path: Path) -> None:
+def test_the_samples_are_valid(tmp_path: Path) -> None:
     for reader in READERS:
         found = judged(lambda: reader.read(reader.written(tmp_path, reader.sample.encode())), reader.name)  # noqa: B023
         assert not isinstance(found, SaglineError), str(found)

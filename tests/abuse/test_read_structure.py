@@ -1,4 +1,4 @@
-"""Files whose parts are missing, twice, in the wrong place, of another kind, or nested in each other."""
+"""Files with parts that are missing, repeated, misplaced, of another type, or nested in each other."""
 
 import copy
 import json
@@ -39,7 +39,7 @@ NAMES = (
 
 
 def slots(tree: Any) -> list[tuple[Any, Any]]:
-    """Every place in a tree of mappings and lists: its holder, and its key there."""
+    """All positions in a tree of mappings and lists: the container and the key."""
     keys = list(tree) if isinstance(tree, dict) else list(range(len(tree))) if isinstance(tree, list) else []
     return [(tree, key) for key in keys] + [place for key in keys for place in slots(tree[key])]
 
@@ -91,7 +91,7 @@ def test_trees_in_yaml(count: int, tmp_path: Path) -> None:
                 change = TREE_CHANGES[int(rng.integers(len(TREE_CHANGES)))]
                 change(rng, *places[int(rng.integers(len(places)))], tree)
                 done.append(change.__name__)
-        # JSON is YAML too, and what it escapes YAML reads again
+        # JSON is valid YAML, and YAML reads its escape sequences
         text = json.dumps(_stringed(tree)) if rng.integers(2) else yaml.dump(tree, allow_unicode=bool(rng.integers(2)))
         _check(reader, text.encode("utf-8", "surrogatepass"), f"case {k}: {reader.name}, {', '.join(done)}", tmp_path)
 
@@ -209,7 +209,7 @@ def _check(reader: Reader, data: bytes, what: str, folder: Path) -> None:
 
 
 def _stringed(tree: Any) -> Any:
-    """The tree with keys that JSON can write."""
+    """The tree with keys as strings, as JSON requires."""
     if isinstance(tree, dict):
         return {str(key): _stringed(value) for key, value in tree.items()}
     return [_stringed(value) for value in tree] if isinstance(tree, list) else tree

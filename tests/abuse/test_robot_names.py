@@ -1,4 +1,4 @@
-"""Robots with names of all kinds: their files are where they were asked for, or there is one line and nothing else."""
+"""Robots with names of all kinds: files only in the requested folder, or one line and no file."""
 
 import json
 import re
@@ -13,14 +13,14 @@ from tests.tiers import extended
 
 pytestmark = extended
 
-LONGEST = 300  # letters of a line
+LONGEST = 300  # characters of a line
 PIECES = ("..", "/", "\\", ".", "-", "~", "$HOME", "con", "NUL", "com1", "evil", "机", "ü", " ", ":", "*", "|", "%2e")
 UNSEEN = ("\0", "\n", "\x1b[2J", "\x7f", "\x9b1A", "\u202e", "\ufeff", "\ud800", "\udfff", "\uffff", "\U000e0001")
 COMMON = ("../../evil", "/etc/evil", "", ".", "..", "x" * 300, "ü" * 300, "con", "a\0b", "\ud800", "\x1b[31mred", "-rf")
 
 
 def names(count: int) -> list[str]:
-    """Common ones, and others of pieces."""
+    """Common names, and names composed of special parts."""
     rng = np.random.default_rng(3)
     pieces = (*PIECES, *UNSEEN)
     others = ["".join(rng.choice(pieces, size=rng.integers(1, 9))) for _ in range(count)]
@@ -29,7 +29,7 @@ def names(count: int) -> list[str]:
 
 @pytest.mark.parametrize("command", ["forward", "tension", "track"])
 @pytest.mark.parametrize("count", [0, pytest.param(300, marks=pytest.mark.soak)])
-def test_files_stay_where_they_were_asked_for(
+def test_files_are_written_only_into_the_requested_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str, count: int
 ) -> None:
     place = tmp_path / "deep" / "deeper"
@@ -42,7 +42,7 @@ def test_files_stay_where_they_were_asked_for(
     words = [word.replace(kind, "odd.yaml") for word in COMMANDS[command]]
     chosen = names(count) if count or command == "forward" else COMMON[:2]
     for name in chosen:
-        # as JSON writes it, which is YAML too: a robot with some of these names cannot be made in Python
+        # written as JSON, which is valid YAML: Python cannot create a robot with some of these names
         Path("odd.yaml").write_text(robot.replace(kind, json.dumps(name), 1), encoding="utf-8")
         before = tree(tmp_path)
         result = ended(*words, *["--no-figures"] * (command == "track"))

@@ -1,4 +1,4 @@
-"""Every file of every command, its name taken by something that is no file: one line, and nothing has changed."""
+"""Each output file of each command with its name taken by a folder, link, pipe or device: one line, no change."""
 
 import os
 from collections.abc import Callable
@@ -10,7 +10,7 @@ import pytest
 from tests.abuse.commands import COMMANDS, Written, ended, prepare, tree
 from tests.tiers import wide
 
-LONGEST = 300  # letters of a line
+LONGEST = 300  # characters of a line
 
 
 def folder(place: Path) -> None:
@@ -48,7 +48,7 @@ def link_to_device(place: Path) -> None:
 
 
 def device(place: Path) -> None:
-    os.mknod(place, 0o20666, os.makedev(1, 3))  # as /dev/null; for root alone
+    os.mknod(place, 0o20666, os.makedev(1, 3))  # a device such as /dev/null; only the superuser can create it
 
 
 KINDS = [folder, full_folder, pipe, link_to_file, link_to_nothing, link_to_folder, link_to_itself, link_to_device]
@@ -58,16 +58,16 @@ if hasattr(os, "getuid") and os.getuid() == 0:
 
 @pytest.mark.parametrize("kinds", [1, pytest.param(len(KINDS), marks=pytest.mark.soak)])
 @pytest.mark.parametrize("name", wide(reversed(COMMANDS)))
-def test_a_taken_name_is_told_and_nothing_has_changed(
+def test_a_taken_name_is_reported_and_the_folder_is_unchanged(
     tmp_path: Path, written: Written, monkeypatch: pytest.MonkeyPatch, name: str, kinds: int
 ) -> None:
     rng = np.random.default_rng(7)
     for file in written(name):
         for kind in rng.permutation(len(KINDS))[:kinds]:
-            assert_told(tmp_path / f"{Path(file).name}-{kind}", file, KINDS[kind], COMMANDS[name], monkeypatch)
+            assert_reported(tmp_path / f"{Path(file).name}-{kind}", file, KINDS[kind], COMMANDS[name], monkeypatch)
 
 
-def assert_told(
+def assert_reported(
     place: Path, file: str, take: Callable[[Path], None], words: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     place.mkdir()

@@ -1,4 +1,4 @@
-"""What a page can send to the viewer that no page of ours sends: it goes on, and shows what the next one asks."""
+"""Invalid messages of a page to the viewer: it keeps running and serves the next client."""
 
 import threading
 import time
@@ -20,8 +20,8 @@ from tests.viewer.client import PATIENCE, Client
 pytestmark = extended
 
 ROBOT = sl.load_robot("article-suspended")
-BATCH = 20  # odd messages between two that make sense
-AGAIN = 5.0  # s: after which the client asks once more
+BATCH = 20  # number of invalid messages between two valid ones
+AGAIN = 5.0  # s after which the client repeats its request
 ODD: tuple[Any, ...] = (
     None, True, "", "nonsense", "50", "1e308", float("nan"), float("inf"), -1.0, 0.0, 1e308, -1e-320, 2**62, [], [1, 2],
     [[1.0]], {}, {"value": 1.0}, b"\x00\xff", "x" * 10_000, [float("nan")] * 3, [0.0] * 4, ["a", "b", "c"], [None] * 3,
@@ -30,7 +30,7 @@ ODD: tuple[Any, ...] = (
 
 
 def message(generator: np.random.Generator, uuids: list[str]) -> dict[str, Any]:
-    """A message of a kind that clients send, with odd values in the places of its values."""
+    """A message of a kind that clients send, with invalid values."""
 
     def odd() -> Any:
         return ODD[generator.integers(len(ODD))]
@@ -62,7 +62,7 @@ def message(generator: np.random.Generator, uuids: list[str]) -> dict[str, Any]:
 
 
 def press(count: int, seed: int) -> None:
-    """Send so many odd messages, and see between them whether the next client is served."""
+    """Send a number of invalid messages, and check between them that the next client is served."""
     generator = np.random.default_rng(seed)
     ends = sl.Pose(np.array([[0.0, 0.0, 1.5], [1.0, 0.0, 1.5]]), np.stack([np.eye(3)] * 2))
     run = PlayedPlan.of(sl.inverse(ROBOT, sl.quintic_path(ends, durations=[1.0], rate=20)))
@@ -78,15 +78,15 @@ def press(count: int, seed: int) -> None:
         usual = {uuid: each.value for uuid, each in handles if not isinstance(each, viser.GuiButtonHandle)}
         for _ in range(0, count, BATCH):
             for _ in range(BATCH):
-                with Client(server.url) as bad:  # one each: a client is cut off by some of them
+                with Client(server.url) as bad:  # the server ends some connections
                     bad.say(**message(generator, list(usual)))
-            time.sleep(0.2)  # what was said is heard
+            time.sleep(0.2)  # the valid message is processed
             assert thread.is_alive()
             place = generator.uniform([-2.0, -2.0, 1.0], [2.0, 2.0, 2.5])
             with Client(server.url) as good:
                 expected = sl.inverse(ROBOT, sl.Pose(place, np.eye(3)), tension=sl.MinimumNorm()).chord_tension
                 end = time.monotonic() + PATIENCE
-                while not shows(viewer, place, expected):  # on a busy machine what was said before may be heard later
+                while not shows(viewer, place, expected):  # a busy machine may process earlier messages later
                     assert time.monotonic() < end, "not served"
                     for uuid, value in usual.items():
                         good.set(uuid, value)
@@ -106,18 +106,18 @@ def shows(viewer: Page, place: np.ndarray, tension: np.ndarray) -> bool:
 
 
 def await_that(done: Callable[[], bool]) -> None:
-    """Wait until it is done, or for so long that it has to be asked for again."""
+    """Wait for the condition, at most for the time after which the request is repeated."""
     end = time.monotonic() + AGAIN
     while not done() and time.monotonic() < end:
         time.sleep(0.01)
 
 
-def test_the_viewer_outlives_odd_messages(capfd: pytest.CaptureFixture[str]) -> None:
+def test_the_viewer_survives_invalid_messages(capfd: pytest.CaptureFixture[str]) -> None:
     press(200, seed=20)
     assert "Traceback" not in "".join(capfd.readouterr())
 
 
 @pytest.mark.soak
-def test_the_viewer_outlives_thousands_of_odd_messages(capfd: pytest.CaptureFixture[str]) -> None:
+def test_the_viewer_survives_thousands_of_invalid_messages(capfd: pytest.CaptureFixture[str]) -> None:
     press(4000, seed=21)
     assert "Traceback" not in "".join(capfd.readouterr())
