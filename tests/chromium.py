@@ -1,4 +1,4 @@
-"""Debian's Chromium without a screen, for tests that look at pages."""
+"""Debian's Chromium without a screen, for tests of pages."""
 
 import os
 import shutil
@@ -10,17 +10,17 @@ from playwright.sync_api import Browser, expect, sync_playwright
 
 CHROMIUM: Final = shutil.which("chromium")
 NEEDED: Final = pytest.mark.skipif(CHROMIUM is None and not os.environ.get("CI"), reason="Chromium is not installed")
-PATIENCE: Final = 240.0  # s: far more than anything takes; pictures are computed without a graphics card
-QUIET: Final = "--headless --no-sandbox --no-first-run --disable-background-networking"  # asks nobody for anything
+PATIENCE: Final = 240.0  # s: a wide limit, because pictures are computed without a graphics card
+QUIET: Final = "--headless --no-sandbox --no-first-run --disable-background-networking"  # no requests to other hosts
 
 expect.set_options(timeout=1e3 * PATIENCE)
 
 
 def launched(flags: str) -> Iterator[Browser]:
-    """A browser for as long as a fixture lasts.
+    """A browser for the duration of a fixture.
 
     Args:
-        flags: Of the command line, beside those of `QUIET`.
+        flags: Flags of the command line in addition to `QUIET`.
     """
     assert CHROMIUM is not None, "install Debian's chromium: apt-get install chromium"
     with sync_playwright() as playwright:

@@ -30,23 +30,23 @@ PATHS: Final = [each.partition("::")[0] for each in sys.argv[1:] if "tests/" in 
 if PATHS and all(map(INNER.search, PATHS)):
     os.environ.setdefault("SAGLINE_BACKEND", "numba")
 ALL_EXTENDED: Final = re.compile(r"^pytestmark = (extended|\[extended\b)", re.MULTILINE)
-EXAMPLES: Final = 40  # of a property, in the first tier
+EXAMPLES: Final = 40  # examples of a property in the first tier
 ROOT: Final = Path(__file__).parents[1]
 CPU: Final = "cpu"  # property of a report: processor time of the test [s], compilation excluded
 
 
-def first_tier_alone(config: pytest.Config) -> bool:
-    """Whether only tests of the first tier run."""
+def only_first_tier(config: pytest.Config) -> bool:
+    """True if only tests of the first tier run."""
     return "not extended" in str(config.getoption("markexpr"))
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Let hypothesis try fewer examples in the first tier (`make soak` has its own number); make a missing module."""
+    """Set the number of examples of hypothesis in the first tier (`make soak` has its own); create a missing module."""
     settings.register_profile("first tier", max_examples=EXAMPLES)
-    if first_tier_alone(config):
+    if only_first_tier(config):
         settings.load_profile("first tier")
     if not hasattr(config, "workerinput"):
-        from tools.translate import portable, wasm  # imports kernels, whose back end is decided above
+        from tools.translate import portable, wasm  # imports kernels after the choice of the back end above
 
         if not (ROOT / wasm.MODULE).is_file():
             wasm.build(ROOT)
@@ -56,7 +56,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.fixture(scope="session", autouse=True)
 def libraries_are_loaded(tmp_path_factory: pytest.TempPathFactory) -> None:
-    """Load large libraries before the first test, so that no test is charged with their import."""
+    """Load large libraries before the first test, so that their import does not count for a test."""
     for name in ("pint", "scipy.optimize", "scipy.spatial", "skimage.measure", "trimesh"):
         import_module(name)
     import xarray
@@ -65,13 +65,13 @@ def libraries_are_loaded(tmp_path_factory: pytest.TempPathFactory) -> None:
     xarray.Dataset({"x": ("row", [1.0])}, {"row": [0.0]}).to_netcdf(
         tmp_path_factory.mktemp("load") / "x.nc", engine="h5netcdf"
     )
-    strategies.characters(codec="utf-8", exclude_categories=("Cc", "Cs", "Cn")).validate()  # its tables of unicode
+    strategies.characters(codec="utf-8", exclude_categories=("Cc", "Cs", "Cn")).validate()  # tables of unicode
     Figure().savefig(tmp_path_factory.mktemp("load") / "x.png")
 
 
 @pytest.fixture(scope="session", autouse=True)
 def command_built_once() -> Iterator[None]:
-    """Keep the command that `CliRunner` would build again for every command line, which takes 40 ms."""
+    """Keep the command that `CliRunner` would build for every command line, which takes 40 ms."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr("typer.testing._get_command", cache(get_command))
         yield
@@ -79,7 +79,7 @@ def command_built_once() -> Iterator[None]:
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
     """Do not import a file whose tests all belong to the second tier when only the first runs."""
-    if first_tier_alone(config) and collection_path.name.startswith("test_") and collection_path.suffix == ".py":
+    if only_first_tier(config) and collection_path.name.startswith("test_") and collection_path.suffix == ".py":
         return True if ALL_EXTENDED.search(collection_path.read_text(encoding="utf-8")) else None
     return None
 
@@ -93,7 +93,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Renew snapshots by the tests that compare one, and by no others; shuffle the tests if asked for."""
+    """Update snapshots only with the tests that compare them; shuffle the tests on request."""
     if config.getoption("update_snapshots", default=False):
         items[:] = [item for item in items if "snapshot" in getattr(item, "fixturenames", ())]
     if (seed := config.getoption("--random-order")) is not None:
@@ -111,7 +111,7 @@ class _Compilation(event.Listener):
         self.count += 1
 
     def on_end(self, event: Any) -> None:
-        """Count the start only."""
+        """Count the start of a compilation only."""
 
 
 _compilation: Final = _Compilation()
@@ -126,8 +126,8 @@ def processor_time() -> float:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_call(item: pytest.Item) -> Iterator[None]:
-    """Measure a test of the first tier; fail it if it takes too long with compiled kernels."""
-    if not first_tier_alone(item.config):
+    """Measure a test of the first tier; the test fails if it takes too long with compiled kernels."""
+    if not only_first_tier(item.config):
         return (yield)
     start, before = processor_time(), _compilation.count
     result = yield
@@ -151,8 +151,8 @@ def pytest_runtest_logreport(report: pytest.TestReport) -> None:
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    """Fail the run if the tests of a file took too long together."""
-    unlimited = session.config.getoption("--no-limits") or not first_tier_alone(session.config)
+    """Fail the run if the tests of a file took too long in total."""
+    unlimited = session.config.getoption("--no-limits") or not only_first_tier(session.config)
     if unlimited or hasattr(session.config, "workerinput"):
         return
     slow = {file: used for file, used in _used_by_file.items() if used > FILE_LIMIT}

@@ -1,7 +1,7 @@
-"""Limits of time that a slow or a busy machine keeps too; what takes seconds too much keeps them nowhere.
+"""Time limits that also hold on slow or busy machines.
 
-A limit is one of an ordinary machine. Only what exceeds it is done again, and then judged by how long a fixed piece of
-work takes here and now.
+A limit applies to an ordinary machine. Only work that exceeds its limit is repeated. The limit is then scaled by the
+time of a fixed piece of work on the present machine.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from contextlib import suppress
 
 import numpy as np
 
-ORDINARY = 0.1  # s, that the piece of work takes where the limits were set
+ORDINARY = 0.1  # s, duration of the fixed piece of work on the machine of the limits
 AGAIN = 3
 
 
-def piece(clock: Callable[[], float] = time.thread_time) -> float:
-    """How long a fixed piece of work takes [s], half of it of Python and half of numpy."""
+def duration_of_fixed_work(clock: Callable[[], float] = time.thread_time) -> float:
+    """Duration of a fixed piece of work [s], half of it Python and half numpy."""
     numbers, found, start = np.linspace(0.0, 1.0, 4000), 0.0, clock()
     for k in range(600):
         found += sum(j * k % 7 for j in range(500)) + np.sort(np.sin(k * numbers))[0]
@@ -27,12 +27,12 @@ def piece(clock: Callable[[], float] = time.thread_time) -> float:
 
 
 def slowness() -> float:
-    """How many times as long as on an ordinary machine work takes the processor now; at least 1."""
-    return max(1.0, piece() / ORDINARY)
+    """Ratio of the present processor time of the fixed piece to its time on an ordinary machine, at least 1."""
+    return max(1.0, duration_of_fixed_work() / ORDINARY)
 
 
 def slowness_of_waiting() -> float:
-    """As `slowness`, by the clock on the wall: of another process, which no thread of this one holds up."""
+    """As `slowness`, with wall time in another process, which the threads of this process do not delay."""
     done = subprocess.run([sys.executable, "-P", __file__], stdout=subprocess.PIPE, text=True, check=True)
     return max(1.0, float(done.stdout) / ORDINARY)
 
@@ -63,7 +63,7 @@ def _seconds(work: Callable[[], object]) -> float:
 
 
 def best_rate(measure: Callable[[], float], wanted: float) -> float:
-    """The highest of some measurements of a rate [1/s of an ordinary machine]; one, if that is as wanted."""
+    """Highest measurement of a rate [1/s of an ordinary machine]; measurements end at the wanted rate."""
     best = measure()
     for _ in range(AGAIN):
         if best >= wanted:
@@ -73,4 +73,4 @@ def best_rate(measure: Callable[[], float], wanted: float) -> float:
 
 
 if __name__ == "__main__":
-    print(piece(time.perf_counter))
+    print(duration_of_fixed_work(time.perf_counter))

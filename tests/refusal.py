@@ -1,4 +1,4 @@
-"""Expected errors, by their parts: the item, its value, what is allowed and the next step; never by a sentence."""
+"""Expected errors, described by their parts: item, value, allowed values and next step."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def refused(
     kind: type[Exception] = sl.SaglineError,
     file: Path | str | None = None,
 ) -> Iterator[pytest.ExceptionInfo[Any]]:
-    """Expect an error of which each given part is equal to that of the error.
+    """Expect an error with the given parts.
 
     Args:
         item: Item that the error names.

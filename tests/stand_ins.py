@@ -1,4 +1,4 @@
-"""Machines and experiments that a command would wait for in real time: accepted, and done with at once."""
+"""Replacements of machines and experiments that would run in real time: they end at once."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -10,13 +10,13 @@ from sagline.cli.session import OperatorSession
 
 
 def instead_of_machines(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A twin ends as soon as it would serve, a controller drives a machine in this process, experiments are over."""
+    """A twin ends instead of serving, a controller drives a machine in this process, and experiments end at once."""
 
     def served(server: Any, watch: Any) -> None:
         raise SystemExit(0)
 
     def begun(session: OperatorSession) -> None:
-        if session._shadow:  # until Ctrl-C
+        if session._shadow:  # runs until Ctrl-C
             raise SystemExit(0)
         begin(session)
 

@@ -1,4 +1,4 @@
-"""The border between a caller's objects and ours."""
+"""Checks of the objects that a caller gives."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ POSE = sl.Pose.from_euler([1.0, 1.0, 2.0], 0.0, 0.0, 0.0)
 PLAN = sl.inverse(ROBOT, POSE)
 
 
-ANY: Any = sl  # for calls that no type allows
+ANY: Any = sl  # for calls that the types forbid
 
 
 @pytest.mark.parametrize(
@@ -56,19 +56,19 @@ ANY: Any = sl  # for calls that no type allows
         (lambda: ANY.TensionMethod(), ("TensionMethod()", "the abstract base class")),
     ],
 )
-def test_what_is_of_the_wrong_kind_is_named_with_the_way_to_the_right_one(call: Any, parts: tuple[str, ...]) -> None:
+def test_a_wrong_type_is_named_with_a_way_to_create_the_right_one(call: Any, parts: tuple[str, ...]) -> None:
     with refused(*parts, kind=InvalidValueError):
         call()
 
 
 @pytest.mark.parametrize("kind", [sl.Straight, sl.Centroid])
-def test_a_class_for_an_instance_is_answered_with_its_call(kind: type) -> None:
+def test_a_class_in_place_of_an_instance_is_answered_with_its_call(kind: type) -> None:
     with pytest.raises(InvalidValueError) as caught:
         ANY.inverse(ROBOT, POSE, **{"model" if kind is sl.Straight else "tension": kind})
     assert f"{kind.__name__}()" in caught.value.next_step
 
 
-def test_what_is_of_the_right_kind_is_taken_as_it_is() -> None:
+def test_a_valid_object_is_returned_unchanged() -> None:
     assert instance(ROBOT, sl.Robot, "robot") is ROBOT
     assert choice(np.str_("3T"), "pattern", ("3T", "2T")) == "3T"
     assert whole_number(np.int8(3), "points", 2) == 3
@@ -84,7 +84,7 @@ def test_what_is_of_the_right_kind_is_taken_as_it_is() -> None:
         (lambda: sl.Brake(winch=-1, time=0.0), ("winch", "-1", "0 to 9999")),
     ],
 )
-def test_a_range_is_told_with_its_end_where_it_has_one(call: Any, parts: tuple[str, ...]) -> None:
+def test_a_message_names_the_finite_ends_of_a_range(call: Any, parts: tuple[str, ...]) -> None:
     with refused(*parts, kind=InvalidValueError):
         call()
 
@@ -95,12 +95,12 @@ REFUSED = [4, -5, (0, 1), None, ..., 1.0, "0", True, [0, 4], [0.0], [[0]], np.on
 
 
 @pytest.mark.parametrize("index", TAKEN)
-def test_an_index_takes_what_numpy_takes(index: Any) -> None:
+def test_an_index_accepts_the_integers_of_numpy(index: Any) -> None:
     np.testing.assert_array_equal(BATCH[part_of(index, BATCH.shape, "single row")], BATCH[index])
 
 
 @pytest.mark.parametrize("index", REFUSED)
-def test_an_index_that_names_no_entry_is_an_index_error(index: Any) -> None:
+def test_an_index_out_of_range_is_an_index_error(index: Any) -> None:
     with refused("index", kind=IndexError) as caught:
         part_of(index, BATCH.shape, "single row")
     assert caught.value.allowed.startswith("-4 to 3, ")
@@ -108,7 +108,7 @@ def test_an_index_that_names_no_entry_is_an_index_error(index: Any) -> None:
         sl.inverse(ROBOT, sl.Pose(np.tile(POSE.position, (4, 1)), np.eye(3))).state[index]
 
 
-def test_a_single_pose_is_no_list() -> None:
+def test_a_single_pose_has_no_length() -> None:
     for single in (POSE, PLAN.state, PLAN.state.cables[0]):
         with refused("this", allowed="a batch", kind=NoBatchError):
             list(single)
@@ -117,36 +117,36 @@ def test_a_single_pose_is_no_list() -> None:
 
 
 @pytest.mark.parametrize("file", ["a" * 256, "x\0y", "\ud800", ".", "", "/", f"folder/{'a' * 300}/x"])
-def test_what_no_file_can_be_called_is_refused(file: str) -> None:
+def test_impossible_file_names_are_refused(file: str) -> None:
     with pytest.raises(FileError):
         file_path(file)
 
 
-def test_the_longest_names_are_names() -> None:
+def test_the_longest_names_are_accepted() -> None:
     assert file_path("ä" * 127 + "a") == Path("ä" * 127 + "a")  # 255 bytes
     assert file_path(".", folder=True) == Path(".")
 
 
 @pytest.mark.parametrize("text", ["cogiro", "größer 2", "名" * 100, "a-b_c.d/.."])
-def test_what_a_name_may_be(text: str) -> None:
+def test_valid_names(text: str) -> None:
     assert label(text, "name") == text
 
 
 @pytest.mark.parametrize(("text", "shown"), [("", "empty"), (" ", "blank"), ("\u3000", "blank")])
-def test_a_name_says_something(text: str, shown: str) -> None:
+def test_an_empty_name_is_refused(text: str, shown: str) -> None:
     with refused("name", shown, kind=InvalidValueError):
         label(text, "name")
 
 
 @pytest.mark.parametrize("text", ["a" * 101, "a\nb", "a\tb", "\x1b[31m", "a\0", "\ud800", "\u202egnp", 5, None, b"a"])
-def test_what_is_no_name_of_anything(text: object) -> None:
+def test_invalid_names(text: object) -> None:
     with refused("name", kind=InvalidValueError) as caught:
         label(text, "name")
     assert " 100 " in caught.value.allowed
     assert len(str(caught.value)) < 300
 
 
-def test_texts_have_lines_but_no_control_characters() -> None:
+def test_texts_may_contain_line_breaks_and_no_control_characters() -> None:
     assert text_of("two\n\tlines" * 1000, "notes") == "two\n\tlines" * 1000
     for text in ("\x1b]0;x\x07", "a\rb", "\ud800", 5):
         with refused("notes", kind=InvalidValueError):

@@ -1,4 +1,4 @@
-"""The border between a caller's numbers and ours."""
+"""Checks of the arrays that a caller gives."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def test_a_callers_array_is_copied_and_locked() -> None:
     assert not array.flags.writeable
 
 
-def test_an_immutable_array_is_taken_as_it_is() -> None:
+def test_an_immutable_array_is_not_copied() -> None:
     ours = locked(np.arange(3.0))
     assert checked(ours, "x", "m") is ours
     assert checked(ours[1:], "x", "m").base is ours
@@ -40,7 +40,7 @@ def test_a_locked_array_over_foreign_memory_is_copied() -> None:
 
 
 @pytest.mark.parametrize("value", [[1.0, 2.0], 3, np.float32(1.5), np.arange(6.0).reshape(2, 3).T, [[1, 2]], True])
-def test_whatever_is_given_comes_out_as_float64_in_c_order(value: object) -> None:
+def test_all_numbers_become_float64_in_c_order(value: object) -> None:
     array = checked(value, "x", "m")  # type: ignore[arg-type]
     assert array.dtype == np.float64
     assert array.flags.c_contiguous
@@ -67,12 +67,12 @@ def test_kernel_input_keeps_the_shape_of_a_single_value() -> None:
         ("near", {}, ("x", "'near'", "numbers")),
     ],
 )
-def test_what_is_wrong_is_named(value: object, limits: dict[str, object], parts: tuple[str, ...]) -> None:
+def test_invalid_arrays_are_named(value: object, limits: dict[str, object], parts: tuple[str, ...]) -> None:
     with refused(*parts, kind=InvalidValueError):
         checked(value, "x", "m", **limits)  # type: ignore[arg-type]
 
 
-def test_infinity_may_pass_where_it_means_no_limit() -> None:
+def test_infinity_is_accepted_as_no_limit() -> None:
     assert checked(np.inf, "x", "m", infinite=True) == np.inf
 
 
@@ -91,7 +91,7 @@ def test_infinity_may_pass_where_it_means_no_limit() -> None:
         (np.broadcast_to(1.0, 10**13), ("the memory for x", "8e+04 GB")),
     ],
 )
-def test_what_is_no_plain_number_is_refused(value: object, parts: tuple[str, ...]) -> None:
+def test_values_that_are_not_plain_numbers_are_refused(value: object, parts: tuple[str, ...]) -> None:
     with refused(*parts, kind=InvalidValueError):
         checked(value, "x", "m")  # type: ignore[arg-type]
 
@@ -103,19 +103,19 @@ class InMillimeters:
         return np.array([1.0])
 
 
-def test_a_unit_of_its_own_is_taken_only_where_it_is_ours() -> None:
+def test_an_array_with_a_unit_is_accepted_only_with_the_expected_unit() -> None:
     with refused("x", allowed="numbers in m", kind=InvalidValueError):
         checked(InMillimeters(), "x", "m")
     np.testing.assert_array_equal(checked(InMillimeters(), "x", "mm"), [1.0])
 
 
-def test_what_one_divides_by_is_not_next_to_nothing() -> None:
+def test_a_divisor_is_not_nearly_zero() -> None:
     with refused("mass", "1e-60 kg", "> 0 kg, 1e-50 to 1e+50 kg, finite", kind=InvalidValueError):
         number(1e-60, "mass", "kg", above=0.0)
     assert number(1e-60, "force", "N", low=0.0) == 1e-60
 
 
-def test_missing_numbers_pass_where_they_may() -> None:
+def test_nan_is_accepted_for_missing_numbers() -> None:
     np.testing.assert_array_equal(checked([1.0, np.nan], "x", "m", missing=True), [1.0, np.nan])
     with refused("x[1]", "inf m", "finite", kind=InvalidValueError):
         checked([np.nan, np.inf], "x", "m", missing=True)

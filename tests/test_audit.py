@@ -1,4 +1,4 @@
-"""Licenses, pinned versions and the verdict of `make audit`."""
+"""Licenses, pinned versions and the result of `make audit`."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_all_packages_have_a_permitted_license() -> None:
     ("text", "permitted"),
     [("MIT", True), ("BSD-3-Clause AND MIT", True), ("GPL-3.0-only", False), ("MIT AND GPL-2.0", False), ("", False)],
 )
-def test_a_license_that_is_not_listed_is_told(text: str, permitted: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_license_that_is_not_listed_is_reported(text: str, permitted: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(audit, "license_of", lambda package: text)
     found = list(audit.refused_licenses({"numpy": distribution("numpy")}))
     assert bool(found) != permitted
@@ -56,13 +56,11 @@ def test_a_license_that_is_not_listed_is_told(text: str, permitted: bool, monkey
         ([], audit.UNREACHED),
     ],
 )
-def test_a_package_that_no_database_knows_is_not_without_vulnerabilities(
-    packages: list[dict[str, Any]], code: int
-) -> None:
+def test_a_package_without_a_database_entry_is_reported(packages: list[dict[str, Any]], code: int) -> None:
     assert audit.verdict(packages)[0] == code
 
 
-def test_a_missing_program_is_told_in_one_line() -> None:
+def test_a_missing_program_is_reported_in_one_line() -> None:
     code, report = audit.vulnerabilities("no-such-program")
     assert (code, report.count("\n")) == (audit.UNREACHED, 0)
     assert "no-such-program" in report

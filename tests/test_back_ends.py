@@ -50,7 +50,7 @@ def ends(count: int = 4) -> tuple[Array, ...]:
 
 
 def test_the_tests_run_the_compiled_library() -> None:
-    """Else all other tests of this run were made by another back end: `python -m tools.build` names the reason."""
+    """Otherwise all other tests of this run used another back end; `python -m tools.build` prints the reason."""
     assert backend() == "c"
     assert sl.backend() == "c"
 
@@ -126,8 +126,8 @@ def test_too_few_arguments_are_refused() -> None:
         batch_end(*ends()[:-1])
 
 
-def test_arrays_that_state_the_byte_order_of_the_processor_are_taken() -> None:
-    """Such an array comes from unpickled data, in a sweep for instance."""
+def test_arrays_with_an_explicit_native_byte_order_are_accepted() -> None:
+    """Unpickled data contains such arrays, for example in a sweep."""
     expected = ends()
     stated = [each.astype(each.dtype.newbyteorder(sys.byteorder)) for each in ends()]
     assert stated[0].data.format != expected[0].data.format
@@ -162,7 +162,7 @@ def test_too_little_memory_is_an_error() -> None:
         cast("Any", inverse_poses)(*arguments)
 
 
-def test_an_entry_keeps_name_and_text_of_its_source() -> None:
+def test_an_entry_has_the_name_and_docstring_of_its_source() -> None:
     assert starting_lengths.__name__ == "starting_lengths"
     assert "lengths" in str(starting_lengths.__doc__)
     assert list(inspect.signature(platform_state).parameters) == list(
@@ -170,7 +170,7 @@ def test_an_entry_keeps_name_and_text_of_its_source() -> None:
     )
 
 
-def test_other_threads_run_while_a_kernel_does() -> None:
+def test_other_threads_run_during_a_kernel() -> None:
     arguments, count = ends(2_000_000), 0
     worker = threading.Thread(target=lambda: [batch_end(*arguments) for _ in range(5)])
     worker.start()
@@ -181,7 +181,7 @@ def test_other_threads_run_while_a_kernel_does() -> None:
 
 
 @pytest.mark.parametrize("content", [b"", b"no library", b"\x7fELF" + bytes(500)])
-def test_a_file_that_is_no_library_is_not_loaded(tmp_path: Path, content: bytes) -> None:
+def test_an_invalid_library_file_is_not_loaded(tmp_path: Path, content: bytes) -> None:
     (tmp_path / FILES[0]).write_bytes(content)
     with pytest.raises(LibraryError, match=FILES[0]):
         Library.load(tmp_path)

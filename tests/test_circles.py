@@ -1,4 +1,4 @@
-"""No two modules import one another, not even for their types: each can be read without the other."""
+"""No two modules import each other, even for types only."""
 
 import ast
 from collections.abc import Iterator
@@ -11,7 +11,7 @@ from tests.tiers import extended
 
 
 def modules() -> dict[str, Path]:
-    """Every module of sagline and its file."""
+    """All modules of sagline with their files."""
     spec = find_spec("sagline")
     assert spec is not None
     assert spec.origin is not None
@@ -21,7 +21,7 @@ def modules() -> dict[str, Path]:
 
 
 def imported(tree: ast.Module, known: set[str]) -> Iterator[str]:
-    """The modules of sagline that a module imports, anywhere in it: inside functions and for types alone too."""
+    """Modules of sagline that a module imports, including imports in functions and for types only."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names if alias.name in known)
@@ -32,7 +32,7 @@ def imported(tree: ast.Module, known: set[str]) -> Iterator[str]:
 
 
 def circles(graph: dict[str, set[str]]) -> list[list[str]]:
-    """Groups of modules each of which leads to every other (Tarjan's strongly connected components)."""
+    """Groups of modules in which each module leads to all others (strongly connected components of Tarjan)."""
     number: dict[str, int] = {}
     low: dict[str, int] = {}
     stack: list[str] = []
@@ -67,12 +67,12 @@ def graph() -> dict[str, set[str]]:
 
 
 @extended
-def test_no_module_leads_back_to_itself(graph: dict[str, set[str]]) -> None:
+def test_imports_have_no_circles(graph: dict[str, set[str]]) -> None:
     assert len(graph) > 200
     assert circles(graph) == []
 
 
-def test_a_circle_would_be_found() -> None:
+def test_a_circle_is_found() -> None:
     tree = ast.parse("if TYPE_CHECKING:\n    from a.b import C\ndef f():\n    from a import d, E\n    import a.g\n")
     assert set(imported(tree, {"a", "a.b", "a.d", "a.g"})) == {"a.b", "a.d", "a", "a.g"}
     graph = {"a": {"b"}, "b": {"c"}, "c": {"a", "d"}, "d": set(), "e": {"e"}}

@@ -1,4 +1,4 @@
-"""CITATION.cff says what the Citation File Format 1.2.0 allows, and the same as the package."""
+"""CITATION.cff follows the Citation File Format 1.2.0 and agrees with the package."""
 
 import tomllib
 from pathlib import Path
@@ -12,7 +12,7 @@ Text = Annotated[str, Field(min_length=1)]
 
 
 class Part(BaseModel):
-    """A part of the file: nothing else stands in it (the format's schema.json, definitions of the same names)."""
+    """A part of the file without other keys (definitions of the same names in schema.json of the format)."""
 
     model_config = ConfigDict(extra="forbid", strict=True, alias_generator=lambda name: name.replace("_", "-"))
 
@@ -51,7 +51,7 @@ class Citation(Part):
     references: list[Reference]
 
 
-def test_the_citation_is_valid_and_that_of_the_package() -> None:
+def test_the_citation_is_valid_and_agrees_with_the_package() -> None:
     found = Citation.model_validate(yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8")))
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     assert (found.version, found.license) == (project["version"], project["license"])

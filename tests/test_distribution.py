@@ -1,4 +1,4 @@
-"""Wheel and source distribution: built, looked into, installed in an empty environment, and used there."""
+"""Wheel and source distribution: built, inspected, installed in an empty environment, and used."""
 
 import email
 import os
@@ -49,14 +49,14 @@ BUILT = (  # by tools/build.py, with gcc or clang on x86-64
 
 
 class Built(NamedTuple):
-    """Where they are."""
+    """Paths of the distributions."""
 
     wheel: Path
     source: Path
 
 
 def run(*words: str | Path, folder: Path) -> str:
-    """What a program prints that knows nothing of this source tree."""
+    """Output of a program that runs outside of this source tree."""
     clean = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "PYTHONSAFEPATH")}
     done = subprocess.run([str(word) for word in words], cwd=folder, env=clean, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
@@ -64,7 +64,7 @@ def run(*words: str | Path, folder: Path) -> str:
 
 
 def build(tree: Path, folder: Path, *targets: str) -> None:
-    """Run the build of pyproject.toml, which needs no network where hatchling is installed."""
+    """Run the build of pyproject.toml; it requires no network if hatchling is installed."""
     where = [path for path in sys.path if path]
     code = f"import sys; sys.path[:] = {where!r}; from hatchling.cli import hatchling; hatchling()"
     chosen = [word for target in targets for word in ("-t", target)]
@@ -89,7 +89,7 @@ def unpacked(built: Built, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def sources(folder: Path) -> set[str]:
-    """The files of a folder that are nobody's cache: not below __pycache__, .ruff_cache and their like."""
+    """Files of a folder, except caches such as __pycache__ and .ruff_cache."""
     found = {path.relative_to(folder) for path in folder.rglob("*") if path.is_file()}
     return {path.as_posix() for path in found if not any("cache" in part and part[0] in "_." for part in path.parts)}
 
@@ -100,8 +100,8 @@ def contents(wheel: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.soak
-def test_a_wheel_and_a_source_that_are_built_twice_have_the_same_bytes(built: Built, tmp_path: Path) -> None:
-    """In folders of different names, with other permissions and another order of hashes."""
+def test_distributions_that_are_built_twice_have_the_same_bytes(built: Built, tmp_path: Path) -> None:
+    """Built in folders of different names, with other permissions and another order of hashes."""
     found = []
     for name, mask, seed in (("a", 0o022, "1"), ("another folder", 0o077, "2")):
         place = tmp_path / name
@@ -119,7 +119,7 @@ def test_a_wheel_and_a_source_that_are_built_twice_have_the_same_bytes(built: Bu
     assert found[0] == found[1]
 
 
-def test_the_wheel_has_the_package_its_data_and_examples_and_nothing_else(built: Built) -> None:
+def test_the_wheel_contains_exactly_the_package_its_data_and_examples(built: Built) -> None:
     package = {f"sagline/{name}" for name in sources(ROOT / "src" / "sagline")}
     examples = {f"sagline/examples/{name}" for name in sources(ROOT / "examples")}
     info = {f"{NAME}.dist-info/{name}" for name in INFO}
@@ -127,7 +127,7 @@ def test_the_wheel_has_the_package_its_data_and_examples_and_nothing_else(built:
     assert {"sagline/py.typed", "sagline/robot/presets/cogiro.yaml", *(f"sagline/{name}" for name in BUILT)} < package
 
 
-def test_the_source_distribution_has_all_that_the_work_needs(unpacked: Path) -> None:
+def test_the_source_distribution_contains_all_files_of_development(unpacked: Path) -> None:
     top = {path.name for path in unpacked.iterdir()}
     folders = {"src", "tests", "docs", "examples", "benchmarks", "tools", "paper", "recipe"}
     files = {"CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "Makefile", "README.md", "mkdocs.yml"}
@@ -147,21 +147,21 @@ def metadata(wheel: Path) -> Message:
     return email.message_from_bytes(contents(wheel)[f"{NAME}.dist-info/METADATA"])
 
 
-def test_what_an_index_would_show(built: Built) -> None:
+def test_metadata_for_an_index(built: Built) -> None:
     told = metadata(built.wheel)
     assert (told["Name"], told["Version"]) == ("sagline", PROJECT["version"])
     assert (told["License-Expression"], told["License-File"]) == ("MIT", "LICENSE")
     assert told["Requires-Python"] == PROJECT["requires-python"]
     assert told["Description-Content-Type"] == "text/markdown"
     assert told["Keywords"].split(",") == sorted(set(PROJECT["keywords"]))
-    assert told.get_all("Classifier") == PROJECT["classifiers"]  # hatchling refuses what is none
+    assert told.get_all("Classifier") == PROJECT["classifiers"]  # hatchling refuses invalid metadata
     assert set(told.get_all("Provides-Extra", [])) == set(PROJECT["optional-dependencies"])
     needed = [line for line in told.get_all("Requires-Dist", []) if "extra ==" not in line]
     assert needed == PROJECT["dependencies"]
 
 
-def test_the_wheel_works_in_an_environment_of_its_own(built: Built, tmp_path: Path) -> None:
-    """Only sagline is installed; what it needs is lent by the environment of the tests, whose sagline is not seen."""
+def test_the_wheel_works_in_another_environment(built: Built, tmp_path: Path) -> None:
+    """Only sagline is installed; its dependencies come from the environment of the tests without its sagline."""
     venv.create(tmp_path / "new", symlinks=True)
     binaries = tmp_path / "new" / "bin"
     offline = ("install", "--no-index", "--no-deps", "--quiet", "--no-compile", "--disable-pip-version-check")
@@ -179,8 +179,8 @@ def test_the_wheel_works_in_an_environment_of_its_own(built: Built, tmp_path: Pa
     assert (tmp_path / "mine" / "own_robot.yaml").is_file()
 
 
-def test_nothing_but_what_is_made_for_an_extra_needs_one() -> None:
-    """Every module loads while the packages of all extras are hidden, but for the viewer and the wires to PLCs."""
+def test_only_modules_of_an_extra_require_it() -> None:
+    """Every module loads without the packages of all extras, except the viewer and the links to PLCs."""
     code = f"""
 import importlib, pkgutil, sys
 class Hidden:
@@ -201,8 +201,8 @@ for module in pkgutil.walk_packages(sagline.__path__, "sagline."):
 
 
 @pytest.mark.soak
-def test_the_wheel_works_with_what_it_asks_for_alone(built: Built, tmp_path: Path) -> None:
-    """From an index, as a user installs it; the kernels compile anew."""
+def test_the_wheel_works_with_its_requirements_only(built: Built, tmp_path: Path) -> None:
+    """From an index, as a user installs it; the kernels are compiled again."""
     venv.create(tmp_path / "new", symlinks=True, with_pip=True)
     binaries = tmp_path / "new" / "bin"
     run(binaries / "python", "-m", "pip", "install", "--quiet", built.wheel, folder=tmp_path)
@@ -212,8 +212,8 @@ def test_the_wheel_works_with_what_it_asks_for_alone(built: Built, tmp_path: Pat
     assert (tmp_path / "made").is_dir()
 
 
-def test_the_viewer_brings_what_its_region_is_made_of() -> None:
-    """The readme installs this extra alone."""
+def test_the_extra_of_the_viewer_contains_the_packages_of_its_region() -> None:
+    """README installs this extra only."""
     extras = PROJECT["optional-dependencies"]
     surface = {line for line in extras["workspace"] if line.startswith(("scikit-image", "trimesh"))}
     assert len(surface) == 2

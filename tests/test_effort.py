@@ -1,4 +1,4 @@
-"""Limits of time: what is too much is found on every machine, and what only a slow machine makes long is not."""
+"""Time limits: excessive time is found on every machine, and the delay of a slow machine is not reported."""
 
 import time
 from itertools import count
@@ -16,35 +16,35 @@ def busy(seconds: float) -> None:
 
 
 @extended
-def test_work_that_takes_too_long_is_found_and_what_was_disturbed_is_not() -> None:
+def test_slow_work_is_found_and_disturbed_work_is_not() -> None:
     assert effort.least_seconds(lambda: busy(0.8), 0.05) > 0.05
-    assert effort.least_seconds(lambda: None, 0.05, seen=9.0) < 0.05  # it was something else, once
+    assert effort.least_seconds(lambda: None, 0.05, seen=9.0) < 0.05  # another process, once
 
 
-def test_what_is_quick_enough_is_not_done_again() -> None:
+def test_fast_work_is_not_repeated() -> None:
     done = count()
     assert effort.least_seconds(done.__next__, 9.0) < 9.0
     assert effort.least_seconds(done.__next__, 9.0, seen=1.0) == 1.0
     assert next(done) == 1
 
 
-def test_a_machine_of_half_the_speed_has_twice_the_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(effort, "piece", lambda: 2.0 * effort.ORDINARY)
+def test_a_machine_with_half_the_speed_has_twice_the_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(effort, "duration_of_fixed_work", lambda: 2.0 * effort.ORDINARY)
     assert effort.least_seconds(lambda: busy(0.15), 0.1) == pytest.approx(0.075, rel=0.2)
     monkeypatch.setattr(effort, "slowness_of_waiting", lambda: 2.0)
     assert effort.best_rate(lambda: 20.0, 30.0) == 40.0
 
 
-def test_a_fast_machine_has_no_less(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(effort, "piece", lambda: 0.1 * effort.ORDINARY)
+def test_the_limit_of_a_fast_machine_is_not_shorter(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(effort, "duration_of_fixed_work", lambda: 0.1 * effort.ORDINARY)
     assert effort.slowness() == 1.0
 
 
-def test_a_rate_that_nothing_excuses_is_told_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_slow_rate_on_an_ordinary_machine_is_not_scaled(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(effort, "slowness_of_waiting", lambda: 1.0)
     assert effort.best_rate(lambda: 20.0, 30.0) == 20.0
     assert effort.slowness() >= 1.0
 
 
-def test_another_process_tells_how_slow_the_machine_is() -> None:
+def test_another_process_measures_the_slowness() -> None:
     assert 1.0 <= effort.slowness_of_waiting() < 1e3

@@ -1,4 +1,4 @@
-"""The article's errata, each shown by a calculation; docs/errata.md lists them by these tests."""
+"""The errata of the article, each shown by a calculation; docs/errata.md lists the tests."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from scipy.spatial.transform import Rotation
 
 import sagline as sl
 
-CABLE = sl.Cable(0.067, 44e3)  # the article's simulation
+CABLE = sl.Cable(0.067, 44e3)  # simulation of the article
 WEIGHT = 0.067 * 9.81
 
 
 def worst_error(robot: sl.Robot, model: sl.CableModel) -> float:
-    """Largest position error along the article's path with a model's lengths [m]."""
+    """Largest position error along the path of the article with the lengths of a model [m]."""
     plan = sl.inverse(robot, sl.article_path(rate=5.0), model, sl.MinimumNorm())
     found = sl.forward(robot, plan.unstrained_length, start=plan.state.pose, wrench=plan.state.wrench)
     return float(np.linalg.norm(found.pose.position - plan.state.pose.position, axis=1).max())
 
 
 def test_erratum_1_the_printed_sign_of_the_intercept_costs_a_centimeter() -> None:
-    """(28), (30): b_pi = +rho g D/2 at the platform end; the printed minus is the frame end's."""
+    """(28), (30): b_pi = +rho g D/2 at the platform end; the printed minus sign is for the frame end."""
     state = sl.Catenary().from_tension(CABLE, 8.0, -5.0, 300.0)
     chord, slope = math.hypot(8.0, 5.0), -5.0 / 8.0
     at_platform = float(state.vertical_force - slope * state.horizontal_tension)
@@ -36,12 +36,12 @@ def test_erratum_1_the_printed_sign_of_the_intercept_costs_a_centimeter() -> Non
 
 
 def test_erratum_2_gravity_read_literally_counts_twice_or_not_at_all() -> None:
-    """(5) adds M g and (51) holds -mg: for either sign of g the cables would lift 0 or 2 Mg. They lift Mg."""
+    """(5) adds M g and (51) contains -mg: for both signs of g the cables would carry 0 or 2 Mg. They carry Mg."""
     robot = sl.load_robot("article-suspended")
     pose = sl.Pose.from_euler([0.5, -0.3, 1.5], 0.0, 0.0, 0.0)
     weight = robot.mass * robot.gravity
     _, b = sl.article_balance(robot, pose)
-    pulls = b[2] + weight  # what the cables' own weight adds; (51) with its -mg taken out
+    pulls = b[2] + weight  # the contribution of the weight of the cables; (51) without its -mg
     for sign, lifted in ((-1.0, 0.0), (1.0, 2.0)):
         literal = sign * weight - (b[2] - pulls)
         np.testing.assert_allclose(literal, lifted * weight)
@@ -50,7 +50,7 @@ def test_erratum_2_gravity_read_literally_counts_twice_or_not_at_all() -> None:
 
 
 def test_erratum_3_euler_accelerations_and_the_spurious_force() -> None:
-    """(5): Euler-angle rates are not the angular velocity, and M W x' is no force."""
+    """(5): Euler-angle rates are not the angular velocity, and M W x' is not a force."""
     alpha, beta, gamma = 0.4, 0.5, -0.3
     rates, step = np.array([0.7, -0.4, 0.6]), 1e-6
 
@@ -61,13 +61,13 @@ def test_erratum_3_euler_accelerations_and_the_spurious_force() -> None:
     sa, ca, sb, cb = math.sin(alpha), math.cos(alpha), math.sin(beta), math.cos(beta)
     mapped = [-sa * rates[1] + ca * cb * rates[2], ca * rates[1] + sa * cb * rates[2], rates[0] - sb * rates[2]]
     np.testing.assert_allclose(omega, mapped, atol=1e-9)
-    assert np.linalg.norm(omega - rates[::-1]) > 0.3  # against (gamma', beta', alpha') taken as x, y, z rates
+    assert np.linalg.norm(omega - rates[::-1]) > 0.3  # compared with (gamma', beta', alpha') as x, y, z rates
     robot = sl.load_robot("article-suspended")
-    coasting = np.array([[1.0, 0.5, 0.0, 0.0, 0.0, 0.8]])  # constant velocity and spin: no force is needed
+    coasting = np.array([[1.0, 0.5, 0.0, 0.0, 0.0, 0.8]])  # constant velocity and spin: no force is required
     pose = sl.Pose(np.zeros((1, 3)), Rotation.identity())
     force = sl.inertial_wrench(robot, pose, coasting, np.zeros((1, 6)))[0, :3]
     np.testing.assert_allclose(force, 0.0, atol=1e-12)
-    assert robot.mass * np.linalg.norm(np.cross(coasting[0, 3:], coasting[0, :3])) > 40.0  # the article's M W x'
+    assert robot.mass * np.linalg.norm(np.cross(coasting[0, 3:], coasting[0, :3])) > 40.0  # M W x' of the article
 
 
 def test_erratum_4_the_normal_matrix_has_no_inverse() -> None:
@@ -95,7 +95,7 @@ def test_erratum_5_the_stretch_takes_the_mean_tension_not_the_one_at_the_end() -
 
 
 def test_erratum_6_the_published_sag_constant_is_a_tenth_too_large_for_shallow_cables() -> None:
-    """(45): k_p = 4.385 against g^2/24 = 4.010, found again from exact, inextensible cables."""
+    """(45): k_p = 4.385 compared with g^2/24 = 4.010, the result of exact, inextensible cables."""
     stiff = sl.Cable(0.067, 1e14)
     tension = np.array([300.0, 600.0])
     state = sl.Catenary().from_tension(stiff, 9.0, 4.0, tension)
@@ -105,7 +105,7 @@ def test_erratum_6_the_published_sag_constant_is_a_tenth_too_large_for_shallow_c
 
 
 def test_erratum_7_the_bound_of_a_suspended_cable_is_positive() -> None:
-    """(54): T_x > +|b_pi/a_pi| is where the lowest point of the exact cable leaves the span."""
+    """(54): T_x > +|b_pi/a_pi| is the condition that the lowest point of the exact cable leaves the span."""
     span, rise = 8.0, -3.0
     bound = WEIGHT * math.hypot(span, rise) / 2 / abs(rise / span)
     assert bound > 0
@@ -120,7 +120,7 @@ def test_erratum_7_the_bound_of_a_suspended_cable_is_positive() -> None:
 
 
 def test_erratum_8_the_articles_variables_break_down_under_an_anchor_and_at_level() -> None:
-    """(26), (50): tan(phi) is infinite for a vertical cable; (54) is infinite for a level one. Ours are not."""
+    """(26), (50): tan(phi) is infinite for a vertical cable; (54) is infinite for a level one. Ours are finite."""
     robot = sl.load_robot("article-suspended")
     anchor, corner = robot.frame_anchors[0], robot.platform_anchors[0]
     under = sl.Pose.from_euler([*(anchor - corner)[:2], 2.0], 0.0, 0.0, 0.0)
@@ -144,12 +144,12 @@ def test_erratum_9_the_errors_of_table_2_are_distances() -> None:
     np.testing.assert_allclose(np.linalg.norm(actual - desired, axis=1) * 1e3, [17.1464, 44.7884], atol=5e-5)
     robot = sl.load_robot("article-prototype")
     ends = actual[0] + robot.platform_anchors
-    assert np.linalg.norm((ends - actual[0]).sum(axis=0)) < 1e-12  # read as a sum of B_i - P it is always 0
-    assert np.linalg.norm(ends.sum(axis=0) - actual[0]) > 5.0  # and as (sum of B_i) - P meters
+    assert np.linalg.norm((ends - actual[0]).sum(axis=0)) < 1e-12  # the sum of B_i - P is always 0
+    assert np.linalg.norm(ends.sum(axis=0) - actual[0]) > 5.0  # (sum of B_i) - P in meters
 
 
 def test_erratum_10_the_robots_are_those_of_table_1() -> None:
-    """Section 7 says Table 2 for the robot parameters; the presets carry Table 1's."""
+    """Section 7 names Table 2 for the robot parameters; the presets use Table 1."""
     for name, density, stiffness in (
         ("article-suspended", 0.067, 2e9 * 22e-6),
         ("article-mixed", 0.067, 2e9 * 22e-6),
@@ -162,7 +162,7 @@ def test_erratum_10_the_robots_are_those_of_table_1() -> None:
 
 
 def test_erratum_11_the_smallest_tension_on_the_line_and_the_direction_of_the_rotation() -> None:
-    """(31): min |T| on T_z = a T_x + b is |b|/sqrt(1 + a^2); (8): the rotation of (9) is platform -> world already."""
+    """(31): min |T| on T_z = a T_x + b is |b|/sqrt(1 + a^2); (8): the rotation of (9) is already platform -> world."""
     a, b = -0.6, 3.0
     found = minimize_scalar(lambda t: math.hypot(t, a * t + b)).fun
     np.testing.assert_allclose(found, abs(b) / math.sqrt(1 + a * a), rtol=1e-8)

@@ -1,4 +1,4 @@
-"""Messages of errors: one line of less than 300 letters, whatever they are about."""
+"""Messages of errors: one line of less than 300 characters for any content."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from sagline.core.errors import MOST, nearest, printable, shortened
 SEED = 7
 
 
-def test_an_error_is_one_short_line_whatever_is_in_it() -> None:
+def test_an_error_is_one_short_line_for_any_content() -> None:
     long = "x" * 5000
     for error in (
         InvalidValueError(long, long, long, long),
@@ -27,7 +27,7 @@ def test_an_error_is_one_short_line_whatever_is_in_it() -> None:
         assert text.encode("utf-8").isascii() or "…" in text
 
 
-def test_what_is_short_stays_when_something_long_is_cut() -> None:
+def test_short_parts_are_kept_and_long_parts_are_cut() -> None:
     begin, end, step = "name is ", "; allowed: a word", "Correct name."
     text = str(FileError("robot.yaml", begin + "y" * 1000 + end, step))
     assert text.startswith(f"robot.yaml: {begin}yyy")
@@ -37,7 +37,7 @@ def test_what_is_short_stays_when_something_long_is_cut() -> None:
 
 
 @pytest.mark.parametrize("long", range(4))
-def test_a_long_part_loses_its_middle_and_the_others_nothing(long: int) -> None:
+def test_a_long_part_loses_its_middle(long: int) -> None:
     parts = ["the item", "the value", "what is allowed", "What to do."]
     parts[long] = f"begin{'x' * 5000}end"
     text = str(InvalidValueError(*parts))
@@ -58,7 +58,7 @@ def test_texts_of_any_length_fit_together() -> None:
             assert fitted == parts
 
 
-def test_errors_keep_their_data_whole() -> None:
+def test_attributes_of_errors_are_complete() -> None:
     error = InvalidValueError("mass", "z" * 1000, "> 0 kg", "Correct mass.")
     assert error.value == "z" * 1000
     again = pickle.loads(pickle.dumps(FileError.of("a.yaml", error)))
@@ -69,7 +69,7 @@ def test_errors_keep_their_data_whole() -> None:
 @pytest.mark.parametrize(
     "text", ["", "plain", "Größe µ ² — …", "日本語", "a b\u00a0c\u202fd", "−7.1 µm · 3 × 4", "عربي"]
 )
-def test_what_prints_stays(text: str) -> None:
+def test_printable_text_is_unchanged(text: str) -> None:
     assert printable(text) == text
 
 
@@ -86,22 +86,22 @@ def test_what_prints_stays(text: str) -> None:
         ("\ue000\U000e0001", r"\ue000\U000e0001"),
     ],
 )
-def test_what_does_not_print_is_written_out(text: str, shown: str) -> None:
+def test_unprintable_characters_are_escaped(text: str, shown: str) -> None:
     assert printable(text) == shown
 
 
-def test_what_may_stay_stays() -> None:
+def test_permitted_characters_are_unchanged() -> None:
     assert printable("a\nb\x1b", "\n") == "a\nb\\x1b"
 
 
-def test_every_control_character_is_written_out() -> None:
+def test_every_control_character_is_escaped() -> None:
     for code in [*range(0x20), *range(0x7F, 0xA0), 0xDCFF]:
         shown = printable(f"a{chr(code)}b")
         assert shown.isprintable(), hex(code)
         assert shown.startswith("a\\"), hex(code)
 
 
-def test_only_near_words_are_suggested() -> None:
+def test_only_similar_words_are_suggested() -> None:
     robots = ["article-mixed", "cogiro", "fast", "ipanema-1"]
     assert nearest("cogero", robots) == "cogiro"
     assert nearest("IPANEMA1", robots) == "ipanema-1"

@@ -1,4 +1,4 @@
-"""Numbers for a reader, read back by another way: what is printed is the number, to the digits that are printed."""
+"""Printed numbers, parsed by another program: the text is the number rounded to the printed digits."""
 
 import re
 from decimal import Decimal
@@ -16,7 +16,7 @@ POWER = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 
 
 def read(text: str, unit: str) -> tuple[Decimal, Decimal, Decimal]:
-    """The value in the unit, half a unit of its last digit, and the mantissa that is seen."""
+    """Value in the unit, half a unit of its last digit, and the printed mantissa."""
     found = TEXT.fullmatch(text)
     assert found is not None, text
     sign, digits, power, shown = found.groups()
@@ -29,7 +29,7 @@ def read(text: str, unit: str) -> tuple[Decimal, Decimal, Decimal]:
 
 
 def shift(shown: str, unit: str) -> int:
-    """The power of ten from the unit that is shown to the one that was meant."""
+    """Power of ten from the printed unit to the given unit."""
     if shown == unit:
         return 0
     own, base = (
@@ -53,9 +53,9 @@ def cases(count: int) -> list[tuple[float, str, str]]:
 
 def check(value: float, form: str, unit: str) -> None:
     text = n(value, form, unit)
-    assert not re.search(r"\de|[-]| {1}", text), text  # no exponents, hyphens, or spaces that break
+    assert not re.search(r"\de|[-]| {1}", text), text  # no exponents, hyphens or breaking spaces
     found, half, mantissa = read(text, unit)
-    rounded = form.endswith("g") and found != 0  # of n significant digits trailing zeros may be missing
+    rounded = form.endswith("g") and found != 0  # trailing zeros of n significant digits may be omitted
     digits = int(re.findall(r"\.(\d)", form)[0])
     slack = max(half, abs(found) * Decimal(10) ** (1 - digits) / 2) if rounded else half
     assert abs(found - Decimal(value)) <= slack * Decimal("1.0001"), (value, text)
@@ -65,13 +65,13 @@ def check(value: float, form: str, unit: str) -> None:
         assert Decimal("0.1") <= mantissa < 1000, (value, text)
 
 
-def test_what_is_printed_is_the_number() -> None:
+def test_the_printed_text_is_the_number() -> None:
     for case in cases(2000):
         check(*case)
 
 
 @pytest.mark.soak
-def test_what_is_printed_is_the_number_whatever_it_is() -> None:
+def test_the_printed_text_is_the_number_for_any_number() -> None:
     for case in cases(100_000):
         check(*case)
 
@@ -117,11 +117,11 @@ def test_numbers_by_hand(value: float, form: str, unit: str, text: str) -> None:
     ],
 )
 def test_uncertainties_by_hand(value: float, uncertainty: float, unit: str, text: str) -> None:
-    """Two digits of the uncertainty behind as many of the value, as JCGM 100:2008, 7.2.2, writes 100.021 47(35)."""
+    """Two digits of the uncertainty after the digits of the value, as 100.021 47(35) in JCGM 100:2008, 7.2.2."""
     assert n(value, unit=unit, uncertainty=uncertainty).replace("\u00a0", " ") == text
 
 
-def test_uncertainties_read_back() -> None:
+def test_printed_uncertainties_are_parsed_exactly() -> None:
     random = np.random.default_rng(7)
     for value, ratio in zip(10.0 ** random.uniform(-9, 6, 500), 10.0 ** random.uniform(-6, 1.5, 500), strict=True):
         error = value * ratio
@@ -134,10 +134,10 @@ def test_uncertainties_read_back() -> None:
         assert float(digits) * scale == pytest.approx(value, abs=0.051 * error)
 
 
-def test_rounding_is_told_as_such() -> None:
+def test_values_of_rounding_are_printed_as_rounding() -> None:
     assert n(-7.1054e-15, ".5g", "N", size=490.5) == "0 (rounding)"
     assert n(4.2e-11, ".3g", "mm", size=16e3) == "0 (rounding)"
-    assert n(1e-6, ".3g", "N", size=490.5) == "1\u00a0µN"  # small, but no rounding
+    assert n(1e-6, ".3g", "N", size=490.5) == "1\u00a0µN"  # small, and not caused by rounding
     assert n(0.0, ".3g", "N", size=490.5) == "0\u00a0N"  # exactly
 
 
@@ -148,7 +148,7 @@ def test_rounding_is_told_as_such() -> None:
         (-7.17611, 0.00123, "m", "−7.1761 ± 0.0012 m"),
         (0.0123, 0.00096, "m", "12.30 ± 0.96 mm"),
         (0.0004, 0.0196, "m", "0 ± 20 mm"),
-        (1.0, 0.0995, "", "1.00 ± 0.10"),  # 0.0995 is written 0.10, of two digits
+        (1.0, 0.0995, "", "1.00 ± 0.10"),  # 0.0995 is printed as 0.10 with two digits
         (1.0, 3456.0, "s", "0 ± 3,500 s"),
         (5.0, float("inf"), "kg", "5 kg, not told"),
         (5.0, 0.0, "kg", "5 kg ± 0"),
@@ -160,5 +160,5 @@ def test_a_number_with_its_error_is_rounded_to_the_error(value: float, error: fl
     )
 
 
-def test_in_a_column_no_number_has_a_prefix() -> None:
+def test_numbers_of_a_column_have_no_prefix() -> None:
     assert plus_minus(0.0123, 0.00096, prefixed=False) == "0.01230\u00a0±\u00a00.00096"

@@ -13,9 +13,9 @@ from tools import prose, size
 
 TESTS = Path(__file__).parent
 LETTERS = re.compile(r"[A-Za-z]{2}")
-SENTENCES = 25  # literal sentences that may be left, outside the snapshots
-FOREIGN = 65  # imports of inner modules of another folder that may be left
-# Places whose tests look at every module, and modules that any test may import: core, kernels, the command line.
+SENTENCES = 25  # largest number of literal sentences outside the snapshots
+FOREIGN = 65  # largest number of imports of inner modules of another folder
+# Folders whose tests inspect all modules, and modules that any test may import: core, kernels, the command line.
 OF_ALL_MODULES = {"kernels", "translate", "abuse", "fuzz", "docs", "mutants", "conftest.py"}
 OPEN = re.compile(r"sagline\.((core|kernels)\b|cli\.main$)")
 
@@ -26,7 +26,7 @@ def trees() -> dict[Path, ast.Module]:
 
 
 def is_sentence(node: ast.AST) -> bool:
-    """Whether a literal has three words or more, as the messages of sagline have."""
+    """True if a literal has three words or more, like the messages of sagline."""
     if isinstance(node, ast.JoinedStr):
         text = "".join(str(part.value) for part in node.values if isinstance(part, ast.Constant))
     else:
@@ -35,7 +35,7 @@ def is_sentence(node: ast.AST) -> bool:
 
 
 def sentences(tree: ast.Module) -> Iterator[int]:
-    """Lines of the sentences that are compared: in an assertion, or as `match` of `pytest.raises`."""
+    """Lines with compared sentences: in an assertion, or as `match` of `pytest.raises`."""
     for node in ast.walk(tree):
         looked_at = node.test if isinstance(node, ast.Assert) else None
         if isinstance(node, ast.keyword) and node.arg == "match":
@@ -79,7 +79,7 @@ def test_few_tests_import_inner_modules_of_another_folder() -> None:
     assert len(found) <= FOREIGN, f"{len(found)} imports; use public names, or the folder's own modules: {found}"
 
 
-def test_a_sentence_is_told_from_a_name_and_from_a_number_with_its_unit() -> None:
+def test_names_and_numbers_with_units_are_no_sentences() -> None:
     code = """
 assert "mass is not positive" in text
 assert error.item == "cable 3: linear_density"

@@ -1,4 +1,4 @@
-"""Statuses are the codes that kernels return, each with its sentence."""
+"""Statuses are the codes of the kernels, each with a sentence."""
 
 import pickle
 
@@ -8,12 +8,12 @@ import sagline as sl
 from sagline.core.status import Status
 from sagline.kernels import codes
 
-# no kernel answers NO_POSE: what is no pose does not reach one
+# kernels do not return NO_POSE: invalid poses do not reach them
 PREFIX = {sl.CableStatus: "CABLE_", sl.PoseStatus: "POSE_", sl.ForwardStatus: "FORWARD_"}
 
 
 @pytest.mark.parametrize("kind", PREFIX)
-def test_a_status_for_every_code_and_a_sentence_for_every_status(kind: type[Status]) -> None:
+def test_every_code_has_a_status_and_every_status_a_sentence(kind: type[Status]) -> None:
     known = {
         name.removeprefix(PREFIX[kind]): code for name, code in vars(codes).items() if name.startswith(PREFIX[kind])
     }

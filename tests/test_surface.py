@@ -10,21 +10,21 @@ import sagline as sl
 from sagline.core.surface import public_names
 from tests.tiers import extended
 
-# yaml is no matter: numba loads it
+# yaml is allowed: numba loads it
 PACKAGES = ("matplotlib", "xarray", "h5netcdf", "h5py", "pint", "pydantic", "typer", "rich", "scipy.spatial")
 HEAVY = (*PACKAGES, "mcap", "mcap_protobuf", "google.protobuf", "zstandard", "snap7", "pymodbus")
 GROUPS = [name for name in sl.__all__ if isinstance(getattr(sl, name), ModuleType)]
-TOP = 45  # largest number of listed names beside the groups
+TOP = 45  # largest number of listed names without those of groups
 
 
-def test_every_public_name_is_there() -> None:
+def test_every_public_name_exists() -> None:
     assert [name for name in public_names("sagline") if not hasattr(sl, name)] == []
     assert dir(sl) == sorted(sl.__all__)
     assert len(sl.__all__) - len(GROUPS) <= TOP
 
 
 @pytest.mark.parametrize("name", GROUPS)
-def test_a_group_shows_its_public_names_alone(name: str) -> None:
+def test_a_group_shows_only_its_public_names(name: str) -> None:
     group = getattr(sl, name)
     assert dir(group) == sorted(group.__all__) == sorted(public_names(f"sagline.{name}"))
     assert not [each for each in dir(group) if each.startswith("_") or isinstance(getattr(group, each), ModuleType)]
@@ -54,7 +54,7 @@ def test_an_unknown_name_is_an_attribute_error() -> None:
 
 
 @extended
-def test_import_loads_the_core_alone() -> None:
+def test_import_loads_only_the_core() -> None:
     code = f"import sys, sagline; print([name for name in {HEAVY} if name in sys.modules])"
     out = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
     assert out.strip() == "[]"

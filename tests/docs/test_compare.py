@@ -1,4 +1,4 @@
-"""docs/compare.md: every fact about another program leads to a source, and those about sagline hold."""
+"""docs/compare.md: each statement on another program has a source, and the statements on sagline are true."""
 
 import re
 import tomllib
@@ -14,12 +14,12 @@ ROOT = Path(__file__).parents[2]
 FACTS, _, SOURCES = (ROOT / "docs" / "compare.md").read_text(encoding="utf-8").partition("\n## Sources\n")
 LETTERS = {"CASPR": "C", "WireX": "W", "MuJoCo": "M", "cdpyr": "D"}
 NEIGHBORS = {"MoorPy": "P", "MoorDyn": "Y", "IRMA": "I", "Hangprinter": "H", "GTDynamics": "G", "cdpr_simulator": "T"}
-OWN_TESTS = ("MuJoCo", "cdpyr")  # programs whose cells need no source: MuJoCo is run by tests
+OWN_TESTS = ("MuJoCo", "cdpyr")  # programs whose cells need no source: tests run MuJoCo
 LABEL = re.compile(r"\[([CWMDPYIHGT]\d+(?:, [CWMDPYIHGT]\d+)*)\]")
 
 
 def rows(head: str) -> dict[str, list[str]]:
-    """The rows of the table that begins with this line, by their first cell."""
+    """Rows by their first cell of the table that begins with the given line."""
     table = FACTS[FACTS.index(head) :].split("\n\n")[0].splitlines()
     cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in table[2:]]
     return {first: rest for first, *rest in cells}
@@ -30,7 +30,7 @@ NEAR = rows("| | sagline | MoorPy |")
 
 
 def labels(text: str) -> list[str]:
-    """Labels of sources in the text, also several in one bracket."""
+    """Labels of sources in the text; a bracket can contain several."""
     return [label for found in LABEL.findall(text) for label in found.split(", ")]
 
 
@@ -42,7 +42,7 @@ def test_every_source_is_named_and_used() -> None:
 
 
 @pytest.mark.parametrize(("table", "programs"), [(FEATURES, LETTERS), (NEAR, NEIGHBORS)], ids=["robots", "neighbors"])
-def test_what_is_said_of_another_program_has_a_source_of_that_program(
+def test_statements_on_other_programs_have_a_source_of_that_program(
     table: dict[str, list[str]], programs: dict[str, str]
 ) -> None:
     told = 0
@@ -62,8 +62,8 @@ def test_every_program_has_a_version_and_a_task() -> None:
     assert not {name for name in NEIGHBORS if name not in tasks}
 
 
-@extended  # it imports all of sagline
-def test_what_is_said_of_sagline() -> None:
+@extended  # counts all modules of sagline
+def test_statements_on_sagline_are_true() -> None:
     version = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
     assert rows("| program |")["sagline"][0] == version
     said = [cells[0] for cells in (*FEATURES.values(), *NEAR.values())]
@@ -74,7 +74,7 @@ def test_what_is_said_of_sagline() -> None:
 
 
 def count_of(base: type) -> int:
-    """Number of public kinds of a class."""
+    """Number of public subclasses of a class."""
     return sum(
         isinstance(each, type) and issubclass(each, base) and each is not base for each in public_values().values()
     )

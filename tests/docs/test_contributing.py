@@ -1,7 +1,8 @@
-"""The pages on contributing are followed, step by step, in a copy of the source.
+"""The pages on contributing are executed step by step in a copy of the source.
 
-A block with a title is that file; one of `diff` changes it, every part of the change at exactly one place; a line that
-ends in … stands for what begins so. A block of `console` is run, with the kernels as plain Python: nothing compiles.
+A block with a file name as title is that file. A `diff` block changes it; each part of the change fits at exactly one
+place. A line that ends in … is an abbreviation of the line that begins in the same way. The commands of a `console`
+block run with the kernels as plain Python, without compilation.
 """
 
 import os
@@ -23,7 +24,7 @@ PAGES = sorted(each for each in (ROOT / "docs" / "contributing").glob("*.md") if
 BLOCK = re.compile(r'^```(?P<kind>\w+)(?: title="(?P<file>[^"]+)")?\n(?P<text>.*?)^```$', re.MULTILINE | re.DOTALL)
 COPIED = ("src", "tests", "tools", "docs", "pyproject.toml", "README.md", "CHANGELOG.md")
 STEPS = 10
-PLACES = {  # what a page's words stand for in the copy
+PLACES = {  # placeholders of a page with their values in the copy
     ".venv/bin/python": [sys.executable],
     "ruff": [sys.executable, "-m", "ruff"],
     "sagline": [sys.executable, "-m", "sagline.cli"],
@@ -38,7 +39,7 @@ class Change(NamedTuple):
 
 
 def changes(text: str) -> list[Change]:
-    """The parts of a block of `diff`."""
+    """Parts of a `diff` block."""
     parts = re.split(r"^@@$\n?", text, flags=re.MULTILINE)
     return [
         Change(
@@ -54,7 +55,7 @@ def is_like(line: str, shown: str) -> bool:
 
 
 def changed(source: list[str], change: Change, where: str) -> list[str]:
-    """The lines of a file after a part of a change, which fits at exactly one place."""
+    """Lines of the file after a part of a change, which must fit at exactly one place."""
     length = len(change.before)
     assert length > 0, f"{where}: a change without a line that stays says not where it belongs"
     starts = range(len(source) - length + 1)
@@ -68,13 +69,13 @@ def changed(source: list[str], change: Change, where: str) -> list[str]:
             new.append(line[1:])
             continue
         while next(shown) != line[1:]:
-            next(kept)  # a line that goes
+            next(kept)  # a removed line
         new.append(source[next(kept)])
     return [*source[: fits[0]], *new, *source[fits[0] + length :]]
 
 
 def copy_of_the_source(folder: Path) -> Path:
-    ignored = shutil.ignore_patterns(".*_cache")  # but what Python has read stays, which saves seconds
+    ignored = shutil.ignore_patterns(".*_cache")  # the caches of Python are kept, which saves seconds
     for name in COPIED:
         if (ROOT / name).is_dir():
             shutil.copytree(ROOT / name, folder / name, ignore=ignored)
@@ -94,7 +95,7 @@ def run(line: str, folder: Path, environment: dict[str, str]) -> None:
 
 
 def follow(page: Path, folder: Path, environment: dict[str, str]) -> None:
-    """Do what a page says, block by block; what it writes is in the style of the house."""
+    """Execute the blocks of a page in order; the written files have the style of the project."""
     written: set[str] = set()
     for block in BLOCK.finditer(page.read_text(encoding="utf-8")):
         file = folder / (block["file"] or "")
@@ -123,25 +124,25 @@ def test_a_page_has_ten_steps(page: Path) -> None:
 
 @extended
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_the_steps_lead_to_what_they_say(page: Path, tmp_path: Path) -> None:
+def test_the_steps_give_the_printed_results(page: Path, tmp_path: Path) -> None:
     follow(page, copy_of_the_source(tmp_path), {"SAGLINE_BACKEND": "python"})
 
 
 @pytest.mark.soak
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_the_steps_lead_there_in_machine_code_too(page: Path, tmp_path: Path) -> None:
+def test_the_steps_give_the_printed_results_in_machine_code(page: Path, tmp_path: Path) -> None:
     follow(page, copy_of_the_source(tmp_path / "tree"), {"NUMBA_CACHE_DIR": str(tmp_path / "kernels")})
 
 
-def test_a_change_that_does_not_fit_is_no_change() -> None:
+def test_a_change_that_does_not_fit_is_an_error() -> None:
     source = ["a", "long", "b", "a"]
 
-    def tried(text: str) -> list[str]:
+    def is_applied(text: str) -> list[str]:
         (change,) = changes(text)
         return changed(source, change, "here")
 
-    assert tried(" lo…\n+new\n") == ["a", "long", "new", "b", "a"]
-    assert tried("-long\n+new\n b\n") == ["a", "new", "b", "a"]
+    assert is_applied(" lo…\n+new\n") == ["a", "long", "new", "b", "a"]
+    assert is_applied("-long\n+new\n b\n") == ["a", "new", "b", "a"]
     for wrong in (" a\n+new\n", " c\n+new\n", "+new\n"):
         with pytest.raises(AssertionError, match="here"):
-            tried(wrong)
+            is_applied(wrong)

@@ -1,4 +1,4 @@
-"""docs/explore.md in headless Chromium: its script calculates what the library does, and people can use it."""
+"""docs/explore.md in headless Chromium: its script computes the numbers of the library, and its controls work."""
 
 import re
 import shutil
@@ -51,7 +51,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def page(browser: Browser, site: Path) -> Iterator[Page]:
-    """Opened from the disk; it complains of nothing and asks for nothing but its own three files."""
+    """The page opened from the disk; it reports no errors and requests only its own three files."""
     complaints: list[str] = []
     asked: list[str] = []
     page = browser.new_page(viewport={"width": 390, "height": 844})
@@ -69,7 +69,7 @@ def page(browser: Browser, site: Path) -> Iterator[Page]:
 
 
 def grid() -> list[dict[str, float]]:
-    """Cables from end to end of every slider and beyond, level ones too."""
+    """Cables over the ranges of all sliders and beyond, including level ones."""
     rises, densities = (-5.0, -4.0, -0.1, 0.0, 3.0), (1e-4, 0.01, 0.067, 0.5)
     every = product(rises, densities, (5e3, 44e3, 5e6), (20.0, 100.0, 2000.0))
     fixed = {"span": explore.SPAN, "gravity": explore.GRAVITY}
@@ -77,7 +77,7 @@ def grid() -> list[dict[str, float]]:
 
 
 @pytest.mark.parametrize(("function", "model"), [("exact", sl.Catenary()), ("empirical", sl.Empirical())])
-def test_the_script_calculates_what_the_library_does(page: Page, function: str, model: sl.CableModel) -> None:
+def test_the_script_computes_the_numbers_of_the_library(page: Page, function: str, model: sl.CableModel) -> None:
     given = grid()
     found: list[dict[str, Any]] = page.evaluate(ALL % function, given)
     column = {name: np.array([one[name] for one in given]) for name in given[0]}
@@ -98,19 +98,19 @@ def table(page: Page) -> dict[str, list[str]]:
     return {str(row.get_attribute("data-row")): row.locator("td").all_text_contents() for row in rows}
 
 
-def told(slider: Any) -> float:
+def printed_numbers(slider: Any) -> float:
     return float(slider.get_attribute("aria-valuetext").split()[0].replace("−", "-"))
 
 
-def test_sliders_move_by_keyboard_and_every_number_follows(page: Page) -> None:
+def test_the_keyboard_moves_sliders_and_all_numbers_change(page: Page) -> None:
     weight, stiffness = page.get_by_label("Weight"), page.get_by_label("Stiffness EA")
     tension, height = page.get_by_label("Tension along the chord"), page.get_by_label("Height of the platform end")
-    assert [told(each) for each in (weight, stiffness, tension, height)] == [67.0, 44.0, 100.0, -4.0]
+    assert [printed_numbers(each) for each in (weight, stiffness, tension, height)] == [67.0, 44.0, 100.0, -4.0]
     for slider, keys in ((weight, "ArrowRight"), (stiffness, "ArrowLeft"), (tension, "PageDown"), (height, "End")):
         slider.focus()
         page.keyboard.press(keys)
-    values = [told(each) for each in (weight, stiffness, tension, height)]
-    assert values[:2] == [70.4, 40.0]  # a step up by 5 %, one down by 10 %
+    values = [printed_numbers(each) for each in (weight, stiffness, tension, height)]
+    assert values[:2] == [70.4, 40.0]  # a step up is 5 %, a step down 10 %
     assert values[2] < 65.0
     assert values[3] == 3.0
     cable = sl.Cable(1e-3 * values[0], 1e3 * values[1])
@@ -130,7 +130,7 @@ def test_sliders_move_by_keyboard_and_every_number_follows(page: Page) -> None:
     assert f"Exact length {exact.unstrained_length:.3f} m" in said
 
 
-def test_the_pictures_follow(page: Page) -> None:
+def test_the_pictures_change(page: Page) -> None:
     pictures = page.locator("svg[data-picture]")
     before = [picture.inner_html() for picture in pictures.all()]
     assert len(before) == 2
@@ -140,8 +140,10 @@ def test_the_pictures_follow(page: Page) -> None:
     assert [picture.inner_html() for picture in pictures.all()] == before
 
 
-def test_what_the_page_says_of_its_cables(page: Page) -> None:
-    """Slack and heavy decimeters too short, out of range; taut half the weight's stretch too long; level always out."""
+def test_the_verdicts_of_the_page_on_its_cables(page: Page) -> None:
+    """Slack cables that are decimeters too short are out of range, and so are taut cables that are too long by half the
+    stretch due to their weight, and level cables.
+    """
     note = page.get_by_text("Outside the article’s range")
     assert not note.is_visible()
     page.get_by_role("button", name="Heavy and slack").click()
@@ -152,9 +154,9 @@ def test_what_the_page_says_of_its_cables(page: Page) -> None:
     slider = page.get_by_label("Tension along the chord")
     slider.focus()
     page.keyboard.press("End")
-    # the force at the lower end is smaller by half the weight along the slope, and stretches it by so much less
+    # the force at the lower end is smaller by half the weight along the slope, which reduces the stretch
     chord, less = 160**0.5, 0.5 * 0.067 * explore.GRAVITY * 4.0 / 44e3
-    assert table(page)["length"][2] == f"+{1e3 * chord * less / (1.0 + told(slider) / 44e3) ** 2:.1f} mm"
+    assert table(page)["length"][2] == f"+{1e3 * chord * less / (1.0 + printed_numbers(slider) / 44e3) ** 2:.1f} mm"
     page.get_by_label("Height of the platform end").fill("0")
     assert note.is_visible()
 

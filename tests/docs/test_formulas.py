@@ -1,4 +1,4 @@
-"""The formulas of the pages stand between dollars, where they are typeset; `make docs` fails where one cannot be."""
+"""Formulas of the pages are between dollar signs, and `make docs` fails if one of them cannot be typeset."""
 
 import re
 from pathlib import Path
@@ -14,7 +14,7 @@ UNSET = re.compile(rf"[α-λν-ωΓΔΘΛΞΣΦΨΩ∂√∑∫]|\b[A-Za-z]_[A-Z
 
 
 def unset(text: str) -> list[str]:
-    """What looks like a formula in prose, with what stands around it."""
+    """Text in prose that looks like a formula, with its surroundings."""
     prose = FORMULA.sub("", CODE.sub("", text))
     found = [prose[max(0, match.start() - 20) : match.end() + 20] for match in UNSET.finditer(prose)]
     return found + ["$"] * prose.count("$")
@@ -36,10 +36,10 @@ def test_no_formula_breaks_a_table(page: Path) -> None:
 
 
 @pytest.mark.parametrize("text", ["τ = T/cos φ", "the T_x of", "g²/24", "10^6 poses", "a \\frac12", "$5 for", "HᵀH"])
-def test_what_is_not_typeset_would_be_found(text: str) -> None:
+def test_a_formula_that_is_not_typeset_is_found(text: str) -> None:
     assert unset(f"Here {text} there")
 
 
 @pytest.mark.parametrize("text", ["5 kg m² or 3 m/s² or 4 mm²", "25 µs", "`T_x`", "$T_x$ and $\\tau$", "$$\nx^2\n$$"])
-def test_units_code_and_formulas_are_not_found(text: str) -> None:
+def test_units_and_code_are_not_taken_for_formulas(text: str) -> None:
     assert unset(text) == []

@@ -1,4 +1,4 @@
-"""docs/images: every picture shows the present page or figure, is small, and is on a page (tools/pages/images.py)."""
+"""docs/images: each picture shows the present page or figure, is small, and is on a page (tools/pages/images.py)."""
 
 import json
 import re
@@ -21,7 +21,7 @@ RENEW = "renew the pictures: python -m tools.pages.images"
 
 
 @pytest.mark.parametrize("group", [name for name in GROUPS if name != "position-error"])
-def test_a_picture_is_not_older_than_what_it_shows(group: str) -> None:
+def test_a_picture_is_not_older_than_its_controls(group: str) -> None:
     names, describe, _ = GROUPS[group]
     present = json.loads(json.dumps(describe()))
     for name in names:
@@ -36,7 +36,7 @@ def test_the_figure_has_the_present_position_errors() -> None:
         assert stored[robot] == [pytest.approx(row, abs=0.011) for row in errors], f"{RENEW} position-error"  # [mm]
 
 
-def test_a_new_control_makes_a_picture_old() -> None:
+def test_a_new_control_invalidates_a_picture() -> None:
     def with_a_button(server: PageServer) -> Page:
         page = viewer_of_pose(server)
         server.gui.add_button("Another control")

@@ -1,4 +1,4 @@
-"""The names of the nomenclature are names of the public surface or fields of its types."""
+"""Names of the nomenclature are names of the public surface or fields of its types."""
 
 import re
 from pathlib import Path
@@ -14,7 +14,7 @@ def rows() -> list[list[str]]:
     return [row for row in cells if row[0] != "term"]
 
 
-def test_every_term_stands_once() -> None:
+def test_every_term_is_listed_once() -> None:
     terms = [row[0] for row in rows()]
     assert len(terms) > 70
     assert sorted(set(terms)) == sorted(terms)

@@ -1,4 +1,4 @@
-"""The documentation as plain Markdown, and the check of the site made of it."""
+"""The documentation as plain Markdown, and the check of its site."""
 
 import re
 import subprocess
@@ -27,7 +27,7 @@ print(marks.printed_during_run("twin", marks.folder_for("twin", {})))
 
 
 def addresses(nav: Any) -> set[str]:
-    """The pages of a navigation."""
+    """Pages of a navigation."""
     if isinstance(nav, str):
         return {nav}
     return set[str]().union(*map(addresses, nav.values() if isinstance(nav, dict) else nav))
@@ -105,7 +105,7 @@ def test_long_output_is_cut(tmp_path: Path) -> None:
 
 
 @extended
-def test_a_background_shell_waits_for_no_twin(tmp_path: Path) -> None:
+def test_a_background_shell_is_not_awaited(tmp_path: Path) -> None:
     command = f"import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)\n{TWIN}"
     environment = {"PYTHONPATH": f"{ROOT}/src:{ROOT}"}
     done = subprocess.run(

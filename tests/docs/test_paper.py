@@ -1,4 +1,4 @@
-"""paper/paper.md: the sections that the journal requires, references that exist, and no number without a test."""
+"""paper/paper.md: the sections that the journal requires, existing references, and a test for each number."""
 
 import re
 from pathlib import Path
@@ -31,7 +31,7 @@ def test_the_form_is_that_of_the_journal() -> None:
     assert (ROOT / "paper" / head["bibliography"]).is_file()
     assert {each["affiliation"] for each in head["authors"]} == {each["index"] for each in head["affiliations"]}
     assert re.findall(r"^# (.*)$", BODY, re.MULTILINE) == SECTIONS
-    assert 750 <= len(BODY.split()) <= 1000  # required: 750 to 1750; an older limit: 1000
+    assert 750 <= len(BODY.split()) <= 1000  # required: 750 to 1750 words; an older limit: 1000
 
 
 def test_every_reference_is_cited_and_every_citation_has_one() -> None:
@@ -70,8 +70,8 @@ def count_of(base: type) -> int:
     return sum(isinstance(each, type) and issubclass(each, base) and each is not base for each in values)
 
 
-@extended  # it imports all of sagline
-def test_every_number_is_that_of_a_computation() -> None:
+@extended  # counts all modules of sagline
+def test_every_number_is_computed() -> None:
     robots = ("article-suspended", "article-mixed")
     suspended, mixed = (f"{1e3 * error_of_plan(robot, sl.Empirical()):.2f}" for robot in robots)
     assert max(error_of_plan(robot, sl.Catenary()) for robot in robots) < 1e-12
@@ -81,7 +81,7 @@ def test_every_number_is_that_of_a_computation() -> None:
     computed += [str(count_of(sl.TensionMethod)), str(len(sl.robot_names()))]
     assert COUNTS.findall(README) == [tuple(computed[-2:])]
     found = NUMBER.findall(CITED.sub("", BODY))
-    assert found == computed  # in the order of the text: each number once
+    assert found == computed  # in the order of the text, each number once
 
 
 def test_the_readme_has_the_same_numbers() -> None:

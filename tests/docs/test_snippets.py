@@ -1,6 +1,6 @@
-"""README and documentation: the code runs and prints what they say, the commands exist; see tools/pages/snippets.py.
+"""README and documentation: code prints the output on the page, and the commands exist; see tools/pages/snippets.py.
 
-A line `<!-- drawn by: sagline ... -->` shows the figures that a command draws; it must be understood as well.
+A line `<!-- drawn by: sagline ... -->` shows the figures of a command, which must be valid as well.
 """
 
 import contextlib
@@ -41,9 +41,7 @@ def name_of(page: Path) -> str:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
-def test_the_code_runs_and_prints_what_the_page_says(
-    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_code_prints_the_output_on_the_page(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     for suffix in ("yaml", "csv"):
         for file in (ROOT / "examples").glob(f"*.{suffix}"):
@@ -52,7 +50,7 @@ def test_the_code_runs_and_prints_what_the_page_says(
     assert executed(text, str(page)) == text
 
 
-def test_a_page_prints_what_its_code_prints(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_page_shows_the_output_of_its_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     file = "  <!-- file: a.txt -->\n  ```yaml\n  7\n  ```\n\n"
     code = "```python\nfrom pathlib import Path\nx = Path('a.txt').read_text()\nprint(x)\n```\n"
@@ -66,9 +64,9 @@ def test_a_page_prints_what_its_code_prints(tmp_path: Path, monkeypatch: pytest.
 )
 def test_the_commands_exist(line: str) -> None:
     arguments = shlex.split(line, comments=True)[1:]
-    whole: Any = typer.main.get_command(app)  # of click, which typer brings under its own name
+    whole: Any = typer.main.get_command(app)  # typer contains click under another name
     if not arguments or arguments[0].startswith("-"):
-        with pytest.raises(typer.Exit):  # --help or --version, or no argument: it has said its word
+        with pytest.raises(typer.Exit):  # --help, --version or no argument
             whole.make_context("sagline", arguments)
         return
     context = whole.make_context("sagline", arguments[:1])
@@ -77,7 +75,7 @@ def test_the_commands_exist(line: str) -> None:
         command.make_context(name, rest, parent=context)
 
 
-def test_the_pages_are_found_and_their_blocks_too() -> None:
+def test_pages_and_their_blocks_are_found() -> None:
     assert ROOT / "docs" / "model.md" in PAGES
     assert [block.kind for block in blocks(PAGES[0].read_text(encoding="utf-8"))].count("python") == 2
 
@@ -94,7 +92,9 @@ def test_a_list_begins_after_an_empty_line(page: Path) -> None:
     prose = BLOCK.sub("", page.read_text(encoding="utf-8"))
     item = re.compile(r"^ *(?:[-*]|\d+\.) ", re.MULTILINE)
     paragraphs = [part.strip("\n") for part in re.split(r"\n\s*\n", prose)]
-    assert [part for part in paragraphs if item.search(part) and not item.match(part)] == []  # else it is no list
+    assert [
+        part for part in paragraphs if item.search(part) and not item.match(part)
+    ] == []  # otherwise Markdown shows no list
 
 
 @pytest.mark.parametrize("file", sorted(filter(Path.is_file, (ROOT / "examples").iterdir())), ids=name_of)

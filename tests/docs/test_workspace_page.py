@@ -1,4 +1,4 @@
-"""The numbers of docs/workspace.md and of the README's first run that no block of code prints."""
+"""Numbers of docs/workspace.md, and of the first run in README, that no code block prints."""
 
 import re
 from pathlib import Path
@@ -24,7 +24,7 @@ def row(name: str) -> str:
     return found[1]
 
 
-def test_what_rays_lose() -> None:
+def test_rays_miss_the_printed_part_of_the_volume() -> None:
     robot, low, high = ipanema()
     level = level_of(robot, sl.Straight())
     rays = ray_hull(level, [0.0, 0.0, 1.0], low, high).volume
@@ -35,6 +35,6 @@ def test_what_rays_lose() -> None:
     assert re.search(rf"\b{rays:.3f} m³; .*? {whole.volume:.3f} m³", MODEL)
 
 
-def test_where_both_robots_of_the_first_run_can_work() -> None:
+def test_workspaces_of_both_robots_of_the_first_run() -> None:
     volumes = [sl.workspace(sl.load_robot(name), cells=CELLS).volume for name in ROBOTS]
     assert f"{volumes[0]:.0f} m³ and {volumes[1]:.0f} m³ of" in README

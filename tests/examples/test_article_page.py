@@ -1,4 +1,4 @@
-"""The snippets of docs/article.md run as they stand, one after another."""
+"""The code of docs/article.md runs block by block."""
 
 import re
 from pathlib import Path
@@ -11,7 +11,7 @@ from tools.pages.snippets import blocks
 PAGE = Path(__file__).parents[2] / "docs" / "article.md"
 
 
-def test_snippets_run_and_print_what_they_should(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_code_prints_the_output_on_the_page(capsys: pytest.CaptureFixture[str]) -> None:
     names: dict[str, Any] = {}
     for block in blocks(PAGE.read_text(encoding="utf-8")):
         if block.kind == "python":

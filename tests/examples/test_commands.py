@@ -1,4 +1,4 @@
-"""The commands of README and help run as printed, in a folder with the files of `sagline examples`."""
+"""The commands in README and in help texts run as printed, in a folder with the files of `sagline examples`."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ LONG = (
 
 
 def lines_of(text: str) -> list[list[str]]:
-    """The lines that begin with `sagline`, as words."""
+    """Lines that begin with `sagline`, as words."""
     whole = text.replace("\\\n", " ")
     return [shlex.split(found, comments=True)[1:] for found in re.findall(r"^ *(sagline \S.*)$", whole, re.MULTILINE)]
 
 
 def printed() -> list[list[str]]:
-    """The commands of README's section on the command line, and the examples in the help of every command."""
+    """Commands of the section on the command line in README, and examples in the help of every command."""
     readme = (ROOT / "README.md").read_text()
     section = readme.partition("## On the command line")[2].partition("\n## ")[0]
     found = lines_of(section.partition("```sh\n")[2].partition("```")[0])
@@ -52,7 +52,7 @@ def printed() -> list[list[str]]:
 
 
 def in_tiers(lines: list[list[str]]) -> list[Any]:
-    """The lines; those of commands that compute for long in the second tier."""
+    """The lines; commands with long computations are in the second tier."""
     return [pytest.param(line, marks=extended) if line[0] in LONG else line for line in lines]
 
 
@@ -73,7 +73,7 @@ def folder(examples: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> P
 
 
 def with_winches(place: Path) -> None:
-    """A robot of one's own, with drums; a run of it, and its counts."""
+    """A robot of the user with drums, a run of it and its counts."""
     (place / "my_robot.yaml").write_text(sl.dump_robot(wound()))
     plan = sl.inverse(wound(), sl.Pose.from_euler([[0.0, 0.0, 2.0], [0.1, 0.0, 2.0]], 0.0, 0.0, 0.0))
     (place / "output").mkdir()
@@ -83,7 +83,7 @@ def with_winches(place: Path) -> None:
 
 
 def with_run(file: Path) -> None:
-    """A run, ROBOT-MODEL.nc, as `sagline track` writes it."""
+    """A run, ROBOT-MODEL.nc, written by `sagline track`."""
     file.parent.mkdir()
     robot, _, model = file.stem.rpartition("-")
     path = sl.quintic_path([(0.0, 0.0, 1.5), (0.1, 0.0, 1.5)], durations=1.0, rate=10)
@@ -91,7 +91,7 @@ def with_run(file: Path) -> None:
 
 
 def with_logs(place: Path) -> None:
-    """A log, one of a process that was killed, and that of a twin."""
+    """A log, a log of a killed process, and a log of a twin."""
     execution().save(place / "run.mcap")
     whole = (place / "run.mcap").read_bytes()
     (place / "killed.mcap").write_bytes(whole[:-20_000])
@@ -135,12 +135,12 @@ def test_a_printed_command_runs(words: list[str], folder: Path, monkeypatch: pyt
     monkeypatch.setattr("sagline.cli.run.FIGURES", ())
     monkeypatch.setattr("sagline.cli.run.CELLS", 4)
     monkeypatch.setattr("sagline.cli.run._figures", lambda *_: ())
-    monkeypatch.setattr("sagline.plot.sheet.RESOLUTION", 50)  # dots an inch: nobody looks at them
+    monkeypatch.setattr("sagline.plot.sheet.RESOLUTION", 50)  # dots per inch: a coarse picture saves time
     instead_of_machines(monkeypatch)
     if words[0] == "twin":
-        words = [*words, "--port", "0"]  # another twin may have the usual ones
+        words = [*words, "--port", "0"]  # another twin may use the default ports
     if words[0] == "workspace":
-        words = [*words, "--cells", "6"]  # the same with less to do, as CELLS above
+        words = [*words, "--cells", "6"]  # less work, as with CELLS above
     if "worn.yaml" in words:
         (folder / "worn.yaml").write_text(sl.dump_robot(sl.load_robot("article-prototype").replace(mass=52.0)))
     if any(word.endswith(".mcap") for word in words):
@@ -155,17 +155,17 @@ def test_a_printed_command_runs(words: list[str], folder: Path, monkeypatch: pyt
         for word in words:
             if word.startswith("output/"):
                 with_run(folder / word)
-    result = CliRunner().invoke(app, words, input="\n" * 9)  # every question takes its default
+    result = CliRunner().invoke(app, words, input="\n" * 9)  # default answers to all questions
     assert result.exit_code == 0, result.output
     assert len(served) == (words[0] == "view")
 
 
 @pytest.mark.soak
-def test_the_whole_article_too(folder: Path) -> None:
+def test_the_command_of_the_whole_article_runs(folder: Path) -> None:
     assert CliRunner().invoke(app, ["article"]).exit_code == 0
 
 
-def test_examples_are_those_of_the_source_and_replace_nothing_unasked(tmp_path: Path) -> None:
+def test_examples_are_copied_and_replace_no_file_without_permission(tmp_path: Path) -> None:
     words = ["examples", "--out", str(tmp_path / "new")]
     assert CliRunner().invoke(app, words).exit_code == 0
     source = {file.name: file.read_bytes() for file in (ROOT / "examples").iterdir() if file.suffix in KINDS}
@@ -182,8 +182,8 @@ def test_examples_are_those_of_the_source_and_replace_nothing_unasked(tmp_path: 
 
 
 @extended
-def test_an_installed_package_has_them_inside(tmp_path: Path) -> None:
-    """As hatch puts them there: `examples` of the source becomes `sagline/examples` of the wheel."""
+def test_an_installed_package_contains_the_examples(tmp_path: Path) -> None:
+    """The folder of hatch: `examples` of the source becomes `sagline/examples` of the wheel."""
     import tomllib
 
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text())

@@ -1,4 +1,4 @@
-"""The snippets of docs/forward.md run as they stand, one after another."""
+"""The code of docs/forward.md runs block by block."""
 
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ from tools.pages.snippets import blocks
 PAGE = Path(__file__).parents[2] / "docs" / "forward.md"
 
 
-def test_snippets_run_and_say_what_the_page_says(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_code_prints_the_output_on_the_page(capsys: pytest.CaptureFixture[str]) -> None:
     names: dict[str, Any] = {}
     for block in blocks(PAGE.read_text(encoding="utf-8")):
         if block.kind == "python":

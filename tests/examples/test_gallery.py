@@ -1,4 +1,4 @@
-"""Every example of the gallery runs as it stands, and comes to the number it claims."""
+"""Every example of the gallery runs and gives the number in its text."""
 
 import re
 import runpy
@@ -80,7 +80,7 @@ def test_feedforward(run: Run) -> None:
     planned, static = distance["planned"], distance["static"]
     assert max(planned) < 6e-4  # m
     assert max(static) > 5e-3
-    assert max(static[-2000:]) > 5.0 * max(planned[-2000:])  # what is left once the motion has ended
+    assert max(static[-2000:]) > 5.0 * max(planned[-2000:])  # the residual after the end of the motion
 
 
 def test_pose_loop(run: Run) -> None:
@@ -101,4 +101,4 @@ def test_to_mujoco(run: Run) -> None:
     model = mujoco.MjModel.from_xml_path("ipanema-2.xml")
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    np.testing.assert_allclose(data.qacc, 0.0, atol=1e-8)  # m/s^2: it rests where it was put
+    np.testing.assert_allclose(data.qacc, 0.0, atol=1e-8)  # m/s^2: the body rests at its start

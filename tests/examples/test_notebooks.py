@@ -1,4 +1,4 @@
-"""The notebooks run from their first cell to their last, show what they say, and are stored without their outputs."""
+"""The notebooks run from the first to the last cell, give the numbers in their texts, and have no stored outputs."""
 
 import ast
 import json
@@ -25,7 +25,7 @@ def cells(file: Path, kind: str) -> list[dict[str, Any]]:
 
 
 def run(name: str) -> tuple[dict[str, Any], list[Any]]:
-    """Names after the last cell of code, and what the cells show: the value of their last line, as Jupyter does."""
+    """Names after the last cell of code, and the outputs of the cells: the value of the last line, as in Jupyter."""
     names: dict[str, Any] = {"__name__": "__main__"}
     shown = []
     for number, cell in enumerate(cells(FOLDER / f"{name}.ipynb", "code")):
@@ -70,9 +70,9 @@ def test_they_are_stored_without_outputs(file: Path) -> None:
 def test_the_article() -> None:
     names, shown = run("article")
     assert [type(thing).__name__ for thing in shown] == ["Robot", "Path", "Plan", "Sheet", "Confirmation"]
-    assert names["largest"]["Empirical"] == pytest.approx(1.66, abs=0.02)  # mm, as the report finds
+    assert names["largest"]["Empirical"] == pytest.approx(1.66, abs=0.02)  # mm, as in the report
     assert names["largest"]["Catenary"] < 1e-6
-    assert names["fit"].model.k_p == pytest.approx(9.81**2 / 24.0, rel=0.05)  # what shallow cables have
+    assert names["fit"].model.k_p == pytest.approx(9.81**2 / 24.0, rel=0.05)  # constant of shallow cables
     for thing in (shown[0], shown[2], shown[4]):
         assert "<svg" in html(thing)
     assert "all 1,201 poses" in html(shown[2])

@@ -1,4 +1,4 @@
-"""The example log is what the true robot's sensors read, and a calibration by it finds that robot."""
+"""The example log contains readings of the true robot, and a calibration with the log finds that robot."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ DRAWN, LOG, TRUTH = (EXAMPLES / f"winches{end}" for end in ("_robot.yaml", ".csv
 
 
 def numbers(robot: sl.Robot) -> Array:
-    """The default unknowns of a robot without its load cells, in their order."""
+    """Default unknowns of a robot without the load cells, in their order."""
     assert robot.winches is not None
     assert robot.winches.length_zero is not None
     shared = [robot.cables.axial_stiffness[0], robot.mass]
@@ -34,8 +34,8 @@ def test_the_truth_is_the_drawing_with_errors() -> None:
     assert abs(made.cables.axial_stiffness[0] / drawn.cables.axial_stiffness[0] - 1.1) < 0.01
 
 
-def test_the_log_is_what_the_true_robot_reads(tmp_path: Path) -> None:
-    """To a step of what is written: another machine may round the last digit the other way."""
+def test_the_log_contains_the_readings_of_the_true_robot(tmp_path: Path) -> None:
+    """To one step of the written digits: another machine may round the last digit differently."""
     file = tmp_path / "again.csv"
     file.write_text(text_of(example_log(sl.load_robot(TRUTH)).log))
     log, again = sl.load_log(LOG), sl.load_log(file)
@@ -55,7 +55,7 @@ def test_the_log_is_what_the_true_robot_reads(tmp_path: Path) -> None:
 
 
 @extended
-def test_every_row_is_fit_and_nothing_is_suspected() -> None:
+def test_all_rows_fit_and_no_diagnostic_is_raised() -> None:
     robot, log = sl.load_robot(DRAWN), sl.load_log(LOG)
     assert len(screen(robot, log)[0]) == len(log) == 60
     assert diagnose_log(robot, log) == ()
@@ -69,7 +69,7 @@ def test_the_calibration_finds_the_truth() -> None:
     assert off @ np.linalg.solve(found.covariance, off) < chi2.ppf(0.99, len(off))
     assert found.outliers == ()
     mass, deviation = found.value_of("mass")
-    assert 0.02 < deviation / 91.44 < 0.04  # the common gain of the load cells is known to 5 %
+    assert 0.02 < deviation / 91.44 < 0.04  # the prior of the common gain of the load cells is 5 %
     assert abs(mass - 91.44) < 3.0 * deviation
     asked = dict.fromkeys(name for name in found.parameters.names if not name.startswith("load_cell"))
     assumed = sl.calibrate(sl.load_robot(DRAWN), sl.load_log(LOG), [*asked], folds=0)

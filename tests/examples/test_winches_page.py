@@ -1,4 +1,4 @@
-"""The numbers of docs/winches.md: what pulleys cost that are left out, and what the straight formula for them does."""
+"""Numbers of docs/winches.md: the errors without a pulley model, and the errors of the straight formula for pulleys."""
 
 import re
 import runpy
@@ -26,8 +26,8 @@ PULLEYS = sl.Winch(0.05)
 RISING = sl.Winch(0.05, dead_cable=3.0, dead_rise=3.0)
 
 
-def said(*parts: str) -> bool:
-    """Whether one sentence of the page has all the parts."""
+def is_stated(*parts: str) -> bool:
+    """True if one sentence of the page has all the parts."""
     return any(all(part in sentence for part in parts) for sentence in re.split(r"[.:;] ", PROSE))
 
 
@@ -38,7 +38,7 @@ def example(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any]
         yield runpy.run_path(str(ROOT / "examples" / "pulleys_left_out.py"))
 
 
-def test_the_table_is_what_the_example_finds(example: dict[str, Any]) -> None:
+def test_the_table_has_the_numbers_of_the_example(example: dict[str, Any]) -> None:
     rows = [re.split(r" *\| *", line)[1:-1] for line in PAGE.splitlines() if re.match(r"\| (position|`)", line)]
     head = next(row for row in rows if row[0].startswith("position error"))
     table = {row[0].strip("`"): row[1:] for row in rows if row[0].strip("`") in ROBOTS}
@@ -47,12 +47,12 @@ def test_the_table_is_what_the_example_finds(example: dict[str, Any]) -> None:
     for name, cells in table.items():
         assert cells == [f"{row.mean():.1f}, {row.max():.0f}" for row in example["found"][name]]
     assert {row.size for rows in example["found"].values() for row in rows} == {405}
-    assert said("405 level")
+    assert is_stated("405 level")
     assert Path("pulleys_left_out.png").stat().st_size > 10_000
 
 
 def test_the_commands_lead_from_homing_to_poses(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The blocks of the page up to its commands, and then these, in a folder with the files of `sagline examples`."""
+    """The code blocks of the page, and then its commands, in a folder with the files of `sagline examples`."""
     monkeypatch.chdir(tmp_path)
     assert CliRunner().invoke(app, ["examples", "--out", "."]).exit_code == 0
     page = (ROOT / "docs" / "winches.md").read_text(encoding="utf-8")
@@ -85,10 +85,10 @@ def box(name: str) -> tuple[sl.Robot, sl.Pose, sl.Pose]:
 
 
 def straight_formula(robot: sl.Robot, pose: sl.Pose, tension: Array) -> tuple[Array, Array]:
-    """Wrap angles and lengths where the cables leave as straight ones would, and hang from there.
+    """Wrap angles and lengths if the cables leave the pulleys as straight cables and then sag.
 
-    The angle is that of the line from the pulley's middle to the platform end, less the one between it and the spoke
-    to where the tangent touches; what is behind is stretched by the tension at the exit.
+    The angle is that of the line from the center of the pulley to the platform end, less the angle between this line
+    and the radius to the point of tangency. The cable after the pulley is stretched by the tension at the exit.
     """
     winches = robot.winches
     assert winches is not None
@@ -117,12 +117,12 @@ def off_by(name: str, winch: sl.Winch, *, zeroed: bool = False) -> tuple[float, 
     return float(1e6 * error), float(np.degrees(np.abs(wrap - plan.wrap_angle).max()))
 
 
-def test_the_straight_formula_is_as_near_as_the_page_says() -> None:
+def test_the_error_of_the_straight_formula_is_that_on_the_page() -> None:
     without = [off_by(name, PULLEYS) for name in ROBOTS]
-    assert said("angle", f"{max(angle for _, angle in without):.1f}°")
-    assert said(f"platform {max(error for error, _ in without):.1f} µm", "at most")
+    assert is_stated("angle", f"{max(angle for _, angle in without):.1f}°")
+    assert is_stated(f"platform {max(error for error, _ in without):.1f} µm", "at most")
     rising = {name: off_by(name, RISING)[0] for name in ROBOTS}
     soft = rising.pop("article-prototype")
-    assert said(f"{1e-3 * soft:.2f} mm on the prototype", f"{1e-3 * max(rising.values()):.2f} mm elsewhere")
+    assert is_stated(f"{1e-3 * soft:.2f} mm on the prototype", f"{1e-3 * max(rising.values()):.2f} mm elsewhere")
     zeroed = max(off_by(name, RISING, zeroed=True)[0] for name in ROBOTS)
-    assert said("at home", f"{zeroed:.0f} µm")
+    assert is_stated("at home", f"{zeroed:.0f} µm")

@@ -132,7 +132,7 @@ def _parts(rng: Random, data: bytes, folder: Path) -> bytes:
     file = folder / "changed.h5"
     file.write_bytes(data[:-SEAL])
     seal(file)
-    if file.read_bytes() != data:  # it is damaged already, and HDF5 may never return from it
+    if file.read_bytes() != data:  # damaged already; HDF5 may never return from it
         return data
     try:
         with h5py.File(file, "r+") as content:

@@ -113,7 +113,7 @@ def work(seed: int, seconds: float, place: Path, only: str) -> None:
             read[target.name] += 1
             if target.checked:
                 sound(found, target.name)
-        if kind not in known[target.name]:  # a message that no input had: this one reached other statements
+        if kind not in known[target.name]:  # a new message: the input reached other statements
             known[target.name].add(kind)
             if len(data) < LARGEST[target.kind] and len(samples[target.name]) < MOST_SAMPLES:
                 samples[target.name].append(data)

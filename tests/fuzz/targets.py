@@ -1,4 +1,4 @@
-"""All readers of sagline, each with good samples of its input."""
+"""All readers of sagline, each with valid samples of its input."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ FAULTS: Final = "cell 3 sticks at 40 s for 2 s"
 class Target:
     """A reader with samples of its input; the changes beyond those of bytes are named by `kind`."""
 
-    name: str  # of the file
+    name: str  # name of the file
     samples: tuple[bytes, ...]
     read: Callable[[Path], Any]
     kind: str = "text"  # text, binary, hdf5
@@ -47,7 +47,7 @@ class Target:
     checked: bool = False  # results are computed with
 
     def written(self, folder: Path, data: bytes) -> Path:
-        """The input as a file, with the files beside it."""
+        """Write the input and its accompanying files."""
         for name, content in self.beside.items():
             (folder / name).write_bytes(content)
         file = folder / self.name
@@ -62,7 +62,7 @@ def _saved(save: Callable[[Path], Any], name: str, folder: Path) -> bytes:
 
 
 def _without_digest(data: bytes) -> bytes:
-    """An HDF5 file of the size that its own head states."""
+    """An HDF5 file with the size that its header states."""
     return data[: -len("\nsagline sha256 \n") - 64]
 
 
@@ -141,6 +141,6 @@ def _robots() -> dict[str, bytes]:
 
 
 def _machine_code() -> bytes:
-    """A file of the folder of kernels: a digest, and what it is of."""
+    """A file of the folder of kernels: a digest and the content."""
     content = bytes(range(256)) * 4
     return sha256(content).digest() + content

@@ -1,1 +1,1 @@
-"""Plausible mistakes, one file a folder of the source, and which tests catch them: `make mutants`."""
+"""Deliberate mistakes, one file per folder of the source, with the tests that detect them: `make mutants`."""

@@ -38,7 +38,7 @@ FILES: Final = (
     ".gitignore",
 )
 FIRST, SECOND = "not extended and not soak", "extended and not soak"
-PATIENCE: Final = 1800.0  # s for one run of tests
+PATIENCE: Final = 1800.0  # s for one run of the tests
 
 
 class Mutant(NamedTuple):
@@ -85,7 +85,7 @@ def mutants(folders: Sequence[str] = ()) -> Iterator[Mutant]:
 
 
 def chosen_at_random(count: int, seed: int) -> Iterator[Mutant]:
-    """Mistakes that nobody chose; the folder is that of the source."""
+    """Mistakes at random places; the folder is that of the source."""
     for change in changes(ROOT / "src" / "sagline", count, seed):
         place = f"line {change.line}: {change.old} -> {change.new}"
         yield Mutant(change.file.parts[0], change.file.as_posix(), place, "", "", source=change.source)
@@ -107,7 +107,7 @@ def catching_test(copy: Path, mutant: Mutant, all_tiers: bool) -> tuple[str, str
 def failing_test(copy: Path, arguments: Sequence[str]) -> str:
     """Name of the first test that fails in a copy; empty if all pass."""
     environment = {**os.environ, "PYTHONPATH": str(copy / "src"), "NUMBA_CACHE_DIR": str(copy / "cache")}
-    environment["SAGLINE_BACKEND"] = "numba"  # compiles what a mistake changes, and nothing else
+    environment["SAGLINE_BACKEND"] = "numba"  # compiles only the changed kernels
     command = [
         sys.executable,
         "-m",
@@ -118,7 +118,7 @@ def failing_test(copy: Path, arguments: Sequence[str]) -> str:
         "-p",
         "no:cacheprovider",
         "--no-limits",
-        "--ignore=tests/test_back_ends.py",  # runs the library, which has no mistake
+        "--ignore=tests/test_back_ends.py",  # the library has no mistake
         *arguments,
     ]
     try:

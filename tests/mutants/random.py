@@ -1,4 +1,4 @@
-"""Mistakes that nobody chose: one operator, sign or number of the source is changed at random."""
+"""Random mistakes: one operator, sign or number of the source is changed."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def changes(sources: Path, count: int, seed: int) -> Iterator[Change]:
 
 
 def _new(node: ast.expr, source: str) -> str:
-    """The changed text of an expression of numbers; empty for what is not changed."""
+    """Changed text of a numerical expression; empty if no change applies."""
     if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS and not _is_text(node):
         left, right = (ast.get_source_segment(source, side) for side in (node.left, node.right))
         return f"(({left}) {OPERATORS[type(node.op)]} ({right}))"
@@ -65,6 +65,6 @@ def _new(node: ast.expr, source: str) -> str:
 
 
 def _is_text(node: ast.BinOp) -> bool:
-    """Whether an operand is a literal text or list, which an operator of numbers would not take."""
+    """True if an operand is a literal text or list, which an operator of numbers does not accept."""
     return any(isinstance(each, ast.JoinedStr | ast.List | ast.Tuple) or isinstance(getattr(each, "value", None), str)
                for each in (node.left, node.right))  # fmt: skip

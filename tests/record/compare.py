@@ -35,7 +35,7 @@ TOLERANCES: Final = (
 
 
 def differences(old: Any, new: Any, place: str = "") -> Iterator[str]:
-    """Places where two records differ, each as one line."""
+    """Differences of two records, one line each."""
     if isinstance(old, dict) and isinstance(new, dict):
         for key in [*old, *(key for key in new if key not in old)]:
             here = f"{place}/{key}"

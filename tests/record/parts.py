@@ -13,23 +13,23 @@ PARTS: Final = ("surface", "formats", "poses", "commands")
 
 
 def recorded(name: str) -> Any:
-    """Make one part anew, in the form in which JSON holds it."""
+    """Make one part again, in the form of JSON."""
     make: Callable[[], Any] = import_module(f"tests.record.{name}").record
     return json.loads(json.dumps(make()))
 
 
 def stored(name: str) -> Any:
-    """The part as it was recorded."""
+    """The recorded part."""
     return json.loads((FOLDER / f"{name}.json").read_text(encoding="utf-8"))
 
 
 def write(name: str, part: Any) -> None:
-    """Write a part, an entry a line, so that a change is a short diff."""
+    """Write a part with one entry per line, for short diffs."""
     (FOLDER / f"{name}.json").write_text(_indented(part, "") + "\n", encoding="utf-8")
 
 
 def _indented(value: Any, indent: str) -> str:
-    """JSON text of a value: what fits on a line of 150 characters stands on one."""
+    """JSON text of a value; a value that fits on a line of 150 characters is on one line."""
     text = json.dumps(value, ensure_ascii=False)
     if len(text) + len(indent) <= 150 or not isinstance(value, dict | list) or not value:
         return text

@@ -30,7 +30,7 @@ METHODS: Final = (
 
 
 def record() -> dict[str, Any]:
-    """A nested dictionary: preset, then `model method`, then what the poses have together."""
+    """A nested dictionary: preset, then `model method`, then the values of the poses."""
     found: dict[str, Any] = {}
     for k, name in enumerate(sl.robot_names()):
         robot = sl.load_robot(name)
@@ -71,7 +71,7 @@ def _inverse(robot: sl.Robot, poses: sl.Pose, model: sl.CableModel, method: sl.T
 
 
 def _forward(robot: sl.Robot, poses: sl.Pose) -> Any:
-    """The way back from the lengths of the default plan."""
+    """Forward solutions of the lengths of the default plan."""
     plan = sl.inverse(robot, poses)
     if not plan.feasible.any():
         return {}

@@ -48,6 +48,6 @@ def _member(owner: type, name: str) -> str:
 def _signature(value: Any) -> str:
     try:
         text = re.sub(r" at 0x[0-9a-f]+", "", str(inspect.signature(value)))
-        return text.replace("-> 'None'", "-> None")  # generated constructors and written ones
+        return text.replace("-> 'None'", "-> None")  # generated constructors and explicit ones
     except (TypeError, ValueError):
         return "()"

@@ -1,4 +1,4 @@
-"""Behavior is as recorded; and the comparison finds what differs."""
+"""Behavior agrees with the record, and the comparison finds differences."""
 
 import pytest
 

@@ -14,14 +14,14 @@ from xml.etree import ElementTree
 import numpy as np
 import yaml
 
-LONGEST: Final = 12  # numbers of a list that are recorded one by one
+LONGEST: Final = 12  # numbers of a list that are recorded individually
 CHANGING: Final = re.compile(
     r"second|us_per_pose|time_taken|created|history|version|duration_of|cpu|memory|workers|started|ended"
 )
 
 
 def values_of(array: Any) -> Any:
-    """An array, by its numbers if it is short, else by its shape, its ends and its statistics."""
+    """An array: its numbers if it is short, otherwise its shape, first and last numbers and statistics."""
     found = np.asarray(array)
     if found.dtype.kind in "SUO":
         texts = [text.decode() if isinstance(text, bytes) else str(text) for text in found.reshape(-1)]
@@ -46,7 +46,7 @@ def values_of(array: Any) -> Any:
 
 
 def plain(value: Any) -> Any:
-    """Nested data without what changes from run to run, long lists of numbers by `values_of`."""
+    """Nested data without values that change from run to run; long lists of numbers by `values_of`."""
     if isinstance(value, Mapping):
         return {str(key): plain(each) for key, each in value.items() if not CHANGING.search(str(key))}
     if isinstance(value, list | tuple):
@@ -62,7 +62,7 @@ def plain(value: Any) -> Any:
 
 
 def file_values(file: Path) -> Any:
-    """Values of a file, by its kind; its name alone for pictures, pages and programs."""
+    """Values of a file by its kind; only the name for pictures, pages and programs."""
     read = READERS.get(file.suffix)
     return read(file) if read else "written"
 

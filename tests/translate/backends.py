@@ -1,4 +1,4 @@
-"""`python -m tests.translate.backends`: compare all back ends on the table of inputs; prints a table of Markdown."""
+"""`python -m tests.translate.backends`: compare all back ends on the table of inputs, and print a Markdown table."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from tools.translate.signatures import entries
 
 
 def all_backends(folder: Path) -> dict[str, Run]:
-    """Each back end by its name; "translated" is C that is translated and compiled now, in a folder."""
+    """Each back end by name; "translated" is newly translated and compiled C in a folder."""
     library = compiled_c(translate(entries()), folder)
     return {"translated": from_library(library)} | {name: from_kernels(name) for name in BACKENDS}
 
 
 def main() -> None:
-    """Print a row for each entry and set of argument types: what one back end wrote, and how far another differs."""
+    """Print a row for each entry and set of argument types: number of outputs and differences of back ends."""
     found: dict[str, Difference] = defaultdict(Difference)
     with tempfile.TemporaryDirectory() as folder:
         backends = all_backends(Path(folder))

@@ -1,4 +1,4 @@
-"""Small kernels, one for each construct of the subset; Python runs them too, numba compiles them."""
+"""Small kernels, one for each construct of the subset, which run in Python and compile with numba."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def comparisons(x: float, y: float, i: int, j: int, out: Any) -> None:
 
 
 def loops(x: float, y: float, i: int, j: int, out: Any) -> None:
-    """Loops, break, continue, and what their variables are afterwards."""
+    """Loops, break, continue, and the values of their variables afterwards."""
     total = 0.0
     n = min(max(i, 0), 10)
     for k in range(n):
@@ -189,13 +189,13 @@ def records(x: float, y: float, i: int, j: int, out: Any) -> None:
 
 
 def weigh(pair: Pair) -> float:
-    """Weigh a pair; an array in it is written."""
+    """Weigh a pair and write to its array."""
     pair.values[0] = 9.0
     return 2.0 * pair.second
 
 
 def order(x: float, y: float, i: int, j: int, out: Any) -> None:
-    """What a call writes is seen by what stands right of it, and not by what stands left."""
+    """A call changes an array: operands to the right see the change, operands to the left do not."""
     out[0] = x
     out[1] = out[0] + change(out, 2.0) * out[0]
     out[2] = change(out, 3.0) - change(out, 4.0) * out[0]
@@ -248,7 +248,7 @@ def whole_divisions(x: float, y: float, i: int, j: int, out: Any) -> None:
 
 
 def limits(x: float, y: float, i: int, j: int, out: Any) -> None:
-    """Operations in which Python raises an exception, and compiled code does not."""
+    """Operations that raise an exception in Python and not in compiled code."""
     out[0] = x / y
     out[1] = i / j
     out[2] = math.sqrt(x)

@@ -1,4 +1,4 @@
-"""The table of inputs on which all back ends are compared: calls of the public functions that reach every entry."""
+"""Inputs for the comparison of all back ends: calls of public functions that reach every entry."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ WINCH: Final = sl.Winch(
 
 
 def poses_of(robot: sl.Robot, count: int, seed: int) -> sl.Pose:
-    """Random poses in a robot's box, level and tilted, feasible and not; the last ones at its corners."""
+    """Random poses in the box of a robot, level and tilted, feasible and infeasible, with its corners at the end."""
     random = np.random.default_rng(seed)
     low, high = robot.frame_anchors.min(axis=0), robot.frame_anchors.max(axis=0)
     if robot.test_box is not None:
@@ -47,7 +47,7 @@ def state_of(robot: sl.Robot) -> sl.Equilibrium:
 
 
 def random_robot(seed: int) -> sl.Robot:
-    """Six to nine cables from the upper part of a room to a box, points as anchors or over pulleys."""
+    """Six to nine cables from the upper part of a room to a box, from points or over pulleys."""
     random = np.random.default_rng(seed)
     m = int(random.integers(6, 10))
     frame = random.uniform([-5.0, -4.0, 2.0], [5.0, 4.0, 6.0], size=(m, 3))
@@ -75,7 +75,7 @@ def there_and_back(robot: sl.Robot, count: int, seed: int) -> sl.Plan:
 
 
 def preset(name: str) -> None:
-    """Poses with a wrench by every cable model and tension method that a robot takes; the lengths back."""
+    """Poses with a wrench for each cable model and tension method of a robot, and the forward solutions."""
     robot = sl.load_robot(name)
     poses = poses_of(robot, POSES, 1)
     wrench = np.random.default_rng(3).uniform(-0.1, 0.1, size=(POSES, 6)) * robot.mass * robot.gravity
@@ -84,7 +84,7 @@ def preset(name: str) -> None:
             try:
                 plan = sl.inverse(robot, poses, model, method, wrench)
             except sl.InvalidValueError:
-                assert robot.cable_count - robot.degrees_of_freedom != 2  # such a robot takes every method
+                assert robot.cable_count - robot.degrees_of_freedom != 2  # such a robot accepts all methods
         sl.forward(robot, plan.unstrained_length, poses, model, wrench)
     there_and_back(robot, POSES, 2)
 
@@ -98,7 +98,7 @@ def random_robots() -> None:
 
 
 def lengths(*factors: float, start: bool = False) -> None:
-    """Poses of the lengths of a level pose times factors, also of unknown lengths, NaN."""
+    """Forward solutions of the lengths of a level pose times factors, with unknown lengths and NaN."""
     plan = sl.inverse(COGIRO, LEVEL)
     rows = plan.unstrained_length * np.array([*factors, np.nan])[:, None]
     sl.forward(COGIRO, rows, LEVEL if start else None)
@@ -118,7 +118,7 @@ def vertical_cable() -> None:
 
 
 def lost_rank() -> None:
-    """All cables vertical: they resist three motions of six."""
+    """All cables are vertical and resist only three of six motions."""
     robot = COGIRO.replace(platform_anchors=COGIRO.frame_anchors - [0.0, 0.0, 4.0])
     sl.inverse(robot, sl.Pose(np.zeros(3), np.eye(3)))
     sl.margin(robot, sl.Pose(np.zeros(3), np.eye(3)))
@@ -164,7 +164,7 @@ def statics(robot: sl.Robot, count: int) -> None:
 
 
 def cables() -> None:
-    """Cables by themselves: from tension, from length, their shapes, creep, fits."""
+    """Single cables: from tension, from length, shapes, creep, fits."""
     cable = sl.Cable(linear_density=0.067, axial_stiffness=44e3)
     span, rise = np.linspace(0.0, 9.0, 5), np.array([3.0, -4.0, 0.0, 1e-9, 5.0])
     for model in MODELS:

@@ -1,4 +1,4 @@
-"""C of the translator, compiled by gcc and called through ctypes with the arguments of Python."""
+"""C of the translator, compiled by gcc and called through ctypes with arguments of Python."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def flat(value: Any, type_: Type) -> list[Any]:
 
 
 def copied(value: Any) -> Any:
-    """A copy of an argument; arrays that are read-only stay so, because numba compiles an entry for these flags."""
+    """A copy of an argument; read-only arrays remain read-only, because numba compiles an entry for these flags."""
     if isinstance(value, np.ndarray):
         same = value.copy()
         same.flags.writeable = value.flags.writeable
@@ -77,7 +77,7 @@ class Entry:
         self.function, self.types, self.result = library[symbol], tuple(types), result
 
     def code(self, *arguments: Any) -> tuple[int, Any]:
-        """Call it; returns its code and its result."""
+        """Call the function; return its code and its result."""
         passed = [each for pair in zip(arguments, self.types, strict=True) for each in flat(*pair)]
         if self.result is None:
             return self.function(*passed), None
@@ -85,7 +85,7 @@ class Entry:
         return self.function(*passed, ctypes.byref(result)), result.value
 
     def __call__(self, *arguments: Any) -> Any:
-        """Call it; returns its result."""
+        """Call the function; return its result."""
         code, result = self.code(*arguments)
         assert code == 0
         return result

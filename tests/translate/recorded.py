@@ -1,4 +1,4 @@
-"""Calls of entries, recorded while the package runs, and repeated in other back ends."""
+"""Calls of entries, recorded while the package runs, and repeated with other back ends."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Call(NamedTuple):
         return None if self.result is None else Scalar.BOOL if isinstance(self.result, bool) else Scalar.INT
 
 
-Run = Callable[[Call, tuple[Any, ...]], Any]  # runs a call with arguments, which it writes to
+Run = Callable[[Call, tuple[Any, ...]], Any]  # runs a call with its arguments and writes to them
 
 
 class Difference(NamedTuple):
@@ -79,7 +79,7 @@ class Difference(NamedTuple):
     largest: float = 0.0
 
     def joined(self, other: Difference) -> Difference:
-        """Both together."""
+        """Both comparisons together."""
         calls, compared, different = (one + two for one, two in zip(self[:3], other[:3], strict=True))
         return Difference(calls, compared, different, max(self.largest, other.largest))
 
@@ -107,7 +107,7 @@ def fits(value: Any, type_: Type) -> bool:
 
 
 def signature_of(name: str, arguments: tuple[Any, ...]) -> tuple[str, tuple[Type, ...]]:
-    """Name in C and types of an entry for arguments, of the declared ones."""
+    """Declared name in C and declared types of an entry for the arguments."""
     for key, types in SIGNATURES[name].items():
         if fits(arguments, plain_tuple(*types)):
             return f"sagline_{name}{f'_{key}' if key else ''}", types
@@ -125,10 +125,10 @@ def load_callers() -> None:
 
 @contextmanager
 def recorded() -> Iterator[list[Call]]:
-    """Record the calls of all entries from outside the kernels."""
+    """Record the calls of all entries from outside of the kernels."""
     load_callers()
     calls: list[Call] = []
-    entries: dict[int, tuple[str, Any]] = {}  # by their identity and that of their listeners
+    entries: dict[int, tuple[str, Any]] = {}  # by identity of the owners
 
     def listener(name: str, entry: Any) -> Any:
         def call(*arguments: Any) -> Any:
@@ -163,7 +163,7 @@ def recorded() -> Iterator[list[Call]]:
 
 
 def _owners() -> Iterator[Any]:
-    """Modules outside the kernels, and their classes: what may call an entry by a name of its own."""
+    """Modules outside of the kernels and their classes, which may contain an entry under another name."""
     for key, module in list(sys.modules.items()):
         if key.startswith("sagline.") and not key.startswith("sagline.kernels"):
             yield module
@@ -171,7 +171,7 @@ def _owners() -> Iterator[Any]:
 
 
 def difference(before: Any, expected: Any, found: Any) -> Difference:
-    """Compare what two back ends wrote to the arrays of one call."""
+    """Compare the arrays of one call after runs of two back ends."""
     count, different, largest = 0, 0, 0.0
     for old, one, other in zip(*map(arrays_of, (before, expected, found)), strict=True):
         unequal = ~equal(one, other)
@@ -195,7 +195,7 @@ def equal(one: Any, other: Any) -> Any:
     """True where numbers are equal with the sign of zero; NaN equals NaN."""
     if one.dtype.kind == "c":
         return equal(one.real, other.real) & equal(one.imag, other.imag)
-    with np.errstate(invalid="ignore"):  # memory that nobody has written
+    with np.errstate(invalid="ignore"):  # memory that was not written
         same = one == other
         if one.dtype.kind == "f":
             same &= np.signbit(one) == np.signbit(other)
@@ -204,7 +204,7 @@ def equal(one: Any, other: Any) -> Any:
 
 
 def repeat(call: Call, run: Run) -> Difference:
-    """Repeat a call in a back end and compare what it wrote and returned."""
+    """Repeat a call with a back end, and compare its outputs."""
     arguments = copied(call.before)
     assert run(call, arguments) == call.result, call.symbol
     return difference(call.before, call.after, arguments)
@@ -232,14 +232,14 @@ def from_library(library: ctypes.CDLL) -> Run:
 
 
 def from_kernels(backend: str) -> Run:
-    """Calls of the package's entries in a back end: of a second copy of the kernels, which stands beside the first."""
+    """Calls of the entries of the package with a back end, from a second copy of the kernels."""
     own: dict[str, Any] = {}
     places = {name: each.__module__ for name, each in functions().items()}
     with in_the_place_of_the_kernels(own), patch.dict(os.environ, {"SAGLINE_BACKEND": backend}):
         entries = {name: getattr(importlib.import_module(module), name) for name, module in places.items()}
 
     def run(call: Call, arguments: tuple[Any, ...]) -> Any:
-        with in_the_place_of_the_kernels(own):  # numba looks for types by the names of their modules
+        with in_the_place_of_the_kernels(own):  # numba finds types by the names of their modules
             return entries[call.name](*arguments)
 
     return run
@@ -247,7 +247,7 @@ def from_kernels(backend: str) -> Run:
 
 @contextmanager
 def in_the_place_of_the_kernels(modules: dict[str, Any]) -> Iterator[None]:
-    """Modules of `sagline.kernels` in the place of the present ones; those that are loaded now are added to them."""
+    """Replace the modules `sagline.kernels` by the given ones, and add newly loaded modules to them."""
     package = sagline.kernels
     present = removed_kernels()
     sys.modules.update(modules)
@@ -260,18 +260,18 @@ def in_the_place_of_the_kernels(modules: dict[str, Any]) -> Iterator[None]:
 
 
 def removed_kernels() -> dict[str, Any]:
-    """Modules of the kernels, which are no longer loaded."""
+    """Remove the modules of the kernels from the loaded ones."""
     return {key: sys.modules.pop(key) for key in list(sys.modules) if f"{key}.".startswith("sagline.kernels.")}
 
 
 def from_wasm(folder: Path) -> Run:
-    """Calls of the module of shared pages, each in a process of node."""
+    """Calls of the WebAssembly module of shared pages, each in a process of node."""
 
     def run(call: Call, arguments: tuple[Any, ...]) -> Any:
         arrays = {str(k): each for k, each in enumerate(arrays_of(arguments))}
         kept = [each.flags.writeable for each in arrays.values()]
         for each in arrays.values():
-            each.flags.writeable = False  # such arrays keep their numbers
+            each.flags.writeable = False  # such arrays keep their values
         entry = call.symbol.removeprefix(wasm.PREFIX)
         kernels = described_calls({"entry": (entry, arguments)}, arrays)
         memory = in_node({"kernels": kernels}, [{}], folder)

@@ -91,13 +91,13 @@ ANY = Other("flag")
     ("function", "arguments", "operations"),  # for n = 6, m = 8
     [
         (sum_of_squares, (ROW,), 16),
-        (triangle, (SQUARE,), 6 * 8),  # rows count as the longest one
-        (dearer_side, (ROW, ANY), 17 + 1),  # what follows a return is added
+        (triangle, (SQUARE,), 6 * 8),  # rows have the length of the longest row
+        (dearer_side, (ROW, ANY), 17 + 1),  # statements after a return are added
         (dearer_side, (ROW, Other("flag", False)), 1),
         (never, (ROW, Other("none")), 1),
         (never, (ROW, ANY), 16),
         (found_count, (ROW,), 8),
-        (part, (ROW,), 2 * 8 + 2 * 3 + 1),  # less a constant counts as the whole
+        (part, (ROW,), 2 * 8 + 2 * 3 + 1),  # a difference with a constant counts as the minuend
     ],
 )
 def test_operations_are_counted(function: Any, arguments: tuple[Value, ...], operations: int) -> None:
@@ -125,7 +125,7 @@ def test_an_integer_keeps_its_bounds() -> None:
 
 @pytest.mark.parametrize("name", ["article-prototype", "falcon-7"])
 def test_the_inverse_kernel_needs_all_of_its_memory(name: str) -> None:
-    """The stated number of elements is enough, and one less is too little."""
+    """The stated number of elements is sufficient, and one element less is not."""
     from sagline.kernels.inverse.poses import inverse_poses
 
     robot = sl.load_robot(name)

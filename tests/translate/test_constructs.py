@@ -40,7 +40,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Any:
 
 
 def results(kernel: Kernel, entry: Entry, *numbers: Any) -> tuple[list[float], list[float]]:
-    """What plain Python and C write."""
+    """Outputs of plain Python and of C."""
     expected, found = np.zeros(SIZE), np.zeros(SIZE)
     PLAIN[kernel](*numbers, expected)
     entry(*numbers, found)
@@ -48,7 +48,7 @@ def results(kernel: Kernel, entry: Entry, *numbers: Any) -> tuple[list[float], l
 
 
 def assert_equal(expected: list[float], found: list[float]) -> None:
-    """Equal to the last bit with the sign of zero."""
+    """Equal to the last bit, including the sign of zero."""
     for k, (one, other) in enumerate(zip(expected, found, strict=True)):
         assert str(one) == str(other), k
 
@@ -60,7 +60,7 @@ def test_python_and_c_give_the_same_numbers(library: Any, kernel: Kernel, x: flo
     assert_equal(*results(kernel, Entry(library, kernel.__name__, TYPES), x, y, i, j))
 
 
-def test_integers_divided_by_zero_give_what_numba_gives(library: Any) -> None:
+def test_integer_division_by_zero_agrees_with_numba(library: Any) -> None:
     entry = Entry(library, "whole_divisions", TYPES)
     by_numba = numba.njit(error_model="numpy")(constructs.whole_divisions)
     for i in (-7, 0, 7):

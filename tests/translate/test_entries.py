@@ -1,4 +1,4 @@
-"""All entries of the package translate and compile to C in which no sanitizer finds a fault."""
+"""All entries of the package are translated to C, compiled, and run without errors of sanitizers."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ KINDS = {"Array": Element.FLOAT, "Indices": Element.INT, "Codes": Element.BYTE, 
 SCALARS = {"int": Scalar.INT, "float": Scalar.FLOAT, "bool": Scalar.BOOL}
 
 
-def test_every_entry_is_declared_and_every_declared_one_is_an_entry() -> None:
+def test_declarations_and_entries_agree() -> None:
     assert set(SIGNATURES) == set(functions()), "renew tools/translate/signatures.py"
 
 
@@ -44,7 +44,7 @@ def test_declared_types_agree_with_the_annotations(name: str) -> None:
 
 
 def agrees(annotation: ast.expr, type_: Type) -> bool:
-    """Whether a type is what an annotation of a number or an array says; of tuples, how many items they have."""
+    """True if a type agrees with the annotation of a number or an array; for tuples, the number of items."""
     text = ast.unparse(annotation)
     if text in KINDS:
         return isinstance(type_, ArrayType) and type_.element is KINDS[text]
@@ -76,7 +76,7 @@ def library(text: str, tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
 
 
 @extended
-def test_translating_again_gives_the_same_text(text: str, tmp_path: Path) -> None:
+def test_a_second_translation_is_identical(text: str, tmp_path: Path) -> None:
     assert command.main([str(tmp_path / "again.c")]) == 0
     assert (tmp_path / "again.c").read_text(encoding="utf-8") == text
 
@@ -95,7 +95,7 @@ def test_too_little_memory_is_an_error_of_numba_and_a_code_of_c(library: ctypes.
 
 
 @extended
-def test_no_sanitizer_finds_a_fault(text: str, tmp_path: Path) -> None:
+def test_sanitizers_find_no_error(text: str, tmp_path: Path) -> None:
     source, pickled = tmp_path / "kernels.c", tmp_path / "calls"
     source.write_text(text, encoding="utf-8")
     with recorded() as calls:

@@ -1,4 +1,4 @@
-"""The table of inputs gives the same numbers, to the last bit, in every back end."""
+"""The inputs of the table give the same numbers, to the last bit, with every back end."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tools.translate import wasm
 from tools.translate.signatures import CHAIN, FOUND, MEMORY, entries
 
 LIMIT = 1e-12  # of WebAssembly, relative for numbers above 1
-FORWARD_LIMIT = 1e-9  # a solve ends with a balance to 1e-10 N; which rest that is depends on the last digits
+FORWARD_LIMIT = 1e-9  # a solution has a residual up to 1e-10 N, which depends on the last digits
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""What is outside the subset is refused with file, line and a way out."""
+"""Constructs outside of the subset are refused with file, line and an alternative."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def kernel(a, b, n, pair):
 """
 FIRST = HEAD.count("\n") + 1  # line of a kernel's first statement
 
-REFUSED = {  # statements, the line of them that is refused, a part of what the error calls it
+REFUSED = {  # statements, the refused line, and a part of the error message
     "a[::2][0] = 1.0": (0, "step"),
     "a[-n] = 1.0": (0, "-n"),
     "a[n / 2] = 1.0": (0, "float as an index"),
@@ -70,7 +70,7 @@ REFUSED = {  # statements, the line of them that is refused, a part of what the 
 
 
 def kernel_of(body: str, folder: Path) -> FunctionType:
-    """A function with these statements, in a file of its own."""
+    """A function with the statements, in a new file."""
     file = folder / "kernel.py"
     file.write_text(HEAD + "".join(f"    {line}\n" for line in body.split("\n")), encoding="utf-8")
     space: dict[str, object] = {"__name__": "kernel"}
@@ -121,6 +121,6 @@ def test_a_function_is_emitted_once_for_each_set_of_types(tmp_path: Path) -> Non
     assert heads == [("kernel_helper", "Float1"), ("kernel_helper_2", "Float1View")]
 
 
-def test_the_command_says_how_it_is_used(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_prints_its_usage(capsys: pytest.CaptureFixture[str]) -> None:
     assert command.main([]) == 2
     assert "OUT.c" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""The example of docs/contributing/c-kernels.md is what the translator writes."""
+"""The example of docs/contributing/c-kernels.md is the output of the translator."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ kernel = lambda each: each
 F1 = ArrayType(Element.FLOAT, 1)
 
 
-def test_the_example_of_the_page_is_what_the_translator_writes(tmp_path: Path) -> None:
+def test_the_example_of_the_page_is_the_output_of_the_translator(tmp_path: Path) -> None:
     page = PAGE.read_text(encoding="utf-8")
     (source,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     function, prototype = re.findall(r"```c\n(.*?)```", page, re.DOTALL)
@@ -30,5 +30,5 @@ def test_the_example_of_the_page_is_what_the_translator_writes(tmp_path: Path) -
     kernel = space["weighted_mean"]
     assert isinstance(kernel, FunctionType)
     text = translate([(kernel, (F1, F1, Scalar.INT), "sagline_example")])
-    for part in (function, prototype):  # the page breaks long lines
+    for part in (function, prototype):  # long lines are broken on the page
         assert " ".join(part.split()) in " ".join(text.split())
