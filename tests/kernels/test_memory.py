@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from sagline.core.arrays import Array, Indices
-from sagline.kernels.balance.setting import new_balance
-from sagline.kernels.cable.cables import new_cables
+from sagline.kernels.cable.terms import new_cables
 from sagline.kernels.codes import LOWEST_MAXIMUM, LOWEST_SUM
 from sagline.kernels.memory import Memory, block, memory_for
+from sagline.kernels.statics import new_balance
 from sagline.kernels.tension.nearest import new_reference_point
 from sagline.kernels.tension.polygon import new_work_arrays
 from tests.kernels.compiled import from_python, memory

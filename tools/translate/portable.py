@@ -18,7 +18,7 @@ from typing import Any, Final
 
 from sagline.kernels import codes, tables
 from sagline.kernels.cable.geometry import CABLE_ROWS
-from sagline.kernels.forward.problem import FORWARD_NUMBERS, LAST_COLUMNS
+from sagline.kernels.forward.platform import FORWARD_NUMBERS, LAST_COLUMNS
 from tools.translate import signatures as s
 from tools.translate.bounds import Bounds
 from tools.translate.extents import (
@@ -53,19 +53,19 @@ FORWARD: Final = (s.BOOL, plain_tuple(K2, K2, K3, K2, K2, K2), s.CHAIN, s.MEMORY
 # constants of the kernels that follow from the rounding of numbers, for single precision
 SINGLE: Final = {
     "algebra.bounds.TOLERANCE": 2e-6,
-    "algebra.eigenvalues.STILL": 1e-7,
+    "algebra.factors.STILL": 1e-7,
     "algebra.factors.LEAST_PIVOT": 1e-6,
     "algebra.factors.RANK": 2e-5,
-    "algebra.linear_program.PIVOT": 1e-5,
-    "algebra.linear_program.ROUNDING": 2e-7,
-    "algebra.nearest_point.DEPENDENT": 1e-5,
-    "balance.setting.SHORTEST_CHORD": 1e-6,
-    "cable.admissible.SMALLEST": 1e-30,
-    "cable.catenary.SMALL_HALLEY_STEP": 1e-4,
-    "cable.catenary.SMALL_NEWTON_STEP": 1e-4,
-    "cable.catenary.SPLIT": 4097.0,
+    "algebra.programs.PIVOT": 1e-5,
+    "algebra.programs.ROUNDING": 2e-7,
+    "algebra.programs.DEPENDENT": 1e-5,
+    "statics.SHORTEST_CHORD": 1e-6,
+    "cable.states.SMALLEST": 1e-30,
+    "cable.models.SMALL_HALLEY_STEP": 1e-4,
+    "cable.models.SMALL_NEWTON_STEP": 1e-4,
+    "cable.models.SPLIT": 4097.0,
     "cable.forces.MISSED": 1e-6,
-    "cable.over_pulleys.TINY": 1e-30,
+    "cable.forces.TINY": 1e-30,
     "cable.states.LIMIT_PRECISION": 1e-6,
     "cable.states.SAME_EXIT": 1e-5,
     "forward.forward.FLAT": 1e-5,
@@ -73,9 +73,9 @@ SINGLE: Final = {
     "forward.newton.LAST_DIGIT": 5e-7,
     "forward.newton.NOISE": 2e-6,
     "forward.newton.SMALLEST_RADIUS": 1e-6,
-    "inverse.iterations.SAG_ROUNDING": 5e-7,
-    "inverse.iterations.SLOPE_STEP": 1e-2,
-    "inverse.iterations.TENSION_CONVERGED": 1e-5,
+    "inverse.poses.SAG_ROUNDING": 5e-7,
+    "inverse.poses.SLOPE_STEP": 1e-2,
+    "inverse.poses.TENSION_CONVERGED": 1e-5,
     "tension.centers.CENTERED": 1e-9,
     "tension.centers.THIN": 1e-5,
     "tension.norms.STILL": 1e-6,

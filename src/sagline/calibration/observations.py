@@ -15,7 +15,7 @@ from sagline.core.progress import blocks
 from sagline.kernels.calibration import kinds
 from sagline.kernels.calibration.observe import observe
 from sagline.kernels.calibration.terms import BESIDE, PoseReadings, SensingArrays
-from sagline.kernels.forward.problem import ForwardTerms
+from sagline.kernels.forward.platform import ForwardTerms
 from sagline.kernels.memory import memory_for
 from sagline.robot.batch import has_routing
 from sagline.robot.drum import Drums, drums_of

@@ -25,7 +25,7 @@ from sagline.files.controller_source import checked_name, filled, origin
 from sagline.files.writing import atomic_files
 from sagline.kernels import codes, tables
 from sagline.kernels.cable.geometry import CABLE_ROWS
-from sagline.kernels.forward.problem import FORWARD_NUMBERS, LAST_COLUMNS
+from sagline.kernels.forward.platform import FORWARD_NUMBERS, LAST_COLUMNS
 from sagline.kinematics.forward import DEPTH, centered_positions
 from sagline.kinematics.status import ForwardStatus, PoseStatus
 from sagline.kinematics.winding import without_guides

@@ -16,7 +16,7 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_memory
 from sagline.core.results import Result
 from sagline.core.table import Columns, Tabular
-from sagline.kernels.forward.problem import ENERGY
+from sagline.kernels.forward.platform import ENERGY
 from sagline.kinematics.forward import checked_lengths, from_orientations, start_quaternions
 from sagline.kinematics.forward_rows import ForwardRows, ForwardSolution
 from sagline.kinematics.status import STABLE, ForwardStatus

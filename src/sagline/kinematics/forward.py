@@ -16,7 +16,7 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_poses
 from sagline.core.progress import Progress, blocks, rows_of
 from sagline.kernels import codes
-from sagline.kernels.forward.problem import ENERGY
+from sagline.kernels.forward.platform import ENERGY
 from sagline.kinematics.forward_rows import BLOCK, ForwardRows, ForwardSolution, solve_forward_rows
 from sagline.kinematics.measured import MeasuredTension, fit_measurements
 from sagline.kinematics.winding import checked_winding, iterate_routing

@@ -14,19 +14,8 @@ from sagline.core.results import Result
 from sagline.core.table import Columns, Tabular
 from sagline.kernels import codes, tables
 from sagline.kernels.cable.geometry import CABLE_ROWS
-from sagline.kernels.forward.fit import fit_poses
-from sagline.kernels.forward.forward import forward_poses
-from sagline.kernels.forward.problem import (
-    ENERGY,
-    FORCE_RESIDUAL,
-    FORWARD_NUMBERS,
-    ITERATIONS,
-    LAST_COLUMNS,
-    MOMENT_RESIDUAL,
-    STIFFNESS_MIN,
-    LastEquilibriumArrays,
-    SolutionArrays,
-)
+from sagline.kernels.forward import platform
+from sagline.kernels.forward.forward import fit_poses, forward_poses
 from sagline.kernels.memory import memory_for
 from sagline.kinematics.status import STABLE, ForwardStatus
 from sagline.robot.batch import Robots, first_of, has_routing
@@ -135,7 +124,7 @@ class ForwardRows(NamedTuple):
         return locked(self.poses[which]) if which.size else before
 
     @property
-    def arrays(self) -> SolutionArrays:
+    def arrays(self) -> platform.SolutionArrays:
         """Plain tuple of the arrays, which kernels accept fastest."""
         return self.poses, self.results, self.cable_status, self.numbers, self.pose_status
 
@@ -146,7 +135,7 @@ class ForwardRows(NamedTuple):
             np.empty((count, tables.POSE_COLUMNS)),
             np.empty((tables.RESULT_ROWS if behind else tables.BARE_ROWS, count, cables)),
             np.empty((count, cables), dtype=np.int8),
-            np.empty((count, FORWARD_NUMBERS)),
+            np.empty((count, platform.FORWARD_NUMBERS)),
             np.empty(count, dtype=np.int8),
         )
 
@@ -170,15 +159,15 @@ class ForwardRows(NamedTuple):
         """
         pose = Pose._adopt(self.poses[:, :3].reshape(*shape, 3), self.poses[:, 3:].reshape(*shape, 4))
         whole = locked(np.ascontiguousarray(np.broadcast_to(load, (*shape, 6))))
-        residuals = self.numbers[:, [FORCE_RESIDUAL, MOMENT_RESIDUAL]]
+        residuals = self.numbers[:, [platform.FORCE_RESIDUAL, platform.MOMENT_RESIDUAL]]
         cables, contact = cables_of_results(robot, model, self.results, self.cable_status, shape)
         return ForwardSolution(
             state=Equilibrium(robot, pose, whole, cables, contact),
             status=locked(self.pose_status.reshape(shape)),
-            stiffness_min=locked(self.numbers[:, STIFFNESS_MIN].reshape(shape)),
-            energy=locked(self.numbers[:, ENERGY].reshape(shape)),
+            stiffness_min=locked(self.numbers[:, platform.STIFFNESS_MIN].reshape(shape)),
+            energy=locked(self.numbers[:, platform.ENERGY].reshape(shape)),
             wrench_residual=locked(residuals.reshape(*shape, 2)),
-            iterations=locked(self.numbers[:, ITERATIONS].astype(np.int64).reshape(shape)),
+            iterations=locked(self.numbers[:, platform.ITERATIONS].astype(np.int64).reshape(shape)),
             covariance=None if covariance is None else locked(covariance.reshape(*shape, 6, 6)),
         )
 
@@ -220,10 +209,10 @@ def solve_forward_rows(
     return found
 
 
-def new_chain(cables: int, freedoms: int) -> LastEquilibriumArrays:
+def new_chain(cables: int, freedoms: int) -> platform.LastEquilibriumArrays:
     """Arrays that pass the last equilibrium of a chain to the next sample. At the start of the chain, all are NaN."""
     return (
         np.full((CABLE_ROWS, cables), np.nan),
         np.full((freedoms, freedoms), np.nan),
-        np.full(LAST_COLUMNS, np.nan),
+        np.full(platform.LAST_COLUMNS, np.nan),
     )

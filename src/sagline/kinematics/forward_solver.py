@@ -14,7 +14,7 @@ from sagline.core.arrays import LARGEST, SMALLEST, Array, Codes, checked, exactl
 from sagline.core.errors import InvalidValueError
 from sagline.kernels import codes, tables
 from sagline.kernels.forward.forward import forward_poses
-from sagline.kernels.forward.problem import FORCE_RESIDUAL, FORWARD_NUMBERS, MOMENT_RESIDUAL, STIFFNESS_MIN
+from sagline.kernels.forward.platform import FORCE_RESIDUAL, FORWARD_NUMBERS, MOMENT_RESIDUAL, STIFFNESS_MIN
 from sagline.kernels.memory import memory_for
 from sagline.kinematics.caller import copy_in, copy_out
 from sagline.kinematics.forward import dead_only, search

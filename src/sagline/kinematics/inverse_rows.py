@@ -9,7 +9,7 @@ import numpy as np
 from sagline.core.arrays import Array, Codes, Flags, locked
 from sagline.core.progress import Progress, blocks
 from sagline.kernels import codes, tables
-from sagline.kernels.forward.stability import stabilities_of_poses
+from sagline.kernels.forward.sensitivity import stabilities_of_poses
 from sagline.kernels.inverse.feasibility import ENOUGH, PROVED, decide_poses
 from sagline.kernels.inverse.poses import Answers, ModelTerms, inverse_poses
 from sagline.kernels.inverse.poses import Robots as RobotTerms

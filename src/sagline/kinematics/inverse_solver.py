@@ -15,7 +15,7 @@ from sagline.core.arguments import flag, instance
 from sagline.core.arrays import Array, exactly, locked
 from sagline.core.errors import InvalidValueError
 from sagline.kernels import codes, tables
-from sagline.kernels.forward.stability import stabilities_of_poses
+from sagline.kernels.forward.sensitivity import stabilities_of_poses
 from sagline.kernels.inverse.feasibility import decide_poses
 from sagline.kernels.inverse.poses import inverse_poses
 from sagline.kernels.jit import bound

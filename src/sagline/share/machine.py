@@ -11,7 +11,7 @@ import numpy as np
 from sagline.cables.models import Catenary
 from sagline.core.arrays import Array, locked
 from sagline.kernels import tables
-from sagline.kernels.cable.courses import cable_courses
+from sagline.kernels.cable.batch import cable_courses
 from sagline.kernels.cable.geometry import GEOMETRY_ROWS
 from sagline.kernels.memory import memory_for
 from sagline.kinematics.forward_rows import ForwardRows, new_chain

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from sagline.core.arguments import instance
 from sagline.core.arrays import Array, checked, exactly, locked, number
 from sagline.core.errors import InvalidValueError
-from sagline.kernels.balance.wrench import structure_matrices
 from sagline.kernels.cable import geometry as rows
+from sagline.kernels.statics import structure_matrices
 from sagline.robot.batch import Robots, bodies_of, first_of, one_a_pose
 from sagline.robot.pose import Pose, PoseLike, pose_of
 from sagline.robot.robot import Robot

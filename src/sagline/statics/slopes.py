@@ -9,15 +9,7 @@ import numpy as np
 from sagline.core.arrays import Array, locked
 from sagline.core.progress import blocks, rows_of
 from sagline.kernels import tables
-from sagline.kernels.forward.sensitivity import (
-    BY_DEAD,
-    BY_DENSITY,
-    BY_LENGTH,
-    BY_RADIUS,
-    BY_STIFFNESS,
-    DATA,
-    describe_states,
-)
+from sagline.kernels.forward import sensitivity
 from sagline.kernels.memory import memory_for
 from sagline.robot.batch import first_of, has_routing, pulleys_of
 from sagline.robot.equilibrium import Equilibrium
@@ -51,14 +43,14 @@ def cable_slopes(state: Equilibrium) -> CableSlopes:
     shape, (count, m) = state.pose.shape, lengths.shape
     matrices = np.empty((count, 6, 6))
     stiffness = np.empty((count, m, 3, 3))
-    slopes = np.empty((count, DATA, m, 3))
+    slopes = np.empty((count, sensitivity.DATA, m, 3))
     levers = np.empty((count, m, 3))
     lengths, wrenches = locked(lengths.view()), locked(np.atleast_2d(state.wrench).view())
     code, memory = (cables.model.code, *cables.model.parameters, behind), memory_for(m)
     for part in blocks(count, BLOCK):
         own = (rows_of(bodies, part), rows_of(robots, part), lengths[part], poses[part], rows_of(wrenches, part))
         found = (matrices[part], stiffness[part], slopes[part], levers[part])
-        describe_states(code, (shared.freedom, *own), memory, *found)
+        sensitivity.describe_states(code, (shared.freedom, *own), memory, *found)
     centers = poses[:, :3] + _turned(state, bodies[:, tables.CENTER_X :])
     reach = (centers[:, None] + levers - robots[:, :, : tables.PLATFORM_X]).reshape(*shape, m, 3)
     # a vertical cable has no horizontal direction
@@ -67,11 +59,11 @@ def cable_slopes(state: Equilibrium) -> CableSlopes:
     return CableSlopes(
         matrices.reshape(*shape, 6, 6),
         stiffness.reshape(*shape, m, 3, 3),
-        slopes[:, BY_LENGTH].reshape(*shape, m, 3),
-        slopes[:, BY_DENSITY].reshape(*shape, m, 3),
-        slopes[:, BY_STIFFNESS].reshape(*shape, m, 3),
-        slopes[:, BY_RADIUS].reshape(*shape, m, 3),
-        slopes[:, BY_DEAD].reshape(*shape, m, 3),
+        slopes[:, sensitivity.BY_LENGTH].reshape(*shape, m, 3),
+        slopes[:, sensitivity.BY_DENSITY].reshape(*shape, m, 3),
+        slopes[:, sensitivity.BY_STIFFNESS].reshape(*shape, m, 3),
+        slopes[:, sensitivity.BY_RADIUS].reshape(*shape, m, 3),
+        slopes[:, sensitivity.BY_DEAD].reshape(*shape, m, 3),
         levers.reshape(*shape, m, 3),
         np.concatenate((sideways, cables.vertical_force[..., None]), axis=-1),
     )

@@ -6,9 +6,9 @@ import numpy as np
 
 from sagline.core.arrays import Array, locked
 from sagline.core.errors import CableGeometryError
-from sagline.kernels.balance.setting import SHORTEST_CHORD
 from sagline.kernels.cable import geometry as rows
 from sagline.kernels.cable.geometry import cable_geometries
+from sagline.kernels.statics import SHORTEST_CHORD
 from sagline.robot.batch import Robots, anchors_of, first_of, pulleys_of
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot

@@ -7,8 +7,8 @@ import pytest
 from scipy.optimize import linprog
 
 from sagline.core.arrays import Array
-from sagline.kernels.algebra import linear_program as lp
-from sagline.kernels.algebra.linear_program import LP_EMPTY, LP_SOLVED, LP_UNBOUNDED
+from sagline.kernels.algebra import bounds as lp
+from sagline.kernels.algebra.programs import LP_EMPTY, LP_SOLVED, LP_UNBOUNDED
 from tests.kernels.compiled import from_python, memory
 
 lowest_point = from_python(lp.lowest_point)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sagline.core.arrays import Array
-from sagline.kernels.algebra import eigenvalues, factors
+from sagline.kernels.algebra import factors
 from sagline.kernels.forward import newton as trust
 from tests.kernels.compiled import from_python
 
@@ -13,7 +13,7 @@ factor_positive = from_python(factors.factor_positive)
 solve_lower = from_python(factors.solve_lower)
 solve_upper = from_python(factors.solve_upper)
 solve_general = from_python(factors.solve_general)
-extreme_eigenvalues = from_python(eigenvalues.extreme_eigenvalues)
+extreme_eigenvalues = from_python(factors.extreme_eigenvalues)
 trust_step = from_python(trust.trust_step)
 
 

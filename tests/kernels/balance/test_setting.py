@@ -7,14 +7,12 @@ import numpy as np
 import pytest
 
 from sagline.core.arrays import Array
+from sagline.kernels import balance as s
 from sagline.kernels import tables
 from sagline.kernels.algebra.bounds import HIGH, LOW, START
-from sagline.kernels.balance import setting as s
 from sagline.kernels.cable import states
-from sagline.kernels.cable.admissible import TensionLimits
-from sagline.kernels.cable.cables import Cables, new_cables
-from sagline.kernels.cable.pulley import Pulley
-from sagline.kernels.cable.terms import Chord, Material, Model
+from sagline.kernels.cable.states import TensionLimits
+from sagline.kernels.cable.terms import Cables, Chord, Material, Model, Pulley, new_cables
 from sagline.kernels.codes import (
     CATENARY,
     CHORD_TENSION,

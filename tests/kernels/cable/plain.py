@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sagline.core.arrays import Array
-from sagline.kernels.cable.cables import Cables
+from sagline.kernels.cable.terms import Cables
 
 SAME = {
     "free_half_weight": "half_weight",

@@ -6,7 +6,7 @@ from decimal import Decimal, localcontext
 import numpy as np
 import pytest
 
-from sagline.kernels.cable import catenary as c
+from sagline.kernels.cable import models as c
 from sagline.kernels.codes import CABLE_SLACK, CABLE_SOLVED, CABLE_TOO_SLACK
 from tests.kernels.cable.exact import exact_end, length_and_pull
 from tests.kernels.compiled import from_python

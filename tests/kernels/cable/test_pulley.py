@@ -9,10 +9,10 @@ from scipy.integrate import quad
 
 from sagline.core.arrays import Array
 from sagline.kernels import tables
-from sagline.kernels.cable import forces, geometry, models, over_pulleys, pulley, states
+from sagline.kernels.cable import forces, geometry, models, pulley, states
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable.pulley import Pulley, Wrap
-from sagline.kernels.cable.terms import Chord, Material, Model
+from sagline.kernels.cable.pulley import Wrap
+from sagline.kernels.cable.terms import Chord, Material, Model, Pulley
 from sagline.kernels.codes import CABLE_SOLVED, CATENARY
 from tests.kernels.compiled import from_python
 
@@ -25,7 +25,7 @@ solve_cable_state = from_python(states.solve_cable_state)
 free_span, free_rise = from_python(pulley.free_span), from_python(pulley.free_rise)
 from_tension = from_python(models.from_tension)
 cable_forces = from_python(forces.forces_from_lengths)
-series = from_python(over_pulleys.stiffness_in_series)
+series = from_python(forces.stiffness_in_series)
 
 GRAVITY = 9.81
 WEIGHT, EA = 8.0, 3e4  # N/m, N: heavy and soft, so that every term shows

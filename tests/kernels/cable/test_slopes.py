@@ -5,7 +5,7 @@ import pytest
 
 import sagline as sl
 from sagline.core.arrays import Array
-from sagline.kernels.cable import slopes, stiffness
+from sagline.kernels.cable import stiffness
 from sagline.kernels.cable.terms import Force, Material, Model
 from tests.kernels.compiled import from_python
 
@@ -13,8 +13,8 @@ MODELS = [sl.Elastic(), sl.Parabolic(), sl.Empirical(), sl.Catenary()]
 ENDS = [(4.0, 3.0, 4.97), (6.0, -2.0, 6.31), (5.0, 0.2, 4.99), (5.0, 1.0, 7.0)]  # the last hangs deep
 DENSITY, AXIAL = 0.067, 44e3
 cable_stiffness = from_python(stiffness.cable_stiffness)
-force_slopes = from_python(slopes.force_slopes)
-force_by_length = from_python(slopes.force_by_length)
+force_slopes = from_python(stiffness.force_slopes)
+force_by_length = from_python(stiffness.force_by_length)
 
 
 def central(of: object, at: float, share: float) -> Array:

@@ -8,10 +8,8 @@ import pytest
 from sagline.core.arrays import Array, Codes
 from sagline.kernels.cable import models
 from sagline.kernels.cable import states as h
-from sagline.kernels.cable.cables import Cables, new_cables
-from sagline.kernels.cable.catenary import ORDINARY_STRAIN, TAUT_STRAIN
-from sagline.kernels.cable.pulley import Pulley
-from sagline.kernels.cable.terms import Chord, Material, Model
+from sagline.kernels.cable.models import ORDINARY_STRAIN, TAUT_STRAIN
+from sagline.kernels.cable.terms import Cables, Chord, Material, Model, Pulley, new_cables
 from sagline.kernels.codes import CABLE_SOLVED, CABLE_TOO_SLACK, CATENARY, ELASTIC, EMPIRICAL, PARABOLIC, STRAIGHT
 from tests.kernels.cable.exact import length_and_pull
 from tests.kernels.compiled import from_python, memory

@@ -8,12 +8,12 @@ import pytest
 
 import sagline as sl
 from sagline.core.arrays import Array
-from sagline.kernels.cable import catenary, stiffness
+from sagline.kernels.cable import models, stiffness
 from sagline.kernels.cable.terms import Force, Material, Model
 from tests.kernels.cable.exact import exact_end
 from tests.kernels.compiled import from_python
 
-catenary_from_length = from_python(catenary.catenary_from_length)
+catenary_from_length = from_python(models.catenary_from_length)
 catenary_energy = from_python(stiffness.catenary_energy)
 elastic_energy = from_python(stiffness.elastic_energy)
 cable_stiffness = from_python(stiffness.cable_stiffness)

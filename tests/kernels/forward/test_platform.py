@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from sagline.kernels.balance import pose
+from sagline.kernels import statics
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.forward import platform
 from sagline.kernels.tables import BODY_COLUMNS, CENTER_X, POSE_COLUMNS
 from tests.kernels.compiled import from_python
 
-move, add_force = from_python(pose.moved_pose), from_python(platform.add_force)
+move, add_force = from_python(statics.moved_pose), from_python(platform.add_force)
 
 
 @pytest.mark.parametrize("size", [1e-12, 0.3, 3.0])

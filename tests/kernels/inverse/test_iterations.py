@@ -2,16 +2,16 @@
 
 import numpy as np
 
-from sagline.kernels.balance.setting import new_balance
-from sagline.kernels.cable.cables import new_cables
-from sagline.kernels.inverse import iterations
+from sagline.kernels.cable.terms import new_cables
+from sagline.kernels.inverse import poses
+from sagline.kernels.statics import new_balance
 from sagline.kernels.tension import polygon
 from tests.kernels.compiled import from_python, memory
 from tests.kernels.tension.problems import nearness, room_of
 
-take_tensions = from_python(iterations.take_tensions)
-sag_force_change = from_python(iterations.sag_force_change)
-stay = from_python(iterations.fix_reference)
+take_tensions = from_python(poses.take_tensions)
+sag_force_change = from_python(poses.sag_force_change)
+stay = from_python(poses.fix_reference)
 reset_work_arrays = from_python(polygon.reset_work_arrays)
 room_for_cables = from_python(new_cables)
 room_for_balance = from_python(new_balance)

@@ -11,8 +11,7 @@ import pytest
 from sagline.core.arrays import Array, Codes, locked
 from sagline.kernels import codes, tables
 from sagline.kernels.cable import models, states
-from sagline.kernels.cable.pulley import Pulley
-from sagline.kernels.cable.terms import Chord, Material, Model
+from sagline.kernels.cable.terms import Chord, Material, Model, Pulley
 from sagline.kernels.codes import (
     CATENARY,
     CHORD_TENSION,

@@ -11,8 +11,7 @@ from scipy.optimize import linprog
 
 from sagline.core.arrays import Array, Indices
 from sagline.kernels.algebra.bounds import HIGH, LOW, START
-from sagline.kernels.algebra.linear_program import Basis
-from sagline.kernels.algebra.nearest_point import ActiveSet
+from sagline.kernels.algebra.programs import ActiveSet, Basis
 from sagline.kernels.tension.nearest import ReferencePoint
 from sagline.kernels.tension.polygon import SPARE_CORNERS, WorkArrays
 from tests.kernels.compiled import memory

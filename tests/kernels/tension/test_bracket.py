@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sagline.kernels.cable.admissible import LOOSEST
+from sagline.kernels.cable.states import LOOSEST
 from sagline.kernels.codes import POSE_INFEASIBLE, POSE_SOLVED
 from sagline.kernels.tension import bracket
 from sagline.kernels.tension.least_change import Demand

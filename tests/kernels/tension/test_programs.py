@@ -9,7 +9,7 @@ from scipy.optimize import linprog
 
 from sagline.core.arrays import Array
 from sagline.kernels.algebra.bounds import HIGH, LOW, START
-from sagline.kernels.algebra.linear_program import LP_EMPTY, LP_GAVE_UP, LP_SOLVED, LP_UNBOUNDED
+from sagline.kernels.algebra.programs import LP_EMPTY, LP_GAVE_UP, LP_SOLVED, LP_UNBOUNDED
 from sagline.kernels.codes import POSE_INFEASIBLE, POSE_NOT_CONVERGED, POSE_SOLVED, POSE_UNBOUNDED
 from sagline.kernels.tension import norms as p
 from tests.kernels.compiled import from_python, memory

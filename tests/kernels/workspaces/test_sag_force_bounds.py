@@ -9,9 +9,8 @@ import pytest
 
 from sagline.core.arrays import Array
 from sagline.kernels.cable import models, states
-from sagline.kernels.cable.admissible import LOOSEST
-from sagline.kernels.cable.pulley import Pulley
-from sagline.kernels.cable.terms import Chord, Material, Model
+from sagline.kernels.cable.states import LOOSEST
+from sagline.kernels.cable.terms import Chord, Material, Model, Pulley
 from sagline.kernels.workspaces import sag_force_bounds
 from sagline.kernels.workspaces.box_tensions import SLACK
 from tests.kernels.cable.curves import GRAVITY, random_curves

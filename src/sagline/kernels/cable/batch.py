@@ -1,22 +1,21 @@
-"""Loops over many cables: states, shapes, sags, closure errors, and creep. Operands of length 1 apply to all cables."""
+"""Loops over many cables: states, shapes, sags, closure errors, creep, and points for drawings.
+
+Operands of length 1 apply to all cables.
+"""
 
 from __future__ import annotations
 
 import math
 
 from sagline.core.arrays import Array, Codes, Flags
-from sagline.kernels import codes
-from sagline.kernels.cable.catenary import (
-    TAUT_STRAIN,
-    catenary_end,
-    is_ordinary,
-    ordinary_length_ratio,
-    ordinary_length_ratio_near,
-    ordinary_sag_force_ratio,
-)
-from sagline.kernels.cable.models import from_length, from_tension, sag_of_shallow, shallow_length_ratio
+from sagline.kernels import codes, tables
+from sagline.kernels.algebra.functions import angle
+from sagline.kernels.cable import models
+from sagline.kernels.cable.geometry import AZIMUTH_X, AZIMUTH_Y, CHORD, COSINE, SINE, cable_geometry
+from sagline.kernels.cable.pulley import pulley_at
+from sagline.kernels.cable.states import solve_cable_state
 from sagline.kernels.cable.terms import Chord, Material, Model, Terms, model_of
-from sagline.kernels.jit import entry, kernel
+from sagline.kernels.jit import entry, glue, kernel
 
 CHUNK = 256  # cables per chunk; buffers of this length fit into the fastest cache of the processor
 BUFFERS = 11
@@ -76,22 +75,22 @@ def batch_from_tension(
             half[i] = 0.5 * rho[i] * model.gravity * chord[i] / tau[i]
         if model.code == codes.CATENARY:
             for i in range(size):
-                ratio[i] = ordinary_length_ratio(half[i], sine[i], cosine[i], tau[i] / ea[i])
+                ratio[i] = models.ordinary_length_ratio(half[i], sine[i], cosine[i], tau[i] / ea[i])
             stretched = 0
             for i in range(size):
-                stretched += 1 if tau[i] > TAUT_STRAIN * ea[i] else 0
+                stretched += 1 if tau[i] > models.TAUT_STRAIN * ea[i] else 0
             if stretched > 0:
                 for i in range(size):
-                    ratio[i] = ordinary_length_ratio_near(half[i], sine[i], cosine[i], tau[i] / ea[i], ratio[i])
+                    ratio[i] = models.ordinary_length_ratio_near(half[i], sine[i], cosine[i], tau[i] / ea[i], ratio[i])
             for i in range(size):
-                sag_force[i] = ordinary_sag_force_ratio(half[i], sine[i], tau[i] / ea[i], ratio[i]) * tau[i]
+                sag_force[i] = models.ordinary_sag_force_ratio(half[i], sine[i], tau[i] / ea[i], ratio[i]) * tau[i]
             for i in range(size):
                 ratio[i] *= chord[i]
         for i in range(size):
             status = codes.CABLE_SOLVED
-            if model.code != codes.CATENARY or not is_ordinary(half[i], tau[i] / ea[i]):
+            if model.code != codes.CATENARY or not models.is_ordinary(half[i], tau[i] / ea[i]):
                 line = Chord(chord[i], sine[i], cosine[i])
-                ratio[i], sag_force[i], status = from_tension(model, line, Material(rho[i], ea[i]), tau[i])
+                ratio[i], sag_force[i], status = models.from_tension(model, line, Material(rho[i], ea[i]), tau[i])
             status_out[start + i] = status
         for i in range(size):
             length_out[start + i] = ratio[i]
@@ -123,7 +122,7 @@ def batch_from_length(
     n = min(length.shape[0] - 1, 1)
     for i in range(tension_out.shape[0]):
         material = Material(density[i * d], stiffness[i * e])
-        force, status = from_length(model, span[i * x], rise[i * z], material, length[i * n])
+        force, status = models.from_length(model, span[i * x], rise[i * z], material, length[i * n])
         horizontal_out[i], vertical_out[i], tension_out[i] = force
         status_out[i] = status
 
@@ -134,7 +133,7 @@ def batch_end(
 ) -> None:
     """Platform ends of exact catenaries with given forces and lengths. All operands have one entry per cable."""
     for i in range(x_out.shape[0]):
-        x_out[i], z_out[i] = catenary_end(horizontal[i], vertical[i], length[i], weight[i], stiffness[i])
+        x_out[i], z_out[i] = models.catenary_end(horizontal[i], vertical[i], length[i], weight[i], stiffness[i])
 
 
 @kernel
@@ -143,7 +142,7 @@ def catenary_point(
 ) -> tuple[float, float]:
     """Point at the share `fraction` of the unstrained length, measured from the frame end."""
     part = fraction * length
-    return catenary_end(horizontal, vertical - weight * (length - part), part, weight, stiffness)
+    return models.catenary_end(horizontal, vertical - weight * (length - part), part, weight, stiffness)
 
 
 @entry
@@ -196,7 +195,7 @@ def _catenary_sag(
     # chord is vertical
     part = length - (vertical - horizontal * slope) / weight
     part = min(max(part, 0.0), length)
-    x, z = catenary_end(horizontal, vertical - weight * (length - part), part, weight, stiffness)
+    x, z = models.catenary_end(horizontal, vertical - weight * (length - part), part, weight, stiffness)
     if span > 0.0:
         return max(slope * x - z, 0.0)
     return max(min(0.0, rise) - z, 0.0)
@@ -249,7 +248,7 @@ def closures(
         if model.code == codes.STRAIGHT:
             residual_out[i] = abs(length[i] - chord)
         elif model.code == codes.CATENARY and density[i] * model.gravity > 0.0:
-            x, z = catenary_end(horizontal[i], vertical[i], length[i], density[i] * model.gravity, stiffness[i])
+            x, z = models.catenary_end(horizontal[i], vertical[i], length[i], density[i] * model.gravity, stiffness[i])
             residual_out[i] = math.hypot(x - span[i], z - rise[i])
         elif tension[i] == 0.0:  # slack: any length above the chord is a solution
             residual_out[i] = max(chord - length[i], 0.0)
@@ -257,9 +256,9 @@ def closures(
             sine = rise[i] / chord
             cosine = span[i] / chord
             weightless = model.code == codes.ELASTIC or density[i] * model.gravity == 0.0
-            sag = 0.0 if weightless else sag_of_shallow(model, density[i] * chord * cosine)
+            sag = 0.0 if weightless else models.sag_of_shallow(model, density[i] * chord * cosine)
             sag_force = vertical[i] - tension[i] * sine if model.code == codes.EMPIRICAL else 0.0
-            ratio = shallow_length_ratio(tension[i], sine, cosine, sag_force, sag, stiffness[i])
+            ratio = models.shallow_length_ratio(tension[i], sine, cosine, sag_force, sag, stiffness[i])
             residual_out[i] = abs(length[i] - chord * ratio)
 
 
@@ -297,3 +296,62 @@ def creep_strains(
                     strain = (end + (strain * stiffness[k] - begin) * math.exp(-step / delay[k])) / stiffness[k]
                 strain_out[p, i] += strain
                 before = p
+
+
+@entry
+def cable_courses(
+    cables: Array, body: Array, pose: Array, tension: Array, wraps: int, rotation: Array, geometry: Array, points: Array
+) -> None:
+    """Points of exact cables from their frame anchors over their pulleys to their platform ends.
+
+    A cable without a tension is drawn along its chord. A cable without a chord is drawn as a line between its ends.
+
+    Args:
+        cables: Row of the cable_table, (m, CABLE_COLUMNS).
+        body: Row of the body_table.
+        pose: Pose row.
+        tension: Chord tensions [N], (m,); NaN for a cable without a tension.
+        wraps: Number of points on each pulley, 0 or at least 2. Without a pulley, all are at the frame anchor.
+        rotation: Work array, (3, 3).
+        geometry: Work array, (GEOMETRY_ROWS, m).
+        points: Filled with the points in world axes [m], (m, points, 3).
+    """
+    gravity = body[tables.GRAVITY]
+    model = Model(codes.CATENARY, 0.0, 0.0, gravity, None)
+    cable_geometry(cables, body, pose, rotation, geometry)
+    free = points.shape[1] - wraps - 1
+    for i in range(tension.size):
+        pulley, material = pulley_at(cables, i), Material(cables[i, tables.DENSITY], cables[i, tables.STIFFNESS])
+        chord, tau, weight = Chord(geometry[CHORD, i], geometry[SINE, i], geometry[COSINE, i]), tension[i], 0.0
+        sine, cosine = chord.cosine, pulley.entry * chord.sine  # sine and cosine of the wrap angle of a straight cable
+        length, horizontal, vertical = 0.0, 0.0, 0.0
+        if tau > 0.0:
+            weight = material.density * gravity
+            length, sag_force, _status = solve_cable_state(model, chord, material, pulley, tau)
+            horizontal, vertical = tau * chord.cosine, tau * chord.sine + sag_force
+            sine, cosine = horizontal, pulley.entry * (vertical - weight * length)
+        wrapped = angle(sine, cosine) if pulley.radius > 0.0 and chord.length > 0.0 else 0.0
+        x, z = 0.0, 0.0
+        for k in range(wraps):
+            part = wrapped * k / (wraps - 1)
+            x, z = pulley.radius * (1.0 - math.cos(part)), pulley.radius * pulley.entry * math.sin(part)
+            _write_point(cables, geometry, i, x, z, points, k)
+        bx, by, bz = cables[i, tables.PLATFORM_X], cables[i, tables.PLATFORM_Y], cables[i, tables.PLATFORM_Z]
+        dx = pose[0] + rotation[0, 0] * bx + rotation[0, 1] * by + rotation[0, 2] * bz - cables[i, tables.FRAME_X]
+        dy = pose[1] + rotation[1, 0] * bx + rotation[1, 1] * by + rotation[1, 2] * bz - cables[i, tables.FRAME_Y]
+        rise = pose[2] + rotation[2, 0] * bx + rotation[2, 1] * by + rotation[2, 2] * bz - cables[i, tables.FRAME_Z]
+        span = math.sqrt(dx * dx + dy * dy)
+        for k in range(free + 1):
+            fraction = k / free
+            along, up = (span - x) * fraction, (rise - z) * fraction
+            if weight > 0.0:
+                along, up = catenary_point(fraction, horizontal, vertical, length, weight, material.stiffness)
+            _write_point(cables, geometry, i, x + along, z + up, points, wraps + k)
+
+
+@glue
+def _write_point(cables: Array, geometry: Array, i: int, x: float, z: float, points: Array, k: int) -> None:
+    """Write point `k` of cable `i` in world axes [m]; `x`, `z`: position in its plane, relative to the frame anchor."""
+    points[i, k, 0] = cables[i, tables.FRAME_X] + geometry[AZIMUTH_X, i] * x
+    points[i, k, 1] = cables[i, tables.FRAME_Y] + geometry[AZIMUTH_Y, i] * x
+    points[i, k, 2] = cables[i, tables.FRAME_Z] + z

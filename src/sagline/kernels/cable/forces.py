@@ -1,8 +1,13 @@
-"""Forces of all cables of one pose at their unstrained lengths.
+"""Forces of all cables of one pose at their unstrained lengths; docs/model.md, section 10.
 
 Most calls are for a pose close to the previous pose. Two Halley steps from the previous parameter h therefore solve
-ordinary catenaries. These loops have no branches, so that they vectorize. The cables that have not converged are then
-solved one by one, without the previous h.
+ordinary catenaries. The cables that have not converged are then solved one by one, without the previous h.
+
+A cable over a pulley is replaced by an equivalent cable without a pulley, which starts where the chord touches the
+pulley. The equivalent cable is shorter by the length between this point and the drum. It is softer, because it also
+includes the stretch of this length. In the next pass, span and rise are corrected by the error of the platform end. The
+next pose starts with these corrections, so that a nearby pose needs only one or two passes. Each loop has one result
+and no branches, so that it vectorizes.
 """
 
 from __future__ import annotations
@@ -12,13 +17,262 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array
 from sagline.kernels import codes, tables
-from sagline.kernels.algebra.functions import cosh_polynomial, sinh_excess_polynomial, sinhc_polynomial
+from sagline.kernels.algebra import functions
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable.catenary import SMALL_HALLEY_STEP, relative_excess
-from sagline.kernels.cable.models import from_length
-from sagline.kernels.cable.over_pulleys import fill_equivalent_cables, start_passes, update_from_equivalent_cables
-from sagline.kernels.cable.terms import Material, Model
+from sagline.kernels.cable.models import SMALL_HALLEY_STEP, catenary_end, from_length, from_tension, relative_excess
+from sagline.kernels.cable.pulley import (
+    Behind,
+    Wrap,
+    behind_cable,
+    energy_behind,
+    free_rise,
+    free_span,
+    from_axis,
+    pulley_at,
+    softness,
+    straight_behind,
+)
+from sagline.kernels.cable.terms import Chord, Material, Model, PlaneStiffness
 from sagline.kernels.jit import formula, glue
+
+LEAST_FREE = 1e-3  # shortest equivalent cable, relative to the cable's length
+TINY = 1e-300  # [N]; avoids a division by zero force
+ORDINARY_END = math.sqrt(
+    functions.EXCESS_LIMIT
+)  # largest u = wL/(T_A + T_B) for which the series of P1 is a polynomial
+
+
+@formula
+def material_at(cables: Array, i: int) -> Material:
+    """Material of cable `i` of the cable_table."""
+    return Material(cables[i, tables.DENSITY], cables[i, tables.STIFFNESS])
+
+
+@formula
+def chord_at(rows: Array, i: int) -> Chord:
+    """Chord of cable `i` at a pose."""
+    return Chord(rows[g.CHORD, i], rows[g.SINE, i], rows[g.COSINE, i])
+
+
+@formula
+def _wrap_at(rows: Array, i: int) -> Wrap:
+    """Wrap of cable `i` on its pulley, after `update_from_equivalent_cables`."""
+    return Wrap(rows[g.WRAP_SINE, i], rows[g.WRAP_COSINE, i], rows[g.WRAP, i])
+
+
+@glue
+def start_passes(cables: Array, rows: Array) -> None:
+    """Fill the cable lengths between chords and drums. Reset the corrections of cables without a previous parameter."""
+    for i in range(rows.shape[1]):
+        rows[g.BEHIND, i] = straight_behind(pulley_at(cables, i), chord_at(rows, i))
+    for i in range(rows.shape[1]):
+        if math.isnan(rows[g.PARAMETER, i]) or math.isnan(rows[g.OFF_X, i] + rows[g.OFF_Z, i] + rows[g.OFF_LENGTH, i]):
+            rows[g.OFF_X, i] = rows[g.OFF_Z, i] = rows[g.OFF_LENGTH, i] = 0.0
+
+
+@glue
+def fill_equivalent_cables(model: Model, cables: Array, rows: Array) -> None:
+    """Fill the equivalent cables, which replace the cables over pulleys."""
+    m = rows.shape[1]
+    for i in range(m):
+        length = rows[g.LENGTH, i]
+        rows[g.ASKED_LENGTH, i] = max(length - rows[g.BEHIND, i], LEAST_FREE * length)
+    for i in range(m):
+        rows[g.SOFT, i] = cables[i, tables.STIFFNESS] / (1.0 + rows[g.BEHIND, i] / rows[g.ASKED_LENGTH, i])
+    if model.code == codes.CATENARY:
+        for i in range(m):
+            rows[g.ASKED_SPAN, i] = rows[g.SPAN, i] + rows[g.OFF_X, i]
+        for i in range(m):
+            half = 0.5 * cables[i, tables.DENSITY] * model.gravity * rows[g.ASKED_LENGTH, i]
+            lift = rows[g.BEHIND, i] * half / cables[i, tables.STIFFNESS]
+            rows[g.ASKED_RISE, i] = rows[g.RISE, i] + (lift + rows[g.OFF_Z, i])
+    else:
+        for i in range(m):
+            rows[g.ASKED_SPAN, i] = rows[g.SPAN, i]
+        for i in range(m):
+            rows[g.ASKED_RISE, i] = rows[g.RISE, i]
+        for i in range(m):
+            rows[g.ASKED_LENGTH, i] += rows[g.OFF_LENGTH, i]
+
+
+@glue
+def update_from_equivalent_cables(model: Model, cables: Array, rows: Array) -> float:
+    """Fill forces and free spans from the equivalent cables. Returns the largest error, relative to the cable length.
+
+    This error corrects the equivalent cables in the next pass. For the exact cable it is the error of the platform end,
+    and for the shallow cables it is the error of the length.
+    """
+    if model.code == codes.CATENARY:
+        _exit_points_from_forces(model, cables, rows)
+        _fill_free_span_ends(model, cables, rows)
+        return _end_errors(rows)
+    return _length_errors(model, cables, rows)
+
+
+@glue
+def _exit_points_from_forces(model: Model, cables: Array, rows: Array) -> None:
+    """Fill exit points, free spans and free lengths of exact cables over pulleys from T_x and T_zA."""
+    m = rows.shape[1]
+    for i in range(m):  # T_zA
+        rows[g.VERTICAL, i] -= cables[i, tables.DENSITY] * model.gravity * rows[g.ASKED_LENGTH, i]
+    for i in range(m):
+        x, z = rows[g.HORIZONTAL, i], rows[g.VERTICAL, i]
+        rows[g.LEAVING, i] = math.sqrt(x * x + z * z)
+    for i in range(m):
+        rows[g.WRAP_SINE, i] = rows[g.HORIZONTAL, i] / (rows[g.LEAVING, i] + TINY)
+    for i in range(m):
+        rows[g.WRAP_COSINE, i] = pulley_at(cables, i).entry * rows[g.VERTICAL, i] / (rows[g.LEAVING, i] + TINY)
+    for i in range(m):
+        rows[g.WRAP, i] = functions.angle(rows[g.WRAP_SINE, i] + TINY, rows[g.WRAP_COSINE, i])
+    for i in range(m):
+        material = material_at(cables, i)
+        wrapped, dead = behind_cable(model, material, pulley_at(cables, i), rows[g.LEAVING, i], _wrap_at(rows, i))
+        rows[g.FREE_LENGTH, i] = rows[g.LENGTH, i] - (wrapped + dead)
+    for i in range(m):  # T_z
+        rows[g.VERTICAL, i] += cables[i, tables.DENSITY] * model.gravity * rows[g.FREE_LENGTH, i]
+    for i in range(m):
+        rows[g.FREE_SPAN, i] = free_span(pulley_at(cables, i), chord_at(rows, i), rows[g.WRAP_COSINE, i])
+    for i in range(m):
+        rows[g.FREE_RISE, i] = free_rise(pulley_at(cables, i), chord_at(rows, i), rows[g.WRAP_SINE, i])
+    for i in range(m):
+        if rows[g.SPAN, i] > 0.0:
+            rows[g.TENSION, i] = rows[g.HORIZONTAL, i] / rows[g.COSINE, i]
+
+
+@glue
+def _fill_free_span_ends(model: Model, cables: Array, rows: Array) -> None:
+    """Fill the ends of the free spans of exact cables, as `catenary_end`; loops for ordinary cables vectorize."""
+    m = rows.shape[1]
+    for i in range(m):
+        x, z = rows[g.HORIZONTAL, i], rows[g.VERTICAL, i]
+        rows[g.TOTAL, i] = rows[g.LEAVING, i] + math.sqrt(x * x + z * z)
+    for i in range(m):
+        weight_length = cables[i, tables.DENSITY] * model.gravity * rows[g.FREE_LENGTH, i]
+        u = weight_length / rows[g.TOTAL, i]
+        gives = 1.0 / cables[i, tables.STIFFNESS] + 2.0 / rows[g.TOTAL, i] * (
+            1.0 + functions.atanhc_excess_polynomial(u * u)
+        )
+        rows[g.END_X, i] = rows[g.HORIZONTAL, i] * rows[g.FREE_LENGTH, i] * gives
+    for i in range(m):
+        weight_length = cables[i, tables.DENSITY] * model.gravity * rows[g.FREE_LENGTH, i]
+        gives = 1.0 / cables[i, tables.STIFFNESS] + 2.0 / rows[g.TOTAL, i]
+        rows[g.END_Z, i] = (rows[g.VERTICAL, i] - 0.5 * weight_length) * rows[g.FREE_LENGTH, i] * gives
+    for i in range(m):
+        weight, free = cables[i, tables.DENSITY] * model.gravity, rows[g.FREE_LENGTH, i]
+        if not weight * free <= ORDINARY_END * rows[g.TOTAL, i]:
+            rows[g.END_X, i], rows[g.END_Z, i] = catenary_end(
+                rows[g.HORIZONTAL, i], rows[g.VERTICAL, i], free, weight, cables[i, tables.STIFFNESS]
+            )
+
+
+@formula
+def _larger(one: float, other: float) -> float:
+    """Maximum of two numbers, NaN if one of them is NaN."""
+    return other if not other <= one and not math.isnan(one) else one
+
+
+@glue
+def _end_errors(rows: Array) -> float:
+    """Correct the equivalent cables by the platform-end errors. Returns the largest error relative to the length."""
+    largest = 0.0
+    for i in range(rows.shape[1]):
+        x, z = rows[g.FREE_SPAN, i] - rows[g.END_X, i], rows[g.FREE_RISE, i] - rows[g.END_Z, i]
+        rows[g.OFF_X, i] += x
+        rows[g.OFF_Z, i] += z
+        largest = _larger(largest, (abs(x) + abs(z)) / rows[g.LENGTH, i])
+    return largest
+
+
+@glue
+def _length_errors(model: Model, cables: Array, rows: Array) -> float:
+    """`_end_errors` for shallow and weightless cables, which leave along the chord. 0 for weightless cables."""
+    largest = 0.0
+    for i in range(rows.shape[1]):
+        material, pulley, chord = material_at(cables, i), pulley_at(cables, i), chord_at(rows, i)
+        tension = rows[g.TENSION, i]
+        sine, cosine = chord.cosine, pulley.entry * chord.sine
+        rows[g.LEAVING, i] = tension
+        rows[g.WRAP_SINE, i] = sine
+        rows[g.WRAP_COSINE, i] = cosine
+        rows[g.WRAP, i] = functions.angle(sine, cosine)
+        rows[g.FREE_SPAN, i] = rows[g.SPAN, i]
+        rows[g.FREE_RISE, i] = rows[g.RISE, i]
+        wrapped, dead = behind_cable(model, material, pulley, tension, _wrap_at(rows, i))
+        free = rows[g.LENGTH, i] - (wrapped + dead)
+        rows[g.FREE_LENGTH, i] = free
+        if model.code != codes.ELASTIC and tension > 0.0:
+            miss = free - from_tension(model, chord, material, tension)[0]
+            rows[g.OFF_LENGTH, i] += miss
+            largest = _larger(largest, abs(miss) / rows[g.LENGTH, i])
+    return largest
+
+
+@formula
+def _weight_per_length(model: Model, material: Material) -> float:
+    """Weight per length [N/m] of the cable between P and the drum; zero except for the exact cable."""
+    return material.density * model.gravity if model.code == codes.CATENARY else 0.0
+
+
+@formula
+def behind_at(model: Model, cables: Array, rows: Array, i: int) -> Behind:
+    """Unstrained cable between P and the drum, after `update_from_equivalent_cables`."""
+    return behind_cable(model, material_at(cables, i), pulley_at(cables, i), rows[g.LEAVING, i], _wrap_at(rows, i))
+
+
+@formula
+def end_motion_per_length(model: Model, cables: Array, rows: Array, i: int) -> tuple[float, float, float]:
+    """Motion of the platform end at a fixed force, x and z per meter of cable; then equivalent length per newton of H.
+
+    An increase of H stretches the part between P and the drum. The platform end then moves as if cable were paid out.
+    The third value is the length of this cable per newton of H.
+    """
+    material, pulley, wrap, tension = (
+        material_at(cables, i),
+        pulley_at(cables, i),
+        _wrap_at(rows, i),
+        rows[g.LEAVING, i],
+    )
+    weight = _weight_per_length(model, material)
+    strained = 1.0 + tension / material.stiffness
+    soft = softness(pulley, weight, material.stiffness, tension, wrap)
+    along = pulley.entry * wrap.cosine
+    more = strained / (1.0 + weight * along * strained * soft)
+    return more * wrap.sine, more * along, soft * strained / more
+
+
+@formula
+def stiffness_in_series(model: Model, cables: Array, rows: Array, i: int, plane: PlaneStiffness) -> PlaneStiffness:
+    """In-plane stiffness of cable `i`: its free span in series with the part between P and the drum."""
+    if not rows[g.LEAVING, i] > 0.0:
+        return plane
+    x, z, gives = end_motion_per_length(model, cables, rows, i)
+    left_x, left_z = plane.xx * x + plane.xz * z, plane.zx * x + plane.zz * z
+    right_x, right_z = plane.xx * x + plane.zx * z, plane.xz * x + plane.zz * z
+    share = gives / (1.0 + gives * (x * left_x + z * left_z))
+    return PlaneStiffness(
+        plane.xx - share * left_x * right_x,
+        plane.xz - share * left_x * right_z,
+        plane.zx - share * left_z * right_x,
+        plane.zz - share * left_z * right_z,
+    )
+
+
+@formula
+def across_pulley(cables: Array, rows: Array, i: int) -> float:
+    """Stiffness of cable `i` normal to its plane [N/m]. The whole plane turns about the swivel axis."""
+    pulley = pulley_at(cables, i)
+    if pulley.radius == 0.0:
+        return rows[g.TENSION, i] / rows[g.CHORD, i]
+    return rows[g.HORIZONTAL, i] / from_axis(pulley, chord_at(rows, i))
+
+
+@formula
+def energy_over(model: Model, cables: Array, rows: Array, i: int) -> float:
+    """Energy [J] that the part between P and the drum adds to the energy of the free span."""
+    material, tension = material_at(cables, i), rows[g.LEAVING, i]
+    weight, free = _weight_per_length(model, material), rows[g.FREE_LENGTH, i]
+    return energy_behind(pulley_at(cables, i), weight, material.stiffness, tension, _wrap_at(rows, i), free)
+
 
 CLOSE = 0.1  # relative first step up to which two Halley steps are accurate
 ORDINARY = 2.0  # largest h at which the polynomials have full precision
@@ -30,9 +284,9 @@ MISSED = 1e-13  # largest error of the platform end, relative to the cable's len
 def _halley_step(h: float, xi2: float, zeta2: float, kappa: float, excess: float) -> float:
     """One Halley step on P2 (docs/model.md, section 2) for h <= 2, without branches."""
     y = h * h
-    more = h * y * sinh_excess_polynomial(y)  # sinh h - h
+    more = h * y * functions.sinh_excess_polynomial(y)  # sinh h - h
     s = h + more
-    c = cosh_polynomial(y)
+    c = functions.cosh_polynomial(y)
     total = 1.0 / (h + kappa)
     lever = 1.0 / (s + kappa * c)
     a = s * total
@@ -135,7 +389,7 @@ def _solve_equivalent_cables(model: Model, cables: Array, asked: _EquivalentCabl
             h, kappa = rows[g.SECOND, i], rows[g.KAPPA, i]
             half = 0.5 * weight / (h + kappa)
             y = h * h
-            tangent = h * sinhc_polynomial(y) / cosh_polynomial(y)
+            tangent = h * functions.sinhc_polynomial(y) / functions.cosh_polynomial(y)
             rows[g.HORIZONTAL, i] = half * span
             rows[g.VERTICAL, i] = 0.5 * weight * (length + rise / (tangent + kappa))
             rows[g.TENSION, i] = half * chord

@@ -1,8 +1,11 @@
-"""Selection of the cable model, and the shallow cable: length from tension, and tension from length.
+"""One cable of any model: length from tension, and force from length; docs/model.md, sections 2 and 3.
 
-The shallow cable is a straight line of tension tau plus a vertical force b on its platform end; docs/model.md, section
-3. The same equations are used for the parabolic model (b = wD/2, k = g^2/24, stretching tension tau) and the empirical
-model (b = k_h rho D, k = k_p, stretching tension |T|):
+Forces act on the cable at its platform end; z points up. The equations of the elastic catenary (Irvine) are written in
+ratios that stay regular as the weight per length w goes to zero, and are solved without cancellation.
+
+The shallow cable is a straight line of tension tau plus a vertical force b on its platform end. The same equations are
+used for the parabolic model (b = wD/2, k = g^2/24, stretching tension tau) and the empirical model (b = k_h rho D, k =
+k_p, stretching tension |T|):
 
     T = tau (cos phi, sin phi) + (0, b)
     L = D (1 + k (rho D cos phi / tau)^2) / (1 + stretching tension/EA)
@@ -15,11 +18,275 @@ import math
 import numpy as np
 
 from sagline.kernels import codes
-from sagline.kernels.cable.catenary import RANGE, catenary_from_length, length_ratio, sag_force_ratio
+from sagline.kernels.algebra import functions
 from sagline.kernels.cable.terms import Chord, Force, Material, Model
-from sagline.kernels.jit import kernel
+from sagline.kernels.jit import formula, kernel
 
-STEPS = 60
+RANGE = 500.0  # largest X = wD/(2 tau): sinh X overflows above it; practical cables are far below
+TAUT_STRAIN = 0.01  # largest e = tau/EA at which two Newton steps reach full precision
+ORDINARY_STRAIN = 0.1  # largest e at which three Newton steps reach full precision
+CATENARY_STEPS = 80
+# Relative steps after which the next step is smaller than the rounding error. Newton's method squares the error;
+# Halley's method cubes it.
+SMALL_NEWTON_STEP = 1e-9
+SMALL_HALLEY_STEP = 1e-6
+SPLIT = 134217729.0  # 2^27 + 1, a factor that splits a mantissa into halves
+
+
+@kernel
+def slack_series(horizontal: float, vertical_a: float, vertical: float, tension_a: float, tension_b: float) -> float:
+    """Ratio atanh(u)/u of P1 for any u = (T_zB - T_zA)/(T_A + T_B); infinite for a folded cable (u = 1)."""
+    total = tension_a + tension_b
+    u = (vertical - vertical_a) / total
+    # T_A + T_B times (1 - u), from sums of positive terms instead of a subtraction
+    square = horizontal * horizontal
+    rest = square / (tension_b + abs(vertical)) + square / (tension_a + abs(vertical_a))
+    if vertical * vertical_a > 0.0:
+        rest += 2.0 * min(abs(vertical), abs(vertical_a))
+    return 0.5 * math.log((1.0 + u) * total / rest) / u if rest > 0.0 else math.inf
+
+
+@kernel
+def catenary_end(
+    horizontal: float, vertical: float, length: float, weight: float, stiffness: float
+) -> tuple[float, float]:
+    """P1: position (x, z) of the platform end from the force on it and the unstrained length."""
+    vertical_a = vertical - weight * length
+    tension_a = math.hypot(horizontal, vertical_a)
+    tension_b = math.hypot(horizontal, vertical)
+    total = tension_a + tension_b
+    if total == 0.0:
+        return 0.0, 0.0
+    u = weight * length / total
+    series = functions.atanhc(u) if u <= 0.5 else slack_series(horizontal, vertical_a, vertical, tension_a, tension_b)
+    x = horizontal * length * (1.0 / stiffness + 2.0 / total * series) if horizontal != 0.0 else 0.0
+    z = (vertical - 0.5 * weight * length) * length * (1.0 / stiffness + 2.0 / total)
+    return x, z
+
+
+@formula
+def is_ordinary(half_weight: float, strain: float) -> bool:
+    """True if the steps for ordinary cables reach full precision: X <= 2 and e <= 0.1."""
+    return half_weight * half_weight <= functions.POLYNOMIAL_LIMIT and strain <= ORDINARY_STRAIN
+
+
+@formula
+def _ordinary_newton_step(ratio: float, square: float, cosine2: float, sine2: float, strain: float) -> float:
+    """One Newton step on P3 in its root form; square = X^2."""
+    taut = 1.0 - strain * ratio
+    y = square * taut * taut
+    s = taut * functions.sinhc_polynomial(y)
+    c = strain * functions.cosh_polynomial(y)
+    inverse = 1.0 / (s + ratio * c)
+    sag_force = sine2 * inverse * inverse
+    root = math.sqrt(cosine2 + sag_force)
+    excess = ratio - s * root
+    slope = 1.0 + c * root - sag_force * inverse * (s * s * strain * strain * square * ratio) / root
+    return ratio - excess / slope
+
+
+@formula
+def ordinary_length_ratio(half_weight: float, sine: float, cosine: float, strain: float) -> float:
+    """P3 by two Newton steps: L/D for X = wD/(2 tau) <= 2 and e = tau/EA <= 0.01; up to e = 0.1, add a third step.
+
+    Without branches and inner loops, a loop over cables vectorizes.
+    """
+    cosine2 = cosine * cosine
+    sine2 = sine * sine
+    square = half_weight * half_weight
+    start = functions.sinhc_polynomial(square)
+    ratio = math.sqrt(start * start * cosine2 + sine2)  # solution of the inextensible cable
+    ratio = ratio / (1.0 + strain * ratio)
+    ratio = _ordinary_newton_step(ratio, square, cosine2, sine2, strain)
+    return _ordinary_newton_step(ratio, square, cosine2, sine2, strain)
+
+
+@formula
+def ordinary_length_ratio_near(half_weight: float, sine: float, cosine: float, strain: float, ratio: float) -> float:
+    """One Newton step from the approximate `ratio`: the ratio at a similar tension, or the result of two steps."""
+    return _ordinary_newton_step(ratio, half_weight * half_weight, cosine * cosine, sine * sine, strain)
+
+
+@kernel
+def length_ratio(half_weight: float, sine: float, cosine: float, strain: float) -> tuple[float, int]:
+    """P3 for any cable: L/D and a status, by Newton steps within two bounds of the solution."""
+    if is_ordinary(half_weight, strain):
+        ratio = ordinary_length_ratio(half_weight, sine, cosine, strain)
+        if strain > TAUT_STRAIN:
+            ratio = ordinary_length_ratio_near(half_weight, sine, cosine, strain, ratio)
+        return ratio, codes.CABLE_SOLVED
+    if not half_weight < RANGE:
+        return math.nan, codes.CABLE_TOO_SLACK
+    cosine2 = cosine * cosine
+    sine2 = sine * sine
+    square = half_weight * half_weight
+    start = functions.sinhc(half_weight)
+    high = math.sqrt(start * start * cosine2 + sine2)
+    if strain * high > 1.0:
+        high = 1.0 / strain
+    low = 0.0
+    ratio = high / (1.0 + strain * high)
+    for _ in range(CATENARY_STEPS):
+        taut = 1.0 - strain * ratio
+        h = half_weight * taut
+        s = taut * functions.sinhc(h)
+        c = strain * functions.cosh(h)
+        inverse = 1.0 / (s + ratio * c)
+        sag_force = sine2 * inverse * inverse
+        root = math.sqrt(cosine2 + sag_force)
+        excess = ratio - s * root
+        slope = 1.0 + c * root - sag_force * inverse * (s * s * strain * strain * square * ratio) / root
+        if excess > 0.0:
+            high = ratio
+        else:
+            low = ratio
+        new = ratio - excess / slope
+        if not low <= new <= high:
+            new = 0.5 * (low + high)
+        change = abs(new - ratio)
+        ratio = new
+        if change <= SMALL_NEWTON_STEP * ratio:
+            return ratio, codes.CABLE_SOLVED
+    return ratio, codes.CABLE_NOT_CONVERGED
+
+
+@kernel
+def sag_force_ratio(half_weight: float, sine: float, strain: float, ratio: float) -> float:
+    """Sag force divided by the chord tension: T_z/tau - sin phi."""
+    taut = 1.0 - strain * ratio
+    h = half_weight * taut
+    s = taut * functions.sinhc(h)
+    c = functions.cosh(h)
+    return half_weight * ratio + sine * (c / (s + strain * ratio * c) - 1.0)
+
+
+@formula
+def ordinary_sag_force_ratio(half_weight: float, sine: float, strain: float, ratio: float) -> float:
+    """`sag_force_ratio` of an ordinary cable, without branches."""
+    taut = 1.0 - strain * ratio
+    y = half_weight * half_weight * taut * taut
+    s = taut * functions.sinhc_polynomial(y)
+    c = functions.cosh_polynomial(y)
+    return half_weight * ratio + sine * (c / (s + strain * ratio * c) - 1.0)
+
+
+@formula
+def _product_error(a: float, product: float) -> float:
+    """a*a - product exactly; product is a*a with rounding (Dekker)."""
+    split = SPLIT * a
+    high = split - (split - a)
+    low = a - high
+    return ((high * high - product) + 2.0 * high * low) + low * low
+
+
+@formula
+def relative_excess(span: float, rise: float, length: float) -> float:
+    """Value of (D^2 - L^2)/L^2 without rounding error in the difference."""
+    x2 = span * span
+    z2 = rise * rise
+    l2 = length * length
+    d2 = x2 + z2
+    big = d2 - x2
+    tail = (x2 - (d2 - big)) + (z2 - big)
+    difference = d2 - l2
+    big = difference - d2
+    tail += (d2 - (difference - big)) - (l2 + big)
+    tail += _product_error(span, x2) + _product_error(rise, z2) - _product_error(length, l2)
+    return (difference + tail) / l2
+
+
+@formula
+def _parameter_start(xi: float, zeta: float, kappa: float, excess: float) -> float:
+    """Initial value of h: root of xi^2 h^3/3 + excess h = 2 kappa (1 + excess), or the asymptote for deep sag."""
+    scale = 3.0 / (xi * xi)
+    p = scale * excess
+    q = 2.0 * scale * kappa * (1.0 + excess)
+    h = math.sqrt(max(-p, 0.0)) + np.cbrt(q)
+    if p * h > q:
+        h = q / p
+    for _ in range(2):  # Newton steps from above on a convex cubic are monotone
+        h -= (h * (h * h + p) - q) / (3.0 * h * h + p)
+    if h > 1.0:
+        steep = zeta / (1.0 + kappa)
+        r = 2.0 * math.sqrt(max(1.0 - steep * steep, 1e-30)) / xi
+        h = max(1.0, math.log(r * (1.0 + kappa + math.log(max(r, 1.0)))))
+    return h
+
+
+@formula
+def _catenary_parameter(xi: float, zeta: float, kappa: float, excess: float) -> tuple[float, int]:
+    """P2: h and status of a cable with span/L = xi > 0, rise/L = zeta, kappa = wL/(2EA) and (D^2 - L^2)/L^2."""
+    xi2 = xi * xi
+    zeta2 = zeta * zeta
+    low = 0.0
+    high = math.inf
+    h = _parameter_start(xi, zeta, kappa, excess)
+    for _ in range(CATENARY_STEPS):
+        s = h * functions.sinhc(h)
+        c = functions.cosh(h)
+        total = 1.0 / (h + kappa)
+        lever = 1.0 / (s + kappa * c)
+        a = s * total  # 1 + alpha
+        alpha = (functions.sinh_excess(h) - kappa) * total
+        alpha1 = (c - a) * total
+        alpha2 = (s - 2.0 * alpha1) * total
+        e = s * lever  # 1 + eta
+        eta = -kappa * c * lever
+        eta1 = kappa * lever * lever
+        eta2 = -2.0 * eta1 * lever * (c + kappa * s)
+        error = excess + xi2 * alpha * (2.0 + alpha) + zeta2 * eta * (2.0 + eta)
+        slope = 2.0 * (xi2 * a * alpha1 + zeta2 * e * eta1)
+        bend = xi2 * (alpha1 * alpha1 + a * alpha2) + zeta2 * (eta1 * eta1 + e * eta2)
+        if error > 0.0:
+            high = h
+        else:
+            low = h
+        if error > 1.0:  # the function is nearly exponential here, and Newton steps solve for its logarithm
+            new = h - math.log1p(error) * (1.0 + error) / slope
+        else:  # Halley
+            new = h - error * slope / (slope * slope - error * bend)
+        if not low <= new <= high:
+            new = 0.5 * (low + high) if high < math.inf else 2.0 * h
+        change = abs(new - h)
+        h = new
+        if change <= SMALL_HALLEY_STEP * (h + kappa):
+            return h, codes.CABLE_SOLVED
+    return h, codes.CABLE_NOT_CONVERGED
+
+
+@formula
+def _vertical_from_length(rise: float, length: float, weight: float, stiffness: float) -> tuple[float, float, int]:
+    """P2 on a vertical chord, in closed form. Returns vertical force, chord tension and a status."""
+    height = abs(rise)
+    kappa = 0.5 * weight * length / stiffness
+    stretch = (height - length) / length  # exact difference for a taut cable
+    if stretch >= kappa:
+        sag_force = stiffness * stretch
+        vertical = math.copysign(sag_force, rise) + 0.5 * weight * length
+        # tanh h = kappa/stretch; a weightless cable has h = 0
+        h = math.atanh(kappa / stretch) if stretch > kappa else math.inf
+        tension = sag_force if weight == 0.0 else 0.5 * weight * height / (h + kappa)
+        return vertical, tension, codes.CABLE_SOLVED if tension > 0.0 else codes.CABLE_SLACK
+    return 0.5 * weight * length + 0.5 * weight * rise / (1.0 + kappa), 0.0, codes.CABLE_SLACK
+
+
+@kernel
+def catenary_from_length(span: float, rise: float, length: float, weight: float, stiffness: float) -> tuple[Force, int]:
+    """P2: force on the platform end, and a status. `weight` must be > 0."""
+    if span == 0.0:
+        vertical, tension, status = _vertical_from_length(rise, length, weight, stiffness)
+        return Force(0.0, vertical, tension), status
+    kappa = 0.5 * weight * length / stiffness
+    excess = relative_excess(span, rise, length)
+    inverse = 1.0 / length
+    h, status = _catenary_parameter(span * inverse, rise * inverse, kappa, excess)
+    half = 0.5 * weight / (h + kappa)
+    tangent = h * functions.sinhc(h) / functions.cosh(h) if h < 20.0 else 1.0  # tanh h
+    vertical = 0.5 * weight * (length + rise / (tangent + kappa))
+    return Force(half * span, vertical, half * math.sqrt(span * span + rise * rise)), status
+
+
+SHALLOW_STEPS = 60
 
 
 @kernel
@@ -53,7 +320,7 @@ def shallow_tension(
         tension = math.sqrt(q / p)
     if tension == 0.0:
         return 0.0, True
-    for _ in range(STEPS):
+    for _ in range(SHALLOW_STEPS):
         new = tension - (tension * tension * (tension + p) - q) / (tension * (3.0 * tension + 2.0 * p))
         if not new < tension:
             break
@@ -62,7 +329,7 @@ def shallow_tension(
         return tension, True
     low = 0.0
     high = math.inf
-    for _ in range(STEPS):
+    for _ in range(SHALLOW_STEPS):
         end = stretching_tension(tension, sine, cosine, sag_force)
         square = tension * tension
         error = length * (1.0 + end / stiffness) - chord * (1.0 + sag / square)

@@ -15,19 +15,10 @@ from typing import NamedTuple
 from sagline.core.arrays import Array
 from sagline.kernels import codes, tables
 from sagline.kernels.algebra.functions import angle
-from sagline.kernels.cable.terms import Chord, Force, Material, Model
+from sagline.kernels.cable.terms import Chord, Force, Material, Model, Pulley
 from sagline.kernels.jit import formula, kernel
 
 LEAST_TURNED = -0.8  # smallest derivative in a Newton step; a derivative near -1 would turn the cable too far
-
-
-class Pulley(NamedTuple):
-    """Pulley at one frame anchor, and dead length between pulley and drum."""
-
-    radius: float  # R [m]; 0 for an eyelet
-    entry: float  # s, +1 if the cable enters from below, -1 if from above
-    dead: float  # length of the straight cable from drum to anchor [m]
-    rise: float  # height of the anchor above the drum [m]
 
 
 class Wrap(NamedTuple):

@@ -13,10 +13,9 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array, Codes
 from sagline.kernels import codes
-from sagline.kernels.cable.cables import Cables, chord_of, material_of, pulley_of
 from sagline.kernels.cable.models import shallow_sag_force
 from sagline.kernels.cable.states import CONTACTS, SAME_EXIT, solve_cable_state, solve_cable_states
-from sagline.kernels.cable.terms import Model
+from sagline.kernels.cable.terms import Cables, Model, chord_of, material_of, pulley_of
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block
 

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from sagline.core.arrays import Array
 from sagline.kernels.algebra.factors import solve_lower, solve_upper
-from sagline.kernels.balance.pose import Triple
-from sagline.kernels.balance.wrench import components_along, fill_motion_of_components, is_rotation
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable.over_pulleys import material_at
+from sagline.kernels.cable.forces import material_at
 from sagline.kernels.cable.pulley import pulley_at
-from sagline.kernels.cable.slopes import PlaneVector, force_slopes, slopes_over
-from sagline.kernels.cable.stiffness import force_of, plane_of
+from sagline.kernels.cable.stiffness import PlaneVector, force_of, force_slopes, plane_of, slopes_over
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.calibration import kinds
 from sagline.kernels.calibration.tension_slopes import frame_end_slopes, in_world_axes
 from sagline.kernels.calibration.terms import CalibrationArrays, Sensing, Slopes, Unknowns
 from sagline.kernels.forward.platform import end_stiffness
 from sagline.kernels.jit import formula, glue, kernel
+from sagline.kernels.statics import Triple, components_along, fill_motion_of_components, is_rotation
 
 
 @formula

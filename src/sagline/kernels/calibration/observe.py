@@ -11,8 +11,6 @@ import math
 from sagline.core.arrays import Array, Indices
 from sagline.kernels import tables
 from sagline.kernels.algebra.factors import factor_positive
-from sagline.kernels.balance.pose import Triple, turned
-from sagline.kernels.balance.wrench import symmetric_part
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.calibration.columns import (
@@ -41,10 +39,17 @@ from sagline.kernels.calibration.terms import (
     Unknowns,
     new_calibration_arrays,
 )
-from sagline.kernels.forward.platform import platform_stiffness, unbalance
-from sagline.kernels.forward.problem import ForwardSamples, ForwardTerms, SampleArrays, row_of
+from sagline.kernels.forward.platform import (
+    ForwardSamples,
+    ForwardTerms,
+    SampleArrays,
+    platform_stiffness,
+    row_of,
+    unbalance,
+)
 from sagline.kernels.jit import entry, formula, glue
 from sagline.kernels.memory import Memory
+from sagline.kernels.statics import Triple, symmetric_part, turned
 
 
 @glue

@@ -7,7 +7,6 @@ import math
 from sagline.core.arrays import Array, Indices
 from sagline.kernels import tables
 from sagline.kernels.algebra.factors import factor_positive, solve_lower, solve_upper
-from sagline.kernels.balance.wrench import components_along
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.geometry import GEOMETRY_ROWS, cable_geometry
 from sagline.kernels.cable.pulley import pulley_at
@@ -15,6 +14,7 @@ from sagline.kernels.cable.states import chord_tension_at_frame_end, hold_cable
 from sagline.kernels.cable.terms import Chord, Material, Terms, model_of
 from sagline.kernels.jit import entry
 from sagline.kernels.memory import Memory, block, vector
+from sagline.kernels.statics import components_along
 
 ITERATIONS = 3  # iterations of balancing; a few are sufficient, because the sag forces depend weakly on the tensions
 LEAST = 0.2  # smallest ratio of a corrected tension to its measured value

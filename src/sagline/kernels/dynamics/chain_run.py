@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array, Indices
 from sagline.kernels import tables
-from sagline.kernels.balance.pose import turned
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.dynamics import chain as c
 from sagline.kernels.dynamics import drives as d
@@ -15,6 +14,7 @@ from sagline.kernels.dynamics.drives import Drives, keep_set_points
 from sagline.kernels.dynamics.rigid_body import CENTER, MASS, VELOCITY, spin
 from sagline.kernels.jit import glue, kernel
 from sagline.kernels.memory import Memory, block, vector
+from sagline.kernels.statics import turned
 
 ROOM = 21
 

@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array, Indices
 from sagline.kernels import codes, tables
-from sagline.kernels.balance.wrench import components_along, fill_motion_of_components
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.cable.terms import Model
@@ -19,6 +18,7 @@ from sagline.kernels.dynamics.rigid_body import STATE_COLUMNS, VELOCITY, power_o
 from sagline.kernels.forward.platform import unbalance
 from sagline.kernels.jit import glue, kernel
 from sagline.kernels.memory import Memory, block
+from sagline.kernels.statics import components_along, fill_motion_of_components
 
 SPLITTING, RUNGE_KUTTA = 0, 1
 DAMPED, LOADED, BLOWN = 1, 2, 4  # bits of the active damping and loads

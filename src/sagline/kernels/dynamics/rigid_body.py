@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 
 from sagline.core.arrays import Array
-from sagline.kernels.balance.pose import turned
 from sagline.kernels.jit import entry, formula
+from sagline.kernels.statics import turned
 
 CENTER, TURN, VELOCITY, MOMENTUM = 0, 3, 7, 10
 STATE_COLUMNS = 13

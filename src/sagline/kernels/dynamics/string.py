@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable.over_pulleys import end_motion_per_length
+from sagline.kernels.cable.forces import end_motion_per_length
 from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.cable.terms import Model, Terms, model_of
 from sagline.kernels.jit import entry, formula

@@ -1,6 +1,8 @@
-"""Forward kinematics of a batch: the pose of the platform at rest on cables of given lengths.
+"""Forward kinematics of a batch: the pose of the platform at rest on cables of given lengths; docs/model.md, section 6.
 
-docs/model.md, section 6.
+For straight cables, the result is the least-squares pose, found by the Levenberg-Marquardt method. This model is for
+comparison with the exact cable. It does not distinguish slack cables from taut cables. All lengths have the same
+weight. A mirrored pose fits the lengths as well as the true pose.
 """
 
 from __future__ import annotations
@@ -9,39 +11,18 @@ import math
 
 from sagline.core.arrays import Array, Codes, Indices
 from sagline.kernels import codes, tables
-from sagline.kernels.algebra.eigenvalues import extreme_eigenvalues
-from sagline.kernels.algebra.factors import factor_positive
-from sagline.kernels.balance.wrench import components_along, is_rotation, symmetric_part
+from sagline.kernels.algebra.factors import extreme_eigenvalues, factor_positive
+from sagline.kernels.algebra.functions import angle
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable.over_pulleys import behind_at
+from sagline.kernels.cable.forces import behind_at, chord_at, material_at
+from sagline.kernels.cable.geometry import cable_geometry
+from sagline.kernels.cable.pulley import Wrap, behind_cable, pulley_at, straight_behind
 from sagline.kernels.cable.terms import Model
-from sagline.kernels.forward.newton import BALANCED, descend, newton_from, polish, predict
-from sagline.kernels.forward.platform import platform_energy, platform_stiffness, unbalance
-from sagline.kernels.forward.problem import (
-    ENERGY,
-    FORCE_RESIDUAL,
-    ITERATIONS,
-    LAST_WRENCH,
-    MOMENT_RESIDUAL,
-    STIFFNESS_MIN,
-    ForwardArrays,
-    ForwardSamples,
-    ForwardTerms,
-    LastEquilibrium,
-    LastEquilibriumArrays,
-    PoseProblem,
-    SampleArrays,
-    SolutionArrays,
-    Solutions,
-    clear_solution,
-    copy_pose,
-    new_forward_arrays,
-    new_motions,
-    problem_at,
-    row_of,
-)
-from sagline.kernels.jit import entry, glue
+from sagline.kernels.forward import platform as f
+from sagline.kernels.forward.newton import BALANCED, descend, newton_from, polish, predict, solve_step
+from sagline.kernels.jit import entry, formula, glue, kernel
 from sagline.kernels.memory import Memory
+from sagline.kernels.statics import components_along, is_rotation, step_pose, symmetric_part
 
 FLAT = 1e-9  # relative to the largest stiffness; a smaller stiffness counts as zero
 OVERSTRETCHED = 0.1  # strain above which a result is unrealistic
@@ -84,18 +65,18 @@ def _fill_residuals(freedom: Array, gradient: Array, numbers: Array) -> None:
             moment += total * total
         else:
             force += total * total
-    numbers[FORCE_RESIDUAL] = math.sqrt(force)
-    numbers[MOMENT_RESIDUAL] = math.sqrt(moment)
+    numbers[f.FORCE_RESIDUAL] = math.sqrt(force)
+    numbers[f.MOMENT_RESIDUAL] = math.sqrt(moment)
 
 
 @glue
 def _find_pose(
-    problem: PoseProblem,
+    problem: f.PoseProblem,
     exact: Model,
     lengths: Array,
     start: Array,
-    chain: LastEquilibrium,
-    space: ForwardArrays,
+    chain: f.LastEquilibrium,
+    space: f.ForwardArrays,
     pose: Array,
 ) -> tuple[int, float]:
     """Find the equilibrium by the first method that succeeds. Returns the number of steps and the sum of tensions.
@@ -110,18 +91,18 @@ def _find_pose(
     predicted = predict(problem, lengths, start, chain.last, space, pose)
     for way in range(PREDICTION if predicted else FROM_START, DOWNHILL + 1):
         if way != PREDICTION:
-            copy_pose(start, pose)
+            f.copy_pose(start, pose)
         if way != DOWNHILL:
             steps, size = newton_from(problem, pose, space)
             known = size if steps == 0 and way == FROM_START and model.code == exact.code else 0.0
             if steps <= 0:
                 continue
-            platform_stiffness(model, cables, space.rows, space.stiffness)
+            f.platform_stiffness(model, cables, space.rows, space.stiffness)
         else:
-            downhill = PoseProblem(exact, free, cables, body, wrench, problem.unit)
+            downhill = f.PoseProblem(exact, free, cables, body, wrench, problem.unit)
             steps, size = descend(downhill, pose, space, known)
             if size == 0.0 or model.code != exact.code:
-                size = unbalance(model, cables, body, wrench, pose, space.rotation, space.rows, space.gradient)
+                size = f.unbalance(model, cables, body, wrench, pose, space.rotation, space.rows, space.gradient)
             steps += polish(problem, pose, space, BALANCED * size * problem.unit)
         symmetric_part(free, space.stiffness, space.matrix)
         positive = factor_positive(space.matrix, 0.0, space.factor)
@@ -134,14 +115,14 @@ def _find_pose(
 
 @glue
 def _fill_stability(
-    problem: PoseProblem, pose: Array, arcs: Array, size: float, space: ForwardArrays, numbers: Array
+    problem: f.PoseProblem, pose: Array, arcs: Array, size: float, space: f.ForwardArrays, numbers: Array
 ) -> int:
     """Fill `numbers` for the pose in the work arrays, except residuals and steps. Returns the status."""
     model, cables, body = problem.model, problem.cables, problem.body
-    numbers[ENERGY] = platform_energy(model, cables, body, problem.wrench, pose, space.rotation, space.rows)[0]
+    numbers[f.ENERGY] = f.platform_energy(model, cables, body, problem.wrench, pose, space.rotation, space.rows)[0]
     symmetric_part(arcs, space.stiffness, space.matrix)
     low, high = extreme_eigenvalues(space.matrix, space.part, space.step, space.motion, FLAT)
-    numbers[STIFFNESS_MIN] = low
+    numbers[f.STIFFNESS_MIN] = low
     status = _stability(low, high)
     if not components_along(problem.free, space.gradient, space.part) <= BALANCED * size * problem.unit:
         status = codes.FORWARD_NOT_CONVERGED
@@ -151,16 +132,16 @@ def _fill_stability(
 
 
 @glue
-def _store_chain(chain: LastEquilibrium, pose: Array, wrench: Array) -> None:
+def _store_chain(chain: f.LastEquilibrium, pose: Array, wrench: Array) -> None:
     """Store `pose` and its factored stiffness as the last equilibrium."""
     if not math.isnan(chain.factor[0, 0]):
-        copy_pose(pose, chain.last)
+        f.copy_pose(pose, chain.last)
         for k in range(6):
-            chain.last[LAST_WRENCH + k] = wrench[k]
+            chain.last[f.LAST_WRENCH + k] = wrench[k]
 
 
 @glue
-def _store_sample(problem: PoseProblem, rows: Array, p: int, results: Array, statuses: Codes) -> None:
+def _store_sample(problem: f.PoseProblem, rows: Array, p: int, results: Array, statuses: Codes) -> None:
     """Write the cables of sample `p`."""
     for i in range(rows.shape[1]):
         statuses[p, i] = int(rows[g.STATUS, i])
@@ -182,12 +163,12 @@ def _store_sample(problem: PoseProblem, rows: Array, p: int, results: Array, sta
 
 @entry
 def forward_poses(
-    model: ForwardTerms,
+    model: f.ForwardTerms,
     chained: bool,
-    given: SampleArrays,
-    chain: LastEquilibriumArrays,
+    given: f.SampleArrays,
+    chain: f.LastEquilibriumArrays,
     memory: tuple[Array, Indices],
-    found: SolutionArrays,
+    found: f.SolutionArrays,
 ) -> None:
     """Solve every sample in turn.
 
@@ -200,33 +181,161 @@ def forward_poses(
         memory: Work arrays from `memory_for`, for the number of cables.
         found: `Solutions`, which is filled.
     """
-    batch, answer, kept = ForwardSamples(*given), Solutions(*found), LastEquilibrium(*chain)
+    batch, answer, kept = f.ForwardSamples(*given), f.Solutions(*found), f.LastEquilibrium(*chain)
     code, k_h, k_p, behind = model
     count, m = batch.lengths.shape
-    space, rest = new_forward_arrays(Memory(*memory), kept.rows, kept.factor)
-    free, arcs, start, pose = new_motions(rest, batch.freedom.shape[0])
-    copy_pose(batch.starts[0], start)
+    space, rest = f.new_forward_arrays(Memory(*memory), kept.rows, kept.factor)
+    free, arcs, start, pose = f.new_motions(rest, batch.freedom.shape[0])
+    f.copy_pose(batch.starts[0], start)
     for p in range(count):
         if math.isnan(batch.lengths[p, 0]):
-            clear_solution(answer, p, codes.FORWARD_NO_LENGTHS, 0)
+            f.clear_solution(answer, p, codes.FORWARD_NO_LENGTHS, 0)
             continue
         if not chained:  # a result must not depend on the previous sample
-            copy_pose(row_of(batch.starts, p), start)
+            f.copy_pose(f.row_of(batch.starts, p), start)
             kept.last[0] = math.nan
             for i in range(m):
                 kept.rows[g.PARAMETER, i] = math.nan
-        problem = problem_at(Model(code, k_h, k_p, 0.0, behind), batch, p, free, arcs)
+        problem = f.problem_at(Model(code, k_h, k_p, 0.0, behind), batch, p, free, arcs)
         exact = Model(
             codes.ELASTIC if code == codes.ELASTIC else codes.CATENARY, 0.0, 0.0, problem.model.gravity, behind
         )
         steps, size = _find_pose(problem, exact, batch.lengths[p], start, kept, space, pose)
         status = _fill_stability(problem, pose, arcs, size, space, answer.numbers[p])
         _fill_residuals(batch.freedom, space.gradient, answer.numbers[p])
-        answer.numbers[p, ITERATIONS] = steps
+        answer.numbers[p, f.ITERATIONS] = steps
         answer.pose_statuses[p] = status
-        copy_pose(pose, answer.poses[p])
+        f.copy_pose(pose, answer.poses[p])
         _store_sample(problem, kept.rows, p, answer.results, answer.statuses)
         kept.last[0] = math.nan
         if status != codes.FORWARD_NOT_CONVERGED:
-            copy_pose(pose, start)
+            f.copy_pose(pose, start)
             _store_chain(kept, pose, problem.wrench)
+
+
+FIT_STEPS = 200
+FIRST_DAMPING = 1e-3  # relative to the largest diagonal element
+SMALL_STEP = 1e-14  # a fit ends at a smaller step, in the problem's units
+NOTHING = 1e-13  # a fit ends at a smaller relative decrease of the cost
+
+
+@formula
+def _straight_length(cables: Array, rows: Array, i: int) -> float:
+    """Length of an unstrained straight cable [m], including pulley and dead length."""
+    return rows[g.CHORD, i] + straight_behind(pulley_at(cables, i), chord_at(rows, i))
+
+
+@kernel
+def _half_square_error(cables: Array, body: Array, lengths: Array, pose: Array, rotation: Array, rows: Array) -> float:
+    """Half the sum of squared length errors [m^2] at `pose`. Fills the geometry of this pose."""
+    cable_geometry(cables, body, pose, rotation, rows)
+    total = 0.0
+    for i in range(lengths.shape[0]):
+        error = _straight_length(cables, rows, i) - lengths[i]
+        total += 0.5 * error * error
+    return total
+
+
+@glue
+def _normal_equations(free: Array, cables: Array, lengths: Array, space: f.ForwardArrays) -> None:
+    """Fill matrix J^T J (n, n) and part J^T e (n,) of the length errors e along the free motions."""
+    rows, matrix, part = space.rows, space.matrix, space.part
+    full, row = space.gradient, space.step
+    n = part.shape[0]
+    for j in range(n):
+        part[j] = 0.0
+        for k in range(n):
+            matrix[j, k] = 0.0
+    for i in range(lengths.shape[0]):
+        for j in range(6):
+            full[j] = 0.0
+        f.add_force(rows, i, rows[g.COSINE, i], rows[g.SINE, i], full)
+        components_along(free, full, row)
+        error = _straight_length(cables, rows, i) - lengths[i]
+        for j in range(n):
+            part[j] += row[j] * error
+            for k in range(n):
+                matrix[j, k] += row[j] * row[k]
+
+
+@glue
+def _fit_pose(problem: f.PoseProblem, lengths: Array, pose: Array, space: f.ForwardArrays) -> tuple[float, int, bool]:
+    """Move `pose` to the best fit. Returns half the sum of squares [m^2], number of steps, and True on success."""
+    cables, body, free = problem.cables, problem.body, problem.free
+    rotation, rows = space.rotation, space.rows
+    cost = _half_square_error(cables, body, lengths, pose, rotation, rows)
+    _normal_equations(free, cables, lengths, space)
+    largest = 0.0
+    for j in range(space.part.shape[0]):
+        largest = max(largest, space.matrix[j, j])
+    damping = FIRST_DAMPING * largest
+    steps, fitted = FIT_STEPS, False
+    for iteration in range(FIT_STEPS):
+        if not factor_positive(space.matrix, damping, space.factor):
+            damping = max(10.0 * damping, 1e-15 * largest)
+            continue
+        length = solve_step(space.factor, space.part, space.step)
+        if length <= SMALL_STEP:
+            steps, fitted = iteration, True
+            break
+        step_pose(free, body, pose, space.step, space.motion, space.trial)
+        new = _half_square_error(cables, body, lengths, space.trial, rotation, rows)
+        if new < cost:
+            f.copy_pose(space.trial, pose)
+            gain = cost - new
+            cost = new
+            damping = 0.1 * damping if damping > 1e-14 * largest else 0.0
+            _normal_equations(free, cables, lengths, space)
+            fitted = gain <= NOTHING * cost
+        else:
+            fitted = length <= 1e-7  # squared errors have a rounding error of the square root of machine precision
+            damping = max(10.0 * damping, 1e-12 * largest)
+        if fitted:
+            steps = iteration + 1
+            break
+    _half_square_error(cables, body, lengths, pose, rotation, rows)
+    return cost, steps, fitted
+
+
+@entry
+def fit_poses(
+    chained: bool,
+    given: f.SampleArrays,
+    chain: f.LastEquilibriumArrays,
+    memory: tuple[Array, Indices],
+    found: f.SolutionArrays,
+) -> None:
+    """Fit all samples; arguments as in `forward_poses`. Forces are NaN, and the energy is half the sum of squares."""
+    batch, answer, kept = f.ForwardSamples(*given), f.Solutions(*found), f.LastEquilibrium(*chain)
+    count, m = batch.lengths.shape
+    space, rest = f.new_forward_arrays(Memory(*memory), kept.rows, kept.factor)
+    free, arcs, start, pose = f.new_motions(rest, batch.freedom.shape[0])
+    f.copy_pose(batch.starts[0], start)
+    for p in range(count):
+        f.clear_solution(answer, p, codes.FORWARD_NO_LENGTHS, codes.CABLE_NO_TENSION)
+        if math.isnan(batch.lengths[p, 0]):
+            continue
+        if not chained:
+            f.copy_pose(f.row_of(batch.starts, p), start)
+        problem = f.problem_at(Model(codes.STRAIGHT, 0.0, 0.0, 0.0, None), batch, p, free, arcs)
+        f.copy_pose(start, pose)
+        answer.numbers[p, f.ENERGY], answer.numbers[p, f.ITERATIONS], fitted = _fit_pose(
+            problem, batch.lengths[p], pose, space
+        )
+        answer.pose_statuses[p] = codes.FORWARD_FITTED if fitted else codes.FORWARD_NOT_CONVERGED
+        f.copy_pose(pose, answer.poses[p])
+        if fitted:
+            f.copy_pose(pose, start)
+        for i in range(m):
+            answer.results[tables.SPAN, p, i] = space.rows[g.SPAN, i]
+            answer.results[tables.RISE, p, i] = space.rows[g.RISE, i]
+            answer.results[tables.LENGTH, p, i] = batch.lengths[p, i]
+            if answer.results.shape[0] > tables.BARE_ROWS:
+                pulley, chord = pulley_at(problem.cables, i), chord_at(space.rows, i)
+                sine, cosine = chord.cosine, pulley.entry * chord.sine
+                wrap = Wrap(sine, cosine, angle(sine, cosine))
+                wrapped, dead = behind_cable(problem.model, material_at(problem.cables, i), pulley, 0.0, wrap)
+                answer.results[tables.WRAP, p, i] = wrap.angle
+                answer.results[tables.WRAPPED, p, i] = wrapped
+                answer.results[tables.DEAD, p, i] = dead
+                answer.results[tables.SINE, p, i] = chord.sine

@@ -11,16 +11,13 @@ import math
 from sagline.core.arrays import Array
 from sagline.kernels import codes, tables
 from sagline.kernels.algebra.factors import factor_positive, solve_general, solve_lower, solve_upper
-from sagline.kernels.balance.pose import step_pose
-from sagline.kernels.balance.wrench import components_along, matrix_along, norm, symmetric_part
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable.over_pulleys import end_motion_per_length, material_at
-from sagline.kernels.cable.slopes import PlaneVector, force_by_length, force_change
-from sagline.kernels.cable.stiffness import force_of, plane_of
+from sagline.kernels.cable.forces import end_motion_per_length, material_at
+from sagline.kernels.cable.stiffness import PlaneVector, force_by_length, force_change, force_of, plane_of
 from sagline.kernels.cable.terms import Model
-from sagline.kernels.forward.platform import add_force, platform_energy, platform_stiffness, unbalance
-from sagline.kernels.forward.problem import LAST_WRENCH, ForwardArrays, PoseProblem, copy_pose
+from sagline.kernels.forward import platform as f
 from sagline.kernels.jit import glue, kernel
+from sagline.kernels.statics import components_along, matrix_along, norm, step_pose, symmetric_part
 
 
 @kernel
@@ -94,7 +91,7 @@ def _add_length_change(model: Model, cables: Array, lengths: Array, rows: Array,
             material, force = material_at(cables, i), force_of(rows, i)
             slope = force_by_length(model, span, rise, material, length, force, plane_of(rows, i))
         wound = lengths[i] - length
-        add_force(rows, i, wound * slope.x, wound * slope.z, wrench)
+        f.add_force(rows, i, wound * slope.x, wound * slope.z, wrench)
 
 
 @kernel
@@ -108,7 +105,9 @@ def solve_step(factor: Array, part: Array, step: Array) -> float:
 
 
 @glue
-def predict(problem: PoseProblem, lengths: Array, start: Array, last: Array, space: ForwardArrays, pose: Array) -> bool:
+def predict(
+    problem: f.PoseProblem, lengths: Array, start: Array, last: Array, space: f.ForwardArrays, pose: Array
+) -> bool:
     """Fill the first-order change due to new lengths and wrench. False if no equilibrium is stored for `start`.
 
     Afterwards the rows contain the new lengths.
@@ -118,7 +117,7 @@ def predict(problem: PoseProblem, lengths: Array, start: Array, last: Array, spa
         known = known and last[k] == start[k]
     if known:
         for k in range(6):
-            space.gradient[k] = last[LAST_WRENCH + k] - problem.wrench[k]
+            space.gradient[k] = last[f.LAST_WRENCH + k] - problem.wrench[k]
         _add_length_change(problem.model, problem.cables, lengths, space.rows, space.gradient)
         components_along(problem.free, space.gradient, space.part)
         known = solve_step(space.factor, space.part, space.step) <= PREDICTED
@@ -130,7 +129,7 @@ def predict(problem: PoseProblem, lengths: Array, start: Array, last: Array, spa
 
 
 @glue
-def newton_from(problem: PoseProblem, pose: Array, space: ForwardArrays) -> tuple[int, float]:
+def newton_from(problem: f.PoseProblem, pose: Array, space: f.ForwardArrays) -> tuple[int, float]:
     """Full Newton steps with the symmetric stiffness. Returns the number of steps and the last sum of tensions.
 
     The number is 0 if the stiffness is not positive definite or the first step is too long. The pose is then unchanged,
@@ -147,7 +146,7 @@ def newton_from(problem: PoseProblem, pose: Array, space: ForwardArrays) -> tupl
     size = 0.0
     last = False
     for iteration in range(NEAR_STEPS + 1):
-        size = unbalance(model, cables, body, wrench, pose, rotation, rows, gradient)
+        size = f.unbalance(model, cables, body, wrench, pose, rotation, rows, gradient)
         rest = components_along(free, gradient, part)
         if last:
             steps = iteration if rest <= BALANCED * size * problem.unit else -1
@@ -156,7 +155,7 @@ def newton_from(problem: PoseProblem, pose: Array, space: ForwardArrays) -> tupl
             break
         best = rest
         if age > FRESH:
-            platform_stiffness(model, cables, rows, space.stiffness)
+            f.platform_stiffness(model, cables, rows, space.stiffness)
             symmetric_part(free, space.stiffness, space.matrix)
             age = 0.0
             if not factor_positive(space.matrix, 0.0, space.factor):
@@ -173,13 +172,13 @@ def newton_from(problem: PoseProblem, pose: Array, space: ForwardArrays) -> tupl
         before = length
         age += length
         step_pose(free, body, pose, step, space.motion, space.trial)
-        copy_pose(space.trial, pose)
+        f.copy_pose(space.trial, pose)
     return steps, size
 
 
 @glue
 def _newton_steps(
-    problem: PoseProblem, pose: Array, space: ForwardArrays, best: float, good: float
+    problem: f.PoseProblem, pose: Array, space: f.ForwardArrays, best: float, good: float
 ) -> tuple[float, float]:
     """One Newton step for the force balance, shortened until the unbalance is below `best`. Needs the stiffness.
 
@@ -199,24 +198,24 @@ def _newton_steps(
         for shortening in range(SHORTENINGS + 1):
             last = shortening == SHORTENINGS or (shortening > 0 and best <= good)
             if last:  # no step reduces the unbalance: restore the pose
-                copy_pose(pose, trial)
+                f.copy_pose(pose, trial)
             else:
                 for j in range(step.shape[0]):
                     step[j] *= share
                 step_pose(free, body, pose, step, space.motion, trial)
-            unbalance(model, cables, body, wrench, trial, space.rotation, space.rows, space.gradient)
+            f.unbalance(model, cables, body, wrench, trial, space.rotation, space.rows, space.gradient)
             new = components_along(free, space.gradient, part)
             better = new < best and not last
             if better or last:
                 break
             share = 0.25
         length = norm(step)
-        copy_pose(trial, pose)
+        f.copy_pose(trial, pose)
     return (new, length) if better else (best, 0.0)
 
 
 @glue
-def polish(problem: PoseProblem, pose: Array, space: ForwardArrays, good: float) -> int:
+def polish(problem: f.PoseProblem, pose: Array, space: f.ForwardArrays, good: float) -> int:
     """Newton steps for the force balance until the unbalance no longer decreases. Returns the number of steps.
 
     good: an unbalance below this counts as zero. The work arrays belong to the initial pose before the steps, and to
@@ -226,7 +225,7 @@ def polish(problem: PoseProblem, pose: Array, space: ForwardArrays, good: float)
     before = 0.0
     steps = POLISH_STEPS
     for iteration in range(POLISH_STEPS):
-        platform_stiffness(problem.model, problem.cables, space.rows, space.stiffness)
+        f.platform_stiffness(problem.model, problem.cables, space.rows, space.stiffness)
         best, length = _newton_steps(problem, pose, space, best, good)
         # the length of a step is about the error before the step; the next length would be about length^3/before^2
         if length == 0.0 or length * length * length <= LAST_DIGIT * before * before:
@@ -244,7 +243,7 @@ NOISE = 4e-15  # rounding error of an energy, relative to the sum of its parts
 
 
 @glue
-def descend(problem: PoseProblem, pose: Array, space: ForwardArrays, known: float) -> tuple[int, float]:
+def descend(problem: f.PoseProblem, pose: Array, space: f.ForwardArrays, known: float) -> tuple[int, float]:
     """Decrease the energy until a full Newton step is short. A start in equilibrium does not move, even if unstable.
 
     known: the sum of tensions at the pose, if space belongs to this pose and matrix is its stiffness; otherwise 0.
@@ -257,11 +256,11 @@ def descend(problem: PoseProblem, pose: Array, space: ForwardArrays, known: floa
     radius = FIRST_RADIUS
     steps, tensions = DESCENT_STEPS, known
     energy, size, promised, shift, length = 0.0, 0.0, 0.0, 0.0, 0.0
-    copy_pose(pose, trial)
+    f.copy_pose(pose, trial)
     for iteration in range(DESCENT_STEPS + 1):
         if iteration > 0 or known == 0.0:
-            tensions = unbalance(model, cables, body, wrench, trial, rotation, rows, gradient)
-        new_energy, new_size = platform_energy(model, cables, body, wrench, trial, rotation, rows)
+            tensions = f.unbalance(model, cables, body, wrench, trial, rotation, rows, gradient)
+        new_energy, new_size = f.platform_energy(model, cables, body, wrench, trial, rotation, rows)
         fresh = True
         if iteration == 0:
             if components_along(free, gradient, part) <= BALANCED * tensions * problem.unit:
@@ -280,7 +279,7 @@ def descend(problem: PoseProblem, pose: Array, space: ForwardArrays, known: floa
                     steps = iteration
                     break
             else:
-                copy_pose(trial, pose)
+                f.copy_pose(trial, pose)
                 if shift == 0.0 and (length <= NEAR or promised <= noise):
                     steps = iteration
                     break
@@ -291,7 +290,7 @@ def descend(problem: PoseProblem, pose: Array, space: ForwardArrays, known: floa
         if fresh:
             energy, size = new_energy, new_size
             if iteration > 0 or known == 0.0:
-                platform_stiffness(model, cables, rows, space.stiffness)
+                f.platform_stiffness(model, cables, rows, space.stiffness)
                 symmetric_part(free, space.stiffness, matrix)
             components_along(free, gradient, part)
         shift = trust_step(matrix, part, radius, space.factor, motion[: part.shape[0]], step)

@@ -1,22 +1,23 @@
-"""Stiffness of a platform in equilibrium, and derivatives of the cable forces with respect to cable data."""
+"""Stiffness, sensitivities and stability of platforms in equilibrium."""
 
 from __future__ import annotations
 
 import math
 
-from sagline.core.arrays import Array, Indices
+from sagline.core.arrays import Array, Codes, Indices
 from sagline.kernels import codes, tables
+from sagline.kernels.algebra.factors import extreme_eigenvalues
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable.geometry import CABLE_ROWS
-from sagline.kernels.cable.over_pulleys import material_at
+from sagline.kernels.cable.forces import material_at
+from sagline.kernels.cable.geometry import CABLE_ROWS, cable_geometry
 from sagline.kernels.cable.pulley import pulley_at
-from sagline.kernels.cable.slopes import PlaneVector, force_slopes, slopes_over
-from sagline.kernels.cable.stiffness import force_of, plane_of
+from sagline.kernels.cable.stiffness import PlaneVector, force_of, force_slopes, plane_of, slopes_over
 from sagline.kernels.cable.terms import Model
-from sagline.kernels.forward.platform import end_stiffness, platform_stiffness, unbalance
-from sagline.kernels.forward.problem import ForwardSamples, ForwardTerms, SampleArrays, row_of
+from sagline.kernels.forward import platform as f
+from sagline.kernels.forward.forward import FLAT
 from sagline.kernels.jit import entry, formula, glue
 from sagline.kernels.memory import Memory, block, vector
+from sagline.kernels.statics import symmetric_part
 
 # index of the quantity with respect to which the force is differentiated
 BY_LENGTH, BY_DENSITY, BY_STIFFNESS, BY_RADIUS, BY_DEAD = 0, 1, 2, 3, 4
@@ -36,7 +37,7 @@ def _describe_cable(
     model: Model, cables: Array, rows: Array, i: int, block: Array, slopes: Array, lever: Array
 ) -> None:
     """Fill `block` (3, 3), `slopes` (DATA, m, 3) and `lever` (3,) of cable `i`, after `platform_stiffness`."""
-    across = end_stiffness(rows, i)
+    across = f.end_stiffness(rows, i)
     for j in range(3):
         block[0, j] = across[0][j]
         block[1, j] = across[1][j]
@@ -57,8 +58,8 @@ def _describe_cable(
 
 @entry
 def describe_states(
-    model: ForwardTerms,
-    given: SampleArrays,
+    model: f.ForwardTerms,
+    given: f.SampleArrays,
     memory: tuple[Array, Indices],
     matrices: Array,
     blocks: Array,
@@ -77,7 +78,7 @@ def describe_states(
         slopes: Filled with derivatives of the force T of every cable with respect to its data, (N, DATA, m, 3).
         levers: Filled with vectors from the center of mass to the platform ends, (N, m, 3).
     """
-    batch = ForwardSamples(*given)
+    batch = f.ForwardSamples(*given)
     code, k_h, k_p, behind = model
     count, m = batch.lengths.shape
     rotation, rest = block(Memory(*memory), 3, 3)
@@ -90,12 +91,85 @@ def describe_states(
             slopes[p] = math.nan
             levers[p] = math.nan
             continue
-        body, cables = row_of(batch.bodies, p), row_of(batch.robots, p)
+        body, cables = f.row_of(batch.bodies, p), f.row_of(batch.robots, p)
         placed = Model(code, k_h, k_p, body[tables.GRAVITY], behind)
         for i in range(m):
             rows[g.LENGTH, i] = batch.lengths[p, i]
             rows[g.PARAMETER, i] = math.nan  # a result must not depend on the previous sample
-        unbalance(placed, cables, body, row_of(batch.wrenches, p), batch.starts[p], rotation, rows, gradient)
-        platform_stiffness(placed, cables, rows, matrices[p])
+        f.unbalance(placed, cables, body, f.row_of(batch.wrenches, p), batch.starts[p], rotation, rows, gradient)
+        f.platform_stiffness(placed, cables, rows, matrices[p])
         for i in range(m):
             _describe_cable(placed, cables, rows, i, blocks[p, i], slopes[p], levers[p, i])
+
+
+@glue
+def _fill_rows(model: Model, cables: Array, results: Array, p: int, rows: Array) -> None:
+    """Fill lengths and forces of the cables at pose `p` of a plan, after `cable_geometry`."""
+    for k in range(tables.WRAP - tables.LENGTH):  # length and forces have the same order in both arrays
+        for i in range(rows.shape[1]):
+            rows[g.LENGTH + k, i] = results[tables.LENGTH + k, p, i]
+    if model.behind is not None:
+        for i in range(rows.shape[1]):
+            rows[g.FREE_SPAN, i] = results[tables.SPAN, p, i]
+            rows[g.FREE_RISE, i] = results[tables.RISE, p, i]
+            rows[g.WRAP, i] = results[tables.WRAP, p, i]
+            rows[g.FREE_LENGTH, i] = rows[g.LENGTH, i] - (results[tables.WRAPPED, p, i] + results[tables.DEAD, p, i])
+        for i in range(rows.shape[1]):
+            # tension and direction at the exit point; cables of the shallow models leave along their chord
+            rows[g.LEAVING, i] = rows[g.TENSION, i]
+            rows[g.WRAP_SINE, i] = rows[g.COSINE, i]
+            rows[g.WRAP_COSINE, i] = pulley_at(cables, i).entry * rows[g.SINE, i]
+            if model.code == codes.CATENARY:
+                weight = material_at(cables, i).density * model.gravity
+                x, z = rows[g.HORIZONTAL, i], rows[g.VERTICAL, i] - weight * rows[g.FREE_LENGTH, i]
+                rows[g.LEAVING, i] = math.sqrt(x * x + z * z)
+                rows[g.WRAP_SINE, i] = x / rows[g.LEAVING, i]
+                rows[g.WRAP_COSINE, i] = pulley_at(cables, i).entry * z / rows[g.LEAVING, i]
+
+
+@entry
+def stabilities_of_poses(
+    terms: f.ForwardTerms,
+    robots: tuple[Array, Array, Array],
+    poses: Array,
+    which: Indices,
+    memory: tuple[Array, Indices],
+    results: Array,
+    pose_statuses: Codes,
+) -> None:
+    """Decide whether the equilibria of solved poses are stable.
+
+    Args:
+        terms: Cable model, the empirical model's constants, and True if cables may have pulleys or dead lengths, else
+            None. The stiffness of straight cables is undefined; poses with straight cables therefore count as solved.
+        robots: Same as in `inverse_poses`.
+        poses: Rows (N, POSE_COLUMNS).
+        which: Indices of the poses, (K,).
+        memory: Work arrays from `memory_for`, for the number of cables.
+        results: Same as in `inverse_poses`, (RESULT_ROWS, N, m).
+        pose_statuses: Statuses (N,), filled for these poses: POSE_UNSTABLE if some free motion does not have a positive
+            stiffness, else POSE_SOLVED.
+    """
+    code, k_h, k_p, behind = terms
+    freedom, bodies, tables_of_cables = robots
+    n, m = freedom.shape[0], results.shape[2]
+    rotation, rest = block(Memory(*memory), 3, 3)
+    rows, rest = block(rest, CABLE_ROWS, m)
+    stiffness, rest = block(rest, 6, 6)
+    arcs, rest = block(rest, n, 6)
+    matrix, rest = block(rest, n, n)
+    work, rest = block(rest, 3, n)
+    for p in which:
+        pose_statuses[p] = codes.POSE_SOLVED
+        if code == codes.STRAIGHT:
+            continue
+        body, cables = f.row_of(bodies, p), f.row_of(tables_of_cables, p)
+        model = Model(code, k_h, k_p, body[tables.GRAVITY], behind)
+        cable_geometry(cables, body, poses[p], rotation, rows)
+        _fill_rows(model, cables, results, p, rows)
+        f.platform_stiffness(model, cables, rows, stiffness)
+        f.fill_arcs(freedom, cables, body, arcs)
+        symmetric_part(arcs, stiffness, matrix)
+        low, high = extreme_eigenvalues(matrix, work[0], work[1], work[2], FLAT)
+        if not low > FLAT * high:
+            pose_statuses[p] = codes.POSE_UNSTABLE

@@ -6,34 +6,14 @@ import math
 from typing import NamedTuple
 
 from sagline.core.arrays import Array, Codes, Flags, Indices
-from sagline.kernels import codes
+from sagline.kernels import codes, statics
 from sagline.kernels.algebra.bounds import START, STRIP_ROWS
-from sagline.kernels.balance.setting import (
-    Balance,
-    Platform,
-    fill_needed_wrench,
-    new_balance,
-    set_pose,
-    start_from_minimum_norm,
-)
-from sagline.kernels.balance.wrench import along_freedom, translation_count
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable.admissible import TensionLimits, cable_without_tension
-from sagline.kernels.cable.cables import Cables, new_cables
 from sagline.kernels.cable.pulley import robots_have_machine
 from sagline.kernels.cable.sag_forces import new_curves, sag_forces_at
-from sagline.kernels.inverse.iterations import linearize_ends
-from sagline.kernels.inverse.poses import (
-    Answers,
-    DistributionTerms,
-    LimitTerms,
-    ModelTerms,
-    Robots,
-    measure_balance,
-    model_at,
-    platform_at,
-    write_solution,
-)
+from sagline.kernels.cable.states import TensionLimits, cable_without_tension
+from sagline.kernels.cable.terms import Cables, new_cables
+from sagline.kernels.inverse import poses as inverse
 from sagline.kernels.jit import entry, glue
 from sagline.kernels.memory import Memory, block, vector
 from sagline.kernels.tension.bracket import NODES, component_along, decide_feasibility
@@ -50,15 +30,15 @@ PROVED, ENOUGH = 0, 1  # columns of the brackets
 
 @entry
 def decide_poses(
-    model_terms: ModelTerms,
-    limit_terms: LimitTerms,
-    robot_terms: Robots,
+    model_terms: inverse.ModelTerms,
+    limit_terms: inverse.LimitTerms,
+    robot_terms: inverse.Robots,
     poses: Array,
     wrenches: Array,
     which: Indices,
     covers: bool,
     memory: tuple[Array, Indices],
-    answers: Answers,
+    answers: inverse.Answers,
     verdicts: tuple[Array, Array, Array, Flags],
 ) -> None:
     """Check with chord tensions whether poses are feasible that the distribution iterations reported as infeasible.
@@ -87,14 +67,14 @@ def decide_poses(
     n = freedom.shape[0]
     m = statuses.shape[1]
     cables, rest = new_cables(Memory(*memory), m, robots_have_machine(robots))
-    balance, rest = new_balance(rest, m, n)
+    balance, rest = statics.new_balance(rest, m, n)
     work, rest = new_demand(rest, m, freedom)
     change = work.change
     translations = work.demand.soft
     for p in which:
-        platform = platform_at(robot_terms, poses, wrenches, p)
-        model = model_at(model_terms, platform.body)
-        set_pose(model, limits, codes.CHORD_TENSION, work.weight, platform, cables, balance)
+        platform = inverse.platform_at(robot_terms, poses, wrenches, p)
+        model = inverse.model_at(model_terms, platform.body)
+        statics.set_pose(model, limits, codes.CHORD_TENSION, work.weight, platform, cables, balance)
         if cable_without_tension(cables) >= 0:
             brackets[p, PROVED], brackets[p, ENOUGH] = math.inf, math.inf
             for i in range(m):
@@ -113,8 +93,8 @@ def decide_poses(
         if status != codes.POSE_SOLVED and status != codes.POSE_INFEASIBLE and status != codes.POSE_BORDERLINE:
             brackets[p, PROVED] = brackets[p, ENOUGH] = math.nan
         if status == codes.POSE_SOLVED:
-            measure_balance(platform, cables, balance, residuals[p])
-            write_solution(True, model, cables, balance, results, p)
+            inverse.measure_balance(platform, cables, balance, residuals[p])
+            inverse.write_solution(True, model, cables, balance, results, p)
         else:
             for i in range(m):
                 statuses[p, i] = codes.CABLE_SOLVED
@@ -160,20 +140,22 @@ def new_demand(memory: Memory, m: int, freedom: Array) -> tuple[DemandArrays, Me
     for i in range(m):
         rows[2 * n, i] = 1.0
     change = TensionChange(rows[2 * n + 1], rows[2 * n + 2], vectors[0], vectors[1])
-    demand = Demand(rows[:n], rows[n : 2 * n], vectors[2], translation_count(freedom), 0.0)
+    demand = Demand(rows[:n], rows[n : 2 * n], vectors[2], statics.translation_count(freedom), 0.0)
     return DemandArrays(rows[2 * n], demand, change), memory
 
 
 @glue
-def demand_of_pose(platform: Platform, cables: Cables, balance: Balance, work: DemandArrays) -> tuple[Demand, float]:
+def demand_of_pose(
+    platform: statics.Platform, cables: Cables, balance: statics.Balance, work: DemandArrays
+) -> tuple[Demand, float]:
     """Fill the demand of a pose on its cables, and the tensions at the start of the search.
 
     Returns the demand, and the lever arm [m] by which its moments are divided.
     """
     demand = work.demand
     n, m = balance.matrix.shape
-    fill_needed_wrench(platform, cables, balance)
-    start_from_minimum_norm(balance)
+    statics.fill_needed_wrench(platform, cables, balance)
+    statics.start_from_minimum_norm(balance)
     for i in range(m):
         work.change.tau[i] = balance.bounds[START, i]
     lever = 0.0
@@ -187,7 +169,7 @@ def demand_of_pose(platform: Platform, cables: Cables, balance: Balance, work: D
         column[2] = 1.0
         column[3] = balance.geometry[g.LEVER_Y, i]
         column[4] = -balance.geometry[g.LEVER_X, i]
-        along_freedom(platform.freedom, column, hanging)
+        statics.along_freedom(platform.freedom, column, hanging)
         for k in range(n):
             unit = 1.0 if k < demand.soft else 1.0 / lever
             demand.matrix[k, i] = balance.matrix[k, i] * unit
@@ -232,10 +214,10 @@ def _block_cables(cables: Cables, demand: Demand, change: TensionChange, blockin
 
 @entry
 def polygon_of_pose(
-    model_terms: ModelTerms,
-    distribution_terms: DistributionTerms,
-    limit_terms: LimitTerms,
-    robot_terms: Robots,
+    model_terms: inverse.ModelTerms,
+    distribution_terms: inverse.DistributionTerms,
+    limit_terms: inverse.LimitTerms,
+    robot_terms: inverse.Robots,
     pose: Array,
     wrench: Array,
     carried: tuple[Array, Array],
@@ -264,18 +246,20 @@ def polygon_of_pose(
     scale, offset, bounds, null, corners, labels = polygon
     r, m = null.shape
     cables, rest = new_cables(Memory(*memory), m, robots_have_machine(robots))
-    balance, rest = new_balance(rest, m, freedom.shape[0])
-    platform = Platform(freedom, bodies[0], robots[0], pose, wrench)
-    model = model_at(model_terms, bodies[0])
-    set_pose(model, TensionLimits(*limit_terms), distribution.variable, distribution.weight, platform, cables, balance)
+    balance, rest = statics.new_balance(rest, m, freedom.shape[0])
+    platform = statics.Platform(freedom, bodies[0], robots[0], pose, wrench)
+    model = inverse.model_at(model_terms, bodies[0])
+    statics.set_pose(
+        model, TensionLimits(*limit_terms), distribution.variable, distribution.weight, platform, cables, balance
+    )
     if not math.isnan(tensions[0]):
         for i in range(m):
             cables.tau[i] = tensions[i]
             cables.sag_force[i] = sag_forces[i]
         if distribution.variable == codes.FRAME_END_TENSION:
-            linearize_ends(model, distribution, cables, balance)
-    fill_needed_wrench(platform, cables, balance)
-    start_from_minimum_norm(balance)
+            inverse.linearize_ends(model, distribution, cables, balance)
+    statics.fill_needed_wrench(platform, cables, balance)
+    statics.start_from_minimum_norm(balance)
     for i in range(m):
         scale[i] = balance.scale[i]
         offset[i] = balance.offset[i]
@@ -294,9 +278,9 @@ def polygon_of_pose(
 
 @entry
 def margins_of_poses(
-    model_terms: ModelTerms,
-    limit_terms: LimitTerms,
-    robot_terms: Robots,
+    model_terms: inverse.ModelTerms,
+    limit_terms: inverse.LimitTerms,
+    robot_terms: inverse.Robots,
     poses: Array,
     wrenches: Array,
     sag_forces: Array,
@@ -309,18 +293,21 @@ def margins_of_poses(
     count, m = sag_forces.shape
     n = freedom.shape[0]
     cables, rest = new_cables(Memory(*memory), m, robots_have_machine(robots))
-    balance, rest = new_balance(rest, m, n)
+    balance, rest = statics.new_balance(rest, m, n)
     weight, rest = vector(rest, m)
     for i in range(m):
         weight[i] = 1.0
-    translations = translation_count(freedom)
+    translations = statics.translation_count(freedom)
     for p in range(count):
         margins[p] = math.nan
-        platform = platform_at(robot_terms, poses, wrenches, p)
-        model = model_at(model_terms, platform.body)
-        placed = set_pose(model, limits, codes.CHORD_TENSION, weight, platform, cables, balance) != codes.POSE_NO_CHORD
+        platform = inverse.platform_at(robot_terms, poses, wrenches, p)
+        model = inverse.model_at(model_terms, platform.body)
+        placed = (
+            statics.set_pose(model, limits, codes.CHORD_TENSION, weight, platform, cables, balance)
+            != codes.POSE_NO_CHORD
+        )
         if placed and not math.isnan(sag_forces[p, 0]):
             for i in range(m):
                 cables.sag_force[i] = sag_forces[p, i]
-            fill_needed_wrench(platform, cables, balance)
+            statics.fill_needed_wrench(platform, cables, balance)
             margins[p] = zonotope_margin(balance.matrix, balance.right, cables.low, cables.high, translations, rest)

@@ -1,7 +1,8 @@
 """Inverse kinematics of a batch of poses: tensions that balance the platform, and unstrained lengths of the cables.
 
 docs/model.md, sections 4 and 5. For the exact cable, the sag forces T_z - tau sin phi depend on the tensions. The
-balance is therefore solved repeatedly with the last sag forces, until the sag forces converge.
+balance is therefore solved repeatedly with the last sag forces, until the sag forces converge. If the variable of the
+distribution is the frame-end tension, the balance is linearized at the last tensions.
 """
 
 from __future__ import annotations
@@ -9,21 +10,168 @@ from __future__ import annotations
 import math
 
 from sagline.core.arrays import Array, Codes, Indices
-from sagline.kernels import codes, tables
+from sagline.kernels import codes, statics, tables
 from sagline.kernels.algebra.functions import angle
-from sagline.kernels.balance.setting import Balance, Platform, fill_needed_wrench, new_balance, set_pose
-from sagline.kernels.balance.wrench import is_rotation, translation_count
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable.admissible import TensionLimits
-from sagline.kernels.cable.cables import Cables, material_of, new_cables, pulley_of
+from sagline.kernels.cable import states
 from sagline.kernels.cable.pulley import Wrap, behind_cable, robots_have_machine
-from sagline.kernels.cable.terms import Model
-from sagline.kernels.inverse.iterations import distribute_and_solve_cables, store_tensions
+from sagline.kernels.cable.terms import Cables, Model, chord_of, material_of, new_cables, pulley_of
 from sagline.kernels.inverse.stability import new_stability_arrays, proves_stability
-from sagline.kernels.jit import entry, glue
+from sagline.kernels.jit import entry, glue, kernel
 from sagline.kernels.memory import Memory
-from sagline.kernels.tension.nearest import Distribution, new_reference_point
-from sagline.kernels.tension.polygon import new_work_arrays
+from sagline.kernels.tension import nearest
+from sagline.kernels.tension.other_methods import distribute_by_other_method
+from sagline.kernels.tension.polygon import WorkArrays, new_work_arrays, reset_work_arrays
+
+TENSION_CONVERGED = 1e-9  # relative change of tension below which a distribution in frame-end tensions has converged
+SLOPE_STEP = 1e-4  # relative step of the central difference of the frame-end tension
+
+
+@kernel
+def linearize_ends(model: Model, distribution: nearest.Distribution, cables: Cables, balance: statics.Balance) -> bool:
+    """Linearize the frame-end tensions at the present chord tensions, and factor the balance. False if singular."""
+    for i in range(cables.tau.size):
+        tau = cables.tau[i]
+        chord, material, pulley = chord_of(cables, i), material_of(cables, i), pulley_of(cables, i)
+        above = states.frame_end_tension(model, chord, material, pulley, tau * (1.0 + SLOPE_STEP))
+        below = states.frame_end_tension(model, chord, material, pulley, tau * (1.0 - SLOPE_STEP))
+        slope = (above - below) / (2.0 * SLOPE_STEP * tau)
+        balance.offset[i] = states.frame_end_tension(model, chord, material, pulley, tau) - slope * tau
+        balance.scale[i] = slope * distribution.weight[i]
+        statics.scale_limits(cables, balance, i)
+    return statics.factor_balance(balance)
+
+
+ITERATIONS = 30
+# iterations after which the reference is fixed, so that rounding cannot change the choice between equal tensions
+FREE_ITERATIONS = 8
+CONVERGED = 1e-10  # largest change of a converged sag force, in N and relative to the largest tension:
+SAG_ROUNDING = 1e-15
+
+
+@glue
+def distribute_and_solve_cables(
+    model: Model, distribution: nearest.Distribution, platform: statics.Platform, cables: Cables, balance: statics.Balance,
+    near: nearest.ReferencePoint, work: WorkArrays | None, statuses: Codes,
+) -> int:  # fmt: skip
+    """Distribute tensions and solve the cables until the sag forces converge. Returns the pose's status.
+
+    cables: the cables from `set_pose`, with tensions, ratios and sag forces to be filled; work: work arrays for
+    frame-end tensions and for methods that are not projections. With None, the code of both is not compiled. statuses:
+    filled with the status of each cable, (m,).
+    """
+    near.held.labels[0] = 0
+    if work is not None:
+        reset_work_arrays(work)
+    nearest.set_reference(distribution, balance.offset, balance.null, near)
+    solved = False
+    statics.fill_needed_wrench(platform, cables, balance)
+    possible = states.cable_without_tension(cables) < 0
+    status = codes.POSE_NOT_CONVERGED if possible else codes.POSE_INFEASIBLE
+    for k in range(ITERATIONS if possible else 0):
+        statics.start_from_minimum_norm(balance)
+        if work is None:
+            status = nearest.share_nearest(balance.bounds, balance.null, near, balance.tension)
+        elif nearest.is_nearest(distribution) or k >= FREE_ITERATIONS:
+            if k >= FREE_ITERATIONS and not nearest.is_nearest(distribution):
+                fix_reference(balance, near)
+            status = nearest.share_nearest(balance.bounds, balance.null, near, balance.tension)
+        else:
+            status = distribute_by_other_method(
+                distribution, balance.bounds, balance.offset, balance.null, near, work, balance.tension
+            )
+        if status != codes.POSE_SOLVED:
+            break
+        moved, largest = take_tensions(cables, balance)
+        gravest, turned = states.solve_cable_states(model, cables, not solved, solved and moved < states.NEAR, statuses)
+        if gravest == codes.CABLE_TOO_SLACK or gravest == codes.CABLE_NOT_CONVERGED:
+            status = codes.POSE_NOT_CONVERGED
+            break
+        status = codes.POSE_NOT_CONVERGED
+        change = sag_force_change(cables)
+        converged = model.code != codes.CATENARY or (
+            change <= CONVERGED + SAG_ROUNDING * largest and turned <= states.SAME_EXIT
+        )
+        if work is None or distribution.variable != codes.FRAME_END_TENSION:
+            if converged:
+                status = codes.POSE_SOLVED
+                break
+        else:
+            if converged and solved and moved <= TENSION_CONVERGED:
+                status = codes.POSE_SOLVED
+                break
+            if not linearize_ends(model, distribution, cables, balance):
+                status = codes.POSE_SINGULAR
+                break
+            nearest.set_reference(distribution, balance.offset, balance.null, near)
+            reset_work_arrays(work)
+        solved = True
+        statics.fill_needed_wrench(platform, cables, balance)
+    if status == codes.POSE_SOLVED and not strain_admits_tensions(cables):
+        status = codes.POSE_INFEASIBLE
+    return status
+
+
+@glue
+def strain_admits_tensions(cables: Cables) -> bool:
+    """True if no cable without upper limit exceeds the largest strain, which distribution methods ignore."""
+    for i in range(cables.tau.size):
+        if cables.tau[i] > cables.high[i] and states.is_limited_by_strain(cables, i):
+            return False
+    return True
+
+
+@glue
+def fix_reference(balance: statics.Balance, near: nearest.ReferencePoint) -> None:
+    """Make the present tensions the reference, and release an active bound that is only due to a tie."""
+    near.held.labels[0] = 0
+    for k in range(balance.null.shape[0]):
+        near.reference[k] = 0.0
+        for i in range(balance.null.shape[1]):
+            near.reference[k] += balance.null[k, i] * balance.tension[i]
+
+
+@glue
+def take_tensions(cables: Cables, balance: statics.Balance) -> tuple[float, float]:
+    """Copy the distributed tensions to the cables. Returns the largest relative change and the largest tension [N]."""
+    largest = 0.0
+    moved = 0.0
+    for i in range(cables.tau.size):
+        new = balance.tension[i] / balance.scale[i]
+        moved = max(moved, abs(new - cables.tau[i]) / new)
+        largest = max(largest, new)
+        cables.tau[i] = new
+        cables.last_sag_force[i] = cables.sag_force[i]
+    return moved, largest
+
+
+@glue
+def sag_force_change(cables: Cables) -> float:
+    """Largest change of a sag force in this iteration [N]."""
+    change = 0.0
+    for i in range(cables.tau.size):
+        change = max(change, abs(cables.sag_force[i] - cables.last_sag_force[i]))
+    return change
+
+
+@glue
+def store_tensions(
+    model: Model,
+    distribution: nearest.Distribution,
+    cables: Cables,
+    work: WorkArrays | None,
+    near: nearest.ReferencePoint,
+) -> None:
+    """Store the tensions, in the variable of the distribution, for the next pose."""
+    for i in range(cables.tau.size):
+        near.previous[i] = cables.tau[i]
+        if distribution.variable == codes.HORIZONTAL_TENSION:
+            near.previous[i] = cables.tau[i] * cables.cosine[i]
+        elif work is not None and distribution.variable == codes.FRAME_END_TENSION:
+            near.previous[i] = states.frame_end_tension(
+                model, chord_of(cables, i), material_of(cables, i), pulley_of(cables, i), cables.tau[i]
+            )
+
 
 FORCE, MOMENT = 0, 1  # columns of the residuals
 
@@ -36,11 +184,11 @@ Answers = tuple[Array, Codes, Array, Array, Codes]  # results, statuses, residua
 
 
 @glue
-def platform_at(robots: Robots, poses: Array, wrenches: Array, p: int) -> Platform:
+def platform_at(robots: Robots, poses: Array, wrenches: Array, p: int) -> statics.Platform:
     """Platform at pose `p`. Robots and wrenches have a single row for all poses, or one row per pose."""
     freedom, bodies, cables = robots
     body, cable_rows = bodies[min(p, bodies.shape[0] - 1)], cables[min(p, cables.shape[0] - 1)]
-    return Platform(freedom, body, cable_rows, poses[p], wrenches[min(p, wrenches.shape[0] - 1)])
+    return statics.Platform(freedom, body, cable_rows, poses[p], wrenches[min(p, wrenches.shape[0] - 1)])
 
 
 @glue
@@ -89,24 +237,26 @@ def inverse_poses(
         first: Index of the first pose.
         last: Index after the last pose.
     """
-    distribution = Distribution(*distribution_terms)
-    limits = TensionLimits(*limit_terms)
+    distribution = nearest.Distribution(*distribution_terms)
+    limits = states.TensionLimits(*limit_terms)
     freedom, _bodies, robots = robot_terms
     results, statuses, residuals, needed, pose_statuses = answers
     m = statuses.shape[1]
     n = freedom.shape[0]
     machine = robots_have_machine(robots)
     cables, rest = new_cables(Memory(*memory), m, machine)
-    balance, rest = new_balance(rest, m, n)
-    near, rest = new_reference_point(rest, previous, m - n)
-    proof, rest = (None, rest) if stability is None else new_stability_arrays(rest, m, n - translation_count(freedom))
+    balance, rest = statics.new_balance(rest, m, n)
+    near, rest = nearest.new_reference_point(rest, previous, m - n)
+    proof, rest = (
+        (None, rest) if stability is None else new_stability_arrays(rest, m, n - statics.translation_count(freedom))
+    )
     others = None if otherwise is None else new_work_arrays(distribution.method, rest, m, m - n)
     for p in range(first, last):
         platform = platform_at(robot_terms, poses, wrenches, p)
         model = model_at(model_terms, platform.body)
         for i in range(m):
             statuses[p, i] = codes.CABLE_SOLVED
-        status = set_pose(model, limits, distribution.variable, distribution.weight, platform, cables, balance)
+        status = statics.set_pose(model, limits, distribution.variable, distribution.weight, platform, cables, balance)
         if status == codes.POSE_SOLVED:
             status = distribute_and_solve_cables(
                 model, distribution, platform, cables, balance, near, others, statuses[p]
@@ -129,16 +279,16 @@ def inverse_poses(
 
 
 @glue
-def measure_balance(platform: Platform, cables: Cables, balance: Balance, residuals: Array) -> None:
+def measure_balance(platform: statics.Platform, cables: Cables, balance: statics.Balance, residuals: Array) -> None:
     """Fill the norms of the unbalanced force [N] and moment [N m] along the platform's free motions."""
-    fill_needed_wrench(platform, cables, balance)
+    statics.fill_needed_wrench(platform, cables, balance)
     force = 0.0
     moment = 0.0
     for k in range(balance.right.size):
         total = -balance.right[k]
         for i in range(cables.tau.size):
             total += balance.matrix[k, i] * cables.tau[i]
-        if is_rotation(platform.freedom, k):
+        if statics.is_rotation(platform.freedom, k):
             moment += total * total
         else:
             force += total * total
@@ -147,7 +297,9 @@ def measure_balance(platform: Platform, cables: Cables, balance: Balance, residu
 
 
 @glue
-def write_solution(solved: bool, model: Model, cables: Cables, balance: Balance, results: Array, p: int) -> None:
+def write_solution(
+    solved: bool, model: Model, cables: Cables, balance: statics.Balance, results: Array, p: int
+) -> None:
     """Write the results of pose `p`. If it has no solution, all rows except span and rise become NaN."""
     for i in range(cables.tau.size):
         tension = cables.tau[i] if solved else math.nan

@@ -15,13 +15,12 @@ from sagline.core.arrays import Array
 from sagline.kernels import codes
 from sagline.kernels.algebra.factors import factor_positive
 from sagline.kernels.algebra.functions import EXCESS_LIMIT, atanhc_excess_polynomial
-from sagline.kernels.balance.setting import Balance, Platform
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable.cables import Cables, pulley_of
 from sagline.kernels.cable.pulley import Wrap, softness
-from sagline.kernels.cable.terms import Model
+from sagline.kernels.cable.terms import Cables, Model, pulley_of
 from sagline.kernels.jit import glue
 from sagline.kernels.memory import Memory, block, vector
+from sagline.kernels.statics import Balance, Platform
 
 ROUNDING = 0.01  # a proof with a smaller margin is not valid
 

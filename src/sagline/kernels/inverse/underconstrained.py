@@ -12,30 +12,15 @@ import math
 from typing import NamedTuple
 
 from sagline.core.arrays import Array, Flags, Indices
-from sagline.kernels import codes, tables
+from sagline.kernels import codes, statics, tables
 from sagline.kernels.algebra.factors import solve_general
-from sagline.kernels.balance.pose import step_pose, turned
-from sagline.kernels.balance.setting import Balance, Platform, fill_needed_wrench, new_balance, place_cables
-from sagline.kernels.balance.wrench import fill_structure_matrix, is_rotation, rows_along_freedom
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable.admissible import TensionLimits
-from sagline.kernels.cable.cables import Cables, new_cables
 from sagline.kernels.cable.geometry import cable_geometry
 from sagline.kernels.cable.pulley import robots_have_machine
 from sagline.kernels.cable.sag_forces import Curves, new_curves, sag_forces_at
-from sagline.kernels.cable.terms import Model
-from sagline.kernels.inverse.poses import (
-    FORCE,
-    MOMENT,
-    Answers,
-    LimitTerms,
-    ModelTerms,
-    Robots,
-    measure_balance,
-    model_at,
-    platform_at,
-    write_solution,
-)
+from sagline.kernels.cable.states import TensionLimits
+from sagline.kernels.cable.terms import Cables, Model, new_cables
+from sagline.kernels.inverse import poses as inverse
 from sagline.kernels.jit import entry, glue
 from sagline.kernels.memory import Memory, block, counters, vector
 
@@ -73,9 +58,9 @@ class _Search(NamedTuple):
     """Search for the equilibrium of one pose."""
 
     limits: TensionLimits
-    platform: Platform  # its pose has the given values
+    platform: statics.Platform  # its pose has the given values
     curves: Curves
-    balance: Balance
+    balance: statics.Balance
     level: float  # tension level [N]
     lever: float  # mean lever arm of the platform ends [m]
     pose: Array  # present pose, (POSE_COLUMNS,)
@@ -103,14 +88,19 @@ def new_underconstrained_arrays(memory: Memory, m: int, n: int) -> tuple[Underco
 
 @glue
 def _place(
-    model: Model, limits: TensionLimits, platform: Platform, pose: Array, cables: Cables, balance: Balance
+    model: Model,
+    limits: TensionLimits,
+    platform: statics.Platform,
+    pose: Array,
+    cables: Cables,
+    balance: statics.Balance,
 ) -> bool:
     """Fill cables, geometry and structure matrix at `pose`. False if a cable has no chord."""
     cable_geometry(platform.robot, platform.body, pose, balance.rotation, balance.geometry)
-    if not place_cables(model, limits, platform.robot, balance.geometry, cables):
+    if not statics.place_cables(model, limits, platform.robot, balance.geometry, cables):
         return False
-    fill_structure_matrix(balance.geometry, balance.full)
-    rows_along_freedom(platform.freedom, balance.full, balance.matrix)
+    statics.fill_structure_matrix(balance.geometry, balance.full)
+    statics.rows_along_freedom(platform.freedom, balance.full, balance.matrix)
     return True
 
 
@@ -133,7 +123,7 @@ def _fill_gram(freedom: Array, matrix: Array, lever: float, gram: Array) -> None
         for j in range(m):
             gram[i, j] = 0.0
             for k in range(matrix.shape[0]):
-                unit = 1.0 / (lever * lever) if is_rotation(freedom, k) else 1.0
+                unit = 1.0 / (lever * lever) if statics.is_rotation(freedom, k) else 1.0
                 gram[i, j] += unit * matrix[k, i] * matrix[k, j]
         trace += gram[i, i]
     for i in range(m):
@@ -163,17 +153,17 @@ def _fill_tension_level(gram: Array, work: Array, along: Array) -> None:
 
 
 @glue
-def _fill_first_tensions(freedom: Array, lever: float, balance: Balance, gram: Array, tau: Array) -> None:
+def _fill_first_tensions(freedom: Array, lever: float, balance: statics.Balance, gram: Array, tau: Array) -> None:
     """Fill tensions whose wrench is close to the needed wrench. Each tension is at least a small part of the load."""
     m = tau.size
     square = 0.0
     for i in range(m):
         tau[i] = 0.0
         for k in range(balance.right.size):
-            unit = 1.0 / (lever * lever) if is_rotation(freedom, k) else 1.0
+            unit = 1.0 / (lever * lever) if statics.is_rotation(freedom, k) else 1.0
             tau[i] += unit * balance.matrix[k, i] * balance.right[k]
     for k in range(balance.right.size):
-        square += 0.0 if is_rotation(freedom, k) else balance.right[k] * balance.right[k]
+        square += 0.0 if statics.is_rotation(freedom, k) else balance.right[k] * balance.right[k]
     solve_general(gram, tau)
     for i in range(m):
         tau[i] = max(tau[i], FLOOR * math.sqrt(square) / m)
@@ -232,11 +222,11 @@ def _fill_system(search: _Search, space: UnderconstrainedArrays) -> None:
             for a in range(6):
                 for b in range(6):
                     jacobian[k, j] += freedom[k, a] * space.stiffness[a, b] * freedom[j, b]
-    center = turned(
+    center = statics.turned(
         pose, platform.body[tables.CENTER_X], platform.body[tables.CENTER_Y], platform.body[tables.CENTER_Z]
     )
-    forward = turned(pose, 1.0, 0.0, 0.0)
-    wanted = turned(start, 1.0, 0.0, 0.0)
+    forward = statics.turned(pose, 1.0, 0.0, 0.0)
+    wanted = statics.turned(start, 1.0, 0.0, 0.0)
     for c in range(m):
         for i in range(m):
             jacobian[n + c, n + i] = space.along[i] if given[c] == LEVEL else 0.0
@@ -280,7 +270,7 @@ def _take_step(search: _Search, space: UnderconstrainedArrays) -> tuple[float, b
     turn = 0.0
     shift = 0.0
     for k in range(n):
-        if is_rotation(freedom, k):
+        if statics.is_rotation(freedom, k):
             turn += step[k] * step[k]
         else:
             shift += step[k] * step[k]
@@ -289,7 +279,7 @@ def _take_step(search: _Search, space: UnderconstrainedArrays) -> tuple[float, b
     share = TURN / turn if turn > TURN else 1.0
     for k in range(step.size):
         step[k] *= share
-    step_pose(freedom, platform.body, pose, step[:n], space.motion, space.moved)
+    statics.step_pose(freedom, platform.body, pose, step[:n], space.motion, space.moved)
     for k in range(pose.size):
         pose[k] = space.moved[k]
     short = False
@@ -316,7 +306,7 @@ def _find_equilibrium(search: _Search, space: UnderconstrainedArrays) -> int:
         if not _place(model, search.limits, search.platform, search.pose, cables, search.balance):
             break
         sag_forces_at(search.curves, tau, space.sag_force)
-        fill_needed_wrench(search.platform, cables, search.balance)
+        statics.fill_needed_wrench(search.platform, cables, search.balance)
         if status == codes.POSE_SOLVED:  # the cables are those of the last step
             break
         _fill_system(search, space)
@@ -339,16 +329,16 @@ def _find_equilibrium(search: _Search, space: UnderconstrainedArrays) -> int:
 
 @entry
 def underconstrained_poses(
-    model_terms: ModelTerms,
-    limit_terms: LimitTerms,
-    robot_terms: Robots,
+    model_terms: inverse.ModelTerms,
+    limit_terms: inverse.LimitTerms,
+    robot_terms: inverse.Robots,
     starts: Array,
     wrenches: Array,
     given: Indices,
     level: float,
     chained: bool,
     memory: tuple[Array, Indices],
-    answers: Answers,
+    answers: inverse.Answers,
     poses: Array,
     blocking: Flags,
     first: int,
@@ -378,7 +368,7 @@ def underconstrained_poses(
     results, statuses, residuals, needed, pose_statuses = answers
     m, n = statuses.shape[1], freedom.shape[0]
     cables, rest = new_cables(Memory(*memory), m, robots_have_machine(robots))
-    balance, rest = new_balance(rest, m, n)
+    balance, rest = statics.new_balance(rest, m, n)
     space, rest = new_underconstrained_arrays(rest, m, n)
     # Without a level, the tensions must turn the platform to its yaw. The search starts at the answer for level 0.
     has_yaw = has_level = False
@@ -387,8 +377,8 @@ def underconstrained_poses(
         has_level = has_level or given[i] == LEVEL
     turned_by_tensions = has_yaw and not has_level
     for p in range(first, last):
-        platform = platform_at(robot_terms, starts, wrenches, p)
-        model = model_at(model_terms, platform.body)
+        platform = inverse.platform_at(robot_terms, starts, wrenches, p)
+        model = inverse.model_at(model_terms, platform.body)
         pose = poses[p]
         for k in range(pose.size):
             pose[k] = starts[p, k]
@@ -401,7 +391,7 @@ def underconstrained_poses(
             _fill_gram(freedom, balance.matrix, lever, space.gram)
             if has_yaw or has_level:
                 _fill_tension_level(space.gram, space.work, space.along)
-            fill_needed_wrench(platform, cables, balance)
+            statics.fill_needed_wrench(platform, cables, balance)
             follows = chained and p > 0 and pose_statuses[p - 1] == codes.POSE_SOLVED
             _fill_first_tensions(freedom, lever, balance, space.gram, space.sag_force)
             for i in range(m):
@@ -418,12 +408,12 @@ def underconstrained_poses(
                     status = _find_equilibrium(search, space)
         solved = status == codes.POSE_SOLVED
         if solved:
-            measure_balance(platform, cables, balance, residuals[p])
+            inverse.measure_balance(platform, cables, balance, residuals[p])
         else:
-            residuals[p, FORCE] = residuals[p, MOMENT] = math.nan
+            residuals[p, inverse.FORCE] = residuals[p, inverse.MOMENT] = math.nan
             for k in range(pose.size):
                 pose[k] = starts[p, k]
         for k in range(n):
             needed[p, k] = balance.right[k] if solved else math.nan
         pose_statuses[p] = status
-        write_solution(solved, model, cables, balance, results, p)
+        inverse.write_solution(solved, model, cables, balance, results, p)

@@ -8,7 +8,7 @@ from sagline.core.arrays import Array
 from sagline.kernels import codes
 from sagline.kernels.algebra.bounds import HIGH, LOW, START, STRIP_ROWS, TOLERANCE, largest_bound
 from sagline.kernels.algebra.factors import factor_positive, solve_lower, solve_upper
-from sagline.kernels.algebra.linear_program import LP_SOLVED, lowest_point
+from sagline.kernels.algebra.programs import LP_SOLVED, lowest_point
 from sagline.kernels.jit import kernel
 from sagline.kernels.memory import Memory, block
 from sagline.kernels.tension.norms import program_status

@@ -21,7 +21,7 @@ from sagline.kernels.algebra.factors import (
     solve_lower,
     solve_upper,
 )
-from sagline.kernels.algebra.nearest_point import ActiveSet, nearest_point, new_active_set
+from sagline.kernels.algebra.programs import ActiveSet, nearest_point, new_active_set
 from sagline.kernels.cable.sag_forces import Curves, sag_forces_at, slopes_at
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block, vector

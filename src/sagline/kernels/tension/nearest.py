@@ -13,7 +13,7 @@ from typing import NamedTuple
 from sagline.core.arrays import Array
 from sagline.kernels import codes
 from sagline.kernels.algebra.bounds import HIGH, LOW, START, TOLERANCE, largest_bound
-from sagline.kernels.algebra.nearest_point import ActiveSet, nearest_point, new_active_set
+from sagline.kernels.algebra.programs import ActiveSet, nearest_point, new_active_set
 from sagline.kernels.jit import formula, glue
 from sagline.kernels.memory import Memory, block
 

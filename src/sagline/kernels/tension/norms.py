@@ -11,8 +11,7 @@ from sagline.core.arrays import Array, Indices
 from sagline.kernels import codes
 from sagline.kernels.algebra.bounds import HIGH, LOW, START, STRIP_ROWS, TOLERANCE, largest_bound, most_violated_bound
 from sagline.kernels.algebra.factors import factor_positive, solve_lower, solve_upper
-from sagline.kernels.algebra.linear_program import LP_GAVE_UP, LP_SOLVED, LP_UNBOUNDED, Basis, lowest_point
-from sagline.kernels.algebra.nearest_point import nearest_point
+from sagline.kernels.algebra.programs import LP_GAVE_UP, LP_SOLVED, LP_UNBOUNDED, Basis, lowest_point, nearest_point
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block, vector
 from sagline.kernels.tension.nearest import ReferencePoint

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from sagline.core.arrays import Array, Indices
 from sagline.kernels import codes
 from sagline.kernels.algebra.bounds import HIGH, LOW, START, TOLERANCE, box_radius, inward, largest_bound, side_of
-from sagline.kernels.algebra.linear_program import Basis, new_basis
+from sagline.kernels.algebra.programs import Basis, new_basis
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block, counters
 

@@ -16,8 +16,8 @@ from sagline.core.arrays import Array
 from sagline.kernels import codes, tables
 from sagline.kernels.algebra.factors import factor_positive, solve_lower, solve_upper
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable.admissible import is_limited_by_strain, least_of_sag
 from sagline.kernels.cable.sag_forces import Curves, sag_forces_at
+from sagline.kernels.cable.states import is_limited_by_strain, least_of_sag
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block
 from sagline.kernels.workspaces.pose_box import MOTIONS, CablesInBox, PoseRange

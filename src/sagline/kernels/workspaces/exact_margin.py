@@ -14,14 +14,13 @@ from typing import NamedTuple
 from sagline.core.arrays import Array
 from sagline.kernels import codes, tables
 from sagline.kernels.algebra.factors import solve_general
-from sagline.kernels.balance.setting import Platform, new_balance, set_pose
-from sagline.kernels.balance.wrench import along_freedom
-from sagline.kernels.cable.admissible import TensionLimits
 from sagline.kernels.cable.sag_forces import Curves, sag_forces_at
+from sagline.kernels.cable.states import TensionLimits
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.inverse.feasibility import demand_of_pose, new_demand
 from sagline.kernels.jit import glue, kernel
 from sagline.kernels.memory import Memory, block, vector
+from sagline.kernels.statics import Platform, along_freedom, new_balance, set_pose
 from sagline.kernels.tension.bracket import decide_feasibility
 from sagline.kernels.tension.least_change import Demand, TensionChange, least_change
 from sagline.kernels.workspaces.sag_force_bounds import HIGH, LOW, SAG_FORCE_LOW, SLOPE

@@ -11,10 +11,10 @@ import math
 from typing import NamedTuple
 
 from sagline.core.arrays import Array
-from sagline.kernels.balance.wrench import fill_structure_matrix, is_rotation, rows_along_freedom
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block
+from sagline.kernels.statics import fill_structure_matrix, is_rotation, rows_along_freedom
 
 BEND = 0.57735027  # half of the largest second derivative of x/|x| times |x|^2, which is 2/sqrt(3), rounded up
 MOTIONS = 6  # number of motions: three translations and three rotations

@@ -11,15 +11,15 @@ import numpy as np
 
 from sagline.core.arrays import Array, Codes, Indices
 from sagline.kernels import tables
-from sagline.kernels.balance.setting import place_cables
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable.admissible import TensionLimits
-from sagline.kernels.cable.cables import new_cables
 from sagline.kernels.cable.geometry import cable_geometry
 from sagline.kernels.cable.sag_forces import new_curves
+from sagline.kernels.cable.states import TensionLimits
+from sagline.kernels.cable.terms import new_cables
 from sagline.kernels.inverse.poses import LimitTerms, ModelTerms, Robots, model_at
 from sagline.kernels.jit import entry
 from sagline.kernels.memory import Memory, block
+from sagline.kernels.statics import place_cables
 from sagline.kernels.workspaces.box_proofs import Precision, proves_inside, proves_outside
 from sagline.kernels.workspaces.box_tensions import (
     Ranges,

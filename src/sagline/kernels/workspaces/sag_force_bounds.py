@@ -11,9 +11,9 @@ import math
 
 from sagline.core.arrays import Array
 from sagline.kernels import codes
-from sagline.kernels.cable.admissible import LOOSEST
-from sagline.kernels.cable.cables import Cables
 from sagline.kernels.cable.sag_forces import Curves, Section, find_extrema, sag_force_range, sag_forces_at
+from sagline.kernels.cable.states import LOOSEST
+from sagline.kernels.cable.terms import Cables
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory
 

@@ -17,17 +17,16 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array, Codes, Indices
 from sagline.kernels import codes, tables
-from sagline.kernels.balance.setting import Platform, place_cables
-from sagline.kernels.balance.wrench import fill_structure_matrix, is_rotation, rows_along_freedom
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable.admissible import TensionLimits, cable_without_tension, least_of_sag
-from sagline.kernels.cable.cables import new_cables
 from sagline.kernels.cable.geometry import cable_geometry
 from sagline.kernels.cable.pulley import robots_have_machine
 from sagline.kernels.cable.sag_forces import new_curves
+from sagline.kernels.cable.states import TensionLimits, cable_without_tension, least_of_sag
+from sagline.kernels.cable.terms import new_cables
 from sagline.kernels.inverse.poses import LimitTerms, ModelTerms, Robots, model_at
 from sagline.kernels.jit import entry, formula, glue, kernel
 from sagline.kernels.memory import Memory, block, vector
+from sagline.kernels.statics import Platform, fill_structure_matrix, is_rotation, place_cables, rows_along_freedom
 from sagline.kernels.workspaces.exact_margin import ABOVE, BELOW, VALUE, LimitingFacet, settle_margin
 from sagline.kernels.workspaces.facets import (
     DEPENDENT,

@@ -1,1 +1,0 @@
-"""Force balance of the platform: geometry, structure matrix, needed wrench."""
