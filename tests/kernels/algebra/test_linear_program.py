@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import linprog
 
 from sagline.core.arrays import Array
-from sagline.kernels.algebra import bounds as lp
+from sagline.kernels.algebra import programs as lp
 from sagline.kernels.algebra.programs import LP_EMPTY, LP_SOLVED, LP_UNBOUNDED
 from tests.kernels.compiled import from_python, memory
 

@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import linprog
 
 from sagline.core.arrays import Array
-from sagline.kernels.algebra import bounds as n
+from sagline.kernels.algebra import programs as n
 from tests.kernels.compiled import from_python, memory
 
 nearest_point = from_python(n.nearest_point)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sagline.kernels import balance as kernels
+from sagline.kernels import statics as kernels
 from sagline.robot.pattern import freedom_matrix
 from tests.kernels.compiled import from_python
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from sagline.core.arrays import Array
-from sagline.kernels import balance as s
+from sagline.kernels import statics as s
 from sagline.kernels import tables
 from sagline.kernels.algebra.bounds import HIGH, LOW, START
 from sagline.kernels.cable import states

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sagline.core.arrays import Array
-from sagline.kernels import balance as w
+from sagline.kernels import statics as w
 from sagline.kernels.cable import geometry as g
 from tests.kernels.balance.robots import A_POINT, EVERY_MOTION, GRAVITY, IN_A_PLANE, TO_AND_FRO, Case, random_case
 from tests.kernels.compiled import from_python

@@ -51,8 +51,8 @@ SAG_ROUNDING = 1e-15
 
 @glue
 def distribute_and_solve_cables(
-    model: Model, distribution: nearest.Distribution, platform: statics.Platform, cables: Cables, balance: statics.Balance,
-    near: nearest.ReferencePoint, work: WorkArrays | None, statuses: Codes,
+    model: Model, distribution: nearest.Distribution, platform: statics.Platform, cables: Cables,
+    balance: statics.Balance, near: nearest.ReferencePoint, work: WorkArrays | None, statuses: Codes,
 ) -> int:  # fmt: skip
     """Distribute tensions and solve the cables until the sag forces converge. Returns the pose's status.
 
