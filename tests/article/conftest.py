@@ -1,4 +1,4 @@
-"""The report, once for all tests of this folder, with the figures that were drawn for it: three chapters, and whole."""
+"""Reports for all tests of this folder, with their figures: one of three chapters and one of all chapters."""
 
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -11,11 +11,11 @@ from sagline.article.report import ArticleReport, write_article
 from sagline.present.page import Panel
 from tests.tiers import wide
 
-QUICK = ("feasible-sets", "intercept", "errata")  # chapters that take less than a second together
+QUICK = ("feasible-sets", "intercept", "errata")  # chapters that take less than a second in total
 
 
 class Written(NamedTuple):
-    """A report, and the drawings in it with their captions.
+    """A report and its drawings with their captions.
 
     Attributes:
         report: The report.
@@ -32,36 +32,36 @@ def written_with_figures(folder: Path, parts: tuple[str, ...] = ()) -> Written:
     figures: list[tuple[str, Figure]] = []
     panel = Drawings.panel
 
-    def kept(self: Drawings, figure: Any, caption: str) -> Panel:
+    def report_kept_for_all_tests(self: Drawings, figure: Any, caption: str) -> Panel:
         figures.append((caption, figure))
         return panel(self, figure, caption)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Drawings, "panel", kept)
+        patch.setattr(Drawings, "panel", report_kept_for_all_tests)
         report = write_article(folder, parts)
     return Written(report, figures, not parts)
 
 
 @pytest.fixture(scope="session")
 def quick(tmp_path_factory: pytest.TempPathFactory) -> Written:
-    """The quick chapters."""
+    """Report of the quick chapters."""
     return written_with_figures(tmp_path_factory.mktemp("quick"), QUICK)
 
 
 @pytest.fixture(scope="session")
 def written(tmp_path_factory: pytest.TempPathFactory) -> Written:
-    """The whole report; its seconds are the longest of this folder."""
+    """Report of all chapters; it takes the longest time of this folder."""
     return written_with_figures(tmp_path_factory.mktemp("report"))
 
 
 @pytest.fixture(scope="session", params=wide(["quick", "written"]))
 def either(request: pytest.FixtureRequest) -> Written:
-    """The quick chapters in the first tier, the whole report in the second."""
+    """Quick chapters in the first tier, all chapters in the second."""
     found: Written = request.getfixturevalue(request.param)
     return found
 
 
 @pytest.fixture(scope="session")
 def report(written: Written) -> ArticleReport:
-    """The whole report alone."""
+    """Page of the whole report."""
     return written.report

@@ -1,4 +1,4 @@
-"""What the page of an experiment must be, for one that was run."""
+"""Checks of the page of an experiment."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from sagline.article.experiment import Experiment
 from sagline.article.experiment_page import NAMES, experiment_chapter, write_experiment
 from sagline.cli.main import app
 from tests.article.test_report import NAMES as NO_NUMBERS
-from tests.article.test_report import NUMBER, Page, is_told_by, leaves
+from tests.article.test_report import NUMBER, Page, is_among, leaves
 
 
 def every_number_in_a_sentence_is_one_of_the_numbers_of_its_finding(whole: Experiment, tmp_path: Path) -> None:
@@ -26,11 +26,11 @@ def every_number_in_a_sentence_is_one_of_the_numbers_of_its_finding(whole: Exper
         numbers = list(leaves(written[finding.key]))
         printed = NUMBER.findall(NO_NUMBERS.sub("", finding.measured))
         told += len(printed)
-        assert [found for found in printed if not is_told_by(found[0], found[1], numbers)] == [], finding.measured
+        assert [found for found in printed if not is_among(found[0], found[1], numbers)] == [], finding.measured
     assert told >= 12
 
 
-def the_table_holds_the_article_s_errors_and_ours(whole: Experiment) -> None:
+def the_table_has_the_errors_of_the_article_and_of_the_run(whole: Experiment) -> None:
     (table,) = experiment_chapter(whole, "A twin.").findings[0].data
     assert [row[0] for row in table.rows] == [*whole.table.points, "mean"]
     for k, row in enumerate(table.rows[:-1]):
@@ -39,7 +39,7 @@ def the_table_holds_the_article_s_errors_and_ours(whole: Experiment) -> None:
     assert float(table.rows[-1][3]) == pytest.approx(18.4, abs=0.05)
 
 
-def the_page_needs_nothing_else_and_its_numbers_stand_beside_it(whole: Experiment, tmp_path: Path) -> None:
+def the_page_is_self_contained_and_its_numbers_are_in_a_file(whole: Experiment, tmp_path: Path) -> None:
     place = write_experiment(whole, tmp_path / "new", "A twin.")
     text = place.read_text()
     page = Page(text)
@@ -51,7 +51,7 @@ def the_page_needs_nothing_else_and_its_numbers_stand_beside_it(whole: Experimen
     np.testing.assert_allclose(numbers["stops"]["distance_mm"], 1e3 * whole.distance, atol=1e-9)
 
 
-def the_command_writes_the_page_and_tells_the_table(
+def the_command_writes_the_page_and_prints_the_table(
     whole: Experiment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("sagline.article.experiment.in_process", lambda *robots, **options: whole)

@@ -1,4 +1,4 @@
-"""The report in headless Chromium: read in the light and in the dark, on a phone, on a desk and on paper."""
+"""The report in headless Chromium: light and dark theme, on a phone, on a desktop screen and on paper."""
 
 import re
 import zlib
@@ -22,7 +22,7 @@ WIDTHS, THEMES = (390, 768, 1440), ("light", "dark")
 
 pytestmark = [extended, NEEDED]
 
-# color and ground of every text outside drawings, and of every drawing against its card
+# colors of text and background outside drawings, and of each drawing and its card
 CONTRASTS = """() => {
   const parts = color => color.match(/[\\d.]+/g).map(Number);
   const light = color => {
@@ -63,7 +63,7 @@ def opened(browser: Browser, report: ArticleReport, width: int, theme: str, heig
 
 @pytest.mark.parametrize("theme", THEMES)
 @pytest.mark.parametrize("width", WIDTHS)
-def test_every_text_can_be_read_and_the_page_does_not_scroll_sideways(
+def test_all_text_is_readable_without_horizontal_scrolling(
     browser: Browser, report: ArticleReport, width: int, theme: str
 ) -> None:
     page = opened(browser, report, width, theme)
@@ -79,7 +79,7 @@ def brightness(color: str) -> float:
     return float(np.mean([int(part) for part in re.findall(r"\d+", color)[:3]]))
 
 
-def test_the_dark_is_dark_and_drawings_stand_on_a_light_card(browser: Browser, report: ArticleReport) -> None:
+def test_the_dark_theme_is_dark_with_drawings_on_light_cards(browser: Browser, report: ArticleReport) -> None:
     page = opened(browser, report, 1440, "dark")
     assert brightness(page.evaluate("getComputedStyle(document.body).backgroundColor")) < 40.0
     cards = page.evaluate("[...document.querySelectorAll('figure svg')].map(e => getComputedStyle(e).backgroundColor)")
@@ -103,7 +103,7 @@ def test_the_first_screen_is_the_result(browser: Browser, report: ArticleReport,
     page.close()
 
 
-def test_a_single_drawing_stands_beside_its_text(browser: Browser, report: ArticleReport) -> None:
+def test_a_single_drawing_is_beside_its_text(browser: Browser, report: ArticleReport) -> None:
     page = opened(browser, report, 1440, "light")
     alone = [f.key for chapter in report.chapters for f in chapter.findings if len(f.panels) == 1]
     assert len(alone) > 5
@@ -117,7 +117,7 @@ def test_a_single_drawing_stands_beside_its_text(browser: Browser, report: Artic
 
 
 def edges(table: Locator) -> tuple[float, float, float]:
-    """How bright the left edge, the ground and the right edge are, where no text is: most rows of each column."""
+    """Brightness of the left edge, the background and the right edge without text: frequent values of columns."""
     with Image.open(BytesIO(table.screenshot())) as picture:
         rows = np.asarray(picture.convert("L"), dtype=np.float64)
     columns = np.median(rows, axis=0)
@@ -125,7 +125,7 @@ def edges(table: Locator) -> tuple[float, float, float]:
 
 
 @pytest.mark.parametrize("theme", THEMES)
-def test_a_table_that_goes_on_beside_the_page_shows_it(browser: Browser, report: ArticleReport, theme: str) -> None:
+def test_a_table_wider_than_the_page_indicates_it(browser: Browser, report: ArticleReport, theme: str) -> None:
     page = opened(browser, report, 390, theme)
     wide = narrow = 0
     for table in page.locator("main .scroll").all():
@@ -148,14 +148,14 @@ def test_a_table_that_goes_on_beside_the_page_shows_it(browser: Browser, report:
 
 
 class Element(NamedTuple):
-    """An element of the structure of a PDF file: its kind, and the pages that it is on."""
+    """An element in the structure of a PDF file: its kind and its pages."""
 
     kind: str
     pages: frozenset[int]
 
 
 def structure(text: bytes) -> list[Element]:
-    """Headings, figures and tables of a tagged file, in order of reading."""
+    """Headings, figures and tables of a tagged file in reading order."""
     objects = {int(k): body for k, body in re.findall(rb"\n(\d+) 0 obj\n(.*?)\nendobj", text, flags=re.DOTALL)}
     numbers = {page: k for k, page in enumerate(k for k in sorted(objects) if b"/Type /Page\n" in objects[k])}
     elements: list[Element] = []
@@ -196,8 +196,8 @@ def test_paper_is_a4(paper: bytes) -> None:
     assert (right - left, high - low) == pytest.approx((210 / 25.4 * 72, 297 / 25.4 * 72), abs=1.0)
 
 
-def test_headings_stay_with_what_they_are_over(paper: bytes) -> None:
-    """A heading is on the page on which the first drawing or row of a table after it is; no drawing is torn apart."""
+def test_headings_are_on_the_page_of_their_content(paper: bytes) -> None:
+    """A heading is on the page of the first following drawing or table row; no drawing is split."""
     elements = structure(paper)
     kinds = [element.kind for element in elements]
     assert kinds.count("H3") > 40
@@ -213,7 +213,7 @@ def test_headings_stay_with_what_they_are_over(paper: bytes) -> None:
 
 
 def lines_of_text(text: bytes) -> list[int]:
-    """How many pieces of text each page shows."""
+    """Number of text pieces on each page."""
     found = re.findall(rb"/Type /Page\n.*?/Contents (\d+) 0 R", text, flags=re.DOTALL)
     counts = []
     for key in found:
@@ -223,7 +223,7 @@ def lines_of_text(text: bytes) -> list[int]:
     return counts
 
 
-def test_every_page_of_paper_has_its_number(browser: Browser, report: ArticleReport, paper: bytes) -> None:
+def test_every_printed_page_has_its_number(browser: Browser, report: ArticleReport, paper: bytes) -> None:
     page = opened(browser, report, 1440, "light")
     page.add_style_tag(content="@page { @bottom-right { content: none; } }")
     without = lines_of_text(page.pdf(prefer_css_page_size=True))

@@ -1,4 +1,4 @@
-"""Drawings of the report: legends off the curves, nothing lifted onto a floor, maps of errors and not of samples."""
+"""Drawings of the report: legends beside the curves, marked values below the axis, maps of the size of errors."""
 
 import re
 from itertools import pairwise
@@ -17,7 +17,7 @@ from tests.article.conftest import Written
 from tests.tiers import extended
 
 
-def test_every_legend_stands_off_its_axes_and_on_its_sheet(either: Written) -> None:
+def test_legends_are_outside_of_the_axes_and_on_the_sheet(either: Written) -> None:
     seen = 0
     for caption, figure in either.figures:
         figure.draw_without_rendering()
@@ -33,8 +33,8 @@ def test_every_legend_stands_off_its_axes_and_on_its_sheet(either: Written) -> N
     assert seen > (40 if either.is_whole else 2)
 
 
-def test_every_drawn_text_is_on_its_sheet_and_dark_enough(either: Written) -> None:
-    """Contrast of at least 4.5 with the card that a drawing stands on in the dark."""
+def test_all_text_is_on_the_sheet_with_enough_contrast(either: Written) -> None:
+    """Contrast of at least 4.5 with the card of the drawing in the dark theme."""
     for caption, figure in either.figures:
         for text in figure.findobj(matplotlib.text.Text):
             if text.get_text() and text.get_visible():
@@ -43,7 +43,7 @@ def test_every_drawn_text_is_on_its_sheet_and_dark_enough(either: Written) -> No
 
 
 def contrast(one: tuple[float, float, float], other: tuple[float, float, float]) -> float:
-    """As the Web Content Accessibility Guidelines 2.2 define it."""
+    """Contrast ratio of the Web Content Accessibility Guidelines 2.2."""
     light = [
         sum(
             share * (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4)
@@ -54,7 +54,7 @@ def contrast(one: tuple[float, float, float], other: tuple[float, float, float])
     return (max(light) + 0.05) / (min(light) + 0.05)
 
 
-def test_a_legend_leaves_the_axes_as_large_as_they_were() -> None:
+def test_a_legend_does_not_change_the_size_of_the_axes() -> None:
     figure, ax = axes("x", "y")
     before = ax.get_position().height * figure.get_figheight()
     for k in range(7):
@@ -68,7 +68,7 @@ def strips(ax: Axes) -> list[tuple[float, float]]:
     return [(box.get_y(), box.get_y() + box.get_height()) for box in boxes]
 
 
-def test_what_is_below_the_floor_is_shaded_and_told_and_nothing_is_lifted() -> None:
+def test_values_below_the_axis_are_shaded_and_stated() -> None:
     courses = np.array([[1e-12, 1e-7, 0.0, 3.0], [2.0, 5.0, 40.0, 1e-3]])
     _, ax = axes("x", "y")
     for course in courses:
@@ -80,10 +80,10 @@ def test_what_is_below_the_floor_is_shaded_and_told_and_nothing_is_lifted() -> N
     assert ax.get_ylim()[1] > 40.0
     assert [text.get_text() for text in ax.texts] == ["below 1 nm"]
     order = min(patch.get_zorder() for patch in ax.patches)
-    assert all(line.get_zorder() < order for line in ax.get_lines())  # they run under it
+    assert all(line.get_zorder() < order for line in ax.get_lines())  # curves continue below it
 
 
-def test_without_anything_below_it_there_is_no_strip() -> None:
+def test_no_strip_is_drawn_without_values_below_the_axis() -> None:
     _, ax = axes("x", "y")
     ax.plot([0, 1, 2], [1e-5, np.nan, 1.0])
     logarithmic_with_floor(ax, 1e-6, "below 1 nm")
@@ -101,8 +101,8 @@ def figure_of(written: Written, caption: str) -> Figure:
     ("caption", "over"),
     [("Over the chord.", "chord"), ("Over the linear density.", "density"), ("Over the chord tension.", "tension")],
 )
-def test_curves_of_length_errors_are_the_errors_however_small(written: Written, caption: str, over: str) -> None:
-    """The elastic cable without weight stretches by Hooke's law: what it lacks is the sag of the exact one."""
+def test_curves_show_length_errors_of_any_size(written: Written, caption: str, over: str) -> None:
+    """An elastic cable without weight stretches by Hooke's law; its length error is the sag of the exact cable."""
     ax = figure_of(written, caption).axes[0]
     lines = {str(line.get_label()): line for line in ax.get_lines()}
     x = np.asarray(lines["Elastic"].get_xdata(), dtype=np.float64)
@@ -116,7 +116,7 @@ def test_curves_of_length_errors_are_the_errors_however_small(written: Written, 
     np.testing.assert_allclose(drawn, 1e3 * np.abs(hooke - exact), rtol=1e-6, atol=1e-10)
     drawn = np.asarray(lines["Parabolic"].get_ydata())
     np.testing.assert_allclose(drawn, 1e3 * np.abs(shallow - exact), rtol=1e-6, atol=1e-10)
-    assert drawn.min() < 1e-3  # less than the micrometer at which such curves are easily cut
+    assert drawn.min() < 1e-3  # less than a micrometer, where such curves are easily cut
 
 
 @extended
@@ -141,7 +141,7 @@ def test_borders_of_the_sufficient_model_are_where_the_error_is_the_tolerance(wr
 
 
 def test_a_map_is_filled_by_the_size_of_the_error_and_gray_where_it_is_too_small() -> None:
-    """An error that falls from +10 to −10 m in a straight line: bands are as wide as their errors, twice."""
+    """An error that falls linearly from +10 to −10 m: the width of each band is the range of its errors."""
     x = np.linspace(-10.0, 10.0, 2001)
     y = np.array([0.0, 1.0])
     edges = np.array([0.01, 0.1, 1.0])
@@ -153,10 +153,10 @@ def test_a_map_is_filled_by_the_size_of_the_error_and_gray_where_it_is_too_small
     found = [k for at in place for k, path in enumerate(filled.get_paths()) if path.contains_point((at, 0.5))]
     assert len(found) == len(place)
     shown = colors[found]
-    np.testing.assert_array_equal(shown[:3], shown[:3:-1])  # the sign does not change the color
+    np.testing.assert_array_equal(shown[:3], shown[:3:-1])  # the sign has no effect on the color
     assert matplotlib.colors.to_hex(shown[3]) == "#bbbbbb"
     brightness = shown[:4, :3].sum(axis=1)
-    assert all(a < b for a, b in pairwise(brightness[:3]))  # darker where it is larger
+    assert all(a < b for a, b in pairwise(brightness[:3]))  # a darker color for a larger error
     labels = [text for text in ax.texts if text.get_text()]
     assert [text.get_text().replace("\u00a0", " ") for text in labels] == ["1 m"]
     assert labels[0].get_path_effects()
@@ -165,7 +165,7 @@ def test_a_map_is_filled_by_the_size_of_the_error_and_gray_where_it_is_too_small
 
 @extended
 @pytest.mark.parametrize("model", ["Straight", "Elastic", "Empirical", "Parabolic"])
-def test_numbers_of_maps_are_wholly_inside(written: Written, model: str) -> None:
+def test_numbers_of_maps_are_inside_the_axes(written: Written, model: str) -> None:
     figure = figure_of(written, f"{model}: length error.")
     figure.draw_without_rendering()
     ax = figure.axes[0]

@@ -1,4 +1,4 @@
-"""The demonstrations of the errata compute what docs/errata.md says."""
+"""Calculations of the errata give the numbers of docs/errata.md."""
 
 from typing import Any
 
@@ -10,11 +10,11 @@ from sagline.article.errata import DEMONSTRATIONS, errata_chapter
 
 
 def numbers(found: Any) -> list[float]:
-    """The numbers of a demonstration, in the order of the page."""
+    """Numbers of a calculation in the order of the page."""
     return list(found.numbers.values())
 
 
-def test_there_are_eleven_in_order() -> None:
+def test_eleven_errata_in_order() -> None:
     assert [erratum.key for erratum in errata_chapter().findings] == [f"erratum-{k}" for k in range(1, 12)]
     assert len({demonstrate.__name__ for demonstrate in DEMONSTRATIONS}) == 11
 

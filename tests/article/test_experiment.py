@@ -1,4 +1,4 @@
-"""The experiment of ten points on a twin: in one process; where it may take long, off in one thing, and over S7."""
+"""The experiment of ten points on a twin: in one process, with single errors of the machine, and over S7."""
 
 from __future__ import annotations
 
@@ -44,18 +44,18 @@ PAGE = Path(__file__).parents[2] / "docs" / "experiment.md"
 
 @extended
 def test_the_experiment_in_one_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """One run for all that is to be looked at: it takes as long as everything else here together."""
+    """One run for all checks: it takes as long as all other tests of this file together."""
     from tests.article import experiment_page
 
     whole = in_process()
     a_machine_as_it_was_planned_is_where_it_should_be(whole)
     it_takes_as_long_as_the_article_s(whole)
     load_cells_are_off_by_their_noise_and_bias_alone(whole)
-    courses_are_those_of_the_plan_without_the_stops(whole)
+    time_courses_are_those_of_the_plan_without_the_stops(whole)
     experiment_page.every_number_in_a_sentence_is_one_of_the_numbers_of_its_finding(whole, tmp_path)
-    experiment_page.the_table_holds_the_article_s_errors_and_ours(whole)
-    experiment_page.the_page_needs_nothing_else_and_its_numbers_stand_beside_it(whole, tmp_path)
-    experiment_page.the_command_writes_the_page_and_tells_the_table(whole, tmp_path, monkeypatch)
+    experiment_page.the_table_has_the_errors_of_the_article_and_of_the_run(whole)
+    experiment_page.the_page_is_self_contained_and_its_numbers_are_in_a_file(whole, tmp_path)
+    experiment_page.the_command_writes_the_page_and_prints_the_table(whole, tmp_path, monkeypatch)
 
 
 def a_machine_as_it_was_planned_is_where_it_should_be(whole: Experiment) -> None:
@@ -82,8 +82,8 @@ def load_cells_are_off_by_their_noise_and_bias_alone(whole: Experiment) -> None:
     assert bias is not None
     np.testing.assert_array_equal(np.abs(bias.load_cell_bias), BIAS)
     off = whole.tension - whole.planned_tension
-    np.testing.assert_allclose(off, np.tile(bias.load_cell_bias, (10, 1)), atol=0.6)  # a second's mean, and stiction
-    # what lengths could mend of it: a plain projection on the null space of the lengths, from the stiffness
+    np.testing.assert_allclose(off, np.tile(bias.load_cell_bias, (10, 1)), atol=0.6)  # mean over a second, and stiction
+    # the part that lengths can correct: projection onto the null space of the lengths, from the stiffness
     here = sl.stiffness(sl.inverse(ROBOT, level_poses(whole.table.desired[3])).state)
     slope = here.tension_sensitivity @ here.null_lengths
     seen = slope @ np.linalg.lstsq(slope, off[3])[0]
@@ -91,7 +91,7 @@ def load_cells_are_off_by_their_noise_and_bias_alone(whole: Experiment) -> None:
     assert whole.null_error.max() <= 1.5 + BIAS
 
 
-def courses_are_those_of_the_plan_without_the_stops(whole: Experiment) -> None:
+def time_courses_are_those_of_the_plan_without_the_stops(whole: Experiment) -> None:
     assert (np.diff(whole.time) > 0.0).all()
     assert whole.time[-1] == pytest.approx(duration() - 12 * STOP, abs=0.2)
     assert (np.diff(whole.stops) > 0.0).all()
@@ -100,11 +100,13 @@ def courses_are_those_of_the_plan_without_the_stops(whole: Experiment) -> None:
     path = sl.quintic_path(points(), speed=0.06, rate=10.0)
     lengths = sl.inverse(ROBOT, path).unstrained_length - home
     planned = np.stack([np.interp(whole.time, path.time, column) for column in lengths.T], axis=1)
-    assert np.abs(whole.lengths - planned).max() <= 4 * 0.01 * whole.winch_speed  # encoders lag, eleven ends round
+    assert (
+        np.abs(whole.lengths - planned).max() <= 4 * 0.01 * whole.winch_speed
+    )  # delay of encoders, rounding at eleven stops
 
 
 @extended
-def test_a_cable_that_breaks_ends_it_with_the_place_and_the_reason() -> None:
+def test_a_cable_break_ends_the_experiment_with_place_and_reason() -> None:
     twin = sl.twin.Machine(ROBOT, start=level_poses(HOME), faults=[f"cable 2 breaks at {STOP + 4.0:g} s"])
     watch = StopObserver(lambda: twin.reading.position)
     with refused("the experiment, on the way to P1", kind=RefusedError) as caught:
@@ -112,7 +114,7 @@ def test_a_cable_that_breaks_ends_it_with_the_place_and_the_reason() -> None:
     assert len(str(caught.value)) < 300
 
 
-def test_drums_and_zeros_of_the_pair_are_off_as_asked() -> None:
+def test_errors_of_drums_and_zeros_of_a_pair_are_applied() -> None:
     true, nominal = pair(ROBOT, {DRUM: -1.0, ZERO: -6.5})
     assert true.winches is not None
     assert nominal.winches is not None
@@ -129,7 +131,7 @@ def test_drums_and_zeros_of_the_pair_are_off_as_asked() -> None:
 
 @pytest.mark.soak
 @pytest.mark.parametrize("name", CLASSES)
-def test_no_tension_loop_mends_a_machine_that_is_off(name: str) -> None:
+def test_the_tension_loop_does_not_correct_the_position_error(name: str) -> None:
     true, nominal = pair(ROBOT, CLASSES[name])
     off, on = (in_process(true, nominal, loop=loop) for loop in (OFF, None))
     assert 1e3 * np.abs(on.distance - off.distance).max() <= 0.1
@@ -141,7 +143,7 @@ def test_no_tension_loop_mends_a_machine_that_is_off(name: str) -> None:
 
 
 @pytest.mark.soak
-def test_zeros_that_differ_are_taken_out_of_tensions_without_moving_the_platform() -> None:
+def test_the_loop_removes_zero_errors_from_tensions_without_motion() -> None:
     zero = sl.inverse(ROBOT, level_poses(HOME)).unstrained_length
     wrong = np.random.default_rng(3).normal(size=8)
     wrong *= 2e-3 / np.sqrt(np.mean(wrong**2))
@@ -151,7 +153,7 @@ def test_zeros_that_differ_are_taken_out_of_tensions_without_moving_the_platform
     )
     off, on = (in_process(true, nominal, loop=loop) for loop in (OFF, None))
     assert on.null_error.mean() <= 1.5
-    assert on.null_error.max() <= TensionSettings().act_above  # from where on it acts
+    assert on.null_error.max() <= TensionSettings().act_above  # threshold of the loop
     assert off.null_error.mean() > 4.0
     assert np.linalg.norm(on.true - off.true, axis=1).max() <= 0.05e-3
     assert np.linalg.norm(on.back) <= 0.05e-3  # no drift in 14 minutes
@@ -159,7 +161,7 @@ def test_zeros_that_differ_are_taken_out_of_tensions_without_moving_the_platform
 
 
 @pytest.mark.soak
-def test_it_goes_over_s7_in_real_time() -> None:
+def test_the_experiment_runs_over_s7_in_real_time() -> None:
     from sagline.cli.experiment import apart_over_s7
 
     begun = time.perf_counter()

@@ -1,4 +1,4 @@
-"""Figure 5: the drawn residual curves, against the article's own equations solved for the end of the cable."""
+"""Figure 5: drawn residual curves, compared with solutions of the equations of the article for the cable end."""
 
 import numpy as np
 import pytest
@@ -9,14 +9,14 @@ from sagline.core.arrays import Array
 from tests.article.conftest import Written
 from tests.article.hanging import GRAVITY, end_of
 
-DENSITY, STIFFNESS = 0.067, 44e3  # of Table 1's simulation: kg/m, N
+DENSITY, STIFFNESS = 0.067, 44e3  # simulation of Table 1: kg/m, N
 SPAN, RISE = 10.0 * np.cos(0.754), 10.0 * np.sin(0.754)
 
 
 def vertical_forces(tensions: Array) -> Array:
-    """T_z that, with some length, puts the end of the cable where it belongs, by (1) and (2)."""
+    """T_z for which (1) and (2) with some length give the position of the cable end."""
     found, guess = [], (tensions[-1] * np.tan(0.754) + 3.0, 10.0)
-    for tension in tensions[::-1]:  # from taut to loose, each from the one before
+    for tension in tensions[::-1]:  # from taut to slack, each from the previous solution
 
         def away(unknown: Array, tension: float = tension) -> list[float]:
             x, z = end_of(tension, unknown[0], unknown[1], DENSITY * GRAVITY, STIFFNESS)
@@ -35,7 +35,7 @@ def lines(either: Written) -> dict[str, Line2D]:
     return {str(line.get_label()): line for line in figure.axes[0].get_lines()}
 
 
-def test_the_residual_curves_are_the_exact_force_less_each_line(lines: dict[str, Line2D]) -> None:
+def test_residual_curves_are_the_exact_force_minus_each_line(lines: dict[str, Line2D]) -> None:
     fitted, stated = lines["fitted line"], lines[r"$\tan\varphi\, T_x + wD/2$"]
     tensions = np.linspace(10.0, 500.0, 200)
     np.testing.assert_allclose(np.asarray(fitted.get_xdata()), tensions, rtol=1e-12)
@@ -45,4 +45,4 @@ def test_the_residual_curves_are_the_exact_force_less_each_line(lines: dict[str,
     by_article = exact - (np.tan(0.754) * tensions + 0.5 * DENSITY * GRAVITY * 10.0)
     np.testing.assert_allclose(np.asarray(fitted.get_ydata()), by_numpy, atol=2e-6)
     np.testing.assert_allclose(np.asarray(stated.get_ydata()), by_article, atol=2e-6)
-    assert np.abs(by_numpy).max() > 0.1  # what is compared is no rounding
+    assert np.abs(by_numpy).max() > 0.1  # the compared numbers are larger than rounding

@@ -16,7 +16,7 @@ def fit() -> sl.EmpiricalFit:
     return sl.identify_empirical(CABLE, SPANS, RISES, TENSIONS)
 
 
-def test_the_constants_are_those_of_least_squares(fit: sl.EmpiricalFit) -> None:
+def test_the_constants_agree_with_least_squares(fit: sl.EmpiricalFit) -> None:
     span, rise, tension = np.meshgrid(SPANS, RISES, TENSIONS, indexing="ij")
     exact = sl.Catenary().from_tension(CABLE, span, rise, tension * np.hypot(span, rise) / span)
 
@@ -40,7 +40,7 @@ def test_the_constants_are_those_of_least_squares(fit: sl.EmpiricalFit) -> None:
 
 
 def test_the_interval_holds_the_intercept_with_95_percent(fit: sl.EmpiricalFit) -> None:
-    """By NumPy's least squares and the interval of Student's distribution."""
+    """By least squares of NumPy and the interval of Student's distribution."""
     span, rise, tension = np.meshgrid(SPANS, RISES, TENSIONS, indexing="ij")
     chord = np.hypot(span, rise)
     exact = sl.Catenary().from_tension(CABLE, span, rise, tension * chord / span)
@@ -91,7 +91,7 @@ def measured(
     return (span, rise, length, state.frame_end_tension + scatter * random.normal(0.0, 1.0, count)), state
 
 
-def test_exact_measurements_give_the_cable_back() -> None:
+def test_exact_measurements_give_the_true_cable() -> None:
     data, state = measured(20.0, 600.0, scatter=0.0)
     for place, tension in (
         ("frame_end", state.frame_end_tension),
@@ -117,7 +117,7 @@ def test_standard_errors_are_the_scatter_of_repeated_measurements() -> None:
     assert np.mean([f.chi_squared for f in fits]) == pytest.approx(1.0, abs=0.15)
 
 
-def test_taut_cables_do_not_tell_their_weight_and_loose_ones_tell_it_best() -> None:
+def test_taut_cables_do_not_determine_their_weight_and_slack_ones_do() -> None:
     taut, loose = (sl.identify_cable(*measured(*limits)[0]) for limits in ((800.0, 1000.0), (15.0, 40.0)))
     assert [w.split()[0] for w in taut.warnings] == ["linear_density"]
     assert "lower tensions" in taut.warnings[0]
@@ -125,7 +125,7 @@ def test_taut_cables_do_not_tell_their_weight_and_loose_ones_tell_it_best() -> N
     assert loose.standard_error[1] > 5.0 * taut.standard_error[1]
 
 
-def test_a_stiffness_and_a_zero_of_lengths_cannot_be_told_apart_at_one_tension() -> None:
+def test_stiffness_and_length_zero_are_unidentifiable_at_one_tension() -> None:
     span, tension = np.full(8, 8.0), np.linspace(300.0, 303.0, 8)
     state = sl.Catenary().from_tension(CABLE, span, 0.0, tension)
     fit = sl.identify_cable(

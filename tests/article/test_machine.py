@@ -1,4 +1,4 @@
-"""The prototype with errors of its parameters, and explanations of measured positions by them; without pulleys."""
+"""The prototype with parameter errors, and explanations of measured positions by these errors; without pulleys."""
 
 import math
 from collections.abc import Sequence
@@ -35,13 +35,13 @@ BY_NAME = {parameter.name: parameter for parameter in PARAMETERS}
 
 
 class Planned(NamedTuple):
-    """The plans of the ten poses and of the home pose."""
+    """Plans of the ten poses and of the home pose."""
 
     plan: sl.Plan
     home: sl.Plan
 
     def error(self, errors: Sequence[Errors]) -> Array:
-        """Actual less desired positions [m]."""
+        """Actual minus desired positions [m]."""
         return rest_positions(ROBOT, self.plan, self.home, errors) - table2().desired
 
 
@@ -62,7 +62,7 @@ def test_table_2_has_distances_for_errors() -> None:
     np.testing.assert_allclose(table.distance, table.printed_error, atol=5.1e-8)
 
 
-def test_a_machine_is_another_robot() -> None:
+def test_a_machine_with_errors_is_another_robot() -> None:
     errors = {p.name: p.typical for p in PARAMETERS}
     robot = robot_with_errors(ROBOT, errors)
     assert robot.winches is not None
@@ -81,7 +81,7 @@ def test_a_machine_is_another_robot() -> None:
     np.testing.assert_array_equal(bare.winches.pulley_radius, np.full(8, 0.04))
 
 
-def test_what_is_wound_is_counted_from_home(study: Planned) -> None:
+def test_wound_lengths_are_counted_from_the_home_pose(study: Planned) -> None:
     planned, home = study.plan.unstrained_length, study.home.unstrained_length
     np.testing.assert_array_equal(wound_lengths(study.plan, study.home, {}), planned)
     lengths = wound_lengths(study.plan, study.home, {DRUM: 2.0, ZERO: -5.0})
@@ -102,7 +102,7 @@ def test_what_is_wound_is_counted_from_home(study: Planned) -> None:
     ],
 )
 def test_slope_of_the_vertical_error_over_the_height(study: Planned, name: str, slope: float) -> None:
-    """Change of the vertical error in mm per m of height, of a typical error of one parameter."""
+    """Change of the vertical error [mm per m of height] due to a typical error of one parameter."""
     (error,) = study.error([{name: BY_NAME[name].typical}])
     assert np.polyfit(table2().desired[:, 2], 1e3 * error[:, 2], 1)[0] == pytest.approx(slope, rel=0.02)
 
@@ -112,7 +112,7 @@ def test_a_wrong_drum_changes_nothing_at_home(study: Planned) -> None:
     np.testing.assert_allclose(wrong, right, atol=1e-9)
 
 
-def test_errors_of_the_machine_are_found_again(study: Planned) -> None:
+def test_errors_of_the_machine_are_estimated(study: Planned) -> None:
     for made in ({ZERO: -12.0, LOAD: 2.0}, {ANCHORS: 30.0, DRUM: 1.5, WIDTH: -8.0}):
         model = tuple(BY_NAME[name] for name in made)
         (found,) = explanations(study.error, study.error([made])[0], [model])
@@ -121,7 +121,7 @@ def test_errors_of_the_machine_are_found_again(study: Planned) -> None:
 
 
 def linear(slopes: Array, measured: Array) -> Explanation:
-    """The explanation by anchor height and zero, of positions that depend on them linearly [m/mm]."""
+    """Estimates of anchor height and zero from positions that depend on them linearly [m/mm]."""
 
     def error_of(errors: Sequence[Errors]) -> Array:
         return np.array([slopes @ [one.get(ANCHORS, 0.0), one.get(ZERO, 0.0)] for one in errors]).reshape(-1, 10, 3)
@@ -129,7 +129,7 @@ def linear(slopes: Array, measured: Array) -> Explanation:
     return explanations(error_of, measured.reshape(10, 3), [(BY_NAME[ANCHORS], BY_NAME[ZERO])])[0]
 
 
-def test_an_explanation_of_linear_positions_is_that_of_least_squares() -> None:
+def test_estimates_from_linear_positions_agree_with_least_squares() -> None:
     random = np.random.default_rng(2)
     slopes, scatter = 1e-3 * random.normal(size=(30, 2)), 1e-3 * random.normal(size=30)
     measured = slopes @ [4.0, -3.0] + scatter
@@ -151,7 +151,7 @@ def test_an_explanation_of_linear_positions_is_that_of_least_squares() -> None:
     assert found.left_out == pytest.approx(np.sqrt(np.mean(np.square(predicted))), rel=1e-9)
 
 
-def test_an_explanation_stays_within_what_is_plausible() -> None:
+def test_estimates_stay_within_plausible_limits() -> None:
     slopes = 1e-3 * np.random.default_rng(2).normal(size=(30, 2))
     highest = BY_NAME[ANCHORS].plausible
     found = linear(slopes, slopes @ [2.0 * highest, 3.0])
@@ -172,11 +172,11 @@ def test_a_fit_that_does_not_converge_is_refused(monkeypatch: pytest.MonkeyPatch
 
 
 def test_information_counts_parameters_and_scatter() -> None:
-    assert corrected_aic(1e-3, 30, 0) == pytest.approx(2.0 + 4.0 / 28.0)  # ln 1 = 0, one unknown: the scatter
+    assert corrected_aic(1e-3, 30, 0) == pytest.approx(2.0 + 4.0 / 28.0)  # ln 1 = 0, with one unknown: the scatter
     assert corrected_aic(math.e * 1e-3, 30, 2) == pytest.approx(60.0 + 6.0 + 24.0 / 26.0)
 
 
-def test_the_tour_stops_at_the_ten_poses() -> None:
+def test_the_path_stops_at_the_ten_poses() -> None:
     plan, stops = tour()
     path = plan.path
     assert path is not None
@@ -186,6 +186,6 @@ def test_the_tour_stops_at_the_ten_poses() -> None:
     assert plan.feasible.all()
 
 
-def test_a_machine_without_rest_says_so(study: Planned) -> None:
+def test_a_machine_without_equilibrium_is_an_error(study: Planned) -> None:
     with refused("the changed robot", kind=sl.InvalidValueError):
         rest_positions(ROBOT, study.plan, study.home, [{}, {ZERO: -1500.0}])

@@ -1,4 +1,4 @@
-"""The report: whole, self-contained, and its numbers."""
+"""The report: complete, self-contained, and with correct numbers."""
 
 import json
 import re
@@ -25,7 +25,7 @@ VOID = {"meta", "br", "link", "img"}
 
 
 class Page(HTMLParser):
-    """What is in a page, and whether its tags are closed in order."""
+    """Contents of a page, with a check that its tags are closed in order."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -63,7 +63,7 @@ def page(either: Written) -> Page:
     return Page(either.report.page.read_text())
 
 
-def test_the_page_needs_nothing_else(either: Written, page: Page) -> None:
+def test_the_page_is_self_contained(either: Written, page: Page) -> None:
     assert page.open == []
     assert page.sources == []
     assert [link for link in page.links if not link.startswith(("#", "data:image/png;base64,"))] == []
@@ -72,14 +72,14 @@ def test_the_page_needs_nothing_else(either: Written, page: Page) -> None:
     assert len(text) < 4_000_000
 
 
-def test_every_name_in_the_page_is_used_once_and_every_link_leads_to_one(page: Page) -> None:
+def test_ids_are_unique_and_links_lead_to_them(page: Page) -> None:
     assert len(page.ids) == len(set(page.ids))
     assert {link[1:] for link in page.links if link.startswith("#")} <= set(page.ids)
 
 
-def test_every_finding_has_its_drawings_and_words(either: Written, page: Page) -> None:
+def test_every_finding_has_its_drawings_and_text(either: Written, page: Page) -> None:
     findings = [finding for chapter in either.report.chapters for finding in chapter.findings]
-    first = int(either.is_whole)  # the picture of the first screen
+    first = int(either.is_whole)  # picture of the first screen
     assert page.counts["svg"] == page.counts["figure"] == first + sum(len(finding.panels) for finding in findings)
     for finding in findings:
         assert finding.panels or finding.data
@@ -88,7 +88,7 @@ def test_every_finding_has_its_drawings_and_words(either: Written, page: Page) -
 
 
 @extended
-def test_every_figure_that_can_be_redone_is_there(report: ArticleReport) -> None:
+def test_all_reproducible_figures_are_on_the_page(report: ArticleReport) -> None:
     findings = [finding for chapter in report.chapters for finding in chapter.findings]
     figures = sorted(number for finding in findings for number in finding.figures)
     assert figures == [*range(3, 16), *range(17, 23), 25, 26, 27]
@@ -146,7 +146,7 @@ def test_the_numbers_are_in_the_json_file(report: ArticleReport) -> None:
     assert poses["explanations"]["models"] == 175
     assert poses["ten-points"]["pulley_imitated_by_zero_and_anchor_height"] == pytest.approx(0.990, abs=1e-3)
     where = numbers["workspace"]["volume"]
-    assert where["article-suspended"]["volume_m3"] == pytest.approx(789.4, abs=1.0)  # by a study's own program
+    assert where["article-suspended"]["volume_m3"] == pytest.approx(789.4, abs=1.0)  # by the program of a study
     assert where["article-suspended"]["change_percent"] == pytest.approx(0.8, abs=0.1)
     for model, key in ((sl.Catenary(), "volume_m3"), (sl.Straight(), "straight_volume_m3")):
         coarse = sl.workspace(sl.load_robot("article-mixed"), model=model, cells=12)
@@ -160,12 +160,12 @@ def test_the_numbers_are_in_the_json_file(report: ArticleReport) -> None:
     assert classes["slope_of_best_mm_per_m"]["pulley radius"] == pytest.approx(-18.0, abs=0.1)
     assert set(classes["explain_nothing"]) == {"linear density ρ", "drum radius", "dead cable"}
     assert classes["dead_meter_mm"] == pytest.approx({"P8": 4.8, "P7": -64.0}, abs=0.1)
-    assert min(classes["left_mm"].values()) > 0.66 * classes["measured_rms_mm"]  # as docs/experiment.md says
+    assert min(classes["left_mm"].values()) > 0.66 * classes["measured_rms_mm"]  # as in docs/experiment.md
     assert classes["two_left_mm"] < classes["measured_rms_mm"] / 3.0
 
 
 @extended
-def test_the_documentation_tells_the_same_volumes(report: ArticleReport) -> None:
+def test_the_documentation_has_the_same_volumes(report: ArticleReport) -> None:
     page = " ".join((Path(__file__).parents[2] / "docs" / "article.md").read_text(encoding="utf-8").split())
     suspended, mixed = report.numbers["workspace"]["volume"].values()
     for found, sign in ((suspended, "+"), (mixed, "−")):
@@ -176,12 +176,12 @@ def test_the_documentation_tells_the_same_volumes(report: ArticleReport) -> None
 NUMBER = re.compile(r"(?<![\w.])([-−]?\d[\d,]*(?:\.\d+)?)(?:\u00a0([fpnµmkMG](?=[mNgs](?![\w²]))))?")
 PREFIX = {"f": -15, "p": -12, "n": -9, "µ": -6, "m": -3, "k": 3, "M": 6, "G": 9}
 NAMES = re.compile(r"\(\d+\)|errat(?:um|a) \d+|[Ff]igures? \d+|[Tt]ables? \d+|/24?\b|\(24 ")  # and parts of formulas
-SCALES = (1.0, 1e2, 1e3, 1e-3, 1e6)  # as it is, in percent, in mm or the like, in kN, in micrometers
-UNITS = (1.0, 1e-3, 1e-12)  # of the numbers behind a length with a prefix: m, mm, pm
+SCALES = (1.0, 1e2, 1e3, 1e-3, 1e6)  # unchanged, in percent, in mm, in kN, in micrometers
+UNITS = (1.0, 1e-3, 1e-12)  # for lengths with a prefix: m, mm, pm
 
 
 def leaves(numbers: Any) -> Iterator[float]:
-    """Every number in it."""
+    """All numbers of nested data."""
     match numbers:
         case dict():
             for value in numbers.values():
@@ -193,8 +193,8 @@ def leaves(numbers: Any) -> Iterator[float]:
             yield float(numbers)
 
 
-def is_told_by(text: str, prefix: str, numbers: list[float]) -> bool:
-    """Whether a printed number is one of the others, rounded to as many digits."""
+def is_among(text: str, prefix: str, numbers: list[float]) -> bool:
+    """True if a printed number is one of the given numbers, rounded to the printed digits."""
     digits = text.replace("−", "-").replace(",", "")
     power = PREFIX.get(prefix, 0)
     printed, half = abs(float(digits)) * 10.0**power, 0.5001 * 10.0 ** (power - len(digits.partition(".")[2]))
@@ -203,8 +203,8 @@ def is_told_by(text: str, prefix: str, numbers: list[float]) -> bool:
     )
 
 
-def test_no_number_in_the_page_is_written_for_machines(either: Written) -> None:
-    """No exponents, no hyphens for minus signs, no digits that are rounding alone."""
+def test_numbers_of_the_page_have_no_machine_notation(either: Written) -> None:
+    """No exponents, no hyphens as minus signs, and no digits due to rounding."""
     report = either.report
     text = re.sub(r"<svg.*?</svg>|<style.*?</style>|<[^>]*>", " ", report.page.read_text(), flags=re.DOTALL)
     assert re.findall(r"\d[eE][-+−]?\d+|±\s*\d[\d.]*e|(?<![\w.,])-\d", text) == []
@@ -215,7 +215,7 @@ def test_no_number_in_the_page_is_written_for_machines(either: Written) -> None:
 
 
 @extended
-def test_uncertain_numbers_have_as_many_digits_as_are_known(report: ArticleReport) -> None:
+def test_uncertain_numbers_have_only_significant_digits(report: ArticleReport) -> None:
     fits = next(f for chapter in report.chapters for f in chapter.findings if f.key == "cable-fit").data[0].rows
     assert [cell.replace("\u00a0", " ") for cell in fits[1][1:3]] == ["55(62) g/m", "43.98(10) kN"]
 
@@ -227,17 +227,19 @@ def test_every_number_in_a_sentence_is_one_of_the_numbers_of_its_finding(either:
             numbers = list(leaves(report.numbers[chapter.key][finding.key]))
             printed = NUMBER.findall(NAMES.sub("", finding.measured))
             told += len(printed)
-            assert [told for told in printed if not is_told_by(told[0], told[1], numbers)] == [], finding.measured
+            assert [told for told in printed if not is_among(told[0], told[1], numbers)] == [], finding.measured
     assert told > (150 if either.is_whole else 15)
 
 
 @extended
-def test_what_the_texts_say_without_numbers_is_so(report: ArticleReport) -> None:
+def test_statements_without_numbers_are_true(report: ArticleReport) -> None:
     numbers = report.numbers
     cases = {case["case"]: case for case in numbers["identify"]["cable-fit"]["cases"]}
     both, taut, loose, offset = cases.values()
-    assert loose["standard_error"][0] < both["standard_error"][0] < taut["standard_error"][0]  # loose tell the density
-    assert both["standard_error"][1] < loose["standard_error"][1]  # taut ones the stiffness
+    assert (
+        loose["standard_error"][0] < both["standard_error"][0] < taut["standard_error"][0]
+    )  # slack cables determine the density
+    assert both["standard_error"][1] < loose["standard_error"][1]  # taut cables determine the stiffness
     assert offset["standard_error"][1] > 1.5 * both["standard_error"][1]
     assert [name for name, case in cases.items() if case["warnings"]] == ["taut only"]
     slopes = numbers["poses"]["one-parameter-off"]["height_slope_mm_per_m"]
@@ -245,16 +247,20 @@ def test_what_the_texts_say_without_numbers_is_so(report: ArticleReport) -> None
     assert falling == ["linear density ρ", "drum radius", "pulley radius", "dead cable"]
     low = numbers["simulation"]["low-tension"]
     good = [max(a, b) <= 6.0 for a, b in zip(low["suspended_mm"], low["mixed_mm"], strict=True)]
-    assert good == sorted(good)  # bad below some limit, good from there on
+    assert good == sorted(good)  # insufficient below a limit, sufficient above it
     assert numbers["poses"]["tour"]["feasible_share"] == 1.0
     assert numbers["poses"]["ten-points"]["pulley_or_anchor_height_in_all_of_them"]
     explained, measured = numbers["poses"]["explanations"], numbers["poses"]["explanations"]["measured_rms_mm"]
-    assert explained["explanations"][2][0]["at_limit"] == ["pulley radius"]  # the best third parameter runs there
-    assert explained["three_inside_aicc_above_best_two"] > 0.5  # and no other is worth its place
+    assert explained["explanations"][2][0]["at_limit"] == [
+        "pulley radius"
+    ]  # the best third parameter ends at its limit
+    assert (
+        explained["three_inside_aicc_above_best_two"] > 0.5
+    )  # and no other parameter improves the information criterion
     assert min(numbers["poses"]["ten-points"]["single_zero_deviation_mm"]) > 4.0 * measured
 
 
-def test_parts_alone(tmp_path: Path) -> None:
+def test_single_chapters(tmp_path: Path) -> None:
     told: list[tuple[int, int, str]] = []
     report = write_article(tmp_path, ["figures", "6-7"], lambda *state: told.append(state))
     assert told == [(0, 1, "intercept"), (1, 1, "done")]
@@ -280,7 +286,7 @@ def test_the_same_report_has_the_same_bytes(tmp_path: Path) -> None:
         (["15-17"], ["sag", "simulation"]),
     ],
 )
-def test_what_is_asked_for_is_understood(words: list[str], keys: list[str]) -> None:
+def test_names_of_chapters_are_accepted(words: list[str], keys: list[str]) -> None:
     assert [part.key for part in selection(words).parts] == keys
 
 
@@ -295,7 +301,7 @@ def test_what_is_asked_for_is_understood(words: list[str], keys: list[str]) -> N
         (["figures", "3-999999999"], "figures 3-999999999", "not repeated here", None, None),
     ],
 )
-def test_what_cannot_be_redone_is_refused(
+def test_names_of_other_chapters_are_refused(
     words: list[str], item: str, value: str, allowed: str | None, next_step: str | None, tmp_path: Path
 ) -> None:
     with refused(item, value, allowed, next_step, kind=sl.InvalidValueError):
@@ -304,7 +310,7 @@ def test_what_cannot_be_redone_is_refused(
 
 
 @extended
-def test_an_interrupted_report_leaves_nothing(tmp_path: Path) -> None:
+def test_an_interrupted_report_leaves_no_files(tmp_path: Path) -> None:
     def interrupt(done: int, total: int, name: str) -> None:
         if done == total:
             raise KeyboardInterrupt

@@ -1,4 +1,4 @@
-"""The chapter of figures 8 to 15: its numbers against textbook catenaries, its sentences against its numbers."""
+"""The chapter of figures 8 to 15: its numbers compared with textbook catenaries, its sentences with its numbers."""
 
 import re
 
@@ -21,12 +21,12 @@ def findings() -> dict[str, Finding]:
 
 
 def factor(shape: Array, values: Array) -> float:
-    """Factor of least squares, by NumPy's own solver."""
+    """Slope of least squares, by the solver of NumPy."""
     return float(np.linalg.lstsq(shape[:, None], values)[0][0])
 
 
-def said(finding: Finding) -> list[str]:
-    """The numbers of its sentence, in order; not those of equations and errata."""
+def numbers_of_sentence(finding: Finding) -> list[str]:
+    """Numbers of a sentence in order, except numbers of equations and errata."""
     text = re.sub(r"\(\d+\)|erratum \d+|/24|\(24 ", "", finding.measured).replace("−", "-")
     return re.findall(r"(?<![\w.])-?\d+(?:\.\d+)?", text)
 
@@ -66,7 +66,7 @@ def test_the_stretched_cable_by_hand(findings: dict[str, Finding]) -> None:
     assert findings["stretch-removed"].numbers["error_of_36_mm"] == pytest.approx(0.51, abs=0.01)
 
 
-def test_the_sentences_say_the_numbers(findings: dict[str, Finding]) -> None:
+def test_the_sentences_contain_the_numbers(findings: dict[str, Finding]) -> None:
     numbers = {key: finding.numbers for key, finding in findings.items()}
     stretch, relieved = numbers["d-over-tension"], numbers["stretch-removed"]
     ratio, density = numbers["d-model"], numbers["p-over-density"]
@@ -92,4 +92,4 @@ def test_the_sentences_say_the_numbers(findings: dict[str, Finding]) -> None:
             f"{each[-1]:.3f}",
         ],
     }
-    assert {key: said(finding) for key, finding in findings.items()} == sentences
+    assert {key: numbers_of_sentence(finding) for key, finding in findings.items()} == sentences

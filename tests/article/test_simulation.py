@@ -15,7 +15,7 @@ def study() -> PathStudy:
     return path_study(rate=20.0)
 
 
-def test_the_mixed_robot_pulls_about_twice_as_hard(study: PathStudy) -> None:
+def test_tensions_of_the_mixed_robot_are_about_twice_as_high(study: PathStudy) -> None:
     assert study.tension_ratio == pytest.approx(2.0755, abs=0.002)
 
 
@@ -38,7 +38,7 @@ def test_each_models_position_error_in_millimeters(
         assert found.error_mean < found.error_max
 
 
-def test_the_exact_model_makes_no_error(study: PathStudy) -> None:
+def test_the_exact_model_has_no_error(study: PathStudy) -> None:
     assert max(figures(run).error_max for run in study.of(sl.Catenary)) < 1e-11
 
 
@@ -74,21 +74,21 @@ def test_steps_slopes_and_corners_by_hand(study: PathStudy) -> None:
 
 
 def _reversed_signs(plan: sl.Plan) -> sl.Plan:
-    """The same plan with tensions that fall where they rose: what is largest in size stays so."""
+    """The same plan with reversed signs of tension changes: the largest sizes stay the same."""
     cables = replace(plan.state.cables, horizontal_tension=-plan.horizontal_tension)
     return replace(plan, state=replace(plan.state, cables=cables))
 
 
-def test_loose_cables_cost_accuracy_and_the_bound_54_keeps_it() -> None:
+def test_slack_cables_reduce_the_accuracy_and_bound_54_limits_it() -> None:
     low = low_tension_study(np.array([10.0, 25.0]), rate=5.0)
     assert low.mixed[0] > 0.1
     assert low.mixed[1] == pytest.approx(1.1e-3, rel=0.05)
-    assert low.suspended[0] == low.suspended[1]  # none of its cables comes near its limit
+    assert low.suspended[0] == low.suspended[1]  # no cable approaches its limit
     assert low.mixed_bound.axis_error_max < 2e-3
     assert low.mixed_bound.tension_min == pytest.approx(14.2, abs=0.3)
 
 
-def test_model_errors_are_against_the_exact_cable() -> None:
+def test_model_errors_are_differences_from_the_exact_cable() -> None:
     study = model_errors(1e15, [5.0, 12.0], [-0.7, 0.2], [0.1, 0.8], [60.0, 400.0])
     chord, angle, density, tension = np.meshgrid(
         study.chords, study.angles, study.densities, study.tensions, indexing="ij"

@@ -21,7 +21,7 @@ CABLE = Cable.from_material(0.067, 2e9, 22e-6)
 END = End(7.0, 6.0)
 
 
-def test_lines_and_factors_are_those_of_numpy() -> None:
+def test_lines_and_factors_agree_with_numpy() -> None:
     random = np.random.default_rng(1)
     x, y = random.normal(size=40), random.normal(size=(3, 40))
     line = fit_line(x, y)
@@ -116,7 +116,7 @@ def test_the_sag_of_a_taut_cable_is_proportional_to_the_fourth_power_of_the_cosi
     study = sag_study(taut)
     limit = (GRAVITY * taut.densities) ** 2 / 24.0 * np.cos(taut.angles[:, None]) ** 4
     cubes = limit[:, None] * taut.chords[:, None] ** 3
-    # what rounding leaves of a difference of lengths, and the next term of the series
+    # rounding of a difference of lengths, and the next term of the series
     np.testing.assert_allclose(study.q_a, limit, rtol=1e-3)
     np.testing.assert_allclose(study.fitted_q_a, limit, rtol=1e-3)
     np.testing.assert_allclose(study.fitted_a_d, cubes, rtol=1e-3)
@@ -128,7 +128,7 @@ def test_no_range_gives_the_published_constants_for_light_cables() -> None:
         published_range(Sampling([0.754], [2.0], [0.01], np.linspace(100.0, 1000.0, 10)))
 
 
-def test_the_mean_tension_stretches_the_cable_not_the_one_at_its_end() -> None:
+def test_the_stretch_is_that_of_the_mean_tension() -> None:
     study = stretch_study(CABLE, END, np.linspace(200.0, 500.0, 4))
     excess = 0.067 * GRAVITY * END.chord**2 * (END.rise / END.chord) / (2.0 * 44e3)
     np.testing.assert_allclose(study.relieved - study.relieved_exactly, excess, rtol=0.03)

@@ -37,7 +37,7 @@ def study() -> TenPoses:
 
 
 def left(study: TenPoses, pulley: float, zero: float, dead: float = 0.0) -> Array:
-    """Measured less predicted positions [m], of a robot written out here: R, zero and dead cable in meters."""
+    """Measured minus predicted positions [m] of a robot written out here: R, zero and dead length in meters."""
     robot = ROBOT.replace(winches=sl.Winch(pulley_radius=pulley, dead_cable=dead))
     over, bare = (
         sl.inverse(one, study.home.state.pose, tension=METHOD).unstrained_length
@@ -54,7 +54,7 @@ def test_the_empirical_model_is_not_the_cause(study: TenPoses) -> None:
     assert study.plan.feasible.all()
 
 
-def test_the_platform_sits_higher_the_lower_it_is(study: TenPoses) -> None:
+def test_the_platform_is_too_high_at_low_positions(study: TenPoses) -> None:
     slope, _ = np.polyfit(study.table.desired[:, 2], study.table.error[:, 2], 1)
     assert 1e3 * slope == pytest.approx(-18.17, abs=0.01)
     assert study.height_line.slope == pytest.approx(slope, rel=1e-12)
@@ -64,7 +64,7 @@ def test_the_platform_sits_higher_the_lower_it_is(study: TenPoses) -> None:
 @pytest.mark.parametrize(
     ("name", "slope"),
     [
-        (MODULUS, 18.2),  # the opposite of what was measured
+        (MODULUS, 18.2),  # opposite to the measurement
         (DENSITY, -0.32),
         (LOAD, 4.21),
         (ANCHORS, 0.21),
@@ -81,23 +81,23 @@ def test_one_parameter_off_at_a_time(study: TenPoses, name: str, slope: float) -
     assert trend.height_slope == pytest.approx(slope, rel=0.02)
 
 
-def test_anchors_raised_lift_the_platform_by_as_much(study: TenPoses) -> None:
+def test_raised_anchors_lift_the_platform_equally(study: TenPoses) -> None:
     trend = next(t for t in study.trends if t.parameter.name == ANCHORS)
     np.testing.assert_allclose(trend.error - study.model_error, [[0.0, 0.0, 0.02]] * 10, atol=1e-7)
 
 
-def test_what_is_set_at_home_is_nothing_at_home(study: TenPoses) -> None:
-    """A wrong drum, a pulley or dead cable; and a thin pulley or short dead cable is hardly anything anywhere."""
+def test_errors_after_homing_vanish_at_the_home_pose(study: TenPoses) -> None:
+    """A wrong drum, pulley or dead length; the effect of a thin pulley or a short dead length is small everywhere."""
     errors = [{}, {DRUM: 2.0}, {PULLEY: 40.0}, {DEAD: 3.0}, {PULLEY: 40.0, DEAD: 3.0}]
     right, *wrong = rest_positions(ROBOT, study.home, study.home, errors)
     np.testing.assert_allclose(wrong[0], right, atol=1e-9)
-    for one in wrong[1:]:  # the home pose is planned with the empirical model, 0.2 mm of length off
+    for one in wrong[1:]:  # the plan of the home pose uses the empirical model, with a length error of 0.2 mm
         np.testing.assert_allclose(one, right, atol=3e-5)
     right, *thin = rest_positions(ROBOT, study.plan, study.home, [{}, {PULLEY: 1e-3}, {DEAD: 1e-5}])
     np.testing.assert_allclose(thin, [right] * 2, atol=2e-6)
 
 
-def test_many_machines_at_once_are_each_alone(study: TenPoses) -> None:
+def test_a_batch_of_machines_agrees_with_single_machines(study: TenPoses) -> None:
     errors = [{p.name: p.typical, PULLEY: 10.0 * k} for k, p in enumerate(PARAMETERS)]
     together = rest_positions(ROBOT, study.plan, study.home, errors)
     for one, some in zip(errors, together, strict=True):
@@ -124,8 +124,8 @@ def test_the_best_explanations(study: TenPoses) -> None:
     assert all(found.names & {PULLEY, ANCHORS} for found in study.explanations[1] if found.rms < 6e-3)
 
 
-def test_the_best_two_are_those_of_a_fit_by_others(study: TenPoses) -> None:
-    """Levenberg-Marquardt of MINPACK, with the robot written out anew: 38(3) mm, −7(1) mm."""
+def test_the_best_two_agree_with_an_independent_fit(study: TenPoses) -> None:
+    """Levenberg-Marquardt of MINPACK with the robot written out again: 38(3) mm, −7(1) mm."""
     best = study.best(2)
     assert [p.name for p in best.parameters] == [ZERO, PULLEY]
     fit = least_squares(lambda x: 1e3 * left(study, 1e-3 * x[1], 1e-3 * x[0]).ravel(), [-5.0, 30.0], method="lm")
@@ -141,7 +141,7 @@ def test_the_best_two_are_those_of_a_fit_by_others(study: TenPoses) -> None:
 
 
 def test_a_pose_left_out_is_predicted_by_fits_to_the_others(study: TenPoses) -> None:
-    """Fitted anew nine poses at a time, not on a tangent."""
+    """Each fit uses nine poses and is nonlinear."""
     best, rest_of = study.best(2), []
     for pose in range(10):
         others = np.arange(10) != pose
@@ -152,7 +152,7 @@ def test_a_pose_left_out_is_predicted_by_fits_to_the_others(study: TenPoses) -> 
     assert best.left_out == pytest.approx(np.sqrt(np.mean(np.square(rest_of))), rel=0.01)
 
 
-def test_dead_cable_modulus_and_load_explain_nothing_more(study: TenPoses) -> None:
+def test_dead_length_modulus_and_load_explain_no_more(study: TenPoses) -> None:
     dead = study.explanation(ZERO, PULLEY, DEAD)
     fit = least_squares(
         lambda x: 1e3 * left(study, 1e-3 * x[1], 1e-3 * x[0], x[2]).ravel(), [-7.0, 38.0, 0.1], method="lm"
@@ -168,7 +168,7 @@ def test_dead_cable_modulus_and_load_explain_nothing_more(study: TenPoses) -> No
         assert found.aicc > study.best(2).aicc
 
 
-def test_an_explanation_is_what_the_machine_does(study: TenPoses) -> None:
+def test_an_explanation_agrees_with_the_machine(study: TenPoses) -> None:
     for found in (study.best(count) for count in (1, 2, 3)):
         errors = dict(zip((p.name for p in found.parameters), found.values, strict=True))
         error = rest_positions(ROBOT, study.plan, study.home, [errors])[0] - study.table.desired
@@ -176,7 +176,7 @@ def test_an_explanation_is_what_the_machine_does(study: TenPoses) -> None:
         remaining = study.table.error - error
         assert found.rms == pytest.approx(np.sqrt(np.mean(remaining**2)), rel=1e-9)
         assert found.worst == pytest.approx(np.linalg.norm(remaining, axis=1).max(), rel=1e-9)
-        # the textbook form, of n ln(RSS/n) in mm²
+        # the textbook form, n ln(RSS/n) in mm²
         unknown = len(found.values) + 1
         aicc = 30 * np.log(1e6 * np.sum(remaining**2) / 30) + 2 * unknown * 30 / (30 - unknown - 1)
         assert found.aicc == pytest.approx(aicc, rel=1e-9)
@@ -187,7 +187,7 @@ def test_an_explanation_is_what_the_machine_does(study: TenPoses) -> None:
                 assert np.sqrt(np.mean(off**2)) > found.rms
 
 
-def test_more_parameters_never_leave_more(study: TenPoses) -> None:
+def test_more_parameters_never_increase_the_residual(study: TenPoses) -> None:
     found = [one for group in study.explanations for one in group]
     by_names = {one.names: one.rms for one in found}
     for one in found:
@@ -195,8 +195,8 @@ def test_more_parameters_never_leave_more(study: TenPoses) -> None:
             assert one.rms <= by_names[one.names - {name}] * (1.0 + 1e-4)
 
 
-def test_errors_that_were_made_are_found_again(study: TenPoses) -> None:
-    """Positions computed for known errors, in place of the measured ones."""
+def test_known_errors_are_estimated(study: TenPoses) -> None:
+    """Positions computed for known errors replace the measured positions."""
     by_name = {p.name: p for p in PARAMETERS}
     for made in ({ZERO: -12.0, PULLEY: 45.0}, {MODULUS: -20.0, DEAD: 2.0}, {ANCHORS: 30.0, DRUM: 1.5, WIDTH: -8.0}):
         positions = rest_positions(ROBOT, study.plan, study.home, [made])[0]
@@ -209,7 +209,7 @@ def test_errors_that_were_made_are_found_again(study: TenPoses) -> None:
         assert found.left_out < 1e-6
 
 
-def test_what_ten_poses_cannot_tell(study: TenPoses) -> None:
+def test_unidentifiable_parameters_of_ten_poses(study: TenPoses) -> None:
     """By differences of the robot written out here."""
     zero, pulley = 1e-3 * study.best(2).values
 
@@ -218,7 +218,7 @@ def test_what_ten_poses_cannot_tell(study: TenPoses) -> None:
 
     by_pulley = slope(left(study, pulley + 1e-4, zero), left(study, pulley - 1e-4, zero), 1e-4)
     by_zero = slope(left(study, pulley, zero + 1e-4), left(study, pulley, zero - 1e-4), 1e-4)
-    by_anchors = np.tile([0.0, 0.0, 1.0], 10)  # nearly: all is lifted
+    by_anchors = np.tile([0.0, 0.0, 1.0], 10)  # approximately: everything is lifted
     others = np.stack((by_zero, by_anchors), axis=1)
     part = others @ np.linalg.lstsq(others, by_pulley)[0]
     assert study.imitated == pytest.approx(np.linalg.norm(part) / np.linalg.norm(by_pulley), abs=5e-3)
@@ -235,7 +235,7 @@ def test_what_ten_poses_cannot_tell(study: TenPoses) -> None:
     np.testing.assert_allclose(study.single_zero, deviation, rtol=1e-3)
 
 
-def test_the_documentation_tells_the_same_numbers(study: TenPoses) -> None:
+def test_the_documentation_has_the_same_numbers(study: TenPoses) -> None:
     text = (Path(__file__).parents[2] / "docs" / "article.md").read_text(encoding="utf-8")
     flowing = " ".join(text.split())
     rows = [

@@ -17,7 +17,7 @@ GRAVITY = 9.81
 
 @dataclass(frozen=True)
 class Reference:
-    """Columns of cables.csv; NaN where the table is empty."""
+    """Columns of cables.csv; NaN for empty fields."""
 
     group: tuple[str, ...]
     span: Array

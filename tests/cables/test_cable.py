@@ -1,4 +1,4 @@
-"""The material of cables, and what is kept of it where a cable is made from another."""
+"""The material of cables, and the attributes of cables that are made from other cables."""
 
 import pickle
 from collections.abc import Callable
@@ -21,7 +21,7 @@ THICKNESS, GROWTH = np.linspace(0.003, 0.01, 8), np.linspace(-1.2e-5, 1.2e-5, 8)
 THICK = Cable(np.linspace(0.05, 0.1, 8), 44e3, diameter=THICKNESS, expansion=GROWTH)
 
 
-def test_all_fields_have_one_shape_and_what_is_not_known_is_none() -> None:
+def test_fields_have_one_shape_and_unknown_fields_are_none() -> None:
     cable = Cable([0.05, 0.1], 44e3, expansion=-1.2e-5)
     assert cable.diameter is None
     assert cable.expansion is not None
@@ -33,7 +33,7 @@ def test_all_fields_have_one_shape_and_what_is_not_known_is_none() -> None:
         wide.linear_density[0] = 1.0
 
 
-def test_from_material_knows_them_too() -> None:
+def test_from_material_accepts_diameter_and_expansion() -> None:
     cable = Cable.from_material(0.067, 2e9, [22e-6, 11e-6], diameter=0.0065, expansion=1e-5)
     np.testing.assert_allclose(cable.axial_stiffness, [44e3, 22e3], rtol=1e-15)
     assert (cable.known()["diameter"].tolist(), cable.known()["expansion"].tolist()) == ([0.0065] * 2, [1e-5] * 2)
@@ -54,7 +54,7 @@ def test_from_material_knows_them_too() -> None:
         ("expansion", [1e-5, 1e-5, 1e-5], (" and ".join(FIELDS), "not of one shape, but (2,) and (3,)")),
     ],
 )
-def test_values_that_no_cable_can_have_are_refused(field: str, value: Any, parts: tuple[str, ...]) -> None:
+def test_impossible_values_are_refused(field: str, value: Any, parts: tuple[str, ...]) -> None:
     good = Cable([0.1, 0.2], 1e4, diameter=0.004, expansion=0.0)
     with refused(*parts, kind=InvalidValueError):
         good.replace(**{field: value})
@@ -62,7 +62,7 @@ def test_values_that_no_cable_can_have_are_refused(field: str, value: Any, parts
         Cable(**{**good.known(), field: value})
 
 
-def test_replace_leaves_the_original() -> None:
+def test_replace_does_not_change_the_original() -> None:
     stiff = THICK.replace(axial_stiffness=50e3, expansion=None)
     assert stiff.axial_stiffness.tolist() == [50e3] * 8
     assert stiff.expansion is None
@@ -84,7 +84,7 @@ def saved_and_loaded(robot: Robot) -> Robot:
 
 
 PROTOTYPE = load_robot("article-prototype").replace(cables=THICK)
-# every way to make cables of others, and which of them are left
+# all ways to make cables from others, with the indices of the remaining ones
 WAYS: dict[str, Callable[[Robot], Robot]] = {
     "a file": saved_and_loaded,
     "a pickle": lambda robot: pickle.loads(pickle.dumps(robot)),
@@ -95,7 +95,7 @@ WAYS: dict[str, Callable[[Robot], Robot]] = {
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_a_cable_made_from_another_is_as_thick(way: str) -> None:
+def test_a_derived_cable_has_the_same_diameter(way: str) -> None:
     cables, kept = WAYS[way](PROTOTYPE).cables, [0, 1, 2, 4, 5, 6, 7] if way == "broken cables" else list(range(8))
     np.testing.assert_array_equal(cables.known()["diameter"], THICKNESS[kept])
     np.testing.assert_array_equal(cables.known()["expansion"], GROWTH[kept])
@@ -109,13 +109,13 @@ def test_part_of_a_batch() -> None:
     assert bare[3].cable.diameter is None
 
 
-def test_a_rope_knows_its_diameter() -> None:
+def test_a_rope_has_a_diameter() -> None:
     for rope in ROPES.values():
         assert rope.cable(0.006).diameter == 0.006
         assert rope.cable(0.006).expansion is None
 
 
-def test_a_cable_that_was_identified_is_as_thick_as_the_one_it_starts_from() -> None:
+def test_an_identified_cable_has_the_diameter_of_the_initial_one() -> None:
     rope, spans, tensions = Cable(0.067, 44e3, diameter=0.0065), np.array([8.0, 10.0, 12.0]), [50.0, 150.0, 300.0]
     length = Catenary().from_tension(rope, spans, -2.0, np.array(tensions)).unstrained_length
     start = rope.replace(linear_density=0.05, axial_stiffness=5e4)

@@ -1,4 +1,4 @@
-"""Creep against its differential equation, integrated step by step."""
+"""Creep compared with a numerical integration of its differential equation."""
 
 import pickle
 from collections.abc import Callable
@@ -16,19 +16,19 @@ CREEP = sl.Creep(axial_stiffness=[1e6, 4e5], time=[3.0, 120.0])
 
 
 def late_strain(creep: sl.Creep, time: np.ndarray, tension: np.ndarray, start: np.ndarray) -> np.ndarray:
-    """Sum of the elements' strains by integration of delay * strain' = tension/stiffness - strain."""
+    """Sum of the strains of the elements by integration of delay * strain' = tension/stiffness - strain."""
 
     def rate(t: float, strain: np.ndarray) -> np.ndarray:
         return np.asarray((np.interp(t, time, tension) / creep.axial_stiffness - strain) / creep.time)
 
     found = [start]
-    for begin, end in pairwise(time):  # where the tension has a corner a step ends
+    for begin, end in pairwise(time):  # a step ends at each corner of the tension
         found.append(solve_ivp(rate, (begin, end), found[-1], rtol=1e-11, atol=1e-16).y[:, -1])
     return np.asarray(np.sum(found, axis=1))
 
 
 @pytest.mark.parametrize("settled", wide([True, False]))
-def test_the_step_is_exact_for_tensions_that_change_evenly(settled: bool) -> None:
+def test_the_step_is_exact_for_linear_tensions(settled: bool) -> None:
     rng = np.random.default_rng(3)
     time, tension = np.cumsum(rng.uniform(0.01, 20.0, 30)), rng.uniform(50.0, 900.0, (30, 2))
     strain = CREEP.strain(time, tension, settled=settled)
@@ -37,7 +37,7 @@ def test_the_step_is_exact_for_tensions_that_change_evenly(settled: bool) -> Non
         np.testing.assert_allclose(strain[:, i], late_strain(CREEP, time, tension[:, i], start), rtol=1e-8)
 
 
-def test_a_tension_that_stays_gives_the_exponential() -> None:
+def test_a_constant_tension_gives_an_exponential() -> None:
     one = sl.Creep(2e6, 40.0)
     time = np.linspace(0.0, 400.0, 7)
     np.testing.assert_allclose(

@@ -1,4 +1,4 @@
-"""The five models against independent programs and against each other."""
+"""The five cable models compared with independent programs and with each other."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from sagline import (
 )
 from tests.refusal import refused
 
-CABLE = Cable(linear_density=0.067, axial_stiffness=44e3)  # the article's simulation
+CABLE = Cable(linear_density=0.067, axial_stiffness=44e3)  # simulation of the article
 WEIGHTED = [Empirical(), Parabolic(), Catenary()]
 TENSIONED = [Elastic(), *WEIGHTED]
 
@@ -33,11 +33,11 @@ spans = st.floats(0.05, 30.0)
 rises = st.floats(-20.0, 20.0)
 densities = st.floats(1e-6, 2.0)
 stiffnesses = st.floats(5e3, 1e8)
-# chord tension as a multiple of half the cable's weight: from a deep U to a bow string
+# chord tension as a multiple of half the weight of the cable, from very slack to very taut
 tautness = st.floats(0.15, 1e4)
 
 
-def hanging(span: float, rise: float, density: float, stiffness: float, ratio: float) -> tuple[Cable, CableState]:
+def catenary_case(span: float, rise: float, density: float, stiffness: float, ratio: float) -> tuple[Cable, CableState]:
     cable = Cable(density, stiffness)
     tension = min(ratio * 0.5 * density * 9.81 * math.hypot(span, rise), 0.05 * stiffness)
     return cable, Catenary().from_tension(cable, span, rise, tension)
@@ -67,9 +67,9 @@ def test_profile_solves_the_differential_equation_of_a_cable() -> None:
 @given(spans, rises, densities, stiffnesses, tautness)
 @settings(deadline=None, max_examples=200, derandomize=True)
 def test_length_and_tension_are_inverse(span: float, rise: float, rho: float, ea: float, ratio: float) -> None:
-    cable, state = hanging(span, rise, rho, ea, ratio)
+    cable, state = catenary_case(span, rise, rho, ea, ratio)
     back = Catenary().from_length(cable, span, rise, state.unstrained_length)
-    # one ulp of the length moves the force by this much: the problem's own conditioning
+    # a change of the length by one ulp changes the force by this amount, the conditioning of the problem
     up = Catenary().from_length(cable, span, rise, np.nextafter(state.unstrained_length, np.inf))
     ulp = abs(float(up.chord_tension - back.chord_tension))
     assert abs(float(back.chord_tension - state.chord_tension)) <= 8.0 * ulp + 1e-14 * float(state.chord_tension)
@@ -81,8 +81,8 @@ def test_length_and_tension_are_inverse(span: float, rise: float, rho: float, ea
 def test_a_cable_seen_from_its_other_end_is_the_same(
     span: float, rise: float, rho: float, ea: float, ratio: float
 ) -> None:
-    _, state = hanging(span, rise, rho, ea, ratio)
-    _, mirrored = hanging(span, -rise, rho, ea, ratio)
+    _, state = catenary_case(span, rise, rho, ea, ratio)
+    _, mirrored = catenary_case(span, -rise, rho, ea, ratio)
     scale = float(state.frame_end_tension + state.platform_end_tension)
     np.testing.assert_allclose(mirrored.unstrained_length, state.unstrained_length, rtol=2e-15)
     np.testing.assert_allclose(mirrored.frame_end_tension, state.platform_end_tension, atol=1e-14 * scale)
@@ -95,7 +95,7 @@ def test_length_scales_with_size_and_forces(
     span: float, rise: float, rho: float, ea: float, ratio: float, factor: float
 ) -> None:
     """Twice the size with twice the forces and stiffness, the same weight per length: twice the length."""
-    cable, state = hanging(span, rise, rho, ea, ratio)
+    cable, state = catenary_case(span, rise, rho, ea, ratio)
     larger = Cable(cable.linear_density, factor * cable.axial_stiffness)
     scaled = Catenary().from_tension(larger, factor * span, factor * rise, factor * state.chord_tension)
     np.testing.assert_allclose(scaled.unstrained_length, factor * state.unstrained_length, rtol=1e-14)
@@ -129,13 +129,13 @@ def test_parabolic_length_converges_in_the_fourth_order_of_the_sag_and_empirical
     empirical = Empirical().from_tension(stiff, 10.0, 4.0, tension).unstrained_length
     orders = np.log2(np.abs(parabolic - exact)[:-1] / np.abs(parabolic - exact)[1:])
     np.testing.assert_allclose(orders, 4.0, atol=0.1)
-    # erratum 6: the published constant overstates the sag term by 4.385/(g^2/24) - 1 = 9.4 %
+    # erratum 6: the published constant is larger by 4.385/(g^2/24) - 1 = 9.4 %
     excess = (empirical - exact) / (exact - np.hypot(10.0, 4.0))
     np.testing.assert_allclose(excess[-1], 24 * 4.385 / 9.81**2 - 1, atol=2e-3)
 
 
-def test_parabolic_pull_converges_in_the_first_order_of_slackness() -> None:
-    """T_z - tau sin(phi) -> wD/2 as tau grows, its error halving as tau doubles; zero on a level chord."""
+def test_parabolic_sag_force_converges_in_the_first_order_of_slackness() -> None:
+    """T_z - tau sin(phi) -> wD/2 for large tau; the error halves if tau doubles, and is zero on a level chord."""
     tension = np.array([200.0, 400.0, 800.0, 1600.0])
     stiff = Cable(0.067, 1e12)
     half_weight = 0.5 * 0.067 * 9.81 * math.hypot(10.0, 4.0)
@@ -148,7 +148,7 @@ def test_parabolic_pull_converges_in_the_first_order_of_slackness() -> None:
 
 
 def test_empirical_is_the_articles_formula_as_printed() -> None:
-    """(21), (27), (28), (48) written out in T_x as the article does."""
+    """(21), (27), (28), (48) written out in T_x as in the article."""
     span, rise, horizontal = 6.0, -3.5, 120.0
     rho, ea, k_h, k_p = 0.067, 44e3, 4.845, 4.385
     chord, slope = math.hypot(span, rise), rise / span
@@ -188,29 +188,29 @@ def test_sag_is_the_largest_drop_of_the_profile(model: CableModel) -> None:
 def test_a_slack_vertical_cable_folds_below_its_lower_end() -> None:
     state = Catenary().from_length(CABLE, 0.0, 2.0, 5.0)
     weight = 0.067 * 9.81
-    # 3 m too long: two strands share the slack, 1.5 m below the frame end, but for their tiny stretch
+    # 3 m too long: two strands share the slack, 1.5 m below the frame end except for their small stretch
     np.testing.assert_allclose(state.sag, 1.5, atol=1e-4)
     np.testing.assert_allclose(state.vertical_force, weight * 3.5, rtol=1e-4)
     assert float(state.chord_tension) == 0.0
     assert CableStatus(int(state.status)) is CableStatus.SLACK
 
 
-def test_statuses_say_what_is_wrong() -> None:
+def test_statuses_name_the_error() -> None:
     assert Straight().from_length(CABLE, 3.0, 4.0, 5.2).status == CableStatus.NO_TENSION
     np.testing.assert_allclose(Straight().from_length(CABLE, 3.0, 4.0, 5.2).closure_residual, 0.2)
     assert Elastic().from_length(CABLE, 3.0, 4.0, 5.2).status == CableStatus.SLACK
     assert Elastic().from_length(CABLE, 3.0, 4.0, 5.2).chord_tension == 0.0
     assert Catenary().from_tension(CABLE, 3.0, 4.0, 1e-6).status == CableStatus.TOO_SLACK
     assert math.isnan(float(Catenary().from_tension(CABLE, 3.0, 4.0, 0.0).unstrained_length))
-    # (54): valid while the lowest point lies outside the span, w D/(2 |sin phi|) in chord tension
+    # (54): valid while the lowest point is outside of the span, w D/(2 |sin phi|) in chord tension
     bound = 4.845 * 0.067 * 5.0 / 0.8
     assert Empirical().from_tension(CABLE, 3.0, 4.0, 1.001 * bound).status == CableStatus.SOLVED
     assert Empirical().from_tension(CABLE, 3.0, 4.0, 0.999 * bound).status == CableStatus.BELOW_VALIDITY
 
 
 @pytest.mark.parametrize("rise", [4.0, -4.0])
-def test_the_empirical_model_says_from_a_length_too_that_it_left_its_range(rise: float) -> None:
-    """(54) again, through the length that goes with each tension beside the bound."""
+def test_from_length_of_the_empirical_model_reports_its_range(rise: float) -> None:
+    """(54) again, for the lengths of the tensions on both sides of the bound."""
     bound = 4.845 * 0.067 * 5.0 / 0.8
     state = Empirical().from_tension(CABLE, 3.0, rise, bound * np.array([0.5, 0.999, 1.001, 2.0]))
     back = Empirical().from_length(CABLE, 3.0, rise, state.unstrained_length)
@@ -231,8 +231,8 @@ def test_every_argument_broadcasts() -> None:
     np.testing.assert_array_equal(state.points(5)[1, 1], single.points(5))
 
 
-def test_a_batch_solves_ordinary_and_odd_cables_alike() -> None:
-    """The vectorized path and the bracketed one, and the switch between them inside a chunk."""
+def test_a_batch_solves_ordinary_and_extreme_cables() -> None:
+    """The vectorized path, the path with brackets, and the change between them inside of a chunk."""
     rng = np.random.default_rng(4)
     count = 1000
     span, rise = rng.uniform(0.0, 12.0, count), rng.uniform(-8.0, 8.0, count)
@@ -280,7 +280,7 @@ def test_bad_material_is_named() -> None:
         Empirical(k_p=-1.0)
 
 
-def test_results_are_locked_and_copied_from_the_caller() -> None:
+def test_results_are_read_only_copies() -> None:
     span = np.array([3.0, 4.0])
     state = Catenary().from_tension(CABLE, span, 1.0, 50.0)
     span[0] = 99.0

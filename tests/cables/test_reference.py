@@ -1,4 +1,4 @@
-"""The exact cable against 90-digit arithmetic: every row, corners included."""
+"""The exact cable compared with 90-digit arithmetic in every row, including extreme cables."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from sagline import Cable, CableStatus, Catenary
 from tests.cables.reference import Reference, load_reference
 
-LIMIT = 4e-15  # of a length, or of the larger end tension
+LIMIT = 4e-15  # relative to the length or to the larger end tension
 
 
 @pytest.fixture(scope="module")
@@ -43,12 +43,12 @@ def test_from_tension_reaches_the_last_digits_on_every_row(reference: Reference)
 
 
 def folded_rows(reference: Reference) -> NDArray[np.bool_]:
-    """Vertical cables with a part that hangs slack: longer than the height by less than their own weight stretches."""
+    """Vertical cables with a slack part: longer than the height, by less than the stretch due to their weight."""
     kappa = 0.5 * reference.weight * reference.p2_length / reference.cable.axial_stiffness
     return np.asarray(reference.span == 0.0) & (np.abs(reference.rise) < reference.p2_length * (1.0 + kappa))
 
 
-def test_vertical_taut_cables_come_back_from_their_tension(reference: Reference) -> None:
+def test_vertical_taut_cables_are_recovered_from_their_tension(reference: Reference) -> None:
     rows = (reference.span == 0.0) & ~folded_rows(reference)
     assert rows.sum() == 8
     cable = Cable(reference.cable.linear_density[rows], reference.cable.axial_stiffness[rows])
@@ -69,6 +69,6 @@ def test_folded_cables_are_slack_and_all_others_solved(reference: Reference) -> 
 
 def test_closure_of_every_row_is_rounding(reference: Reference) -> None:
     state = Catenary().from_length(reference.cable, reference.span, reference.rise, reference.p2_length)
-    # the profile turns a rounding of the force into its compliance times that, and of the length one to one
+    # a rounding error of the force changes the profile by its compliance, one of the length by itself
     scale = np.maximum(reference.p2_length, np.hypot(reference.span, reference.rise))
     assert np.max(state.closure_residual / scale) < 1e-13

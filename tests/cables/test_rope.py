@@ -1,4 +1,4 @@
-"""The catalogue of ropes, by hand from its sources."""
+"""The catalogue of ropes, computed by hand from its sources."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ def test_steel_ropes_of_10_mm_by_the_factors_of_en_12385_4() -> None:
     ("name", "modulus", "strength"), [("dyneema-sk78", 109e9, 3.3e9), ("dyneema-sk62", 65e9, 2.4e9)]
 )
 def test_a_braid_is_two_thirds_fiber_at_half_its_modulus(name: str, modulus: float, strength: float) -> None:
-    fiber = 2.0 / 3.0 * np.pi * 0.003**2  # of the circle of 6 mm
+    fiber = 2.0 / 3.0 * np.pi * 0.003**2  # of a circle of 6 mm
     cable = ROPES[name].cable(0.006)
     assert cable.linear_density == pytest.approx(975.0 * fiber, rel=1e-12)
     assert cable.axial_stiffness == pytest.approx(0.5 * modulus * fiber, rel=1e-12)

@@ -1,6 +1,6 @@
-"""The log of the examples, and what the robot that it was read from really is.
+"""The log of the examples and the true robot behind its readings.
 
-`python -m tests.calibration.example_log` writes both anew.
+`python -m tests.calibration.example_log` writes both again.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ ROWS: Final = 60
 
 
 def example_truth() -> Truth:
-    """What the robot of `winches_robot.yaml` is, with as many decimals as a person writes."""
+    """The true robot of `winches_robot.yaml`, with a usual number of decimals."""
     drawn = sl.load_robot(EXAMPLES / "winches_robot.yaml")
     truth = true_robot(drawn, ERRORS, SEED, sensors=usual_sensors())
     robot = truth.robot
@@ -48,7 +48,7 @@ def example_truth() -> Truth:
 
 
 def example_log(robot: sl.Robot) -> Synthetic:
-    """What its encoders and load cells read, as they write it: whole counts, tenths of a newton.
+    """Readings of its encoders and load cells with their resolution: whole counts, tenths of a newton.
 
     Args:
         robot: What it is.
@@ -64,7 +64,7 @@ def example_log(robot: sl.Robot) -> Synthetic:
 
 
 def text_of(log: sl.WinchLog) -> str:
-    """The file: commanded angles in degrees, which nobody wants to read as quaternions."""
+    """Text of the log with commanded angles in degrees, which are easier to read than quaternions."""
     assert log.counts is not None
     assert log.load_cells is not None
     assert log.time is not None
@@ -86,7 +86,7 @@ def text_of(log: sl.WinchLog) -> str:
 
 
 def robot_text(robot: sl.Robot) -> str:
-    """The file of a robot, for a page of 80 columns: a number that all cables have is written once."""
+    """Text of the robot file for 80 columns: a number that all cables have is written once."""
     text = re.sub(rf"\[(\S+)(?:, \1){{{robot.cable_count - 1}}}\]", r"\1", sl.dump_robot(robot))
     lines = (line if len(line) <= PAGE else line.replace(": [", ":\n    [") for line in text.splitlines())
     return "\n".join(lines) + "\n"

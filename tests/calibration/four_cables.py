@@ -1,8 +1,7 @@
-"""A platform on four cables with two freedoms left to gravity, and its log: a twin by code that shares nothing with
-the fit.
+"""A platform on four cables with two free motions, and its log: a twin whose code shares no part with the fit.
 
-The cables are Irvine's elastic catenaries in closed form. Pose and cable forces are found together, by Newton's method
-with differences.
+The cables are Irvine's elastic catenaries in closed form. Newton's method with differences finds pose and cable forces
+together.
 """
 
 from __future__ import annotations
@@ -26,13 +25,13 @@ POSES: Final = 27
 LENGTH_NOISE: Final = 2e-3  # m
 CELL_NOISE: Final = 2.0  # N
 TOLERANCES: Final = {"frame_anchors": 0.01, "length_zero": 0.02, "axial_stiffness": 0.2, "center_of_mass": 0.01}
-MASS_OFF: Final = 0.05  # share of the mass by which the file is wrong
+MASS_OFF: Final = 0.05  # relative error of the mass in the robot file
 LEAST: Final = 10.0  # N
 DEFECTS: Final = ("gains of the same sign", "gains of any sign", "one gain", "biases", "gains and biases")
 
 
 class Twin(NamedTuple):
-    """What the machine is: anchors [m], mass [kg], center of mass [m], stiffness [N], length zeros [m], cells."""
+    """True machine: anchors [m], mass [kg], center of mass [m], stiffness [N], length zeros [m], cells."""
 
     frame: Array
     mass: float
@@ -44,7 +43,7 @@ class Twin(NamedTuple):
 
 
 def drawn_robot(**changes: Any) -> sl.Robot:
-    """The robot as its file has it: without a tolerance of the mass."""
+    """Robot of the robot file, without a tolerance of the mass."""
     return sl.Robot(
         "four cables",
         frame_anchors=FRAME,
@@ -60,7 +59,7 @@ def drawn_robot(**changes: Any) -> sl.Robot:
 
 
 def twin_of(seed: int, defect: str | None = None) -> Twin:
-    """A machine with errors of its drawing, and with a defect of its load cells."""
+    """A machine with errors of its drawing and a defect of its load cells."""
     rng = np.random.default_rng(seed)
     normal = rng.normal
     gain, bias = np.ones(4), np.zeros(4)
@@ -85,7 +84,7 @@ def twin_of(seed: int, defect: str | None = None) -> Twin:
 
 
 def cable_vectors(force: Array, length: Array, stiffness: float) -> tuple[Array, Array]:
-    """From the platform end to the frame end [m] (4, 3), and the tension there [N], by the force on the platform."""
+    """Vectors from the platform end to the frame end [m] (4, 3) and tensions there [N] for forces on the platform."""
     weight = DENSITY * GRAVITY
     flat = np.hypot(force[:, 0], force[:, 1])
     below, above = force[:, 2], force[:, 2] + weight * length
@@ -95,8 +94,8 @@ def cable_vectors(force: Array, length: Array, stiffness: float) -> tuple[Array,
     return np.column_stack((force[:, :2] * along[:, None], rise)), tension
 
 
-def misses(unknown: Array, twin: Twin, place: Array) -> Array:
-    """Gaps of the cables [m], and force and moment about the center of mass in weights, (18,).
+def residuals(unknown: Array, twin: Twin, place: Array) -> Array:
+    """Gaps of the cables [m], and force and moment about the center of mass divided by the weight, (18,).
 
     unknown: roll, pitch [rad], lengths [m], forces [N]; place: x, y, z [m] and yaw [rad].
     """
@@ -123,7 +122,7 @@ def turn_of(unknown: Array, place: Array) -> Array:
 
 
 def at_rest(twin: Twin, place: Array) -> Array | None:
-    """Roll, pitch, lengths and forces at x, y, z and yaw; None if a cable would pull less than `LEAST`."""
+    """Roll, pitch, lengths and forces at x, y, z and yaw; None if a tension is below `LEAST`."""
     ends = place[:3] + PLATFORM @ turn_of(np.zeros(2), place).T
     reach = twin.frame - ends
     length = np.linalg.norm(reach, axis=1)
@@ -133,9 +132,9 @@ def at_rest(twin: Twin, place: Array) -> Array | None:
         return None
     found = np.concatenate((np.zeros(2), length, (reach * (pull / length)[:, None]).ravel()))
     for _ in range(20):
-        miss = misses(found, twin, place)
+        miss = residuals(found, twin, place)
         steps = 1e-6 * np.maximum(1.0, np.abs(found))
-        slopes = [(misses(found + way, twin, place) - miss) / way.sum() for way in np.diag(steps)]
+        slopes = [(residuals(found + way, twin, place) - miss) / way.sum() for way in np.diag(steps)]
         change = np.linalg.solve(np.transpose(slopes), miss)
         found = found - change * min(1.0, 0.2 / np.abs(change[:6]).max())
         if np.abs(change[:6]).max() < 1e-9:
@@ -144,7 +143,7 @@ def at_rest(twin: Twin, place: Array) -> Array | None:
 
 
 def log_of_twin(twin: Twin, seed: int, poses: int = POSES) -> sl.WinchLog:
-    """Lengths and load cells at places over the workspace, with noise, and the poses that were commanded."""
+    """Readings of lengths and load cells at places of the workspace with noise, and the commanded poses."""
     rng = np.random.default_rng((seed, 1))
     lengths: list[Array] = []
     cells: list[Array] = []

@@ -1,4 +1,4 @@
-"""Machines at equilibria, of every kind that a calibration meets."""
+"""Machines at equilibria, for all cases of a calibration."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _DRUM: dict[str, Any] = {
 
 
 class Standing(NamedTuple):
-    """A machine at poses."""
+    """A machine at several poses."""
 
     machine: Machine
     pose: sl.Pose
@@ -32,20 +32,20 @@ class Standing(NamedTuple):
 
 
 def sensors(length: float = 1e-9) -> sl.Sensors:
-    """All there are, of a measuring system that stands askew, and a target off the platform's origin."""
+    """All sensors, with a rotated measuring system and a target beside the origin of the platform."""
     frame = sl.Pose((1.0, -2.0, 0.5), Rotation.from_rotvec((0.3, -0.2, 0.7)))
     cell = {"position_deviation": [1e-3, 2e-3, 3e-3], "rotation_deviation": [1e-3, 3e-3, 2e-3]}
     return sl.Sensors(length, 5.0, **cell, frame=frame, target=(0.2, -0.1, 0.3))
 
 
 def with_drums(robot: sl.Robot, **changes: Any) -> sl.Robot:
-    """The robot with a drum, pulleys and load cells behind each anchor."""
+    """The robot with a drum, pulleys and load cells at each anchor."""
     rope = robot.cables.replace(diameter=0.004)
     return robot.replace(cables=rope, winches=sl.Winch(**{**_DRUM, **changes}))
 
 
 def robots() -> dict[str, sl.Robot]:
-    """By name; those with winches have numbers that differ from cable to cable."""
+    """Robots by name; numbers of those with winches differ from cable to cable."""
     few = np.linspace(0.9, 1.1, 8)
     cell = {"load_cell_gain": few, "load_cell_bias": 20.0 * few - 18.0}
     run = {"dead_cable": 3.0 * few, "dead_rise": 2.0 * few - 1.0}

@@ -1,7 +1,7 @@
-"""A calibration made by hand, so that words, figures and pages can be compared with numbers that are known.
+"""An artificial calibration with known numbers, for comparison with texts, figures and pages.
 
-Its readings are those of a robot whose every value is known; what it claims to have found has errors drawn from the
-covariance that it claims, and its residuals are drawn from the sensors' deviations.
+The readings belong to a robot with known values. The estimates have errors drawn from the stated covariance, and the
+residuals are drawn from the deviations of the sensors.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from sagline.core.arrays import Array, locked
 
 NAMES = ("frame_anchors", "length_zero", "axial_stiffness", "mass", "center_of_mass")
 SENSORS = sl.Sensors(length_deviation=5e-4, tension_deviation=5.0, position_deviation=1e-3)
-LIFT = 0.04  # standard deviation of what the readings tell, of that of the priors
+LIFT = 0.04  # standard deviation of the information in the readings, and of the priors
 MOTIONS = ("the world shifted along x", "the world shifted along y", "the world shifted along z",
            "the world turned about the vertical")  # fmt: skip
 STEP = "fix a frame anchor, or measure 3 points"
 
 
 def parameters(robot: sl.Robot, names: tuple[str, ...] = NAMES) -> Parameters:
-    """The numbers of these kinds, with the usual priors."""
+    """Parameters of the given kinds with usual priors."""
     rows: list[tuple[str, str, str, int, float, float, bool]] = []
     m = robot.cable_count
     where = np.full((max(kind.first + len(kind.axes) for kind in KINDS.values()), m), -1, dtype=np.int64)
@@ -49,7 +49,7 @@ def parameters(robot: sl.Robot, names: tuple[str, ...] = NAMES) -> Parameters:
 
 
 def value_in(robot: sl.Robot, name: str, cable: int, axis: int) -> float:
-    """The robot's own value of a number."""
+    """Value of a parameter in a robot."""
     if name in ("frame_anchors", "platform_anchors"):
         return float(getattr(robot, name)[cable, axis])
     if name in ("linear_density", "axial_stiffness"):
@@ -60,7 +60,7 @@ def value_in(robot: sl.Robot, name: str, cable: int, axis: int) -> float:
 
 
 def covariance_of(numbers: Parameters, robot: sl.Robot, random: np.random.Generator) -> Array:
-    """What readings leave that tell of everything but a shift and a turn of the world."""
+    """Covariance after readings that determine everything except a shift and a rotation of the world."""
     told = random.standard_normal((3 * len(numbers.prior), len(numbers.prior))) / np.sqrt(3.0 * len(numbers.prior))
     told /= LIFT * numbers.prior_deviation
     unseen, _ = np.linalg.qr(motions(numbers, robot))
@@ -71,7 +71,7 @@ def covariance_of(numbers: Parameters, robot: sl.Robot, random: np.random.Genera
 
 
 def motions(numbers: Parameters, robot: sl.Robot) -> Array:
-    """Shifts of the frame anchors along x, y and z by a meter, and their turn about z by a radian, (P, 4)."""
+    """Shifts of the frame anchors along x, y and z by a meter, and their rotation about z by a radian, (P, 4)."""
     ways = np.zeros((len(numbers.prior), 4))
     for axis in range(3):
         for cable, number in enumerate(numbers.where[axis]):
@@ -162,7 +162,7 @@ def made_up(
 
 
 def changed_robot(robot: sl.Robot, numbers: Parameters, values: Array) -> sl.Robot:
-    """A robot with frame anchors and mass as they were found."""
+    """A robot with estimated frame anchors and mass."""
     frame = np.array(robot.frame_anchors)
     for axis in range(3):
         found = numbers.where[axis]

@@ -1,4 +1,4 @@
-"""Mistakes that people make with logs, made on purpose, and the words by which each is to be told."""
+"""Deliberate mistakes of users in logs, with the expected words of the diagnostics."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tests.calibration.reference import counts_of
 
 
 class Mistake(NamedTuple):
-    """A log with a mistake in it.
+    """A log with a mistake.
 
     Attributes:
         log: The log.
@@ -66,7 +66,7 @@ def swapped_cells(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -
 
 
 def flipped_encoder(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> Mistake:
-    """Counts go backward from their zero; lengths from one at which somebody switched on."""
+    """Counts run backward from their zero; lengths run backward from the length at switch-on."""
     i = int(rng.integers(log.readings.shape[1]))
     read = log.readings.copy()
     counts = robot.winches is not None and log.counts is not None
@@ -78,14 +78,14 @@ def flipped_encoder(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator)
 def late_cells(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> Mistake:
     by = int(rng.integers(1, 4)) * int(rng.choice([-1, 1]))
     n = len(log)
-    cells = np.arange(max(0, -by), min(n, n - by))  # what they read is written beside the lengths of so many rows later
+    cells = np.arange(max(0, -by), min(n, n - by))  # the readings are in rows that are later by this number
     shifted = log.rows(cells + by).replace(load_cells=_cells(log)[cells])
     words = f"load cell readings seem to be {abs(by)} row{'s'[: abs(by) != 1]} {'late' if by > 0 else 'early'}"
     return Mistake(shifted, (words,))
 
 
 def late_lengths(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> Mistake:
-    """All other columns stand beside the lengths of so many rows before."""
+    """All other columns are in rows that are earlier by this number."""
     by = int(rng.integers(1, 4)) * int(rng.choice([-1, 1]))
     n = len(log)
     lengths = np.arange(max(0, -by), min(n, n - by))
@@ -135,7 +135,7 @@ def kilonewtons(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> 
 
 
 def customary_units(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> Mistake:
-    """Load cells or reported lengths in units that differ from those of SI by less than a factor of fifty."""
+    """Load cells or reported lengths in units that differ from SI units by less than a factor of fifty."""
     units = {"kgf": 9.80665, "lbf": 4.4482216} | ({} if log.counts is not None else {"ft": 0.3048, "in": 0.0254})
     unit = str(rng.choice(list(units)))
     if unit in ("kgf", "lbf"):

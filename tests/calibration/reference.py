@@ -1,4 +1,4 @@
-"""What sensors of a robot would read, and its slopes by differences: through public functions alone."""
+"""Readings of the sensors of a robot and their slopes by differences, through public functions only."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from sagline.core.arrays import Array, locked
 from sagline.kernels.calibration import kinds
 from sagline.robot.drum import drums_of
 
-# steps of the differences in meters, newtons and radians; shares of itself where the logarithm is looked for
+# steps of the differences in meters, newtons and radians; relative steps for parameters with a logarithm
 STEPS = {
     kinds.FRAME: 1e-4,
     kinds.PLATFORM: 1e-4,
@@ -38,7 +38,7 @@ _WINCH |= {kinds.BIAS: "load_cell_bias", kinds.ZERO: "length_zero", kinds.DRUM: 
 
 @dataclass(frozen=True)
 class Machine:
-    """A robot with its sensors; `offset` is what lengths are short of where no counts are read, (m,)."""
+    """A robot with its sensors; `offset` is the error of the lengths if no counts are read, (m,)."""
 
     robot: sl.Robot
     sensors: sl.Sensors
@@ -46,12 +46,12 @@ class Machine:
 
     @property
     def counting(self) -> bool:
-        """Whether lengths are known by counts."""
+        """True if counts determine the lengths."""
         winches = self.robot.winches
         return winches is not None and winches.drum_radius is not None and winches.length_zero is not None
 
     def believed(self, lengths: Array) -> Array:
-        """Counts, not rounded, or lengths as the machine has them, where true lengths are (N, m)."""
+        """Counts before rounding, or measured lengths, at true lengths (N, m)."""
         if not self.counting:
             return lengths - self.offset
         return counts_of(self.robot, lengths)
@@ -63,7 +63,7 @@ class Machine:
         return sl.lengths_from_counts(self.robot, believed)
 
     def changed(self, row: int, cable: int, by: float) -> Machine:
-        """The machine with a number of `kinds` changed, by a share of itself where its logarithm is looked for."""
+        """The machine with a changed parameter of `kinds`; the change is relative for parameters with a logarithm."""
         robot, sensors, winches = self.robot, self.sensors, self.robot.winches
         if row >= kinds.TARGET:
             return Machine(robot, sensors.replace(target=_added(sensors.target, row - kinds.TARGET, by)), self.offset)
@@ -97,13 +97,13 @@ class Machine:
 
     @property
     def gain_and_bias(self) -> tuple[Array | float, Array | float]:
-        """Of the load cells, (m,)."""
+        """Gain and bias of the load cells, (m,)."""
         winches = self.robot.winches
         return (1.0, 0.0) if winches is None else (winches.load_cell_gain, winches.load_cell_bias)
 
 
 def counts_of(robot: sl.Robot, lengths: Array) -> Array:
-    """Counts at unstrained lengths (N, m), not rounded as those of `encoder_counts` are."""
+    """Counts at unstrained lengths (N, m), not rounded, unlike `encoder_counts`."""
     drums = drums_of(robot)
     return drums.counts(lengths * (1.0 + drums.rest_strain))
 
@@ -124,7 +124,7 @@ def _rotation(pose: sl.Pose) -> Rotation:
 
 
 def readings(machine: Machine, lengths: Array, start: sl.Pose, model: sl.CableModel) -> tuple[Array, Rotation]:
-    """What load cells and measured positions read, (N, m + 3), and measured rotations."""
+    """Readings of load cells and measured positions, (N, m + 3), and measured rotations."""
     found = sl.forward(machine.robot, lengths, start, model)
     assert found.stable.all()
     gain, bias = machine.gain_and_bias
@@ -174,7 +174,7 @@ def _stencil(step: float) -> tuple[float, ...]:
 def _differences(
     machines: list[Machine], lengths: list[Array], pose: sl.Pose, model: sl.CableModel, step: float
 ) -> Array:
-    """Central differences of one, two and three steps, extrapolated: wrong by the sixth power of the step."""
+    """Central differences of one, two and three steps, extrapolated: the error has the sixth order of the step."""
     read = [readings(one, own, pose, model) for one, own in zip(machines, lengths, strict=True)]
     found: Array = np.zeros(())
     for multiple, weight in zip((1, 2, 3), (1.5, -0.6, 0.1), strict=True):
@@ -185,7 +185,7 @@ def _differences(
 
 
 def parameters(machine: Machine, names: tuple[str, ...], shared: tuple[str, ...] = ()) -> Parameters:
-    """The numbers of some kinds, each cable its own but for those shared, with the usual priors."""
+    """Parameters of some kinds, one per cable except for shared ones, with usual priors."""
     m = machine.robot.cable_count
     where = np.full((kinds.KIND_ROWS, m), -1)
     each: list[tuple[str, str, str, int, float, float, bool]] = []
@@ -208,7 +208,7 @@ def parameters(machine: Machine, names: tuple[str, ...], shared: tuple[str, ...]
 
 
 def value_of(machine: Machine, name: str, axis: int, cable: int) -> float:
-    """The number that a machine has there."""
+    """Value of a parameter in a machine."""
     robot, sensors, winches = machine.robot, machine.sensors, machine.robot.winches
     if name == "measuring_frame":
         return float(sensors.frame.position[axis]) if axis < 3 else 0.0

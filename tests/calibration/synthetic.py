@@ -1,4 +1,4 @@
-"""Robots that are not quite as their drawings say, and what their encoders and load cells read: for tests."""
+"""Robots with errors of their drawings, and the readings of their encoders and load cells."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from tests.kinematics.feasible import box_poses
 
 LENGTH_NOISE: Final = 5e-4  # m
 TENSION_NOISE: Final = 5.0  # N
-PAUSE: Final = 30.0  # s between rows: nobody can tell from them whether the platform moved
-COMMANDED_OFF: Final = (0.03, 0.01)  # m and rad: how far from where it was sent the platform stands
-USUAL: Final[Mapping[str, float]] = {  # errors of a robot that somebody has set up with a tape measure
+PAUSE: Final = 30.0  # s between rows: too long to see whether the platform moved
+COMMANDED_OFF: Final = (0.03, 0.01)  # m and rad: difference between commanded and true poses
+USUAL: Final[Mapping[str, float]] = {  # errors of a robot that is set up with a tape measure
     "frame_anchors": 0.05,
     "length_zero": 0.03,
     "axial_stiffness": 0.1,
@@ -38,7 +38,7 @@ _OF_CABLES: Final = ("linear_density", "axial_stiffness")
 
 
 class Truth(NamedTuple):
-    """What a robot really is.
+    """True values of a robot.
 
     Attributes:
         robot: With its true values, gain and bias of the load cells in its winches.
@@ -52,7 +52,7 @@ class Truth(NamedTuple):
 
 
 class Synthetic(NamedTuple):
-    """A log and what really was.
+    """A log and its true values.
 
     Attributes:
         log: The readings.
@@ -68,7 +68,7 @@ class Synthetic(NamedTuple):
 
 
 def with_drums(name: str = "cogiro", **changes: Any) -> sl.Robot:
-    """A robot of 4 mm rope on drums of one layer, whose encoders count."""
+    """A robot with 4 mm rope on single-layer drums with encoders."""
     robot = sl.load_robot(name)
     winches = sl.Winch(**{**DRUMS, **changes})
     return robot.replace(cables=robot.cables.replace(diameter=0.004), winches=winches)
@@ -222,7 +222,7 @@ def _measured(
 
 
 def _off(pose: sl.Pose, rng: np.random.Generator) -> sl.Pose:
-    """Commanded poses: those of the rows of one pose are one."""
+    """Commanded poses: rows of one pose have the same one."""
     step, angle = COMMANDED_OFF
     _, which = np.unique(pose.position, axis=0, return_inverse=True)
     poses = int(which.max()) + 1

@@ -1,4 +1,4 @@
-"""Calibrations of robots that are known: whether the answer is right, and whether it knows how right."""
+"""Calibrations of known robots: correct values and correct standard errors."""
 
 import sys
 from functools import cache
@@ -25,7 +25,7 @@ from tests.refusal import refused
 from tests.tiers import extended, wide
 
 COGIRO = with_drums()
-ALL = {  # of 63 numbers: what an honest drawing may be off
+ALL = {  # plausible errors of the 63 parameters of a drawing
     "frame_anchors": 0.02,
     "platform_anchors": 0.005,
     "length_zero": 0.03,
@@ -43,8 +43,8 @@ def unknowns(errors: dict[str, float]) -> list[sl.Unknown]:
     return [sl.Unknown(name, deviation=error) for name, error in errors.items()]
 
 
-def missed(found: sl.Calibration, truth: Truth) -> Array:
-    """By how much the values are off, (P,)."""
+def errors_of_values(found: sl.Calibration, truth: Truth) -> Array:
+    """Errors of the values, (P,)."""
     names = tuple(dict.fromkeys(found.parameters.names))
     really = parameters_of(truth.robot, names, truth.sensors, counted=True)
     assert really.labels == found.parameters.labels
@@ -52,7 +52,7 @@ def missed(found: sl.Calibration, truth: Truth) -> Array:
 
 
 class Covered(NamedTuple):
-    """How often the truth lies within one and two standard errors; mean square of Mahalanobis; slips not found.
+    """Shares of true values in one and two standard errors, mean squared Mahalanobis distance, missed slips.
 
     Attributes:
         one: Within one.
@@ -83,7 +83,7 @@ def covered(robots: int, slips: int = 0, *, robust: bool = True) -> Covered:
         truth = true_robot(COGIRO, ALL, seed)
         made = log_of(truth, 60, seed, slips=slipped)
         found = sl.calibrate(COGIRO, made.log, unknowns(ALL), folds=0, robust=robust)
-        error = missed(found, truth)
+        error = errors_of_values(found, truth)
         inside.append(np.abs(error) / found.standard_error)
         distances.append(error @ np.linalg.solve(found.covariance, error))
         named = {one.row: one.cable for one in found.outliers}
@@ -104,9 +104,7 @@ def covered(robots: int, slips: int = 0, *, robust: bool = True) -> Covered:
         pytest.param(2000, 0.015, 0.007, 1.0, marks=pytest.mark.soak),
     ],
 )
-def test_the_truth_lies_within_the_standard_errors_as_often_as_it_must(
-    robots: int, one: float, two: float, mahalanobis: float
-) -> None:
+def test_standard_errors_cover_the_truth(robots: int, one: float, two: float, mahalanobis: float) -> None:
     found = covered(robots)
     assert abs(found.one - 0.683) < one
     assert abs(found.two - 0.954) < two
@@ -115,7 +113,7 @@ def test_the_truth_lies_within_the_standard_errors_as_often_as_it_must(
 
 
 @pytest.mark.parametrize("robots", [pytest.param(10, marks=extended), pytest.param(200, marks=pytest.mark.soak)])
-def test_slipped_cables_are_found_and_do_no_harm(robots: int) -> None:
+def test_slipped_cables_are_found_and_excluded(robots: int) -> None:
     found = covered(robots, slips=3)
     assert found.unseen == 0
     assert found.misnamed <= 0.01 * 3 * robots
@@ -127,14 +125,14 @@ def test_slipped_cables_are_found_and_do_no_harm(robots: int) -> None:
 
 @pytest.mark.parametrize("trials", [20, pytest.param(200, marks=pytest.mark.soak)])
 def test_few_poses_and_few_unknowns_converge(trials: int) -> None:
-    """20 poses and 10 numbers from load cells and counts."""
+    """20 poses and 10 parameters with load cells and counts."""
     errors = {"length_zero": 0.05, "linear_density": 0.1, "axial_stiffness": 0.2}
     right = told = 0
     for seed in range(trials):
         truth = true_robot(COGIRO, errors, seed)
         found = sl.calibrate(COGIRO, log_of(truth, 20, seed).log, unknowns(errors), folds=0)
-        error = missed(found, truth)
-        good = float(error @ np.linalg.solve(found.covariance, error)) < 40.0  # chi squared of 10: 2e-5
+        error = errors_of_values(found, truth)
+        good = float(error @ np.linalg.solve(found.covariance, error)) < 40.0  # probability of chi squared 10: 2e-5
         right += good
         told += good or found.status != sl.CalibrationStatus.FOUND
     assert told == trials
@@ -142,15 +140,15 @@ def test_few_poses_and_few_unknowns_converge(trials: int) -> None:
 
 
 @pytest.mark.parametrize("robots", [pytest.param(5, marks=extended), pytest.param(100, marks=pytest.mark.soak)])
-def test_anchors_half_a_meter_off_end_where_the_truth_begins(robots: int) -> None:
-    """The sum of squares has one minimum near the truth: whoever starts there must find no better one."""
+def test_errors_of_half_a_meter_converge_to_the_global_minimum(robots: int) -> None:
+    """The sum of squares has one minimum near the truth; a fit from the truth finds the same one."""
     errors = {"frame_anchors": 0.5, "length_zero": 0.1, "axial_stiffness": 0.1, "mass": 0.03, "center_of_mass": 0.02}
     reached = told = 0
     for seed in range(robots):
         truth = true_robot(COGIRO, errors, seed, usual_sensors(position_deviation=1e-3))
         made = log_of(truth, 60, seed, positions=60)
         found = sl.calibrate(COGIRO, made.log, unknowns(errors), folds=0)
-        error = missed(found, truth)
+        error = errors_of_values(found, truth)
         good = float(error @ np.linalg.solve(found.covariance, error)) < 3.0 * len(error)
         reached += good
         told += good or found.status != sl.CalibrationStatus.FOUND
@@ -158,8 +156,8 @@ def test_anchors_half_a_meter_off_end_where_the_truth_begins(robots: int) -> Non
     assert told == robots
 
 
-def test_poses_that_fit_nowhere_put_the_rest_in_doubt_where_they_are_many() -> None:
-    """Lengths of other poses at seven of sixty: some count little, some are left out, and each is an odd one."""
+def test_many_outlying_poses_make_the_result_doubtful() -> None:
+    """Lengths of other poses in seven of sixty rows: they are outliers, with reduced weight or excluded."""
     truth = true_robot(COGIRO, ALL, 4)
     made = log_of(truth, 60, 4)
     counts = made.log.readings.copy()
@@ -172,8 +170,8 @@ def test_poses_that_fit_nowhere_put_the_rest_in_doubt_where_they_are_many() -> N
 
 
 @pytest.mark.parametrize("deviation", wide([1e6, 1e3, 1e9]))
-def test_a_prior_as_wide_as_nothing_tells_nothing(deviation: float) -> None:
-    """Of the anchors, of which the readings leave four directions open: what they tell is told as well as without."""
+def test_a_very_wide_prior_has_no_influence(deviation: float) -> None:
+    """Priors of anchors, of which the readings determine all but four directions."""
     robot = sl.load_robot("cogiro")
     log = log_of(true_robot(robot, {"frame_anchors": 0.05, "mass": 0.03, "length_zero": 0.03}), 40).log
     wide, none = (
@@ -186,14 +184,14 @@ def test_a_prior_as_wide_as_nothing_tells_nothing(deviation: float) -> None:
     assert [one.name for one in wide.gauge] == [one.name for one in none.gauge]
     assert np.isinf(none.value_of("frame_anchors[0].x")[1])
     assert wide.value_of("frame_anchors[0].x")[1] > 0.3 * deviation
-    # readings of 8 cells, less the numbers that they tell: of 33 all but the four, 9 of which priors hold beside
+    # readings of 8 cells minus the determined parameters: 29 of 33, of which priors also determine 9
     assert none.degrees_of_freedom == 40 * 8 + 9 - (33 - 4)
     assert none.chi_squared == pytest.approx(wide.chi_squared, rel=1e-6)
 
 
 @extended
 @pytest.mark.parametrize(("radius", "least"), [(0.06, 0.01), (0.0, 0.0)])
-def test_pulleys_are_found_by_a_robot_that_is_drawn_without(radius: float, least: float) -> None:
+def test_pulleys_are_estimated_for_a_robot_drawn_without_them(radius: float, least: float) -> None:
     bare = sl.load_robot("cogiro").replace(winches=sl.Winch())
     truth = true_robot(bare.replace(winches=sl.Winch(pulley_radius=radius)), {"mass": 0.03}, 3)
     asked = ("length_zero", "mass", sl.Unknown("pulley_radius", deviation=0.05))
@@ -206,8 +204,8 @@ def test_pulleys_are_found_by_a_robot_that_is_drawn_without(radius: float, least
     assert value >= least
 
 
-def test_a_log_of_which_no_pose_fits_is_refused() -> None:
-    """One pose, and only the mass may be other than drawn."""
+def test_a_log_without_a_fitting_pose_is_refused() -> None:
+    """One pose, and only the mass may change."""
     robot = sl.load_robot("cogiro")
     log = log_of(true_robot(robot), 40).log.rows(slice(0, 1))
     with refused("log", *NO_POSE, kind=InvalidValueError):
@@ -234,7 +232,7 @@ def test_too_few_readings_are_refused() -> None:
         ),
     ],
 )
-def test_unknowns_that_are_none_say_what_to_do(
+def test_invalid_unknowns_give_a_next_step(
     changes: dict[str, None], unknown: str, parts: tuple[str, ...], step: str
 ) -> None:
     robot = sl.load_robot("cogiro")
@@ -244,7 +242,7 @@ def test_unknowns_that_are_none_say_what_to_do(
     assert step in caught.value.next_step
 
 
-def test_readings_that_are_too_few_are_counted_with_the_reason() -> None:
+def test_too_few_readings_are_counted_with_the_reason() -> None:
     log = log_of(true_robot(COGIRO, ALL), 9).log
     slack = np.array(log.load_cells)
     slack[2:, 3] = 0.0
@@ -258,7 +256,7 @@ def test_readings_that_are_too_few_are_counted_with_the_reason() -> None:
     [(0.7, sl.CalibrationStatus.DOUBTFUL), (1.0, sl.CalibrationStatus.FOUND), (1.5, sl.CalibrationStatus.FOUND)],
 )
 def test_chi_squared_too_large_is_doubtful_and_too_small_is_not(factor: float, status: sl.CalibrationStatus) -> None:
-    """Deviations of the sensors of which the log believes so many times the true ones."""
+    """Stated deviations of the sensors as multiples of the true ones."""
     robot = sl.load_robot("cogiro")
     log = log_of(true_robot(robot, {"mass": 0.03}, 4), 40, 4).log
     believed = usual_sensors(length_deviation=factor * LENGTH_NOISE, tension_deviation=factor * TENSION_NOISE)
@@ -269,7 +267,7 @@ def test_chi_squared_too_large_is_doubtful_and_too_small_is_not(factor: float, s
 
 
 @extended
-def test_wrong_deviations_are_said_first() -> None:
+def test_wrong_deviations_are_printed_first() -> None:
     truth = true_robot(COGIRO, ALL, 1)
     log = log_of(truth, 60, 1).log
     trusted = log.replace(sensors=usual_sensors(length_deviation=1e-4, tension_deviation=1.0))
@@ -291,11 +289,11 @@ def test_a_log_of_another_wiring_is_refused_with_the_reason(rows: int) -> None:
 
 
 def test_poses_in_another_equilibrium_are_left_out_and_counted() -> None:
-    """Two rows of a robot that hangs elsewhere at these lengths: cables of no length that it has."""
+    """Two rows of a robot in another equilibrium at these lengths: its cables have other lengths."""
     truth = true_robot(COGIRO, ALL, 2)
     made = log_of(truth, 60, 2)
     counts = made.log.readings.copy()
-    counts[[4, 9]] = counts[[9, 4]]  # lengths of other poses, beside the tensions of these
+    counts[[4, 9]] = counts[[9, 4]]  # lengths of other poses with the tensions of these
     found = sl.calibrate(COGIRO, made.log.replace(counts=counts), unknowns(ALL), folds=0)
     honest = sl.calibrate(COGIRO, made.log, unknowns(ALL), folds=0)
     out = {int(row) for rows in found.left_out.values() for row in rows}
@@ -304,8 +302,8 @@ def test_poses_in_another_equilibrium_are_left_out_and_counted() -> None:
     assert (np.abs(found.values - honest.values) / honest.standard_error).max() < 1.0
 
 
-def test_a_log_of_which_no_row_is_left_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As that of another robot may be: every pose fits worse than noise, and the lengths put it elsewhere."""
+def test_a_log_without_a_valid_row_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in the log of another robot: all residuals of poses are large, and the lengths give other positions."""
     log = log_of(true_robot(COGIRO, ALL, 2), 10, 2).log
     monkeypatch.setattr(search, "STRANGE", 1.0)
     monkeypatch.setattr(search, "FAR", -1.0)
@@ -317,7 +315,7 @@ TURNED = np.array([[-0.5, -(0.75**0.5), 0.0], [0.75**0.5, -0.5, 0.0], [0.0, 0.0,
 
 
 @pytest.mark.parametrize(("shift", "rows"), wide([((3.0, -2.0, 1.0), 5), ((0.0, 0.0, 0.0), 5), ((3.0, -2.0, 1.0), 60)]))
-def test_measured_positions_in_other_axes_are_refused_with_what_to_ask_for(shift: tuple[float, ...], rows: int) -> None:
+def test_positions_in_other_axes_are_refused_with_the_missing_unknown(shift: tuple[float, ...], rows: int) -> None:
     sensors = usual_sensors(position_deviation=1e-3)
     log = log_of(true_robot(COGIRO, ALL, 3, sensors), 60, 3, positions=rows).log
     assert log.position is not None
@@ -334,7 +332,7 @@ def test_measured_positions_in_other_axes_are_refused_with_what_to_ask_for(shift
 
 
 @extended
-def test_a_log_of_another_wiring_is_told_whatever_axes_it_was_measured_in() -> None:
+def test_a_log_of_another_wiring_is_recognized_in_any_axes() -> None:
     sensors = usual_sensors(position_deviation=1e-3)
     log = log_of(true_robot(COGIRO, ALL, 1, sensors), 60, 1, positions=5).log
     assert log.position is not None
@@ -346,7 +344,7 @@ def test_a_log_of_another_wiring_is_told_whatever_axes_it_was_measured_in() -> N
     assert "cables 2 and 5" in caught.value.value
 
 
-def test_an_unknown_that_is_none_is_refused_before_any_work(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_invalid_unknown_is_refused_before_any_work(monkeypatch: pytest.MonkeyPatch) -> None:
     def work(*_: object) -> None:
         raise AssertionError("it has begun")
 

@@ -1,4 +1,4 @@
-"""Short tours against all orders."""
+"""Short tours compared with all permutations."""
 
 from itertools import permutations
 
@@ -10,7 +10,7 @@ from tests.tiers import wide
 
 
 @pytest.mark.parametrize("seed", wide(range(12), first=2))
-def test_tours_against_all_orders(seed: int) -> None:
+def test_tours_are_as_short_as_the_best_permutation(seed: int) -> None:
     places = np.random.default_rng(seed).uniform(size=(7, 3))
     best = min(tour_length(places, np.array(order)) for order in permutations(range(7)))
     found = shortest_tour(places)
@@ -18,15 +18,15 @@ def test_tours_against_all_orders(seed: int) -> None:
     assert best - 1e-12 <= tour_length(places, found) <= 1.1 * best
 
 
-def test_a_row_of_places_is_driven_along() -> None:
+def test_places_on_a_line_are_visited_in_order() -> None:
     places = np.zeros((30, 3))
     places[:, 1] = np.random.default_rng(1).permutation(30)
     assert tour_length(places, shortest_tour(places)) == pytest.approx(29.0)
 
 
-def test_many_places_are_no_way_for_long() -> None:
+def test_tours_of_many_places_are_near_the_best_length() -> None:
     places = np.random.default_rng(2).uniform(size=(300, 2))
-    # 0.7124 sqrt(N A) is the best tour of many places; 2-opt is some 5 % longer, nearest neighbors alone 25 %
+    # 0.7124 sqrt(N A) is the best tour of many places; 2-opt is about 5 % longer, nearest neighbors 25 %
     assert tour_length(places, shortest_tour(places)) <= 1.12 * 0.7124 * np.sqrt(300.0)
 
 

@@ -1,4 +1,4 @@
-"""Fixed parameters that the readings contradict: score tests against repeated fits, and coverage of standard errors."""
+"""Fixed parameters that contradict the readings: score tests compared with fits, coverage of standard errors."""
 
 from __future__ import annotations
 
@@ -45,9 +45,7 @@ def found_with(truth: Any, seed: int = 0, asked: Any = ASKED, robot: sl.Robot = 
         ),
     ],
 )
-def test_the_wrong_value_that_was_not_estimated_is_named_and_its_estimation_gives_what_was_predicted(
-    name: str, change: Any
-) -> None:
+def test_a_wrong_fixed_value_is_named_and_its_estimation_gives_the_prediction(name: str, change: Any) -> None:
     truth = true_robot(COGIRO, HONEST, 1)
     truth = truth._replace(robot=change(truth.robot))
     found = found_with(truth, 1, robust=False)
@@ -60,7 +58,7 @@ def test_the_wrong_value_that_was_not_estimated_is_named_and_its_estimation_give
     )
     assert again.status is sl.CalibrationStatus.FOUND
     assert not again.criticisms
-    # the test is linear, and one load cell alone has fewer parameters than all of them
+    # the test is linear, and a single load cell has fewer parameters than all of them
     assert found.chi_squared - again.chi_squared == pytest.approx(worst.fall, rel=0.25)
     moved = again.value_of(worst.moves)[0] - found.value_of(worst.moves)[0]
     assert moved == pytest.approx(worst.change, rel=0.3, abs=1.5 * again.value_of(worst.moves)[1])
@@ -68,8 +66,8 @@ def test_the_wrong_value_that_was_not_estimated_is_named_and_its_estimation_give
     assert worst.moves in str(found)
 
 
-def test_a_score_test_equals_a_fit_where_the_readings_depend_linearly_on_the_fixed_value() -> None:
-    """Biases of the load cells, without a change of the cables: the mass alone is estimated."""
+def test_a_score_test_agrees_with_a_fit_of_a_linear_parameter() -> None:
+    """Biases of the load cells without a change of the cables: only the mass is estimated."""
     truth = true_robot(COGIRO, {"mass": 0.03}, 2)
     truth = truth._replace(robot=with_cells(truth.robot, bias=np.linspace(-15.0, 15.0, 8)))
     found = found_with(truth, 2, ("mass",), robust=False)
@@ -78,14 +76,14 @@ def test_a_score_test_equals_a_fit_where_the_readings_depend_linearly_on_the_fix
     assert found.chi_squared - again.chi_squared == pytest.approx(bias.fall, rel=5e-3)
 
 
-def test_honest_logs_are_found() -> None:
+def test_logs_without_defects_are_found() -> None:
     statuses = [found_with(true_robot(COGIRO, HONEST, seed), seed).status for seed in range(30)]
     assert sum(status is sl.CalibrationStatus.FOUND for status in statuses) >= 28
 
 
 @extended
 def test_standard_errors_include_the_tolerances_of_values_that_were_not_estimated() -> None:
-    """Platform anchors off by 5 mm: about two thirds of the true values are within a standard error, as they should."""
+    """Platform anchors with errors of 5 mm: about two thirds of the true values are within one standard error."""
     shares = []
     for robot in (COGIRO, COGIRO.replace(tolerances={"platform_anchors": 0.005})):
         within = []
@@ -106,7 +104,7 @@ def test_standard_errors_include_the_tolerances_of_values_that_were_not_estimate
     assert 0.6 < shares[1] < 0.78
 
 
-def test_chi_squared_of_all_counts_poses_of_less_weight_but_no_outliers() -> None:
+def test_total_chi_squared_includes_poses_of_reduced_weight_and_no_outliers() -> None:
     log = log_of(true_robot(COGIRO, HONEST, 8), 60, 8, slips={(5, 2): 0.01}).log
     found = sl.calibrate(COGIRO, log, ASKED, folds=0)
     outlying = np.isin(found.rows, [one.row for one in found.outliers])

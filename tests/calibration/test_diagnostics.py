@@ -1,4 +1,4 @@
-"""Mistakes in logs are told by what they are, and honest logs, however wrong the drawing is, raise no alarm."""
+"""The diagnostics name the mistakes in logs, and logs without mistakes raise none, for any error of the drawing."""
 
 from __future__ import annotations
 
@@ -40,16 +40,16 @@ ROBOTS = (
 MORE_ERRORS = {**USUAL, "platform_anchors": 0.01, "drum_radius": 0.01, "load_cell_gain": 0.01, "load_cell_bias": 10.0}
 
 
-class Honest(NamedTuple):
-    """An honest log, what it is called, and the robot as drawn."""
+class FaultlessLog(NamedTuple):
+    """A log without mistakes, its name, and the robot of the drawing."""
 
     name: str
     robot: sl.Robot
     log: sl.WinchLog
 
 
-def honest(count: int, anchors: float) -> Iterator[Honest]:
-    """Logs of robots with anchors so far off [m]."""
+def faultless_logs(count: int, anchors: float) -> Iterator[FaultlessLog]:
+    """Logs of robots with anchor errors of the given size [m]."""
     for seed in range(count):
         rng = np.random.default_rng((seed, int(1e3 * anchors)))
         robot = ROBOTS[int(rng.integers(len(ROBOTS)))]
@@ -59,7 +59,7 @@ def honest(count: int, anchors: float) -> Iterator[Honest]:
         log = log_of(truth, rows, seed, sets=sets, positions=positions).log
         if rng.random() < 0.3:
             log = log.replace(commanded=None)
-        yield Honest(f"{robot.name}, seed {seed}: {log}", robot, log)
+        yield FaultlessLog(f"{robot.name}, seed {seed}: {log}", robot, log)
 
 
 @pytest.mark.parametrize(
@@ -71,13 +71,13 @@ def honest(count: int, anchors: float) -> Iterator[Honest]:
         pytest.param(100, 0.5, marks=pytest.mark.soak),
     ],
 )
-def test_honest_logs_raise_no_alarm(count: int, anchors: float) -> None:
-    alarms = {name: told for name, robot, log in honest(count, anchors) if (told := diagnose_log(robot, log))}
+def test_faultless_logs_raise_no_diagnostic(count: int, anchors: float) -> None:
+    alarms = {name: told for name, robot, log in faultless_logs(count, anchors) if (told := diagnose_log(robot, log))}
     assert alarms == {}
 
 
-def told_wrongly(makers: tuple[Maker, ...], seeds: range) -> list[str]:
-    """Cases in which the mistake is not what is told, and nothing else."""
+def wrong_diagnostics(makers: tuple[Maker, ...], seeds: range) -> list[str]:
+    """Cases in which the diagnostics are not exactly the mistake."""
     wrong = []
     for seed in seeds:
         robot = ROBOTS[seed % 2]
@@ -93,26 +93,26 @@ def told_wrongly(makers: tuple[Maker, ...], seeds: range) -> list[str]:
     return wrong
 
 
-def test_the_units_of_readings_are_told() -> None:
+def test_wrong_units_of_readings_are_recognized() -> None:
     units = (millimeters, positions_in_millimeters, commanded_in_millimeters, deviations_in_millimeters, kilonewtons)
-    assert told_wrongly((*units, far_zero), range(4)) == []
-    assert told_wrongly((customary_units,), range(2)) == []
+    assert wrong_diagnostics((*units, far_zero), range(4)) == []
+    assert wrong_diagnostics((customary_units,), range(2)) == []
 
 
 @pytest.mark.parametrize("make", wide(MISTAKES[:6]), ids=lambda make: make.__name__)
-def test_a_mistake_is_told_by_what_it_is(make: Maker) -> None:
-    assert told_wrongly((make,), range(1, 2)) == []
+def test_a_mistake_is_recognized(make: Maker) -> None:
+    assert wrong_diagnostics((make,), range(1, 2)) == []
 
 
 @pytest.mark.soak
 @pytest.mark.parametrize("make", MISTAKES, ids=lambda make: make.__name__)
-def test_mistakes_are_told_by_what_they_are(make: Maker) -> None:
-    assert told_wrongly((make,), range(40)) == []
+def test_all_mistakes_are_recognized(make: Maker) -> None:
+    assert wrong_diagnostics((make,), range(40)) == []
 
 
 @pytest.mark.soak
 @pytest.mark.parametrize("make", [swapped_encoders, swapped_cables, swapped_cells, late_cells])
-def test_mistakes_are_told_without_commanded_poses(make: Maker) -> None:
+def test_mistakes_are_recognized_without_commanded_poses(make: Maker) -> None:
     robot = ROBOTS[0]
     log = log_of(true_robot(robot, USUAL, 5), 60, 5).log.replace(commanded=None)
     made = make(log, robot, np.random.default_rng(5))
@@ -121,8 +121,8 @@ def test_mistakes_are_told_without_commanded_poses(make: Maker) -> None:
 
 
 @extended
-def test_a_mistake_is_told_of_a_log_with_rows_that_are_not_fit() -> None:
-    """Rows keep their numbers: cells that are late are late in the whole log."""
+def test_a_mistake_is_recognized_in_a_log_with_excluded_rows() -> None:
+    """Rows keep their numbers: late cells are late in the whole log."""
     robot = ROBOTS[0]
     log = log_of(true_robot(robot, USUAL, 3), 60, 3).log
     made = late_cells(log, robot, np.random.default_rng(3))
@@ -135,14 +135,14 @@ def test_a_mistake_is_told_of_a_log_with_rows_that_are_not_fit() -> None:
 
 
 @pytest.mark.parametrize("changes", [{"load_cells": None}, {"load_cells": None, "commanded": None}])
-def test_lengths_alone_say_nothing(changes: dict[str, Any]) -> None:
+def test_lengths_alone_raise_no_diagnostic(changes: dict[str, Any]) -> None:
     robot = ROBOTS[1]
     log = log_of(true_robot(robot, USUAL, 3), 20, 3).log.replace(**changes)
     assert diagnose_log(robot, log) == ()
     assert diagnose_log(robot, log.rows(slice(0, 0))) == ()
 
 
-def test_what_is_none_is_refused() -> None:
+def test_invalid_arguments_are_refused() -> None:
     log = log_of(true_robot(ROBOTS[1]), 4).log
     wrong: Any = "a log"
     for robot, given, model in (
@@ -156,7 +156,7 @@ def test_what_is_none_is_refused() -> None:
         diagnose_log(sl.load_robot("falcon-7"), log)
 
 
-def test_exchanged_load_cells_that_leave_poses_without_equilibrium_are_a_refusal() -> None:
+def test_exchanged_load_cells_without_equilibrium_are_refused() -> None:
     robot, log = sl.load_robot(EXAMPLES / "winches_robot.yaml"), sl.load_log(EXAMPLES / "winches.csv")
     assert log.load_cells is not None
     cells = log.load_cells[:, [2, 1, 0, 3, 4, 5, 6, 7]]

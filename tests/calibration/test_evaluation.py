@@ -1,4 +1,4 @@
-"""A calibrated robot says where its numbers come from."""
+"""A calibrated robot contains the provenance of its numbers."""
 
 from pathlib import Path
 
@@ -39,7 +39,7 @@ def test_every_number_has_the_standard_error_of_its_parameter(shared: bool, coun
     assert (again.log, again.date, again.note) == ("winches.csv", "2026-03-01", "")
 
 
-def test_what_is_not_to_be_trusted_is_noted() -> None:
+def test_doubtful_results_are_noted() -> None:
     robot = sl.load_robot("cogiro")
     parameters = parameters_of(robot, ["mass"], sensors(), counted=False)
     for status in (sl.CalibrationStatus.DOUBTFUL, sl.CalibrationStatus.NOT_CONVERGED):

@@ -1,4 +1,4 @@
-"""The default calibration of a platform on four cables whose load cells are wrong, and of honest logs."""
+"""The default calibration of a platform on four cables with wrong load cells, and of logs without defects."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_a_weighed_platform_gives_the_gain_of_the_load_cells() -> None:
 
 
 @pytest.mark.soak
-def test_random_defects_end_near_the_truth_or_doubtful_and_honest_logs_are_found() -> None:
+def test_random_defects_give_true_or_doubtful_results_and_faultless_logs_are_found() -> None:
     defects = [verdict(seed, DEFECTS[seed % len(DEFECTS)]) for seed in range(200)]
     right = [status == "DOUBTFUL" or (status == "FOUND" and off < 2.0) for status, off in defects]
     honest = Counter(verdict(seed, None)[0] for seed in range(1000, 1200))

@@ -1,4 +1,4 @@
-"""What readings leave open, counted by differences of forward solutions, and named."""
+"""Unidentifiable directions, counted by differences of forward solutions, with their names."""
 
 from dataclasses import replace
 from functools import cache
@@ -35,14 +35,14 @@ BOTH = tuple(f"both anchors of cable {cable} shifted along {axis}" for cable in 
 
 
 class Case(NamedTuple):
-    """What is unknown, what reads, and what that leaves open."""
+    """Unknowns, sensors and the expected unidentifiable directions."""
 
     robot: str
     unknowns: tuple[str, ...]
-    names: tuple[str, ...]  # of the directions, in any order; what the words begin with
-    fixed: tuple[str, ...] = ()  # beginnings of labels of numbers that are known
+    names: tuple[str, ...]  # number of the directions in any order, and the beginnings of their names
+    fixed: tuple[str, ...] = ()  # beginnings of the labels of known parameters
     cells: bool = True
-    positions: int = 0  # at so many of the poses
+    positions: int = 0  # readings at this number of the poses
     rotations: bool = False
 
 
@@ -90,12 +90,12 @@ CASES = {
     ),
 }
 ANCHOR_FIXED = CASES["one anchor fixed"]
-# the others take a second of differences each
+# the other cases take a second of differences each
 TIER: dict[str, Any] = {"plane": (), "63 of the CoGiRo": extended, "2 points": extended}
 
 
 @cache
-def stand(name: str) -> Standing:
+def poses_of_case(name: str) -> Standing:
     known = robots()
     cogiro = sl.load_robot("cogiro")
     known["drums"] = with_drums(cogiro)
@@ -116,13 +116,13 @@ def stand(name: str) -> Standing:
 
 @cache
 def column(robot: str, kind: str, cable: int, axis: int) -> Array:
-    machine, pose, lengths = stand(robot)
+    machine, pose, lengths = poses_of_case(robot)
     placed = Machine(machine.robot, sl.Sensors(5e-4, 5.0, 1e-3, 1e-3), machine.offset)
     return reference.slopes(placed, pose, lengths, KINDS[kind].first + axis, cable)
 
 
 def without(parameters: Parameters, fixed: tuple[str, ...]) -> Parameters:
-    """Without the numbers whose labels begin so."""
+    """Parameters except those whose labels begin with the given texts."""
     keep = np.array([not label.startswith(fixed) if fixed else True for label in parameters.labels])
     new = np.where(keep, np.cumsum(keep) - 1, -1)
     where = np.where(parameters.where >= 0, new[parameters.where], -1)
@@ -144,14 +144,14 @@ def sensors_of(case: Case) -> sl.Sensors:
 
 
 def asked(case: Case) -> Parameters:
-    machine = stand(case.robot).machine
+    machine = poses_of_case(case.robot).machine
     shared = () if case.robot == "pulleys" else SHARED
     return without(reference.parameters(machine, case.unknowns, tuple(set(shared) & set(case.unknowns))), case.fixed)
 
 
 def by_differences(case: Case) -> Array:
-    """Slopes of what is read by the internal parameters, in deviations of both, (rows, P)."""
-    machine = stand(case.robot).machine
+    """Slopes of the readings with respect to the internal parameters, in deviations of both, (rows, P)."""
+    machine = poses_of_case(case.robot).machine
     m, parameters = machine.robot.cable_count, asked(case)
     total = np.zeros((POSES, m + 6, len(parameters.names)))
     for kind in case.unknowns:
@@ -166,12 +166,14 @@ def by_differences(case: Case) -> Array:
     rows = np.vstack([part.reshape(-1, total.shape[2]) for part in parts])
     rows = rows * prior_units(parameters).scale
     size = np.linalg.norm(rows, axis=1, keepdims=True)
-    found: Array = rows[size[:, 0] > 0.0] / size[size[:, 0] > 0.0]  # stiff poses are as wrong as they are large
+    found: Array = (
+        rows[size[:, 0] > 0.0] / size[size[:, 0] > 0.0]
+    )  # errors at stiff poses are proportional to the slopes
     return found
 
 
 def triangle_of(case: Case) -> Array:
-    machine, pose, lengths = stand(case.robot)
+    machine, pose, lengths = poses_of_case(case.robot)
     parameters, sensors = asked(case), sensors_of(case)
     triangle = np.zeros((0, len(parameters.names)))
     for part, given in ((slice(0, case.positions), sensors), (slice(case.positions, None), None)):
@@ -186,12 +188,12 @@ SLOW = [pytest.param(name, marks=TIER.get(name, pytest.mark.soak)) for name in C
 
 
 def directions(case: Case) -> tuple[Direction, ...]:
-    machine, parameters = stand(case.robot).machine, asked(case)
+    machine, parameters = poses_of_case(case.robot).machine, asked(case)
     return gauge_of(triangle_of(case), parameters, parameters.prior, machine.robot, sensors_of(case))
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=extended if name == "pulleys" else ()) for name in CASES])
-def test_directions_left_open(name: str) -> None:
+def test_unidentifiable_directions(name: str) -> None:
     left = [one.name for one in directions(CASES[name])]
     assert len(left) == len(CASES[name].names)
     for wanted in sorted(CASES[name].names, key=len, reverse=True):
@@ -199,7 +201,7 @@ def test_directions_left_open(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", SLOW)
-def test_differences_leave_as_many_open_and_the_same(name: str) -> None:
+def test_differences_give_the_same_unidentifiable_directions(name: str) -> None:
     case = CASES[name]
     found, rows = directions(case), by_differences(case)
     values = np.linalg.svd(rows)[1]
@@ -211,7 +213,7 @@ def test_differences_leave_as_many_open_and_the_same(name: str) -> None:
     assert np.linalg.matrix_rank(vectors, tol=1e-3) == len(found)
 
 
-def test_63_unknowns_of_the_cogiro() -> None:
+def test_63_parameters_of_the_cogiro() -> None:
     case = CASES["63 of the CoGiRo"]
     assert len(asked(case).names) == 63
     values = np.linalg.svd(triangle_of(case) * prior_units(asked(case)).scale)[1]
@@ -221,7 +223,7 @@ def test_63_unknowns_of_the_cogiro() -> None:
 
 def test_an_anchor_stated_to_be_known_is_fixed() -> None:
     case = CASES["63 of the CoGiRo"]
-    machine, parameters = stand("drums").machine, asked(case)
+    machine, parameters = poses_of_case("drums").machine, asked(case)
     first = np.array([label.startswith("frame_anchors[0]") for label in parameters.labels])
     stated = replace(parameters, stated=first, prior_deviation=np.where(first, 1e-6, parameters.prior_deviation))
     found = gauge_of(triangle_of(case), stated, stated.prior, machine.robot, sensors_of(case))
@@ -229,7 +231,7 @@ def test_an_anchor_stated_to_be_known_is_fixed() -> None:
     assert all(not one.vector[first].any() for one in found)
 
 
-def test_rows_in_parts_fold_into_the_same_triangle() -> None:
+def test_row_blocks_give_the_same_triangular_factor() -> None:
     rng = np.random.default_rng(2)
     rows = rng.normal(size=(40, 7, 5))
     whole = append_rows(np.zeros((0, 5)), rows)
@@ -252,5 +254,5 @@ def test_rows_in_parts_fold_into_the_same_triangle() -> None:
         ([0.0, 0.0], 0),
     ],
 )
-def test_the_gap_between_told_and_open(values: list[float], count: int) -> None:
+def test_the_gap_between_identifiable_and_unidentifiable_directions(values: list[float], count: int) -> None:
     assert numerical_rank(np.array(values)) == count

@@ -1,4 +1,4 @@
-"""The greedy choice against an exhaustive search, and its sums against determinants and inverses written out."""
+"""The greedy choice compared with an exhaustive search, and its sums with determinants and inverses."""
 
 from itertools import combinations
 
@@ -9,12 +9,12 @@ from sagline.calibration.information import Information, choose_informative, dev
 from sagline.core.arrays import Array, Indices
 from tests.tiers import wide
 
-SURELY = 1.0 - np.exp(-1.0)  # of the best log det, which a greedy choice never misses
-NEAR = 0.97  # of the best, in all cases below
+SURELY = 1.0 - np.exp(-1.0)  # guaranteed share of the best log det by a greedy choice
+NEAR = 0.97  # share of the best in all cases below
 
 
 def rows_of(seed: int, candidates: int = 11, readings: int = 2, numbers: int = 5) -> Array:
-    """Readings of very different worth, some candidates nearly alike."""
+    """Readings of very different information, with some nearly equal candidates."""
     rng = np.random.default_rng(seed)
     rows = rng.normal(size=(candidates, readings, numbers)) * 10.0 ** rng.uniform(-1.0, 1.5, (candidates, 1, numbers))
     rows[-3:] = rows[:3] + 0.05 * rng.normal(size=(3, readings, numbers))
@@ -27,7 +27,7 @@ def log_det(rows: Array, which: tuple[int, ...] | Indices) -> float:
 
 
 @pytest.mark.parametrize("count", wide([3, 1, 2, 4]))
-def test_choice_against_an_exhaustive_search(count: int) -> None:
+def test_the_choice_is_near_an_exhaustive_search(count: int) -> None:
     shares = []
     for seed in range(25):
         rows = rows_of(seed)
@@ -39,15 +39,15 @@ def test_choice_against_an_exhaustive_search(count: int) -> None:
     assert np.median(shares) >= 1.0 - 1e-9
 
 
-def test_an_exchange_finds_what_greed_misses() -> None:
-    # the first tells most alone, the two others together
+def test_exchanges_improve_a_greedy_choice() -> None:
+    # the first has the most information alone, the two others together
     rows = np.array([[[3.0, 3.0]], [[4.0, 0.0]], [[0.0, 4.0]]])
     rows[0] *= 1.01
     assert log_det(rows, (0,)) > log_det(rows, (1,))
     assert sorted(choose_informative(rows, np.eye(2), 2).order) == [1, 2]
 
 
-def test_gains_and_deviations_written_out() -> None:
+def test_gains_and_deviations_by_definition() -> None:
     rows = rows_of(3, candidates=20)
     choice = choose_informative(rows, np.eye(5), 12)
     assert len(set(choice.order)) == 12
@@ -56,10 +56,10 @@ def test_gains_and_deviations_written_out() -> None:
         known = np.eye(5) + flat.T @ flat
         assert choice.gain[k - 1] == pytest.approx(np.linalg.slogdet(known)[1], rel=1e-10)
         np.testing.assert_allclose(choice.deviation[k - 1], np.sqrt(np.diag(np.linalg.inv(known))), rtol=1e-7)
-    assert (np.diff(choice.gain, 2) <= 1e-9).all()  # each tells less than the one before
+    assert (np.diff(choice.gain, 2) <= 1e-9).all()  # the gain decreases from candidate to candidate
 
 
-def test_taken_and_left_again() -> None:
+def test_adding_and_removing_a_candidate_is_reversible() -> None:
     rows = rows_of(5) * 1e3
     found, again = Information(rows, np.eye(5)), Information(rows, np.eye(5))
     for candidate in (4, 7, 2):
@@ -71,17 +71,17 @@ def test_taken_and_left_again() -> None:
     np.testing.assert_allclose(found.gains(), again.gains(), rtol=1e-6)
 
 
-def test_candidates_that_tell_nothing_are_taken_once_each() -> None:
+def test_candidates_without_information_are_used_once() -> None:
     assert sorted(choose_informative(np.zeros((4, 2, 3)), np.eye(3), 4).order) == [0, 1, 2, 3]
 
 
-def test_deviations_of_what_is_open() -> None:
+def test_deviations_of_undetermined_parameters() -> None:
     rows = np.diag([2.0, 1e8, 0.0, 5.0])
     np.testing.assert_allclose(deviations_of(rows, np.zeros(4), np.eye(4)), [0.5, 1e-8, np.inf, 0.2])
     np.testing.assert_allclose(
         deviations_of(rows, np.array([0.0, 0.0, 4.0, 12.0]), np.eye(4)), [0.5, 1e-8, 0.25, 1.0 / 13.0]
     )
-    # of two numbers the sum is read, their difference is open, or known beforehand of one of them
+    # only the sum of two numbers is read; their difference is undetermined, or one of them has a prior
     both = np.array([[[1.0, 1.0, 0.0]], [[0.0, 0.0, 2.0]]])
     np.testing.assert_array_equal(deviations_of(both, np.zeros(3), np.eye(3)), [np.inf, np.inf, 0.5])
     np.testing.assert_allclose(deviations_of(both, np.array([0.5, 0.0, 0.0]), np.eye(3)), [2.0, np.sqrt(5.0), 0.5])
@@ -90,12 +90,12 @@ def test_deviations_of_what_is_open() -> None:
 @pytest.mark.parametrize("precision", [1.0, 1e4, 1e8])
 def test_readings_of_any_precision(precision: float) -> None:
     rows = rows_of(7, candidates=12, numbers=6) * precision
-    rows[..., 5] = rows[..., 4]  # never told apart
+    rows[..., 5] = rows[..., 4]  # never distinguished
     choice = choose_informative(rows, prior_information(rows, np.eye(6)), 8)
     assert len(set(choice.order)) == 8
     found = deviations_of(rows[choice.order], np.ones(6), np.eye(6))
     told = rows.reshape(-1, 6)[:, :5] / precision
-    # of the two that are told together half the difference remains of what was known
+    # half of the prior difference remains in two numbers with a common reading
     np.testing.assert_allclose(found[4:], np.sqrt(0.5), rtol=1e-3 if precision == 1.0 else 1e-9)
     assert (
         found[:4] >= 0.9 * np.sqrt(np.diag(np.linalg.inv(np.eye(5) / precision**2 + told.T @ told)))[:4] / precision

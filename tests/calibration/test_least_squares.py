@@ -1,4 +1,4 @@
-"""The least squares, against one that knows nothing of it: all lengths unknowns, slopes by differences."""
+"""The least squares compared with a plain fit that has all lengths as unknowns and slopes by differences."""
 
 import numpy as np
 import pytest
@@ -43,13 +43,13 @@ def fitted(problem: FitProblem, made: Synthetic, *, robust: bool = False) -> Fit
 
 
 def errors_of(problem: FitProblem, fit: Fit) -> Array:
-    """Standard errors of the internal numbers, (P,)."""
+    """Standard errors of the internal parameters, (P,)."""
     information = fit.normal.matrix + np.diag(problem.prior_deviation**-2.0)
     return np.asarray(np.sqrt(np.diag(np.linalg.inv(information))))
 
 
-def plainly(problem: FitProblem, made: Synthetic, fit: Fit) -> Array:
-    """The numbers and lengths that a library's least squares finds from the same sum of squares, by the public API."""
+def plain_fit(problem: FitProblem, made: Synthetic, fit: Fit) -> Array:
+    """Parameters and lengths by a least squares library for the same sum of squares, by public functions."""
     log, sensors, poses = made.log, problem.sensors, made.pose
     assert log.counts is not None
     assert log.load_cells is not None
@@ -79,21 +79,21 @@ def plainly(problem: FitProblem, made: Synthetic, fit: Fit) -> Array:
 
 
 @pytest.mark.parametrize("name", wide(NOMINAL))
-def test_the_minimum_is_that_of_a_plain_least_squares_with_all_lengths_as_unknowns(name: str) -> None:
+def test_the_minimum_is_that_of_a_plain_fit_with_all_lengths(name: str) -> None:
     made = log_of(true_robot(NOMINAL[name], ERRORS, 3), 4, 3, sets=4)
     problem = problem_of(made, UNKNOWNS, NOMINAL[name])
     fit = fitted(problem, made)
     assert fit.converged
     width = len(problem.prior)
-    plain = plainly(problem, made, fit)
+    plain = plain_fit(problem, made, fit)
     error = errors_of(problem, fit)
     assert (np.abs(plain[:width] - fit.state.numbers) / error).max() < 1e-3
-    assert np.abs(plain[width:] - fit.state.lengths.ravel()).max() < 1e-6  # of 0.5 mm that a length may be off
+    assert np.abs(plain[width:] - fit.state.lengths.ravel()).max() < 1e-6  # of 0.5 mm standard deviation of a length
 
 
 @extended
-def test_no_number_falls_below_the_least_that_it_may_be_and_the_others_fit_best_beside_it() -> None:
-    """No pulleys, and lengths that want some of less than none: the conditions of Karush, Kuhn and Tucker."""
+def test_parameters_respect_lower_bounds_and_the_others_are_optimal() -> None:
+    """No pulleys, and lengths that favor negative radii: the conditions of Karush, Kuhn and Tucker."""
     small = with_drums(pulley_radius=0.001)
     made = log_of(true_robot(with_drums(pulley_radius=0.0), {}, 1), 12, 1)
     shifted = made._replace(log=made.log.replace(counts=made.log.readings - 200.0))
@@ -113,7 +113,7 @@ def test_no_number_falls_below_the_least_that_it_may_be_and_the_others_fit_best_
 
 @pytest.mark.parametrize("name", wide(NOMINAL))
 @pytest.mark.parametrize("seed", range(3))
-def test_a_pose_that_does_not_fit_counts_less_and_changes_little(seed: int, name: str) -> None:
+def test_an_outlying_pose_has_less_weight_and_little_influence(seed: int, name: str) -> None:
     nominal = NOMINAL[name]
     true = true_robot(nominal, ERRORS, seed)
     honest = log_of(true, 40, seed)
@@ -126,7 +126,7 @@ def test_a_pose_that_does_not_fit_counts_less_and_changes_little(seed: int, name
 
 
 @pytest.mark.parametrize("name", wide(NOMINAL))
-def test_lengths_follow_their_readings_as_far_as_these_are_trusted(name: str) -> None:
+def test_lengths_follow_their_readings_by_their_precision(name: str) -> None:
     true = true_robot(NOMINAL[name], {}, 0, usual_sensors(length_deviation=1e-6))
     made = log_of(true, 8, 2)
     fit = fitted(problem_of(made, UNKNOWNS, NOMINAL[name]), made)
@@ -146,12 +146,14 @@ ALL = (
 
 
 def missed_after(name: str, share: float) -> tuple[float, float]:
-    """How far platforms move by a share of a step of all numbers, and are then from where they were looked for [m]."""
+    """Motion of the platforms for a partial step of all parameters, and distance to the predicted positions [m]."""
     machine, pose, lengths = standing(robots()[name])
     robot, model = machine.robot, sl.Catenary()
     given = sl.Sensors(length_deviation=5e-4, tension_deviation=5.0)
     gain, bias = load_cells_of(robot)
-    cells = gain * sl.forward(robot, lengths, pose).state.cables.frame_end_tension + bias  # what is not off stays so
+    cells = (
+        gain * sl.forward(robot, lengths, pose).state.cables.frame_end_tension + bias
+    )  # correct values stay unchanged
     silent = np.full((len(lengths), 3), np.nan), np.full((len(lengths), 4), np.nan)
     problem = FitProblem(
         robot,
@@ -172,7 +174,7 @@ def missed_after(name: str, share: float) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("name", wide(["cogiro", "article-suspended", "planar", "point", "pulleys"], first=4))
-def test_a_step_looks_for_the_platform_where_the_slopes_have_it(name: str) -> None:
+def test_a_step_starts_at_the_poses_predicted_by_slopes(name: str) -> None:
     moves, misses = zip(*(missed_after(name, share) for share in (1.0, 0.5)), strict=True)
     assert misses[0] < 0.15 * moves[0]
-    assert 3.5 < misses[0] / misses[1] < 4.5  # what is left is of second order
+    assert 3.5 < misses[0] / misses[1] < 4.5  # the remainder is of second order

@@ -1,4 +1,4 @@
-"""A log of readings: what it takes, what it refuses, and parts of it."""
+"""A log of readings: valid and invalid data, and parts of it."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ def fields(**changes: Any) -> dict[str, Any]:
 
 
 def counted(text: str) -> dict[str, int]:
-    """The numbers in a text, by the words that follow."""
+    """Numbers in a text by the words that follow them."""
     return {words: int(number) for number, words in re.findall(r"(\d+) ((?:measured )?\w+)", text)}
 
 
-def test_it_keeps_what_it_is_given() -> None:
+def test_a_log_contains_the_given_data() -> None:
     given = fields()
     log = sl.WinchLog(**given)
     assert len(log) == N
@@ -57,7 +57,7 @@ def test_it_keeps_what_it_is_given() -> None:
     assert str(sl.WinchLog([[1.0]])).endswith(": counts")
 
 
-def test_rotations_become_units_and_stay_missing() -> None:
+def test_quaternions_are_normalized_and_missing_ones_stay_nan() -> None:
     given: Array = np.array([[np.nan] * 4, [0.6000001, 0.0, 0.0, 0.8], [0.0, 1.0, 0.0, 0.0], [np.nan] * 4])
     found = sl.WinchLog(**fields(rotation=given)).rotation
     assert found is not None
@@ -75,7 +75,7 @@ def test_rotations_become_units_and_stay_missing() -> None:
         (slice(0, 0), []),
     ],
 )
-def test_rows_takes_the_same_of_every_field(which: Any, kept: list[int]) -> None:
+def test_rows_selects_the_same_rows_of_every_field(which: Any, kept: list[int]) -> None:
     log = sl.WinchLog(**fields(time=np.zeros(N)))
     part = log.rows(which)
     assert len(part) == len(kept)
@@ -88,7 +88,7 @@ def test_rows_takes_the_same_of_every_field(which: Any, kept: list[int]) -> None
     assert part.source == log.source
 
 
-def test_it_is_pickled_and_copied_whole() -> None:
+def test_a_log_is_pickled_and_copied_completely() -> None:
     log = sl.WinchLog(**fields())
     for again in (pickle.loads(pickle.dumps(log)), copy.deepcopy(log)):
         assert str(again) == str(log)
@@ -125,12 +125,12 @@ QUARTER = np.array([0.0, 0.0, np.nan, 1.0])
         ({"source": "a\x00b"}, ("source", r"'a\x00b'")),
     ],
 )
-def test_it_refuses_what_does_not_fit(changes: dict[str, Any], parts: tuple[str, ...]) -> None:
+def test_inconsistent_data_are_refused(changes: dict[str, Any], parts: tuple[str, ...]) -> None:
     with refused(*parts, kind=sl.InvalidValueError):
         sl.WinchLog(**fields(**changes))
 
 
-def test_what_is_replaced_is_checked() -> None:
+def test_replaced_fields_are_checked() -> None:
     log = sl.WinchLog(**fields())
     less = log.replace(load_cells=None, source="")
     assert (less.load_cells, less.source) == (None, "")

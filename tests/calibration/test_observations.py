@@ -1,4 +1,4 @@
-"""What readings tell of the unknowns, block by block, against differences of forward solutions."""
+"""Slopes of readings with respect to the unknowns, block by block, compared with differences of forward solutions."""
 
 from functools import cache
 from typing import Any
@@ -26,7 +26,7 @@ OVER_PULLEYS = ("pulleys", "layers")
 
 
 def cases(other_kinds: tuple[str, ...]) -> list[Any]:
-    """Robots and kinds; in the first tier all kinds of one robot, and one kind of each without pulleys."""
+    """Robots and kinds; the first tier has all kinds of one robot, and one kind of each robot without pulleys."""
     found = [(robot, kind) for kind in KINDS if kind not in other_kinds for robot in WITH.get(kind, tuple(ROBOTS))]
     return [
         pytest.param(
@@ -40,14 +40,14 @@ def cases(other_kinds: tuple[str, ...]) -> list[Any]:
 
 
 @cache
-def stand(name: str) -> Standing:
+def machine_at_poses(name: str) -> Standing:
     return standing(ROBOTS[name])
 
 
 @cache
-def told(name: str, kind: str) -> Array:
-    """What `observed` says of a kind, not whitened any more: lengths are known to a nanometer."""
-    machine, pose, lengths = stand(name)
+def observed_slopes(name: str, kind: str) -> Array:
+    """Output of `observed` for a kind without whitening; lengths have deviations of a nanometer."""
+    machine, pose, lengths = machine_at_poses(name)
     asked = reference.parameters(machine, (kind,))
     seen = predicted_rows(machine.robot, sl.Catenary(), asked, machine.sensors, pose_rows(pose), lengths)
     assert not seen.misfit.any()
@@ -57,8 +57,8 @@ def told(name: str, kind: str) -> Array:
 
 @cache
 def differences(name: str, kind: str) -> Array:
-    """The same, (N, m + 6, P)."""
-    machine, pose, lengths = stand(name)
+    """The same by differences, (N, m + 6, P)."""
+    machine, pose, lengths = machine_at_poses(name)
     each = KINDS[kind]
     cables = range(machine.robot.cable_count) if each.each else range(1)
     columns = [
@@ -80,32 +80,32 @@ def deviations(machine: Machine) -> Array:
 
 def agree(found: Array, wanted: Array) -> None:
     assert found.shape == wanted.shape
-    largest = np.abs(wanted).max() or 1e-3  # where nothing is told, rounding
+    largest = np.abs(wanted).max() or 1e-3  # rounding where the true slope is zero
     np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-7 * largest)
 
 
 @pytest.mark.parametrize(("robot", "kind"), cases(POSE_ONLY))
-def test_load_cells_by(robot: str, kind: str) -> None:
+def test_slopes_of_load_cells(robot: str, kind: str) -> None:
     m = ROBOTS[robot].cable_count
-    agree(told(robot, kind)[:, :m], differences(robot, kind)[:, :m])
+    agree(observed_slopes(robot, kind)[:, :m], differences(robot, kind)[:, :m])
 
 
 @pytest.mark.parametrize(("robot", "kind"), cases(CELL_ONLY))
-def test_positions_by(robot: str, kind: str) -> None:
+def test_slopes_of_positions(robot: str, kind: str) -> None:
     rows = slice(ROBOTS[robot].cable_count, -3)
-    agree(told(robot, kind)[:, rows], differences(robot, kind)[:, rows])
+    agree(observed_slopes(robot, kind)[:, rows], differences(robot, kind)[:, rows])
 
 
 @pytest.mark.parametrize(("robot", "kind"), cases(CELL_ONLY))
-def test_rotations_by(robot: str, kind: str) -> None:
-    agree(told(robot, kind)[:, -3:], differences(robot, kind)[:, -3:])
+def test_slopes_of_rotations(robot: str, kind: str) -> None:
+    agree(observed_slopes(robot, kind)[:, -3:], differences(robot, kind)[:, -3:])
 
 
 @pytest.mark.parametrize(
     "robot", [pytest.param(robot, marks=extended if robot in OVER_PULLEYS else ()) for robot in ROBOTS]
 )
-def test_whitening_by_what_lengths_are_off(robot: str) -> None:
-    machine, pose, lengths = stand(robot)
+def test_whitening_by_errors_of_lengths(robot: str) -> None:
+    machine, pose, lengths = machine_at_poses(robot)
     loose = machine.sensors.replace(length_deviation=LENGTH)
     asked = reference.parameters(machine, ("frame_anchors", "mass"))
     seen = predicted_rows(machine.robot, sl.Catenary(), asked, loose, pose_rows(pose), lengths)
@@ -119,8 +119,8 @@ def test_whitening_by_what_lengths_are_off(robot: str) -> None:
 
 @pytest.mark.parametrize("robot", ["cogiro", "drums"])
 @pytest.mark.parametrize("absent", ["tension_deviation", "position_deviation", "rotation_deviation"])
-def test_a_sensor_that_is_not_there_tells_nothing(robot: str, absent: str) -> None:
-    machine, pose, lengths = stand(robot)
+def test_a_missing_sensor_has_no_slopes(robot: str, absent: str) -> None:
+    machine, pose, lengths = machine_at_poses(robot)
     rows = {"tension_deviation": slice(0, 8), "position_deviation": slice(8, 11), "rotation_deviation": slice(11, 14)}
     without = machine.sensors.replace(**{absent: None}, length_deviation=LENGTH)
     asked = reference.parameters(machine, ("frame_anchors", "measuring_frame", "target"))
@@ -139,26 +139,26 @@ def test_a_sensor_that_is_not_there_tells_nothing(robot: str, absent: str) -> No
 
 @extended
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if KINDS[kind].each])
-def test_a_number_of_all_cables_is_the_sum_of_theirs(kind: str) -> None:
-    machine, pose, lengths = stand("layers")
+def test_slopes_of_a_common_parameter_are_sums_over_cables(kind: str) -> None:
+    machine, pose, lengths = machine_at_poses("layers")
     asked = reference.parameters(machine, (kind,), shared=(kind,))
     seen = predicted_rows(machine.robot, sl.Catenary(), asked, machine.sensors, pose_rows(pose), lengths)
-    each = told("layers", kind)
+    each = observed_slopes("layers", kind)
     wanted = each.reshape(*each.shape[:2], 8, -1).sum(axis=2)
     agree(seen.matrix * deviations(machine)[:, None], wanted)
 
 
 @extended
-def test_the_reference_itself_with_half_the_step(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_reference_agrees_with_half_the_step(monkeypatch: pytest.MonkeyPatch) -> None:
     wide = {(name, kind): differences(name, kind) for name in ("layers", "planar") for kind in ("mass", "length_zero")}
     monkeypatch.setattr(reference, "STEPS", {row: 0.5 * step for row, step in reference.STEPS.items()})
     for (name, kind), found in wide.items():
         agree(differences.__wrapped__(name, kind), found)
 
 
-def test_a_measured_point_written_out() -> None:
-    machine, pose, _ = stand("cogiro")
-    read, _ = reference.readings(machine, stand("cogiro").lengths, pose, sl.Catenary())
+def test_a_measured_point_by_definition() -> None:
+    machine, pose, _ = machine_at_poses("cogiro")
+    read, _ = reference.readings(machine, machine_at_poses("cogiro").lengths, pose, sl.Catenary())
     frame, target = sensors().frame, sensors().target
     by_hand = [
         frame.matrix.T @ (p + r @ target - frame.position) for p, r in zip(pose.position, pose.matrix, strict=True)

@@ -1,4 +1,4 @@
-"""What went wrong at a pose: on synthetic logs in which something did."""
+"""Outliers in synthetic logs with deliberate errors at single poses."""
 
 from functools import cache
 
@@ -21,7 +21,7 @@ def truth(robot: str = "cogiro", *, positions: bool = False) -> Truth:
 
 
 def outliers(log: sl.WinchLog, true: Truth) -> tuple[Outlier, ...]:
-    """Of a robot that is as believed but for its mass."""
+    """Outliers of a robot that is known except for its mass."""
     return sl.calibrate(true.robot, log, ("mass",), folds=0).outliers
 
 
@@ -33,7 +33,7 @@ def slips(seed: int, count: int = 3) -> dict[tuple[int, int], float]:
 
 
 def seeds(quick: int, count: int) -> list[object]:
-    """The first few, and the rest where there is time."""
+    """The first few seeds, and the others if time permits."""
     return [pytest.param(seed, marks=() if seed < quick else pytest.mark.soak) for seed in range(count)]
 
 
@@ -61,7 +61,7 @@ def test_slips_of_20_mm_that_load_cells_alone_see(seed: int) -> None:
 
 
 @pytest.mark.soak
-def test_cables_that_are_named_are_the_ones() -> None:
+def test_the_named_cables_are_the_slipped_ones() -> None:
     right, named = 0, 0
     for seed in range(20, 60):
         made = slips(seed)
@@ -102,20 +102,20 @@ def test_two_cables_of_one_pose() -> None:
     np.testing.assert_allclose([one.size for one in found], [-0.03, 0.02], atol=4e-3)
 
 
-def test_a_log_in_which_nothing_went_wrong() -> None:
+def test_a_log_without_errors() -> None:
     assert outliers(log_of(truth(), POSES, 70).log, truth()) == ()
 
 
 @pytest.mark.soak
 def test_one_log_in_a_hundred_shows_an_outlier_by_chance() -> None:
     found = [outliers(log_of(truth(), POSES, 70 + seed).log, truth()) for seed in range(100)]
-    assert sum(bool(each) for each in found) <= 5  # of 1 to be expected; 6 or more in 1 of 1700
+    assert sum(bool(each) for each in found) <= 5  # 1 is expected; 6 or more occur in 1 of 1700 runs
 
 
 @pytest.mark.parametrize("size", wide([-0.1, 0.05, 0.2]))
 @pytest.mark.parametrize("seed", seeds(2, 20))
-def test_cables_that_slipped_by_far_are_told_with_their_size(size: float, seed: int) -> None:
-    """Lengths so far off that they put the platform elsewhere: a slip all the same, or a count read wrongly."""
+def test_large_slips_are_reported_with_their_size(size: float, seed: int) -> None:
+    """Length errors that move the platform far away: still a slip or a wrong count."""
     rng = np.random.default_rng(seed)
     row, cable = int(rng.integers(POSES)), int(rng.integers(8))
     found = sl.calibrate(
@@ -126,7 +126,7 @@ def test_cables_that_slipped_by_far_are_told_with_their_size(size: float, seed: 
     assert abs(found.outliers[0].size - size) < 5e-3
 
 
-def test_the_cable_that_explains_most_by_its_slopes_is_not_named_where_another_explains_all() -> None:
+def test_the_cable_with_the_best_nonlinear_explanation_is_named() -> None:
     """By the slopes alone it would be cable 4, which leaves 35 of the sum of squares; cable 2 leaves 11 of 7."""
     robot = sl.load_robot("cogiro")
     made = log_of(true_robot(robot), 40, slips={(7, 2): -0.1})

@@ -1,4 +1,4 @@
-"""The numbers that a calibration looks for, and what is known of each beforehand."""
+"""Parameters of a calibration and their priors."""
 
 import numpy as np
 import pytest
@@ -16,20 +16,20 @@ def asked(robot: sl.Robot, *unknowns: str | sl.Unknown, sensors: sl.Sensors | No
     return parameters_of(robot, unknowns, sensors or usual_sensors(), counted=True)
 
 
-def test_who_asks_knows_best_then_the_robot_file_then_what_is_usual() -> None:
+def test_priors_come_from_the_call_then_the_robot_file_then_the_defaults() -> None:
     told = COGIRO.replace(tolerances={"frame_anchors": [0.01, 0.02, 0.03], "mass": 2.0})
     own = asked(told, "frame_anchors", "mass", "center_of_mass")
     np.testing.assert_array_equal(own.prior_deviation[:24], np.tile([0.01, 0.02, 0.03], 8))
-    assert own.prior_deviation[24] == 2.0  # kg: tolerances are in units
+    assert own.prior_deviation[24] == 2.0  # kg: tolerances have units
     np.testing.assert_array_equal(own.stated, [True] * 25 + [False] * 3)
     np.testing.assert_array_equal(own.prior_deviation[25:], 0.05)
     over = asked(told, sl.Unknown("frame_anchors", deviation=0.5), sl.Unknown("mass", deviation=0.1))
     np.testing.assert_array_equal(over.prior_deviation[:24], 0.5)
-    assert over.prior_deviation[24] == pytest.approx(0.1 * told.mass)  # a share, as an unknown says it
+    assert over.prior_deviation[24] == pytest.approx(0.1 * told.mass)  # relative, as in the unknown
     assert over.stated.all()
 
 
-def test_what_the_source_does_not_give_is_less_well_known() -> None:
+def test_assumed_values_have_wider_priors() -> None:
     known, guessed = (
         asked(COGIRO.replace(assumed=assumed), "center_of_mass", "mass")
         for assumed in ({}, {"center_of_mass": "nobody says"})
@@ -41,7 +41,7 @@ def test_what_the_source_does_not_give_is_less_well_known() -> None:
 
 
 @pytest.mark.parametrize(("name", "value"), [("axial_stiffness", 1e4), ("pulley_radius", 1e-3)])
-def test_cables_share_a_number_only_where_it_is_equal_and_as_well_known(name: str, value: float) -> None:
+def test_cables_share_a_parameter_only_with_equal_values_and_priors(name: str, value: float) -> None:
     assert asked(COGIRO, name).labels == (name,)
     each = value * np.arange(1, 9)
     apart = asked(COGIRO.replace(tolerances={name: each}), name)
@@ -52,7 +52,7 @@ def test_cables_share_a_number_only_where_it_is_equal_and_as_well_known(name: st
 
 
 @pytest.mark.parametrize("name", ["load_cell_gain", "load_cell_bias"])
-def test_what_no_sensor_sees_is_refused_unless_somebody_knows_it(name: str) -> None:
+def test_a_parameter_without_a_sensor_or_a_prior_is_refused(name: str) -> None:
     blind = sl.Sensors(position_deviation=1e-3)
     with refused(f"unknown: {name}", "observed by no reading", "load cells in the log", kind=InvalidValueError):
         asked(COGIRO, name, sensors=blind)

@@ -1,4 +1,4 @@
-"""Poses worth measuring: against random ones, whole forward solves, slopes by differences; and what is refused."""
+"""Measurement poses: compared with random ones, whole forward solutions and slopes by differences; and refusals."""
 
 import re
 from functools import cache
@@ -34,8 +34,8 @@ def chosen(name: str, count: int = 40, unknowns: tuple[str, ...] = ALL, seed: in
     return sl.calibration_poses(with_drums(name), count, unknowns, usual_sensors(), seed=seed)
 
 
-def told(plan: sl.CalibrationPoses, pose: sl.Pose, lengths: Array) -> Array:
-    """What poses tell of the numbers of a plan, in units of what is known of them beforehand, (P, P)."""
+def information_of(plan: sl.CalibrationPoses, pose: sl.Pose, lengths: Array) -> Array:
+    """Information of poses on the parameters of a plan, in units of the priors, (P, P)."""
     numbers = plan.parameters
     unit = numbers.prior_deviation / np.where(numbers.logarithmic, numbers.prior, 1.0)
     matrix = predicted_rows(plan.robot, sl.Catenary(), numbers, plan.sensors, pose_rows(pose), lengths).matrix
@@ -46,24 +46,24 @@ def told(plan: sl.CalibrationPoses, pose: sl.Pose, lengths: Array) -> Array:
 
 @cache
 def of_random_poses(name: str, count: int) -> list[Array]:
-    """What poses of the box tell that nobody chose, each with tensions of its own, (P, P); some draws."""
+    """Information of random poses of the box with their own tensions, (P, P); several draws."""
     truth, found = Truth(with_drums(name), np.zeros(8), usual_sensors()), []
     for seed in range(5):
         log = log_of(truth, 4 * count, seed, sets=4)
         rows = 4 * np.arange(count) + np.arange(count) % 4
-        found.append(told(chosen(name), log.pose[rows], log.length[rows]))
+        found.append(information_of(chosen(name), log.pose[rows], log.length[rows]))
     return found
 
 
 @pytest.mark.parametrize("name", wide(["cogiro", "article-suspended"]))
-def test_as_good_as_random_poses_of_twice_the_number(name: str) -> None:
+def test_poses_are_as_good_as_twice_the_number_of_random_ones(name: str) -> None:
     plan = chosen(name)
     prior = np.eye(63)
-    own = prior + told(plan, plan.poses, plan.unstrained_length)
+    own = prior + information_of(plan, plan.poses, plan.unstrained_length)
     double = [float(np.linalg.slogdet(prior + each)[1]) for each in of_random_poses(name, 80)]
     assert plan.gain[-1] == pytest.approx(np.linalg.slogdet(own)[1], rel=1e-9)
     assert plan.gain[-1] > max(double)
-    # error by error, in the directions that random poses of the same number tell of
+    # error by error, in directions that the same number of random poses determines
     single = of_random_poses(name, 40)
     size, vectors = np.linalg.eigh(np.mean(single, axis=0))
     known = vectors[:, size > 3.0]
@@ -75,7 +75,7 @@ def test_as_good_as_random_poses_of_twice_the_number(name: str) -> None:
     assert plan.share_of_random == pytest.approx(np.exp(np.log(shares).mean()), rel=0.15)
 
 
-def test_every_error_is_that_of_slopes_by_differences() -> None:
+def test_errors_agree_with_slopes_by_differences() -> None:
     robot = MACHINES["drums"]
     unknowns = ("frame_anchors", "drum_radius", "load_cell_gain", "mass")
     sensors = sl.Sensors(5e-4, 4.0, 2e-3, 1e-3, target=(0.1, 0.2, -0.1))
@@ -89,7 +89,7 @@ def test_every_error_is_that_of_slopes_by_differences() -> None:
             for axis in range(len(kind.axes)):
                 columns.append(reference.slopes(machine, plan.poses, plan.unstrained_length, kind.first + axis, cable))
     slopes = np.stack(columns, axis=-1)
-    slopes[..., 24] = slopes[..., 24:32].sum(axis=-1)  # one radius for all drums
+    slopes[..., 24] = slopes[..., 24:32].sum(axis=-1)  # one radius of all drums
     slopes = np.delete(slopes, range(25, 32), axis=-1)
     lengths = reference.by_lengths(machine, plan.poses, plan.unstrained_length, model)
     deviations = np.repeat([4.0, 2e-3, 1e-3], [8, 3, 3])
@@ -106,7 +106,7 @@ def test_every_error_is_that_of_slopes_by_differences() -> None:
 
 
 def read_at(truth: Truth, plan: sl.CalibrationPoses, seed: int) -> sl.WinchLog:
-    """What a robot reads that is sent to the poses of a plan, with tensions as near to those of the plan as it has."""
+    """Readings of a robot at the poses of a plan, with tensions as close to the plan as possible."""
     rng, robot = np.random.default_rng(seed), truth.robot
     wide = robot.replace(tension_min=1.0)
     methods = [sl.QuadraticProgram(target=tension) for tension in plan.frame_end_tension]
@@ -125,7 +125,7 @@ def read_at(truth: Truth, plan: sl.CalibrationPoses, seed: int) -> sl.WinchLog:
 
 
 def found_at(plan: sl.CalibrationPoses, unknowns: list[sl.Unknown], trials: int) -> tuple[Array, Array]:
-    """Errors of real calibrations of robots that are off by what is known beforehand, (trials, P); which converged."""
+    """Errors of calibrations of robots with errors drawn from the priors, (trials, P), and which converged."""
     off = {unknown.name: unknown.deviation or 0.0 for unknown in unknowns}
     errors, converged = [], []
     for seed in range(trials):
@@ -143,7 +143,7 @@ def found_at(plan: sl.CalibrationPoses, unknowns: list[sl.Unknown], trials: int)
         pytest.param(40, ALL, 200, 0.03, marks=pytest.mark.soak),
     ],
 )
-def test_errors_to_expect_are_those_of_real_calibrations(
+def test_expected_errors_agree_with_calibrations(
     count: int, kinds_off: tuple[str, ...], trials: int, within: float
 ) -> None:
     unknowns = [sl.Unknown(name, deviation=OFF[name]) for name in kinds_off]
@@ -156,7 +156,7 @@ def test_errors_to_expect_are_those_of_real_calibrations(
 
 
 @pytest.mark.parametrize("name", ["cogiro", "article-suspended"])
-def test_poses_stand_where_they_may(name: str) -> None:
+def test_poses_are_within_the_limits(name: str) -> None:
     plan = chosen(name)
     robot, box = plan.robot, plan.robot.test_box
     assert box is not None
@@ -168,12 +168,12 @@ def test_poses_stand_where_they_may(name: str) -> None:
     np.testing.assert_allclose(found.pose.position, plan.poses.position, atol=1e-7)
     np.testing.assert_allclose(found.state.cables.frame_end_tension, plan.frame_end_tension, rtol=1e-5)
     tension = found.state.chord_tension
-    clear = 0.019 * (robot.tension_max - robot.tension_min)  # nobody sets the tensions of an uncalibrated robot exactly
+    clear = 0.019 * (robot.tension_max - robot.tension_min)  # tensions of an uncalibrated robot are inaccurate
     assert (tension >= robot.tension_min + clear).all()
     assert (tension <= robot.tension_max - clear).all()
 
 
-def test_sets_of_tensions_at_a_pose_follow_each_other_on_a_short_way() -> None:
+def test_sets_of_tensions_at_a_pose_are_in_a_short_order() -> None:
     plan = chosen("cogiro")
     moved = np.linalg.norm(np.diff(plan.poses.position, axis=0), axis=1)
     places = 1 + np.count_nonzero(moved)
@@ -186,7 +186,7 @@ def test_sets_of_tensions_at_a_pose_follow_each_other_on_a_short_way() -> None:
     assert moved.sum() < 0.5 * min(order)
 
 
-def test_tensions_of_a_pose_differ_as_much_as_they_may() -> None:
+def test_tensions_of_a_pose_differ_as_much_as_possible() -> None:
     plan = chosen("article-suspended")
     by_place: dict[tuple[float, ...], list[Array]] = {}
     for position, tension in zip(plan.poses.position, plan.frame_end_tension, strict=True):
@@ -197,7 +197,7 @@ def test_tensions_of_a_pose_differ_as_much_as_they_may() -> None:
     assert np.median(spread) > 0.3
 
 
-def test_enough_is_where_errors_no_longer_fall() -> None:
+def test_the_number_of_poses_ends_when_errors_no_longer_fall() -> None:
     plan = sl.calibration_poses(sl.load_robot("cogiro"), 60, ("mass", "center_of_mass"), usual_sensors())
     assert 1 < plan.enough < 60
     more = sl.calibration_poses(sl.load_robot("cogiro"), 30, ("mass", "center_of_mass"), usual_sensors())
@@ -210,7 +210,7 @@ def test_the_same_seed_gives_the_same_poses() -> None:
     assert np.abs(one.poses.position - other.poses.position).max() > 0.01
 
 
-def test_progress_is_told() -> None:
+def test_progress_is_reported() -> None:
     heard: list[tuple[int, int]] = []
     sl.calibration_poses(sl.load_robot("cogiro"), 5, ("mass",), progress=lambda done, of: heard.append((done, of)))
     assert heard[-1][0] == heard[-1][1] > 0
@@ -218,7 +218,7 @@ def test_progress_is_told() -> None:
 
 
 @pytest.mark.parametrize(("name", "box"), [("planar", PLANE), ("point", ROOM)], ids=["planar", "point"])
-def test_robots_that_move_less(name: str, box: sl.PoseBox) -> None:
+def test_robots_with_fewer_degrees_of_freedom(name: str, box: sl.PoseBox) -> None:
     robot = MACHINES[name]
     plan = sl.calibration_poses(robot, 12, ("frame_anchors", "mass"), box=box)
     assert sl.forward(robot, plan.unstrained_length, start=plan.poses).solved.all()
@@ -255,19 +255,19 @@ def test_winches_with_little_cable_and_small_cells() -> None:
     assert (1.25 * plan.frame_end_tension <= 1500.0).all()
 
 
-def test_sensors_that_nobody_names_are_usual_ones() -> None:
+def test_default_sensors_are_the_usual_ones() -> None:
     robot = sl.load_robot("cogiro")
     plan = sl.calibration_poses(robot, 5, ("mass",))
     assert plan.sensors.tension_deviation is not None
     assert 1.0 <= float(plan.sensors.tension_deviation) <= 10.0
-    told = robot.replace(winches=sl.Winch(load_cell_deviation=2.5))
-    assert np.all(sl.calibration_poses(told, 5, ("mass",)).sensors.tension_deviation == 2.5)
+    information_of = robot.replace(winches=sl.Winch(load_cell_deviation=2.5))
+    assert np.all(sl.calibration_poses(information_of, 5, ("mass",)).sensors.tension_deviation == 2.5)
 
 
-def test_what_nothing_is_known_of_stays_open() -> None:
+def test_parameters_without_information_stay_undetermined() -> None:
     unknowns = (sl.Unknown("frame_anchors", deviation=np.inf), sl.Unknown("platform_anchors", deviation=np.inf), "mass")
     plan = sl.calibration_poses(sl.load_robot("cogiro"), 20, unknowns, usual_sensors())
-    assert np.isinf(plan.expected_error[:48]).all()  # nobody said where the world is
+    assert np.isinf(plan.expected_error[:48]).all()  # the position of the world is unknown
     assert plan.expected_error[48] < plan.parameters.prior_deviation[48]
     assert "–" in str(plan)
     measured = usual_sensors(position_deviation=1e-3, rotation_deviation=1e-3)
@@ -289,7 +289,7 @@ def test_readings_and_priors_of_any_precision(deviation: float) -> None:
 
 
 def changed(robot: sl.Robot, words: str) -> dict[str, Any]:
-    """The unknowns with which it is known what somebody is told to measure."""
+    """The unknowns with priors after a recommended measurement."""
     if "caliper on the pulleys" in words:
         return {"pulley_radius": 1e-4}
     if "weighing the platform" in words:
@@ -305,7 +305,9 @@ def changed(robot: sl.Robot, words: str) -> dict[str, Any]:
         (("mass", "center_of_mass"), None, "platform"),
     ],
 )
-def test_what_would_help_most_does(unknowns: tuple[str, ...], position: float | None, word: str) -> None:
+def test_the_first_recommended_measurement_reduces_errors_most(
+    unknowns: tuple[str, ...], position: float | None, word: str
+) -> None:
     robot = MACHINES["pulleys"].replace(winches=sl.Winch(0.1))
     wide = [sl.Unknown(name, deviation=1.0 if name == "mass" else None) for name in unknowns]
     sensors = sl.Sensors(5e-4, 50.0, position)
@@ -319,7 +321,7 @@ def test_what_would_help_most_does(unknowns: tuple[str, ...], position: float | 
 
 
 def _errors_at(plan: sl.CalibrationPoses, unknowns: list[sl.Unknown]) -> Array:
-    """Errors at the poses of a plan where something else is known beforehand."""
+    """Errors at the poses of a plan with other priors."""
     numbers = parameters_of(plan.robot, unknowns, plan.sensors, counted=plan.parameters.counted)
     unit = np.where(numbers.logarithmic, numbers.prior, 1.0)
     rows = pose_rows(plan.poses)
@@ -331,19 +333,19 @@ def _errors_at(plan: sl.CalibrationPoses, unknowns: list[sl.Unknown]) -> Array:
     return errors
 
 
-def test_what_costs_less_will_do() -> None:
+def test_the_cheaper_measurement_is_recommended_if_it_is_sufficient() -> None:
     unknowns = [sl.Unknown(name) for name in MATERIAL]
     plan = sl.calibration_poses(with_drums("article-suspended"), 40, unknowns, usual_sensors())
     left = {}
     for name, known in (("mass", 1e-3), ("linear_density", 0.01)):
         held = [sl.Unknown(one, deviation=known if one == name else None) for one in MATERIAL]
         left[name] = float(np.log(_errors_at(plan, held) / plan.expected_error).mean())
-    assert 0.9 * left["linear_density"] > left["mass"] > left["linear_density"]  # a hair better, and twice the work
+    assert 0.9 * left["linear_density"] > left["mass"] > left["linear_density"]  # slightly better, with twice the work
     assert "weighing" in plan.most_helpful
     assert "platform" in plan.most_helpful
 
 
-def test_load_cells_are_missed_where_there_are_none() -> None:
+def test_load_cells_are_recommended_if_missing() -> None:
     robot = sl.load_robot("cogiro")
     sensors = sl.Sensors(5e-4, None, 1e-2)
     plan = sl.calibration_poses(robot, 10, ("axial_stiffness", "center_of_mass"), sensors)
@@ -351,7 +353,7 @@ def test_load_cells_are_missed_where_there_are_none() -> None:
 
 
 @pytest.mark.parametrize("name", wide(["cogiro", *(name for name in sl.robot_names() if name != "cogiro")]))
-def test_words_fit_a_terminal(name: str) -> None:
+def test_texts_fit_a_terminal(name: str) -> None:
     robot = sl.load_robot(name)
     plan = sl.calibration_poses(robot, 6, candidates=30)
     text, lines = str(plan), plan.table().splitlines()
@@ -368,7 +370,7 @@ def test_words_fit_a_terminal(name: str) -> None:
 
 
 class Refused(NamedTuple):
-    """Arguments, and parts of the error: the item, its value or the beginning of it, the beginning of the range."""
+    """Arguments, and parts of the error: the item, the beginning of its value, the beginning of the allowed range."""
 
     given: dict[str, Any]
     item: str

@@ -1,4 +1,4 @@
-"""Where the search begins: at which place a measuring system stands of which nothing is known."""
+"""Initial values of the search: the place of a measuring system without prior information."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ ERRORS = {"frame_anchors": 0.02, "length_zero": 0.02, "mass": 0.02}
     "vector", wide([pytest.param(vector) for vector in ((2.0, -2.0, 0.5), (0.0, 0.0, np.pi), (-1.2, 0.0, 1.2))])
 )
 @pytest.mark.parametrize(("positions", "rotations"), [(0, 20), (20, 0), (1, 20), (20, 20)])
-def test_a_measuring_system_turned_by_anything_is_found(
+def test_a_measuring_system_with_any_rotation_is_found(
     vector: tuple[float, float, float], positions: int, rotations: int
 ) -> None:
     turned = Rotation.from_rotvec(vector)
@@ -31,13 +31,13 @@ def test_a_measuring_system_turned_by_anything_is_found(
     believed = really.replace(frame=sl.Pose(np.zeros(3), np.eye(3)))
     found = sl.calibrate(robot, log.replace(sensors=believed), ASKED, folds=0)
     assert found.status == sl.CalibrationStatus.FOUND
-    assert (found.sensors.frame.rotation * turned.inv()).magnitude() < 0.02  # rad: the world may be turned with it
+    assert (found.sensors.frame.rotation * turned.inv()).magnitude() < 0.02  # rad: the world may be rotated with it
     if positions:
         assert np.linalg.norm(found.sensors.frame.position - truth.sensors.frame.position) < 0.15
 
 
-def test_points_on_a_line_say_nothing_of_a_turn_about_it_and_warn_of_nothing() -> None:
-    """A platform that was driven along a line, watched by a system of which nothing is known."""
+def test_points_on_a_line_leave_their_rotation_undetermined() -> None:
+    """A platform that moved along a line, measured in axes without prior information."""
     robot = sl.load_robot("cogiro")
     places = np.column_stack((np.linspace(-1.0, 1.0, 12), np.zeros(12), np.full(12, 1.5)))
     pose = sl.Pose(places, np.eye(3))

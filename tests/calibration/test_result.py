@@ -1,4 +1,4 @@
-"""Where the platform is to be expected: against robots drawn from the covariance."""
+"""Expected pose errors compared with robots drawn from the covariance."""
 
 import re
 from dataclasses import replace
@@ -41,7 +41,7 @@ def commanded(name: str) -> sl.Pose:
 
 
 def values_drawn(calibration: sl.Calibration, count: int, rng: np.random.Generator) -> Array:
-    """Values as they may be, (count, P)."""
+    """Values drawn from the covariance, (count, P)."""
     error = calibration.standard_error
     values, vectors = np.linalg.eigh(calibration.covariance / np.outer(error, error))
     normal = rng.normal(size=(count, len(error)))
@@ -50,7 +50,7 @@ def values_drawn(calibration: sl.Calibration, count: int, rng: np.random.Generat
 
 
 def drawn(name: str, believed: Array, start: sl.Pose, rng: np.random.Generator) -> tuple[Array, Rotation]:
-    """Where robots drawn from the covariance put the platform, (DRAWS, 3), at lengths or counts believed."""
+    """Positions of robots drawn from the covariance, (DRAWS, 3), at measured lengths or counts."""
     calibration = found(name)
     counted = name == "drums"
     parameters = calibration.parameters
@@ -71,7 +71,7 @@ def drawn(name: str, believed: Array, start: sl.Pose, rng: np.random.Generator) 
 
 
 def agrees(samples: Array, covariance: Array) -> None:
-    """Squares of draws in standard deviations are those of as many numbers, and each number has its deviation."""
+    """Squared draws have the expected mean, and each coordinate has its standard deviation."""
     values, vectors = np.linalg.eigh(covariance)
     scaled = (samples @ vectors) / np.sqrt(values)
     np.testing.assert_allclose(np.mean(scaled**2, axis=0), 1.0, atol=5.0 * np.sqrt(2.0 / len(samples)))
@@ -95,8 +95,8 @@ def test_robots_drawn_from_the_covariance(name: str) -> None:
     assert abs(expected.rotation / np.sqrt(np.mean(np.sum(turn**2, axis=1))) - 1.0) < 0.15
 
 
-def test_what_the_poses_of_the_log_have_in_common() -> None:
-    """Own errors: of drawn robots, beside the shift and the turn that fit what they do to the log's poses best."""
+def test_common_errors_of_the_poses_of_the_log() -> None:
+    """Own errors: drawn robots minus the shift and rotation that fit their errors at the poses of the log best."""
     calibration, pose = found("cogiro"), commanded("cogiro")[0]
     rng = np.random.default_rng(4)
     values = values_drawn(calibration, 150, rng)
@@ -124,7 +124,7 @@ def test_what_the_poses_of_the_log_have_in_common() -> None:
 
 
 @pytest.mark.parametrize("name", UNKNOWNS)
-def test_forward_carries_the_covariance_on(name: str) -> None:
+def test_forward_propagates_the_covariance(name: str) -> None:
     calibration, poses = found(name), commanded(name)
     lengths = sl.inverse(calibration.robot, poses).unstrained_length
     solution = calibration.forward(lengths - calibration.length_offset, poses)
@@ -142,7 +142,7 @@ def test_forward_carries_the_covariance_on(name: str) -> None:
     np.testing.assert_allclose(single.covariance, solution.covariance[0], rtol=1e-6, atol=1e-12)
 
 
-def test_a_pose_that_the_robot_cannot_hold_has_no_error() -> None:
+def test_a_pose_without_equilibrium_has_no_error() -> None:
     pose = commanded("cogiro")
     far = sl.Pose(np.array([pose.position[0], [50.0, 0.0, 1.0]]), np.array([pose.matrix[0], np.eye(3)]))
     expected = found("cogiro").pose_error(far)
@@ -151,7 +151,7 @@ def test_a_pose_that_the_robot_cannot_hold_has_no_error() -> None:
     assert np.isnan(expected.own_covariance[1]).all()
 
 
-def test_what_nothing_tells_leaves_the_pose_open() -> None:
+def test_an_undetermined_parameter_leaves_the_pose_undetermined() -> None:
     truth = true_robot(nominal("cogiro"), ERRORS, seed=5)
     free = (sl.Unknown("frame_anchors", deviation=np.inf), "length_zero", "mass")
     calibration = sl.calibrate(nominal("cogiro"), log_of(truth, 40, 6).log, free, folds=0)
@@ -159,8 +159,8 @@ def test_what_nothing_tells_leaves_the_pose_open() -> None:
 
 
 @pytest.mark.parametrize("name", ["the world turned about the vertical", "the world shifted along y"])
-def test_a_world_that_is_elsewhere_is_no_own_error(name: str) -> None:
-    """Poses in a world that is turned or shifted are off by just that, and a robot's own errors are none."""
+def test_a_shifted_world_is_not_an_own_error(name: str) -> None:
+    """Poses in a rotated or shifted world have exactly this error, and the own errors of the robot are zero."""
     calibration, pose = found("cogiro"), commanded("cogiro")
     vector = next(one.vector for one in calibration.gauge if one.name == name)
     sharp = calibration.sensors.replace(length_deviation=1e-9)
@@ -175,8 +175,8 @@ def test_a_world_that_is_elsewhere_is_no_own_error(name: str) -> None:
         np.testing.assert_allclose(told.position, abs(moved[0, 1]), rtol=1e-6)
 
 
-def test_errors_are_told_in_a_line() -> None:
-    """Of poses that the robot can hold, as root mean squares."""
+def test_errors_are_printed_in_one_line() -> None:
+    """Root mean squares over poses with an equilibrium."""
     covariance = np.zeros((3, 6, 6))
     covariance[:2, :3, :3] = np.diag([1e-6, 2e-6, 6e-6]), np.diag([9e-6, 10e-6, 22e-6])  # 3 mm and 6.4 mm
     covariance[:2, 5, 5] = 4e-6
@@ -187,11 +187,11 @@ def test_errors_are_told_in_a_line() -> None:
     assert repr(error) == f"<PoseError: {error}>"
 
 
-def test_forward_says_so_too_where_nothing_tells() -> None:
-    """Of a platform whose center of mass is off its origin, with one number that nothing tells."""
+def test_forward_reports_undetermined_errors() -> None:
+    """A platform with a center of mass beside its origin, and one undetermined parameter."""
     told = found("cogiro")
     free = np.array(told.covariance)
-    free[0, 0] = np.inf  # an anchor's x, on which all six follow
+    free[0, 0] = np.inf  # x of an anchor, which all six coordinates follow
     lost = replace(told, covariance=free)
     lengths = told.unstrained_length[:2]
     assert told.robot.center_of_mass.any()
@@ -204,12 +204,12 @@ def test_forward_says_so_too_where_nothing_tells() -> None:
     kept[mass, mass] = np.inf
     level = replace(told, covariance=kept).forward(lengths).covariance
     assert level is not None
-    assert np.isinf(np.diagonal(level, axis1=1, axis2=2)[:, 2]).all()  # it hangs lower or higher
+    assert np.isinf(np.diagonal(level, axis1=1, axis2=2)[:, 2]).all()  # a lower or a higher position
 
 
 @pytest.mark.parametrize("counted", [False, True])
-def test_the_same_robot_moves_otherwise_by_its_stiffness_where_counts_were_read(counted: bool) -> None:
-    """Rope that was wound under tension is shorter at rest: counts tell less of it, lengths that were read do not."""
+def test_the_effect_of_stiffness_differs_between_counts_and_lengths(counted: bool) -> None:
+    """Rope that was wound under tension is shorter at rest: counts contain less information on it than lengths."""
     robot, sensors, step = with_drums(), sl.Sensors(tension_deviation=5.0), 1e-4
     parameters = parameters_of(robot, ["axial_stiffness"], sensors, counted=counted)
     plan = sl.inverse(robot, commanded("drums")[0])

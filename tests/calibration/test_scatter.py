@@ -1,4 +1,4 @@
-"""Standard deviations of sensors from residuals: against the restricted likelihood, and on logs of wrong deviations."""
+"""Standard deviations of sensors from residuals: restricted likelihood, and logs with wrong deviations."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ GROUPS = [np.array([0, 1, 2]), np.array([3, 4])]
 
 
 def minus_log_likelihood(logs: Array, rows: Array, noise: Array, misfit: Array, prior: Array) -> float:
-    """Of all readings as one normal vector whose mean is zero at the prior of the parameters."""
+    """Negative log likelihood of all readings as one normal vector with zero mean at the prior parameters."""
     count, width, _ = rows.shape
     whole = np.zeros((count * width, count * width))
     for k in range(count):
@@ -53,7 +53,7 @@ def test_the_ratios_have_the_largest_likelihood_by_its_definition() -> None:
 
 
 @pytest.mark.parametrize("wrong", [(1.0, 1.0), (3.0, 0.7)])
-def test_deviations_that_were_stated_wrong_are_found(wrong: tuple[float, float]) -> None:
+def test_wrongly_stated_deviations_are_estimated(wrong: tuple[float, float]) -> None:
     log = log_of_twin(twin_of(3), 3, 40)
     stated = sl.Sensors(LENGTH_NOISE / wrong[0], CELL_NOISE / wrong[1])
     found = sl.calibrate(drawn_robot(), log.replace(sensors=stated), folds=0)

@@ -1,4 +1,4 @@
-"""Poses left out, against calibrations without them through public functions alone."""
+"""Cross-validation compared with explicit calibrations without the omitted poses, through public functions."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ def synthetic(robot: sl.Robot) -> Synthetic:
 
 
 def missed(robot: sl.Robot, lengths: Array, made: Synthetic, which: Flags) -> tuple[Array, Array]:
-    """Load cells and distances from measured positions, read less predicted."""
+    """Measured minus predicted load cells, and distances from measured positions."""
     found = sl.forward(robot, lengths[which], made.pose[np.flatnonzero(which)])
     assert found.stable.all()
     assert made.log.load_cells is not None
@@ -34,7 +34,7 @@ def root(values: list[Array]) -> float:
 
 
 @pytest.mark.parametrize("name", wide(["cogiro", "article-suspended"]))
-def test_calibrations_without_the_poses_that_they_predict(name: str) -> None:
+def test_cross_validation_agrees_with_explicit_calibrations(name: str) -> None:
     robot = sl.load_robot(name)
     made = synthetic(robot)
     assert made.log.unstrained_length is not None
@@ -56,7 +56,7 @@ def test_calibrations_without_the_poses_that_they_predict(name: str) -> None:
     assert told.position < 0.2 * told.position_before
 
 
-def test_no_positions_no_error_of_theirs() -> None:
+def test_without_positions_they_have_no_error() -> None:
     robot = sl.load_robot("cogiro")
     made = log_of(true_robot(robot, {"mass": 0.02}, seed=1), 8, 3)
     told = sl.calibrate(robot, made.log, ("mass",), folds=3).cross_validation
@@ -65,7 +65,7 @@ def test_no_positions_no_error_of_theirs() -> None:
     assert told.tension < told.tension_before
 
 
-def test_more_folds_than_poses_leave_out_one_at_a_time() -> None:
+def test_more_folds_than_poses_omit_one_pose_at_a_time() -> None:
     robot = sl.load_robot("cogiro")
     made = log_of(true_robot(robot, {"mass": 0.02}, seed=1), 4, 3)
     told = sl.calibrate(robot, made.log, ("mass",), folds=50).cross_validation
@@ -73,13 +73,13 @@ def test_more_folds_than_poses_leave_out_one_at_a_time() -> None:
     assert told.folds == 4
 
 
-def test_none_where_it_is_not_asked_for() -> None:
+def test_no_cross_validation_by_default() -> None:
     robot = sl.load_robot("cogiro")
     made = log_of(true_robot(robot, {"mass": 0.02}, seed=1), 4, 3)
     assert sl.calibrate(robot, made.log, ("mass",), folds=0).cross_validation is None
 
 
-def test_positions_in_axes_that_nobody_knew_were_not_missed_before() -> None:
+def test_positions_in_unknown_axes_have_no_initial_error() -> None:
     robot = sl.load_robot("cogiro")
     turned = usual_sensors(position_deviation=1e-3, frame=sl.Pose.from_euler([1.0, 2.0, 0.0], 1.0, 0.0, 0.0))
     made = log_of(true_robot(robot, {"mass": 0.02}, 1, turned), 40, 3, positions=40)

@@ -1,4 +1,4 @@
-"""What a sensor may be: deviations of one shape each."""
+"""Sensors have deviations of one shape."""
 
 from typing import Any
 
@@ -20,7 +20,7 @@ from tests.refusal import refused
         ({"frame": sl.Pose(np.zeros((2, 3)), np.eye(3))}, ("frame", "a batch of 2")),
     ],
 )
-def test_values_that_no_sensor_has_are_refused(fields: dict[str, Any], parts: tuple[str, ...]) -> None:
+def test_impossible_deviations_are_refused(fields: dict[str, Any], parts: tuple[str, ...]) -> None:
     with refused(*parts, kind=sl.InvalidValueError):
         sl.Sensors(**fields)
 

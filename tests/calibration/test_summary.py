@@ -1,4 +1,4 @@
-"""What a calibration says: the verdict first, numbers to the digits that count, nothing wider than 80 columns."""
+"""Printout of a calibration: verdict first, significant digits only, at most 80 columns."""
 
 import re
 from dataclasses import replace
@@ -35,7 +35,7 @@ def read(text: str) -> float:
 
 
 def factor(shown: str, unit: str) -> float:
-    """What one of the unit that is shown is in the unit that was meant."""
+    """Ratio of the printed unit to the given unit."""
     if shown == unit:
         return 1.0
     if unit.startswith("kg"):
@@ -44,7 +44,7 @@ def factor(shown: str, unit: str) -> float:
 
 
 def check_pair(text: str, value: float, error: float, unit: str) -> None:
-    """A pair that is written is the number and its error, both to the second digit of the error."""
+    """A printed pair is the value and its error, both rounded to the second digit of the error."""
     match = PAIR.search(text)
     assert match is not None, text
     shown, own, symbol = match.groups()
@@ -58,7 +58,7 @@ def check_pair(text: str, value: float, error: float, unit: str) -> None:
     assert read(own) * size == pytest.approx(error, abs=half)
 
 
-def test_every_number_of_the_table_is_what_was_found(found: sl.Calibration) -> None:
+def test_every_number_of_the_table_is_an_estimate(found: sl.Calibration) -> None:
     head, *lines = found.table().splitlines()
     assert head.split()[:3] == ["number", "found", "before"]
     assert len(lines) == len(found.parameters.labels)
@@ -91,7 +91,7 @@ def test_the_lines_have_every_value_with_its_unit(found: sl.Calibration) -> None
         check_pair(zero[1], *found.value_of(f"length_zero[{cable}]"), "m")
 
 
-def test_what_is_found_says_of_what_and_what_was_left_out(found: sl.Calibration) -> None:
+def test_the_verdict_names_the_numbers_of_used_and_excluded_rows(found: sl.Calibration) -> None:
     first, *rest = str(found).splitlines()
     assert re.findall(r"\b\d+\b(?!-)|cogiro|winches.csv|\d+-\d+-\d+", first) == [
         "37", "cogiro", "20", "winches.csv", "2026-11-22"
@@ -115,7 +115,7 @@ def test_what_is_found_says_of_what_and_what_was_left_out(found: sl.Calibration)
 @pytest.mark.parametrize(
     ("status", "word"), [(sl.CalibrationStatus.DOUBTFUL, "DOUBTFUL"), (sl.CalibrationStatus.NOT_CONVERGED, "Not conv")]
 )
-def test_what_is_not_to_be_trusted_says_so_first(
+def test_a_doubtful_result_begins_with_its_verdict(
     found: sl.Calibration, status: sl.CalibrationStatus, word: str
 ) -> None:
     text = str(replace(found, status=status, chi_squared=4321.0))
@@ -125,7 +125,7 @@ def test_what_is_not_to_be_trusted_says_so_first(
 
 
 def calibrations(count: int, found: sl.Calibration) -> list[sl.Calibration]:
-    """One calibration, its fields replaced by others that a log may bring."""
+    """One calibration with fields replaced by other possible values."""
     random = np.random.default_rng(3)
     some = []
     for _ in range(count):
@@ -141,7 +141,7 @@ def calibrations(count: int, found: sl.Calibration) -> list[sl.Calibration]:
             Direction(" with ".join(random.choice(found.parameters.labels, 3)), found.values, float(known), step)
             for known, step in zip(random.uniform(0.0, 1.0, 5), ["measure it"] * 2 + ["a " * 99] * 3, strict=True)
         )
-        # errors from a millionth to a million times what they are, a few of them infinite
+        # errors multiplied by a millionth to a million, a few of them infinite
         scale = 10.0 ** random.uniform(-6.0, 6.0, len(found.values))
         covariance = found.covariance * np.outer(scale, scale)
         for k in random.choice(len(found.values), 3):
@@ -164,7 +164,7 @@ def calibrations(count: int, found: sl.Calibration) -> list[sl.Calibration]:
     return some
 
 
-def test_a_narrow_terminal_gets_the_same_words_in_shorter_lines(found: sl.Calibration) -> None:
+def test_a_narrow_terminal_shows_the_same_words_in_shorter_lines(found: sl.Calibration) -> None:
     for one in calibrations(10, found):
         narrow = calibration_text(one, 60)
         assert [line for line in narrow.splitlines() if len(line) > 60] == []
@@ -176,7 +176,7 @@ def test_a_narrow_terminal_gets_the_same_words_in_shorter_lines(found: sl.Calibr
 
 
 @pytest.mark.parametrize("count", [20, pytest.param(1000, marks=pytest.mark.soak)])
-def test_nothing_is_wider_than_80_columns_or_hidden(found: sl.Calibration, count: int) -> None:
+def test_the_text_has_80_columns_and_is_complete(found: sl.Calibration, count: int) -> None:
     for one in calibrations(count, found):
         text = str(one)
         assert [line for line in text.splitlines() if len(line) > 80] == []
@@ -195,7 +195,7 @@ def test_nothing_is_wider_than_80_columns_or_hidden(found: sl.Calibration, count
         assert 1 <= len(told) <= 3
 
 
-def test_rows_that_follow_each_other_are_a_span() -> None:
+def test_consecutive_rows_are_printed_as_a_range() -> None:
     assert row_ranges([3]) == "row 3"
     assert row_ranges([3, 17, 18, 19, 40]) == "rows 3, 17 to 19, 40"
     assert row_ranges(range(0, 2000, 2)).endswith("14 and 992 more")
@@ -213,7 +213,7 @@ def test_a_correlation_has_ones_and_the_signs_of_the_covariance(found: sl.Calibr
     assert np.isfinite(np.delete(np.delete(beside, 3, 0), 3, 1)).all()
 
 
-def test_a_label_that_is_none_is_refused(found: sl.Calibration) -> None:
+def test_an_unknown_label_is_refused(found: sl.Calibration) -> None:
     k = found.parameters.labels.index("frame_anchors[3].y")
     assert found.value_of("frame_anchors[3].y") == (found.values[k], np.sqrt(found.covariance[k, k]))
     with refused("label", "'frame_anchor[3].y'", kind=sl.InvalidValueError):
@@ -221,7 +221,7 @@ def test_a_label_that_is_none_is_refused(found: sl.Calibration) -> None:
 
 
 def rigid(points: Array, random: np.random.Generator, *, upright: bool) -> Array:
-    """Covariance of what moves all points together."""
+    """Covariance of common motions of all points."""
     ways = [np.tile(axis, len(points)) for axis in np.eye(3)]
     ways += [np.cross(axis, points).ravel() for axis in (np.eye(3)[2:] if upright else np.eye(3))]
     root = np.stack(ways, axis=1) @ random.standard_normal((len(ways), len(ways)))
@@ -229,7 +229,7 @@ def rigid(points: Array, random: np.random.Generator, *, upright: bool) -> Array
 
 
 @pytest.mark.parametrize(("which", "freedoms"), [("frame_anchors", 4), ("platform_anchors", 6)])
-def test_what_moves_all_anchors_together_is_taken_out(which: str, freedoms: int) -> None:
+def test_common_motions_of_anchors_are_removed(which: str, freedoms: int) -> None:
     random = np.random.default_rng(1)
     points = random.uniform(-5.0, 5.0, (8, 3))
     plain = (4e-6 * np.eye(24)).reshape(8, 3, 8, 3)
@@ -257,7 +257,7 @@ def test_relative_errors_are_those_without_the_gauge(found: sl.Calibration) -> N
     assert anchor_covariance(parameters(found.before, ("mass",)), np.eye(1), "frame_anchors") is None
 
 
-def test_that_poses_count_less_is_said_only_where_they_do(found: sl.Calibration) -> None:
+def test_reduced_weights_are_printed_only_if_present(found: sl.Calibration) -> None:
     odd = replace(found, outliers=(Outlier(int(found.rows[3]), 2, "length", 0.02, 12.0),))
     odd_alone = replace(odd, weights=np.ones(len(found.rows)))
     less = replace(odd, weights=np.where(np.arange(len(found.rows)) == 3, 0.1, 1.0))
@@ -265,7 +265,7 @@ def test_that_poses_count_less_is_said_only_where_they_do(found: sl.Calibration)
     assert [head and "less" in head[1] for head in heads] == [True, False]
 
 
-def test_a_load_cell_that_is_off_in_many_rows_is_named_as_a_load_cell() -> None:
+def test_a_load_cell_with_many_outliers_is_named() -> None:
     robot = sl.load_robot("cogiro")
     log = log_of(true_robot(robot, {"mass": 0.03}, 4), 60, 4).log
     cells = np.array(log.load_cells)

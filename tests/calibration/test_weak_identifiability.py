@@ -1,4 +1,4 @@
-"""What is hardly told: checked against covariances of normal equations, and machines of which it is known."""
+"""Weakly identifiable parameters: compared with covariances of normal equations, and machines with a known result."""
 
 from functools import cache
 from typing import NamedTuple
@@ -19,8 +19,8 @@ from tests.calibration.reference import pose_rows
 from tests.tiers import extended, wide
 
 
-class Told(NamedTuple):
-    """What was asked for, the scatter of it but for the gauge, in deviations of its priors, and what is hardly told."""
+class Identified(NamedTuple):
+    """Unknowns, their covariance without the gauge in units of the priors, and the weakly identifiable ones."""
 
     parameters: Parameters
     scatter: Array
@@ -28,7 +28,7 @@ class Told(NamedTuple):
 
 
 @cache
-def told(robot: str, unknowns: tuple[str, ...], *, positions: bool = False) -> Told:
+def identified(robot: str, unknowns: tuple[str, ...], *, positions: bool = False) -> Identified:
     machine, pose, lengths = standing(sl.load_robot(robot), 40)
     sensors = sl.Sensors(5e-4, 5.0, 1e-3 if positions else None)
     shared = tuple(name for name in unknowns if name in ("pulley_radius", "axial_stiffness", "linear_density"))
@@ -41,26 +41,26 @@ def told(robot: str, unknowns: tuple[str, ...], *, positions: bool = False) -> T
     basis = np.linalg.qr(left.T)[0]
     outside = np.eye(rows.shape[1]) - basis @ basis.T
     scatter: Array = outside @ np.linalg.inv(rows.T @ rows + np.eye(rows.shape[1])) @ outside
-    return Told(parameters, scatter, weak_directions(triangle, parameters, gauge))
+    return Identified(parameters, scatter, weak_directions(triangle, parameters, gauge))
 
 
 @extended
 def test_a_pulley_and_the_height_of_anchors() -> None:
-    seen = told("ipanema-2-pulleys", ("frame_anchors", "length_zero", "pulley_radius"), positions=True).found
+    seen = identified("ipanema-2-pulleys", ("frame_anchors", "length_zero", "pulley_radius"), positions=True).found
     assert [one.name.split(" with ") for one in seen] == [["pulley_radius", "frame_anchors z"]]
     assert "caliper" in seen[0].step
 
 
 @extended
 def test_a_pulley_and_zeros() -> None:
-    seen = told(
+    seen = identified(
         "ipanema-2-pulleys", ("length_zero", "pulley_radius", "axial_stiffness", "mass", "center_of_mass")
     ).found
     assert [one.name.split(" with ") for one in seen] == [["pulley_radius", "length_zero"]]
 
 
-def test_rope_and_platform_weigh_alike() -> None:
-    seen = told("cogiro", ("length_zero", "linear_density", "mass")).found
+def test_densities_of_ropes_and_mass_of_the_platform() -> None:
+    seen = identified("cogiro", ("length_zero", "linear_density", "mass")).found
     assert [one.name.split(" with ") for one in seen] == [["linear_density", "mass"]]
     assert "weigh" in seen[0].step
 
@@ -80,8 +80,8 @@ def test_rope_and_platform_weigh_alike() -> None:
         first=3,
     ),
 )
-def test_what_is_left_of_the_prior(robot: str, unknowns: tuple[str, ...]) -> None:
-    parameters, scatter, found = told(robot, unknowns)
+def test_remaining_share_of_the_prior(robot: str, unknowns: tuple[str, ...]) -> None:
+    parameters, scatter, found = identified(robot, unknowns)
     units = prior_units(parameters).units
     for one in found:
         vector = one.vector / units
@@ -93,7 +93,7 @@ def test_what_is_left_of_the_prior(robot: str, unknowns: tuple[str, ...]) -> Non
 @pytest.mark.parametrize("robot", ["cogiro", "article-suspended"])
 def test_every_strong_correlation_is_named(robot: str) -> None:
     unknowns = ("platform_anchors", "length_zero", "axial_stiffness", "mass", "center_of_mass")
-    parameters, scatter, found = told(robot, unknowns)
+    parameters, scatter, found = identified(robot, unknowns)
     size = np.sqrt(np.diag(scatter))
     strong = np.argwhere(np.triu(np.abs(scatter / np.outer(size, size)), 1) > 0.98)
     kinds = {(parameters.labels[i].partition("[")[0], parameters.labels[j].partition("[")[0]) for i, j in strong}
@@ -101,5 +101,5 @@ def test_every_strong_correlation_is_named(robot: str) -> None:
     assert kinds <= named | {(other, one) for one, other in named if (one, other) in named}
 
 
-def test_nothing_is_hardly_told_where_all_is_measured() -> None:
-    assert told("cogiro", ("length_zero", "mass"), positions=True).found == ()
+def test_no_parameter_is_weakly_identifiable_if_all_is_measured() -> None:
+    assert identified("cogiro", ("length_zero", "mass"), positions=True).found == ()

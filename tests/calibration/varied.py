@@ -1,4 +1,4 @@
-"""Logs in which every pose has tensions of its own, and what position error a calibration leaves."""
+"""Logs with different tensions at each pose, and the position error after a calibration."""
 
 from typing import Final
 
@@ -9,9 +9,9 @@ from tests.calibration.reference import counts_of
 from tests.calibration.synthetic import Synthetic, Truth, log_of
 from tests.kinematics.feasible import box_poses
 
-SETS: Final = 6  # of tensions, of which a pose takes one
-POINT: Final = 1e-3  # m, of a measured coordinate
-ERRORS: Final = {  # standard deviations of a robot that was set up with a tape measure
+SETS: Final = 6  # number of sets of tensions, of which each pose has one
+POINT: Final = 1e-3  # m, standard deviation of a measured coordinate
+ERRORS: Final = {  # standard deviations of a robot that is set up with a tape measure
     "frame_anchors": 0.035,
     "platform_anchors": 0.005,
     "length_zero": 0.03,
@@ -24,7 +24,7 @@ ERRORS: Final = {  # standard deviations of a robot that was set up with a tape 
 
 
 def varied(truth: Truth, count: int, seed: int, positions: int = 0) -> Synthetic:
-    """A log of so many poses, each with other tensions, of which some positions are measured."""
+    """A log with the given number of poses, each with its own tensions; some positions are measured."""
     made = log_of(truth, SETS * count, seed, sets=SETS)
     rng = np.random.default_rng(seed)
     rows = np.arange(count) * SETS + rng.integers(SETS, size=count)
@@ -38,7 +38,7 @@ def varied(truth: Truth, count: int, seed: int, positions: int = 0) -> Synthetic
 
 
 def at_chosen(truth: Truth, chosen: sl.CalibrationPoses, seed: int, positions: int = 0) -> Synthetic:
-    """A log of a machine that stands where `calibration_poses` says, near the tensions that it says."""
+    """A log of a machine at the poses of `calibration_poses`, with tensions near the given ones."""
     rng, true, sensors = np.random.default_rng(seed), truth.robot, truth.sensors
     plans = [
         sl.inverse(true, chosen.poses[k], tension=sl.QuadraticProgram(target=chosen.frame_end_tension[k]))
@@ -63,7 +63,7 @@ def at_chosen(truth: Truth, chosen: sl.CalibrationPoses, seed: int, positions: i
 
 
 def left_error(believed: sl.Robot, true: sl.Robot, seed: int, *, own: bool, scaled: bool = False) -> float:
-    """Root mean square of how far a robot ends from where it is sent [m].
+    """Root mean square distance between commanded and reached positions [m].
 
     Args:
         believed: The robot by which lengths are wound.
