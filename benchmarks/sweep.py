@@ -53,7 +53,7 @@ def in_a_loop_and_on_workers() -> Iterator[Row]:
 
 def without_the_start() -> Iterator[Row]:
     """Tasks per second of one worker and of two workers, without their start, as in a long sweep."""
-    from sagline.sweep.cluster import local_workers, run_tasks
+    from sagline.sweep.running import local_workers, run_tasks
 
     request = asked(POSES // 4, LOADS)  # about twenty tasks; the first and the last would dominate fewer tasks
     size, rates = measured_size(request), []

@@ -15,8 +15,8 @@ import numpy as np
 import sagline as sl
 from sagline import SaglineError
 from sagline.core.errors import printable
-from sagline.files.measurements import load_counts, load_lengths
 from sagline.files.pose_text import pose_of_text
+from sagline.files.table import load_counts, load_lengths
 from tests.effort import least_seconds
 
 SECONDS: Final = 2.0  # of processor time of an ordinary machine

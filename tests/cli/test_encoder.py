@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 import sagline as sl
 from sagline.cli.main import app
-from sagline.files.measurements import load_counts
+from sagline.files.table import load_counts
 from tests.kinematics.winches import wound
 from tests.refusal import refused
 from tests.tiers import extended, wide

@@ -55,7 +55,7 @@ def test_a_sweep_tells_how_its_requests_ended_and_is_done_once(folder: Path) -> 
 
 
 def test_without_a_scheduler_nothing_is_written(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sagline.sweep.cluster.PATIENCE", 0.5)
+    monkeypatch.setattr("sagline.sweep.running.PATIENCE", 0.5)
     before = sorted(folder.iterdir())
     found = ended("own_sweep.yaml", "--scheduler", "tcp://127.0.0.1:9")
     assert found.exit_code == 2

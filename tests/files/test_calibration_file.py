@@ -13,7 +13,7 @@ from syrupy.assertion import SnapshotAssertion
 import sagline as sl
 from sagline import dump_robot
 from sagline.calibration.findings import CrossValidation, Direction, Outlier
-from sagline.files import calibration_file, format
+from sagline.files import calibration_file, netcdf
 from sagline.files.calibration_file import FORMAT
 from sagline.files.netcdf import read_dataset
 from sagline.files.robot_file import parse_robot
@@ -159,7 +159,7 @@ def read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[xarray.Da
     monkeypatch.setattr(calibration_file, "parse_robot", cache(parse_robot))
 
     def load(data: xarray.Dataset) -> sl.Calibration:
-        monkeypatch.setattr(format, "read_dataset", lambda *_: data)
+        monkeypatch.setattr(netcdf, "read_dataset", lambda *_: data)
         return sl.load_calibration(tmp_path / "edited.nc")
 
     return load

@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from sagline import FileError, load_measurements
-from sagline.files.measurements import load_lengths
+from sagline.files.table import load_lengths
 from tests.refusal import refused
 
 

@@ -17,7 +17,7 @@ from syrupy.assertion import SnapshotAssertion
 
 import sagline as sl
 from sagline import FileError, dump_robot
-from sagline.files import format, netcdf
+from sagline.files import netcdf
 from sagline.files.netcdf import seal
 from sagline.files.plan_file import FORMAT
 from sagline.files.robot_file import parse_robot
@@ -53,7 +53,7 @@ def read(monkeypatch: pytest.MonkeyPatch) -> Reader:
     monkeypatch.setattr(netcdf, "parse_robot", cache(parse_robot))
 
     def load(data: xr.Dataset) -> sl.Plan:
-        monkeypatch.setattr(format, "read_dataset", lambda *_: data)
+        monkeypatch.setattr(netcdf, "read_dataset", lambda *_: data)
         return sl.load_plan("run.nc")
 
     return load

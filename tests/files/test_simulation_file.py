@@ -14,7 +14,7 @@ from syrupy.assertion import SnapshotAssertion
 
 import sagline as sl
 from sagline import EnergyBalance, Occurrence
-from sagline.files import format, netcdf
+from sagline.files import netcdf
 from sagline.files.netcdf import seal
 from sagline.files.robot_file import parse_robot
 from sagline.files.simulation_file import EVENTS, LARGEST, NODES, SAMPLES, TIME
@@ -130,7 +130,7 @@ def read(monkeypatch: pytest.MonkeyPatch) -> Reader:
     monkeypatch.setattr(netcdf, "parse_robot", cache(parse_robot))
 
     def load(data: xr.Dataset) -> sl.Simulation:
-        monkeypatch.setattr(format, "read_dataset", lambda *_: data)
+        monkeypatch.setattr(netcdf, "read_dataset", lambda *_: data)
         return sl.load_simulation("sim.nc")
 
     return load

@@ -14,9 +14,9 @@ import pytest
 from syrupy.assertion import SnapshotAssertion
 
 import sagline as sl
-from sagline.sweep import cluster, running, work
 from sagline.sweep import folder as sweep_folder
 from sagline.sweep import result as sweep_result
+from sagline.sweep import running, work
 from tests.refusal import refused
 from tests.sweep.requests import bits, chunks, in_tasks, marked, planar
 from tests.tiers import extended, wide
@@ -265,7 +265,7 @@ def test_without_dask_tasks_are_done_one_after_the_other(
 )  # fmt: skip
 def test_what_is_no_address_is_refused(address: object) -> None:
     with refused("scheduler", repr(address), "an address, tcp://HOST:PORT", kind=sl.InvalidValueError):
-        cluster.check_address(address)
+        running.check_address(address)
 
 
 def test_without_zarr_a_sentence_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

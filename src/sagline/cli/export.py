@@ -73,7 +73,7 @@ def export_scl(
         sagline export-scl article-prototype --out plc.scl
     """
     from sagline.control.link import groups_of
-    from sagline.files.controller_source import export_scl
+    from sagline.files.c_source import export_scl
     from sagline.files.robot_file import load_robot
 
     loaded = load_robot(robot)

@@ -24,7 +24,7 @@ from sagline.cli.output import Output, TextTable, number_text, show_table
 from sagline.cli.terminal import show_json, show_note, show_text, working
 
 if TYPE_CHECKING:
-    from sagline.files.measurements import LengthSamples
+    from sagline.files.table import LengthSamples
     from sagline.kinematics.forward_rows import ForwardSolution
     from sagline.robot.robot import Robot
 
@@ -97,13 +97,13 @@ def forward(
 
 
 def _measured(file: Path, robot: Robot) -> LengthSamples:
-    from sagline.files.measurements import load_lengths
+    from sagline.files.table import load_lengths
 
     return load_lengths(file, robot.cable_count, float(np.linalg.norm(np.ptp(robot.frame_anchors, axis=0))))
 
 
 def _counted(file: Path, robot: Robot) -> LengthSamples:
-    from sagline.files.measurements import LengthSamples, load_counts
+    from sagline.files.table import LengthSamples, load_counts
     from sagline.kinematics.winches import lengths_from_counts
 
     read = load_counts(file, robot.cable_count)

@@ -25,7 +25,7 @@ from sagline.core.numbers import n
 if TYPE_CHECKING:
     from sagline.article.identify import EmpiricalFit
     from sagline.article.identify_cable import CableFit
-    from sagline.files.measurements import Measurements
+    from sagline.files.table import Measurements
 
 
 class _TensionPlace(StrEnum):
@@ -69,7 +69,7 @@ def identify(
         sagline identify cable.csv --length-error "2 mm" --tension-at platform-end --offset
     """
     from sagline.article.identify_cable import UNITS, identify_cable
-    from sagline.files.measurements import load_measurements
+    from sagline.files.table import load_measurements
 
     output = Output(folder, file.stem, [TABLE] * write_table)
     data = load_measurements(file)

@@ -18,7 +18,7 @@ from sagline.core.arrays import locked
 _PAGES = "sagline.notebook.html"
 _SUMMARIES = "sagline.present.summaries"
 # imported by name when a result is saved, because the formats import all results
-_FORMATS: Final = "sagline.files.format"
+_FORMATS: Final = "sagline.files.netcdf"
 
 
 def formats() -> Any:
@@ -89,7 +89,7 @@ class Result(ByFields, Shown):
 
 
 class Saved:
-    """A result that can be saved in a file; `sagline.files.format` declares the formats."""
+    """A result that can be saved in a file; `sagline.files.netcdf` declares the formats."""
 
     __slots__ = ()
 

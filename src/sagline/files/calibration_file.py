@@ -18,8 +18,7 @@ from sagline.calibration.result import Calibration
 from sagline.core.arguments import choice, text
 from sagline.core.arrays import locked
 from sagline.core.errors import InvalidValueError
-from sagline.files.format import Format
-from sagline.files.netcdf import choice_attributes, choice_of, labeled_dataset
+from sagline.files.netcdf import Format, choice_attributes, choice_of
 from sagline.files.robot_file import dump_robot, parse_robot
 from sagline.files.variables import (
     SOMEWHERE,
@@ -45,38 +44,39 @@ OUTLYING = ("length", "load cell", "position", "rotation")
 P: Final = ("parameter",)
 N: Final = ("pose",)
 PARAMETERS: Final = (
-    Quantity("parameter_name", P, "", "kind of each number", "names", values=str),
-    Quantity("parameter_label", P, "", "name of each number", "labels", values=str),
-    Quantity("parameter_unit", P, "", "unit of each number, 1 for none", "units", values=str),
-    Quantity("parameter_cable", P, "", "cable of each number, -1 for a number of all cables", "cables", values=int),
-    Quantity("parameter_place", ("kind_row", "cable"), "", "number of each row of kinds, -1", "where", values=int),
-    Quantity("prior", P, "", "prior values, in the units of the numbers"),
-    Quantity("prior_deviation", P, "", "its standard deviation", infinite=True),
+    Quantity("parameter_name", P, "", "kind of each parameter", "names", values=str),
+    Quantity("parameter_label", P, "", "name of each parameter", "labels", values=str),
+    Quantity("parameter_unit", P, "", "unit of each parameter, 1 for none", "units", values=str),
+    Quantity("parameter_cable", P, "", "cable of each parameter, -1 for all cables", "cables", values=int),
+    Quantity(
+        "parameter_place",
+        ("kind_row", "cable"),
+        "",
+        "index of each parameter by kind and cable, -1 for none",
+        "where",
+        values=int,
+    ),
+    Quantity("prior", P, "", "prior values, in the units of the parameters"),
+    Quantity("prior_deviation", P, "", "standard deviations of the prior values", infinite=True),
     Quantity("prior_stated", P, "", "source of the prior: tolerances or caller", "stated", values=bool),
-    Quantity("logarithmic", P, "", "whether the logarithm was estimated", values=bool),
+    Quantity("logarithmic", P, "", "true if the logarithm was estimated", values=bool),
 )
+READINGS: Final = "lengths [m], load cells [N], position [m], rotation [rad]"
 FOUND: Final = (
-    Quantity("length_offset", ("cable",), "m", "to be added to the lengths of the machine"),
+    Quantity("length_offset", ("cable",), "m", "correction of the lengths of the machine"),
     Quantity("status", (), "", "status of the calibration", codes=CalibrationStatus),
-    Quantity("value", P, "", "estimated values, in the units of the numbers", "values"),
+    Quantity("value", P, "", "estimated values, in the units of the parameters", "values"),
     Quantity("covariance", (*P, "other_parameter"), "", "covariance of the values", known=SOMEWHERE, infinite=True),
-    Quantity("chi_squared", (), "1", "sum of squares of residuals in deviations", low=0.0),
-    Quantity("degrees_of_freedom", (), "", "what chi_squared is compared with", values=int),
-    Quantity("iterations", (), "", "iterations of the least squares", values=int),
-    Quantity("row", N, "", "rows of the log that were used", "rows", values=int),
+    Quantity("chi_squared", (), "1", "sum of squares of the normalized residuals", low=0.0),
+    Quantity("degrees_of_freedom", (), "", "degrees of freedom of chi_squared", values=int),
+    Quantity("iterations", (), "", "number of iterations of the least squares", values=int),
+    Quantity("row", N, "", "used rows of the log", "rows", values=int),
     Quantity("position", (*N, "axis"), "m", "position of the platform", "poses.position"),
     Quantity("quaternion", (*N, "quaternion_part"), "1", "rotation from platform to world", "poses.quaternion"),
     Quantity("unstrained_length", (*N, "cable"), "m", "true lengths of the cables", low=0.0),
-    Quantity(
-        "residual",
-        (*N, "reading"),
-        "",
-        "readings minus predictions: lengths [m], load cells [N], position [m], rotation [rad]",
-        "residuals",
-        SOMEWHERE,
-    ),
+    Quantity("residual", (*N, "reading"), "", f"readings minus predictions: {READINGS}", "residuals", SOMEWHERE),
     Quantity("chi_squared_of_pose", N, "1", "share of each pose in chi_squared", low=0.0),
-    Quantity("weight", N, "1", "less than 1 for a pose that does not fit the rest", "weights", low=0.0),
+    Quantity("weight", N, "1", "weight of each pose, below 1 for an outlier", "weights", low=0.0),
 )
 SENSORS: Final = {  # name in the file: attribute and unit; the value is one number, or one per cable or axis
     "length_deviation": ("cable", "m"),
@@ -86,28 +86,30 @@ SENSORS: Final = {  # name in the file: attribute and unit; the value is one num
 }
 PLACED: Final = (
     Quantity("measuring_position", ("axis",), "m", "position of the measuring system", "frame.position"),
-    Quantity("measuring_quaternion", ("quaternion_part",), "1", "its rotation to the world", "frame.quaternion"),
-    Quantity("target", ("axis",), "m", "the measured point of the platform"),
+    Quantity(
+        "measuring_quaternion", ("quaternion_part",), "1", "rotation from measuring system to world", "frame.quaternion"
+    ),
+    Quantity("target", ("axis",), "m", "measured point of the platform"),
 )
 LEFT_OUT: Final = (
-    Quantity("left_out_row", ("omission",), "", "rows of the log that were left out", values=int),
-    Quantity("left_out_reason", ("omission",), "", "why", codes=Omission),
+    Quantity("left_out_row", ("omission",), "", "omitted rows of the log", values=int),
+    Quantity("left_out_reason", ("omission",), "", "reason of the omission", codes=Omission),
 )
 OUTLIERS: Final = (
     Quantity("outlier_row", ("outlier",), "", "row of the log", "row", values=int),
-    Quantity("outlier_cable", ("outlier",), "", "its cable, -1 for the whole pose", "cable", SOMEWHERE, values=int),
-    Quantity("outlier_quantity", ("outlier",), "", "quantity that does not fit", "quantity", values=str),
+    Quantity("outlier_cable", ("outlier",), "", "cable, -1 for the whole pose", "cable", SOMEWHERE, values=int),
+    Quantity("outlier_quantity", ("outlier",), "", "quantity with the deviation", "quantity", values=str),
     Quantity("outlier_size", ("outlier",), "", "size of the deviation [m, N or rad]", "size"),
-    Quantity("outlier_deviations", ("outlier",), "1", "the same in standard deviations", "deviations"),
+    Quantity("outlier_deviations", ("outlier",), "1", "size of the deviation in standard deviations", "deviations"),
 )
 CRITICISMS: Final = (
-    Quantity("criticism_name", ("criticism",), "", "parameters that were not estimated", "name", values=str),
-    Quantity("criticism_kind", ("criticism",), "", "their kind of unknown", "kind", values=str),
+    Quantity("criticism_name", ("criticism",), "", "parameters without an estimate", "name", values=str),
+    Quantity("criticism_kind", ("criticism",), "", "kind of these parameters", "kind", values=str),
     Quantity("criticism_fall", ("criticism",), "1", "reduction of chi_squared by their estimation", "fall", low=0.0),
     Quantity("criticism_chance", ("criticism",), "1", "probability of this reduction by chance", "chance", low=0.0),
-    Quantity("criticism_moves", ("criticism",), "", "number that would change most", "moves", values=str),
-    Quantity("criticism_change", ("criticism",), "", "this change, in the unit of the number", "change"),
-    Quantity("criticism_deviations", ("criticism",), "1", "this change in standard errors", "deviations", low=0.0),
+    Quantity("criticism_moves", ("criticism",), "", "parameter with the largest change", "moves", values=str),
+    Quantity("criticism_change", ("criticism",), "", "largest change, in the unit of this parameter", "change"),
+    Quantity("criticism_deviations", ("criticism",), "1", "largest change in standard errors", "deviations", low=0.0),
 )
 CROSS_VALIDATION: Final = (
     Quantity("folds", (), "", "folds of the cross-validation", values=int),
@@ -125,8 +127,8 @@ CROSS_VALIDATION: Final = (
 
 DIRECTIONS: Final = {  # unobservable or weakly observable directions in parameter space
     group: (
-        Quantity(f"{group}_name", (group,), "", "what each is", "name", values=str),
-        Quantity(f"{group}_vector", (group, *P), "", "combination of the numbers, in their units", "vector"),
+        Quantity(f"{group}_name", (group,), "", "name of the direction", "name", values=str),
+        Quantity(f"{group}_vector", (group, *P), "", "combination of the parameters, in their units", "vector"),
         Quantity(f"{group}_known", (group,), "1", "remaining share of the prior deviation", "known", low=0.0),
         Quantity(f"{group}_step", (group,), "", "next step", "step", values=str),
     )
@@ -215,7 +217,15 @@ def _pack(found: Calibration) -> Dataset:
     omitted = np.array([(row, reason) for reason, rows in found.left_out.items() for row in rows], dtype=np.int64)
     for one, values in zip(LEFT_OUT, omitted.reshape(-1, 2).T, strict=True):
         variables[one.name] = one.parts, values.astype(one.type), one.attributes
-    return labeled_dataset(variables, _attributes(found))
+    attributes = {
+        "log": found.log,
+        "read": READ[found.parameters.counted],
+        "date": found.date,
+        "left_out": " ".join(reason.name.lower() for reason in found.left_out),
+        **choice_attributes("model", found.model, MODELS),
+        "robot_before": dump_robot(found.before),
+    }
+    return FORMAT.dataset(f"Calibration of {found.robot.name}", found.robot, attributes, variables)
 
 
 def _sensor(name: str, axes: int) -> Quantity:
@@ -223,19 +233,6 @@ def _sensor(name: str, axes: int) -> Quantity:
     part, unit = SENSORS[name]
     long_name = f"standard deviation of a {name.removesuffix('_deviation')} that is read"
     return Quantity(name, (part,) if axes else (), unit, long_name, low=0.0)
-
-
-def _attributes(found: Calibration) -> dict[str, Any]:
-    return {
-        **FORMAT.attributes(f"Calibration of {found.robot.name}"),
-        "log": found.log,
-        "read": READ[found.parameters.counted],
-        "date": found.date,
-        "left_out": " ".join(reason.name.lower() for reason in found.left_out),
-        **choice_attributes("model", found.model, MODELS),
-        "robot": dump_robot(found.robot),
-        "robot_before": dump_robot(found.before),
-    }
 
 
 def _unpack(path: Path, data: Dataset) -> Calibration:
@@ -285,4 +282,3 @@ FORMAT: Final = Format(
     pack=_pack,
     unpack=_unpack,
 )
-save = FORMAT.save

@@ -16,14 +16,12 @@ from sagline.control.states import State
 from sagline.core.arguments import brief, file_path, instance, integer
 from sagline.core.arrays import locked
 from sagline.core.errors import FileError, InvalidValueError, SaglineWarning
-from sagline.files.format import Format
 from sagline.files.mcap_layout import CABLE, CYCLES, EVENTS, EVERY, ROWS, SMALL, TIME, columns_of
 from sagline.files.mcap_reader import AGAIN, Ending, RecordedLog, read_log
 from sagline.files.mcap_writer import BLOCK, McapFile, check_packages
-from sagline.files.netcdf import index_coordinate, labeled_dataset, write_dataset
+from sagline.files.netcdf import Format, index_coordinate, write_dataset
 from sagline.files.packed import unpack_dataset
 from sagline.files.plan_file import plan_dataset, plan_of_dataset
-from sagline.files.robot_file import dump_robot
 from sagline.files.variables import NONE, PARTS, Quantity
 from sagline.files.writing import atomic_file
 from sagline.kinematics.plan import Plan
@@ -137,13 +135,13 @@ def _check_shapes(columns: dict[str, NDArray[Any]], robot: Robot) -> None:
             raise InvalidValueError(f"{quantity.name}: shape", shape, str(wanted), AGAIN)
 
 
-def to_dataset(execution: Execution) -> Dataset:
+def pack(execution: Execution) -> Dataset:
     """Create the data set of an execution: every quantity over time, with its unit."""
     done = instance(execution, Execution, "execution")
     variables: dict[str, Any] = {
         quantity.name: ((ROWS, *quantity.parts), quantity.of(done), quantity.attributes) for quantity in CYCLES
     }
-    variables["zero"] = (CABLE, done.zero, {"units": "m", "long_name": "what homing adds to lengths"})
+    variables["zero"] = (CABLE, done.zero, {"units": "m", "long_name": "correction of the lengths by homing"})
     for name, what in EVENTS.items() if done.events else ():
         values = [getattr(event, name) for event in done.events]
         variables[f"event_{name}"] = ("event", [_plain(value) for value in values], {"long_name": what})
@@ -152,21 +150,21 @@ def to_dataset(execution: Execution) -> Dataset:
         "group": index_coordinate("group", done.samples.age.shape[1]),
         TIME.name: (ROWS, done.time, TIME.attributes),
     }
-    attributes = {
-        **FORMAT.attributes(f"Execution on {done.robot.name}"),
-        **{"status": done.status.name, "reason": done.reason, "period": done.period, "period_units": "s"},
-        "robot": dump_robot(done.robot),
-    }
-    return labeled_dataset(variables, attributes, coordinates)
+    attributes = {"status": done.status.name, "reason": done.reason, "period": done.period, "period_units": "s"}
+    return FORMAT.dataset(f"Execution on {done.robot.name}", done.robot, attributes, variables, coordinates)
 
 
 def save(execution: Execution, file: os.PathLike[str] | str) -> None:
     """Write an execution to an MCAP log or to NetCDF, depending on the suffix of the file."""
     path = file_path(file)
-    ways = {".mcap": save_execution, ".nc": save_dataset}
-    if path.suffix.lower() not in ways:
-        raise FileError(path, "is not a valid name for an execution", "Let it end in .mcap, or in .nc.")
-    ways[path.suffix.lower()](execution, path)
+    match path.suffix.lower():
+        case ".mcap":
+            save_execution(execution, path)
+        case ".nc":  # the plan is the group `plan`
+            plan = instance(execution, Execution, "execution").plan
+            write_dataset(pack(execution), path, {} if plan is None else {PLAN_GROUP: plan_dataset(plan)})
+        case _:
+            raise FileError(path, "is not a valid name for an execution", "Let it end in .mcap, or in .nc.")
 
 
 def save_execution(execution: Execution, file: os.PathLike[str] | str) -> None:
@@ -187,13 +185,6 @@ def save_execution(execution: Execution, file: os.PathLike[str] | str) -> None:
         mcap.finish()
 
 
-def save_dataset(execution: Execution, file: os.PathLike[str] | str) -> None:
-    """Write an execution to a NetCDF file atomically; its plan is the group `plan`."""
-    plan = instance(execution, Execution, "execution").plan
-    groups = {} if plan is None else {PLAN_GROUP: plan_dataset(plan)}
-    write_dataset(to_dataset(execution), file_path(file), groups)
-
-
 def _plain(value: Any) -> Any:
     """Value for the table of events: a number or a text without change; a state as its name."""
     return value.name if isinstance(value, State) else str(value) if isinstance(value, str) else value
@@ -207,5 +198,5 @@ FORMAT: Final = Format(
     again="Write it again with sagline log.",
     key="sagline_execution_format",
     version=1,
-    pack=to_dataset,
+    pack=pack,
 )

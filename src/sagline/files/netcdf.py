@@ -1,4 +1,4 @@
-"""NetCDF files: atomic writing with a digest at the end. Damaged files are not read.
+"""Formats of results, and NetCDF files with a digest at the end. Damaged files are not read.
 
 An HDF5 file states its own length, and HDF5 ignores all bytes after it. The digest is therefore appended to the file.
 It is checked first, because reading a damaged file may take any amount of memory and time. A file without a digest is
@@ -7,19 +7,22 @@ not read.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import os
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from hashlib import sha256
+from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, Final, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, BinaryIO, Final, Generic, Literal, TypeVar
 
 import numpy as np
 
+from sagline.core.arguments import file_path, instance
 from sagline.core.errors import FileError, InvalidValueError, shortened
 from sagline.files.reading import check_regular, unreadable
-from sagline.files.robot_file import parse_robot
+from sagline.files.robot_file import dump_robot, parse_robot
 from sagline.files.variables import PARTS
 from sagline.files.writing import atomic_file
 from sagline.robot.robot import Robot
@@ -36,6 +39,7 @@ OTHERS: Final = {
     "sagline_frequency_map_format": ("a frequency map", "Open it with xarray.open_dataset."),
 }
 Choice = TypeVar("Choice")
+T = TypeVar("T")
 _BEGIN: Final = b"\x89HDF\r\n\x1a\n"  # first bytes of every NetCDF-4 file
 _KINDS: Final = {
     **dict.fromkeys((".yaml", ".yml"), "a YAML file"),
@@ -77,55 +81,75 @@ def _line(handle: BinaryIO, size: int) -> bytes:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Content:
-    """Kind of content of a file, with texts for messages."""
+class Format(Generic[T]):
+    """The format of files with one kind of result, and texts for messages."""
 
+    kind: type[T]  # type of the result
     name: str  # name of the content: "plan"
     made: str  # description of such a file: "run of sagline track"
     give: str  # next step for the user: "Give the .nc file that sagline track wrote."
     again: str  # next step for a damaged file
     key: str  # attribute that holds the version of the format
     version: int  # newest version of the format; incremented with every change that an older sagline could misread
+    # functions that create the data set of a result, and the result from a data set and a path for messages; None if
+    # another module writes the files, or if results are only written
+    pack: Callable[[T], Dataset] | None = None
+    unpack: Callable[[Path, Dataset], T] | None = None
 
-    def format_of(self, path: Path, attributes: Mapping[str, Any]) -> int:
-        """Read the format version of a file; raise FileError for other content or a newer version."""
+    def save(self, result: T, file: os.PathLike[str] | str) -> None:
+        """Write a result to a NetCDF file atomically, with a digest at its end."""
+        assert self.pack is not None
+        write_dataset(self.pack(instance(result, self.kind, self.name)), file_path(file))
+
+    def load(self, file: os.PathLike[str] | str) -> T:
+        """Read a file that `save` wrote."""
+        path = file_path(file)
+        data = read_dataset(path, self)
+        self.check(path, data.attrs)
+        assert self.unpack is not None
+        with file_errors(path):
+            return self.unpack(path, data)
+
+    def check(self, path: Path, attributes: Mapping[str, Any]) -> None:
+        """Refuse a file with other content, or of a newer version of the format."""
         found = attributes.get(self.key)
         if found is None:
-            raise FileError(path, *self._instead(attributes))
+            other = next((said for key, said in OTHERS.items() if key in attributes), None)
+            if other is not None:
+                raise FileError(path, f"is {other[0]} of sagline, not a {self.name}", other[1])
+            reason = f"is not a {self.name} of sagline: it has no {self.key}"
+            raise FileError(path, reason, "Check that this is the file you mean.")
         if not isinstance(found, int | np.integer) or found < 1:
             step = "Write the file again, because it was edited or damaged."
             raise FileError(path, f"has the unknown format {found!r}", step, item=self.key)
-        if found > self.version:
-            raise FileError(
-                path,
-                f"has format {found}, written by {attributes.get('source')}; this is sagline {version('sagline')}, "
-                f"which reads up to {self.version}",
-                "Install a newer sagline.",
-                item=self.key,
-            )
-        return int(found)
-
-    def _instead(self, attributes: Mapping[str, Any]) -> tuple[str, str]:
-        """Describe the content of a file of another kind, and give the next step."""
-        for key, (what, step) in OTHERS.items():
-            if key in attributes:
-                return f"is {what} of sagline, not a {self.name}", step
-        return f"is not a {self.name} of sagline: it has no {self.key}", "Check that this is the file you mean."
+        check_version(path, int(found), self.version, attributes.get("source"), self.key)
 
     def attributes(self, title: str) -> dict[str, Any]:
-        """Attributes that every file of this content has."""
+        """Attributes that every file of this format has."""
         return {"title": title, "source": f"sagline {version('sagline')}", self.key: self.version}
 
+    def dataset(
+        self,
+        title: str,
+        robot: Robot,
+        attributes: Mapping[str, Any],
+        variables: Mapping[str, Any],
+        coordinates: Mapping[str, Any] | None = None,
+    ) -> Dataset:
+        """Make a data set without indexes for its dimensions. The reader makes the necessary indexes."""
+        from xarray import Coordinates, Dataset
 
-def labeled_dataset(
-    variables: Mapping[str, Any], attributes: Mapping[str, Any], coordinates: Mapping[str, Any] | None = None
-) -> Dataset:
-    """Make a data set without indexes for its dimensions. The reader makes the necessary indexes."""
-    from xarray import Coordinates, Dataset
+        parts = {dimension for dimensions, *_ in variables.values() for dimension in dimensions} & PARTS.keys()
+        labels = {part: (part, list(PARTS[part])) for part in sorted(parts)}
+        known = {**self.attributes(title), **attributes, "robot": dump_robot(robot)}
+        return Dataset(variables, Coordinates({**labels, **(coordinates or {})}, indexes={}), known)
 
-    parts = {dimension for dimensions, *_ in variables.values() for dimension in dimensions} & PARTS.keys()
-    labels = {part: (part, list(PARTS[part])) for part in sorted(parts)}
-    return Dataset(variables, Coordinates({**labels, **(coordinates or {})}, indexes={}), attributes)
+
+def check_version(path: Path, found: int, newest: int, source: Any, item: str | None = None) -> None:
+    """Refuse a file of a format that is newer than the `newest` known version."""
+    if found > newest:
+        here = f"this is sagline {version('sagline')}, which reads up to {newest}"
+        raise FileError(path, f"has format {found}, written by {source}; {here}", "Install a newer sagline.", item=item)
 
 
 def index_coordinate(dimension: str, count: int) -> tuple[str, Any, dict[str, str]]:
@@ -151,7 +175,7 @@ def write_dataset(data: Dataset, file: Path, groups: Mapping[str, Dataset] | Non
         seal(partial)
 
 
-def read_dataset(path: Path, content: Content) -> Dataset:
+def read_dataset(path: Path, content: Format[Any]) -> Dataset:
     """Read the data set of an undamaged file. The digest is checked before the content is read."""
     try:
         check_regular(path, path.stat().st_mode)  # a pipe is not opened, because opening would wait for its writer
@@ -183,7 +207,7 @@ def file_errors(path: Path) -> Iterator[None]:
         raise FileError(path, f"has parts that do not agree ({text})", step) from error
 
 
-def is_of(path: Path, content: Content) -> bool:
+def is_of(path: Path, content: Format[Any]) -> bool:
     """True if a file has the attributes of `content`. Nothing else is checked."""
     from h5py import File
 
@@ -197,7 +221,7 @@ def is_of(path: Path, content: Content) -> bool:
         return False
 
 
-def _load(path: Path, content: Content) -> Dataset:
+def _load(path: Path, content: Format[Any]) -> Dataset:
     from h5py import File
     from xarray import open_dataset
 
@@ -215,7 +239,7 @@ def _load(path: Path, content: Content) -> Dataset:
         raise FileError(path, "is not a NetCDF file of sagline, but ends with a digest", content.again) from error
 
 
-def _cause(path: Path, content: Content) -> tuple[str, str]:
+def _cause(path: Path, content: Format[Any]) -> tuple[str, str]:
     """Reason why a file cannot be read, and the next step. They replace technical messages of the libraries."""
     with path.open("rb") as file:
         begin = file.read(len(_BEGIN))
@@ -271,3 +295,45 @@ def robot_of(path: Path, data: Dataset, item: str = "robot") -> Robot:
         reason = f"has {data.sizes['cable']} cables, its robot {robot.cable_count}"
         raise FileError(path, reason, "Write it again.", item="cable")
     return robot
+
+
+# Writer of each type of result: a module with a function save(result, file), or a format in a module. It is loaded when
+# a result of its type is saved.
+WRITERS: Final = {
+    "Calibration": "calibration_file.FORMAT",
+    "CalibrationPoses": "path_file",
+    "Execution": "execution_file",
+    "FrequencyMap": "simulation_file.FREQUENCY_MAP",
+    "Plan": "plan_file.FORMAT",
+    "Simulation": "simulation_file.FORMAT",
+    "Surface": "mesh_file",
+    "WinchLog": "log_file",
+    "Workspace": "workspace_file",
+}
+
+
+def writer_of(result: object) -> Any:
+    """Find the writer of results of this type or of a base class; None if there is none."""
+    name = next((kind.__name__ for kind in type(result).__mro__ if kind.__name__ in WRITERS), None)
+    if name is None:
+        return None
+    module, _, form = WRITERS[name].partition(".")
+    found = import_module(f"sagline.files.{module}")
+    return getattr(found, form) if form else found
+
+
+def dataset_of(result: Any) -> Dataset:
+    """Data set of a result in its NetCDF format. A result without a format has a table with the dimension row."""
+    pack = getattr(writer_of(result), "pack", None)
+    if pack is not None:
+        found: Dataset = pack(result)
+        return found
+    from xarray import Dataset
+
+    table = result.table()
+    return Dataset({name: ("row", values, {"units": table.units[name]}) for name, values in table.columns.items()})
+
+
+def save(result: object, file: os.PathLike[str] | str) -> None:
+    """Write a result to a file atomically, in the format of the result's type."""
+    writer_of(result).save(result, file)

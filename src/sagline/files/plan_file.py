@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import os
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from sagline.cables.model import CableState, CableStatus
 from sagline.cables.models import MODELS
 from sagline.core.errors import FileError, InvalidValueError
-from sagline.files.format import Format
-from sagline.files.netcdf import choice_attributes, choice_of, index_coordinate, labeled_dataset, robot_of
-from sagline.files.robot_file import dump_robot
+from sagline.files.netcdf import Format, choice_attributes, choice_of, index_coordinate, robot_of
 from sagline.files.variables import (
     SOLVED,
     SOMEWHERE,
@@ -35,140 +33,62 @@ from sagline.tension.methods import METHODS
 if TYPE_CHECKING:
     from xarray import Dataset
 
-CABLE: Final = ("cable",)
+CABLE, AXIS, WRENCH, TWIST = ("cable",), ("axis",), ("wrench_part",), ("twist_part",)
+CABLES, CONTACT = "state.cables.", "state.contact."  # states of the free cables, and of the cables on their pulleys
+CHANGE: Final = "change of the force that makes the pose feasible"
 QUANTITIES = (
-    Quantity("unstrained_length", CABLE, "m", "unstrained length L to wind", known=SOLVED, low=0.0),
+    Quantity("unstrained_length", CABLE, "m", "unstrained length L off the drum", known=SOLVED, low=0.0),
     Quantity("chord_tension", CABLE, "N", "tension along the chord, T_x / cos phi", known=SOLVED, low=0.0),
-    Quantity(
-        "horizontal_tension", CABLE, "N", "horizontal tension T_x", "state.cables.horizontal_tension", SOLVED, 0.0
-    ),
-    Quantity(
-        "vertical_force",
-        CABLE,
-        "N",
-        "vertical force T_z on the cable at its platform end, up positive",
-        "state.cables.vertical_force",
-        SOLVED,
-    ),
-    Quantity("span", CABLE, "m", "horizontal distance from frame end to platform end", "state.cables.span", low=0.0),
-    Quantity("rise", CABLE, "m", "height of the platform end above the frame end", "state.cables.rise"),
-    Quantity("cable_status", CABLE, "", "status of each cable's calculation", "state.cables.status", codes=CableStatus),
+    Quantity("horizontal_tension", CABLE, "N", "horizontal tension T_x", CABLES, SOLVED, 0.0),
+    Quantity("vertical_force", CABLE, "N", "vertical force T_z at the platform end, up positive", CABLES, SOLVED),
+    Quantity("span", CABLE, "m", "horizontal distance from frame end to platform end", CABLES, low=0.0),
+    Quantity("rise", CABLE, "m", "height of the platform end above the frame end", CABLES),
+    Quantity("cable_status", CABLE, "", "status of each cable's calculation", f"{CABLES}status", codes=CableStatus),
     Quantity("pose_status", (), "", "status of each pose's calculation", "status", codes=PoseStatus),
+    Quantity("shortfall", (), "N", f"smallest {CHANGE}", known=SOMEWHERE, low=0.0, infinite=True),
+    Quantity("wrench_residual", ("residual_part",), "N, N m", "unbalanced force and moment", known=SOLVED, low=0.0),
+    Quantity("blocking", CABLE, "", "true if the cable's limits oppose the needed wrench", values=bool),
     Quantity(
-        "shortfall",
-        (),
-        "N",
-        "smallest change of the force that would make the pose feasible",
-        known=SOMEWHERE,
-        low=0.0,
-        infinite=True,
+        "wrench", WRENCH, "N, N m", "external and inertial wrench about the center of mass, without gravity", "state."
     ),
-    Quantity(
-        "wrench_residual",
-        ("residual_part",),
-        "N, N m",
-        "norms of the unbalanced force and moment in the free motions",
-        known=SOLVED,
-        low=0.0,
-    ),
-    Quantity("blocking", CABLE, "", "whether the cable's limits oppose the needed wrench", values=bool),
-    Quantity(
-        "wrench",
-        ("wrench_part",),
-        "N, N m",
-        "external and inertial wrench about the center of mass in world axes, without gravity",
-        "state.wrench",
-    ),
-    Quantity("position", ("axis",), "m", "position of the platform origin in the world", "state.pose.position"),
-    Quantity(
-        "quaternion", ("quaternion_part",), "1", "rotation from platform to world, scalar last", "state.pose.quaternion"
-    ),
+    Quantity("position", AXIS, "m", "position of the platform origin in the world", "state.pose."),
+    Quantity("quaternion", ("quaternion_part",), "1", "rotation from platform to world, scalar last", "state.pose."),
 )
 
 # variables of a plan with pulleys or drums
 MACHINE = (
     Quantity("free_length", CABLE, "m", "unstrained length of the free cable", known=SOLVED, low=0.0),
     Quantity(
-        "free_chord_tension",
-        CABLE,
-        "N",
-        "tension along the chord of the free cable, from its exit point",
-        "state.cables.chord_tension",
-        SOLVED,
-        0.0,
+        "free_chord_tension", CABLE, "N", "tension along the free cable's chord", f"{CABLES}chord_tension", SOLVED, 0.0
     ),
     Quantity("wrap_angle", CABLE, "rad", "angle over which the cable lies on its pulley", known=SOLVED, low=0.0),
-    Quantity(
-        "wrapped_length", CABLE, "m", "unstrained length on the pulley", "state.contact.wrapped_length", SOLVED, 0.0
-    ),
-    Quantity(
-        "dead_length", CABLE, "m", "unstrained length between pulley and drum", "state.contact.dead_length", SOLVED, 0.0
-    ),
-    Quantity(
-        "chord_sine",
-        CABLE,
-        "1",
-        "sine of the slope of the chord that touches the pulley",
-        "state.contact.chord_sine",
-        SOLVED,
-    ),
+    Quantity("wrapped_length", CABLE, "m", "unstrained length on the pulley", CONTACT, SOLVED, 0.0),
+    Quantity("dead_length", CABLE, "m", "unstrained length between pulley and drum", CONTACT, SOLVED, 0.0),
+    Quantity("chord_sine", CABLE, "1", "sine of the slope of the chord that touches the pulley", CONTACT, SOLVED),
 )
 
 # variable of a plan with friction
-WINDING = Quantity(
-    "winding",
-    CABLE,
-    "1",
-    "direction of friction: 1 winding in, -1 paying out, 0 standing",
-    "state.contact.winding",
-    low=-1.0,
-)
+WINDING = Quantity("winding", CABLE, "1", "friction: 1 winding in, -1 paying out, 0 standing", CONTACT, low=-1.0)
 
 # proofs of infeasibility; older files do not have them
 PROOF = (
+    Quantity("farkas", WRENCH, "1, 1/m", "vector y that proves a pose infeasible", known=SOMEWHERE),
+    Quantity("needed", WRENCH, "N, N m", "wrench J tau that the chord tensions must supply", known=SOMEWHERE),
     Quantity(
-        "farkas",
-        ("wrench_part",),
-        "1, 1/m",
-        "vector y that proves a pose infeasible: along y the cables provide too little force, at any tensions",
-        known=SOMEWHERE,
+        "bracket", ("bracket_part",), "N", f"bounds of the smallest {CHANGE}", known=SOMEWHERE, low=0.0, infinite=True
     ),
-    Quantity("needed", ("wrench_part",), "N, N m", "wrench J tau that the chord tensions must supply", known=SOMEWHERE),
-    Quantity(
-        "bracket",
-        ("bracket_part",),
-        "N",
-        "proved lower bound and sufficient value of the smallest change of the force that would make the pose feasible",
-        known=SOMEWHERE,
-        low=0.0,
-        infinite=True,
-    ),
-    Quantity(
-        "relief", ("axis",), "N", "smallest force that, added to the wrench, makes the pose feasible", known=SOMEWHERE
-    ),
-    Quantity(
-        "at_border",
-        (),
-        "",
-        "whether the tensions were searched for at the border of feasibility, not by the tension method",
-        values=bool,
-    ),
+    Quantity("relief", AXIS, "N", "smallest additional force that makes the pose feasible", known=SOMEWHERE),
+    Quantity("at_border", (), "", "true if the tensions are at the border of feasibility", values=bool),
 )
 
 # variable of a plan along a path
-TIME = Quantity("time", (), "s", "time from the start of the path", "path.time")
+TIME = Quantity("time", (), "s", "time from the start of the path", "path.")
 MOTION = (
-    Quantity("twist", ("twist_part",), "m/s, rad/s", "velocity of the platform origin, angular velocity", "path.twist"),
-    Quantity(
-        "twist_rate",
-        ("twist_part",),
-        "m/s^2, rad/s^2",
-        "acceleration of the platform origin, angular acceleration",
-        "path.twist_rate",
-    ),
+    Quantity("twist", TWIST, "m/s, rad/s", "velocity of the platform origin, angular velocity", "path."),
+    Quantity("twist_rate", TWIST, "m/s^2, rad/s^2", "acceleration of the origin, angular acceleration", "path."),
 )
 # variable of a path with known jerk
-JERK = Quantity("jerk", ("twist_part",), "m/s^3, rad/s^3", "rate of twist_rate", "path.jerk")
+JERK = Quantity("jerk", TWIST, "m/s^3, rad/s^3", "rate of twist_rate", "path.")
 RESTS = "rests"  # attribute of a path with known rests
 
 
@@ -239,25 +159,18 @@ def load_plan(file: os.PathLike[str] | str) -> Plan:
 
 def plan_dataset(plan: Plan) -> Dataset:
     """Create the data set of a plan of one robot. An attribute contains the robot."""
-    rows = ("pose",) * len(plan.state.pose.shape)
-    cables = plan.state.one_robot.cable_count
+    robot, rows = plan.state.one_robot, ("pose",) * len(plan.state.pose.shape)
+    cables = robot.cable_count
     machine = () if plan.state.contact is None else MACHINE
     variables = variables_of_result(plan, (*QUANTITIES, *machine, WINDING, *PROOF, *MOTION, JERK), rows)
     coordinates = {"cable": index_coordinate("cable", cables), **variables_of_result(plan, (TIME,), rows)}
     if plan.path is not None and plan.path.rests is not None:
         variables[RESTS] = (("rest",), plan.path.rests, {"units": "s", "long_name": "times of rest of the platform"})
-    data = labeled_dataset(variables, _attributes(plan), coordinates)
+    choices = choice_attributes("model", plan.state.cables.model, MODELS)
+    choices |= choice_attributes("tension", plan.tension, METHODS)
+    data = FORMAT.dataset(f"Cable lengths and tensions of {robot.name}", robot, choices, variables, coordinates)
     _check_plan(data, cables)
     return data
-
-
-def _attributes(plan: Plan) -> dict[str, Any]:
-    return {
-        **FORMAT.attributes(f"Cable lengths and tensions of {plan.state.one_robot.name}"),
-        **choice_attributes("model", plan.state.cables.model, MODELS),
-        **choice_attributes("tension", plan.tension, METHODS),
-        "robot": dump_robot(plan.state.one_robot),
-    }
 
 
 def plan_of_dataset(path: FilePath, data: Dataset, item: str = "robot") -> Plan:
@@ -304,4 +217,3 @@ FORMAT: Final = Format(
     pack=plan_dataset,
     unpack=plan_of_dataset,
 )
-save = FORMAT.save

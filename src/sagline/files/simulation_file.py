@@ -1,4 +1,4 @@
-"""Simulations in NetCDF: every quantity with its unit, the energy balance, the events, and the robot."""
+"""Simulations and frequency maps in NetCDF: every quantity with its unit, events, and the robot."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from sagline.core.errors import InvalidValueError
 from sagline.dynamics.simulation.results import EnergyBalance, Occurrence, Simulation
 from sagline.dynamics.simulation.winches import SecondOrder
 from sagline.dynamics.vibration.dynamic_stiffness import Damping
-from sagline.files.format import Format
-from sagline.files.netcdf import attributes_with_units, index_coordinate, labeled_dataset, robot_of
-from sagline.files.robot_file import dump_robot
+from sagline.dynamics.vibration.frequency_map import FrequencyMap
+from sagline.dynamics.vibration.vibration import VibrationStatus
+from sagline.files.netcdf import Format, attributes_with_units, index_coordinate, robot_of
 from sagline.files.variables import (
     NONE,
     SOMEWHERE,
@@ -58,13 +58,13 @@ NODES: Final = Quantity(
 )
 # variables of each event: attributes of an `Occurrence`
 EVENT: Final = ("event",)
-WHICH: Final = "which cable or winch, counted from 0; -1 for the platform"
+INDEX: Final = "index of the cable or winch, from 0; -1 for the platform"
 EVENTS: Final = (
-    Quantity("event_time", EVENT, "s", "when it happened", "time"),
-    Quantity("event_kind", EVENT, "", "what happened", "kind", values=str),
-    Quantity("event_cable", EVENT, "", WHICH, "cable", SOMEWHERE, values=int),
-    Quantity("event_tension_before", EVENT, "N", "largest tension before it", "tension_before", SOMEWHERE, 0.0),
-    Quantity("event_tension_after", EVENT, "N", "largest tension after it", "tension_after", SOMEWHERE, 0.0),
+    Quantity("event_time", EVENT, "s", "time of the event", "time"),
+    Quantity("event_kind", EVENT, "", "kind of the event", "kind", values=str),
+    Quantity("event_cable", EVENT, "", INDEX, "cable", SOMEWHERE, values=int),
+    Quantity("event_tension_before", EVENT, "N", "largest tension before the event", "tension_before", SOMEWHERE, 0.0),
+    Quantity("event_tension_after", EVENT, "N", "largest tension after the event", "tension_after", SOMEWHERE, 0.0),
 )
 CABLE_MASS: Final = ("none", "lumped", "modal")
 INTEGRATORS: Final = ("splitting", "runge-kutta", "exact")
@@ -209,24 +209,20 @@ def _pack(simulation: Simulation) -> Dataset:
         variables |= record_variables(simulation.events, EVENTS)
     cables = simulation.robot.cable_count
     coordinates = {"cable": index_coordinate("cable", cables), **variables_of_result(simulation, (TIME,), (ROWS,))}
-    data = labeled_dataset(variables, _attributes(simulation), coordinates)
-    _check_simulation(data, cables)
-    return data
-
-
-def _attributes(simulation: Simulation) -> dict[str, Any]:
     winches = simulation.winches
     lagging = isinstance(winches, SecondOrder)
-    return {
-        **FORMAT.attributes(f"Motion of {simulation.robot.name} in time"),
+    attributes = {
         "cable_mass": simulation.cable_mass,
         "integrator": simulation.integrator,
         **attributes_with_units(simulation, {"step": "s"}),
         **({"winches": LAGGING, **attributes_with_units(winches, LAG)} if lagging else {"winches": winches}),
         "winding": simulation.winding,
         **attributes_with_units(instance(simulation.damping, Damping, "damping"), LOSSES),
-        "robot": dump_robot(simulation.robot),
     }
+    robot = simulation.robot
+    data = FORMAT.dataset(f"Motion of {robot.name} in time", robot, attributes, variables, coordinates)
+    _check_simulation(data, cables)
+    return data
 
 
 def _unpack(path: FilePath, data: Dataset) -> Simulation:
@@ -262,4 +258,37 @@ FORMAT: Final = Format(
     pack=_pack,
     unpack=_unpack,
 )
-save = FORMAT.save
+
+
+FREQUENCIES: Final = (
+    Quantity("position", ("axis",), "m", "position of the platform origin in the world", "pose.position"),
+    Quantity("quaternion", ("quaternion_part",), "1", "rotation from platform to world", "pose.quaternion"),
+    Quantity("status", (), "", "status of the vibration analysis", codes=VibrationStatus),
+    Quantity("frequency", (), "Hz", "lowest frequency with cable mass", known=SOMEWHERE),
+    Quantity("massless_frequency", (), "Hz", "lowest frequency, massless cables"),
+    Quantity("platform_share", (), "1", "platform's share of the lowest mode with cable mass"),
+    Quantity("peak", (), "m/N", "largest response to a force, with cable mass"),
+    Quantity("peak_frequency", (), "Hz", "frequency of the largest response"),
+)
+
+
+def _pack_frequencies(found: FrequencyMap) -> Dataset:
+    """Create the data set of a frequency map."""
+    attributes = attributes_with_units(found, {"up_to": "Hz"})
+    attributes |= attributes_with_units(
+        found.damping, {"loss_time": "s", "air_damping": "N s/m2", "modal_damping": None}
+    )
+    variables = variables_of_result(found, FREQUENCIES, ("pose",))
+    return FREQUENCY_MAP.dataset(f"Frequencies of {found.robot.name} over poses", found.robot, attributes, variables)
+
+
+FREQUENCY_MAP: Final = Format(
+    kind=FrequencyMap,
+    name="map of frequencies",
+    made="map of sagline",
+    give="Give a .nc file that the save method of a map wrote.",
+    again="Make the map again, or get the original file.",
+    key="sagline_frequency_map_format",
+    version=1,
+    pack=_pack_frequencies,
+)

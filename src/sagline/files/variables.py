@@ -47,7 +47,8 @@ class Quantity(NamedTuple):
     parts: tuple[str, ...]  # dimensions after the dimensions of the rows (poses, or samples in time)
     unit: str  # unit in the file; "" for a plain number
     long_name: str  # description
-    source: str = ""  # attribute of the result, with dots for nested attributes; "" if the attribute is `name`
+    # attribute of the result, with dots for nested attributes; if it is "" or ends with a dot, `name` follows
+    source: str = ""
     # poses with values; in records, an integer with values SOMEWHERE is `NONE` elsewhere
     known: Known = EVERYWHERE
     low: float = -np.inf  # lowest value
@@ -59,7 +60,7 @@ class Quantity(NamedTuple):
     @property
     def place(self) -> str:
         """Name of the result's attribute that has the values, with dots for nested attributes."""
-        return self.source or self.name
+        return self.source + self.name if self.source[-1:] in ("", ".") else self.source
 
     @property
     def type(self) -> np.dtype[Any]:

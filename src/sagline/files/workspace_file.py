@@ -15,9 +15,8 @@ from attrs import fields
 from sagline.cables.models import MODELS
 from sagline.core.arguments import choice
 from sagline.core.arrays import locked, number
-from sagline.files.format import Format
-from sagline.files.netcdf import choice_attributes, choice_of, labeled_dataset
-from sagline.files.robot_file import dump_robot, parse_robot
+from sagline.files.netcdf import Format, choice_attributes, choice_of
+from sagline.files.robot_file import parse_robot
 from sagline.files.variables import Quantity, check_indices, check_variables, fields_of, variables_of_result
 from sagline.interference.mesh import Mesh
 from sagline.interference.obstacles import Box, Capsule, Sphere
@@ -182,14 +181,8 @@ def load_workspace(file: os.PathLike[str] | str) -> Workspace:
 
 def _pack(space: Workspace) -> Dataset:
     """Create the data set of a workspace."""
-    attributes, obstacles = _criteria_attributes(space.criteria)
-    return labeled_dataset(variables_of_result(space, QUANTITIES) | obstacles, _attributes(space) | attributes)
-
-
-def _attributes(space: Workspace) -> dict[str, Any]:
     box = space.box
     attributes = {
-        **FORMAT.attributes(f"Workspace of {space.robot.name}"),
         **{"volume": space.volume, "volume_error": space.volume_error, "volume_units": space.unit},
         **{"box_low": box.low, "box_high": box.high, "box_units": "m", "box_tilt": box.tilt, "box_tilt_units": "rad"},
         "need": space.orientations.need,
@@ -197,17 +190,16 @@ def _attributes(space: Workspace) -> dict[str, Any]:
         "open_faces": ", ".join(space.open_faces),
         **choice_attributes("model", space.model, MODELS),
         **choice_attributes("tension", space.tension, METHODS),
-        "robot": dump_robot(space.robot),
     }
     if space.moment_arm is not None:
         attributes |= {"moment_arm": space.moment_arm, "moment_arm_units": "m"}
-    if space.nearest is not None:
-        near = space.nearest
-        position, quaternion = near.pose.position.tolist(), near.pose.quaternion.tolist()
-        names = ("level", "margin", "criterion", "cables", "reason")
-        said = {"position": position, "quaternion": quaternion, **{name: getattr(near, name) for name in names}}
+    if (near := space.nearest) is not None:
+        said = {"position": near.pose.position.tolist(), "quaternion": near.pose.quaternion.tolist()}
+        said |= {name: getattr(near, name) for name in ("level", "margin", "criterion", "cables", "reason")}
         attributes["nearest"] = json.dumps(said)
-    return attributes
+    criteria, obstacles = _criteria_attributes(space.criteria)
+    variables = variables_of_result(space, QUANTITIES) | obstacles
+    return FORMAT.dataset(f"Workspace of {space.robot.name}", space.robot, attributes | criteria, variables)
 
 
 def _unpack(path: FilePath, data: Dataset) -> Workspace:
@@ -277,4 +269,4 @@ FORMAT: Final = Format(
     pack=_pack,
     unpack=_unpack,
 )
-save = FORMAT.save
+save, pack = FORMAT.save, FORMAT.pack

@@ -8,6 +8,6 @@ from .free import FreeCable as FreeCable
 from .free import FreeLimit as FreeLimit
 from .free_anchors import FreeAnchors as FreeAnchors
 from .front import Front as Front
-from .goals import Goal as Goal
-from .moving import MovingAnchors as MovingAnchors
-from .moving import moving_anchors as moving_anchors
+from .rating import MovingAnchors as MovingAnchors
+from .rating import moving_anchors as moving_anchors
+from .request import Goal as Goal

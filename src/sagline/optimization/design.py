@@ -18,8 +18,7 @@ from sagline.optimization.candidates import AnchorErrors
 from sagline.optimization.folder import open_record
 from sagline.optimization.free import Free
 from sagline.optimization.front import Front, Ledger
-from sagline.optimization.goals import Goal
-from sagline.optimization.request import COUNTS, MOST_EVALUATIONS, checked_request, poses_of
+from sagline.optimization.request import COUNTS, MOST_EVALUATIONS, Goal, checked_request, poses_of
 from sagline.optimization.search import SEARCHES, Task, latin_hypercube, population_of
 from sagline.robot.pose import PoseBox, PoseLike
 from sagline.robot.robot import Robot

@@ -18,7 +18,7 @@ from sagline.files.yaml_text import YAML_LIMIT, YamlEntry, parse_mapping, valida
 from sagline.optimization.candidates import AnchorErrors
 from sagline.optimization.free import CableChoice, Free, FreeCable, FreeLimit
 from sagline.optimization.free_anchors import FreeAnchors
-from sagline.optimization.goals import KINDS, Goal
+from sagline.optimization.request import KINDS, Goal
 from sagline.robot.pose import PoseBox
 from sagline.workspaces.wrench_sets import Accelerations, WrenchBox, WrenchSet
 

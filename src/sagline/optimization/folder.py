@@ -29,8 +29,7 @@ from sagline.core.errors import FileError
 from sagline.files.quantity import plain_number
 from sagline.files.reading import exists, read_text
 from sagline.files.writing import check_file, check_files, create_folder, json_text, try_lock, write_text
-from sagline.optimization.goals import heading
-from sagline.optimization.request import Request
+from sagline.optimization.request import Request, heading
 
 REQUEST, EVALUATIONS = "design.json", "evaluations.csv"
 LIMIT: Final = 1000.0  # largest file of evaluations [MB]

@@ -19,9 +19,8 @@ from sagline.files.writing import atomic_files, create_folder, file_stem
 from sagline.optimization.candidates import Candidates
 from sagline.optimization.folder import DesignFolder
 from sagline.optimization.free import DesignVariable
-from sagline.optimization.goals import Goal, heading
 from sagline.optimization.rating import Rating
-from sagline.optimization.request import Request
+from sagline.optimization.request import Goal, Request, heading
 from sagline.robot.robot import Robot
 
 FRONT: Final = "front.csv"

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from sagline.core.arrays import Array
-    from sagline.optimization.goals import Goal
+    from sagline.optimization.request import Goal
 
 EACH = 3.2  # height of a panel [in]
 

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from sagline.cables.models import MODELS
 from sagline.core.arrays import locked
 from sagline.core.errors import FileError, InvalidValueError
-from sagline.files.netcdf import Content, choice_attributes, choice_of
+from sagline.files.netcdf import Format, choice_attributes, choice_of
 from sagline.files.robot_file import dump_robot, parse_robot
 from sagline.files.writing import staging
 from sagline.robot.pose import Pose
@@ -34,7 +34,8 @@ from sagline.workspaces.wrench_sets import WrenchSet
 if TYPE_CHECKING:
     from zarr import Group
 
-CONTENT: Final = Content(
+FORMAT: Final = Format(
+    kind=Request,
     name="sweep",
     made="folder of sagline sweep",
     give="Give a folder that sagline sweep has written.",
@@ -134,7 +135,7 @@ def make_folder(path: Path, request: Request, size: TaskSize) -> None:
     texts = [dump_robot(robot) for robot in request.robots]
     options = _options(request)
     attributes = {
-        **CONTENT.attributes(f"Sweep of {len(request):,} requests"),
+        **FORMAT.attributes(f"Sweep of {len(request):,} requests"),
         "digest": _digest(texts, options, request),
         "task_poses": size.poses,
         "task_wrenches": size.wrenches,
@@ -158,14 +159,14 @@ def open_folder(path: Path) -> SweepFolder:
 
     check_package("zarr", "sweeps")
     if not path.is_dir():
-        raise FileError(path, "is not a folder", CONTENT.give)
+        raise FileError(path, "is not a folder", FORMAT.give)
     try:
         group = zarr.open_group(path / GROUP, mode="r+", zarr_format=3)
         attributes: dict[str, Any] = dict(group.attrs)
         given: dict[str, Any] = {name: group[name] for name in GIVEN}
     except (OSError, ValueError, KeyError, TypeError):
-        raise FileError(path, "is not a folder of a sweep", CONTENT.give) from None
-    CONTENT.format_of(path, attributes)
+        raise FileError(path, "is not a folder of a sweep", FORMAT.give) from None
+    FORMAT.check(path, attributes)
     try:
         texts = list(attributes["robots"])
         request = Request(
@@ -183,9 +184,9 @@ def open_folder(path: Path) -> SweepFolder:
     except (KeyError, ValueError, TypeError, RuntimeError, OSError) as error:
         if isinstance(error, InvalidValueError):
             raise FileError.of(path, error) from None
-        raise FileError(path, f"is damaged ({type(error).__name__}: {error})", CONTENT.again) from None
+        raise FileError(path, f"is damaged ({type(error).__name__}: {error})", FORMAT.again) from None
     if digest != request_digest(request) or min(size) < 1:
-        raise FileError(path, "has changed since its creation, because its digest differs", CONTENT.again)
+        raise FileError(path, "has changed since its creation, because its digest differs", FORMAT.again)
     return SweepFolder(path, group, request, digest, size, made_by)
 
 

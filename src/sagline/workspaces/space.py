@@ -141,7 +141,7 @@ class Workspace(Result, Saved):
 
         The result is an xarray Dataset with dimensions x, y and z. Each call computes it again.
         """
-        return formats().module_of(self).field_of(self)
+        return formats().writer_of(self).field_of(self)
 
     def levels(self) -> Levels:
         """Signed feasibility function of the position.
