@@ -136,7 +136,7 @@ def test_the_inverse_kernel_needs_all_of_its_memory(name: str) -> None:
         sum(value * n**i * (m - n) ** j for i, j, value in stated[kind]) for kind in ("numbers", "counters")
     )
     pose = pose_rows(sl.Pose.from_euler(robot.frame_anchors.mean(axis=0), 0.0, 0.0, 0.0))
-    found = InverseRows.empty(1, m, n, False)
+    found = InverseRows.empty(robot, 1)
     given = (*kernel_options(robot, sl.Catenary(), sl.MinimumNorm()), robot_terms(robot), pose, np.zeros((1, 6)))
 
     def solve(size: int, count: int) -> None:

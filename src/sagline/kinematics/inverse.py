@@ -18,10 +18,17 @@ from sagline.core.memory import check_poses
 from sagline.core.numbers import n
 from sagline.core.progress import Progress
 from sagline.kernels import codes
-from sagline.kinematics.inverse_rows import InverseRows, Verdicts, decide_rows, decide_stability, solve_inverse_rows
+from sagline.kinematics.inverse_rows import (
+    Given,
+    InverseRows,
+    decide_rows,
+    decide_stability,
+    given_codes,
+    solve_inverse_rows,
+    solve_underconstrained_rows,
+)
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
-from sagline.kinematics.underconstrained import Given, given_codes, solve_underconstrained_rows
 from sagline.kinematics.winding import Winding, checked_winding
 from sagline.motion.path import Path
 from sagline.robot.batch import first_of, has_routing, one_a_pose
@@ -126,12 +133,12 @@ def inverse(
     loads = np.atleast_2d(load)
     if options is None:
         asked = values, number(level, "level", "N"), path is not None, stability
-        found, verdicts, rows = solve_underconstrained_rows(robots, model, rows, loads, *asked, progress)
+        found, rows = solve_underconstrained_rows(robots, model, rows, loads, *asked, progress)
         pose = Pose.from_quaternion(rows[:, :3].reshape(*pose.shape, 3), rows[:, 3:].reshape(*pose.shape, 4))
     else:
         reference = _reference(shared, previous, tension.variable)
         found = solve_inverse_rows(robots, method, options, rows, loads, reference, stability, progress)
-        verdicts = decide_rows(robot_terms(robots), options, rows, loads, found, progress)
+        decide_rows(robot_terms(robots), options, rows, loads, found, progress)
     if (found.pose_status == codes.POSE_NO_CHORD).any():
         refuse_missing_chords(robots, pose)
     whole = locked(np.ascontiguousarray(np.broadcast_to(load, (*pose.shape, 6))))
@@ -142,17 +149,15 @@ def inverse(
         return with_routing(Equilibrium(robots, pose, whole, cables, contact), direction)
 
     state = equilibrium()
-    if found.reject_slack(verdicts, state.unstrained_length):
+    if found.reject_slack(state.unstrained_length):
         state = equilibrium()
     if stability:
-        decide_stability(robots, (model.code, *model.parameters), rows, found, verdicts)
-    plan = _plan_of(state, path, tension, found, verdicts)
+        decide_stability(robots, (model.code, *model.parameters), rows, found)
+    plan = _plan_of(state, path, tension, found)
     return plan if winding is None or turning is not None else _with_path_friction(plan)
 
 
-def _plan_of(
-    state: Equilibrium, path: Path | None, tension: TensionMethod, found: InverseRows, verdicts: Verdicts
-) -> Plan:
+def _plan_of(state: Equilibrium, path: Path | None, tension: TensionMethod, found: InverseRows) -> Plan:
     """Plan of solved rows, in the shape of the poses."""
     shared, shape = first_of(state.robot), state.pose.shape
     return Plan(
@@ -160,14 +165,14 @@ def _plan_of(
         path=path,
         tension=tension,
         status=locked(found.pose_status.reshape(shape)),
-        shortfall=locked(verdicts.shortfall.reshape(shape)),
+        shortfall=locked(found.shortfall.reshape(shape)),
         wrench_residual=locked(found.residuals.reshape(*shape, 2)),
-        blocking=locked(verdicts.blocking.reshape(*shape, shared.cable_count)),
-        farkas=locked(_in_world(verdicts.farkas, shared).reshape(*shape, 6)),
+        blocking=locked(found.blocking.reshape(*shape, shared.cable_count)),
+        farkas=locked(_in_world(found.farkas, shared).reshape(*shape, 6)),
         needed=locked(_in_world(found.needed, shared).reshape(*shape, 6)),
-        bracket=locked(verdicts.brackets.reshape(*shape, 2)),
-        relief=locked(np.ascontiguousarray(_in_world(verdicts.reliefs, shared)[:, :3]).reshape(*shape, 3)),
-        at_border=locked(verdicts.at_border.reshape(shape)),
+        bracket=locked(found.brackets.reshape(*shape, 2)),
+        relief=locked(np.ascontiguousarray(_in_world(found.reliefs, shared)[:, :3]).reshape(*shape, 3)),
+        at_border=locked(found.at_border.reshape(shape)),
     )
 
 

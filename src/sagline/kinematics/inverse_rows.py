@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
-from sagline.core.arrays import Array, Codes, Flags, locked
+from sagline.cables.model import CableModel
+from sagline.core.arguments import brief, choice
+from sagline.core.arrays import Array, Codes, Flags, Indices, locked
+from sagline.core.errors import InvalidValueError
 from sagline.core.progress import Progress, blocks
 from sagline.kernels import codes, tables
 from sagline.kernels.forward.sensitivity import stabilities_of_poses
 from sagline.kernels.inverse.feasibility import ENOUGH, PROVED, decide_poses
 from sagline.kernels.inverse.poses import Answers, ModelTerms, inverse_poses
 from sagline.kernels.inverse.poses import Robots as RobotTerms
+from sagline.kernels.inverse.underconstrained import LEVEL, YAW, underconstrained_poses
 from sagline.kernels.memory import memory_for
 from sagline.robot.batch import Robots, first_of, has_routing
+from sagline.robot.reach import is_underconstrained
+from sagline.robot.robot import Robot
 from sagline.statics.tables import robot_terms
-from sagline.tension.method import Options, TensionMethod, takes_default_kernel
+from sagline.tension.method import LIMITS_OF, Options, TensionMethod, takes_default_kernel
 
 UNDECIDED = (codes.POSE_INFEASIBLE, codes.POSE_NOT_CONVERGED)  # statuses of poses without a result from the iterations
 SOLVED = (codes.POSE_SOLVED, codes.UNPROVED_STABILITY)  # statuses of poses with a result
@@ -25,26 +32,41 @@ DECIDED = 1 << 10  # poses per block of the feasibility decision, which takes lo
 
 
 class InverseRows(NamedTuple):
-    """Results of the kernel, in its order. The first axis has the length N, except in results (RESULT_ROWS, N, m)."""
+    """Results and proofs of N poses. The first axis has the length N, except in results (RESULT_ROWS, N, m)."""
 
     results: Array
     cable_status: Codes
     residuals: Array
     needed: Array
     pose_status: Codes
+    # Smallest change of the force that makes the pose feasible [N]: lower bound and sufficient value, (N, 2). The
+    # values are 0 at a solved pose, and NaN if the load is not the cause of the failure.
+    brackets: Array
+    # sufficient change of the force, along the free motions [N], (N, n); NaN if it is not needed or not known
+    reliefs: Array
+    farkas: Array  # Farkas vectors along the free motions, (N, n)
+    blocking: Flags  # cables whose limits oppose the needed wrench, (N, m)
+    at_border: Flags  # True for poses that `decide_rows` solved in place of the tension distribution method, (N,)
 
     @classmethod
-    def empty(cls, count: int, cables: int, freedoms: int, behind: bool) -> InverseRows:
-        """Empty arrays for a batch; `behind`: True if any cable has a pulley or a dead length."""
+    def empty(cls, robot: Robots, count: int) -> InverseRows:
+        """Arrays for `count` poses. The results are empty; the proofs are NaN or False."""
+        shared = first_of(robot)
+        m, n = shared.cable_count, shared.degrees_of_freedom
         return cls(
-            np.empty((tables.RESULT_ROWS if behind else tables.BARE_ROWS, count, cables)),
-            np.empty((count, cables), dtype=np.int8),
+            np.empty((tables.RESULT_ROWS if has_routing(robot) else tables.BARE_ROWS, count, m)),
+            np.empty((count, m), dtype=np.int8),
             np.empty((count, 2)),
-            np.empty((count, freedoms)),
+            np.empty((count, n)),
             np.empty(count, dtype=np.int8),
+            np.full((count, 2), np.nan),
+            np.full((count, n), np.nan),
+            np.full((count, n), np.nan),
+            np.zeros((count, m), dtype=np.bool_),
+            np.zeros(count, dtype=np.bool_),
         )
 
-    def reject_slack(self, verdicts: Verdicts, lengths: Array) -> bool:
+    def reject_slack(self, lengths: Array) -> bool:
         """Mark solved poses as TOO_SLACK if `lengths` (N, m) between guides are NaN. True if a pose is marked."""
         slack = np.isnan(np.atleast_2d(lengths)) & np.isfinite(self.results[tables.LENGTH])
         lost = np.isin(self.pose_status, SOLVED) & slack.any(axis=-1)
@@ -52,15 +74,26 @@ class InverseRows(NamedTuple):
             return False
         self.results[tables.LENGTH :, lost] = np.nan
         self.pose_status[lost] = codes.POSE_TOO_SLACK
-        for array in (self.residuals, verdicts.brackets):
+        for array in (self.residuals, self.brackets):
             array[lost] = np.nan
-        verdicts.at_border[lost] = False
+        self.at_border[lost] = False
         return True
 
     @property
+    def shortfall(self) -> Array:
+        """Smallest known sufficient change of the force [N], (N,); infinite if a proof shows that none exists."""
+        proved, enough = self.brackets[:, PROVED], self.brackets[:, ENOUGH]
+        return np.where(np.isinf(enough) & np.isfinite(proved), np.nan, enough)
+
+    @property
     def answers(self) -> Answers:
-        """Plain tuple of the arrays, as the kernel requires."""
+        """Plain tuple of the results, as kernels require."""
         return self.results, self.cable_status, self.residuals, self.needed, self.pose_status
+
+    @property
+    def proofs(self) -> tuple[Array, Array, Array, Flags]:
+        """Plain tuple of the proofs, as the kernel requires."""
+        return self.brackets, self.reliefs, self.farkas, self.blocking
 
 
 def solve_inverse_rows(
@@ -76,58 +109,22 @@ def solve_inverse_rows(
     """Run the kernel over poses.
 
     rows: pose rows (N, POSE_COLUMNS); loads: external plus inertial wrenches (1 or N, 6); reference: initial tensions
-    of `Closest`, in its variable (m,), or NaN; the kernel overwrites them with the last feasible tensions; stability:
-    True to mark solved poses without a proof of stability as UNPROVED_STABILITY; progress: called after each block with
+    of `Closest`, in its variable, or NaN: (m,) for the first pose, (N, m) for each pose independently; stability: True
+    to mark solved poses without a proof of stability as UNPROVED_STABILITY; progress: called after each block with
     the number of finished poses, which does not include undecided poses, and the number of all poses.
     """
-    shared = first_of(robot)
-    behind = has_routing(robot)
-    found = InverseRows.empty(len(rows), shared.cable_count, shared.degrees_of_freedom, behind)
-    otherwise = None if takes_default_kernel(method) else True
-    memory = memory_for(shared.cable_count)
-    given = (*options, robot_terms(robot), rows, loads, reference, memory, otherwise, stability, found.answers)
+    found, last = InverseRows.empty(robot, len(rows)), np.array(np.atleast_2d(reference)[0])
+    memory, otherwise = memory_for(last.size), None if takes_default_kernel(method) else True
+    given = (*options, robot_terms(robot), rows, loads, last, memory, otherwise, stability, found.answers)
     done = 0
-    for part in blocks(len(rows), BLOCK):
+    for part in blocks(len(rows), BLOCK if reference.ndim == 1 else 1):
+        if reference.ndim > 1:
+            last[:] = reference[part.start]
         inverse_poses(*given, part.start, part.stop)
         if progress is not None:
             done += int(np.count_nonzero(~np.isin(found.pose_status[part], UNDECIDED)))
             progress(done, len(rows))
     return found
-
-
-class Verdicts(NamedTuple):
-    """Proofs for infeasible poses. The first axis of all arrays has the length N, one entry per pose."""
-
-    # Smallest change of the force that makes the pose feasible [N]: lower bound and sufficient value, (N, 2). The
-    # values are 0 at a solved pose, and NaN if the load is not the cause of the failure.
-    brackets: Array
-    # sufficient change of the force, along the free motions [N], (N, n); NaN if it is not needed or not known
-    reliefs: Array
-    farkas: Array  # Farkas vectors along the free motions, (N, n)
-    blocking: Flags  # cables whose limits oppose the needed wrench, (N, m)
-    at_border: Flags  # True for poses that this search solved in place of the tension distribution method, (N,)
-
-    @classmethod
-    def empty(cls, count: int, cables: int, freedoms: int) -> Verdicts:
-        """Arrays for a batch that has no verdicts yet: all values are NaN or False."""
-        return cls(
-            np.full((count, 2), np.nan),
-            np.full((count, freedoms), np.nan),
-            np.full((count, freedoms), np.nan),
-            np.zeros((count, cables), dtype=np.bool_),
-            np.zeros(count, dtype=np.bool_),
-        )
-
-    @property
-    def shortfall(self) -> Array:
-        """Smallest known sufficient change of the force [N], (N,); infinite if a proof shows that none exists."""
-        proved, enough = self.brackets[:, PROVED], self.brackets[:, ENOUGH]
-        return np.where(np.isinf(enough) & np.isfinite(proved), np.nan, enough)
-
-    @property
-    def answers(self) -> tuple[Array, Array, Array, Flags]:
-        """Plain tuple of the arrays, as the kernel requires."""
-        return self.brackets, self.reliefs, self.farkas, self.blocking
 
 
 def covers_all(method: int, redundant: int) -> bool:
@@ -140,8 +137,8 @@ def covers_all(method: int, redundant: int) -> bool:
 
 def decide_rows(
     terms: RobotTerms, options: Options, rows: Array, loads: Array, found: InverseRows, progress: Progress | None = None
-) -> Verdicts:
-    """Decide the feasibility of poses for which the iterations gave no result. Fill the results of feasible poses.
+) -> None:
+    """Decide the feasibility of poses for which the iterations gave no result. Fill the proofs and the results.
 
     terms: from `robot_terms`; rows: pose rows (N, POSE_COLUMNS); loads: external plus inertial wrenches (1 or N,
     6); progress: called after each block with the number of all finished poses, which includes feasible poses, and the
@@ -149,30 +146,92 @@ def decide_rows(
     """
     count, n = found.needed.shape
     m = found.cable_status.shape[1]
-    verdicts = Verdicts.empty(count, m, n)
-    verdicts.brackets[np.isin(found.pose_status, SOLVED)] = 0.0
+    found.brackets[np.isin(found.pose_status, SOLVED)] = 0.0
     which = locked(np.flatnonzero(np.isin(found.pose_status, UNDECIDED)))
     if not which.size:
-        return verdicts
+        return
     given = (options.model, options.limits, terms, rows, loads)
-    how = (covers_all(options.sharing[0], m - n), memory_for(m), found.answers, verdicts.answers)
+    how = (covers_all(options.sharing[0], m - n), memory_for(m), found.answers, found.proofs)
     for part in blocks(which.size, DECIDED):
         decide_poses(*given, which[part], *how)
         if progress is not None:
             progress(count - which.size + part.stop, count)
-    verdicts.at_border[which] = found.pose_status[which] == codes.POSE_SOLVED
-    return verdicts
+    found.at_border[which] = found.pose_status[which] == codes.POSE_SOLVED
 
 
-def decide_stability(robot: Robots, model: ModelTerms, rows: Array, found: InverseRows, verdicts: Verdicts) -> None:
+def decide_stability(robot: Robots, model: ModelTerms, rows: Array, found: InverseRows) -> None:
     """Decide the stability of solved poses that have no proof of stability. Unstable poses get the status UNSTABLE.
 
     model: code and constants of the cable model; rows: pose rows (N, POSE_COLUMNS).
     """
-    which = locked(np.flatnonzero((found.pose_status == codes.UNPROVED_STABILITY) | verdicts.at_border))
+    which = locked(np.flatnonzero((found.pose_status == codes.UNPROVED_STABILITY) | found.at_border))
     if not which.size:
         return
     given = ((*model, has_routing(robot) or None), robot_terms(robot), rows)
     memory = memory_for(found.cable_status.shape[1])
     for part in blocks(which.size, BLOCK):
         stabilities_of_poses(*given, which[part], memory, found.results, found.pose_status)
+
+
+Given = Literal["x", "y", "z", "yaw", "level"]
+CODES: Final[dict[str, int]] = {"x": 0, "y": 1, "z": 2, "yaw": YAW, "level": LEVEL}
+_DEFAULT: Final = (*"xyz", "level")  # the first m of these, with three or four cables
+
+
+def given_codes(robot: Robot, given: Sequence[Given] | None) -> Indices | None:
+    """Codes of the given values of an underconstrained platform, (m,); None if the robot has enough cables.
+
+    Raises:
+        InvalidValueError: If the number of names is not m, or m is 1. If a name is unknown or occurs twice. If names
+            are given for a robot with enough cables.
+    """
+    m = robot.cable_count
+    if not is_underconstrained(robot):
+        if given is not None:
+            step = "Leave it out; the whole pose is given."
+            raise InvalidValueError("given", brief(given), f"None for {m} cables and {robot.motion_pattern}", step)
+        return None
+    if given is None and not (3 <= m <= len(_DEFAULT) and robot.motion_pattern == "3R3T"):
+        fewer = "3, 4 or " if robot.motion_pattern == "3R3T" else ""
+        allowed = f"{fewer}>= {robot.degrees_of_freedom} for {robot.motion_pattern}"
+        step = f"Add cables; or, in Python, name {m} given values for inverse, such as given=('x', 'z')."
+        raise InvalidValueError(f"{robot.name}: number of cables", m, allowed, step)
+    names = _DEFAULT[:m] if given is None else tuple(choice(name, "given", CODES) for name in given)
+    if len(names) != m or len(set(names)) != m or m < 2:
+        allowed = f"{m} different names of {', '.join(CODES)} for {m} cables" if m > 1 else "at least 2 cables"
+        raise InvalidValueError("given", ", ".join(names), allowed, "Give as many values as the robot has cables.")
+    return locked(np.array([CODES[name] for name in names], dtype=np.int64))
+
+
+def solve_underconstrained_rows(
+    robot: Robots,
+    model: CableModel,
+    rows: Array,
+    loads: Array,
+    given: Indices | None,
+    level: float,
+    chained: bool,
+    stability: bool,
+    progress: Progress | None = None,
+) -> tuple[InverseRows, Array]:
+    """Results, and rows of the found poses (N, POSE_COLUMNS).
+
+    rows: rows of the given poses; loads: external plus inertial wrenches (1 or N, 6); given: codes (m,); level: tension
+    level [N]; chained: True to start each pose at the pose before; stability: True to mark solved poses as
+    UNPROVED_STABILITY.
+    """
+    assert given is not None  # checked by the caller
+    shared = first_of(robot)
+    found, poses = InverseRows.empty(robot, len(rows)), np.empty_like(rows)
+    terms = (model.code, *model.parameters), (LIMITS_OF[shared.tension_limits_of], np.nan), robot_terms(robot)
+    memory = memory_for(shared.degrees_of_freedom)
+    arrays = (found.answers, poses, found.blocking)
+    for part in blocks(len(rows), BLOCK):
+        underconstrained_poses(*terms, rows, loads, given, level, chained, memory, *arrays, part.start, part.stop)
+        if progress is not None:
+            progress(part.stop, len(rows))
+    solved = found.pose_status == codes.POSE_SOLVED
+    found.brackets[solved] = 0.0
+    if stability:
+        found.pose_status[solved] = codes.UNPROVED_STABILITY
+    return found, locked(poses)

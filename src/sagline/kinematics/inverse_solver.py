@@ -21,7 +21,7 @@ from sagline.kernels.inverse.poses import inverse_poses
 from sagline.kernels.jit import bound
 from sagline.kernels.memory import memory_for
 from sagline.kinematics.caller import ARRAY, FLOAT, WHOLE, copy_in, copy_out
-from sagline.kinematics.inverse_rows import UNDECIDED, InverseRows, Verdicts, covers_all
+from sagline.kinematics.inverse_rows import UNDECIDED, InverseRows, covers_all
 from sagline.kinematics.status import BALANCED, PoseStatus
 from sagline.kinematics.winding import without_guides
 from sagline.robot.batch import has_routing
@@ -107,7 +107,7 @@ class InverseSolver:
         self._quaternion: Any = self._pose[0, 3:].data
         self._load = self._wrench[0].data
         self._reference = np.full(m, np.nan)
-        self._found = InverseRows.empty(1, m, n, has_routing(robot))
+        self._found = InverseRows.empty(robot, 1)
         # reading it takes a fifth of the time of reading an array of one element
         self._status = self._found.pose_status.data
         self._loaded = False  # True if the wrench of the last step was not zero
@@ -121,9 +121,8 @@ class InverseSolver:
         otherwise = None if takes_default_kernel(method) else True
         share = (*self._options, *given, self._reference, memory, otherwise, self._stability, answers, 0, 1)
         self._solve = bound(inverse_poses, *share)
-        self._verdicts = Verdicts.empty(1, m, n)
         only = locked(np.zeros(1, dtype=np.int64))
-        how = (only, covers_all(sharing_terms[0], m - n), memory, answers, self._verdicts.answers)
+        how = (only, covers_all(sharing_terms[0], m - n), memory, answers, self._found.proofs)
         decide = (model_terms, limit_terms, *given, *how)
         self._decide = bound(decide_poses, *decide)
         terms = (*model_terms, has_routing(robot) or None)
@@ -250,4 +249,4 @@ class InverseSolver:
         if status in BALANCED:
             return 0.0
         decided = status in (PoseStatus.INFEASIBLE, PoseStatus.BORDERLINE)
-        return float(self._verdicts.shortfall[0]) if decided else nan
+        return float(self._found.shortfall[0]) if decided else nan

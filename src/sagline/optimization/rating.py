@@ -53,7 +53,7 @@ def distribute(
     options = kernel_options(robot, model, method.alone)
     count, m = cables.shape[:2]
     behind = has_routing(robot)
-    found = InverseRows.empty(count, m, robot.degrees_of_freedom, behind)
+    found = InverseRows.empty(robot, count)
     body, load, memory = body_table(robot), locked(np.atleast_2d(wrench).copy()), memory_for(m)
     cables, poses = locked(np.ascontiguousarray(cables)), locked(np.ascontiguousarray(poses))
     terms = (robot.freedom, body, cables)

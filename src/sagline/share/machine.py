@@ -15,7 +15,7 @@ from sagline.kernels.cable.batch import cable_courses
 from sagline.kernels.cable.geometry import GEOMETRY_ROWS
 from sagline.kernels.memory import memory_for
 from sagline.kinematics.forward_rows import ForwardRows, new_chain
-from sagline.kinematics.inverse_rows import UNDECIDED, InverseRows, Verdicts, covers_all
+from sagline.kinematics.inverse_rows import UNDECIDED, InverseRows, covers_all
 from sagline.kinematics.status import ForwardStatus, PoseStatus
 from sagline.robot.batch import has_routing, pulleys_of
 from sagline.robot.pose import Pose
@@ -52,11 +52,10 @@ def model_data(robot: Robot) -> dict[str, Any]:
     terms, options, memory = robot_terms(robot), kernel_options(robot, model, method), memory_for(m)
     pose, length, tension = np.zeros((1, tables.POSE_COLUMNS)), np.zeros((1, m)), np.zeros(m)
     wrench, first, reference = (locked(each) for each in (np.zeros((1, 6)), np.zeros(1, np.int64), np.full(m, np.nan)))
-    found, verdicts = InverseRows.empty(1, m, n, bool(behind)), Verdicts.empty(1, m, n)
-    rest = ForwardRows.empty(1, m, behind)
+    found, rest = InverseRows.empty(robot, 1), ForwardRows.empty(1, m, behind)
     given, decided = (
         (terms, pose, wrench),
-        (first, covers_all(method.code, m - n), memory, found.answers, verdicts.answers),
+        (first, covers_all(method.code, m - n), memory, found.answers, found.proofs),
     )
     forward = (model.code, *model.parameters, behind), False, (*terms, length, pose, wrench), new_chain(m, n)
     draw = _draw_arguments(robot, terms, pose[0], tension)
@@ -72,8 +71,8 @@ def model_data(robot: Robot) -> dict[str, Any]:
         "tension": found.results[tables.TENSION, 0],
         "length": found.results[tables.LENGTH, 0],
         "status": found.pose_status,
-        "bracket": verdicts.brackets,
-        "blocking": verdicts.blocking,
+        "bracket": found.brackets,
+        "blocking": found.blocking,
         "given": length,
         "rest": rest.poses,
         "restTension": rest.results[tables.TENSION, 0],

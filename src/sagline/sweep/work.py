@@ -14,9 +14,8 @@ from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.core.errors import FileError
 from sagline.kernels import codes, tables
 from sagline.kernels.inverse.feasibility import PROVED
-from sagline.kinematics.inverse_rows import UNDECIDED, InverseRows, Verdicts, decide_rows, solve_inverse_rows
+from sagline.kinematics.inverse_rows import UNDECIDED, InverseRows, decide_rows, solve_inverse_rows
 from sagline.kinematics.status import PoseStatus
-from sagline.robot.batch import has_routing
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.tables import robot_terms
@@ -96,9 +95,9 @@ class _Inverse:
         found = solve_inverse_rows(self._robot, request.tension, self._options, rows, wrenches, none)
         answers: dict[str, NDArray[Any]] = {}
         if "shortfall" in request.quantities:
-            verdicts = decide_rows(robot_terms(self._robot), self._options, rows, wrenches, found)
-            answers["enough"] = verdicts.shortfall
-            answers["proof"] = verdicts.brackets[:, PROVED]
+            decide_rows(robot_terms(self._robot), self._options, rows, wrenches, found)
+            answers["enough"] = found.shortfall
+            answers["proof"] = found.brackets[:, PROVED]
         else:
             answers["proof"] = proofs_of(self._robot, self._options, poses, loads, found)
         answers["status"] = found.pose_status
@@ -278,15 +277,14 @@ def _decide(
     """Decide some requests; returns proved lower bounds, directions of the proofs, and a mask of proved requests."""
     rows = locked(poses[which // len(loads)])
     wrenches = locked(loads[which % len(loads)])
-    n, m = robot.degrees_of_freedom, robot.cable_count
-    some = InverseRows.empty(len(which), m, n, has_routing(robot))
+    some = InverseRows.empty(robot, len(which))
     some.pose_status[:] = codes.POSE_INFEASIBLE
     some.results[:] = np.nan
-    verdicts: Verdicts = decide_rows(robot_terms(robot), options, rows, wrenches, some)
+    decide_rows(robot_terms(robot), options, rows, wrenches, some)
     found.results[:, which] = some.results
     found.pose_status[which] = some.pose_status
-    proved = verdicts.brackets[:, PROVED]
+    proved = some.brackets[:, PROVED]
     proof[which] = proved
     known = (some.pose_status == codes.POSE_INFEASIBLE) & (proved > 0.0) & np.isfinite(proved)
-    known &= np.isfinite(verdicts.farkas).all(axis=1)
-    return np.where(known, proved, 0.0), np.where(known[:, None], verdicts.farkas, 0.0), known
+    known &= np.isfinite(some.farkas).all(axis=1)
+    return np.where(known, proved, 0.0), np.where(known[:, None], some.farkas, 0.0), known
