@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary, model_of
 from sagline.core.arguments import callback, optional
-from sagline.core.arrays import LARGEST, SMALLEST, Array, Flags, Indices, locked, numbers
+from sagline.core.arrays import LARGEST, SMALLEST, Array, Indices, locked, numbers
 from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_poses
 from sagline.core.progress import Progress, blocks, rows_of
@@ -71,18 +71,21 @@ def search(
 
 def _search_block(robot: Robots, model: CableModel, lengths: Array, wrenches: Array) -> ForwardRows:
     found = ForwardRows.empty(len(lengths), lengths.shape[1], has_routing(robot))
-    open_samples = np.arange(len(lengths))
-    for round_, quaternion in enumerate(start_quaternions(first_of(robot))):
-        loads = wrenches if len(wrenches) == 1 else locked(wrenches[open_samples])
-        robots = robots_at(robot, open_samples)
-        answer = from_orientations(robots, model, locked(lengths[open_samples]), loads, quaternion)
-        better = np.ones(len(open_samples), dtype=np.bool_)
-        if round_:
-            better = _is_better(_rank(robots, model, answer), _rank(robots, model, found.part(open_samples)))
-        found.keep(open_samples[better], answer, np.flatnonzero(better))
-        iterate_routing = _is_plausible(robots, model, answer)
-        open_samples = open_samples[~iterate_routing]
-        if not len(open_samples):
+    ranks, left = np.full((len(lengths), 3), np.inf), np.arange(len(lengths))
+    for quaternion in start_quaternions(first_of(robot)):
+        loads = wrenches if len(wrenches) == 1 else locked(wrenches[left])
+        robots = robots_at(robot, left)
+        answer = from_orientations(robots, model, locked(lengths[left]), loads, quaternion)
+        outside = outside_limits(robots, model, answer)
+        energy = np.nan_to_num(answer.numbers[:, ENERGY], nan=0.0)
+        rank = np.stack((_POOR[answer.pose_status].astype(np.float64), outside, energy), axis=1)
+        first = np.argmax(rank != ranks[left], axis=1)[:, None]  # column of the first difference
+        better = np.flatnonzero(np.take_along_axis(rank, first, 1) < np.take_along_axis(ranks[left], first, 1))
+        found.keep(left[better], answer, better)
+        ranks[left[better]] = rank[better]
+        done = np.isin(answer.pose_status, (codes.FORWARD_SOLVED, codes.FORWARD_NO_LENGTHS)) & (outside == 0)
+        left = left[~done]
+        if not len(left):
             break
     return found
 
@@ -158,22 +161,6 @@ def outside_limits(robot: Robots, model: CableModel, found: ForwardRows) -> Indi
     high = (1.0 + _LIMIT_SLACK) * limits.high
     count: Indices = ((tension < low) | (tension > high)).sum(axis=1)
     return count
-
-
-def _is_plausible(robot: Robots, model: CableModel, found: ForwardRows) -> Flags:
-    done = np.isin(found.pose_status, (codes.FORWARD_SOLVED, codes.FORWARD_NO_LENGTHS))
-    return np.asarray(done & (outside_limits(robot, model, found) == 0))
-
-
-def _rank(robot: Robots, model: CableModel, found: ForwardRows) -> Array:
-    """Rows (rank of the status, number of cables outside their limits, energy), (N, 3); the smaller row is better."""
-    energy = np.nan_to_num(found.numbers[:, ENERGY], nan=0.0)
-    return np.stack((_POOR[found.pose_status].astype(np.float64), outside_limits(robot, model, found), energy), axis=1)
-
-
-def _is_better(new: Array, old: Array) -> Flags:
-    first = np.argmax(new != old, axis=1)[:, None]
-    return np.asarray(np.take_along_axis(new, first, 1) < np.take_along_axis(old, first, 1))[:, 0]
 
 
 _CATENARY = Catenary()

@@ -17,7 +17,7 @@ from sagline.kernels.cable.geometry import GEOMETRY_ROWS
 from sagline.kernels.cable.states import lengths_at_frame_ends
 from sagline.robot.checks import per_cable
 from sagline.robot.drum import warmth
-from sagline.robot.pose import Pose, PoseLike, single_pose
+from sagline.robot.pose import PoseLike, single_pose
 from sagline.robot.robot import Robot
 from sagline.robot.winch import Winch
 from sagline.statics.tables import body_table, cable_table, pose_rows, refuse_missing_chords
@@ -86,90 +86,69 @@ def home(
     reading = per_cable(checked(frame_end_tension, "frame_end_tension", "N"), "frame_end_tension", m)
     zero = per_cable(checked(counts, "counts", ""), "counts", m)
     tension = _tensions(robot, winches, reading)
-    length = _lengths(robot, pose, tension, model_of(model))
+    given, model = pose_rows(pose)[0], model_of(model)
+    length, reached = _lengths(robot, given, tension, model)
+    if not reached.all():
+        i = int(np.argmin(reached))
+        allowed, least = (
+            "a tension that the cable can have at this pose",
+            _least_tension(robot, given, model, i, tension[i]),
+        )
+        if least is not None:
+            least = least * winches.load_cell_gain[i] + winches.load_cell_bias[i]
+            allowed = f">= {least:.5g} N at this pose, because of the cable's weight"
+        step = "Correct the reading, its unit, or the pose."
+        raise InvalidValueError(f"cable {i}: frame_end_tension", f"{reading[i]:g} N", allowed, step)
     strain = winches.winding_tension / robot.cables.axial_stiffness
     at_rest = length * (1.0 + strain) / warmth(robot, temperature)
-    _check_whole(winches, at_rest)
+    if winches.cable_length is not None and (wrong := at_rest > winches.cable_length).any():
+        i = int(np.argmax(wrong))
+        most = f"<= {winches.cable_length[i]:g} m, its cable_length"
+        item, step = f"cable {i}: length off its drum at the pose", "Correct cable_length, or the pose."
+        raise InvalidValueError(item, f"{at_rest[i]:.6g} m", most, step)
     return robot.replace(winches=winches.replace(count_zero=zero, length_zero=at_rest))
 
 
 def _tensions(robot: Robot, winches: Winch, reading: Array) -> Array:
     """Tensions from the load cell values `reading`; refuses impossible tensions."""
-    bias, gain, most = winches.load_cell_bias, winches.load_cell_gain, winches.load_cell_range
-    if most is not None:
-        _check_readings(
-            reading > most, reading, [f"<= {cell:g} N, its load_cell_range" for cell in most], "Correct it."
-        )
-    tension = (reading - bias) / gain
+    bias, gain = winches.load_cell_bias, winches.load_cell_gain
+    tension, strongest = (reading - bias) / gain, LARGEST_STRAIN * robot.cables.axial_stiffness
+    cell = np.full(reading.shape, np.inf) if winches.load_cell_range is None else winches.load_cell_range
     least = [f"> {b:g} N{', its load_cell_bias' if b else ''}" for b in bias]
-    _check_readings(~(tension > 0.0), reading, least, "A cable only pulls; correct the reading.")
-    strongest = LARGEST_STRAIN * robot.cables.axial_stiffness
     holds = [f"<= {r:.6g} N, at which the cable is {LARGEST_STRAIN:.0%} longer" for r in strongest * gain + bias]
-    _check_readings(tension > strongest, reading, holds, "Correct the reading, its unit, or axial_stiffness.")
+    for wrong, allowed, step in (
+        (reading > cell, [f"<= {most:g} N, its load_cell_range" for most in cell], "Correct it."),
+        (~(tension > 0.0), least, "A cable only pulls; correct the reading."),
+        (tension > strongest, holds, "Correct the reading, its unit, or axial_stiffness."),
+    ):
+        if wrong.any():
+            i = int(np.argmax(wrong))
+            raise InvalidValueError(f"cable {i}: frame_end_tension", f"{reading[i]:g} N", allowed[i], step)
     return tension
 
 
-def _lengths(robot: Robot, pose: Pose, tension: Array, model: CableModel) -> Array:
-    """Unstrained lengths off the drums at `pose`, with the tensions `tension` at the frame ends."""
-    length, held = _lengths_and_reached(robot, pose, tension, model)
-    if not (missed := ~held).any():
-        return length
-    i = int(np.argmax(missed))
-    least = _least_tension(robot, pose, model, i, float(tension[i]))
-    shown, allowed = _cell_reading(robot, i, float(tension[i])), "a tension that the cable can have at this pose"
-    if least is not None:
-        allowed = f">= {_cell_reading(robot, i, least):.5g} N at this pose, because of the cable's weight"
-    step = "Correct the reading, its unit, or the pose."
-    raise InvalidValueError(f"cable {i}: frame_end_tension", f"{shown:g} N", allowed, step)
-
-
-def _cell_reading(robot: Robot, cable: int, tension: float) -> float:
-    """Measured value of the load cell of cable `cable` at the tension `tension`."""
-    if robot.winches is None:
-        return tension
-    return float(tension * robot.winches.load_cell_gain[cable] + robot.winches.load_cell_bias[cable])
-
-
-def _lengths_and_reached(robot: Robot, pose: Pose, tension: Array, model: CableModel) -> tuple[Array, Flags]:
-    """Unstrained lengths off the drums, and True for each cable that reaches its given tension."""
+def _lengths(robot: Robot, pose: Array, tension: Array, model: CableModel) -> tuple[Array, Flags]:
+    """Unstrained lengths off the drums at a pose row, and True for each cable that reaches its given tension."""
     m = robot.cable_count
     held, length = np.empty(m), np.empty(m)
     table, body = cable_table(robot)[0], body_table(robot)[0]
-    room = np.empty((3, 3)), np.empty((GEOMETRY_ROWS, m))
-    lengths_at_frame_ends(model.terms(robot.gravity), table, body, pose_rows(pose)[0], tension, held, length, *room)
+    work = np.empty((3, 3)), np.empty((GEOMETRY_ROWS, m))
+    lengths_at_frame_ends(model.terms(robot.gravity), table, body, pose, tension, held, length, *work)
     return length, (np.abs(held - tension) <= MISSED * tension) & (length > 0.0)
 
 
-def _least_tension(robot: Robot, pose: Pose, model: CableModel, cable: int, low: float) -> float | None:
-    """Smallest tension >= `low` that cable `cable` can have at `pose`; None if there is none."""
+def _least_tension(robot: Robot, pose: Array, model: CableModel, cable: int, low: float) -> float | None:
+    """Smallest tension >= `low` that cable `cable` can have at a pose row; None if there is none."""
     high = LARGEST_STRAIN * float(robot.cables.axial_stiffness[cable])
 
     def can(tension: float) -> bool:
-        return bool(_lengths_and_reached(robot, pose, np.full(robot.cable_count, tension), model)[1][cable])
+        return bool(_lengths(robot, pose, np.full(robot.cable_count, tension), model)[1][cable])
 
     if not can(high):
         return None
     for _ in range(HALVINGS):
         if high <= (1.0 + PRECISION) * low:
             break
-        centered_positions = math.sqrt(low * high)
-        low, high = (low, centered_positions) if can(centered_positions) else (centered_positions, high)
+        middle = math.sqrt(low * high)
+        low, high = (low, middle) if can(middle) else (middle, high)
     return high * (1.0 + PRECISION)  # rounded up, so that the number in the message, with five digits, is large enough
-
-
-def _check_whole(winches: Winch, length: Array) -> None:
-    if winches.cable_length is None or not (wrong := length > winches.cable_length).any():
-        return
-    i = int(np.argmax(wrong))
-    raise InvalidValueError(
-        f"cable {i}: length off its drum at the pose",
-        f"{length[i]:.6g} m",
-        f"<= {winches.cable_length[i]:g} m, its cable_length",
-        "Correct cable_length, or the pose.",
-    )
-
-
-def _check_readings(wrong: Flags, reading: Array, allowed: list[str], step: str) -> None:
-    if wrong.any():
-        i = int(np.argmax(wrong))
-        raise InvalidValueError(f"cable {i}: frame_end_tension", f"{reading[i]:g} N", allowed[i], step)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from attrs import field, fields, frozen
 
@@ -15,6 +13,7 @@ from sagline.core.results import Result
 from sagline.kernels import codes, tables
 from sagline.kinematics.forward_rows import ForwardRows, solve_forward_rows
 from sagline.robot.batch import Robots, robot_at
+from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.robot import Robot
 from sagline.statics.stiffness import stiffness
 
@@ -73,14 +72,12 @@ def fit_measurements(
         _fitting("length_deviation", measured.length_deviation, lengths.shape[1:]),
     )
     covariance = np.full((len(lengths), 6, 6), np.nan)
-    for i in range(len(lengths)):
+    for i in np.flatnonzero(found.stable):
         sample = np.array([i])
-        one = robot_at(robot, i)
-        fit = _Fit(one, model, lengths[i].copy(), locked(loads[i % len(loads)].copy()), readings[i], *deviations)
-        answer = found.part(sample)
-        if answer.stable[0]:
-            answer, covariance[i] = fit.best(answer)
-            found.keep(sample, answer, np.array([0]))
+        load = locked(loads[i % len(loads)].copy())
+        given = robot_at(robot, int(i)), model, lengths[i].copy(), load, readings[i], *deviations
+        answer, covariance[i] = _best_fit(found.part(sample), *given)
+        found.keep(sample, answer)
     return locked(covariance)
 
 
@@ -93,57 +90,52 @@ def _fitting(name: str, value: Array, shape: tuple[int, ...]) -> Array:
         ) from None
 
 
-class _Fit(NamedTuple):
-    """Best fit to the lengths and tensions of one sample."""
+def _best_fit(
+    found: ForwardRows,
+    robot: Robot,
+    model: CableModel,
+    measured: Array,
+    load: Array,
+    readings: Array,
+    tension_deviation: Array,
+    length_deviation: Array,
+) -> tuple[ForwardRows, Array]:
+    """Best fit to one sample and covariance of its pose; the search starts at the equilibrium at measured lengths."""
+    known = ~np.isnan(readings)
 
-    robot: Robot
-    model: CableModel
-    lengths: Array
-    load: Array
-    readings: Array
-    tension_deviation: Array
-    length_deviation: Array
+    def misfit(state: Equilibrium) -> Array:
+        """Lengths and tensions of `state` minus the measured values, in standard deviations."""
+        tensions = (state.cables.frame_end_tension - readings) / tension_deviation
+        return np.concatenate(((state.unstrained_length - measured) / length_deviation, tensions[known]))
 
-    def best(self, found: ForwardRows) -> tuple[ForwardRows, Array]:
-        """Best fit and covariance of its pose; the search starts at the equilibrium at the measured lengths."""
-        known = ~np.isnan(self.readings)
-        covariance = np.full((6, 6), np.nan)
-        for _ in range(_STEPS):
-            stiff = stiffness(found.solution(self.robot, self.model, self.load, ()).state)
-            by_length = stiff.length_sensitivity
-            misread = stiff.tension_sensitivity / self.tension_deviation[:, None]
-            matrix = np.concatenate((np.diag(1.0 / self.length_deviation), misread[known]))
-            inverse = np.linalg.inv(matrix.T @ matrix)
-            downhill = -matrix.T @ self.misfit(found)
-            step = inverse @ downhill
-            covariance = by_length @ inverse @ by_length.T
-            if step @ downhill <= _TOLERANCE:
-                return found, covariance
-            moved = self.moved(found, step)
-            if moved is None:
-                break
-            found = moved
-        found.pose_status[:] = codes.FORWARD_NOT_CONVERGED
-        return found, covariance
-
-    def misfit(self, found: ForwardRows) -> Array:
-        """Lengths and tensions of `found` minus the measured values, in standard deviations."""
-        state = found.solution(self.robot, self.model, self.load, ()).state
-        tensions = (state.cables.frame_end_tension - self.readings) / self.tension_deviation
-        lengths = (state.unstrained_length - self.lengths) / self.length_deviation
-        return np.concatenate((lengths, tensions[~np.isnan(tensions)]))
-
-    def moved(self, found: ForwardRows, step: Array) -> ForwardRows | None:
+    def moved(step: Array, now: Array) -> tuple[ForwardRows, Equilibrium] | None:
         """Equilibrium after `step`, which is halved until the fit improves; None if the fit does not improve."""
-        lengths = found.results[tables.LENGTH]
-        now = self.misfit(found)
+        lengths, starts = found.results[tables.LENGTH], locked(found.poses.view())
         for _ in range(_HALVINGS):
             if (lengths + step > 0.0).all():
-                new = solve_forward_rows(
-                    self.robot, self.model, locked(lengths + step), locked(found.poses.view()), self.load[None]
-                )
-                misfit = self.misfit(new)
-                if new.stable[0] and misfit @ misfit < now @ now:
-                    return new
+                new = solve_forward_rows(robot, model, locked(lengths + step), starts, load[None])
+                there = new.solution(robot, model, load, ()).state
+                missed = misfit(there)
+                if new.stable[0] and missed @ missed < now @ now:
+                    return new, there
             step = 0.5 * step
         return None
+
+    state, covariance = found.solution(robot, model, load, ()).state, np.full((6, 6), np.nan)
+    for _ in range(_STEPS):
+        stiff, missed = stiffness(state), misfit(state)
+        by_length = stiff.length_sensitivity
+        misread = stiff.tension_sensitivity / tension_deviation[:, None]
+        matrix = np.concatenate((np.diag(1.0 / length_deviation), misread[known]))
+        inverse = np.linalg.inv(matrix.T @ matrix)
+        downhill = -matrix.T @ missed
+        step = inverse @ downhill
+        covariance = by_length @ inverse @ by_length.T
+        if step @ downhill <= _TOLERANCE:
+            return found, covariance
+        better = moved(step, missed)
+        if better is None:
+            break
+        found, state = better
+    found.pose_status[:] = codes.FORWARD_NOT_CONVERGED
+    return found, covariance

@@ -15,7 +15,6 @@ from sagline.kernels.inverse.feasibility import polygon_of_pose
 from sagline.kernels.memory import memory_for
 from sagline.kernels.tension.polygon import SPARE_CORNERS
 from sagline.kinematics.inverse import inverse
-from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
 from sagline.robot.pose import Pose, PoseLike, single_pose
 from sagline.robot.robot import Robot
@@ -70,7 +69,7 @@ def tension_polygon(
             "pose", "a pose without solution", "a pose that `inverse` can solve", PoseStatus(int(plan.status)).text
         )
     options = kernel_options(robot, model, MinimumNorm(variable))
-    return polygon_at(robot, pose, options, plan.state.wrench, plan.chord_tension, _pulls(plan), bool(plan.feasible))
+    return polygon_at(robot, pose, options, plan.state.wrench, plan.chord_tension, plan.state.pull, bool(plan.feasible))
 
 
 def polygon_at(
@@ -104,11 +103,6 @@ def polygon_at(
         scale=locked(scale),
         offset=locked(offset),
     )
-
-
-def _pulls(plan: Plan) -> Array:
-    """Sag forces T_z - tau sin phi of the cables [N], for kernels."""
-    return plan.state.pull
 
 
 def _sides_of(
