@@ -2,15 +2,9 @@
 
 from .calibration import calibration as calibration
 from .drawing import drawing as drawing
-from .dynamics import energy as energy
 from .dynamics import frequencies as frequencies
 from .dynamics import frequency_map as frequency_map
 from .dynamics import response as response
-from .execution import execution as execution
-from .execution import measured_tensions as measured_tensions
-from .execution import mendable_tensions as mendable_tensions
-from .execution import place_errors as place_errors
-from .execution import states as states
 from .film import film as film
 from .front import front as front
 from .plan import error as error
@@ -23,8 +17,14 @@ from .plan import tensions as tensions
 from .plan import velocity as velocity
 from .polygon import polygon as polygon
 from .robot import robot as robot
+from .runs import energy as energy
+from .runs import execution as execution
+from .runs import measured_tensions as measured_tensions
+from .runs import mendable_tensions as mendable_tensions
+from .runs import place_errors as place_errors
+from .runs import simulation as simulation
+from .runs import states as states
 from .sheet import save as save
-from .simulation import simulation as simulation
 from .style import style as style
 from .workspace import slice as slice
 from .workspace import workspace as workspace

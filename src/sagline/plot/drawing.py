@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import floor, log10
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from matplotlib.collections import LineCollection, PolyCollection
@@ -14,19 +14,8 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
 from sagline.kinematics.inverse import inverse
 from sagline.plot.occlusion import FlatLine, view_axes, visible_parts
-from sagline.plot.robot import (
-    EDGES,
-    FACES,
-    catenary_points,
-    drawn_pose,
-    frame_box,
-    ground,
-    platform_box,
-    pulleys_and_drums,
-    straight_points,
-    tension_bar,
-)
-from sagline.plot.sheet import VERMILLION, Sheet, axes_or_new
+from sagline.plot.robot import FACES, Stroke, drawn_pose, ground, platform_box, strokes, tension_bar
+from sagline.plot.sheet import Sheet, axes_or_new
 from sagline.plot.style import current
 from sagline.robot.pose import Pose, PoseLike
 from sagline.robot.robot import Robot
@@ -43,8 +32,8 @@ if TYPE_CHECKING:
 
 AZIMUTH, ELEVATION = np.radians(-60.0), np.radians(24.0)
 USUAL: Final = view_axes(float(AZIMUTH), float(ELEVATION))
-FRAME, GROUND, BODY, WHEEL = "0.45", (0.5, 0.5, 0.5, 0.12), (0.835, 0.369, 0.0, 0.16), "0.4"
-CABLE_WIDTH, FRAME_WIDTH, BODY_WIDTH, THIN, GAP = 1.2, 0.7, 1.1, 0.6, 1.3  # line widths [pt]
+GROUND, BODY = (0.5, 0.5, 0.5, 0.12), (0.835, 0.369, 0.0, 0.16)
+GAP: Final = 1.3  # width of the gap in a line behind another line [pt]
 SPECK: Final = 1.5  # pieces of a line between two gaps are omitted if they are shorter [pt]
 SPARE: Final = 0.05  # margin around the drawing, as a share of the picture
 LEAST, MOST = 0.35, 1.1  # smallest and largest ratio of height to width
@@ -54,16 +43,6 @@ CLEAR = 1.15  # distance from other lines, in text sizes, of a number that is ne
 FROM_ANCHOR = 1.6  # distance of a number from the frame end, in text sizes
 ARROW: Final = 0.16  # largest length of the axes, as a share of the picture's width
 END_ON: Final = 0.12  # an axis that appears shorter than this share of its length has no name
-
-
-class _Stroke(NamedTuple):
-    """A line of the drawing: points in the world (P, 3) [m], style, width [pt]; True if it hides lines behind it."""
-
-    points: Array
-    color: Any
-    width: float
-    style: Any
-    covers: bool
 
 
 def drawing(
@@ -110,54 +89,26 @@ def drawing(
 
 def draw_at_rest(robot: Robot, where: Pose, plan: Plan | None, view: Array = USUAL, ax: Axes | None = None) -> Axes:
     """Draw `robot` at the pose `where`. Cables of a feasible `plan` have the colors of their tensions."""
-    held, scale = plan is not None and bool(plan.feasible), TensionScale.of(robot)
-    tension = plan.chord_tension if plan is not None else np.full(len(robot.frame_anchors), np.nan)
-    courses = catenary_points(robot, where, plan) if plan is not None and held else straight_points(robot, where)
-    scene = _Scene.of(robot, where, courses, scale.colors(tension) / 255.0, dashed=not held)
-    ax = _axes(ax, scene, view, bar=held)
-    if held:
-        tension_bar(ax, scale, tension, "right")
+    held, (cables, others) = plan is not None and bool(plan.feasible), strokes(robot, where, plan)
+    body = platform_box(robot, where)
+    points = np.concatenate([line.points for line in (*cables, *others)])
+    flat = ground(points, body)
+    ax = _axes(ax, np.concatenate((points, flat[0])) @ view[:2].T, bar=held)
+    if plan is not None and held:
+        tension_bar(ax, TensionScale.of(robot), plan.chord_tension, "right")
     elif plan is not None:
         ax.set_title("no tensions within the limits balance the platform at this pose", fontsize=current().label)
-    _draw(ax, scene, view)
+    facing = [face for face in body[np.array(FACES)] @ view.T if _seen_from_outside(face)]
+    shown = [each @ view[:2].T for each in flat]
+    for surface, color in (*((each, GROUND) for each in shown), *((face[:, :2], BODY) for face in facing)):
+        ax.add_collection(PolyCollection([surface], facecolors=[color], edgecolors="none", zorder=0.5))
+    _draw_lines(ax, cables, others, facing, view, np.concatenate(shown))
     return ax
 
 
-class _Scene(NamedTuple):
-    """Geometry of the drawing in world axes; the corners of each face of the platform (6, 4, 3) are in order."""
-
-    cables: list[_Stroke]
-    others: list[_Stroke]
-    faces: Array
-    flat: tuple[Array, Array]
-
-    @classmethod
-    def of(cls, robot: Robot, where: Pose, courses: Array, colors: Array, *, dashed: bool) -> _Scene:
-        """Geometry of the robot with the platform at a pose."""
-        style = (0, (3.0, 2.0)) if dashed else "-"
-        cables = [
-            _Stroke(course, color, CABLE_WIDTH, style, covers=True)
-            for course, color in zip(courses, colors, strict=True)
-        ]
-        circles, runs = pulleys_and_drums(robot, where)
-        others = [_Stroke(circle, WHEEL, THIN, "-", covers=False) for circle in circles]
-        others += [_Stroke(run, WHEEL, THIN, "-" if known else ":", covers=False) for run, known in runs]
-        frame, body = frame_box(robot), platform_box(robot, where)
-        if frame is not None:
-            others += [_Stroke(frame[[*edge]], FRAME, FRAME_WIDTH, "-", covers=True) for edge in EDGES]
-        others += [_Stroke(body[[*edge]], VERMILLION, BODY_WIDTH, "-", covers=False) for edge in EDGES]
-        points = np.concatenate([stroke.points for stroke in (*cables, *others)])
-        return cls(cables, others, body[np.array(FACES)], ground(points, body))
-
-    @property
-    def points(self) -> Array:
-        """All points of the geometry [m], shape (n, 3)."""
-        return np.concatenate([stroke.points for stroke in (*self.cables, *self.others)] + [self.flat[0]])
-
-
-def _axes(ax: Axes | None, scene: _Scene, view: Array, *, bar: bool) -> Axes:
-    """Axes with equal scales, whose limits fit the picture."""
-    low, high = (end(scene.points @ view[:2].T, axis=0) for end in (np.min, np.max))
+def _axes(ax: Axes | None, points: Array, *, bar: bool) -> Axes:
+    """Axes with equal scales, whose limits fit the `points` (n, 2) of the picture."""
+    low, high = points.min(axis=0), points.max(axis=0)
     spare = SPARE * float((high - low).max())
     low, high = low - spare, high + spare
     if ax is None:
@@ -172,37 +123,37 @@ def _axes(ax: Axes | None, scene: _Scene, view: Array, *, bar: bool) -> Axes:
     return ax
 
 
-def _draw(ax: Axes, scene: _Scene, view: Array) -> None:
-    """Draw the visible parts of all lines; widths and gaps are computed for the size on paper."""
+def _draw_lines(
+    ax: Axes, cables: list[Stroke], others: list[Stroke], facing: list[Array], view: Array, flat: Array
+) -> None:
+    """Draw the visible parts of all lines; widths and gaps are computed for the size on paper.
+
+    facing: visible faces of the platform in the picture (4, 3); flat: points of the ground in the picture (n, 2).
+    """
     figure: Any = ax.get_figure(root=True)
     figure.draw_without_rendering()
     point = float(np.ptp(ax.get_xlim())) / (ax.bbox.width / figure.dpi * 72.0)  # [m]
-    look = current()
-    strokes = [*scene.cables, *scene.others]
+    look, every = current(), [*cables, *others]
     lines = [
         FlatLine(each.points @ view.T, *(each.covers * look.line * point * np.array([0.5 * each.width, GAP])))
-        for each in strokes
+        for each in every
     ]
     courses = [line.points[:, :2] for line in lines]
-    numbers = _number_positions(courses[: len(scene.cables)], courses, look.tick * point)
+    numbers = _number_positions(courses[: len(cables)], courses, look.tick * point)
     boxes = _label_boxes(numbers, look.tick * point)
-    turned = scene.faces @ view.T
-    facing = [face for face in turned if _seen_from_outside(face)]
-    for flat, color in (*((each @ view[:2].T, GROUND) for each in scene.flat), *((f[:, :2], BODY) for f in facing)):
-        ax.add_collection(PolyCollection([flat], facecolors=[color], edgecolors="none", zorder=0.5))
-    for k, (stroke, parts) in enumerate(zip(strokes, visible_parts(lines, facing, boxes), strict=True)):
+    for k, (stroke, parts) in enumerate(zip(every, visible_parts(lines, facing, boxes), strict=True)):
         long = [part[:, :2] for part in parts if _length(part) > SPECK * point]
         shown = LineCollection(
             long, colors=[stroke.color], linewidths=stroke.width, linestyles=[stroke.style],
             capstyle="butt", joinstyle="round", zorder=2.0,
         )  # fmt: skip
         ax.add_collection(shown, autolim=False)
-        if k < len(scene.cables) and parts and np.array_equal(parts[0][0], lines[k].points[0]):
+        if k < len(cables) and parts and np.array_equal(parts[0][0], lines[k].points[0]):
             ax.scatter(parts[0][0, 0], parts[0][0, 1], color="black", s=5.0, linewidths=0.0, zorder=3.0)
     for k, place in enumerate(numbers):
         ax.text(place[0], place[1], str(k), fontsize=look.tick, ha="center", va="center", zorder=4.0)
-    occupied = np.concatenate([*courses, *(each @ view[:2].T for each in scene.flat)])
-    _draw_axes(ax, *_free_axes(occupied, view, np.array([ax.get_xlim(), ax.get_ylim()]), look.tick * point), look)
+    occupied, limits = np.concatenate((*courses, flat)), np.array([ax.get_xlim(), ax.get_ylim()])
+    _draw_axes(ax, *_free_axes(occupied, view, limits, look.tick * point), look)
 
 
 def _length(part: Array) -> float:

@@ -1,4 +1,4 @@
-"""Energy of a simulation; natural frequencies along a path and over a grid of poses; frequency response."""
+"""Natural frequencies along a path and over a grid of poses; frequency response."""
 
 from __future__ import annotations
 
@@ -16,28 +16,11 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 from sagline.core.arguments import choice, instance, listed, text
 from sagline.core.arrays import checked
 from sagline.core.errors import InvalidValueError
-from sagline.core.numbers import ROUNDING, n, prefixed_unit
-from sagline.dynamics.simulation.results import Simulation
 from sagline.dynamics.vibration.frequency_map import FrequencyMap
 from sagline.dynamics.vibration.response import FrequencyResponse, curves_of_response, response_curves
 from sagline.dynamics.vibration.vibration import Vibration
-from sagline.plot.labels import figure_legend, legend_above, name_lines, set_heading, wrap_heading
-from sagline.plot.sheet import (
-    BLUE,
-    COLORS,
-    DASHED,
-    GAP_COLOR,
-    LINE_STYLES,
-    MAP_COLORS,
-    VERMILLION,
-    axes_or_new,
-    color_bar,
-    draw_map,
-    format_axes,
-    format_clock,
-    mark_event,
-    sheet,
-)
+from sagline.plot import sheet
+from sagline.plot.labels import legend_above, name_lines, set_heading
 from sagline.plot.style import current
 
 if TYPE_CHECKING:
@@ -47,7 +30,6 @@ if TYPE_CHECKING:
 
     from sagline.core.arrays import Array
 
-AT_REST = 1e-7  # smallest range of the energy axis, as a share of the potential energy
 THIN, WIDE = 0.6, 3.6  # line width if only the cables move, and if only the platform moves [pt]
 FAINT = 0.4  # opacity of thin lines
 SHARES = (1.0, 0.5, 0.0)  # platform shares that the legend shows
@@ -55,59 +37,6 @@ PANELS: Final = {6: 3, 4: 2, 3: 3, 2: 2, 1: 1}  # number of heights -> panels pe
 HIGHEST, LOWEST = 2e2, 1e-3  # limits of the axis relative to the static response; undamped curves have none
 MARK = 0.035  # length of the longest mark of a mode, as a share of the axes' height
 FAINTEST = 0.15  # opacity of the mark of a mode without platform motion
-
-
-def energy(simulation: Simulation) -> Figure:
-    """Kinetic and potential energy, supplied work and lost energy over time; below, the error of the energy balance.
-
-    The potential energy is drawn minus its initial value.
-
-    Args:
-        simulation: The simulation.
-
-    Returns:
-        A figure of two panels.
-
-    Examples:
-        >>> import sagline as sl
-        >>> robot = sl.load_robot("cogiro")
-        >>> pose = sl.Pose.from_euler((1.0, 0.5, 2.0), 0.0, 0.0, 0.0)
-        >>> motion = sl.simulate(sl.inverse(robot, pose).state, duration=0.5)
-        >>> figure = sl.plot.energy(motion)
-    """
-    balance, time = instance(simulation, Simulation, "simulation").energy, simulation.time
-    figure = sheet(height=4.2)
-    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.4, 1.0))
-    rise = balance.potential - balance.potential[0]
-    courses = {"kinetic": balance.kinetic, "potential, minus its initial value": rise}
-    courses |= {"supplied": balance.supplied, "lost": balance.lost}
-    if balance.removed.any():
-        courses["removed"] = balance.removed
-    for (name, course), color, style in zip(courses.items(), COLORS, LINE_STYLES, strict=False):
-        above.plot(time, course, color=color, linestyle=style, linewidth=1.2, label=name)
-    format_clock(above, time, "energy [J]")
-    above.set_xlabel("")
-    for event in simulation.events:
-        name = event.kind if event.cable is None else f"{event.kind}, cable {event.cable}"
-        mark_event(above, event.time, name, GAP_COLOR, 1.0)
-    figure_legend(figure, [above])
-    widest = _largest(*courses.values(), balance.potential)
-    power, unit = prefixed_unit(max(_largest(balance.error), ROUNDING * widest), ".2g", "J")
-    below.plot(time, balance.error * 10.0**power, color="black", linewidth=1.0, label="error of the balance")
-    format_clock(below, time, f"error [{unit}]")
-    for event in simulation.events:
-        mark_event(below, event.time, "", GAP_COLOR, 1.0)
-    for ax, share in ((above, AT_REST), (below, ROUNDING * 10.0**power)):
-        low, high = ax.get_ylim()
-        ax.set_ylim(min(low, -share * widest), max(high, share * widest))
-    worst = n(_largest(balance.error), ".2g", "J", size=_largest(balance.potential))
-    text = wrap_heading(f"kinetic + potential + lost - supplied, minus initial value: at most {worst}", current().tick)
-    below.set_title(text, fontsize=current().tick, loc="left")
-    return figure
-
-
-def _largest(*courses: Array) -> float:
-    return max(float(np.nanmax(np.abs(course), initial=0.0)) for course in courses)
 
 
 def frequencies(
@@ -147,11 +76,11 @@ def frequencies(
         clock = checked(time, "time", "s", shape=(len(states),))
         if clock.ndim != 1 or not np.all(np.diff(clock) > 0.0):
             raise InvalidValueError("time", "not ascending", "a time a state", "Sort the states by their times.")
-    ax = axes_or_new(ax, height=3.6)
+    ax = sheet.axes_or_new(ax, height=3.6)
     ax.add_collection(_swinging(states, clock))
     massless = _filled([each.massless_frequency for each in states])
-    ax.plot(clock, massless, color=VERMILLION, linewidth=0.9, linestyle=DASHED, zorder=2.5)
-    format_axes(ax, "state" if time is None else label, "natural frequency [Hz]")
+    ax.plot(clock, massless, color=sheet.VERMILLION, linewidth=0.9, linestyle=sheet.DASHED, zorder=2.5)
+    sheet.format_axes(ax, "state" if time is None else label, "natural frequency [Hz]")
     if time is None:
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
     ax.set_xlim(clock[0], clock[-1])
@@ -182,7 +111,7 @@ def _widths(share: Array) -> Array:
 def _colors(share: Array) -> list[tuple[float, float, float]]:
     """Colors mixed with white, because transparent lines would be darker where their ends overlap."""
     dense = FAINT + (1.0 - FAINT) * share
-    red, green, blue = (1.0 - dense * (1.0 - part) for part in to_rgb(BLUE))
+    red, green, blue = (1.0 - dense * (1.0 - part) for part in to_rgb(sheet.BLUE))
     return list(zip(red.tolist(), green.tolist(), blue.tolist(), strict=True))
 
 
@@ -200,7 +129,7 @@ def _legend_of_shares(ax: Axes) -> None:
                label=f"with cable mass, platform share {100.0 * share:.0f} %")
         for share in SHARES
     ]  # fmt: skip
-    handles.append(Line2D([], [], color=VERMILLION, linewidth=0.9, linestyle=DASHED, label="massless"))
+    handles.append(Line2D([], [], color=sheet.VERMILLION, linewidth=0.9, linestyle=sheet.DASHED, label="massless"))
     labels = [str(handle.get_label()) for handle in handles]
     ax.legend(handles=handles, **legend_above(ax, labels))
 
@@ -254,12 +183,14 @@ def frequency_map(found: FrequencyMap, quantity: str = "frequency") -> Figure:
     columns = PANELS[shown]
     count, each = shown // columns, current().width / columns
     tall = np.clip(np.ptp(y) / max(float(np.ptp(x)), 1e-9), 0.4, 1.4) * each
-    figure = sheet(1.4 + count * (0.85 * float(tall) + 0.5))
+    figure = sheet.sheet(1.4 + count * (0.85 * float(tall) + 0.5))
     figure.set_layout_engine("compressed")  # panels of equal scales
     panels = figure.subplots(count, columns, sharex=True, sharey=True, squeeze=False)
     for ax, row in zip(panels.flat, rows, strict=True):
-        draw_map(ax, x, y, values[:, :, row], scale, f"$z$ = {z[row]:.3g} m")
-    color_bar(ScalarMappable(scale, MAP_COLORS), list(panels.flat), label, shrink=0.8, location="bottom", aspect=30)
+        sheet.draw_map(ax, x, y, values[:, :, row], scale, f"$z$ = {z[row]:.3g} m")
+    sheet.color_bar(
+        ScalarMappable(scale, sheet.MAP_COLORS), list(panels.flat), label, shrink=0.8, location="bottom", aspect=30
+    )
     set_heading(figure, found.robot.name)
     return figure
 
@@ -310,13 +241,13 @@ def response(
     else:
         curves = response_curves(vibration, force, motion)
         modes = list(zip(vibration.frequency, vibration.platform_share, strict=True))
-    ax = axes_or_new(ax)
-    ax.loglog(curves.frequency, curves.with_mass, color=BLUE, linewidth=1.2, label="with cable mass", zorder=2.2)
+    ax = sheet.axes_or_new(ax)
+    ax.loglog(curves.frequency, curves.with_mass, color=sheet.BLUE, linewidth=1.2, label="with cable mass", zorder=2.2)
     ax.loglog(
-        curves.frequency, curves.massless, color=VERMILLION, linewidth=1.1, linestyle=DASHED,
+        curves.frequency, curves.massless, color=sheet.VERMILLION, linewidth=1.1, linestyle=sheet.DASHED,
         label="massless", zorder=2.1,
     )  # fmt: skip
-    format_axes(ax, "frequency [Hz]", f"{_name(motion or force)} for a {_cause(force)} [{curves.unit}]")
+    sheet.format_axes(ax, "frequency [Hz]", f"{_name(motion or force)} for a {_cause(force)} [{curves.unit}]")
     ax.set_xlim(curves.frequency[0], curves.frequency[-1])
     ax.set_ylim(*_vertical_range(curves.with_mass, curves.massless, curves.static))
     ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
@@ -325,7 +256,7 @@ def response(
     ax.tick_params(which="minor", length=1.5, width=0.4)
     for frequency, share in modes:
         shade = FAINTEST + (1.0 - FAINTEST) * float(share)
-        ax.axvline(frequency, ymax=MARK, color=BLUE, alpha=shade, linewidth=0.9, zorder=1.9)
+        ax.axvline(frequency, ymax=MARK, color=sheet.BLUE, alpha=shade, linewidth=0.9, zorder=1.9)
     ax.set_title(_damping(vibration), fontsize=current().tick, loc="right")
     name_lines(ax)
     return ax

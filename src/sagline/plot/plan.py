@@ -13,22 +13,8 @@ from sagline.core.numbers import n
 from sagline.kinematics.confirm import Confirmation
 from sagline.kinematics.plan import Plan
 from sagline.motion.path import Path
+from sagline.plot import sheet
 from sagline.plot.labels import LENGTHS, PLACE, TENSIONS, TIME, figure_legend, name_lines
-from sagline.plot.sheet import (
-    BLUE,
-    ORANGE,
-    VERMILLION,
-    axes_or_new,
-    cable_look,
-    draw_components,
-    draw_series,
-    format_axes,
-    format_clock,
-    hide_shared_labels,
-    shade_spans,
-    sheet,
-    true_runs,
-)
 from sagline.plot.style import current
 
 if TYPE_CHECKING:
@@ -73,7 +59,7 @@ def tensions(plan: Plan, quantity: str = "chord_tension", ax: Axes | None = None
         >>> plan = sl.inverse(robot, path)
         >>> axes = sl.plot.tensions(plan)
     """
-    ax = axes_or_new(ax)
+    ax = sheet.axes_or_new(ax)
     _draw_cables(ax, plan, quantity, TENSIONS)
     name_lines(ax)
     return ax
@@ -100,7 +86,7 @@ def lengths(plan: Plan, quantity: str = "unstrained_length", ax: Axes | None = N
         >>> plan = sl.inverse(robot, path)
         >>> axes = sl.plot.lengths(plan)
     """
-    ax = axes_or_new(ax)
+    ax = sheet.axes_or_new(ax)
     _draw_cables(ax, plan, quantity, LENGTHS)
     name_lines(ax)
     return ax
@@ -123,11 +109,11 @@ def overview(plan: Plan) -> Figure:
         >>> figure = sl.plot.overview(plan)
     """
     rows, columns, height = (4, 1, 9.0) if current().narrow else (2, 2, 5.0)
-    figure = sheet(height)
+    figure = sheet.sheet(height)
     panels = figure.subplots(rows, columns, sharex=True).flat
     for ax, quantity in zip(panels, OVERVIEW, strict=True):
         _draw_cables(ax, plan, quantity, LENGTHS | TENSIONS)
-        hide_shared_labels(ax)
+        sheet.hide_shared_labels(ax)
     figure_legend(figure, panels[:1])
     return figure
 
@@ -148,16 +134,15 @@ def _values(plan: Plan, quantity: str, table: dict[str, tuple[str, float]]) -> t
 def _format(ax: Axes, plan: Plan, label: str) -> None:
     """Shade the infeasible poses; set the labels and limits of axes over time or over the numbers of poses."""
     clock, axis = abscissa(plan)
-    shade_spans(ax, clock, [(gap.first, gap.last) for gap in plan.gaps], INFEASIBLE)
-    format_clock(ax, clock, label, axis)
+    sheet.shade_spans(ax, clock, [(gap.first, gap.last) for gap in plan.gaps], INFEASIBLE)
+    sheet.format_clock(ax, clock, label, axis)
 
 
 def _draw_cables(ax: Axes, plan: Plan, quantity: str, table: dict[str, tuple[str, float]]) -> None:
     """Draw one line per cable; infeasible poses are shaded."""
     values, label = _values(plan, quantity, table)
     clock, _ = abscissa(plan)
-    for i, course in enumerate(values.T):
-        draw_series(ax, clock, course, **cable_look(i), linewidth=1.1, label=f"cable {i}")
+    sheet.draw_cables(ax, clock, values)
     _format(ax, plan, label)
 
 
@@ -181,7 +166,7 @@ def error(confirmation: Confirmation, ax: Axes | None = None) -> Axes:
         >>> plan = sl.inverse(robot, path)
         >>> axes = sl.plot.error(sl.confirm(plan))
     """
-    ax = axes_or_new(ax, height=2.6)
+    ax = sheet.axes_or_new(ax, height=2.6)
     _draw_errors(ax, confirmation)
     _write_flat_error(ax, confirmation)
     name_lines(ax)
@@ -212,12 +197,12 @@ def errors(*confirmations: Confirmation) -> Figure:
     """
     if not confirmations:
         raise InvalidValueError("confirmations", "none", "at least one", HOW_TO_GET["Confirmation"])
-    figure = sheet(height=2.8)
+    figure = sheet.sheet(height=2.8)
     panels = figure.subplots(1, len(confirmations), sharey=True, squeeze=False)[0]
     for ax, confirmation in zip(panels, confirmations, strict=True):
         _draw_errors(ax, confirmation)
         ax.set_title(confirmation.plan.state.one_robot.name, fontsize=current().tick)
-        hide_shared_labels(ax)
+        sheet.hide_shared_labels(ax)
     for ax, confirmation in zip(panels, confirmations, strict=True):
         _write_flat_error(ax, confirmation)  # the scale that all panels have
     figure_legend(figure, panels)
@@ -227,10 +212,10 @@ def errors(*confirmations: Confirmation) -> Figure:
 def _draw_errors(ax: Axes, confirmation: Confirmation) -> None:
     plan = instance(confirmation, Confirmation, "confirmation").plan
     clock, _ = abscissa(plan)
-    draw_components(ax, clock, 1e3 * np.atleast_2d(confirmation.position_error))
+    sheet.draw_components(ax, clock, 1e3 * np.atleast_2d(confirmation.position_error))
     _format(ax, plan, "position error [mm]")
     lost = np.atleast_1d(plan.feasible & ~confirmation.held)
-    shade_spans(ax, clock, true_runs(lost), UNCONFIRMED, ORANGE, 0.25)
+    sheet.shade_spans(ax, clock, sheet.true_runs(lost), UNCONFIRMED, sheet.ORANGE, 0.25)
     low, high = ax.get_ylim()
     ax.set_ylim(min(low, -LEAST_ERROR), max(high, LEAST_ERROR))
 
@@ -274,24 +259,24 @@ def small_multiples(plan: Plan, quantity: str = "chord_tension") -> Figure:
     (clock, axis), robot, count = abscissa(plan), plan.state.one_robot, values.shape[1]
     columns = min(count, 2 if current().narrow else 4)
     rows = ceil(count / columns)
-    figure = sheet(0.4 + rows * ROW_HEIGHT)
+    figure = sheet.sheet(0.4 + rows * ROW_HEIGHT)
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).flat
     for i, ax in enumerate(panels):
         if i >= count:
             ax.set_axis_off()
             continue
         for other in np.delete(values, i, axis=1).T:
-            draw_series(ax, clock, other, color=OTHER_CABLES, linewidth=0.6, zorder=1.5)
-        draw_series(ax, clock, values[:, i], color=BLUE, linewidth=1.3, zorder=2.0, label=f"cable {i}")
+            sheet.draw_series(ax, clock, other, color=OTHER_CABLES, linewidth=0.6, zorder=1.5)
+        sheet.draw_series(ax, clock, values[:, i], color=sheet.BLUE, linewidth=1.3, zorder=2.0, label=f"cable {i}")
         _format(ax, plan, "")
         ax.set_xlabel("")
         ax.set_title(f"cable {i}", fontsize=current().tick, loc="left", pad=2.0)
-        hide_shared_labels(ax)
+        sheet.hide_shared_labels(ax)
     low, high = panels[0].get_ylim()
     for i, ax in enumerate(panels[:count]):
         for limit in (robot.tension_min[i], robot.tension_max[i]):
             if LIMITED.get(quantity) == robot.tension_limits_of and low <= limit <= high:
-                ax.axhline(limit, color=VERMILLION, linewidth=0.8, linestyle=":", zorder=1.8)
+                ax.axhline(limit, color=sheet.VERMILLION, linewidth=0.8, linestyle=":", zorder=1.8)
     figure.supxlabel(axis, fontsize=current().label)
     figure.supylabel(label, fontsize=current().label)
     return figure
@@ -316,22 +301,22 @@ def path(path: Path, ax: Axes | None = None) -> Axes:
     if ax is None:
         top = 0.7 + WIDTH * float(np.clip(np.ptp(y) / max(float(np.ptp(x)), LEVEL), 0.2, 0.9))
         heights = (top,) if high - low < LEVEL else (top, SIDE)
-        ax, *below = sheet(sum(heights)).subplots(len(heights), 1, squeeze=False, height_ratios=heights)[:, 0]
+        ax, *below = sheet.sheet(sum(heights)).subplots(len(heights), 1, squeeze=False, height_ratios=heights)[:, 0]
         for side in below:
-            draw_series(side, path.time, z, color=BLUE, linewidth=1.3)
-            format_clock(side, path.time, PLACE[2])
-    ax = axes_or_new(ax)
-    ax.plot(x, y, color=BLUE, linewidth=1.3)
-    ax.plot(x[0], y[0], "o", color=VERMILLION, markersize=5.0, zorder=3.0)
+            sheet.draw_series(side, path.time, z, color=sheet.BLUE, linewidth=1.3)
+            sheet.format_clock(side, path.time, PLACE[2])
+    ax = sheet.axes_or_new(ax)
+    ax.plot(x, y, color=sheet.BLUE, linewidth=1.3)
+    ax.plot(x[0], y[0], "o", color=sheet.VERMILLION, markersize=5.0, zorder=3.0)
     ax.set_title("\N{BLACK CIRCLE} start", color=START_COLOR, fontsize=current().tick, loc="left")
     for k in _arrow_samples(path):
         base = path.pose.position[k, :2]
         tip = base + 1e-3 * path.twist[k, :2]  # s: short enough to show the direction only
-        arrow = {"arrowstyle": "-|>", "color": BLUE, "mutation_scale": 11.0}
+        arrow = {"arrowstyle": "-|>", "color": sheet.BLUE, "mutation_scale": 11.0}
         ax.annotate("", (tip[0], tip[1]), (base[0], base[1]), arrowprops=arrow)
     height = f"$z$ = {low:g} m" if high - low < LEVEL else f"$z$ from {low:g} m to {high:g} m"
     ax.set_title(height, fontsize=current().tick, loc="right")
-    format_axes(ax, *PLACE[:2])
+    sheet.format_axes(ax, *PLACE[:2])
     ax.set_aspect("equal")
     ax.margins(0.06)
     return ax
@@ -351,9 +336,9 @@ def velocity(path: Path, ax: Axes | None = None) -> Axes:
         >>> import sagline as sl
         >>> axes = sl.plot.velocity(sl.article_path())
     """
-    ax = axes_or_new(ax, height=2.6)
-    draw_components(ax, instance(path, Path, "path").time, path.twist[:, :3], "v_{}")
-    format_clock(ax, path.time, "velocity [m/s]")
+    ax = sheet.axes_or_new(ax, height=2.6)
+    sheet.draw_components(ax, instance(path, Path, "path").time, path.twist[:, :3], "v_{}")
+    sheet.format_clock(ax, path.time, "velocity [m/s]")
     name_lines(ax)
     return ax
 

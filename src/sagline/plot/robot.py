@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import combinations, product
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from matplotlib import patheffects
@@ -40,7 +40,7 @@ EDGES = tuple(  # the edges of a box are between corners that differ in a single
     (a, b) for a, b in combinations(range(8), 2) if np.count_nonzero(_SIGNS[a] != _SIGNS[b]) == 1
 )
 FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))  # seen from outside
-FRAME_COLOR, FLOOR_COLOR, SHADOW_COLOR, WHEEL_COLOR = "0.6", "0.955", "0.82", "0.35"
+FRAME_COLOR, FLOOR_COLOR, SHADOW_COLOR, WHEEL_COLOR = "0.5", "0.955", "0.82", "0.4"
 SAME_PLACE = 0.04  # anchors have a common label if they are closer than this share of the robot's size
 HALO = [patheffects.withStroke(linewidth=2.0, foreground="white")]
 LABEL_DISTANCE = 0.045  # distance of a label outward from its anchor, as a share of the robot's size
@@ -56,30 +56,40 @@ def drawn_pose(robot: Robot, pose: PoseLike | None) -> Pose:
     return Pose(0.5 * (robot.test_box.low + robot.test_box.high))
 
 
-def catenary_points(robot: Robot, pose: Pose, plan: Plan) -> Array:
-    """Points of the cables in the world [m], shape (m, points, 3), computed from a feasible `plan` of `pose`."""
-    contact = plan.state.contact
-    wraps = shapes.wraps(robot, pose, None if contact is None else contact.wrap_angle)
-    free = shapes.catenaries(shapes.chords(robot, pose, wraps[:, -1]), plan.state.cables, 1.0)
-    return np.concatenate((wraps, free), axis=1)
+class Stroke(NamedTuple):
+    """A line of a figure of a robot, drawn over the lines with a smaller `order` where none of them is hidden."""
+
+    points: Array  # in the world [m], shape (P, 3)
+    color: Any
+    width: float  # [pt]
+    style: Any
+    order: float
+    covers: bool = False  # True if it hides lines behind it
 
 
-def straight_points(robot: Robot, pose: Pose) -> Array:
-    """Points of straight cables in the world [m], shape (m, points, 3)."""
-    wraps = shapes.wraps(robot, pose, None)
-    return np.concatenate((wraps, shapes.straight(shapes.chords(robot, pose, wraps[:, -1]))), axis=1)
+def strokes(robot: Robot, pose: Pose, plan: Plan | None) -> tuple[list[Stroke], list[Stroke]]:
+    """Cables, and pulleys, drums, frame and platform of a robot at `pose`, whose tensions are in `plan`.
 
-
-def pulleys_and_drums(robot: Robot, pose: Pose) -> tuple[list[Array], list[tuple[Array, bool]]]:
-    """Circles of pulleys and known drums; cables between drum and pulley, and True for each vertical cable of them."""
+    Cables have the colors of their tensions. Cables without tensions are straight, dashed and gray.
+    """
+    state = plan.state if plan is not None and plan.feasible else None
+    tension = np.full(robot.cable_count, np.nan) if plan is None else plan.chord_tension
+    colors = TensionScale.of(robot).colors(tension) / 255.0
+    style = (0, (3.0, 2.0)) if state is None else "-"
+    courses = shapes.courses(robot, pose, state, 1.0)
+    cables = [Stroke(*each, 1.3, style, 2.0, covers=True) for each in zip(courses, colors, strict=True)]
     turn = np.linspace(0.0, 2.0 * np.pi, POINTS)[:, None]
-    pulleys = np.swapaxes(points_on_pulleys(robot, pose, turn), 0, 1)[pulleys_of(robot).radius > 0.0]
+    circles = list(np.swapaxes(points_on_pulleys(robot, pose, turn), 0, 1)[pulleys_of(robot).radius > 0.0])
     known = None if robot.winches is None else robot.winches.drum_radius
-    radii = np.empty(0) if known is None else known
-    drums = [_rims(ends, radius) for ends, radius in zip(shapes.drum_axes(robot), radii, strict=False)]
-    runs, upright = shapes.dead_runs(robot)
-    high = [(run, bool(known)) for run, known in zip(runs, upright, strict=True) if run[0, 2] != run[1, 2]]
-    return [*pulleys, *drums], high
+    circles += map(_rims, shapes.drum_axes(robot), [] if known is None else known)
+    others = [Stroke(circle, WHEEL_COLOR, 0.8, "-", 1.9) for circle in circles]
+    for run, upright in zip(*shapes.dead_runs(robot), strict=True):
+        if run[0, 2] != run[1, 2]:
+            others.append(Stroke(run, WHEEL_COLOR, 0.7, "-" if upright else ":", 1.8))
+    frame, body = frame_box(robot), platform_box(robot, pose)
+    if frame is not None:
+        others += [Stroke(frame[[*edge]], FRAME_COLOR, 0.7, "-", 1.7, covers=True) for edge in EDGES]
+    return cables, others + [Stroke(body[[*edge]], VERMILLION, 1.2, "-", 2.3) for edge in EDGES]
 
 
 def _rims(ends: Array, radius: float) -> Array:
@@ -169,43 +179,17 @@ def draw_robot(ax: Axes3D, robot: Robot, where: Pose, color: str | None = None) 
     """Draw frame, platform, cables and ground; the axes have no labels yet."""
     ax.computed_zorder = False  # matplotlib's order by centers would draw the floor over objects on it
     plan = inverse(robot, where)
-    courses = catenary_points(robot, where, plan) if plan.feasible else straight_points(robot, where)
-    colors = TensionScale.of(robot).colors(plan.chord_tension) / 255.0  # cables without a tension are gray
-    for line, own in zip(courses, colors, strict=True):
-        style = "-" if plan.feasible else (0, (3.0, 2.0))
-        ax.plot(*line.T, color=own if color is None else color, linewidth=1.4, linestyle=style, zorder=2.0)
-    machinery = _draw_wheels(ax, robot, where)
-    frame = frame_box(robot)
-    if frame is not None:
-        _draw_box(ax, frame, FRAME_COLOR, 0.7)
+    cables, others = strokes(robot, where, plan)
+    if color is not None:
+        cables = [line._replace(color=color) for line in cables]
+    for line in (*cables, *others):
+        ax.plot(*line.points.T, color=line.color, linewidth=line.width, linestyle=line.style, zorder=line.order)
     ax.scatter(*robot.frame_anchors.T, color="black", s=8.0, depthshade=False, zorder=4.0)
-    platform = platform_box(robot, where)
-    _draw_box(ax, platform, VERMILLION, 1.3)
-    points = np.concatenate((courses.reshape(-1, 3), machinery, platform, *([] if frame is None else [frame])))
-    _draw_ground(ax, points, platform)
+    points = np.concatenate([line.points for line in (*cables, *others)])
+    for flat, shade in zip(ground(points, platform_box(robot, where)), (FLOOR_COLOR, SHADOW_COLOR), strict=True):
+        ax.add_collection3d(Poly3DCollection([flat], facecolor=shade, edgecolor="none", zorder=0.5))
     _number_cables(ax, robot.frame_anchors, points)
     return plan, points
-
-
-def _draw_wheels(ax: Axes3D, robot: Robot, pose: Pose) -> Array:
-    """Draw pulleys, known drums and the cables between them; returns their points (n, 3)."""
-    circles, runs = pulleys_and_drums(robot, pose)
-    for circle in circles:
-        ax.plot(*circle.T, color=WHEEL_COLOR, linewidth=0.9, zorder=1.9)
-    for run, upright in runs:
-        ax.plot(*run.T, color=WHEEL_COLOR, linewidth=0.7, linestyle="-" if upright else ":", zorder=1.8)
-    return np.concatenate([*circles, *(run for run, _ in runs), np.empty((0, 3))])
-
-
-def _draw_box(ax: Axes3D, corners: Array, color: str, width: float) -> None:
-    for edge in EDGES:
-        ax.plot(*corners[list(edge)].T, color=color, linewidth=width, zorder=1.0 + width)
-
-
-def _draw_ground(ax: Axes3D, points: Array, platform: Array) -> None:
-    """Draw the ground below all objects, and the platform's shadow on the ground."""
-    for flat, color in zip(ground(points, platform), (FLOOR_COLOR, SHADOW_COLOR), strict=True):
-        ax.add_collection3d(Poly3DCollection([flat], facecolor=color, edgecolor="none", zorder=0.5))
 
 
 def _number_cables(ax: Axes3D, anchors: Array, points: Array) -> None:

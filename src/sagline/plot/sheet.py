@@ -205,6 +205,12 @@ def draw_series(ax: Axes, clock: Array, course: Array, **look: Any) -> None:
     ax.plot(clock, course, **look, **points)
 
 
+def draw_cables(ax: Axes, clock: Array, values: Array, linewidth: float = 1.1) -> None:
+    """Draw one line over time for each cable; `values` (N, m)."""
+    for i, course in enumerate(values.T):
+        draw_series(ax, clock, course, **cable_look(i), linewidth=linewidth, label=f"cable {i}")
+
+
 def draw_components(ax: Axes, clock: Array, courses: Array, name: str = "{}") -> None:
     """Draw the components (N, 3) along x, y and z over time; `name` formats the symbol of each component."""
     for axis, course, color, style in zip("xyz", courses.T, COLORS, LINE_STYLES, strict=False):

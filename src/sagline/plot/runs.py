@@ -1,0 +1,284 @@
+"""Simulations and executions over time: tensions, motion, energy, states, errors and faults."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from sagline.control.execution import Execution, null_space_error, position_error
+from sagline.control.recording import EventKind
+from sagline.control.states import State
+from sagline.core.arguments import instance
+from sagline.core.numbers import ROUNDING, n, prefixed_unit
+from sagline.dynamics.simulation.results import Simulation
+from sagline.plot import sheet
+from sagline.plot.labels import figure_legend, legend_above, name_lines, wrap_heading
+from sagline.plot.style import current
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from sagline.core.arrays import Array
+
+PER_METER: Final = 1e3  # [mm]
+SHOWN: Final = 0.5  # the limit is drawn if the largest tension exceeds this share of it
+AT_REST = 1e-7  # smallest range of the energy axis, as a share of the potential energy
+STATES: Final = {  # states that have a color of their own
+    State.HOMING: sheet.ORANGE, State.MOVING: sheet.BLUE, State.JOGGING: sheet.SKY, State.PAUSING: sheet.GREEN,
+    State.STOPPING: sheet.PURPLE, State.FAULT: sheet.VERMILLION, State.EMERGENCY: "#8B0000",
+}  # fmt: skip
+
+
+def simulation(simulation: Simulation) -> Figure:
+    """Tensions at the frame ends over time, and displacement and rotation of the platform relative to its first pose.
+
+    Args:
+        simulation: The simulation.
+
+    Returns:
+        A figure of three panels.
+
+    Examples:
+        >>> import sagline as sl
+        >>> robot, broken = sl.load_robot("cogiro"), sl.Break(cable=3, time=0.1)
+        >>> motion = sl.simulate(robot, (1.0, 0.5, 2.0), duration=0.5, events=broken)
+        >>> figure = sl.plot.simulation(motion)
+    """
+    time, pose = instance(simulation, Simulation, "simulation").time, simulation.pose
+    figure = sheet.sheet(height=6.5)
+    above, middle, below = figure.subplots(3, 1, sharex=True, height_ratios=(1.8, 1.0, 1.0))
+    sheet.draw_cables(above, time, simulation.tensions)
+    limit = float(simulation.robot.tension_max.min())
+    if float(np.nanmax(simulation.tensions)) > SHOWN * limit:
+        above.axhline(limit, color=sheet.VERMILLION, linewidth=0.8, linestyle=":", label="tension_max")
+    sheet.draw_components(middle, time, pose.position - pose.position[0])
+    sheet.draw_components(below, time, np.degrees((pose.rotation * pose.rotation[0].inv()).as_rotvec()))
+    labels = "tension [N]", "displacement [m]", "rotation [°]"
+    for ax, label in zip((above, middle, below), labels, strict=True):
+        sheet.format_clock(ax, time, label)
+        sheet.hide_shared_labels(ax)
+        _mark_events(ax, simulation, named=ax is above)
+        if ax is not above:
+            name_lines(ax)
+    figure_legend(figure, [above])  # above the names of the events
+    return figure
+
+
+def energy(simulation: Simulation) -> Figure:
+    """Kinetic and potential energy, supplied work and lost energy over time; below, the error of the energy balance.
+
+    The potential energy is drawn minus its initial value.
+
+    Args:
+        simulation: The simulation.
+
+    Returns:
+        A figure of two panels.
+
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("cogiro")
+        >>> pose = sl.Pose.from_euler((1.0, 0.5, 2.0), 0.0, 0.0, 0.0)
+        >>> motion = sl.simulate(sl.inverse(robot, pose).state, duration=0.5)
+        >>> figure = sl.plot.energy(motion)
+    """
+    balance, time = instance(simulation, Simulation, "simulation").energy, simulation.time
+    figure = sheet.sheet(height=4.2)
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.4, 1.0))
+    rise = balance.potential - balance.potential[0]
+    courses = {"kinetic": balance.kinetic, "potential, minus its initial value": rise}
+    courses |= {"supplied": balance.supplied, "lost": balance.lost}
+    if balance.removed.any():
+        courses["removed"] = balance.removed
+    for (name, course), color, style in zip(courses.items(), sheet.COLORS, sheet.LINE_STYLES, strict=False):
+        above.plot(time, course, color=color, linestyle=style, linewidth=1.2, label=name)
+    sheet.format_clock(above, time, "energy [J]")
+    above.set_xlabel("")
+    _mark_events(above, simulation, named=True)
+    figure_legend(figure, [above])
+    widest = _largest(*courses.values(), balance.potential)
+    power, unit = prefixed_unit(max(_largest(balance.error), ROUNDING * widest), ".2g", "J")
+    below.plot(time, balance.error * 10.0**power, color="black", linewidth=1.0, label="error of the balance")
+    sheet.format_clock(below, time, f"error [{unit}]")
+    _mark_events(below, simulation, named=False)
+    for ax, share in ((above, AT_REST), (below, ROUNDING * 10.0**power)):
+        low, high = ax.get_ylim()
+        ax.set_ylim(min(low, -share * widest), max(high, share * widest))
+    worst = n(_largest(balance.error), ".2g", "J", size=_largest(balance.potential))
+    text = wrap_heading(f"kinetic + potential + lost - supplied, minus initial value: at most {worst}", current().tick)
+    below.set_title(text, fontsize=current().tick, loc="left")
+    return figure
+
+
+def _mark_events(ax: Axes, simulation: Simulation, *, named: bool) -> None:
+    for event in simulation.events:
+        name = event.kind if event.cable is None else f"{event.kind}, cable {event.cable}"
+        sheet.mark_event(ax, event.time, name if named else "", sheet.GAP_COLOR, 1.0)
+
+
+def _largest(*courses: Array) -> float:
+    return max(float(np.nanmax(np.abs(course), initial=0.0)) for course in courses)
+
+
+def execution(done: Execution) -> Figure:
+    """Overview of an execution: states, tensions, their error, and the estimated position of the platform.
+
+    The panels are, from top to bottom: the states, with a line at each fault; the measured and the planned tensions
+    (dashed); the part of the tension error that lengths can correct while the platform stays at rest, filtered as in
+    the tension loop; and the estimated minus the planned position.
+
+    Args:
+        done: The execution.
+
+    Returns:
+        A figure of four panels.
+
+    Raises:
+        InvalidValueError: If `done` is not an execution.
+
+    Examples:
+        >>> import sagline as sl
+        >>> done = sl.load_execution("run.mcap")  # doctest: +SKIP
+        >>> figure = sl.plot.execution(done)  # doctest: +SKIP
+    """
+    instance(done, Execution, "execution")
+    figure = sheet.sheet(height=7.6)
+    parts = figure.subplots(4, 1, sharex=True, height_ratios=(0.25, 1.6, 1.0, 1.0))
+    draw: tuple[Callable[[Execution, Axes], Axes], ...] = (states, measured_tensions, mendable_tensions, place_errors)
+    for part, panel in zip(draw, parts, strict=True):
+        part(done, panel)
+        if panel is not parts[-1]:
+            panel.set_xlabel("")
+            panel.tick_params(labelbottom=False)
+        _mark_faults(panel, done)
+    own: Any = parts[0].get_legend()
+    own.remove()  # the names of the faults are written at the place of the label
+    figure_legend(figure, parts[:1])
+    return figure
+
+
+def states(done: Execution, ax: Axes | None = None) -> Axes:
+    """The states of the controller over time, as a band.
+
+    Args:
+        done: The execution.
+        ax: Axes to draw on; None for a new figure.
+
+    Returns:
+        The axes.
+
+    Examples:
+        >>> import sagline as sl
+        >>> done = sl.load_execution("run.mcap")  # doctest: +SKIP
+        >>> axes = sl.plot.states(done)  # doctest: +SKIP
+    """
+    ax = sheet.axes_or_new(ax, height=0.9)
+    clock = _clock(done)
+    looks: dict[State | None, tuple[str, str]] = {code: (color, code.name) for code, color in STATES.items()}
+    looks[None] = sheet.GAP_COLOR, "standing"
+    for code, (color, name) in looks.items():
+        there = ~np.isin(done.state, list(STATES)) if code is None else done.state == code
+        spans = [(clock[first], clock[last] + done.period - clock[first]) for first, last in sheet.true_runs(there)]
+        if spans:
+            ax.broken_barh(spans, (0.0, 1.0), facecolors=color, label=name, linewidth=0.0)
+    sheet.format_clock(ax, clock, "")
+    ax.set_yticks([])
+    ax.grid(visible=False)
+    ax.spines["left"].set_visible(False)
+    handles, labels = ax.get_legend_handles_labels()
+    place = legend_above(ax, labels)
+    ax.legend(handles, labels, **{**place, "handlelength": 1.0, "columnspacing": 1.0})
+    return ax
+
+
+def measured_tensions(done: Execution, ax: Axes | None = None) -> Axes:
+    """Tensions at the frame ends: measured by the load cells, and planned (dashed).
+
+    Args:
+        done: The execution.
+        ax: Axes to draw on; None for a new figure.
+
+    Returns:
+        The axes.
+
+    Examples:
+        >>> import sagline as sl
+        >>> done = sl.load_execution("run.mcap")  # doctest: +SKIP
+        >>> axes = sl.plot.measured_tensions(done)  # doctest: +SKIP
+    """
+    ax = sheet.axes_or_new(ax)
+    clock = _clock(done)
+    for i, read in enumerate(done.tension.T):
+        look = sheet.cable_look(i) | {"linestyle": "-", "label": f"cable {i}"}
+        sheet.draw_series(ax, clock, read, **look, linewidth=0.8, alpha=0.8)
+    for i, planned in enumerate(done.planned_tension.T):
+        look = {"color": "black", "linestyle": sheet.DASHED, "label": "planned" if i == 0 else "_"}
+        sheet.draw_series(ax, clock, planned, **look, linewidth=0.7)
+    return _finished(ax, clock, "tension at the frame end [N]")
+
+
+def mendable_tensions(done: Execution, ax: Axes | None = None) -> Axes:
+    """Part of the tension errors that lengths can correct with the platform at rest, filtered as in the tension loop.
+
+    Args:
+        done: The execution.
+        ax: Axes to draw on; None for a new figure.
+
+    Returns:
+        The axes; empty for a robot without redundancy.
+
+    Examples:
+        >>> import sagline as sl
+        >>> done = sl.load_execution("run.mcap")  # doctest: +SKIP
+        >>> axes = sl.plot.mendable_tensions(done)  # doctest: +SKIP
+    """
+    ax = sheet.axes_or_new(ax, height=2.6)
+    clock = _clock(done)
+    sheet.draw_cables(ax, clock, null_space_error(done), linewidth=1.0)
+    return _finished(ax, clock, "correctable tension\nerror [N]")
+
+
+def place_errors(done: Execution, ax: Axes | None = None) -> Axes:
+    """Estimated minus planned position of the platform's origin, along x, y and z, over time.
+
+    Args:
+        done: The execution.
+        ax: Axes to draw on; None for a new figure.
+
+    Returns:
+        The axes.
+
+    Examples:
+        >>> import sagline as sl
+        >>> done = sl.load_execution("run.mcap")  # doctest: +SKIP
+        >>> axes = sl.plot.place_errors(done)  # doctest: +SKIP
+    """
+    ax = sheet.axes_or_new(ax, height=2.6)
+    clock = _clock(done)
+    sheet.draw_components(ax, clock, PER_METER * position_error(done))
+    return _finished(ax, clock, "estimated minus\nplanned [mm]")
+
+
+def _clock(done: Execution) -> Array:
+    """Time since the first cycle [s]."""
+    time = instance(done, Execution, "execution").time
+    return np.asarray(time - time[0]) if time.size else time
+
+
+def _finished(ax: Axes, clock: Array, label: str) -> Axes:
+    """Set the labels and limits of the axes, and write the names of the lines."""
+    sheet.format_clock(ax, clock, label)
+    name_lines(ax)
+    return ax
+
+
+def _mark_faults(ax: Axes, done: Execution) -> None:
+    """Draw a line at each fault; the fault's name is above the panel of the states."""
+    for event in done.events:
+        if event.kind is EventKind.FAULT and len(done):
+            name = "" if ax.get_yticks().size else event.name
+            sheet.mark_event(ax, float(event.time - done.time[0]), name, sheet.VERMILLION, 4.0)
