@@ -12,7 +12,7 @@ from syrupy.assertion import SnapshotAssertion
 import sagline as sl
 from sagline import Calibration, plot
 from sagline.core.arrays import Array
-from sagline.plot.calibration import LINE, MOST_POSES, REACH, _apart
+from sagline.plot.calibration import MOST_POSES, REACH
 from tests.calibration.made_up import NAMES, made_up
 from tests.plot.readable import drawn_texts, overlaps
 from tests.refusal import refused
@@ -92,15 +92,14 @@ def test_the_matrix_is_the_correlation_by_kinds(found: sl.Calibration) -> None:
         assert list(overlaps(drawn_texts(plot.calibration(found, "correlation")))) == []
 
 
-@pytest.mark.parametrize("seed", range(20))
-def test_names_beside_the_matrix_never_meet(seed: int) -> None:
-    random = np.random.default_rng(seed)
-    sizes = random.choice([1, 3, 8, 24], int(random.integers(1, 15)))
-    ends = np.cumsum(sizes)
-    middles = ends - 0.5 * sizes - 0.5
-    moved = _apart(middles, LINE * ends[-1], int(ends[-1]))
-    assert np.diff(moved).min(initial=np.inf) >= LINE * ends[-1] - 1e-9
-    assert moved[-1] <= max(ends[-1], middles[-1])
+def test_the_whole_figure_is_higher_than_a_slide_where_its_parts_would_overlap(found: sl.Calibration) -> None:
+    with plot.style("slides") as look:
+        figure = plot.calibration(found)
+    assert figure.get_figheight() > 2.0 * look.tallest
+    drawn_texts(figure)  # the first drawing determines the layout
+    assert list(overlaps(drawn_texts(figure))) == []
+    with plot.style("slides"):
+        assert plot.calibration(found, "correlation").get_figheight() <= look.tallest
 
 
 def test_maps_are_the_expected_errors_before_and_after(

@@ -16,7 +16,7 @@ from sagline.core.arguments import choice, instance
 from sagline.core.arrays import locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
-from sagline.plot.labels import figure_legend, set_heading
+from sagline.plot.labels import figure_legend, set_heading, spread_heights
 from sagline.plot.sheet import COLORS, GAP_COLOR, MAP_COLORS, VERMILLION, color_bar, draw_map, format_axes, sheet
 from sagline.plot.style import current
 from sagline.robot.pose import Pose
@@ -39,6 +39,7 @@ MARKS: Final = ("o", "s", "^", "D")
 PANEL, MATRIX, BESIDE, MAP = 1.3, 3.8, 1.2, 2.7  # heights of panel and matrix; extra height and width of a map [in]
 LINE: Final = 1.3 / 72.0  # height of a name in a font of 1 pt [in]
 LEADER: Final[dict[str, Any]] = {"arrowstyle": "-", "linewidth": 0.5, "relpos": (1.0, 0.5), "shrinkB": 0.0}
+SHRUNK: Final = 1.5  # a figure is higher than a slide if its parts would otherwise be reduced by more than this factor
 ROUND: Final = FuncFormatter(lambda value, _: f"{value:g}")
 PER_METER: Final = 1e3  # [mm]
 
@@ -79,7 +80,7 @@ def calibration(found: Calibration, part: str = "all", *, height: float | None =
     """
     instance(found, Calibration, "found")
     choice(part, "part", PARTS)
-    at = None if height is None else number(height, "height", "m")
+    place = None if height is None else number(height, "height", "m")
     heights: dict[str, float] = {
         "residuals": 0.5 + PANEL * (len(_kinds(found)) + 1),
         "correlation": MATRIX,
@@ -88,10 +89,13 @@ def calibration(found: Calibration, part: str = "all", *, height: float | None =
     draw: dict[str, Callable[[Any], None]] = {
         "residuals": lambda own: _residuals(own, found),
         "correlation": lambda own: _correlation(own, found),
-        "errors": lambda own: _errors(own, found, at),
+        "errors": lambda own: _errors(own, found, place),
     }
     shown = [part] if part != "all" else list(draw)
-    figure = sheet(height=sum(heights[name] for name in shown))
+    height, look = sum(heights[name] for name in shown), current()
+    figure = sheet(height)
+    if look.height * height > SHRUNK * look.tallest:
+        figure.set_figheight(look.height * height)
     own = figure.subfigures(len(shown), 1, height_ratios=[heights[name] for name in shown], squeeze=False)[:, 0]
     for name, where in zip(shown, own, strict=True):
         draw[name](where)
@@ -184,25 +188,14 @@ def _correlation(figure: SubFigure, found: Calibration) -> None:
     ax.set_xticks([])
     ax.set_yticks([])
     side = min(0.9 * figure.bbox.height, 0.5 * figure.bbox.width) / figure.dpi  # least side of the matrix [in]
-    line = LINE * current().tick * len(names) / side
     middles = np.array([0.5 * (start + end - 1) for start, end in zip(starts, ends, strict=True)])
-    for start, middle, place in zip(starts, middles, _apart(middles, line, len(names)), strict=True):
+    places = len(names) * spread_heights((middles + 0.5) / len(names), LINE * current().tick / side) - 0.5
+    for start, middle, place in zip(starts, middles, places, strict=True):
         ax.annotate(
             names[start].replace("_", " "), (-0.5, middle), xytext=(-0.5 - 0.05 * len(names), place),
             fontsize=current().tick, ha="right", va="center", annotation_clip=False, arrowprops=LEADER,
         )  # fmt: skip
     color_bar(image, ax, "correlation", shrink=0.8, pad=0.02)
-
-
-def _apart(places: Array, least: float, end: float) -> Array:
-    """Ascending `places` between 0 and `end`, moved apart so that their distances are at least `least`."""
-    moved = np.array(places)
-    for k in range(1, len(moved)):
-        moved[k] = max(moved[k], moved[k - 1] + least)
-    moved[-1] = min(moved[-1], max(end - 0.5 * least, places[-1]))
-    for k in range(len(moved) - 2, -1, -1):
-        moved[k] = min(moved[k], moved[k + 1] - least)
-    return moved
 
 
 def _errors(figure: SubFigure, found: Calibration, at: float | None) -> None:
