@@ -1,9 +1,9 @@
-"""Processes that hear signals, whoever runs the tests."""
+"""Child processes that react to signals in every environment of the tests."""
 
 import signal
 
 
 def heard() -> None:
-    """What a child does before it starts: a shell that runs the tests in the background tells it to ignore Ctrl-C."""
+    """Set the default action of Ctrl-C in a child: a shell ignores it in programs in the background."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_DFL)

@@ -35,7 +35,7 @@ def measurements(tmp_path: Path) -> Path:
     return file
 
 
-def test_article_writes_what_is_asked_for(tmp_path: Path) -> None:
+def test_article_writes_the_requested_files(tmp_path: Path) -> None:
     result = sagline("article", "figure", "3", "--out", str(tmp_path))
     assert result.exit_code == 0, result.output
     assert sorted(file.name for file in tmp_path.iterdir()) == ["article.html", "article.json"]
@@ -65,7 +65,7 @@ def test_identify_finds_the_cable_and_its_empirical_model(measurements: Path) ->
     assert 20.0 < found["empirical"]["tension_min_N"] < 400.0
 
 
-def test_identify_tells_what_it_found(measurements: Path) -> None:
+def test_identify_prints_its_results(measurements: Path) -> None:
     result = sagline("identify", str(measurements), "--offset")
     assert result.exit_code == 0, result.output
     for word in ("linear_density", "axial_stiffness", "length_offset", "k_h", "k_p", "kg/m", "chi-squared"):

@@ -1,4 +1,4 @@
-"""`sagline cache`: what is in the folder, what is damaged, and nothing else removed."""
+"""`sagline cache`: contents of the folder, damaged files, and removal of files of sagline only."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def fill(folder: Path) -> dict[str, Path]:
     return files
 
 
-def test_an_empty_folder_is_not_made(folder: Path) -> None:
+def test_an_empty_folder_is_not_created(folder: Path) -> None:
     result = sagline("--json")
     found = json.loads(result.stdout)
     assert (result.exit_code, found["files"], found["bytes"], found["damaged"]) == (0, 0, 0, [])
@@ -57,7 +57,7 @@ def test_damaged_files_are_named(folder: Path) -> None:
     assert text.stderr.count("Damaged: ") == 3
 
 
-def test_clear_removes_what_sagline_wrote(folder: Path, tmp_path: Path) -> None:
+def test_clear_removes_the_files_of_sagline(folder: Path, tmp_path: Path) -> None:
     files = fill(folder)
     (tmp_path / "elsewhere").mkdir()
     kept = tmp_path / "elsewhere" / f"a{SUFFIX}"

@@ -48,7 +48,7 @@ def run(files: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
     return ran
 
 
-def test_what_is_found_is_told_and_written(run: Run, files: Path) -> None:
+def test_results_are_printed_and_written(run: Run, files: Path) -> None:
     result = run("robot.yaml", "winches.csv", *FEW, "--out", "found/robot.yaml", "--out", "found/all.nc")
     assert result.exit_code == 0, result.output
     found = sl.load_calibration(files / "found" / "all.nc")
@@ -84,17 +84,17 @@ def test_the_numbers_in_json_are_those_of_the_library(run: Run, files: Path) -> 
 
 @extended
 @pytest.mark.parametrize("file", ["winches.csv", "silent.csv"])
-def test_deviations_stand_above_those_of_the_log(file: str, run: Run, files: Path) -> None:
+def test_deviations_of_options_replace_those_of_the_log(file: str, run: Run, files: Path) -> None:
     words = ["--length-deviation", "1 mm", "--tension-deviation", "0.01 kN", "--out", "found/all.nc"]
     result = run("robot.yaml", file, *FEW, "--folds", "0", *words)
-    assert result.exit_code in {0, 1}, result.output  # twice the deviations are in doubt, and rightly so
+    assert result.exit_code in {0, 1}, result.output  # with doubled deviations the result is doubtful
     sensors = sl.load_calibration(files / "found" / "all.nc").sensors
     assert sensors.tension_deviation is not None
     assert [float(sensors.length_deviation), float(sensors.tension_deviation)] == [1e-3, 10.0]
 
 
 @pytest.mark.parametrize("status", [sl.CalibrationStatus.DOUBTFUL, sl.CalibrationStatus.NOT_CONVERGED])
-def test_what_is_not_to_be_trusted_ends_with_1(
+def test_a_doubtful_result_ends_with_1(
     status: sl.CalibrationStatus, run: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     found = made_up(status=status)
@@ -104,12 +104,12 @@ def test_what_is_not_to_be_trusted_ends_with_1(
     assert status.text in result.stderr.replace("\n", " ")
     assert (tmp_path / "all.nc").exists()
     converged = status is not sl.CalibrationStatus.NOT_CONVERGED
-    assert (tmp_path / "r.yaml").exists() == converged  # no robot of numbers that are none
+    assert (tmp_path / "r.yaml").exists() == converged  # no robot of doubtful numbers is written
     assert ("robot file" in result.stderr) == (not converged)
 
 
 @extended
-def test_it_is_written_for_a_narrow_terminal(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_output_fits_a_narrow_terminal(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(terminal, "_out", Console(force_terminal=True, width=60, markup=False, emoji=False))
     robot, log = sl.load_robot("robot.yaml"), sl.load_log("winches.csv")
     found = sl.calibrate(robot, log, ("length_zero", "mass"), folds=0)
@@ -124,7 +124,7 @@ def test_it_is_written_for_a_narrow_terminal(run: Run, monkeypatch: pytest.Monke
 
 
 @pytest.mark.parametrize("whole", wide([[], ["--out", "found/all.nc"]]))
-def test_what_no_robot_file_keeps_is_told(whole: list[str], run: Run, files: Path) -> None:
+def test_results_that_a_robot_file_cannot_contain_are_printed(whole: list[str], run: Run, files: Path) -> None:
     robot, log = sl.load_robot(files / "robot.yaml"), sl.load_log(files / "winches.csv")
     lengths = log.replace(counts=None, unstrained_length=sl.lengths_from_counts(robot, log.readings))
     lengths.save(files / "lengths.csv")
@@ -134,7 +134,7 @@ def test_what_no_robot_file_keeps_is_told(whole: list[str], run: Run, files: Pat
     assert "length_zero" not in run("robot.yaml", "winches.csv", *FEW, "--out", "found/robot.yaml").stderr
 
 
-def test_poses_are_chosen_told_and_written(run: Run, files: Path) -> None:
+def test_chosen_poses_are_printed_and_written(run: Run, files: Path) -> None:
     result = run("robot.yaml", "--plan", "6", *FEW, "--tension-deviation", "5 N", "--out", "poses.yaml")
     assert result.exit_code == 0, result.output
     assert re.match(r"6 poses\b.*\b9 numbers\b", result.stdout)
@@ -148,7 +148,7 @@ def test_poses_are_chosen_told_and_written(run: Run, files: Path) -> None:
     np.testing.assert_allclose([one["expected_error"] for one in told["numbers"]], plan.expected_error, rtol=1e-9)
 
 
-def test_the_help_names_what_is_looked_for_by_itself() -> None:
+def test_the_help_names_the_default_unknowns() -> None:
     parameters: Any = {parameter.name: parameter for parameter in commands()["calibrate"].params}
     assert signature(sl.calibrate).parameters["unknowns"].default is None
     names = set(sl.calibration_poses(sl.load_robot("cogiro"), 3, candidates=30).parameters.names)

@@ -1,4 +1,4 @@
-"""The command: what it prints, what it writes, and how it ends."""
+"""The command: outputs, files and exit codes."""
 
 import json
 import os
@@ -27,7 +27,7 @@ INSIDE = "durations: 5\nrate: 20\nwaypoints: [{position: [0, 0, 1.5]}, {position
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch) -> FilePath:
-    """Every test runs in a folder of its own, on a terminal 80 characters wide."""
+    """A new current folder for each test, on a terminal with 80 columns."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "80")
     (tmp_path / "outside.yaml").write_text(OUTSIDE)
@@ -51,7 +51,7 @@ def spawned(*words: str) -> subprocess.Popen[str]:
     )
 
 
-def test_track_says_and_writes_what_the_library_finds(folder: FilePath) -> None:
+def test_track_prints_and_writes_results_of_the_library(folder: FilePath) -> None:
     result = sagline("track", "article-suspended", "inside.yaml", "--model", "empirical", "--no-figures", "--json")
     assert result.exit_code == 0
     (run,) = json.loads(result.stdout)["runs"]
@@ -87,12 +87,12 @@ def test_options_reach_the_solver() -> None:
     assert run["chord_tension_max_n"] == pytest.approx(plan.chord_tension.max(), rel=1e-12)
 
 
-def test_the_table_fits_and_names_its_units() -> None:
+def test_the_table_fits_and_has_units() -> None:
     result = sagline("track", "article-suspended", "inside.yaml", "--no-figures")
     assert set(re.findall(r"\[(\S+)\]", result.stdout)) == {"mm", "N", "m", "%"}
     assert re.search(r"feasible poses \[%\] +100 *$", result.stdout, re.MULTILINE)
     assert max(len(line) for line in result.stdout.splitlines() if not line.startswith("In ")) <= 80
-    assert "\x1b" not in result.stdout  # no colors into a pipe
+    assert "\x1b" not in result.stdout  # no colors in a pipe
 
 
 @extended
@@ -118,8 +118,8 @@ def test_a_path_that_leaves_the_feasible_region() -> None:
     assert np.isfinite(plan.unstrained_length[: outside[0]]).all()
 
 
-def test_a_plan_that_the_platform_would_leave() -> None:
-    # near its post the mixed robot's equilibrium turns unstable before the tensions run out: stiffness falls to zero
+def test_a_plan_with_unstable_equilibria() -> None:
+    # near its post the equilibrium of the mixed robot becomes unstable before the tensions reach their limits
     (FilePath("corner.yaml")).write_text(
         "durations: 5\nwaypoints: [{position: [0, 0, 1.5]}, {position: [6.34, 4.43, 5.02]}]"
     )
@@ -144,12 +144,12 @@ def test_robots_lists_all_presets() -> None:
     )
     falcon = next(robot for robot in numbers("robots") if robot["name"] == "falcon-7")
     assert (falcon["cables"], falcon["mass_kg"], falcon["motion_pattern"]) == (7, 0.3, "3R3T")
-    np.testing.assert_allclose(falcon["frame_size_m"], [1.45, 1.45, 1.25])  # its anchors hang 1.25 m over the floor
+    np.testing.assert_allclose(falcon["frame_size_m"], [1.45, 1.45, 1.25])  # its anchors are 1.25 m above the floor
     np.testing.assert_allclose(falcon["platform_size_m"], [0.0, 0.1, 1.0])
 
 
 @pytest.mark.parametrize("name", wide(sl.robot_names(), first=3))
-def test_show_holds_every_value(name: str) -> None:
+def test_show_prints_every_value(name: str) -> None:
     robot, shown = sl.load_robot(name), numbers("show", name)
     for field in ("frame_anchors", "platform_anchors", "inertia", "center_of_mass", "tension_min", "tension_max"):
         np.testing.assert_array_equal(shown[field]["value"], getattr(robot, field))
@@ -163,28 +163,28 @@ def test_show_holds_every_value(name: str) -> None:
         assert f"{field}: {' '.join(why.split())}" in text
 
 
-def test_show_marks_what_is_assumed() -> None:
+def test_show_marks_assumed_values() -> None:
     text = sagline("show", "article-mixed").stdout
     assert re.search(r"^ inertia \* +diagonal \(1\.4167, 1\.4167, 0\.75\) +kg m² *$", text, re.MULTILINE)
     assert re.search(r"^ mass +50 +kg *$", text, re.MULTILINE)
     assert re.search(r"^ +0 +\(7\.5, 5\.5, 6\) +\(0\.15, 0\.15, -0\.25\) *$", text, re.MULTILINE)
 
 
-def test_unlimited_tensions_are_no_number_in_json(folder: FilePath) -> None:
+def test_unlimited_tensions_are_null_in_json(folder: FilePath) -> None:
     robot = sl.load_robot("falcon-7").replace(tension_max=np.inf)
     (folder / "free.yaml").write_text(sl.dump_robot(robot))
     assert numbers("show", "free.yaml")["tension_max"]["value"] == [None] * 7
 
 
 @extended
-def test_run_makes_the_articles_test(folder: FilePath) -> None:
+def test_run_repeats_the_test_of_the_article(folder: FilePath) -> None:
     result = sagline("run", "--json")
     assert result.exit_code == 0
     runs = {(run["robot"], run["model"]): run for run in json.loads(result.stdout)["runs"]}
     largest = {key: run["position_error_max_mm"] for key, run in runs.items()}
     assert largest["article-suspended", "Catenary"] < 1e-6
     assert largest["article-mixed", "Catenary"] < 1e-6
-    # the article's "about +-6 mm" with its own, unpublished anchors; on ours, as found with this path
+    # the article: "about +-6 mm" with its own, unpublished anchors; this value belongs to the anchors of the preset
     assert largest["article-suspended", "Empirical"] == pytest.approx(1.71, abs=0.01)
     assert largest["article-mixed", "Empirical"] == pytest.approx(1.13, abs=0.01)
     plans = {name: sl.load_plan(f"output/article-{name}-empirical.nc") for name in ("suspended", "mixed")}
@@ -213,10 +213,10 @@ def test_exit_codes_of_the_real_command() -> None:
 
 
 @extended
-def test_ctrl_c_during_a_long_run_leaves_nothing_half_done(folder: FilePath) -> None:
+def test_ctrl_c_during_a_long_run_leaves_no_partial_files(folder: FilePath) -> None:
     (folder / "long.yaml").write_text(INSIDE.replace("rate: 20", "rate: 40000"))
     process = spawned("track", "article-suspended", "long.yaml", "--out", "out")
-    time.sleep(3.0)  # a second of loading, then 200,000 poses and figures of them
+    time.sleep(3.0)  # a second of loading, then 200,000 poses and their figures
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=120)
     assert process.returncode == 130, errors
@@ -225,8 +225,8 @@ def test_ctrl_c_during_a_long_run_leaves_nothing_half_done(folder: FilePath) -> 
     assert not [name for name in left if name.endswith(".part")]
 
 
-def test_a_lost_interrupt_ends_the_command_all_the_same(capsys: pytest.CaptureFixture[str]) -> None:
-    """Python prints and forgets an interrupt that comes while it finalizes an object."""
+def test_a_lost_interrupt_still_ends_the_command(capsys: pytest.CaptureFixture[str]) -> None:
+    """Python prints and discards an interrupt during the finalization of an object."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
 

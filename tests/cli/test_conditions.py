@@ -1,4 +1,4 @@
-"""Options that have an effect only with or without another one are declared, and rejected without effect."""
+"""Options that require or exclude another option are declared, and refused if they have no effect."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 import sagline.cli
 from sagline.cli.main import MODULES, NAMES, app
 
-Context = frozenset[tuple[int, bool, str]]  # line of an `if`, its branch, and a parameter of its test
+Context = frozenset[tuple[int, bool, str]]  # line of an `if`, its branch, and a parameter in its condition
 GROUP: Any = get_command(app)
 COMMANDS: dict[str, Any] = {name: GROUP.commands[name] for name in NAMES}
 
@@ -32,7 +32,7 @@ DECLARED = [
 
 
 def words(parameter: Any) -> list[str]:
-    """A parameter on the command line."""
+    """A parameter as on the command line."""
     if parameter.param_type_name == "argument":
         return ["1"]
     return [parameter.opts[0]] if parameter.is_flag else [parameter.opts[0], "1"]
@@ -48,7 +48,7 @@ def test_an_option_without_effect_is_rejected(name: str, parameter: Any, conditi
     given = [*required, *words(parameter)]
     if not condition.given:
         given += words(other)
-    elif other.default:  # a flag that is set by default
+    elif other.default:  # a flag that is true by default
         given.append(other.secondary_opts[0])
     done = CliRunner().invoke(app, [name, *given])
     assert done.exit_code == 2
@@ -61,7 +61,7 @@ def parameters_in(node: ast.AST, names: set[str]) -> list[str]:
 
 
 def uses(node: ast.AST | Sequence[ast.AST], names: set[str], context: Context) -> Iterator[tuple[str, Context]]:
-    """Uses of parameters, and the branches in which they stand; what follows a branch that returns is the other one."""
+    """Uses of parameters with their branches; statements after a branch with a return belong to the other branch."""
     if isinstance(node, ast.Name):
         if node.id in names:
             yield node.id, context
@@ -89,7 +89,7 @@ def function_of(name: str) -> ast.FunctionDef:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_an_option_that_is_used_in_one_branch_of_another_is_declared(name: str) -> None:
+def test_an_option_used_in_one_branch_of_another_is_declared(name: str) -> None:
     function = function_of(name)
     parameters = {each.arg for each in function.args.args}
     found: dict[str, Context] = {}

@@ -1,4 +1,4 @@
-"""The operator's place: lines from a pipe against a machine in the same process, where nobody waits for a clock."""
+"""The operator's commands: lines from a pipe to a machine in the same process, without real time."""
 
 import io
 import re
@@ -20,7 +20,7 @@ def session(monkeypatch: pytest.MonkeyPatch, lines: str) -> tuple[OperatorSessio
     return OperatorSession(control, alone=True, shadow=False), machine
 
 
-def test_lines_from_a_pipe_are_done_one_after_the_other(
+def test_lines_from_a_pipe_are_executed_in_order(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     place, machine = session(monkeypatch, "home 0,0,1.5; goto 0.05,0,1.5\n# a word\n\njog 3 +2mm\njog z -5 mm\nstate\n")
@@ -33,7 +33,7 @@ def test_lines_from_a_pipe_are_done_one_after_the_other(
     assert abs(machine.reading.position - [0.05, 0.0, 1.495]).max() < 3e-3
 
 
-def test_an_operator_confirms_a_pose_that_the_lengths_contradict(
+def test_an_operator_confirms_a_pose_that_contradicts_the_lengths(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     control, _ = rig(home=False)
@@ -78,7 +78,7 @@ def test_a_cell_without_a_reading_is_named_in_place_of_a_number(
         first=9,
     ),
 )
-def test_a_line_that_is_refused_ends_it_and_the_machine_is_given_back(
+def test_a_refused_line_ends_the_command_and_releases_the_machine(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], line: str, snapshot: Any
 ) -> None:
     place, _ = session(monkeypatch, f"home\n{line}\ngoto 0.05,0,1.5\n")
@@ -90,7 +90,9 @@ def test_a_line_that_is_refused_ends_it_and_the_machine_is_given_back(
     assert "MOVING" not in capsys.readouterr().out
 
 
-def test_a_fault_ends_it_with_an_exit_code(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_fault_ends_the_command_with_an_exit_code(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     place, machine = session(monkeypatch, "home\ngoto 0.1,0,1.5\ngoto 0,0,1.5\n")
     machine.inject("cable 3 breaks at 1.5 s")
     assert place.run() == 1
@@ -98,7 +100,7 @@ def test_a_fault_ends_it_with_an_exit_code(monkeypatch: pytest.MonkeyPatch, caps
     assert place.control.state is State.EMERGENCY
 
 
-def test_the_last_line_of_a_terminal_is_as_wide_as_it_and_given_back(
+def test_the_status_line_has_the_width_of_the_terminal_and_is_removed(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("COLUMNS", "80")

@@ -65,7 +65,7 @@ def test_a_preset_becomes_a_mujoco_model(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "said"), [("cogiro", "0.4 mm away"), ("article-mixed", "19 mm away"), ("fast", "400 mm away")]
 )
-def test_what_straight_tendons_cost_is_told(name: str, said: str, tmp_path: Path) -> None:
+def test_the_error_of_straight_tendons_is_printed(name: str, said: str, tmp_path: Path) -> None:
     import mujoco
 
     robot = load_robot(name)
@@ -76,7 +76,7 @@ def test_what_straight_tendons_cost_is_told(name: str, said: str, tmp_path: Path
     told = [line for line in stderr.splitlines() if line.startswith("Lost: Sag ")]
     assert len(told) == 1
     assert told[0].endswith(f" {said}.")
-    model = mujoco.MjModel.from_xml_path(str(out))  # from the file itself
+    model = mujoco.MjModel.from_xml_path(str(out))  # computed from the file
     rests = forward(robot, model.tendon_lengthspring[:, 1], start=pose)
     away = np.linalg.norm(rests.pose.position - pose.position)
     number, unit = said.split()[:2]
@@ -92,7 +92,7 @@ def test_what_straight_tendons_cost_is_told(name: str, said: str, tmp_path: Path
         ("x.xml", "robot", ".yaml"),
     ],
 )
-def test_the_ending_is_that_of_the_format(tmp_path: Path, name: str, form: str, ending: str) -> None:
+def test_the_file_name_has_the_suffix_of_the_format(tmp_path: Path, name: str, form: str, ending: str) -> None:
     code, stdout, stderr = run("cogiro", "--out", str(tmp_path / name), "--format", form)
     assert (code, stdout, list(tmp_path.iterdir())) == (2, "", [])
     assert f"{tmp_path / name}: " in stderr

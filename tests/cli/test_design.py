@@ -1,4 +1,4 @@
-"""`sagline design`: its table, its files, and that it goes on where it stopped."""
+"""`sagline design`: table, files, and continuation of a stopped search."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def library(**changes: Any) -> sl.Front:
     return sl.design(sl.load_robot("article-suspended"), **{**sl.load_design("design.yaml"), **changes})
 
 
-def test_the_robots_are_those_of_the_library(folder: Path) -> None:
+def test_the_robots_agree_with_the_library(folder: Path) -> None:
     result = sagline("--json")
     assert result.exit_code == 0, result.stderr
     told, front = json.loads(result.stdout), library()
@@ -62,7 +62,7 @@ def test_the_robots_are_those_of_the_library(folder: Path) -> None:
     assert names == ["article-suspended-better.yaml", "design.json", "evaluations.csv", "front.csv"]
 
 
-def test_the_table_has_both_robots_and_the_sentence_both_numbers() -> None:
+def test_the_output_compares_both_robots() -> None:
     result = sagline()
     assert result.exit_code == 0, result.stderr
     front = library()
@@ -72,7 +72,7 @@ def test_the_table_has_both_robots_and_the_sentence_both_numbers() -> None:
     assert front.text in result.stdout.replace("\n", " ")
 
 
-def test_it_goes_on_from_where_it_was(folder: Path) -> None:
+def test_a_stopped_search_continues(folder: Path) -> None:
     assert sagline("--evaluations", "30").exit_code == 0
     before = (folder / "front" / "evaluations.csv").read_text()
     result = sagline("--json")
@@ -81,7 +81,7 @@ def test_it_goes_on_from_where_it_was(folder: Path) -> None:
     assert json.loads(result.stdout)["evaluations"] == len(library().evaluated)
 
 
-def test_an_interrupt_says_how_to_go_on(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupt_prints_the_command_to_continue(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from sagline.optimization import rating
 
     rate, calls = rating.Rating.__call__, [0]
@@ -114,7 +114,7 @@ def test_the_folder_of_another_search_is_refused(folder: Path) -> None:
 
 
 @extended
-def test_a_figure_is_drawn_of_what_was_tried(folder: Path) -> None:
+def test_a_figure_shows_the_candidates(folder: Path) -> None:
     result = CliRunner().invoke(app, ["design", "article-suspended", "design.yaml", "--evaluations", "30"])
     assert result.exit_code == 0, result.stderr
     assert (folder / "front" / "front.png").read_bytes().startswith(b"\x89PNG")

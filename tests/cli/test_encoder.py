@@ -1,4 +1,4 @@
-"""`sagline encoder` and `sagline forward --counts`: a run to counts, and counts to poses."""
+"""`sagline encoder` and `sagline forward --counts`: counts of a run, and poses of counts."""
 
 import csv
 import json
@@ -26,7 +26,7 @@ def sagline(*words: str) -> Any:
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Run of a robot that has winches."""
+    """A run of a robot with winches."""
     file = tmp_path_factory.mktemp("run") / "run.nc"
     sl.inverse(wound(length_zero=11.0), PATH).save(file)
     return file
@@ -34,7 +34,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(autouse=True)
 def folder(run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every test runs in a folder of its own with the robot and the run."""
+    """A new folder for each test with the robot and the run."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "80")
     Path("my_robot.yaml").write_text(sl.dump_robot(wound(length_zero=11.0)))
@@ -47,7 +47,7 @@ def rows_of(text: str) -> tuple[list[str], np.ndarray]:
 
 
 @pytest.mark.parametrize("winding", wide(["remembered", "constant"]))
-def test_counts_of_a_run_are_those_of_the_library(winding: Any) -> None:
+def test_counts_of_a_run_agree_with_the_library(winding: Any) -> None:
     result = sagline("encoder", "run.nc", "--winding", winding)
     assert (result.exit_code, result.stderr) == (0, "")
     plan = sl.load_plan("run.nc")
@@ -60,8 +60,8 @@ def test_counts_of_a_run_are_those_of_the_library(winding: Any) -> None:
 
 
 @extended
-def test_counts_lead_forward_to_the_planned_poses() -> None:
-    poses = sl.inverse(wound(length_zero=11.0), PATH.pose)  # at rest: forward knows of no inertia
+def test_forward_of_counts_gives_the_planned_poses() -> None:
+    poses = sl.inverse(wound(length_zero=11.0), PATH.pose)  # at rest: forward does not include inertia
     poses.save("rest.nc")
     assert sagline("encoder", "rest.nc", "--out", "counts.csv").exit_code == 0
     assert sagline("encoder", "rest.nc").stdout == Path("counts.csv").read_text()
@@ -70,11 +70,11 @@ def test_counts_lead_forward_to_the_planned_poses() -> None:
     found = json.loads(result.stdout)["poses"]
     np.testing.assert_allclose(
         [[pose[axis] for axis in "xyz"] for pose in found], PATH.pose.position, atol=2e-5
-    )  # a count is 8 micrometers of cable
+    )  # one count is 8 micrometers of cable
 
 
 @extended
-def test_samples_without_an_answer_are_left_out_and_counted() -> None:
+def test_samples_without_a_solution_are_omitted_and_counted() -> None:
     path = sl.quintic_path([(0.0, 0.0, 1.5), (9.0, 0.5, 2.0)], durations=2.0, rate=8.0)
     sl.inverse(wound(length_zero=11.0), path).save("far.nc")
     plan = sl.load_plan("far.nc")
@@ -86,7 +86,7 @@ def test_samples_without_an_answer_are_left_out_and_counted() -> None:
 
 
 @extended
-def test_what_is_too_much_for_the_winches_is_told() -> None:
+def test_exceeded_limits_of_winches_are_printed() -> None:
     robot = wound(length_zero=11.0, speed_limit=150.0, torque_limit=1.7, inertia=1e-4)
     sl.inverse(robot, PATH).save("fast.nc")
     result = sagline("encoder", "fast.nc", "--out", "counts.csv")
@@ -117,7 +117,7 @@ def test_what_is_too_much_for_the_winches_is_told() -> None:
         ("time,C0,C1,C2\n1,1,2,3\n1,1,2,3\n", 3, "time is 1 s", "a time after the time of the previous row"),
     ],
 )
-def test_a_wrong_file_of_counts_is_named_with_its_line(text: str, line: int, named: str, allowed: str) -> None:
+def test_errors_in_a_file_of_counts_are_named_with_their_line(text: str, line: int, named: str, allowed: str) -> None:
     Path("counts.csv").write_text(text)
     with refused(f"line {line}", allowed=allowed, kind=sl.FileError, file="counts.csv") as caught:
         load_counts("counts.csv", 3)

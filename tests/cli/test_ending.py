@@ -1,4 +1,4 @@
-"""How the command ends when something goes wrong: one line, an exit code, and nothing that it did not mean to say."""
+"""End of the command after an error: one line, an exit code, and no other output."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def broken(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
     ],
     ids=lambda value: str(value) if isinstance(value, int) else type(value).__name__,
 )
-def test_whatever_goes_wrong_is_told_in_one_line(
+def test_every_error_is_reported_in_one_line(
     error: BaseException, code: int, monkeypatch: pytest.MonkeyPatch, snapshot: Any
 ) -> None:
     broken(monkeypatch, error)
@@ -59,7 +59,7 @@ def test_whatever_goes_wrong_is_told_in_one_line(
 
 
 @pytest.mark.parametrize("words", [["--debug", "robots"], ["robots", "--debug"]])
-def test_the_traceback_comes_only_if_asked_for(words: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_traceback_is_printed_only_on_request(words: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
     broken(monkeypatch, RuntimeError("boom"))
     result = CliRunner().invoke(app, words)
     assert result.exit_code == 70
@@ -68,7 +68,7 @@ def test_the_traceback_comes_only_if_asked_for(words: list[str], monkeypatch: py
     assert "RuntimeError: boom." in result.stderr.splitlines()[-1]
 
 
-def test_what_was_written_before_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_files_written_before_the_error_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("short.yaml").write_text(
         "durations: 1\nrate: 4\nwaypoints: [{position: [0, 0, 1.5]}, {position: [1, 0, 1.5]}]\n"
@@ -87,7 +87,7 @@ def test_what_was_written_before_is_named(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 @pytest.mark.parametrize("length", [280, 292, 293, 5000])
-def test_an_error_is_cut_once_and_its_line_stays_short(length: int, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_long_error_is_cut_once(length: int, capsys: pytest.CaptureFixture[str]) -> None:
     error = sl.FileError("a", "x" * (length - len("a: . Next.")), "Next.")
 
     def fail() -> None:
@@ -101,10 +101,10 @@ def test_an_error_is_cut_once_and_its_line_stays_short(length: int, capsys: pyte
 
 
 @pytest.mark.parametrize("command", wide(["show", "forward", "tension", "track"], first=2))
-def test_no_name_from_a_file_gives_orders_to_the_terminal(
+def test_names_from_files_contain_no_terminal_commands(
     command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Names that readers would refuse, so that what prints is asked on its own."""
+    """Readers refuse such names, so the printing is tested without them."""
     monkeypatch.chdir(tmp_path)
     evil = "\x1b[31mred\x9b2J\x07[bold]x[/bold] :smile: \u202eevil"
     robot = sl.load_robot("cogiro")
@@ -134,7 +134,7 @@ def test_no_name_from_a_file_gives_orders_to_the_terminal(
             assert "[bold]x[/bold] :smile:" in result.output
 
 
-def test_a_file_on_stdout_is_to_the_letter_but_for_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_on_stdout_is_exact_except_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
     class Terminal(StringIO):
         def isatty(self) -> bool:
             return True
@@ -165,12 +165,12 @@ def test_a_full_disk_behind_stdout(words: list[str]) -> None:
 
 @extended
 @pytest.mark.parametrize("words", [["robots", "--json"], ["--help"], ["convert", "cogiro"]])
-def test_nobody_reads_any_more(words: list[str]) -> None:
+def test_a_closed_pipe_ends_the_command(words: list[str]) -> None:
     reader, writer = os.pipe()
     os.close(reader)
     done = subprocess.run([*COMMAND, *words], stdout=writer, stderr=subprocess.PIPE, text=True)
     os.close(writer)
-    assert (done.returncode, done.stderr) == (141, "")  # as of a command that SIGPIPE ends
+    assert (done.returncode, done.stderr) == (141, "")  # as after SIGPIPE
 
 
 @extended
@@ -187,7 +187,7 @@ def test_stdout_and_stderr_may_be_closed() -> None:
 
 
 @extended
-def test_any_encoding_of_the_output_will_do() -> None:
+def test_every_encoding_of_the_output_works() -> None:
     environment = {**os.environ, "PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"}
     done = subprocess.run([*COMMAND, "robots"], capture_output=True, env=environment)
     assert (done.returncode, done.stderr) == (0, b"")
@@ -197,7 +197,7 @@ def test_any_encoding_of_the_output_will_do() -> None:
 
 
 @extended
-def test_what_libraries_warn_of_is_not_told() -> None:
+def test_warnings_of_libraries_are_not_printed() -> None:
     code = (
         "import logging, sys, warnings\n"
         "from sagline.cli import __main__ as start\n"
@@ -217,7 +217,7 @@ def test_what_libraries_warn_of_is_not_told() -> None:
 
 
 @extended
-def test_a_thread_that_fails_says_so_in_one_line() -> None:
+def test_an_error_in_a_thread_is_reported_in_one_line() -> None:
     code = (
         "import threading\n"
         "from sagline.cli import __main__ as start\n"
@@ -235,7 +235,7 @@ def test_a_thread_that_fails_says_so_in_one_line() -> None:
     assert done.stderr.count("\n") == 1
 
 
-def test_the_end_of_the_input_is_no_answer() -> None:
+def test_the_end_of_the_input_is_an_error() -> None:
     def asks() -> None:
         import typer
 
@@ -245,8 +245,8 @@ def test_the_end_of_the_input_is_no_answer() -> None:
 
 
 @extended
-def test_loading_takes_no_time_that_is_not_needed() -> None:
-    """Before the first line of the command's own nothing of weight is loaded: until then nobody hears Ctrl-C."""
+def test_only_light_modules_are_loaded_first() -> None:
+    """Only light modules are loaded before the first statement of the command: until then Ctrl-C has no handler."""
     heavy = ("numpy", "numba", "typer", "rich", "yaml", "matplotlib")
     code = f"import sys, sagline.cli.__main__; print([name for name in {heavy} if name in sys.modules])"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout == "[]\n"
@@ -265,7 +265,7 @@ print(*(name for name in sys.modules if name.split(".")[0] == "sagline"))
 @extended
 @pytest.mark.parametrize(("words", "most"), [(["--help"], 40), (["track", "--help"], 20), (["robots"], 90)])
 def test_a_command_loads_few_modules(words: list[str], most: int) -> None:
-    """Each subcommand is imported by itself, and what it works with when it is called."""
+    """Each subcommand is imported when it is used, and its libraries when it is called."""
     done = subprocess.run([sys.executable, "-c", LOADED, *words], capture_output=True, text=True, check=True)
     loaded = done.stdout.split()
     assert len(loaded) <= most

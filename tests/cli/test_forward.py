@@ -31,7 +31,7 @@ def write_lengths(file: Path, plan: sl.Plan, scale: float = 1.0, unit: str = "")
             writer.writerow([0.2 * k, *(repr(float(scale * length)) for length in row)])
 
 
-def test_planned_lengths_lead_back_to_the_planned_poses(tmp_path: Path, plan: sl.Plan) -> None:
+def test_planned_lengths_give_the_planned_poses(tmp_path: Path, plan: sl.Plan) -> None:
     write_lengths(tmp_path / "lengths.csv", plan)
     done = CliRunner().invoke(app, ["forward", ROBOT, str(tmp_path / "lengths.csv"), "--out", str(tmp_path / "out")])
     assert done.exit_code == 0, done.output
@@ -43,7 +43,7 @@ def test_planned_lengths_lead_back_to_the_planned_poses(tmp_path: Path, plan: sl
     assert {row["status"] for row in rows} == {"SOLVED"}
 
 
-def test_json_carries_the_same_poses_and_units_are_read(tmp_path: Path, plan: sl.Plan) -> None:
+def test_json_has_the_same_poses_and_units_are_read(tmp_path: Path, plan: sl.Plan) -> None:
     write_lengths(tmp_path / "lengths.csv", plan, 1e3, " [mm]")
     arguments = ["forward", ROBOT, str(tmp_path / "lengths.csv"), "--out", str(tmp_path / "out"), "--json"]
     done = CliRunner().invoke(app, arguments)
@@ -55,11 +55,11 @@ def test_json_carries_the_same_poses_and_units_are_read(tmp_path: Path, plan: sl
     assert (type(last["iterations"]), last["status"]) == (int, "SOLVED")
     with (tmp_path / "out" / f"{ROBOT}-poses.csv").open(newline="") as stream:
         rows = list(csv.DictReader(stream))
-    for pose, row in zip(poses, rows, strict=True):  # the same to the last bit
+    for pose, row in zip(poses, rows, strict=True):  # equal to the last bit
         assert [float(row[f"{axis} [m]"]) for axis in "xyz"] == [pose[axis] for axis in "xyz"]
 
 
-def test_lengths_too_short_to_meet_are_told_and_end_with_1(tmp_path: Path, plan: sl.Plan) -> None:
+def test_lengths_that_are_too_short_are_reported_and_end_with_1(tmp_path: Path, plan: sl.Plan) -> None:
     write_lengths(tmp_path / "lengths.csv", plan, 0.7)
     done = CliRunner().invoke(app, ["forward", ROBOT, str(tmp_path / "lengths.csv"), "--out", str(tmp_path / "out")])
     assert done.exit_code == 1

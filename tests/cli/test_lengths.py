@@ -1,4 +1,4 @@
-"""The lengths that a command writes are those that winches control: all cable off the drum."""
+"""Lengths in output files are the lengths that winches control: all cable off the drum."""
 
 import csv
 from io import StringIO
@@ -15,14 +15,14 @@ ROBOT = sl.load_robot("article-suspended").replace(winches=sl.Winch(pulley_radiu
 ENDS = sl.Pose(np.array([[0.0, 0.0, 1.5], [1.0, 0.5, 2.0]]), np.stack([np.eye(3)] * 2))
 
 
-def test_a_plan_of_a_robot_with_pulleys_is_written_with_all_cable_off_the_drum() -> None:
+def test_written_lengths_of_a_robot_with_pulleys_include_all_cable_off_the_drum() -> None:
     plan = sl.inverse(ROBOT, ENDS)
     rows = list(csv.DictReader(StringIO(csv_text(plan.table().rows))))
     written = np.array([[float(row[f"L{k} [m]"]) for k in range(8)] for row in rows])
     np.testing.assert_allclose(sl.forward(ROBOT, written, start=ENDS).pose.position, ENDS.position, atol=1e-9)
     tension = np.array([[float(row[f"T{k} [N]"]) for k in range(8)] for row in rows])
     force = sl.structure_matrix(ROBOT, ENDS)[:, :3] @ tension[..., None]
-    np.testing.assert_allclose(force[:, :2, 0], 0.0, atol=1e-9 * tension.max())  # chords balance level
+    np.testing.assert_allclose(force[:, :2, 0], 0.0, atol=1e-9 * tension.max())  # straight cables at equal heights
 
 
 def test_the_summary_counts_all_cable_off_the_drum() -> None:

@@ -1,4 +1,4 @@
-"""External wrenches, payloads, lengths and tables: what the commands take and give besides paths and figures."""
+"""Wrenches, payloads, lengths and tables as inputs and outputs of the commands."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def sagline(*words: str) -> Any:
 
 
 def loaded() -> sl.Robot:
-    """The robot with five kilograms more, by hand."""
+    """The robot with an additional mass of five kilograms."""
     robot = sl.load_robot("article-suspended")
     return robot.replace(mass=55.0, inertia=robot.inertia * 1.1)
 
@@ -51,7 +51,7 @@ def test_track_takes_a_wrench_and_a_payload() -> None:
     assert plan.state.one_robot.mass == 55.0
 
 
-def test_forward_takes_them_too() -> None:
+def test_forward_takes_a_wrench_and_a_payload() -> None:
     pose = sl.Pose([[0.5, 0.2, 2.0]], [np.eye(3)])
     plan = sl.inverse(loaded(), pose, wrench=WRENCH)
     Path("lengths.csv").write_text(
@@ -63,7 +63,7 @@ def test_forward_takes_them_too() -> None:
     assert abs(other["z"] - 2.0) > 1e-4
 
 
-def test_tension_takes_them_too() -> None:
+def test_tension_takes_a_wrench_and_a_payload() -> None:
     words = ("tension", "article-suspended", "--pose", "0.5,0.2,2", "--no-figures", "--json")
     found = json.loads(sagline(*words, *LOADS).stdout)["tensions"]["MinimumNorm"]["chord_tension"]
     plan = sl.inverse(loaded(), sl.Pose([0.5, 0.2, 2.0], np.eye(3)), tension=sl.MinimumNorm(), wrench=WRENCH)
@@ -75,7 +75,7 @@ def test_tension_takes_them_too() -> None:
     np.testing.assert_allclose(force, alone.chord_tension, rtol=1e-12)
 
 
-def test_the_viewer_takes_them_too(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_viewer_takes_a_wrench_and_a_payload(monkeypatch: pytest.MonkeyPatch) -> None:
     taken: list[Any] = []
 
     class Page:
@@ -96,7 +96,7 @@ def test_the_viewer_takes_them_too(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @extended
-def test_planned_lengths_go_to_forward_and_come_back_as_the_path() -> None:
+def test_forward_of_planned_lengths_gives_the_path() -> None:
     assert sagline("track", "article-suspended", "short.yaml", "--no-figures").exit_code == 0
     assert sagline("lengths", "output/article-suspended-catenary.nc", "--out", "lengths.csv").exit_code == 0
     printed = sagline("lengths", "output/article-suspended-catenary.nc").stdout
@@ -104,17 +104,17 @@ def test_planned_lengths_go_to_forward_and_come_back_as_the_path() -> None:
     plan = sl.load_plan("output/article-suspended-catenary.nc")
     rows = np.array([[float(cell) for cell in row] for row in list(csv.reader(printed.splitlines()))[1:]])
     assert plan.path is not None
-    np.testing.assert_array_equal(rows[:, 0], plan.path.time)  # to the last bit
+    np.testing.assert_array_equal(rows[:, 0], plan.path.time)  # equal to the last bit
     np.testing.assert_array_equal(rows[:, 1:], plan.unstrained_length)
     found = json.loads(sagline("forward", "article-suspended", "lengths.csv", "--json").stdout)["poses"]
     assert len(found) == len(plan.path)
-    np.testing.assert_allclose(  # at rest at both ends, where no inertia moves it
+    np.testing.assert_allclose(  # at rest at both ends, without inertia
         [[found[k][axis] for axis in "xyz"] for k in (0, -1)], [[0.0, 0.0, 1.5], [1.0, 0.5, 1.5]], atol=1e-9
     )
 
 
 @extended
-def test_lengths_of_infeasible_samples_are_left_out_and_counted() -> None:
+def test_lengths_of_infeasible_samples_are_omitted_and_counted() -> None:
     assert sagline("track", "article-suspended", "far.yaml", "--no-figures").exit_code == 1
     result = sagline("lengths", "output/article-suspended-catenary.nc")
     plan = sl.load_plan("output/article-suspended-catenary.nc")

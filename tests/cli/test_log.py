@@ -1,4 +1,4 @@
-"""`sagline log` and `sagline view run.mcap`: what they tell of a log, write of it, and refuse."""
+"""`sagline log` and `sagline view run.mcap`: printed summary, written files and refusals."""
 
 import json
 import re
@@ -34,7 +34,7 @@ def log(tmp_path: Path) -> Path:
     return tmp_path / "run.mcap"
 
 
-def test_it_tells_states_largest_errors_lateness_and_events(log: Path) -> None:
+def test_the_summary_has_states_largest_errors_lateness_and_events(log: Path) -> None:
     result = CliRunner().invoke(app, ["log", str(log)])
     assert result.exit_code == 0, result.output
     done, text = execution(), " ".join(result.stdout.split())
@@ -45,14 +45,14 @@ def test_it_tells_states_largest_errors_lateness_and_events(log: Path) -> None:
     row, cable = np.unravel_index(int(np.nanargmax(off)), off.shape)
     assert f" error {off[row, cable]:.3g} N {cable} {0.01 * row:.2f}" in text
     late = int(np.count_nonzero(done.late <= 1e-4))
-    assert late == 201  # none of them is later than 0.1 ms
+    assert late == 201  # no cycle is later than 0.1 ms
     assert re.search(rf"up to 100 µs {late} █{{30}}", text)
     for event in events_of():
         assert event.text in text
 
 
 @pytest.mark.parametrize("width", wide([60, 80, 120]))
-def test_it_fits_a_terminal(log: Path, width: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_summary_fits_a_terminal(log: Path, width: int, monkeypatch: pytest.MonkeyPatch) -> None:
     from rich.console import Console
 
     console = Console(highlight=False, markup=False, emoji=False, width=width, force_terminal=True, no_color=True)
@@ -63,7 +63,7 @@ def test_it_fits_a_terminal(log: Path, width: int, monkeypatch: pytest.MonkeyPat
     assert "cell 3: 120.5 N" in " ".join(plain.split())
 
 
-def test_numbers_for_a_program(log: Path) -> None:
+def test_json_has_the_numbers(log: Path) -> None:
     said = json.loads(CliRunner().invoke(app, ["log", str(log), "--json"]).stdout)
     assert (said["cycles"], said["cycles_without_answer"], said["status"]) == (201, 4, "DONE")
     assert said["states_s"] == {"MOVING": 2.01}
@@ -90,13 +90,13 @@ def test_a_data_set_has_every_number_and_the_plan(log: Path, tmp_path: Path) -> 
         sl.load_plan(tmp_path / "run.nc")
 
 
-def test_a_log_without_its_end_is_told_and_mended(log: Path, tmp_path: Path) -> None:
+def test_a_log_without_its_end_is_reported_and_repaired(log: Path, tmp_path: Path) -> None:
     killed = tmp_path / "killed.mcap"
     killed.write_bytes(log.read_bytes()[:-20_000])
     result = CliRunner().invoke(app, ["log", str(killed), "--to", str(tmp_path / "mended.mcap")])
     assert result.exit_code == 0, result.output
     assert str(killed) in result.stderr
-    mended = sl.load_execution(tmp_path / "mended.mcap")  # no warning, which would be an error here
+    mended = sl.load_execution(tmp_path / "mended.mcap")  # a warning would be an error here
     with pytest.warns(sl.SaglineWarning):
         assert_same(mended, sl.load_execution(killed))
     assert len(mended) == 100
@@ -104,7 +104,7 @@ def test_a_log_without_its_end_is_told_and_mended(log: Path, tmp_path: Path) -> 
 
 @pytest.mark.parametrize("there", [None, b"", b"\x89MC"])
 @pytest.mark.parametrize("name", ["run.mcap", "twin.mcap"])
-def test_a_growing_log_is_waited_for_until_its_first_bytes_are_there(
+def test_a_growing_log_is_awaited_until_its_first_bytes_exist(
     log: Path, name: str, there: bytes | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with Recorder(log.parent / "twin.mcap", ROBOT) as recorder:
@@ -125,7 +125,7 @@ def test_a_growing_log_is_waited_for_until_its_first_bytes_are_there(
 
 
 @pytest.mark.parametrize("said", [b"no log at all", b"no", None])
-def test_what_is_no_log_is_not_waited_for(tmp_path: Path, said: bytes | None) -> None:
+def test_a_file_that_is_no_log_is_not_awaited(tmp_path: Path, said: bytes | None) -> None:
     file = tmp_path / "run.mcap"
     file.mkdir() if said is None else file.write_bytes(said)
     with refused(kind=sl.FileError, file=file):
@@ -133,8 +133,8 @@ def test_what_is_no_log_is_not_waited_for(tmp_path: Path, said: bytes | None) ->
 
 
 @extended
-def test_a_growing_log_is_followed_from_before_it_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """In place of the page: what it would be given."""
+def test_a_log_is_followed_before_it_exists(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Replacement of the page, which records the calls."""
     monkeypatch.setattr("sagline.cli.view.LOOK", 0.05)
     monkeypatch.setattr("sagline.files.mcap_writer.CHUNK", 0.2)
     lengths: list[int] = []
@@ -167,6 +167,6 @@ def test_a_growing_log_is_followed_from_before_it_is_there(tmp_path: Path, monke
     writer.start()
     assert view.view_log(file, None, NOWHERE, live=True) == 0
     writer.join()
-    assert lengths == sorted(lengths)  # equal ones: what came then was an event, or a cycle was cut in two
+    assert lengths == sorted(lengths)  # equal if an event arrived, or if a cycle was split
     assert lengths[-1] == 200
     assert len(set(lengths)) > 2

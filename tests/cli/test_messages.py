@@ -1,6 +1,6 @@
 """Messages of the command line on typical mistakes, compared with a snapshot that `make messages` renews.
 
-This is the one place where their sentences are compared; other tests look at exit codes, files and numbers.
+Only these tests compare whole sentences; other tests compare exit codes, files and numbers.
 """
 
 from __future__ import annotations
@@ -398,9 +398,9 @@ def folder(files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path
     ids=[line for _, line in lines(FIRST_TIER) + lines(SECOND_TIER)],
 )
 def test_message(code: int, line: str, folder: Path, snapshot: Any) -> None:
-    """Exit code and stderr are as listed; a command that ends with 2 prints one line and writes nothing."""
+    """Exit code and stderr agree with the snapshot; a command that ends with 2 prints one line and writes no file."""
     before = sorted(folder.rglob("*"))
-    enough_for_new = "\n" * 6  # of its seven questions one is answered by an option
+    enough_for_new = "\n" * 6  # an option answers one of its seven questions
     result = CliRunner().invoke(app, shlex.split(line), input=enough_for_new, prog_name="sagline")
     assert result.exit_code == code, result.output
     if code == 2:

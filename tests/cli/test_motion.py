@@ -1,4 +1,4 @@
-"""`sagline vibrate` and `sagline simulate`: numbers of the library, files, what is said where nothing comes."""
+"""`sagline vibrate` and `sagline simulate`: numbers of the library, files, and messages for empty results."""
 
 import json
 import re
@@ -30,7 +30,7 @@ def sagline(*words: str) -> Any:
     return CliRunner().invoke(app, list(words))
 
 
-def test_the_modes_are_those_of_the_library(folder: FilePath) -> None:
+def test_the_modes_agree_with_the_library(folder: FilePath) -> None:
     result = sagline(
         "vibrate", "article-suspended", "--pose", "3,2,1.5", "--up-to", "2", "--loss-time", "1e-3", "--json"
     )
@@ -39,7 +39,7 @@ def test_the_modes_are_those_of_the_library(folder: FilePath) -> None:
     state = sl.inverse(sl.load_robot("article-suspended"), sl.Pose([3, 2, 1.5], np.eye(3))).state
     modes = sl.vibration(state, up_to=2.0, damping=sl.Damping(loss_time=1e-3, modal_damping=0.01))
     swinging = [mode for mode in found["modes"] if mode["kind"] == "with cable mass"]
-    # the lowest six, as finite elements have them
+    # the lowest six, as by finite elements
     told = [mode["frequency_hz"] for mode in swinging]
     np.testing.assert_allclose(told[:6], [1.32058, 1.32629, 1.36270, 1.41008, 1.75574, 1.82122], atol=1e-5)
     np.testing.assert_allclose([mode["platform_share"] for mode in swinging], modes.platform_share, rtol=1e-9)
@@ -51,7 +51,7 @@ def test_the_modes_are_those_of_the_library(folder: FilePath) -> None:
     assert names == [f"article-suspended-{each}" for each in ("modes.csv", "response.png", "response.svg")]
 
 
-def test_every_frequency_says_what_it_is_and_hidden_modes_are_counted(folder: FilePath) -> None:
+def test_frequencies_have_descriptions_and_hidden_modes_are_counted(folder: FilePath) -> None:
     result = sagline("vibrate", "cogiro", "--pose", "0,0,2", "--up-to", "12", "--no-figures")
     assert result.exit_code == 0, result.stderr
     state = sl.inverse(sl.load_robot("cogiro"), sl.Pose([0, 0, 2], np.eye(3))).state
@@ -68,7 +68,7 @@ def test_every_frequency_says_what_it_is_and_hidden_modes_are_counted(folder: Fi
     assert len(table) == 1 + modes.count + 6
 
 
-def test_where_no_mode_lies_the_lowest_massless_one_is_told(folder: FilePath) -> None:
+def test_without_a_mode_in_the_range_the_lowest_massless_one_is_printed(folder: FilePath) -> None:
     result = sagline("vibrate", "article-suspended", "--pose", "0,0,1.5", "--up-to", "1", "--no-figures")
     assert result.exit_code == 0, result.stderr
     text = " ".join(result.stdout.split())
@@ -89,11 +89,11 @@ def test_a_film_of_ten_seconds(folder: FilePath) -> None:
         for k in (0, 6, 25):
             film.seek(k)
             pictures.append(np.asarray(film.convert("L"), dtype=float))
-    assert np.abs(pictures[0] - pictures[1]).max() > 50.0  # a quarter of a swing later
+    assert np.abs(pictures[0] - pictures[1]).max() > 50.0  # a quarter of a period later
     np.testing.assert_array_equal(pictures[0], pictures[2])
 
 
-def test_a_break_is_what_the_library_says_and_its_file_is_read_again(folder: FilePath) -> None:
+def test_a_break_agrees_with_the_library_and_its_file_can_be_read(folder: FilePath) -> None:
     words = ["--break", "3@0.2s", "--after", "1", "--loss-time", "1e-3", "--tension", "minimum-norm"]
     result = sagline("simulate", "cogiro", *words, "--out", "sim.nc")
     assert result.exit_code == 0, result.stderr
@@ -108,7 +108,7 @@ def test_a_break_is_what_the_library_says_and_its_file_is_read_again(folder: Fil
     text = " ".join(result.stdout.split())
     (event,) = own.events
     assert own.largest_tension is not None
-    assert own.largest_tension.max() == event.tension_after > np.nanmax(own.tensions)  # between samples too
+    assert own.largest_tension.max() == event.tension_after > np.nanmax(own.tensions)  # also between samples
     np.testing.assert_array_equal(read.largest_tension, own.largest_tension)
     cable = int(own.largest_tension.argmax())
     assert f" {event.tension_after:,.1f} N, cable {cable} " in text

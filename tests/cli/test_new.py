@@ -1,4 +1,4 @@
-"""`sagline new`: the robot file it writes, what it says of it, and what it refuses."""
+"""`sagline new`: the robot file, its summary, and refusals."""
 
 import os
 import pty
@@ -28,17 +28,17 @@ def folder(tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch) -> FilePath:
 
 
 def new(*words: str) -> Any:
-    return CliRunner().invoke(app, ["new", *words], input="\n" * 9)  # every question takes its default
+    return CliRunner().invoke(app, ["new", *words], input="\n" * 9)  # default answers to all questions
 
 
-def test_options_become_the_robot(folder: FilePath) -> None:
+def test_options_define_the_robot(folder: FilePath) -> None:
     result = new(
         *("mine.yaml", "--frame", "15 x 11 x 6 m", "--platform", "30cm x 30 cm x 0.5 m", "--mass", "50 kg"),
         *("--layout", "mixed", "--rope", "steel-6x19", "--diameter", "3 mm"),
     )
     assert result.exit_code == 0
     robot = sl.load_robot(folder / "mine.yaml")
-    mixed = sl.load_robot("article-mixed")  # the same frame, platform and layout; its cables in another order
+    mixed = sl.load_robot("article-mixed")  # the same frame, platform and layout, with another order of the cables
     order = [0, 2, 4, 6, 1, 3, 5, 7]
     assert robot.frame_anchors == pytest.approx(mixed.frame_anchors[order])
     assert robot.platform_anchors == pytest.approx(mixed.platform_anchors[order])
@@ -49,7 +49,7 @@ def test_options_become_the_robot(folder: FilePath) -> None:
     assert robot.tension_min == pytest.approx(np.full(8, 0.05 * 50.0 * 9.81))
 
 
-def test_it_tells_the_feasible_share_of_the_middle(folder: FilePath) -> None:
+def test_the_summary_has_the_feasible_share_of_the_middle(folder: FilePath) -> None:
     result = new("mine.yaml", "--cables", "6")
     robot = sl.load_robot(folder / "mine.yaml")
     half = 0.25 * (np.array([6.0, 4.0, 3.0]) - [0.5, 0.5, 0.4])
@@ -61,14 +61,14 @@ def test_it_tells_the_feasible_share_of_the_middle(folder: FilePath) -> None:
     assert "Advice" in result.stderr
 
 
-def test_the_box_it_recommends_is_feasible(folder: FilePath) -> None:
+def test_the_recommended_box_is_feasible(folder: FilePath) -> None:
     assert new("mine.yaml").exit_code == 0
     robot = sl.load_robot(folder / "mine.yaml")
     assert robot.test_box is not None
     assert sl.inverse(robot, grid(robot.test_box)).feasible.mean() >= 0.95
 
 
-def test_the_end_of_the_input_is_no_answer(folder: FilePath) -> None:
+def test_the_end_of_the_input_is_an_error(folder: FilePath) -> None:
     keys = ("frame", "layout", "cables", "platform", "mass", "rope", "diameter")
     for count, key in enumerate(keys):
         result = CliRunner().invoke(app, ["new", "mine.yaml"], input="\n" * count)
@@ -82,7 +82,7 @@ def test_the_end_of_the_input_is_no_answer(folder: FilePath) -> None:
     np.testing.assert_array_equal(frame, [5.0, 5.0, 3.0])
 
 
-def test_it_replaces_nothing_unasked(folder: FilePath) -> None:
+def test_no_file_is_replaced_without_permission(folder: FilePath) -> None:
     (folder / "mine.yaml").write_text("precious")
     assert new("mine.yaml").exit_code == 2
     assert (folder / "mine.yaml").read_text() == "precious"
@@ -90,7 +90,7 @@ def test_it_replaces_nothing_unasked(folder: FilePath) -> None:
     assert sl.load_robot(folder / "mine.yaml").name == "mine"
 
 
-def test_an_answer_is_no_yaml(folder: FilePath) -> None:
+def test_answers_are_not_read_as_yaml(folder: FilePath) -> None:
     assert new("mine.yaml", "--mass", "30\nname: 'evil'").exit_code == 2
     assert new("mine.yaml", "--mass", "30 \n kg").exit_code == 0
     assert not re.search(r"^ *kg", (folder / "mine.yaml").read_text(), re.MULTILINE)
@@ -104,18 +104,18 @@ def test_every_layout_is_feasible_somewhere(layout: str, cables: int) -> None:
     assert sl.inverse(robot, grid(design.placed(0.5))).feasible.mean() > 0.2
 
 
-def test_ropes_agree_with_a_makers_table() -> None:
+def test_ropes_agree_with_the_table_of_a_manufacturer() -> None:
     # 6x19 IWRC 10 mm, grade 1770, EN 12385-4: 40.0 kg/100 m, 63.0 kN
     steel = ROPES["steel-6x19"]
     assert float(steel.cable(0.010).linear_density) == pytest.approx(0.400)
     assert steel.breaking_force(0.010) == pytest.approx(63.0e3, rel=1e-3)
-    # a braid of polyethylene is lighter and, for its weight, stronger than steel
+    # a polyethylene braid is lighter and stronger for its weight than steel
     braid = ROPES["dyneema-sk78"]
     assert braid.strength_factor / braid.density_factor > 5.0 * steel.strength_factor / steel.density_factor
 
 
 def on_terminal(folder: FilePath, *answers: str) -> tuple[int, str]:
-    """What `sagline new` says on a terminal where someone types."""
+    """Output of `sagline new` on a terminal with typed answers."""
     leader, follower = pty.openpty()
     process = subprocess.Popen(
         [sys.executable, "-m", "sagline.cli", "new", "mine.yaml"],
@@ -135,7 +135,7 @@ def on_terminal(folder: FilePath, *answers: str) -> tuple[int, str]:
 
 
 @extended
-def test_a_wrong_answer_is_told_at_once_and_asked_again(folder: FilePath) -> None:
+def test_an_invalid_answer_is_refused_at_once_and_asked_again(folder: FilePath) -> None:
     code, said = on_terminal(
         folder,
         *("3 x 2", "4 x 4 x 0 m", "4 x 4 x 3 m", "bottom", "top", "7", "6", "9 x 1 x 1 m", "0.4 x 0.4 x 0.3 m"),
@@ -152,7 +152,7 @@ def test_a_wrong_answer_is_told_at_once_and_asked_again(folder: FilePath) -> Non
     ]
 
 
-def test_what_the_options_say_is_checked_before_anything_is_asked_of_the_rest(folder: FilePath) -> None:
+def test_options_are_checked_before_the_first_question(folder: FilePath) -> None:
     for option, value in (("--frame", "3 x 2"), ("--mass", "nan"), ("--cables", "eight"), ("--mass", "")):
         result = new("mine.yaml", option, value)
         assert result.exit_code == 2

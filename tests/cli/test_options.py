@@ -1,4 +1,4 @@
-"""Options of all commands: equal names mean the same, and tables, figures and files have the same options."""
+"""Options of all commands: equal names have equal meanings, and tables, figures and files have the same options."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ for _name in NAMES:
         if _parameter.param_type_name == "option":
             OPTIONS[_parameter.opts[0]][_name] = _parameter
 SHARED = sorted(name for name, commands in OPTIONS.items() if len(commands) > 1)
-# commands with figures of numbers; those of the page of `article` and `experiment` are part of it
+# commands with figures; `article` and `experiment` have figures in their page
 DRAWING = {"track", "run", "tension", "vibrate", "simulate", "workspace", "design"}
-# JSON without a table of equal rows, or with files that hold all rows: front.csv, Zarr, a page
+# JSON without a table of equal rows, or commands whose files contain all rows: front.csv, Zarr, a page
 NO_TABLE = {"design", "sweep", "article", "cache"}
 
 
 def conversions() -> Iterator[tuple[str, str]]:
-    """File and name of the conversion of each option."""
+    """File and function of the conversion of each option."""
     for file in Path(sagline.cli.__file__).parent.glob("*.py"):
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "converted_option":
@@ -63,7 +63,7 @@ def test_options_with_one_name_have_one_meaning(name: str) -> None:
 
 
 def kind_of(command: str, option: Any) -> str:
-    """Type of one value of an option, which may be repeated, or None."""
+    """Type of one value of an option that can be repeated, or None."""
     module = import_module(f"sagline.cli.{MODULES.get(command, command)}")
     kind = get_type_hints(getattr(module, command.replace("-", "_")))[option.name]
     for _ in range(2):
@@ -79,7 +79,7 @@ def test_tables_and_figures_have_the_same_options() -> None:
     assert set(OPTIONS["--pose"]) >= {"tension", "vibrate", "simulate", "view"}
 
 
-def test_former_names_are_no_names_of_today() -> None:
+def test_former_names_are_not_used_again() -> None:
     for command, names in FORMER.items():
         assert not set(names) & {name for name, commands in OPTIONS.items() if command in commands}
         assert all(command in OPTIONS[name] for name in names.values())
@@ -114,14 +114,14 @@ def test_out_is_a_folder_or_the_main_file(folder: Path) -> None:
     assert (done.exit_code, done.stderr.count("\n")) == (2, 1)
     assert "plan.txt" in done.stderr
     assert ".nc" in done.stderr
-    (folder / "plan.txt").mkdir()  # a folder that exists is one, whatever its name
+    (folder / "plan.txt").mkdir()  # an existing folder is a folder, with any name
     assert sagline_(*words, "--out", "plan.txt").exit_code == 0
 
 
 @pytest.mark.parametrize(
     "words", ["article errata", "examples", "sweep own_sweep.yaml", "design cogiro design.yaml", "run"]
 )
-def test_where_files_have_fixed_names_out_is_a_folder(words: str, folder: Path) -> None:
+def test_out_is_a_folder_for_files_with_fixed_names(words: str, folder: Path) -> None:
     for file in ("own_sweep.yaml", "own_planar.yaml", "design.yaml"):
         shutil.copy(EXAMPLES / file, folder)
     before = names_in(folder)
@@ -130,7 +130,7 @@ def test_where_files_have_fixed_names_out_is_a_folder(words: str, folder: Path) 
     assert "into.nc" in done.stderr
 
 
-def test_files_to_stdout_and_elsewhere_are_the_same(folder: Path) -> None:
+def test_files_on_stdout_are_the_same(folder: Path) -> None:
     sagline_("track", "cogiro", "path.yaml", "--no-figures", "--out", "plan.nc")
     text = sagline_("lengths", "plan.nc").stdout
     assert sagline_("lengths", "plan.nc", "--out", "into").exit_code == 0
@@ -155,7 +155,7 @@ def test_tables_have_the_numbers_of_json(folder: Path) -> None:
     for row in rows_of(folder / "output" / "robots.csv"):
         assert float(row["mass [kg]"]) == robots[row["robot"]]["mass_kg"]
         assert [float(row[f"frame {axis} [m]"]) for axis in "xyz"] == robots[row["robot"]]["frame_size_m"]
-    assert sagline_("robots", "--out", "r.csv").exit_code == 2  # without effect
+    assert sagline_("robots", "--out", "r.csv").exit_code == 2  # no effect
     cables = json.loads(sagline_("show", "cogiro", "--csv", "--out", "c.csv", "--json").stdout)
     rows = rows_of(folder / "c.csv")
     assert [[float(row[f"frame_anchors {axis} [m]"]) for axis in "xyz"] for row in rows] == cables["frame_anchors"][
@@ -175,7 +175,7 @@ def test_the_cycles_of_a_log_are_a_table(folder: Path) -> None:
         np.testing.assert_array_equal(found, tensions)
 
 
-def test_a_simulation_has_its_course_in_a_table(folder: Path) -> None:
+def test_a_simulation_has_a_table_of_its_samples(folder: Path) -> None:
     words = ("simulate", "cogiro", "--pose", "1,0.5,2", "--break", "3@0.1s", "--after", "0.3", "--csv")
     done = sagline_(*words, "--no-figures", "--out", "s.nc")
     assert done.exit_code == 0, done.stderr
@@ -191,7 +191,7 @@ def test_a_simulation_has_its_course_in_a_table(folder: Path) -> None:
 
 
 @extended
-def test_figures_have_the_style_and_the_formats(folder: Path) -> None:
+def test_figures_have_the_requested_style_and_formats(folder: Path) -> None:
     words = ("simulate", "cogiro", "--after", "0.1", "--out", "s.nc", "--style", "ieee")
     assert sagline_(*words, "--format", "svg").exit_code == 0
     assert names_in(folder) == {"s.nc", "s-motion.svg", "s-energy.svg"}
@@ -208,7 +208,7 @@ def test_a_simulation_at_an_infeasible_pose_names_the_shortfall(folder: Path) ->
     assert f" {', '.join(map(str, np.flatnonzero(plan.blocking)))})" in done.stderr
 
 
-def test_tension_reaches_the_modes(folder: Path) -> None:
+def test_the_tension_method_applies_to_the_modes(folder: Path) -> None:
     words = ("vibrate", "cogiro", "--pose", "0,0,2", "--up-to", "8", "--no-figures", "--no-csv", "--json")
     found = json.loads(sagline_(*words, "--tension", "centroid").stdout)["modes"]
     state = sl.inverse(sl.load_robot("cogiro"), sl.Pose([0, 0, 2], np.eye(3)), tension=sl.Centroid()).state
@@ -234,11 +234,11 @@ def test_a_verdict_is_the_first_line(line: str, folder: Path) -> None:
     assert len(first.split()) > 2
     assert any(character.isdigit() for character in first)
     rules = [k for k, row in enumerate(rest) if set(row.strip()) == {"─"}]
-    assert rules[0] <= 4  # the table follows
+    assert rules[0] <= 4  # followed by the table
 
 
 @extended
-def test_run_draws_and_writes_on_request_only(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_run_draws_and_writes_only_on_request(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sagline.motion.rest_to_rest.article_path", lambda: sl.load_path("path.yaml"))
     monkeypatch.setattr("sagline.cli.run.CELLS", 4)
     assert sagline_("run", "--no-figures", "--csv").exit_code == 0

@@ -1,4 +1,4 @@
-"""The progress line: the work at once, a bar for long work, and nothing in a file."""
+"""The progress line: shown at once, with a bar for long work, and absent in files."""
 
 import re
 import time

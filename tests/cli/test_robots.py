@@ -30,7 +30,7 @@ def shown(*words: str) -> str:
     return str(done.stdout)
 
 
-def test_every_value_stands_beside_its_unit() -> None:
+def test_every_value_has_its_unit() -> None:
     robot = sl.load_robot("cogiro")
     record = json.loads(shown("cogiro", "--json"))
     assert {name: entry["unit"] for name, entry in record.items() if isinstance(entry, dict)} == UNITS
@@ -75,7 +75,7 @@ def test_a_tilt_is_shown_in_degrees() -> None:
     assert f" {180.0 / np.pi * robot.test_box.tilt:.3g}°" in " ".join(shown("cogiro").split())
 
 
-def test_tolerances_and_what_a_calibration_found_are_shown(tmp_path: Path) -> None:
+def test_tolerances_and_calibrated_values_are_shown(tmp_path: Path) -> None:
     made = Provenance(
         "winches.csv", "2026-03-01", {"mass": 0.08, "frame_anchors": np.arange(24.0).reshape(8, 3)}, "wet"
     )

@@ -1,4 +1,4 @@
-"""`sagline share`: which pages it makes of what, and what it refuses."""
+"""`sagline share`: pages of robots and runs, and refusals."""
 
 from pathlib import Path
 
@@ -28,7 +28,7 @@ def plan(*places: tuple[float, float, float]) -> sl.Plan:
     return sl.inverse(sl.load_robot("cogiro"), pose if len(places) > 1 else pose[0])
 
 
-def test_a_robot_becomes_one_page_and_its_size_is_told(folder: Path) -> None:
+def test_a_robot_becomes_one_page_and_its_size_is_printed(folder: Path) -> None:
     result = shared("cogiro")
     assert result.exit_code == 0, result.output
     page = (folder / "cogiro.html").read_bytes()
@@ -53,16 +53,16 @@ def test_runs_simulations_and_logs_play(folder: Path) -> None:
     assert "cable 3 at 0.050 s" in (folder / "sim.html").read_text(encoding="utf-8")
 
 
-def test_a_name_nobody_chose_is_not_taken_from_other_pages(folder: Path) -> None:
+def test_a_default_name_does_not_replace_another_page(folder: Path) -> None:
     (folder / "cogiro.html").write_text("<p>my notes", encoding="utf-8")
     result = shared("cogiro")
     assert result.exit_code == 2
     assert (folder / "cogiro.html").read_text(encoding="utf-8") == "<p>my notes"
     assert shared("cogiro", "--out", "cogiro.html").exit_code == 0
-    assert shared("cogiro").exit_code == 0  # over a page of its own
+    assert shared("cogiro").exit_code == 0  # over a page of sagline
 
 
-def test_without_the_module_one_line_says_how_it_is_made(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_the_module_one_line_gives_the_next_step(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(calls, "MODULE", folder / "kernels.wasm")
     result = shared("no-such-robot")
     assert result.exit_code == 2

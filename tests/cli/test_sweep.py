@@ -1,4 +1,4 @@
-"""`sagline sweep`: what it tells, and how it goes on."""
+"""`sagline sweep`: its summary, and how it continues."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ def ended(*words: str) -> Result:
 
 
 def command_of(result: Result) -> list[str]:
-    """Words of the command that is printed on stderr to go on with."""
+    """Words of the printed command that continues the sweep."""
     return shlex.split(result.stderr.partition(": sagline ")[2].partition("\n")[0])
 
 
-def test_a_sweep_tells_how_its_requests_ended_and_is_done_once(folder: Path) -> None:
+def test_a_sweep_prints_the_results_of_its_requests_and_runs_once(folder: Path) -> None:
     first = ended("own_sweep.yaml", "--workers", "1")
     assert (first.exit_code, first.stderr) == (0, "")
     assert re.search(r"\b1 robot.*\b609 .*\b9 ", first.stdout)
@@ -75,7 +75,7 @@ def test_the_folder_of_another_sweep_is_refused(folder: Path) -> None:
     assert result.stdout == ""
 
 
-def test_ctrl_c_prints_the_command_that_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ctrl_c_prints_the_command_to_continue(monkeypatch: pytest.MonkeyPatch) -> None:
     def stopped(*_: Any, **__: Any) -> None:
         raise KeyboardInterrupt
 
@@ -86,7 +86,7 @@ def test_ctrl_c_prints_the_command_that_goes_on(monkeypatch: pytest.MonkeyPatch)
     assert "Interrupted." in result.stderr
 
 
-def test_a_failure_on_the_way_prints_it_too(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_error_prints_the_command_to_continue(monkeypatch: pytest.MonkeyPatch) -> None:
     def failed(_: Any, folder: Path, *__: Any, **___: Any) -> None:
         folder.mkdir()
         (folder / "done").touch()
@@ -101,7 +101,7 @@ def test_a_failure_on_the_way_prints_it_too(monkeypatch: pytest.MonkeyPatch) -> 
     assert command_of(result) == ["sweep", "own_sweep.yaml", "--out", "out", "--scheduler", address]
 
 
-def test_requests_without_a_verdict_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_requests_without_a_verdict_are_printed(monkeypatch: pytest.MonkeyPatch) -> None:
     found = sl.sweep.run(sl.load_sweep("own_sweep.yaml"), "out", workers=1)
     open_ones = sl.sweep.Sweep(found.folder, found.request, 1, 1, sl.sweep.Counts(5000, 479, 0, 2, 0), 1.0)
     monkeypatch.setattr("sagline.sweep.running.run", lambda *_, **__: open_ones)

@@ -1,4 +1,4 @@
-"""`sagline tension`: numbers of every method, the figure, and what it says where there is no answer."""
+"""`sagline tension`: numbers of all methods, the figure, and messages without a solution."""
 
 import json
 from pathlib import Path as FilePath
@@ -24,7 +24,7 @@ def sagline(*words: str) -> Any:
     return CliRunner().invoke(app, ["tension", *words])
 
 
-def test_numbers_are_those_of_the_library(folder: FilePath) -> None:
+def test_numbers_agree_with_the_library(folder: FilePath) -> None:
     result = sagline("article-mixed", "--pose", "1,-0.5,2.5,3,0,0", "--json")
     assert result.exit_code == 0, result.stderr
     found = json.loads(result.stdout)
@@ -47,7 +47,7 @@ def test_table_and_robots_without_polygon(folder: FilePath) -> None:
     assert not (folder / "output").exists()
 
 
-def test_infeasible_pose_says_why(folder: FilePath) -> None:
+def test_an_infeasible_pose_has_a_reason(folder: FilePath) -> None:
     result = sagline("article-suspended", "--pose", "7.45,0,1.5")
     plan = sl.inverse(sl.load_robot("article-suspended"), sl.Pose([7.45, 0, 1.5], np.eye(3)))
     assert result.exit_code == 1
@@ -88,7 +88,7 @@ def test_the_polygon_is_that_of_the_load(folder: FilePath, monkeypatch: pytest.M
     assert not np.allclose(expected.vertices, sl.tension_polygon(robot, middle).vertices)
 
 
-def test_the_number_of_methods_in_the_help_is_that_of_the_table() -> None:
+def test_help_and_table_have_the_same_number_of_methods() -> None:
     from sagline.cli.tension import LEFT_OUT, tension
 
     methods = set(public_methods())

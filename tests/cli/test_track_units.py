@@ -1,4 +1,4 @@
-"""`sagline track` refuses a path in another unit than it says, and one that nobody can have meant."""
+"""`sagline track` refuses a path that is probably in another unit, and an impossible path."""
 
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,7 @@ def track(folder: Path, name: str, text: str) -> Any:
 
 
 @pytest.mark.parametrize(("name", "form"), wide([("path.yaml", YAML), ("path.csv", CSV)]))
-def test_millimeters_are_told(tmp_path: Path, name: str, form: str) -> None:
+def test_millimeters_are_recognized(tmp_path: Path, name: str, form: str) -> None:
     result = track(tmp_path, name, form.format(1500, 2500))
     assert (result.exit_code, result.stdout, (tmp_path / "out").exists()) == (2, "", False)
     assert result.stderr.count("\n") == 1
@@ -29,7 +29,7 @@ def test_millimeters_are_told(tmp_path: Path, name: str, form: str) -> None:
 
 
 @pytest.mark.parametrize("timing", ["durations: 0.001", "durations: [1, 0.01]", "durations: 1\nrate: 1e-30"])
-def test_a_segment_without_a_sample_is_told(tmp_path: Path, timing: str) -> None:
+def test_a_segment_without_a_sample_is_reported(tmp_path: Path, timing: str) -> None:
     text = f"{timing}\nwaypoints: [{{position: [0, 0, 1.5]}}, {{position: [1, 0, 1.5]}}, {{position: [2, 0, 1.5]}}]\n"
     result = track(tmp_path, "path.yaml", text)
     assert (result.exit_code, (tmp_path / "out").exists()) == (2, False)

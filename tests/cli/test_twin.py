@@ -1,4 +1,4 @@
-"""`sagline twin` on the command line: what it says, and what it refuses."""
+"""`sagline twin` on the command line: outputs and refusals."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from tests.tiers import extended
 OWNER = 4711
 
 
-@extended  # the name of a computer is looked up
-def test_an_address_of_no_computer_is_refused() -> None:
+@extended  # the name of the host is looked up
+def test_an_unknown_host_is_refused() -> None:
     result = CliRunner().invoke(app, ["twin", "article-prototype", "--host", "nobody.invalid", "--port", "0"])
     assert (result.exit_code, result.stdout) == (2, "")
     assert "'nobody.invalid'" in result.stderr
@@ -32,7 +32,7 @@ def test_an_address_of_no_computer_is_refused() -> None:
     assert len(result.stderr) < 300
 
 
-def test_a_port_without_ports_after_it_is_refused_before_the_machine_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_port_without_free_ports_after_it_is_refused_first(monkeypatch: pytest.MonkeyPatch) -> None:
     made = []
     monkeypatch.setattr("sagline.twin.machine.Machine", lambda *_, **__: made.append(1))
     result = CliRunner().invoke(app, ["twin", "article-prototype", "--port", "65533"])
@@ -45,9 +45,7 @@ def interrupted(server: Server, watch: Callable[..., object]) -> None:
 
 
 @pytest.mark.parametrize("words", [[], ["--modbus"]])
-def test_the_first_lines_fit_80_columns_and_can_be_pasted_and_ctrl_c_is_130(
-    words: list[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_first_lines_fit_80_columns_and_ctrl_c_is_130(words: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Server, "run", interrupted)
     result = CliRunner().invoke(app, ["twin", "article-prototype", "--port", "0", *words])
     assert result.exit_code == 130
@@ -62,7 +60,7 @@ def test_the_first_lines_fit_80_columns_and_can_be_pasted_and_ctrl_c_is_130(
     assert len(command[-1].split(",")) == 4
 
 
-def test_what_the_plcs_do_is_told_when_it_changes(capsys: pytest.CaptureFixture[str], snapshot: Any) -> None:
+def test_changes_of_the_plcs_are_printed(capsys: pytest.CaptureFixture[str], snapshot: Any) -> None:
     machine = Machine(sl.load_robot("article-prototype"), seed=1, faults=["servo 7 trips at 0.5 s"])
     watch, link = TwinMonitor(machine), machine.link()
     with closing(link):
@@ -74,7 +72,7 @@ def test_what_the_plcs_do_is_told_when_it_changes(capsys: pytest.CaptureFixture[
     assert [float(line.split()[0]) for line in said] == pytest.approx([0.0, 0.1, 0.6], abs=0.11)
 
 
-def test_a_log_says_where_the_platform_was(tmp_path: Path) -> None:
+def test_a_log_contains_the_true_poses(tmp_path: Path) -> None:
     machine = Machine(sl.load_robot("article-prototype"), seed=1, faults=["cable 0 breaks at 0 s"])
     watch, seen = TwinMonitor(machine), []
     with Recorder(tmp_path / "twin.mcap", machine.robot) as watch.recorder:
@@ -85,4 +83,4 @@ def test_a_log_says_where_the_platform_was(tmp_path: Path) -> None:
     truth = read_log(tmp_path / "twin.mcap").truth
     found = [(each.time, *each.position, *each.quaternion) for each in truth]
     np.testing.assert_allclose(found, seen, atol=1e-6)
-    assert abs(seen[-1][3] - seen[0][3]) > 1e-4  # it moved meanwhile
+    assert abs(seen[-1][3] - seen[0][3]) > 1e-4  # the platform moved in the meantime

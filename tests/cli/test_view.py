@@ -1,4 +1,4 @@
-"""`sagline view` as a process: where it listens, what it says, and how it ends."""
+"""`sagline view` as a process: address, outputs and end."""
 
 import re
 import signal
@@ -41,7 +41,7 @@ def viewing(*words: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
 
 
 @extended
-def test_it_serves_a_page_and_stops_at_ctrl_c_mid_drag() -> None:
+def test_it_serves_a_page_and_ctrl_c_during_a_drag_ends_it() -> None:
     with viewing("article-suspended") as (process, address):
         with urlopen(address) as page:
             assert b"<html" in page.read().lower()
@@ -88,7 +88,7 @@ def test_the_printed_address_has_the_token_and_the_browser_starts_with_another(
     assert (place in result.stderr) is others
 
 
-def test_a_taken_port_is_told() -> None:
+def test_a_port_in_use_is_reported() -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
@@ -99,7 +99,7 @@ def test_a_taken_port_is_told() -> None:
     assert "--port 0" in result.stderr
 
 
-def test_a_simulation_is_played_as_a_run_is(tmp_path: FilePath) -> None:
+def test_a_simulation_is_played_like_a_run(tmp_path: FilePath) -> None:
     state = sl.inverse(sl.load_robot("cogiro"), sl.Pose([0.0, 0.0, 2.0], np.eye(3))).state
     swing = sl.simulate(state, duration=0.5, events=sl.Break(cable=3, time=0.25))
     swing.save(tmp_path / "sim.nc")

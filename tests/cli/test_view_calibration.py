@@ -1,4 +1,4 @@
-"""`sagline view found.nc`: a calibrated robot with what was found, and no other robot."""
+"""`sagline view found.nc`: a calibrated robot with the results, and no other robot."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""No number and no word is cut, however narrow the terminal: what is printed there is what goes into a file."""
+"""Numbers and words are complete at every width of the terminal: the same as in a file."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ from tests.tiers import extended, wide
 
 WIDTHS = (60, 80, 120)
 SHORT = "durations: 1\nrate: 4\nwaypoints: [{position: [0, 0, 1.5]}, {position: [1, 0, 1.5]}]\n"
-# paths, or on stderr
+# paths, or texts on stderr
 WHOLE = r"In |Try: |Written: |Look at it: |Every value: |Advice: |[\w-]+: the path|The file contains|Empty workspace: "
 COMMANDS = (
     ["forward", "cogiro", "lengths.csv"],
     ["show", "many.yaml"],
     ["track", "--help"],
-    # the second tier
+    # commands of the second tier
     ["robots"],
     ["track", "cogiro", "short.yaml", "--no-figures"],
     ["track", "article-suspended", "far.yaml", "--no-figures"],
@@ -64,7 +64,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     examples(place, force=False)
     (place / "short.yaml").write_text(SHORT)
     (place / "far.yaml").write_text(SHORT.replace("[1, 0, 1.5]", "[7.2, 3, 1.5]"))
-    robot = sl.load_robot("article-suspended")  # three robots in one: 24 cables, as many as can be
+    robot = sl.load_robot("article-suspended")  # three robots in one: 24 cables, the largest number
     many = robot.replace(
         name="a robot of twenty-four cables and a name of many words",
         frame_anchors=np.concatenate([robot.frame_anchors + k * 0.1 for k in range(3)]),
@@ -88,11 +88,11 @@ def place(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sagline.cli.run.FIGURES", ())
     monkeypatch.setattr("sagline.cli.run.CELLS", 4)
     monkeypatch.setattr("sagline.cli.run._figures", lambda *_: ())
-    monkeypatch.setattr("sagline.cli.study.perf_counter", iter(range(1000)).__next__)  # every run takes a second
+    monkeypatch.setattr("sagline.cli.study.perf_counter", iter(range(1000)).__next__)  # each run takes a second
 
 
 def printed(words: list[str], width: int | None, monkeypatch: pytest.MonkeyPatch) -> str:
-    """What a command says on a terminal of a width; None for a pipe."""
+    """Output of a command on a terminal with a width, or in a pipe for None."""
     with monkeypatch.context() as patched:
         patched.setattr("sagline.cli.study.perf_counter", iter(range(1000)).__next__)
         if width is not None:
@@ -107,12 +107,12 @@ def printed(words: list[str], width: int | None, monkeypatch: pytest.MonkeyPatch
 
 
 def words_of(text: str) -> Counter[str]:
-    """Everything between blanks, rules apart."""
+    """All texts between spaces, except rules."""
     return Counter(word for word in text.split() if not set(word) <= set("─"))
 
 
 @pytest.mark.parametrize("words", wide(COMMANDS, first=3), ids=" ".join)
-def test_no_number_and_no_word_is_cut(words: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_numbers_and_words_are_complete(words: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
     wide = words_of(printed(words, None, monkeypatch))
     assert sum(wide.values()) > 10
     for width in WIDTHS:
@@ -134,7 +134,7 @@ def test_the_help_lists_every_command_once_in_a_group(monkeypatch: pytest.Monkey
         assert re.findall(r"^  ([\w-]+) ", section, re.MULTILINE) == list(names)
 
 
-def test_a_table_is_split_where_it_does_not_fit_and_nowhere_else() -> None:
+def test_a_table_is_split_only_if_it_does_not_fit() -> None:
     rows = [[f"method {k}", *(f"{1234.5 + k + j:.1f}" for j in range(8))] for k in range(3)]
     grid = TextTable(["", *map(str, range(8))], rows, "Tensions")
     for width, pieces in ((200, 1), (82, 1), (60, 2), (40, 3), (30, 4)):
@@ -150,7 +150,7 @@ def test_a_table_is_split_where_it_does_not_fit_and_nowhere_else() -> None:
 
 
 def on_terminal(width: int, *words: str) -> str:
-    """What a command prints on a real terminal."""
+    """Output of a command on a real terminal."""
     leader, follower = pty.openpty()
     fcntl.ioctl(follower, termios.TIOCSWINSZ, struct.pack("HHHH", 40, width, 0, 0))
     environment = {name: value for name, value in os.environ.items() if name not in ("COLUMNS", "NO_COLOR")}
@@ -179,7 +179,7 @@ def test_on_a_real_terminal_and_in_a_real_pipe() -> None:
     assert "\x1b" not in piped.stdout
     narrow = on_terminal(60, *command)
     assert words_of(piped.stdout) - words_of(narrow) == Counter()
-    assert max(len(line) for line in piped.stdout.splitlines()) > 120  # one table, however wide
+    assert max(len(line) for line in piped.stdout.splitlines()) > 120  # one table of any width
     assert max(len(line) for line in narrow.splitlines() if not line.startswith("In ")) <= 60
 
 

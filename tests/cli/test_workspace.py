@@ -1,4 +1,4 @@
-"""`sagline workspace`: the library's numbers, its files, what is said of an empty one; loads and boxes as texts."""
+"""`sagline workspace`: numbers of the library, files, an empty workspace, loads and boxes as texts."""
 
 import json
 import re
@@ -47,7 +47,7 @@ def test_the_volume_of_the_article(folder: FilePath) -> None:
 @extended
 def test_options_are_arguments() -> None:
     words = ["--wrench", "±50 N, ±5 N m, ±0.5 m/s^2", "--tilt", "5deg", "--max-sag", "30 cm", "--clearance", "1 mm"]
-    words.append("--no-figures")  # of 27 rotations and all criteria: most of a minute
+    words.append("--no-figures")  # 27 rotations and all criteria take most of a minute
     result = sagline(
         "cogiro", *words, "--box", "-4..4, -3..3, 1..4 m", "--cells", "4", "--payload", "10 kg", "--model", "elastic",
         "--reserve", "10", "--min-stiffness", "1000", "--min-frequency", "0.5 Hz", "--in-frame", "--json",
@@ -77,7 +77,7 @@ def test_options_are_arguments() -> None:
     assert re.search(r"\b27 sampled\b.* 5°$", found["orientations"])
 
 
-def test_what_is_told(folder: FilePath) -> None:
+def test_outputs(folder: FilePath) -> None:
     result = sagline("article-suspended", "--cells", "6", "--no-figures")
     assert result.exit_code == 0, result.stderr
     lines = [" ".join(line.split()) for line in result.stdout.splitlines()]
@@ -89,7 +89,7 @@ def test_what_is_told(folder: FilePath) -> None:
 
 
 @extended
-def test_what_is_proved_and_what_is_not() -> None:
+def test_proved_and_unproved_volumes() -> None:
     words = ["--cells", "4", "--no-figures", "--json", "--prove"]
     inside = sagline("article-suspended", *words, "-1..1, -1..1, 2..2.5 m")
     assert inside.exit_code == 0, inside.stderr
@@ -102,7 +102,7 @@ def test_what_is_proved_and_what_is_not() -> None:
 
 
 @extended
-def test_what_stands_around(folder: FilePath) -> None:
+def test_obstacles(folder: FilePath) -> None:
     (folder / "own.yaml").write_text(
         sl.dump_robot(sl.load_robot("article-suspended"))
         + "scene:\n  - {name: wall, box: [0.2, 12, 1.0], center: [1, 0, 0.5]}\n"
@@ -136,7 +136,7 @@ def test_a_robot_file_of_any_name_has_its_scene_and_a_mesh_is_counted(folder: Fi
         assert f"{scene}: has no scene. " in result.stderr
 
 
-def test_nowhere_ends_with_the_nearest_pose(folder: FilePath) -> None:
+def test_an_empty_workspace_prints_the_nearest_pose(folder: FilePath) -> None:
     result = sagline("article-suspended", "--wrench", "±5 kN", "--cells", "4", "--json")
     assert result.exit_code == 1
     assert "Empty workspace: " in result.stderr
@@ -199,7 +199,7 @@ def test_boxes(text: str, low: list[float], high: list[float]) -> None:
         ["--cells", "1000"],
     ],
 )
-def test_what_is_refused(words: list[str], folder: FilePath) -> None:
+def test_refusals(words: list[str], folder: FilePath) -> None:
     result = sagline("cogiro", *words, "--no-figures")
     assert result.exit_code == 2
     assert len(result.stderr.splitlines()) == 1
