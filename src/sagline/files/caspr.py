@@ -13,7 +13,7 @@ from sagline.cables.cable import Cable
 from sagline.core.arguments import file_path, optional, text
 from sagline.core.arrays import Array
 from sagline.core.errors import FileError, InvalidValueError
-from sagline.files.reading import exists
+from sagline.files.reading import exists, value_errors
 from sagline.files.robot_xml import (
     Imported,
     cables_of_file,
@@ -75,10 +75,9 @@ def load_caspr(source: str | os.PathLike[str], cables: Cable | None = None, cabl
     if cable_set is not None:
         text(cable_set, "cable_set")
     bodies, cables_file = _files(file_path(source, "source", folder=True))
-    at = bodies
-    try:
+    with value_errors(bodies):
         platform, lost = _platform(read_xml(bodies))
-        at = cables_file
+    with value_errors(cables_file):
         chosen = _select_set(read_xml(cables_file), cable_set, lost)
         columns = _columns(chosen, platform["center_of_mass"], lost)
         stiffness, radii, axes = (columns.pop(name) for name in ("axial_stiffness", "pulley_radius", "swivel_axis"))
@@ -94,8 +93,6 @@ def load_caspr(source: str | os.PathLike[str], cables: Cable | None = None, cabl
             **columns,
             **platform,
         )
-    except InvalidValueError as error:
-        raise FileError.of(at, error) from None
     return with_losses(robot, tuple(lost))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable, Iterator
+from contextlib import nullcontext
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Final
@@ -14,11 +15,11 @@ import numpy as np
 from sagline.calibration.log import Sensors, WinchLog
 from sagline.core.arguments import file_path, instance, optional
 from sagline.core.arrays import Array, locked
-from sagline.core.errors import FileError, InvalidValueError
+from sagline.core.errors import FileError
 from sagline.files.path_file import EULER, QUATERNION
 from sagline.files.pose_text import QUATERNION_TOLERANCE, PoseEntry, pose_of_entry
 from sagline.files.quantity import in_si
-from sagline.files.reading import read_text
+from sagline.files.reading import read_text, value_errors
 from sagline.files.table import TABLE_LIMIT, CsvTable, column_of_cable, line_error, separator_of
 from sagline.files.writing import write_text
 from sagline.files.yaml_text import YamlEntry, parse_mapping, validate
@@ -61,10 +62,15 @@ def sensors_of_comments(text: str, path: Path) -> tuple[Sensors, str]:
     if not any(said):
         return Sensors(), rows
     entry = validate(parse_mapping("\n".join(said), path), _Sensors, path)
-    try:
-        return _sensors(entry), rows
-    except InvalidValueError as error:
-        raise FileError.of(path, error) from None
+    with value_errors(path):
+        values: dict[str, Any] = {
+            name: in_si(value, unit, name)
+            for name, unit in (DEVIATIONS | {"target": "m"}).items()
+            if (value := getattr(entry, name)) is not None
+        }
+        if entry.frame is not None:
+            values["frame"] = pose_of_entry(entry.frame, "frame")
+        return Sensors(**values), rows
 
 
 def _key_line(line: str) -> str:
@@ -75,19 +81,6 @@ def _key_line(line: str) -> str:
     key = found[1]
     meant = "deviation" in key or bool(get_close_matches(key.lower(), _KEYS, n=1, cutoff=_NEAR))
     return f"{key}:{found[2]}" if meant else ""
-
-
-def _sensors(entry: _Sensors) -> Sensors:
-    values: dict[str, Any] = {
-        name: in_si(value, unit, name)
-        for name, unit in DEVIATIONS.items()
-        if (value := getattr(entry, name)) is not None
-    }
-    if entry.frame is not None:
-        values["frame"] = pose_of_entry(entry.frame, "frame")
-    if entry.target is not None:
-        values["target"] = in_si(entry.target, "m", "target")
-    return Sensors(**values)
 
 
 def _comments_of_sensors(sensors: Sensors) -> Iterator[str]:
@@ -260,12 +253,8 @@ def load_log(file: os.PathLike[str] | str, sensors: Sensors | None = None) -> Wi
             step = f"Write a comment above the columns, for instance '{wish}', or give sensors (--{key}-deviation)."
             reason = f"does not give the {key}_deviation of a sensor with readings"
             raise FileError(path, reason, step, item=f"{key}_deviation")
-    try:
+    with value_errors(path) if sensors is None else nullcontext():  # `sensors` may be the cause of an error
         return WinchLog(**fields, sensors=given, source=str(path))
-    except InvalidValueError as error:
-        if sensors is not None:
-            raise
-        raise FileError.of(path, error) from None
 
 
 def save(log: WinchLog, file: os.PathLike[str] | str) -> None:

@@ -16,7 +16,7 @@ from sagline.core.arguments import brief, file_path, label
 from sagline.core.arrays import Array, Indices
 from sagline.core.errors import FileError, InvalidValueError, SaglineError
 from sagline.files.quantity import in_si
-from sagline.files.reading import read_bytes
+from sagline.files.reading import read_bytes, value_errors
 from sagline.files.writing import atomic_file, check_file
 from sagline.interference.mesh import MOST, Mesh, check_coordinates, extent_text
 from sagline.workspaces.surface import Surface
@@ -64,10 +64,8 @@ def load_mesh(file: str | os.PathLike[str], unit: str = "m", name: str | None = 
         raise FileError(
             path, f"has {len(faces):,} triangles; allowed: {MOST:,}", "Simplify the mesh in the program that made it."
         )
-    try:
+    with value_errors(path):
         mesh = Mesh(vertices, faces, called)
-    except InvalidValueError as error:
-        raise FileError.of(path, error) from None
     if len(faces) <= CHECKED and (crossing := first_crossing(mesh)) is not None:
         where = ", ".join(f"{value:.4g}" for value in crossing)
         reason = f"crosses itself at ({where}) m, {extent_text(mesh.vertices)}; allowed: a simple surface"
@@ -99,7 +97,11 @@ def _triangles(path: Path, data: bytes, unit: float) -> tuple[Array, Indices]:
     try:
         with np.errstate(all="ignore"):  # coordinates that are not numbers are refused below
             read: Any = trimesh.load(BytesIO(data), file_type=kind, force="mesh", process=False, skip_materials=True)
-            _check_vertices(path, np.asarray(read.vertices, dtype=np.float64) * unit)
+            coordinates = np.asarray(read.vertices, dtype=np.float64) * unit
+            if not np.isfinite(coordinates).all():
+                raise FileError(path, "contains coordinates that are not numbers", _MEANT)
+            with value_errors(path):
+                check_coordinates(coordinates)  # coordinates that are too far away for any machine are refused
             read.merge_vertices(merge_tex=True, merge_norm=True)
         vertices, faces = unit * np.array(read.vertices, dtype=np.float64), np.array(read.faces, dtype=np.int64)
     except SaglineError:
@@ -111,16 +113,6 @@ def _triangles(path: Path, data: bytes, unit: float) -> tuple[Array, Indices]:
         raise FileError(path, "contains no triangles", _MEANT)
     distinct = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
     return (vertices @ _UPRIGHT.T if kind == "glb" else vertices), faces[distinct]
-
-
-def _check_vertices(path: Path, vertices: Array) -> None:
-    """Refuse `vertices` [m] that are not numbers, or that are too far away for any machine."""
-    if not np.isfinite(vertices).all():
-        raise FileError(path, "contains coordinates that are not numbers", _MEANT)
-    try:
-        check_coordinates(vertices)
-    except InvalidValueError as error:
-        raise FileError.of(path, error) from None
 
 
 def first_crossing(mesh: Mesh) -> Array | None:
@@ -137,14 +129,9 @@ def first_crossing(mesh: Mesh) -> Array | None:
     result = fcl.CollisionResult()
     fcl.collide(one, other, request, result)
     pairs = np.array([(contact.b1, contact.b2) for contact in result.contacts], dtype=np.int64).reshape(-1, 2)
-    apart = _without_common_vertex(mesh.faces, pairs)
+    first, second = mesh.faces[pairs[:, 0]], mesh.faces[pairs[:, 1]]
+    apart = ~(first[:, :, None] == second[:, None, :]).any(axis=(1, 2))  # pairs without a common corner
     return None if not apart.any() else np.array(result.contacts[int(np.argmax(apart))].pos)
-
-
-def _without_common_vertex(faces: Indices, pairs: Indices) -> NDArray[np.bool_]:
-    """True for pairs of triangles without a common corner."""
-    one, other = faces[pairs[:, 0]], faces[pairs[:, 1]]
-    return np.asarray(~(one[:, :, None] == other[:, None, :]).any(axis=(1, 2)))
 
 
 def save(surface: Surface, file: Path | str, colors: ArrayLike | None = None) -> None:
@@ -160,15 +147,17 @@ def save(surface: Surface, file: Path | str, colors: ArrayLike | None = None) ->
         raise InvalidValueError("surface", "empty", "a surface with triangles", "Search the set in another box.")
     tints = None if colors is None else _check_colors(colors, len(surface.vertices))
     check_file(target)
-    content = None if ending in _VTK else _by_trimesh(surface, ending[1:], tints)
-    package = _vtk_package(target) if content is None else ""
-    with atomic_file(target) as partial:
-        if content is not None:
+    if ending not in _VTK:
+        content = _by_trimesh(surface, ending[1:], tints)
+        with atomic_file(target) as partial:
             partial.write_bytes(content)
-        elif package == "meshio":
-            _by_meshio(surface, partial, ending[1:])
-        else:
-            _by_pyvista(surface, partial, ending)
+        return
+    write = next((write for package, write in _VTK_WRITERS.items() if find_spec(package) is not None), None)
+    if write is None:
+        step = "Install one (pip install meshio), or write .stl, .glb or .ply."
+        raise FileError(target, "needs meshio or PyVista, and both are missing", step)
+    with atomic_file(target) as partial:
+        write(surface, partial, ending)
 
 
 def _check_colors(colors: ArrayLike, count: int) -> NDArray[np.uint8]:
@@ -201,18 +190,10 @@ def _in_single_precision(vertices: Array, faces: Indices) -> tuple[Array, Indice
     return rounded.astype(np.float64), faces[(faces != faces[:, [1, 2, 0]]).all(axis=1)]
 
 
-def _vtk_package(file: Path) -> str:
-    for name in ("meshio", "pyvista"):
-        if find_spec(name) is not None:
-            return name
-    step = "Install one (pip install meshio), or write .stl, .glb or .ply."
-    raise FileError(file, "needs meshio or PyVista, and both are missing", step)
-
-
-def _by_meshio(surface: Surface, file: Path, kind: str) -> None:
+def _by_meshio(surface: Surface, file: Path, ending: str) -> None:
     import meshio
 
-    meshio.Mesh(surface.vertices, [("triangle", surface.faces)]).write(str(file), file_format=kind)
+    meshio.Mesh(surface.vertices, [("triangle", surface.faces)]).write(str(file), file_format=ending[1:])
 
 
 def _by_pyvista(surface: Surface, file: Path, ending: str) -> None:
@@ -223,3 +204,6 @@ def _by_pyvista(surface: Surface, file: Path, ending: str) -> None:
     mesh = pyvista.PolyData(surface.vertices, faces.ravel())
     (mesh if ending == ".vtk" else mesh.cast_to_unstructured_grid()).save(str(named))
     os.replace(named, file)
+
+
+_VTK_WRITERS: Final = {"meshio": _by_meshio, "pyvista": _by_pyvista}

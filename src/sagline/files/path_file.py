@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from importlib.metadata import version
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import numpy as np
 
@@ -14,8 +14,7 @@ from sagline.core.arguments import file_path
 from sagline.core.arrays import FARTHEST, Array
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.pose_text import QUATERNION_TOLERANCE, PoseEntry, pose_of_entry
-from sagline.files.quantity import in_si
-from sagline.files.reading import read_text
+from sagline.files.reading import read_text, value_errors
 from sagline.files.table import TABLE_LIMIT, CsvTable, line_error
 from sagline.files.writing import write_text
 from sagline.files.yaml_text import YAML_LIMIT, YamlEntry, dump_mapping, parse_mapping, validate
@@ -34,14 +33,7 @@ EULER = ("alpha", "beta", "gamma")
 QUATERNION = ("qx", "qy", "qz", "qw")
 UNITS = dict(zip(PLACE + EULER + QUATERNION, ("s", "m", "m", "m", "rad", "rad", "rad", "", "", "", ""), strict=True))
 _LEAST_STEP = 1e-12  # shortest time step [s]; differences over shorter steps are too inexact for a velocity
-TIMING_UNITS = {
-    "rate": "1/s",
-    "durations": "s",
-    "speed": "m/s",
-    "acceleration": "m/s^2",
-    "angular_speed": "rad/s",
-    "angular_acceleration": "rad/s^2",
-}
+
 PROFILES = {"quintic": quintic_path, "septic": septic_path}
 
 
@@ -128,10 +120,8 @@ def load_path(file: str | os.PathLike[str]) -> Path:
         raise FileError.of(path, InvalidValueError("the suffix", path.suffix or "missing", ", ".join(readers), step))
     reader, limit = readers[path.suffix.lower()]
     text = read_text(path, limit)
-    try:
+    with value_errors(path):
         return reader(path, text)
-    except InvalidValueError as error:
-        raise FileError.of(path, error) from None
 
 
 class _Waypoint(PoseEntry):
@@ -143,12 +133,12 @@ class _Waypoint(PoseEntry):
 
 
 class _Waypoints(YamlEntry):
-    rate: Any = 100.0
-    durations: Any = None
-    speed: Any = None
-    acceleration: Any = None
-    angular_speed: Any = None
-    angular_acceleration: Any = None
+    rate: Annotated[Any, "1/s"] = 100.0
+    durations: Annotated[Any, "s"] = None
+    speed: Annotated[Any, "m/s"] = None
+    acceleration: Annotated[Any, "m/s^2"] = None
+    angular_speed: Annotated[Any, "rad/s"] = None
+    angular_acceleration: Annotated[Any, "rad/s^2"] = None
     profile: Literal["quintic", "septic"] = "quintic"
     waypoints: list[_Waypoint]
     calibration: dict[str, Any] | None = None  # content of a file of calibration poses
@@ -156,11 +146,7 @@ class _Waypoints(YamlEntry):
 
 def _path_from_yaml(path: FilePath, text: str) -> Path:
     entry = validate(parse_mapping(text, path), _Waypoints, path)
-    timing: dict[str, Any] = {
-        name: in_si(getattr(entry, name), unit, name)
-        for name, unit in TIMING_UNITS.items()
-        if name in entry.model_fields_set
-    }
+    timing = entry.given()
     return PROFILES[entry.profile](
         [pose_of_entry(w, f"waypoints[{k}]") for k, w in enumerate(entry.waypoints)], **timing
     )

@@ -5,10 +5,12 @@ from __future__ import annotations
 import codecs
 import re
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
-from sagline.core.errors import FileError
+from sagline.core.errors import FileError, InvalidValueError
 
 MEGABYTE: Final = 1_000_000
 _IRREGULAR: Final = {
@@ -26,6 +28,15 @@ def check_regular(path: Path, mode: int) -> None:
     if not stat.S_ISREG(mode):
         kind, step = _IRREGULAR.get(stat.S_IFMT(mode), ("no file", "Name a file."))
         raise FileError(path, f"is {kind}", step)
+
+
+@contextmanager
+def value_errors(path: Path | str) -> Iterator[None]:
+    """Name the file `path` in the errors of its values."""
+    try:
+        yield
+    except InvalidValueError as error:
+        raise FileError.of(path, error) from None
 
 
 def unreadable(path: Path, error: Exception) -> FileError:

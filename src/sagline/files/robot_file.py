@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from sagline.core.arguments import brief, file_path, instance
 from sagline.core.arrays import Array
 from sagline.core.errors import FileError, InvalidValueError, nearest
-from sagline.files.reading import exists, read_text
-from sagline.files.robot_schema import SWIVEL_AXES, ObstacleEntry, RobotEntry
+from sagline.files.reading import exists, read_text, value_errors
+from sagline.files.robot_schema import SWIVEL_AXES, RobotEntry
 from sagline.files.yaml_text import YAML_LIMIT, dump_mapping, parse_mapping, validate
 from sagline.robot.catalogue import preset_text, robot_names
 from sagline.robot.robot import Robot
@@ -75,10 +75,8 @@ def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
 def parse_robot(text: str, origin: Path | str) -> Robot:
     """Read the robot from the text of a robot file."""
     entry = _robot_entry(text, origin)
-    try:
+    with value_errors(origin):
         return entry.robot()
-    except InvalidValueError as error:
-        raise FileError.of(origin, error) from None
 
 
 def _robot_entry(text: str, origin: Path | str) -> RobotEntry:
@@ -196,17 +194,15 @@ def load_scene(file: str | os.PathLike[str]) -> tuple[Obstacle, ...]:
     """
     path = file_path(file, "file")
     entry = _robot_entry(read_text(path, YAML_LIMIT), path)
-    return tuple(_obstacle(place, f"scene[{k}]", path) for k, place in enumerate(entry.scene))
+    with value_errors(path):
+        solids = [place.solid(f"scene[{k}]") for k, place in enumerate(entry.scene)]
+    found: list[Obstacle] = []
+    for k, (place, solid) in enumerate(zip(entry.scene, solids, strict=True)):
+        if solid is None:
+            from sagline.files.mesh_file import load_mesh
 
-
-def _obstacle(place: ObstacleEntry, item: str, path: Path) -> Obstacle:
-    """Convert an entry of a scene to an obstacle. A mesh is loaded from the folder of the robot file."""
-    try:
-        solid = place.solid(item)
-    except InvalidValueError as error:
-        raise FileError.of(path, error) from None
-    if solid is not None:
-        return solid
-    from sagline.files.mesh_file import load_mesh
-
-    return load_mesh(path.parent / str(place.mesh), place.unit, place.name).placed(place.pose(item))
+            mesh = load_mesh(path.parent / str(place.mesh), place.unit, place.name)
+            found.append(mesh.placed(place.pose(f"scene[{k}]")))
+        else:
+            found.append(solid)
+    return tuple(found)

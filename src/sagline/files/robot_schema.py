@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import reprlib
-from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any, Final, TypeAlias
 
 import numpy as np
 from pydantic import Field, create_model, model_validator
@@ -14,7 +14,7 @@ from sagline.core.arguments import label
 from sagline.core.arrays import Array, checked, exactly, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.fields import units
-from sagline.files.quantity import in_si, plain_number
+from sagline.files.quantity import plain_number
 from sagline.files.yaml_text import YamlEntry
 from sagline.robot.inertia import box_inertia, cylinder_inertia
 from sagline.robot.pose import Pose, PoseBox
@@ -33,31 +33,9 @@ _KINDS: Final = {  # kinds of obstacles, and the further keys that each kind all
 }
 _EITHER: Final = "one of box, capsule, sphere, mesh"
 _ERROR: Final = "calibration.standard_error."  # prefix of the keys of standard errors
-_UNITS: Final = {
-    "frame_anchors": "m",
-    "platform_anchors": "m",
-    "mass": "kg",
-    "center_of_mass": "m",
-    "gravity": "m/s^2",
-    "plane_normal": "",
-    "tension_min": "N",
-    "tension_max": "N",
-    "platform_size": "m",
-    "frame_size": "m",
-    "cables.youngs_modulus": "Pa",
-    "cables.section_area": "m^2",
-    "cables.radius": "m",
-    "inertia.box": "m",
-    "inertia.cylinder_radius": "m",
-    "inertia.cylinder_height": "m",
-    **{f"tolerances.{name}": what.unit for name, what in UNCERTAIN.items()},
-    **{f"{_ERROR}{name}": what.unit for name, what in UNCERTAIN.items()},
-    "test_box.low": "m",
-    "test_box.high": "m",
-    "test_box.tilt": "rad",
-    **{f"cables.{name}": unit for name, unit in units(Cable).items()},
-    **{f"winches.{name}": unit for name, unit in units(Winch).items()},
-}  # the unit of all other keys of inertia is kg m^2
+Meters: TypeAlias = Annotated[Any, "m"]
+Newtons: TypeAlias = Annotated[Any, "N"]
+Moment: TypeAlias = Annotated[Any, "kg*m^2"]  # moment or product of inertia
 SWIVEL_AXES: Final = {"up": [0.0, 0.0, 1.0], "down": [0.0, 0.0, -1.0]}  # words for vertical directions
 
 
@@ -65,15 +43,15 @@ class ObstacleEntry(YamlEntry):
     """Obstacle around the robot; `_KINDS` lists the allowed combinations of keys."""
 
     name: str
-    box: Any = None  # edges of a box
-    center: Any = None  # center of a box
-    capsule: Any = None  # end points of the axis of a capsule
-    sphere: Any = None  # center of a sphere
-    radius: Any = None  # radius of a capsule or sphere
+    box: Meters = None  # edges of a box
+    center: Meters = None  # center of a box
+    capsule: Meters = None  # end points of the axis of a capsule
+    sphere: Meters = None  # center of a sphere
+    radius: Meters = None  # radius of a capsule or sphere
     mesh: str | None = None  # file in the folder of the robot file
     unit: str = "m"  # unit of the coordinates of a mesh
-    position: Any = None  # position of the origin of a mesh
-    turned: Any = 0.0  # angle of a box or mesh about z
+    position: Meters = None  # position of the origin of a mesh
+    turned: Annotated[Any, "rad"] = 0.0  # angle of a box or mesh about z
 
     def _kind(self, item: str) -> str:
         """Kind of the obstacle; raise InvalidValueError for a combination of keys that is not allowed."""
@@ -102,32 +80,27 @@ class ObstacleEntry(YamlEntry):
             meters(self.unit, f"{item}.unit")
             return None
         if kind == "box":
-            size = exactly(in_si(self.box, "m", f"{item}.box"), f"{item}.box", "m", (3,), above=0.0)
+            size = exactly(self.si("box", f"{item}."), f"{item}.box", "m", (3,), above=0.0)
             return Box(size, self._point(item, "center"), self.pose(item).matrix, self.name)
-        radius = number(in_si(self.radius, "m", f"{item}.radius"), f"{item}.radius", "m", low=0.0)
+        radius = number(self.si("radius", f"{item}."), f"{item}.radius", "m", low=0.0)
         if kind == "sphere":
             return Sphere(self._point(item, "sphere"), radius, self.name)
-        ends = exactly(in_si(self.capsule, "m", f"{item}.capsule"), f"{item}.capsule", "m", (2, 3))
+        ends = exactly(self.si("capsule", f"{item}."), f"{item}.capsule", "m", (2, 3))
         return Capsule(ends[0], ends[1], radius, self.name)
 
     def pose(self, item: str) -> Pose:
         """Pose of the obstacle's frame: the position of a mesh, and the rotation about z."""
-        angle = number(in_si(self.turned, "rad", f"{item}.turned"), f"{item}.turned", "rad")
+        angle = number(self.si("turned", f"{item}."), f"{item}.turned", "rad")
         return Pose.from_euler(self._point(item, "position"), angle, 0.0, 0.0)
 
     def _point(self, item: str, key: str) -> Any:
-        value = getattr(self, key)
-        place = f"{item}.{key}"
-        return np.zeros(3) if value is None else exactly(in_si(value, "m", place), place, "m", (3,))
+        if getattr(self, key) is None:
+            return np.zeros(3)
+        return exactly(self.si(key, f"{item}."), f"{item}.{key}", "m", (3,))
 
 
 class _RobotPart(YamlEntry):
     """Schema of a mapping in a robot file."""
-
-    def given(self, key: str, within: str = "") -> Any:
-        """Value of the key `key` in SI."""
-        item = within + key
-        return in_si(getattr(self, key), _UNITS.get(item, "kg*m^2"), item)
 
     def only_way(self, item: str, ways: tuple[tuple[str, ...], ...], beside: tuple[str, ...]) -> tuple[str, ...]:
         """Set of the given keys without the keys in `beside`. Raise an error if it is not one of the `ways`."""
@@ -143,22 +116,22 @@ class _RobotPart(YamlEntry):
         )
 
 
-def _with_keys(names: Iterable[str]) -> Any:
-    """Create the schema of a mapping with optional keys of these names."""
-    keys: dict[str, Any] = dict.fromkeys(names, (Any, None))
-    return create_model("_Keys", __base__=_RobotPart, **keys)
+def _with_keys(units_of_keys: Mapping[str, str]) -> Any:
+    """Create the schema of a mapping with optional keys; `units_of_keys`: unit of each key."""
+    keys: dict[str, Any] = {name: (Annotated[Any, unit], None) for name, unit in units_of_keys.items()}
+    return create_model("_Keys", __base__=YamlEntry, **keys)
 
 
 class _Cables(_RobotPart):
     """Schema of the cables. Each value is one number for all cables, or a list."""
 
-    linear_density: Any
-    axial_stiffness: Any = None
-    youngs_modulus: Any = None
-    section_area: Any = None
-    radius: Any = None
-    diameter: Any = None
-    expansion: Any = None
+    linear_density: Annotated[Any, "kg/m"]
+    axial_stiffness: Newtons = None
+    youngs_modulus: Annotated[Any, "Pa"] = None
+    section_area: Annotated[Any, "m^2"] = None
+    radius: Meters = None
+    diameter: Meters = None
+    expansion: Annotated[Any, "1/K"] = None
 
     def cable(self) -> Cable:
         """Create the cables. Their stiffness follows from the given keys; the default section, from the diameter."""
@@ -167,29 +140,28 @@ class _Cables(_RobotPart):
         if self.model_fields_set & {"axial_stiffness", "section_area"}:
             beside.append("diameter")
         *_, section = self.only_way("cables: stiffness", ways, beside=tuple(beside))
-        density = self.given("linear_density", "cables.")
-        width = self.given(section, "cables.")
-        known = {key: self.given(key, "cables.") for key in ("diameter", "expansion") if key in self.model_fields_set}
+        density = self.si("linear_density", "cables.")
+        width = self.si(section, "cables.")
+        known = {key: self.si(key, "cables.") for key in ("diameter", "expansion") if key in self.model_fields_set}
         if section == "axial_stiffness":
             return Cable(density, width, **known)
         if section != "section_area":
             radius = checked(width, f"cables.{section}", "m", above=0.0) * (0.5 if section == "diameter" else 1.0)
             known.setdefault("diameter", 2.0 * radius)
             width = np.pi * radius**2
-        return Cable.from_material(density, self.given("youngs_modulus", "cables."), width, **known)
+        return Cable.from_material(density, self.si("youngs_modulus", "cables."), width, **known)
 
 
 class _Winches(_with_keys(units(Winch))):  # type: ignore[misc]
     """Schema of the winches and pulleys. Each value is one number for all cables, or a list."""
 
-    swivel_axis: Any = None  # a vector or a word
+    swivel_axis: Annotated[Any, ""] = None  # a vector or a word
 
     def winches(self) -> Winch:
         """Create the winches. Missing values are the defaults of `Winch`."""
         if "swivel_axis" in self.model_fields_set:
             self.swivel_axis = _vectors(self.swivel_axis)
-        keys = [key for key in _Winches.model_fields if key in self.model_fields_set]
-        return Winch(**{key: self.given(key, "winches.") for key in keys})
+        return Winch(**self.given("winches."))
 
 
 def _vectors(value: object) -> object:
@@ -212,17 +184,17 @@ def _vectors(value: object) -> object:
 class _Inertia(_RobotPart):
     """Schema of the inertia about the center of mass: matrix, diagonal, elements, or solid body of the robot's mass."""
 
-    matrix: Any = None
-    diagonal: Any = None
-    Ixx: Any = None
-    Iyy: Any = None
-    Izz: Any = None
-    Ixy: Any = 0.0  # this and the next two are elements of the matrix: negative products of inertia
-    Ixz: Any = 0.0
-    Iyz: Any = 0.0
-    box: Any = None
-    cylinder_radius: Any = None
-    cylinder_height: Any = None
+    matrix: Moment = None
+    diagonal: Moment = None
+    Ixx: Moment = None
+    Iyy: Moment = None
+    Izz: Moment = None
+    Ixy: Moment = 0.0  # this and the next two are elements of the matrix: negative products of inertia
+    Ixz: Moment = 0.0
+    Iyz: Moment = 0.0
+    box: Meters = None
+    cylinder_radius: Meters = None
+    cylinder_height: Meters = None
 
     @model_validator(mode="before")
     @classmethod
@@ -237,7 +209,7 @@ class _Inertia(_RobotPart):
         ways = (("matrix",), ("diagonal",), ("Ixx", "Iyy", "Izz"), ("box",), ("cylinder_radius", "cylinder_height"))
         mixed = ("Ixy", "Ixz", "Iyz") if "Ixx" in self.model_fields_set else ()
         way = self.only_way("inertia", ways, beside=mixed)
-        values = [self.given(key, "inertia.") for key in way]
+        values = [self.si(key, "inertia.") for key in way]
         match way[0]:
             case "matrix":
                 return exactly(values[0], "inertia", "kg m^2", (3, 3))
@@ -249,19 +221,19 @@ class _Inertia(_RobotPart):
                 sizes = zip(values, way, strict=True)
                 return cylinder_inertia(mass, *(number(v, f"inertia.{key}", "m", above=0.0) for v, key in sizes))
         xx, yy, zz = values
-        xy, xz, yz = (self.given(key, "inertia.") for key in ("Ixy", "Ixz", "Iyz"))
+        xy, xz, yz = (self.si(key, "inertia.") for key in ("Ixy", "Ixz", "Iyz"))
         return exactly([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], "inertia", "kg m^2", (3, 3))
 
 
-class _TestBox(_RobotPart):
+class _TestBox(YamlEntry):
     """Schema of the test box: poses for tests of the robot."""
 
-    low: Any
-    high: Any
-    tilt: Any = 0.0
+    low: Meters
+    high: Meters
+    tilt: Annotated[Any, "rad"] = 0.0
 
 
-class _Deviations(_with_keys(UNCERTAIN)):  # type: ignore[misc]
+class _Deviations(_with_keys({name: what.unit for name, what in UNCERTAIN.items()})):  # type: ignore[misc]
     """Schema of standard deviations of a robot's values: one number per field, per axis, or per value."""
 
     def of(self, robot: Robot, within: str) -> dict[str, Any]:
@@ -272,7 +244,7 @@ class _Deviations(_with_keys(UNCERTAIN)):  # type: ignore[misc]
             if UNCERTAIN[key].share and _in_percent(value):
                 found[key] = of_share(_share(value, item), value_of(robot, key), item.replace(".", ": "))
             else:
-                found[key] = self.given(key, within)
+                found[key] = self.si(key, within)
         return found
 
 
@@ -293,7 +265,7 @@ def _share(value: Any, item: str) -> Any:
     return number / 100.0
 
 
-class _Calibration(_RobotPart):
+class _Calibration(YamlEntry):
     """Schema of the calibration that has determined some of the values."""
 
     log: str
@@ -306,25 +278,25 @@ class _Calibration(_RobotPart):
         return Provenance(self.log, self.date, self.standard_error.of(robot, _ERROR), self.note)
 
 
-class RobotEntry(_RobotPart):
+class RobotEntry(YamlEntry):
     """Schema of a whole robot file. The keys are the fields of `Robot`, and so are the defaults."""
 
     name: str
-    frame_anchors: Any
-    platform_anchors: Any
+    frame_anchors: Meters
+    platform_anchors: Meters
     cables: _Cables
     winches: _Winches | None = None
-    mass: Any
+    mass: Annotated[Any, "kg"]
     inertia: _Inertia | None = None
-    center_of_mass: Any = None
-    gravity: Any = None
+    center_of_mass: Meters = None
+    gravity: Annotated[Any, "m/s^2"] = None
     motion_pattern: str = ""
-    plane_normal: Any = None
-    tension_min: Any = None
-    tension_max: Any = None
+    plane_normal: Annotated[Any, ""] = None
+    tension_min: Newtons = None
+    tension_max: Newtons = None
     tension_limits_of: str = ""
-    platform_size: Any = None
-    frame_size: Any = None
+    platform_size: Meters = None
+    frame_size: Meters = None
     test_box: _TestBox | None = None
     source: str = ""
     assumed: dict[str, str] = Field(default_factory=dict)
@@ -336,7 +308,7 @@ class RobotEntry(_RobotPart):
     def robot(self) -> Robot:
         """Create the robot that the file describes."""
         keys = self.model_fields_set - {"scene", "tolerances", "calibration"}
-        fields = {key: self.given(key) if key in _UNITS else getattr(self, key) for key in keys}
+        fields = {key: getattr(self, key) for key in keys} | self.given()
         for k, place in enumerate(self.scene):
             place.solid(f"scene[{k}]")
         fields["cables"] = self.cables.cable()
@@ -346,7 +318,7 @@ class RobotEntry(_RobotPart):
             mass = number(fields["mass"], "mass", "kg", above=0.0)
             fields["inertia"] = self.inertia.about_center(mass)
         if self.test_box is not None:
-            fields["test_box"] = PoseBox(*(self.test_box.given(key, "test_box.") for key in ("low", "high", "tilt")))
+            fields["test_box"] = PoseBox(**self.test_box.given("test_box."))
         return self._with_tolerances(Robot(**fields))
 
     def _with_tolerances(self, robot: Robot) -> Robot:

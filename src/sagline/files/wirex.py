@@ -13,7 +13,8 @@ import numpy as np
 from sagline.cables.cable import Cable
 from sagline.core.arguments import file_path, optional
 from sagline.core.arrays import Array
-from sagline.core.errors import FileError, InvalidValueError
+from sagline.core.errors import InvalidValueError
+from sagline.files.reading import value_errors
 from sagline.files.robot_xml import (
     Imported,
     cables_of_file,
@@ -58,12 +59,10 @@ def load_wirex(source: str | os.PathLike[str], cables: Cable | None = None) -> I
     """
     optional(cables, Cable, "cables")
     path = file_path(source, "source")
-    try:
+    with value_errors(path):
         root = read_xml(path)
         _check_generation(root)
         return _robot(root, path.stem, cables)
-    except InvalidValueError as error:
-        raise FileError.of(path, error) from None
 
 
 def _check_generation(root: Element) -> None:

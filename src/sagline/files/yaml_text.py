@@ -13,7 +13,7 @@ import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from sagline.core.errors import FileError, nearest
-from sagline.files.quantity import plain_number
+from sagline.files.quantity import in_si, plain_number
 from sagline.files.reading import error_at_line
 
 if TYPE_CHECKING:
@@ -31,9 +31,25 @@ _WORDS: Final = {
 
 
 class YamlEntry(BaseModel):
-    """Base class of the schemas: only declared keys are allowed, and types are not converted."""
+    """Base class of the schemas: only declared keys are allowed, and types are not converted.
+
+    A quantity is declared with its unit: `mass: Annotated[Any, "kg"]`.
+    """
 
     model_config = ConfigDict(extra="forbid", strict=True)
+
+    def si(self, key: str, within: str = "") -> Any:
+        """Quantity of the key `key` in SI units; `within` precedes the key in messages."""
+        return in_si(getattr(self, key), type(self).model_fields[key].metadata[0], within + key)
+
+    def given(self, within: str = "") -> dict[str, Any]:
+        """Quantities in SI units of all keys that the file contains."""
+        return {key: self.si(key, within) for key in units_of(type(self)) if key in self.model_fields_set}
+
+
+def units_of(schema: type[YamlEntry]) -> dict[str, str]:
+    """Units of the quantities of a schema, by key."""
+    return {key: str(field.metadata[0]) for key, field in schema.model_fields.items() if field.metadata}
 
 
 Schema = TypeVar("Schema", bound=YamlEntry)

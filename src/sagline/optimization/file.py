@@ -5,15 +5,16 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from functools import partial
-from typing import Any, Final, TypeVar
+from typing import Annotated, Any, Final, TypeVar
 
 from pydantic import model_validator
 
 from sagline.cables.cable import Cable
 from sagline.core.arguments import choice, file_path
-from sagline.core.errors import FileError, InvalidValueError
+from sagline.core.errors import InvalidValueError
+from sagline.core.fields import units
 from sagline.files.quantity import in_si
-from sagline.files.reading import read_text
+from sagline.files.reading import read_text, value_errors
 from sagline.files.yaml_text import YAML_LIMIT, YamlEntry, parse_mapping, validate
 from sagline.optimization.candidates import AnchorErrors
 from sagline.optimization.free import CableChoice, Free, FreeCable, FreeLimit
@@ -75,60 +76,48 @@ def load_design(file: str | os.PathLike[str]) -> dict[str, Any]:
     """
     path = file_path(file)
     entry = validate(parse_mapping(read_text(path, YAML_LIMIT), path), _Design, path)
-    try:
+    with value_errors(path):
         return entry.arguments()
-    except InvalidValueError as error:
-        raise FileError.of(path, error) from None
 
 
-class _Part(YamlEntry):
-    """A mapping in a design file."""
-
-    def si(self, key: str, unit: str) -> Any:
-        """Quantity of a key in SI units."""
-        return in_si(getattr(self, key), unit, key)
-
-    def given(self, **units: str) -> dict[str, Any]:
-        """Quantities of several keys in SI units; `units` has the unit of each key."""
-        return {key: self.si(key, unit) for key, unit in units.items() if key in self.model_fields_set}
-
-
-class _Anchors(_Part):
-    low: Any
-    high: Any
-    along: Any = None
+class _Anchors(YamlEntry):
+    low: Annotated[Any, "m"]
+    high: Annotated[Any, "m"]
+    along: Annotated[Any, ""] = None
     cables: list[int] | None = None
     symmetry: str | None = None
 
     def free(self, end: str) -> Free:
-        along = None if self.along is None else self.si("along", "")
-        bounds = [self.si(key, "m") for key in ("low", "high")]
-        return FreeAnchors(end, *bounds, along=along, cables=self.cables, symmetry=self.symmetry)
+        along = None if self.along is None else self.si("along")
+        return FreeAnchors(
+            end, self.si("low"), self.si("high"), along=along, cables=self.cables, symmetry=self.symmetry
+        )
 
 
-class _Limit(_Part):
-    low: Any
-    high: Any
+class _Limit(YamlEntry):
+    low: Annotated[Any, "N"]
+    high: Annotated[Any, "N"]
     cables: list[int] | None = None
 
     def free(self, which: str) -> Free:
-        return FreeLimit(which, *(self.si(key, "N") for key in ("low", "high")), cables=self.cables)
+        return FreeLimit(which, **self.given(), cables=self.cables)
 
 
-class _Choice(_Part):
+class _Choice(YamlEntry):
     name: str
-    linear_density: Any
-    axial_stiffness: Any
-    diameter: Any = None
-    cost: Any = None
-    tension_max: Any = None
+    linear_density: Annotated[Any, "kg/m"]
+    axial_stiffness: Annotated[Any, "N"]
+    diameter: Annotated[Any, "m"] = None
+    cost: Annotated[Any, ""] = None
+    tension_max: Annotated[Any, "N"] = None
 
     def choice(self) -> CableChoice:
-        cable = Cable(**self.given(linear_density="kg/m", axial_stiffness="N", diameter="m"))
-        return CableChoice(self.name, cable, **self.given(cost="", tension_max="N"))
+        found = self.given()
+        cable = Cable(**{key: found.pop(key) for key in units(Cable) if key in found})
+        return CableChoice(self.name, cable, **found)
 
 
-class _Free(_Part):
+class _Free(YamlEntry):
     frame_anchors: _Anchors | None = None
     platform_anchors: _Anchors | None = None
     tension_min: _Limit | None = None
@@ -151,12 +140,12 @@ class _Free(_Part):
         return _made(where, lambda: free(key.removesuffix("_anchors")))
 
 
-class _Goal(_Part):
+class _Goal(YamlEntry):
     goal: str | None = None
     maximize: str | None = None
     minimize: str | None = None
-    weight: Any = 1.0
-    scale: Any = None
+    weight: Annotated[Any, ""] = 1.0
+    scale: Any = None  # its unit is that of the goal
 
     @model_validator(mode="before")
     @classmethod
@@ -172,19 +161,19 @@ class _Goal(_Part):
             raise InvalidValueError("name", value, f"one of {', '.join(WAYS)}", "Write - maximize: workspace_share.")
         way = given[0]
         kind = choice(getattr(self, way), way, KINDS)
-        scale = None if self.scale is None else self.si("scale", KINDS[kind].unit)
+        scale: Any = None if self.scale is None else in_si(self.scale, KINDS[kind].unit, "scale")
         maximize = None if way == "goal" else way == "maximize"
-        return Goal(kind, maximize=maximize, weight=self.si("weight", ""), scale=scale)
+        return Goal(kind, maximize=maximize, weight=self.si("weight"), scale=scale)
 
 
-class _Accelerations(_Part):
-    linear: Any = 0.0
-    angular: Any = 0.0
+class _Accelerations(YamlEntry):
+    linear: Annotated[Any, "m/s^2"] = 0.0
+    angular: Annotated[Any, "rad/s^2"] = 0.0
 
 
-class _Wrenches(_Part):
-    force: Any = 0.0
-    moment: Any = 0.0
+class _Wrenches(YamlEntry):
+    force: Annotated[Any, "N"] = 0.0
+    moment: Annotated[Any, "N*m"] = 0.0
     center: Any = None
     accelerations: _Accelerations | None = None
 
@@ -193,29 +182,27 @@ class _Wrenches(_Part):
         center = self.center
         if isinstance(center, list) and len(center) == 6:
             center = [in_si(one, "N" if k < 3 else "N*m", f"center[{k}]") for k, one in enumerate(center)]
-        found = WrenchBox(self.si("force", "N"), self.si("moment", "N*m"), center)
-        if self.accelerations is None:
-            return found
-        return found + Accelerations(**self.accelerations.given(linear="m/s^2", angular="rad/s^2"))
+        found = WrenchBox(self.si("force"), self.si("moment"), center)
+        return found if self.accelerations is None else found + Accelerations(**self.accelerations.given())
 
 
-class _Box(_Part):
-    low: Any
-    high: Any
+class _Box(YamlEntry):
+    low: Annotated[Any, "m"]
+    high: Annotated[Any, "m"]
 
 
-class _Robust(_Part):
-    deviation: Any
+class _Robust(YamlEntry):
+    deviation: Annotated[Any, "m"]
     samples: int = 8
     take: str = "worst"
     seed: int = 0
 
     def errors(self) -> AnchorErrors:
         """Sample of anchor errors."""
-        return AnchorErrors(self.si("deviation", "m"), samples=self.samples, take=self.take, seed=self.seed)
+        return AnchorErrors(**self.model_dump() | self.given())
 
 
-class _Design(_Part):
+class _Design(YamlEntry):
     free: list[_Free]
     goals: list[_Goal]
     wrenches: _Wrenches | None = None
@@ -241,7 +228,7 @@ class _Design(_Part):
         if self.wrenches is not None:
             found["wrenches"] = _made("wrenches", self.wrenches.wrenches)
         if self.box is not None:
-            found["box"] = _made("box", partial(PoseBox, **self.box.given(low="m", high="m")))
+            found["box"] = _made("box", partial(PoseBox, **self.box.given()))
         if self.grid:
             found["grid"] = tuple(self.grid)
         if self.robust is not None:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Annotated, Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from sagline.cables.models import model_of
 from sagline.core.arguments import brief, file_path, whole_number
@@ -16,18 +15,17 @@ from sagline.core.errors import FileError, InvalidValueError
 from sagline.core.memory import check_memory
 from sagline.files.path_file import load_path
 from sagline.files.quantity import in_si
-from sagline.files.reading import read_text
+from sagline.files.reading import read_text, value_errors
 from sagline.files.robot_file import load_robot
-from sagline.files.yaml_text import YAML_LIMIT, YamlEntry, parse_mapping, validate
+from sagline.files.yaml_text import YAML_LIMIT, YamlEntry, parse_mapping, units_of, validate
 from sagline.robot.catalogue import robot_names
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.sweep.request import Request
 from sagline.tension.methods import method_of
-from sagline.workspaces.wrench_sets import WrenchBox, WrenchSet
+from sagline.workspaces.wrench_sets import WrenchBox
 
 KEYS: Final = ("low", "high", "count")  # keys of an axis: its two ends, and the number of points
-ANGLES: Final = ("alpha", "beta", "gamma")
 MOST: Final = 1_000_000  # largest number of points along an axis
 _POINT_BYTES: Final = 400.0  # memory per point of a grid while poses are made [bytes]
 
@@ -35,12 +33,12 @@ _POINT_BYTES: Final = 400.0  # memory per point of a grid while poses are made [
 class _Grid(YamlEntry):
     """A grid of poses; each coordinate is a value or an axis."""
 
-    x: Any
-    y: Any
-    z: Any
-    alpha: Any = 0.0
-    beta: Any = 0.0
-    gamma: Any = 0.0
+    x: Annotated[Any, "m"]
+    y: Annotated[Any, "m"]
+    z: Annotated[Any, "m"]
+    alpha: Annotated[Any, "rad"] = 0.0
+    beta: Annotated[Any, "rad"] = 0.0
+    gamma: Annotated[Any, "rad"] = 0.0
 
 
 class _Poses(YamlEntry):
@@ -51,12 +49,12 @@ class _Poses(YamlEntry):
 class _Loads(YamlEntry):
     """A grid of forces and moments; each component is a value or an axis."""
 
-    force_x: Any = 0.0
-    force_y: Any = 0.0
-    force_z: Any = 0.0
-    moment_x: Any = 0.0
-    moment_y: Any = 0.0
-    moment_z: Any = 0.0
+    force_x: Annotated[Any, "N"] = 0.0
+    force_y: Annotated[Any, "N"] = 0.0
+    force_z: Annotated[Any, "N"] = 0.0
+    moment_x: Annotated[Any, "N*m"] = 0.0
+    moment_y: Annotated[Any, "N*m"] = 0.0
+    moment_z: Annotated[Any, "N*m"] = 0.0
 
 
 class _Wrenches(YamlEntry):
@@ -67,8 +65,8 @@ class _Wrenches(YamlEntry):
 class _Around(YamlEntry):
     """Loads around each wrench: the largest force and moment components, each as one number or three numbers."""
 
-    force: Any = 0.0
-    moment: Any = 0.0
+    force: Annotated[Any, "N"] = 0.0
+    moment: Annotated[Any, "N*m"] = 0.0
 
 
 class _SweepEntry(YamlEntry):
@@ -121,7 +119,7 @@ def load_sweep(file: os.PathLike[str] | str) -> Request:
         step = "Give a sweep file: sagline examples writes one."
         raise FileError.of(path, InvalidValueError("the suffix", path.suffix or "missing", ".yaml, .yml", step))
     entry = validate(parse_mapping(read_text(path, YAML_LIMIT), path), _SweepEntry, path)
-    try:
+    with value_errors(path):
         return Request(
             _robots(entry.robots, path.parent),
             _poses(entry.poses, path.parent),
@@ -129,11 +127,9 @@ def load_sweep(file: os.PathLike[str] | str) -> Request:
             entry.quantities,
             model=model_of(entry.model),
             tension=method_of(entry.tension),
-            around=None if entry.around is None else _around(entry.around),
+            around=None if entry.around is None else WrenchBox(**entry.around.given("around.")),
             moment_arm=None if entry.moment_arm is None else _one(entry.moment_arm, "moment_arm", "m"),
         )
-    except InvalidValueError as error:
-        raise FileError.of(path, error) from None
 
 
 def _robots(given: Any, folder: Path) -> list[Robot]:
@@ -156,8 +152,8 @@ def _poses(given: _Poses, folder: Path) -> Pose:
         raise InvalidValueError("poses", both, "a grid, or a path", "Give one of the two.")
     if given.path is not None:
         return load_path(folder / file_path(given.path, "poses.path")).pose
-    units = dict.fromkeys("xyz", "m") | dict.fromkeys(ANGLES, "rad")
-    points = _product({name: _axis(value, f"poses.grid.{name}", units[name]) for name, value in given.grid or ()})
+    assert given.grid is not None
+    points = _product(given.grid, "poses.grid.")
     return Pose.from_euler(points[:, :3], *points[:, 3:].T)
 
 
@@ -168,25 +164,16 @@ def _wrenches(given: _Wrenches | None) -> Array | None:
         both = "given by grid and rows" if given.grid is not None else "given by nothing"
         raise InvalidValueError("wrenches", both, "a grid, or rows", "Give one of the two, or leave wrenches out.")
     if given.grid is not None:
-        return _product({name: _axis(value, f"wrenches.grid.{name}", _unit(name)) for name, value in given.grid})
-    names = tuple(_Loads.model_fields)
+        return _product(given.grid, "wrenches.grid.")
+    units = units_of(_Loads)
     rows = []
     for k, row in enumerate(given.rows or ()):
-        if not isinstance(row, list) or len(row) != len(names):
+        if not isinstance(row, list) or len(row) != len(units):
             step = "Give force x, y, z, then moment x, y, z."
             raise InvalidValueError(f"wrenches.rows[{k}]", brief(row), "a list of six quantities", step)
-        pairs = zip(names, row, strict=True)
-        rows.append([_one(value, f"wrenches.rows[{k}]: {name}", _unit(name)) for name, value in pairs])
-    return np.array(rows).reshape(-1, len(names))
-
-
-def _around(given: _Around) -> WrenchSet:
-    force, moment = in_si(given.force, "N", "around.force"), in_si(given.moment, "N*m", "around.moment")
-    return WrenchBox(cast(ArrayLike, force), cast(ArrayLike, moment))
-
-
-def _unit(name: str) -> str:
-    return "N" if name.startswith("force") else "N*m"
+        cells = zip(row, units.items(), strict=True)
+        rows.append([_one(value, f"wrenches.rows[{k}]: {name}", unit) for value, (name, unit) in cells])
+    return np.array(rows).reshape(-1, len(units))
 
 
 def _one(given: Any, item: str, unit: str) -> float:
@@ -210,8 +197,9 @@ def _axis(given: Any, item: str, unit: str) -> Array:
     return np.linspace(low, high, count)
 
 
-def _product(axes: dict[str, Array]) -> Array:
-    """All points of a grid, shape (N, axes); the last axis varies fastest."""
-    count = int(np.prod([float(len(axis)) for axis in axes.values()]))
+def _product(grid: _Grid | _Loads, within: str) -> Array:
+    """All points of a grid, shape (N, axes), in SI; the last axis varies fastest."""
+    axes = [_axis(getattr(grid, name), within + name, unit) for name, unit in units_of(type(grid)).items()]
+    count = int(np.prod([float(len(axis)) for axis in axes]))
     check_memory(f"a grid of {count:,} points", _POINT_BYTES * count, "Give fewer points.")
-    return np.stack(np.meshgrid(*axes.values(), indexing="ij"), axis=-1).reshape(-1, len(axes))
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
