@@ -16,7 +16,7 @@ import sagline as sl
 from sagline import SaglineError
 from sagline.core.errors import printable
 from sagline.files.pose_text import pose_of_text
-from sagline.files.table import load_counts, load_lengths
+from sagline.files.table import load_readings
 from tests.effort import least_seconds
 
 SECONDS: Final = 2.0  # of processor time of an ordinary machine
@@ -170,8 +170,8 @@ READERS: Final = (
     Reader("robot.yaml", ROBOT, sl.load_robot),
     Reader("tour.yaml", WAYPOINTS, sl.load_path),
     Reader("tour.csv", PATH, sl.load_path),
-    Reader("lengths.csv", LENGTHS, lambda file: load_lengths(file, 4, 5.0)),
-    Reader("counts.csv", COUNTS, lambda file: load_counts(file, 4)),
+    Reader("lengths.csv", LENGTHS, lambda file: load_readings(file, "length", 4, 5.0)),
+    Reader("counts.csv", COUNTS, lambda file: load_readings(file, "count", 4)),
     Reader("cable.csv", MEASURED, sl.load_measurements),
     Reader("winches.csv", LOG, sl.load_log),
     Reader("shelf.wcrfx", WIREX, sl.load_wirex),

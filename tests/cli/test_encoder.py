@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 import sagline as sl
 from sagline.cli.main import app
-from sagline.files.table import load_counts
+from sagline.files.table import load_readings
 from tests.kinematics.winches import wound
 from tests.refusal import refused
 from tests.tiers import extended, wide
@@ -120,13 +120,13 @@ def test_exceeded_limits_of_winches_are_printed() -> None:
 def test_errors_in_a_file_of_counts_are_named_with_their_line(text: str, line: int, named: str, allowed: str) -> None:
     Path("counts.csv").write_text(text)
     with refused(f"line {line}", allowed=allowed, kind=sl.FileError, file="counts.csv") as caught:
-        load_counts("counts.csv", 3)
+        load_readings("counts.csv", "count", 3)
     assert named in caught.value.value
 
 
 def test_counts_may_be_negative() -> None:
     Path("counts.csv").write_text("time [ms],C0,C1\n0,-5,7\n10,0,1e3\n")
-    read = load_counts("counts.csv", 2)
-    assert read.time is not None
-    assert read.time.tolist() == [0.0, 0.01]
-    assert read.counts.tolist() == [[-5.0, 7.0], [0.0, 1000.0]]
+    time, counts = load_readings("counts.csv", "count", 2)
+    assert time is not None
+    assert time.tolist() == [0.0, 0.01]
+    assert counts.tolist() == [[-5.0, 7.0], [0.0, 1000.0]]

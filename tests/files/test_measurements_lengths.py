@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from sagline import FileError, load_measurements
-from sagline.files.table import load_lengths
+from sagline.files.table import load_readings
 from tests.refusal import refused
 
 
@@ -17,15 +17,15 @@ def test_lengths_that_look_like_millimeters_are_told(tmp_path: Path) -> None:
     file = written(tmp_path, "L0,L1\n5.25,4.5\n5285,4500\n")
     allowed = "lengths like the robot's 18.2 m; if these are millimeters, call the column length_0 [mm]"
     with refused("line 3", "length_0 is 5285 m", allowed, kind=FileError):
-        load_lengths(file, 2, 18.2)
+        load_readings(file, "length", 2, 18.2)
 
 
 def test_who_names_the_unit_means_it(tmp_path: Path) -> None:
-    found = load_lengths(written(tmp_path, "L0 [mm],L1 [m]\n5285,1900\n"), 2, 18.2)
-    assert found.unstrained_length.tolist() == [[5.285, 1900.0]]
+    found = load_readings(written(tmp_path, "L0 [mm],L1 [m]\n5285,1900\n"), "length", 2, 18.2)
+    assert found[1].tolist() == [[5.285, 1900.0]]
     # a hoist: one meter wide and ninety deep
-    assert load_lengths(written(tmp_path, "L0,L1\n90,90\n"), 2, 1.0).unstrained_length.tolist() == [[90.0, 90.0]]
-    assert load_lengths(written(tmp_path, "L0,L1\n5285,4500\n"), 2).unstrained_length[0, 0] == 5285.0
+    assert load_readings(written(tmp_path, "L0,L1\n90,90\n"), "length", 2, 1.0)[1].tolist() == [[90.0, 90.0]]
+    assert load_readings(written(tmp_path, "L0,L1\n5285,4500\n"), "length", 2)[1][0, 0] == 5285.0
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,7 @@ def planar(poses: int = 40, wrenches: int = 25, quantities: tuple[str, ...] = ("
 
 def in_tasks(folder: Path, request: sl.sweep.Request, size: tuple[int, int]) -> Path:
     """The folder of a sweep whose tasks have a size of their own."""
-    sweep_folder.make_folder(folder, request, sweep_folder.TaskSize(*size))
+    sweep_folder.make_folder(folder, request, size)
     return folder
 
 

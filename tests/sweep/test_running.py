@@ -282,8 +282,8 @@ def test_tasks_take_as_long_as_they_should(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr("sagline.sweep.work.time.process_time", lambda: next(times))
     request = planar(2000, 1000)
     size = work.measured_size(request)  # 10 ms for 4,000 requests
-    assert size.wrenches == 1000
-    assert size.poses * size.wrenches * 0.01 / 4000 == pytest.approx(work.SECONDS, rel=0.05)
+    assert size[1] == 1000
+    assert size[0] * size[1] * 0.01 / 4000 == pytest.approx(work.SECONDS, rel=0.05)
 
 
 def test_the_folder_opens_with_xarray_and_units(tmp_path: Path) -> None:

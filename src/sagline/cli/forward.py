@@ -24,9 +24,8 @@ from sagline.cli.output import Output, TextTable, number_text, show_table
 from sagline.cli.terminal import show_json, show_note, show_text, working
 
 if TYPE_CHECKING:
-    from sagline.files.table import LengthSamples
+    from sagline.core.arrays import Array
     from sagline.kinematics.forward_rows import ForwardSolution
-    from sagline.robot.robot import Robot
 
 SHOWN = 12  # largest number of printed rows; the file has all rows
 COLUMNS = ("x", "y", "z", "qx", "qy", "qz", "qw", "force_residual", "moment_residual", "iterations")
@@ -60,19 +59,24 @@ def forward(
         sagline forward my_robot.yaml counts.csv --counts
     """
     from sagline.cli.values import robot_with_payload
+    from sagline.files.table import load_readings
     from sagline.files.writing import file_stem
     from sagline.kinematics.forward import forward as solve
     from sagline.kinematics.status import ForwardStatus
+    from sagline.kinematics.winches import lengths_from_counts
 
     robot = robot_with_payload(name, payload)
-    lengths = _counted(file, robot) if counts else _measured(file, robot)
+    size = float(np.linalg.norm(np.ptp(robot.frame_anchors, axis=0)))
+    times, lengths = load_readings(file, "count" if counts else "length", robot.cable_count, size)
+    if counts:
+        lengths = lengths_from_counts(robot, lengths)
     table = "-poses.csv"
     output = Output(folder, file_stem(robot.name), [table] * write_table)
-    with working(f"{robot.name}: finding {len(lengths.unstrained_length):,} poses") as line:
-        first = solve(robot, lengths.unstrained_length[0], model=model.build(), wrench=wrench)
+    with working(f"{robot.name}: finding {len(lengths):,} poses") as line:
+        first = solve(robot, lengths[0], model=model.build(), wrench=wrench)
         start = first.pose if np.isfinite(first.pose.position).all() else None
-        found = solve(robot, lengths.unstrained_length, start, model.build(), wrench, progress=line.progress)
-    rows = _rows(lengths, found)
+        found = solve(robot, lengths, start, model.build(), wrench, progress=line.progress)
+    rows = _rows(times, found)
     if write_table:
         output.table(table, rows)
     lost = [k for k, status in enumerate(found.status) if status not in (ForwardStatus.SOLVED, ForwardStatus.FITTED)]
@@ -96,21 +100,7 @@ def forward(
     return OUTSIDE
 
 
-def _measured(file: Path, robot: Robot) -> LengthSamples:
-    from sagline.files.table import load_lengths
-
-    return load_lengths(file, robot.cable_count, float(np.linalg.norm(np.ptp(robot.frame_anchors, axis=0))))
-
-
-def _counted(file: Path, robot: Robot) -> LengthSamples:
-    from sagline.files.table import LengthSamples, load_counts
-    from sagline.kinematics.winches import lengths_from_counts
-
-    read = load_counts(file, robot.cable_count)
-    return LengthSamples(read.time, lengths_from_counts(robot, read.counts))
-
-
-def _rows(lengths: LengthSamples, found: ForwardSolution) -> list[list[Cell]]:
+def _rows(times: Array | None, found: ForwardSolution) -> list[list[Cell]]:
     """The header, then one row per sample; rows have the time if the input file has it."""
     from sagline.kinematics.status import ForwardStatus
 
@@ -119,9 +109,9 @@ def _rows(lengths: LengthSamples, found: ForwardSolution) -> list[list[Cell]]:
     words = [ForwardStatus(int(code)).name for code in found.status]
     body = [[*row, steps, word] for row, steps, word in zip(numbers, found.iterations.tolist(), words, strict=True)]
     header = [f"{name} [{units[name]}]" if name in units else name for name in (*COLUMNS, "status")]
-    if lengths.time is None:
+    if times is None:
         return [header, *body]
-    return [["time [s]", *header], *([time, *row] for time, row in zip(lengths.time.tolist(), body, strict=True))]
+    return [["time [s]", *header], *([time, *row] for time, row in zip(times.tolist(), body, strict=True))]
 
 
 def _grid(rows: list[list[Cell]]) -> TextTable:

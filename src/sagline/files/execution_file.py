@@ -16,8 +16,8 @@ from sagline.control.states import State
 from sagline.core.arguments import brief, file_path, instance, integer
 from sagline.core.arrays import locked
 from sagline.core.errors import FileError, InvalidValueError, SaglineWarning
-from sagline.files.mcap_layout import CABLE, CYCLES, EVENTS, EVERY, ROWS, SMALL, TIME, columns_of
-from sagline.files.mcap_reader import AGAIN, Ending, RecordedLog, read_log
+from sagline.files.mcap_layout import CABLE, CYCLES, EVENTS, EVERY, ROWS, TIME, columns_of
+from sagline.files.mcap_reader import AGAIN, RecordedLog, read_log
 from sagline.files.mcap_writer import BLOCK, McapFile, check_packages
 from sagline.files.netcdf import Format, index_coordinate, write_dataset
 from sagline.files.packed import unpack_dataset
@@ -92,14 +92,13 @@ def _execution(log: RecordedLog, robot: Robot, blocks: list[dict[str, NDArray[An
     samples = {field.name: found.pop(f"samples.{field.name}", found["time"]) for field in fields(Samples)}
     first, last = (found["time"][[0, -1]].tolist()) if len(found["time"]) else (0.0, 0.0)
     whole = len(blocks) == len(log.blocks)
-    ending = log.endings.get(NONE if number is None else number)
-    if ending is None:
-        ending = Ending(ExecutionStatus.UNKNOWN.name, "the log does not contain the end of the execution")
+    unknown = ExecutionStatus.UNKNOWN.name, "the log does not contain the end of the execution"
+    status, reason = log.endings.get(NONE if number is None else number, unknown)
     return Execution(
         robot=robot,
         plan=None if number is None else plan_of_log(log, number),
-        status=ExecutionStatus[ending.status],
-        reason=str(ending.reason),
+        status=ExecutionStatus[status],
+        reason=reason,
         period=log.period,
         zero=locked(blocks[-1]["zero"]),
         events=tuple(event for event in log.events if whole or first <= event.time <= last),
@@ -116,9 +115,8 @@ def plan_of_log(log: RecordedLog, number: int) -> Plan:
 
 def _column(quantity: Quantity, blocks: list[dict[str, NDArray[Any]]]) -> NDArray[Any]:
     whole = np.concatenate([block[quantity.name] for block in blocks])
-    wanted = np.dtype(np.int8) if quantity.name in SMALL else quantity.type
-    if whole.dtype != wanted:
-        raise InvalidValueError(f"{quantity.name}: type", whole.dtype, str(wanted), AGAIN)
+    if whole.dtype != quantity.type:
+        raise InvalidValueError(f"{quantity.name}: type", whole.dtype, str(quantity.type), AGAIN)
     if quantity.codes is not None and (unknown := np.setdiff1d(whole, list(quantity.codes))).size:
         known = ", ".join(code.name for code in quantity.codes)
         raise InvalidValueError(quantity.name, int(unknown[0]), known, "Read it with a newer sagline.")

@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator
 from importlib.metadata import version
 from itertools import combinations
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,38 +49,31 @@ CYCLES: Final = (
     _real("clock", (), "s", "time on the plan, from the start of the plan; none without a plan"),
     _real("position", AXIS, "m", "position of the platform origin, estimated from the encoders"),
     _real("quaternion", TURN, "1", "rotation from platform to world, estimated, scalar last"),
-    _integer("estimate", (), f"code of the estimate; {NONE}: none"),
-    _integer("mode", (), f"code of the command's mode; {NONE}: no command"),
+    Quantity("estimate", (), "", f"code of the estimate; {NONE}: none", values=np.int8),
+    Quantity("mode", (), "", f"code of the command's mode; {NONE}: no command", values=np.int8),
     _real("set_length", CABLE, "m", "set point of the unstrained length, with the zero of homing"),
     _real("set_rate", CABLE, "m/s", "set point of the rate of the length"),
     _real("set_tension", CABLE, "N", "set point of the tension at the drum"),
     _real("planned_tension", CABLE, "N", "planned tension at the frame end at the time of the sample"),
     _real("correction", CABLE, "m", "correction of the set length by the tension loop"),
-    _real("age", GROUP, "s", "time since the arrival of the newest valid block", "samples.age"),
-    _integer("counter", GROUP, "counter of the blocks", "samples.counter"),
-    _real("plc_time", GROUP, "s", "time of the PLC's block, on the clock of the PLC", "samples.plc_time"),
-    _integer("owner", GROUP, "id of the controller that owns the group; 0: none", "samples.owner"),
-    _integer("echo", GROUP, "counter of the last command that the PLC accepted", "samples.echo"),
+    _real("age", GROUP, "s", "time since the arrival of the newest valid block", "samples."),
+    _integer("counter", GROUP, "counter of the blocks", "samples."),
+    _real("plc_time", GROUP, "s", "time of the PLC's block, on the clock of the PLC", "samples."),
+    _integer("owner", GROUP, "id of the controller that owns the group; 0: none", "samples."),
+    _integer("echo", GROUP, "counter of the last command that the PLC accepted", "samples."),
     _integer("group_status", GROUP, "bits of the PLC's status", "samples.status"),
     _integer("group_fault", GROUP, "code of the reason why the PLC has stopped its winches; 0: none", "samples.fault"),
-    _integer("discarded", GROUP, "number of invalid blocks so far", "samples.discarded"),
-    _real(
-        "length",
-        CABLE,
-        "m",
-        "unstrained length off the drum, from the encoder, without the zero of homing",
-        "samples.length",
-    ),
-    _real("rate", CABLE, "m/s", "rate of the length", "samples.rate"),
-    _real("torque", CABLE, "N m", "torque at the motor's shaft, positive if it pays out cable", "samples.torque"),
-    _real("tension", CABLE, "N", "tension at the frame end, from the load cell", "samples.tension"),
-    _real("filtered", CABLE, "N", "tension at the frame end, after the filter of the PLC", "samples.filtered"),
-    _integer("counts", CABLE, "counts of the encoder", "samples.counts"),
+    _integer("discarded", GROUP, "number of invalid blocks so far", "samples."),
+    _real("length", CABLE, "m", "unstrained length off the drum, from the encoder, before homing", "samples."),
+    _real("rate", CABLE, "m/s", "rate of the length", "samples."),
+    _real("torque", CABLE, "N m", "torque at the motor's shaft, positive if it pays out cable", "samples."),
+    _real("tension", CABLE, "N", "tension at the frame end, from the load cell", "samples."),
+    _real("filtered", CABLE, "N", "tension at the frame end, after the filter of the PLC", "samples."),
+    _integer("counts", CABLE, "counts of the encoder", "samples."),
     _integer("winch_state", CABLE, "code of the winch's state", "samples.state"),
-    _integer("winch_fault", CABLE, "fault code of the drive; 0: none", "samples.winch_fault"),
+    _integer("winch_fault", CABLE, "fault code of the drive; 0: none", "samples."),
 )
 EVERY: Final = (TIME, *CYCLES)
-SMALL: Final = frozenset({"estimate", "mode"})  # integers that are stored in one byte
 # Decimals of the quantities that are recorded while the machine runs. This rounding is finer than the resolution of the
 # sensors: an encoder step is 72 nm, and the noise of a load cell is 1 N. Counts are not rounded. With all digits of the
 # noise, a log of 14 minutes would be twice as large.
@@ -117,35 +110,30 @@ SHARE_TF, SHARE_SCENE = 10, 100  # number of cycles per message
 PER_METER: Final = 1e3  # [mm/m]
 
 
-class _CycleField(NamedTuple):
-    """Quantity of the topic `/cycle`, rounded for human readers. The topic `/record` contains all digits."""
-
-    digits: int  # number of decimals
-    unit: str
-    what: str
-    several: bool = False  # True for a list
+def _number(description: str) -> dict[str, Any]:
+    return {"type": "number", "description": description}
 
 
+def _list(description: str) -> dict[str, Any]:
+    return {"type": "array", "items": {"type": "number"}, "description": description}
+
+
+# Number of decimals and JSON schema of the quantities of the topic `/cycle`, which are rounded for human readers. The
+# topic `/record` contains all digits.
 CYCLE_FIELDS: Final = {
-    "time": _CycleField(2, "s", "time on the clock of the link"),
-    "late": _CycleField(4, "s", "delay of the start of the cycle"),
-    "clock": _CycleField(2, "s", "time on the plan, from the start of the plan"),
-    "position": _CycleField(5, "m", "position of the platform's origin, estimated from the encoders", True),
-    "tension": _CycleField(1, "N", "tensions at the frame ends, from the load cells", True),
-    "planned_tension": _CycleField(1, "N", "planned tensions at the frame ends", True),
-    "length_error": _CycleField(2, "mm", "set length minus encoder length", True),
-    "correction": _CycleField(2, "mm", "corrections of the lengths by the tension loop", True),
+    "time": (2, _number("time on the clock of the link [s]")),
+    "late": (4, _number("delay of the start of the cycle [s]")),
+    "clock": (2, _number("time on the plan, from the start of the plan [s]")),
+    "position": (5, _list("position of the platform's origin, estimated from the encoders [m]")),
+    "tension": (1, _list("tensions at the frame ends, from the load cells [N]")),
+    "planned_tension": (1, _list("planned tensions at the frame ends [N]")),
+    "length_error": (2, _list("set length minus encoder length [mm]")),
+    "correction": (2, _list("corrections of the lengths by the tension loop [mm]")),
 }
 
 
-def _schema(title: str, properties: dict[str, Any]) -> bytes:
+def _schema(title: str, **properties: Any) -> bytes:
     return json.dumps({"title": title, "type": "object", "properties": properties}).encode()
-
-
-def _number(shown: _CycleField) -> dict[str, Any]:
-    """JSON schema of a quantity of a cycle."""
-    said = {"description": f"{shown.what} [{shown.unit}]"}
-    return {"type": "array", "items": {"type": "number"}, **said} if shown.several else {"type": "number", **said}
 
 
 _TEXT: Final = {"type": "string"}
@@ -162,24 +150,19 @@ _PARTIAL: Final = {
 }
 SCHEMAS: Final = {
     CYCLE: _schema(
-        "sagline.Cycle",
-        {"state": _TEXT, **{name: _number(shown) for name, shown in CYCLE_FIELDS.items()}, PARTIAL: _PARTIAL},
+        "sagline.Cycle", state=_TEXT, **{name: shown for name, (_, shown) in CYCLE_FIELDS.items()}, partial=_PARTIAL
     ),
     EVENT: _schema(
         "sagline.Event",
-        {
-            "time": {"type": "number", "description": "[s]"},
-            "cycle": {"type": "integer"},
-            **dict.fromkeys(("kind", "name", "state", "text"), _TEXT),
-        },
+        time=_number("[s]"),
+        cycle={"type": "integer"},
+        **dict.fromkeys(("kind", "name", "state", "text"), _TEXT),
     ),
     TRUTH: _schema(
         "sagline.Truth",
-        {
-            "time": _number(_CycleField(0, "s", "time on the clock of the twin")),
-            "position": _number(_CycleField(0, "m", "position of the platform's origin", True)),
-            "quaternion": _number(_CycleField(0, "1", "rotation from platform to world, scalar last", True)),
-        },
+        time=_number("time on the clock of the twin [s]"),
+        position=_list("position of the platform's origin [m]"),
+        quaternion=_list("rotation from platform to world, scalar last [1]"),
     ),
 }
 
@@ -193,12 +176,10 @@ def cycle_texts(columns: dict[str, NDArray[Any]]) -> Iterator[bytes]:
     """Messages of N cycles for other programs, with rounded numbers."""
     away = PER_METER * (columns["set_length"] - columns["length"] - columns["zero"])
     there = {**columns, "length_error": away, "correction": PER_METER * columns["correction"]}
-    kept = {name: _json_values(np.round(there[name], shown.digits)) for name, shown in CYCLE_FIELDS.items()}
-    states = [State(code).name for code in columns["state"].tolist()]
-    rows = zip(states, *kept.values(), strict=True)
-    names = ("state", *kept)
-    for row in rows:
-        known = {name: value for name, value in zip(names, row, strict=True) if value is not None}
+    kept = {"state": [State(code).name for code in columns["state"].tolist()]}
+    kept |= {name: _json_values(np.round(there[name], digits)) for name, (digits, _) in CYCLE_FIELDS.items()}
+    for row in zip(*kept.values(), strict=True):
+        known = {name: value for name, value in zip(kept, row, strict=True) if value is not None}
         for name in [name for name, value in known.items() if isinstance(value, list) and None in value]:
             pairs = enumerate(known.pop(name))
             part = [{"name": name, "index": index, "value": value} for index, value in pairs if value is not None]

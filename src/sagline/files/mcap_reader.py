@@ -9,7 +9,6 @@ import struct
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from importlib.metadata import version
 from io import BytesIO
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -22,6 +21,7 @@ from sagline.core.errors import FileError, InvalidValueError
 from sagline.core.memory import check_memory
 from sagline.files.mcap_layout import END, EVENT, EVERY, FORMAT, HEAD, PLAN, RECORD, TRUTH, event_of
 from sagline.files.mcap_writer import check_packages
+from sagline.files.netcdf import check_version
 from sagline.files.packed import unpack
 from sagline.files.reading import check_regular, unreadable
 from sagline.files.robot_file import parse_robot
@@ -38,13 +38,6 @@ _LARGEST: Final = 1 << 24  # largest size of the packed cycles of a chunk [bytes
 _SCHEMA, _CHANNEL, _MESSAGE = 0x03, 0x04, 0x05
 _MESSAGE_HEAD: Final = struct.Struct("<HIQQ")  # channel, sequence number, two times
 _PLAN_NAME, _END_NAME = (re.compile(name.replace(".", r"\.").format(r"(\d+|none)")) for name in (PLAN, END))
-
-
-class Ending(NamedTuple):
-    """End of a plan."""
-
-    status: str  # name of its `ExecutionStatus`
-    reason: str  # reason in one line
 
 
 class Truth(NamedTuple):
@@ -64,7 +57,8 @@ class RecordedLog:
     robot: Robot | None = None  # the robot; None until it has been read
     period: float = 0.0  # period of a cycle [s]
     plans: list[bytes] = field(default_factory=list)  # the plans, packed
-    endings: dict[int, Ending] = field(default_factory=dict)  # end of each plan, by its index; -1: no plan
+    # end of each plan, by its index; -1: no plan: name of its `ExecutionStatus`, and the reason in one line
+    endings: dict[int, tuple[str, str]] = field(default_factory=dict)
     blocks: list[dict[str, NDArray[Any]]] = field(default_factory=list)  # columns of cycles, for each chunk
     events: list[Event] = field(default_factory=list)  # events in order
     truth: list[Truth] = field(default_factory=list)  # true poses of the platform, in the log of a twin
@@ -194,13 +188,11 @@ class LogReader:
                 raise ValueError("a plan is missing")
             self.log.plans.append(data)
         elif match := _END_NAME.fullmatch(name):
-            self.log.endings[-1 if match[1] == "none" else int(match[1])] = Ending(**json.loads(data))
+            said = json.loads(data)
+            self.log.endings[-1 if match[1] == "none" else int(match[1])] = said["status"], str(said["reason"])
 
     def _begin(self, said: dict[str, Any]) -> None:
-        found = said["sagline_log_format"]
-        if found > FORMAT:
-            text = f"has format {found}, written by {said['source']}; this is sagline {version('sagline')}, which "
-            raise FileError(self.log.path, f"{text}reads up to {FORMAT}", "Install a newer sagline.")
+        check_version(self.log.path, said["sagline_log_format"], FORMAT, said["source"])
         self.log.period = float(said["period"])
         self.log.robot = parse_robot(said["robot"], f"{self.log.path}, robot")
 

@@ -11,7 +11,6 @@ which the tendon leaves the cylinder. Force and stiffness are then the same as w
 from __future__ import annotations
 
 from decimal import ROUND_DOWN, Context
-from typing import NamedTuple
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Comment, Element, SubElement
 
@@ -59,16 +58,10 @@ _ROUNDING = 1e-12
 _SHORTEST = 1e-6  # shortest cable [m]
 
 
-class _Lead(NamedTuple):
-    """First points of the tendons, and points beside the pulleys, world axes [m], (m, 3)."""
-
-    start: Array
-    side: Array  # a point beside each pulley, on the side of the cable
-    missing: Array  # cable off the drum minus tendon length [m], (m,); negative if the tendon is longer
-
-
-def _lead_of(robot: Robot, pose: Pose) -> _Lead:
-    """First points of the tendons, at the frame anchors or at their pulleys."""
+def _lead_of(robot: Robot, pose: Pose) -> tuple[Array, Array, Array]:
+    """First points of the tendons and side points of the pulleys (m, 3), and missing lengths (m,), world axes [m]."""
+    # A side point is beside a pulley, on the side of the cable. A missing length is the cable off the drum minus the
+    # length of the tendon; it is negative if the tendon is longer
     radius, entry = pulleys_of(robot)
     wrap = touching_angle(robot, pose)
     if np.isnan(wrap).any():
@@ -81,7 +74,7 @@ def _lead_of(robot: Robot, pose: Pose) -> _Lead:
     start = points_on_pulleys(robot, pose, first) - (off * radius)[:, None] * along
     centers = pulley_centers(robot, pose)
     side = centers + _BESIDE * (points_on_pulleys(robot, pose, 0.5 * (first + wrap)) - centers)
-    return _Lead(start, side, dead_cable(robot) + radius * (first - off))
+    return start, side, dead_cable(robot) + radius * (first - off)
 
 
 def _free_chords(robot: Robot, pose: Pose) -> Array:
@@ -90,7 +83,7 @@ def _free_chords(robot: Robot, pose: Pose) -> Array:
     return np.asarray(pose.transform(robot.platform_anchors) - exits)
 
 
-def _add_pulleys(world: Element, robot: Robot, pose: Pose, lead: _Lead) -> None:
+def _add_pulleys(world: Element, robot: Robot, pose: Pose, side: Array) -> None:
     """Add the pulleys, each as a separate fixed body."""
     radius = pulleys_of(robot).radius
     toward, centers = outward(robot, pose), pulley_centers(robot, pose)
@@ -98,7 +91,7 @@ def _add_pulleys(world: Element, robot: Robot, pose: Pose, lead: _Lead) -> None:
         body = _add(world, "body", name=f"pulley_{i}")
         size, axis = (radius[i], 0.5 * _WIDTH * radius[i]), (-toward[i, 1], toward[i, 0], 0.0)
         _add(body, "geom", name=f"pulley_{i}", type="cylinder", pos=centers[i], size=size, zaxis=axis, **_DRAWN)
-        _add(body, "site", name=f"side_{i}", pos=lead.side[i], rgba="0 0 0 0", size=0.01 * radius[i])
+        _add(body, "site", name=f"side_{i}", pos=side[i], rgba="0 0 0 0", size=0.01 * radius[i])
 
 
 def _add(parent: Element, tag: str, **attributes: str | ArrayLike) -> Element:
@@ -146,7 +139,8 @@ def dump_mjcf(robot: Robot, pose: PoseLike, unstrained_length: ArrayLike | None 
     pose = single_pose(pose)
     lengths = _lengths_at_rest(robot, pose) if unstrained_length is None else _check_lengths(robot, unstrained_length)
     stiffness = robot.cables.axial_stiffness / lengths
-    lead, over_pulley = _lead_of(robot, pose), pulleys_of(robot).radius > 0.0
+    start, side, missing = _lead_of(robot, pose)
+    over_pulley = pulleys_of(robot).radius > 0.0
     time_step, stretch_time, drag = _step_and_damping(robot, pose, stiffness)
     root = Element("mujoco", model=robot.name)
     root.append(Comment(_NOTE + NOTE if over_pulley.any() else _NOTE))
@@ -156,10 +150,10 @@ def dump_mjcf(robot: Robot, pose: PoseLike, unstrained_length: ArrayLike | None 
     _add(root, "option", gravity=(0.0, 0.0, -robot.gravity), timestep=step, integrator="implicitfast")
     radius = _RADIUS * _add_view(root, robot)
     world = _add(root, "worldbody")
-    for i, point in enumerate(lead.start):
+    for i, point in enumerate(start):
         _add(world, "site", name=f"frame_{i}", pos=point, size=radius)
     _add_platform(world, robot, pose, radius, drag)
-    _add_pulleys(world, robot, pose, lead)
+    _add_pulleys(world, robot, pose, side)
     listed = _add(root, "tendon")
     for i, length in enumerate(lengths):
         tendon = _add(
@@ -167,7 +161,7 @@ def dump_mjcf(robot: Robot, pose: PoseLike, unstrained_length: ArrayLike | None 
             "spatial",
             name=f"cable_{i}",
             stiffness=stiffness[i],
-            springlength=(0.0, length - lead.missing[i]),
+            springlength=(0.0, length - missing[i]),
             damping=stretch_time * stiffness[i],
             width=0.3 * radius,
         )

@@ -11,9 +11,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from math import prod
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,15 +30,9 @@ _GAPS: Final = np.iinfo(np.int64).min + np.arange(3)  # codes of NaN, infinity a
 _GAP_VALUES: Final = np.array([np.nan, np.inf, -np.inf])
 
 
-@dataclass(frozen=True, slots=True)
-class _Column:
-    """Head of a packed column."""
-
-    name: str  # name of the column
-    type: str  # type of the values
-    shape: tuple[int, ...]  # shape of the column
-    decimals: int  # largest number of decimals; -1 for integers or bits of floats
-    order: int  # order of the stored differences
+# Head of a packed column: name; type and shape of the values; largest number of decimals, -1 for integers or bits of
+# floats; order of the stored differences
+_Column: TypeAlias = tuple[str, str, tuple[int, ...], int, int]
 
 
 def round_decimals(values: NDArray[np.float64], decimals: int) -> NDArray[np.float64]:
@@ -87,15 +80,15 @@ def unpack(data: bytes, most: int = 1 << 62) -> dict[str, NDArray[Any]]:
         plain = ZstdDecompressor().decompress(data, allow_extra_data=False)
         start = 4 + int.from_bytes(plain[:4], "little")
         heads = json.loads(plain[4:start])
-        columns = [_Column(name, kind, tuple(shape), *rest) for name, kind, shape, *rest in heads]
+        columns: list[_Column] = [(name, kind, tuple(shape), *rest) for name, kind, shape, *rest in heads]
     except (ZstdError, TypeError, ValueError) as error:  # JSON also raises ValueError
         raise ValueError(f"no packed columns ({error})") from None
     found: dict[str, NDArray[Any]] = {}
     for column in columns:
         end = start + 8 * _count(column)
         if end > len(plain):
-            raise ValueError(f"column {column.name!r} is cut off")
-        found[column.name] = _values(column, plain[start:end])
+            raise ValueError(f"column {column[0]!r} is cut off")
+        found[column[0]] = _values(column, plain[start:end])
         start = end
     if start != len(plain):
         raise ValueError("the data are longer than their header states")
@@ -104,12 +97,11 @@ def unpack(data: bytes, most: int = 1 << 62) -> dict[str, NDArray[Any]]:
 
 def _count(column: _Column) -> int:
     """Number of values of a column; raise ValueError for a head that `pack` never writes."""
-    sizes = all(0 <= size < 1 << 40 for size in column.shape)
-    if not (
-        column.type in TYPES and sizes and column.order in range(MOST_ORDER + 1) and column.decimals in range(-1, 16)
-    ):
+    _, kind, shape, decimals, order = column
+    sizes = all(0 <= size < 1 << 40 for size in shape)
+    if not (kind in TYPES and sizes and order in range(MOST_ORDER + 1) and decimals in range(-1, 16)):
         raise ValueError(f"a column has an invalid header: {column}")
-    return prod(column.shape)
+    return prod(shape)
 
 
 def _whole(values: NDArray[Any], decimals: int) -> tuple[NDArray[np.int64], int]:
@@ -161,16 +153,17 @@ def _planes(small: NDArray[np.uint64]) -> bytes:
 
 
 def _values(column: _Column, planes: bytes) -> NDArray[Any]:
-    rows = column.shape[0] if column.shape else 1
+    _, kind, shape, decimals, order = column
+    rows = shape[0] if shape else 1
     packed = np.frombuffer(planes, dtype=np.uint8).reshape(8, -1).T
     small = np.ascontiguousarray(packed).view(np.uint64).reshape(-1, rows).T if packed.size else np.empty(0, np.uint64)
     whole = (small >> np.uint64(1)).view(np.int64) ^ -(small & np.uint64(1)).view(np.int64)
-    for _ in range(column.order):
+    for _ in range(order):
         whole = np.cumsum(whole, axis=0)
-    whole = np.ascontiguousarray(whole).reshape(column.shape)
-    if column.type != "float64":
-        return whole.astype(column.type)
-    return whole.view(np.float64) if column.decimals < 0 else _decimal(whole, column.decimals)
+    whole = np.ascontiguousarray(whole).reshape(shape)
+    if kind != "float64":
+        return whole.astype(kind)
+    return whole.view(np.float64) if decimals < 0 else _decimal(whole, decimals)
 
 
 def pack_dataset(data: Dataset) -> bytes:

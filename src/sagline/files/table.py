@@ -192,61 +192,34 @@ _OTHERS: Final = {
 UNITS = {"span": "m", "rise": "m", "length": "m", "tension": "N"}
 
 
-class LengthSamples(NamedTuple):
-    """N samples of the unstrained lengths of m cables."""
-
-    time: Array | None  # times [s], shape (N,); None if the file has no times
-    unstrained_length: Array  # lengths [m], shape (N, m)
-
-
-class CountSamples(NamedTuple):
-    """N samples of the counts of m encoders."""
-
-    time: Array | None  # times [s], shape (N,); None if the file has no times
-    counts: Array  # counts, shape (N, m)
-
-
-def load_lengths(file: os.PathLike[str] | str, cable_count: int, size: float = np.inf) -> LengthSamples:
-    """Read a CSV file with one column per cable, length_0, length_1, ..., and optionally the time."""
-    # Units are in brackets, `time [s],length_0 [mm],length_1 [mm]`; the defaults are s and m. `L0` is another name of
-    # `length_0`. cable_count: number of cables m of the robot; size: largest extent of the robot [m]; lengths that are
-    # a hundred times larger must have another unit
-    table, names = _read(file, "length", "m", cable_count)
-    for name in names:
-        table.refuse(table.columns[name] <= 0.0, name, table.columns[name], "m", "> 0 m")
-        table.refuse_millimeters(name, size, f"the robot's {size:.3g} m")
-    return LengthSamples(*_samples(table, names))
-
-
-def load_counts(file: os.PathLike[str] | str, cable_count: int) -> CountSamples:
-    """Read a CSV file with one column per encoder, count_0, count_1, ..., and optionally the time."""
-    # The result has times [s] (None if the file has no times) and counts
-    return CountSamples(*_samples(*_read(file, "count", "", cable_count)))
-
-
-def _read(file: os.PathLike[str] | str, kind: str, unit: str, cable_count: int) -> tuple[CsvTable, list[str]]:
-    """Read a table with one column per cable; return it with the names of these columns."""
+def load_readings(
+    file: os.PathLike[str] | str, kind: str, cable_count: int, size: float = np.inf
+) -> tuple[Array | None, Array]:
+    """Read a CSV file with one column per cable or encoder, and optionally the time; return times and readings."""
+    # Times [s], shape (N,), are None if the file has none. Readings have the shape (N, m). kind: "length" for columns
+    # length_0, length_1, ... [m], or "count" for count_0, ...; `L0` is another name of `length_0`. Units are in
+    # brackets, `time [s],length_0 [mm]`. cable_count: number of cables m of the robot; size: largest extent of the
+    # robot [m]; lengths that are a hundred times larger must have another unit
     path = Path(file)
     names = _columns(kind, cable_count)
     other, hint = _OTHERS[kind]
-    units, strangers = {"time": "s", **dict.fromkeys(names, unit)}, dict.fromkeys(_columns(other, cable_count), hint)
+    units = {"time": "s", **dict.fromkeys(names, "m" if kind == "length" else "")}
+    strangers = dict.fromkeys(_columns(other, cable_count), hint)
     table = CsvTable.read(path, read_text(path, TABLE_LIMIT), units, strangers)
     table.check_columns(names, f"; the robot has {cable_count} cables")
     table.check_rows()
-    return table, names
-
-
-def _columns(kind: str, cable_count: int) -> list[str]:
-    return [f"{kind}_{k}" for k in range(cable_count)]
-
-
-def _samples(table: CsvTable, names: list[str]) -> tuple[Array | None, Array]:
-    """Times, and values with one row for each sample."""
+    for name in names if kind == "length" else ():
+        table.refuse(table.columns[name] <= 0.0, name, table.columns[name], "m", "> 0 m")
+        table.refuse_millimeters(name, size, f"the robot's {size:.3g} m")
     time = table.columns.get("time")
     if time is not None:
         late = np.diff(time, prepend=-np.inf) <= 0.0
         table.refuse(late, "time", time, "s", "a time after the time of the previous row")
     return time, locked(np.stack([table.columns[name] for name in names], axis=-1))
+
+
+def _columns(kind: str, cable_count: int) -> list[str]:
+    return [f"{kind}_{k}" for k in range(cable_count)]
 
 
 class Measurements(NamedTuple):

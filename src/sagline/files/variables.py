@@ -54,8 +54,8 @@ class Quantity(NamedTuple):
     low: float = -np.inf  # lowest value
     infinite: bool = False  # True if values may be infinite
     codes: type[IntEnum] | None = None  # status type, if the values are codes
-    # type of values that are not codes: float, int, bool or str
-    values: type[float | int | bool | str] = float
+    # type of values that are not codes: float, int, np.int8, bool or str
+    values: type[float | int | np.int8 | bool | str] = float
 
     @property
     def place(self) -> str:

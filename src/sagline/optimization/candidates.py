@@ -30,7 +30,7 @@ class Candidates:
         self.robot = robot
         self.free = free_parts(free, item)
         self._bound: list[Bound] = [one.bound(robot, f"{item}[{k}]") for k, one in enumerate(self.free)]
-        self.parts: tuple[DesignVariable, ...] = tuple(part for bound in self._bound for part in bound.parts)
+        self.parts: tuple[DesignVariable, ...] = tuple(part for parts, _ in self._bound for part in parts)
         names = [part.name for part in self.parts]
         for name in names:
             if names.count(name) > 1:
@@ -65,10 +65,9 @@ class Candidates:
     def write(self, cables: Array, values: Array) -> None:
         """Write design variables (N, d) into cable tables (N, m, CABLE_COLUMNS), in place."""
         first = 0
-        for bound in self._bound:
-            last = first + len(bound.parts)
-            bound.write(cables, values[:, first:last])
-            first = last
+        for parts, write in self._bound:
+            write(cables, values[:, first : first + len(parts)])
+            first += len(parts)
 
     def costs(self, values: Array) -> Array | None:
         """Cost per meter of cable, shape (N,); None without a catalogue; raises an error if an entry has no cost."""
@@ -111,7 +110,7 @@ class Candidates:
         return self.robot.replace(**changed, name=name, assumed=assumed, notes=notes)
 
     def _column(self, which: int) -> int:
-        return sum(len(bound.parts) for bound in self._bound[:which])
+        return sum(len(parts) for parts, _ in self._bound[:which])
 
 
 def free_parts(free: object, item: str) -> tuple[Free, ...]:

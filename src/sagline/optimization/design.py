@@ -19,7 +19,7 @@ from sagline.optimization.folder import open_record
 from sagline.optimization.free import Free
 from sagline.optimization.front import Front, Ledger
 from sagline.optimization.request import COUNTS, MOST_EVALUATIONS, Goal, checked_request, poses_of
-from sagline.optimization.search import SEARCHES, Task, latin_hypercube, population_of
+from sagline.optimization.search import SEARCHES, latin_hypercube, population_of
 from sagline.robot.pose import PoseBox, PoseLike
 from sagline.robot.robot import Robot
 from sagline.workspaces.wrench_sets import WrenchSet
@@ -107,5 +107,5 @@ def design(
     sample = latin_hypercube(population - 1, dimensions, request.seed)
     first = np.concatenate((candidates.units(candidates.start[None]), sample))
     with nullcontext() if folder is None else open_record(folder, request) as ledger.record:
-        SEARCHES[request.optimizer](Task(ledger.rate, first, ledger.costs, request.seed, count))
+        SEARCHES[request.optimizer](ledger.rate, first, count, request.seed, ledger.costs)
         return ledger.front()

@@ -161,7 +161,7 @@ class _Goal(YamlEntry):
             raise InvalidValueError("name", value, f"one of {', '.join(WAYS)}", "Write - maximize: workspace_share.")
         way = given[0]
         kind = choice(getattr(self, way), way, KINDS)
-        scale: Any = None if self.scale is None else in_si(self.scale, KINDS[kind].unit, "scale")
+        scale: Any = None if self.scale is None else in_si(self.scale, KINDS[kind][0], "scale")
         maximize = None if way == "goal" else way == "maximize"
         return Goal(kind, maximize=maximize, weight=self.si("weight"), scale=scale)
 

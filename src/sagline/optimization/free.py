@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, TypeAlias
 
 import numpy as np
 from attrs import field, frozen
@@ -41,16 +41,9 @@ class DesignVariable(NamedTuple):
     choices: int = 0
 
 
-class Bound(NamedTuple):
-    """Design variables of a part, for one robot.
-
-    Attributes:
-        parts: The K design variables.
-        write: Function that writes the values of the variables (N, K) to cable tables (N, m, CABLE_COLUMNS), in place.
-    """
-
-    parts: tuple[DesignVariable, ...]
-    write: Callable[[Array, Array], None]
+# Design variables of a part, for one robot: the K variables, and a function that writes their values (N, K) to cable
+# tables (N, m, CABLE_COLUMNS), in place
+Bound: TypeAlias = tuple[tuple[DesignVariable, ...], Callable[[Array, Array], None]]
 
 
 class Free(ByFields):
@@ -181,7 +174,7 @@ class FreeCable(Free):
             limits = one.tension_max is None or bool(np.allclose(robot.tension_max, one.tension_max, rtol=SAME))
             if limits and all(np.allclose(mine, its, rtol=SAME, atol=0.0) for mine, its in pairs):
                 part = DesignVariable("cable", "", 0.0, float(len(self.catalogue) - 1), float(k), len(self.catalogue))
-                return Bound((part,), partial(_write_cables, self.catalogue))
+                return (part,), partial(_write_cables, self.catalogue)
         density, stiffness = own.linear_density[0], own.axial_stiffness[0]
         value = f"{1e3 * density:g} g/m, {stiffness:g} N, up to {robot.tension_max[0]:g} N"
         step = "Add the robot's own cable, because the search begins with it."
@@ -257,4 +250,4 @@ class FreeLimit(Free):
         def write(tables_of_cables: Array, values: Array) -> None:
             tables_of_cables[:, cables, LIMITS[self.which]] = values
 
-        return Bound((DesignVariable(name, "N", self.low, self.high, start),), write)
+        return (DesignVariable(name, "N", self.low, self.high, start),), write

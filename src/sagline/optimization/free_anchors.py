@@ -193,7 +193,7 @@ class FreeAnchors(Free):
             for k, rate in enumerate(rates):  # einsum sums in an order that does not depend on the number of candidates
                 tables_of_cables += values[:, k, None, None] * rate
 
-        return Bound(tuple(parts), write)
+        return tuple(parts), write
 
 
 def _directions(along: ArrayLike) -> Array:

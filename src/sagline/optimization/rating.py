@@ -207,8 +207,8 @@ class Rating:
         found = np.full((len(values), len(self._goals)), np.nan)
         worst = self._robust is not None and self._robust.take == "worst"
         whole: Flags = np.ones(int((~none).sum()), dtype=np.bool_)
-        if measured.tension is not None:
-            whole = np.asarray(~np.isnan(measured.tension).any(axis=(1, 2)))
+        if "tension" in measured:
+            whole = np.asarray(~np.isnan(measured["tension"]).any(axis=(1, 2)))
         columns = [np.where(whole, goal.values(measured, worst=worst), np.nan) for goal in self._goals]
         found[~none] = np.stack(columns, axis=-1)
         return found
@@ -226,19 +226,20 @@ class Rating:
             self._inner.write(each, shifts)
         elif "margin" in self._needs:
             margin = self.margins(robots, rows)
-        margin = margin.reshape(shape)
+        measured = {"margin": margin.reshape(shape)}
         if self._needs <= {"margin"}:
-            return Measured(margin)
+            return measured
         if self._inner is None:
             each = np.repeat(robots, len(self.rows), axis=0)
-        cost = self._cost(each.reshape(*shape, *each.shape[1:]), values) if "cost" in self._needs else None
+        if "cost" in self._needs:
+            measured["cost"] = self._cost(each.reshape(*shape, *each.shape[1:]), values)
         if not self._needs & set(AT_POSES):
-            return Measured(margin, cost=cost)
+            return measured
         held = np.tile(self._held, shape[0] * shape[1])
         wanted = "stiffness" in self._needs
         found = distribute(self._candidates.robot, self._model, each[held], rows[held], self._wrench, stiffness=wanted)
-        tension, sag, stiffness = (None if one is None else one.reshape(*shape[:2], -1) for one in found)
-        return Measured(margin, tension, sag, stiffness, cost)
+        at_poses = zip(AT_POSES, found, strict=True)
+        return measured | {name: one.reshape(*shape[:2], -1) for name, one in at_poses if one is not None}
 
     def _cost(self, cables: Array, values: Array) -> Array:
         """Cost (N, S) of cables, each as long as its longest chord, from tables (N, S, G, m, CABLE_COLUMNS)."""

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from types import MappingProxyType
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 
@@ -180,56 +181,12 @@ def _check_platform(request: Request) -> None:
         raise InvalidValueError(item, value, "outside the platform at all poses", step)
 
 
-class Measured(NamedTuple):
-    """Quantities of N candidates at G poses, for S samples of anchor errors (1 without errors).
-
-    Attributes:
-        margin: Margin of the wrench set [N], shape (N, S, G); -inf if a pose is singular or a cable has no length.
-        tension: Largest cable tension [N], shape (N, S, G), NaN without tensions; None if no goal needs it.
-        sag: Largest cable sag [m], shape (N, S, G), NaN without tensions; None if no goal needs it.
-        stiffness: Stiffness in the softest direction [N/m], shape (N, S, G), NaN without tensions, or None as above.
-        cost: Cost of the cables, shape (N, S); None if no goal needs it.
-    """
-
-    margin: Array
-    tension: Array | None = None
-    sag: Array | None = None
-    stiffness: Array | None = None
-    cost: Array | None = None
-
-
-class _Kind(NamedTuple):
-    """A kind of goal.
-
-    Attributes:
-        unit: Unit of the goal; "" for a share or a currency.
-        larger_is_better: True if it is maximized by default.
-        needs: Field of `Measured` from which the goal is computed.
-        over_poses: Function that computes the goal's value from this field, over the last axis.
-        text: Description of the goal.
-    """
-
-    unit: str
-    larger_is_better: bool
-    needs: str
-    over_poses: Callable[[Array], Array]
-    text: str
-
-
-def _share(margin: Array) -> Array:
-    return np.asarray((margin >= 0.0).mean(axis=-1))
-
-
-def _mean(margin: Array) -> Array:
-    return np.asarray(margin.mean(axis=-1))
-
-
-def _least(values: Array) -> Array:
-    return np.asarray(np.nanmin(values, axis=-1, initial=np.inf))
-
-
-def _largest(values: Array) -> Array:
-    return np.asarray(np.nanmax(values, axis=-1, initial=-np.inf))
+# Quantities of N candidates at G poses, for S samples of anchor errors (1 without errors), if goals need them:
+# "margin": margin of the wrench set [N], (N, S, G); -inf if a pose is singular or a cable has no length
+# "tension", "sag": largest cable tension [N] and sag [m], (N, S, G); NaN without tensions
+# "stiffness": stiffness in the softest direction [N/m], (N, S, G); NaN without tensions
+# "cost": cost of the cables, (N, S)
+Measured: TypeAlias = Mapping[str, Array]
 
 
 def heading(name: str, unit: str) -> str:
@@ -237,15 +194,18 @@ def heading(name: str, unit: str) -> str:
     return f"{name} [{unit}]" if unit else name
 
 
-KINDS: Final = MappingProxyType(
+_LEAST, _LARGEST = partial(np.nanmin, axis=-1, initial=np.inf), partial(np.nanmax, axis=-1, initial=-np.inf)
+# Kinds of goals: unit ("" for a share or a currency); True if the goal is maximized by default; quantity in `Measured`;
+# function that computes the value of the goal from this quantity, over the last axis
+KINDS: Final[Mapping[str, tuple[str, bool, str, Callable[[Array], Any]]]] = MappingProxyType(
     {
-        "workspace_share": _Kind("", True, "margin", _share, "share of the poses with a nonnegative margin"),
-        "mean_margin": _Kind("N", True, "margin", _mean, "mean margin of all poses"),
-        "least_margin": _Kind("N", True, "margin", _least, "least margin of all poses"),
-        "largest_tension": _Kind("N", False, "tension", _largest, "largest tension"),
-        "largest_sag": _Kind("m", False, "sag", _largest, "largest sag"),
-        "least_stiffness": _Kind("N/m", True, "stiffness", _least, "least stiffness against a force"),
-        "cable_cost": _Kind("", False, "cost", lambda cost: cost, "cost of the cables"),
+        "workspace_share": ("", True, "margin", lambda margin: (margin >= 0.0).mean(axis=-1)),
+        "mean_margin": ("N", True, "margin", lambda margin: margin.mean(axis=-1)),
+        "least_margin": ("N", True, "margin", _LEAST),
+        "largest_tension": ("N", False, "tension", _LARGEST),
+        "largest_sag": ("m", False, "sag", _LARGEST),
+        "least_stiffness": ("N/m", True, "stiffness", _LEAST),
+        "cable_cost": ("", False, "cost", lambda cost: cost),
     }
 )
 AT_POSES: Final = ("tension", "sag", "stiffness")  # goals that require a tension distribution
@@ -292,26 +252,26 @@ class Goal:
             >>> print(sl.Goal("workspace_share").maximize, sl.Goal("cable_cost").maximize)
             True False
         """
-        found = KINDS[choice(kind, "goal", KINDS)]
+        unit, larger_is_better, *_ = KINDS[choice(kind, "goal", KINDS)]
         if maximize is not None and not isinstance(maximize, bool | np.bool_):
             raise InvalidValueError("maximize", brief(maximize), "True, False or None", "Choose one of these goals.")
         set_fields(
             self,
             kind=str(kind),
-            maximize=found.larger_is_better if maximize is None else bool(maximize),
+            maximize=larger_is_better if maximize is None else bool(maximize),
             weight=number(weight, "weight", "", above=0.0),
-            scale=None if scale is None else number(scale, "scale", found.unit, above=0.0),
+            scale=None if scale is None else number(scale, "scale", unit, above=0.0),
         )
 
     @property
     def unit(self) -> str:
         """Unit of the goal's values."""
-        return KINDS[self.kind].unit
+        return KINDS[self.kind][0]
 
     @property
     def needs(self) -> str:
-        """Field of `Measured` from which the goal is computed."""
-        return KINDS[self.kind].needs
+        """Quantity of the candidates from which the goal is computed."""
+        return KINDS[self.kind][2]
 
     def values(self, measured: Measured, *, worst: bool) -> Array:
         """Value of the goal of each candidate.
@@ -323,7 +283,7 @@ class Goal:
         Returns:
             Values in the unit of the goal, shape (N,).
         """
-        samples = KINDS[self.kind].over_poses(getattr(measured, self.needs))
+        samples: Array = KINDS[self.kind][3](measured[self.needs])
         if not worst:
             return np.asarray(samples.mean(axis=-1))
         return np.asarray(samples.min(axis=-1) if self.maximize else samples.max(axis=-1))

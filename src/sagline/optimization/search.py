@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from importlib import import_module
 from types import MappingProxyType
-from typing import Any, Final, NamedTuple, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 
@@ -26,24 +26,8 @@ def _optional_module(module: str) -> Any:
 
 
 Rate: TypeAlias = Callable[[Array], Array]  # points of the unit cube (N, d) -> costs (N, g)
-
-
-class Task(NamedTuple):
-    """Problem of an optimizer.
-
-    Attributes:
-        rate: Function that returns the costs of a generation, from its points of the unit cube.
-        first: Points of the first generation, shape (K, d); the initial robot is the first point.
-        goals: Number of costs, g.
-        seed: Seed of the search.
-        evaluations: Largest number of rated points, including the first generation.
-    """
-
-    rate: Rate
-    first: Array
-    goals: int
-    seed: int
-    evaluations: int
+# The arguments of a search are: function that rates a generation; points of the first generation (K, d), which begins
+# with the initial robot; largest number of rated points, including the first generation; seed; number of costs g.
 
 
 def latin_hypercube(count: int, dimensions: int, seed: int) -> Array:
@@ -58,14 +42,13 @@ GROWTH: Final = 2  # factor by which the population grows at each restart
 LEAST_DIMENSIONS: Final = 2  # the package fails with one variable, so a second variable without effect is added
 
 
-def _search_cma(task: Task) -> None:
+def _search_cma(rate: Rate, first: Array, evaluations: int, seed: int, _: int) -> None:
     """CMA-ES (Hansen & Ostermeier 2001), restarted with a growing population (Auger & Hansen 2005)."""
     cma = _optional_module("cma")
-    first = task.first
-    costs = task.rate(first)[:, 0]
+    costs = rate(first)[:, 0]
     order = iter(np.argsort(costs, kind="stable"))
-    left, population = task.evaluations - len(first), None
-    random = np.random.default_rng(task.seed)
+    left, population = evaluations - len(first), None
+    random = np.random.default_rng(seed)
     while True:
         strategy = _strategy(cma, first[next(order, 0)], random, population)
         population = strategy.popsize * GROWTH
@@ -73,7 +56,7 @@ def _search_cma(task: Task) -> None:
             return
         while left >= strategy.popsize and not strategy.stop():
             points = strategy.ask()
-            found = task.rate(np.clip(points, 0.0, 1.0)[:, : task.first.shape[1]])[:, 0]
+            found = rate(np.clip(points, 0.0, 1.0)[:, : first.shape[1]])[:, 0]
             strategy.tell(points, found.tolist())
             left -= len(points)
 
@@ -91,49 +74,46 @@ def _strategy(cma: Any, start: Array, random: np.random.Generator, population: i
     return cma.CMAEvolutionStrategy(padded, SPREAD, options)
 
 
-def _search_differential_evolution(task: Task) -> None:
+def _search_differential_evolution(rate: Rate, first: Array, evaluations: int, seed: int, _: int) -> None:
     """Differential evolution (Storn & Price 1997)."""
     from scipy.optimize import differential_evolution
 
-    generations = task.evaluations // len(task.first) - 1
-
     def costs(points: Array) -> Array:  # scipy passes points as columns
-        return task.rate(np.ascontiguousarray(points.T))[:, 0]
+        return rate(np.ascontiguousarray(points.T))[:, 0]
 
     differential_evolution(
         costs,
-        [(0.0, 1.0)] * task.first.shape[1],
-        init=task.first,
-        maxiter=generations,
+        [(0.0, 1.0)] * first.shape[1],
+        init=first,
+        maxiter=evaluations // len(first) - 1,  # number of generations after the first
         vectorized=True,
         updating="deferred",
         polish=False,
         tol=0.0,
         atol=0.0,
-        rng=np.random.default_rng(task.seed),
+        rng=np.random.default_rng(seed),
     )
 
 
-def _search_nsga2(task: Task) -> None:
+def _search_nsga2(rate: Rate, first: Array, evaluations: int, seed: int, goals: int) -> None:
     """NSGA-II (Deb, Pratap, Agarwal & Meyarivan 2002)."""
     evaluator, problems = _optional_module("pymoo.core.evaluator"), _optional_module("pymoo.core.problem")
     static, termination = _optional_module("pymoo.problems.static"), _optional_module("pymoo.core.termination")
-    dimensions = task.first.shape[1]
-    problem = problems.Problem(n_var=dimensions, n_obj=task.goals, xl=np.zeros(dimensions), xu=np.ones(dimensions))
-    algorithm = _optional_module("pymoo.algorithms.moo.nsga2").NSGA2(pop_size=len(task.first), sampling=task.first)
-    algorithm.setup(problem, termination=termination.NoTermination(), seed=task.seed)
-    left = task.evaluations
-    while left > 0:
+    dimensions = first.shape[1]
+    problem = problems.Problem(n_var=dimensions, n_obj=goals, xl=np.zeros(dimensions), xu=np.ones(dimensions))
+    algorithm = _optional_module("pymoo.algorithms.moo.nsga2").NSGA2(pop_size=len(first), sampling=first)
+    algorithm.setup(problem, termination=termination.NoTermination(), seed=seed)
+    while True:
         asked = algorithm.ask()
-        if asked is None or not 0 < len(asked) <= left:  # None if the optimizer finds only known points
+        if asked is None or not 0 < len(asked) <= evaluations:  # None if the optimizer finds only known points
             return
-        costs = task.rate(asked.get("X"))
+        costs = rate(asked.get("X"))
         evaluator.Evaluator().eval(static.StaticProblem(problem, F=costs), asked)
         algorithm.tell(infills=asked)
-        left -= len(asked)
+        evaluations -= len(asked)
 
 
-SEARCHES: Final[MappingProxyType[str, Callable[[Task], None]]] = MappingProxyType(
+SEARCHES: Final[MappingProxyType[str, Callable[[Rate, Array, int, int, int], None]]] = MappingProxyType(
     {"cma": _search_cma, "differential_evolution": _search_differential_evolution, "nsga2": _search_nsga2}
 )
 

@@ -25,9 +25,10 @@ from sagline.core.arrays import locked
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.netcdf import Format, choice_attributes, choice_of
 from sagline.files.robot_file import dump_robot, parse_robot
+from sagline.files.variables import Quantity
 from sagline.files.writing import staging
 from sagline.robot.pose import Pose
-from sagline.sweep.request import Request, RequestBox, SweepArray, variables_of
+from sagline.sweep.request import Request, RequestBox, variables_of
 from sagline.tension.methods import METHODS
 from sagline.workspaces.wrench_sets import WrenchSet
 
@@ -62,28 +63,21 @@ SHAPES: Final = {  # dimensions of the arrays of a set of loads
 STEP: Final = "Free some space or correct the permissions, and run the same sweep again to continue."
 
 
-class TaskSize(NamedTuple):
-    """Size of the tasks of a folder: numbers of poses and wrenches. A task has one robot."""
-
-    poses: int
-    wrenches: int
-
-
 class SweepFolder(NamedTuple):
-    """An open folder of a sweep: path, Zarr group, request with its digest, size of the tasks, sagline's version."""
+    """An open folder of a sweep."""
 
     path: Path
-    group: Group
+    group: Group  # Zarr group
     request: Request
-    digest: str
-    size: TaskSize
-    made_by: str
+    digest: str  # digest of the request
+    size: tuple[int, int]  # numbers of poses and wrenches of a task, which has one robot
+    made_by: str  # version of sagline
 
     @property
     def grid(self) -> tuple[int, int, int]:
         """Numbers of tasks along the axes of robots, poses and wrenches."""
         robots, poses, wrenches = self.request.shape
-        return robots, math.ceil(poses / self.size.poses), math.ceil(wrenches / self.size.wrenches)
+        return robots, math.ceil(poses / self.size[0]), math.ceil(wrenches / self.size[1])
 
     @property
     def tasks(self) -> int:
@@ -94,9 +88,9 @@ class SweepFolder(NamedTuple):
         """Box of requests that a task computes."""
         _, poses, wrenches = self.request.shape
         robot, row, column = (int(k) for k in np.unravel_index(number, self.grid))
-        first, left = row * self.size.poses, column * self.size.wrenches
-        rows = slice(first, min(first + self.size.poses, poses))
-        return RequestBox(robot, rows, slice(left, min(left + self.size.wrenches, wrenches)))
+        tall, wide = self.size
+        rows = slice(row * tall, min((row + 1) * tall, poses))
+        return RequestBox(robot, rows, slice(column * wide, min((column + 1) * wide, wrenches)))
 
     def write(self, number: int, numbers: Mapping[str, NDArray[np.generic]]) -> None:
         """Write the chunks of a task, each of them atomically; FileError if a chunk cannot be written."""
@@ -115,7 +109,9 @@ class SweepFolder(NamedTuple):
         numbers = {}
         for variable in variables_of(self.request.quantities):
             array: Any = self.group[variable.name]
-            if not self._chunk(number, variable).is_file():
+            # file of the chunk, with the name that Zarr uses
+            place = [*np.unravel_index(number, self.grid), *[0] * len(variable.parts)]
+            if not self.path.joinpath(GROUP, variable.name, "c", *map(str, place)).is_file():
                 return None
             try:
                 numbers[variable.name] = np.asarray(array[robot, rows, columns])
@@ -123,13 +119,8 @@ class SweepFolder(NamedTuple):
                 return None
         return numbers
 
-    def _chunk(self, number: int, variable: SweepArray) -> Path:
-        """File of a chunk, with the name that Zarr uses."""
-        place: list[Any] = [*np.unravel_index(number, self.grid), *[0] * variable.a_cable]
-        return self.path.joinpath(GROUP, variable.name, "c", *map(str, place))
 
-
-def make_folder(path: Path, request: Request, size: TaskSize) -> None:
+def make_folder(path: Path, request: Request, size: tuple[int, int]) -> None:
     """Create the folder of a sweep atomically; FileError or InvalidValueError if the request cannot be written."""
     check_package("zarr", "sweeps")
     texts = [dump_robot(robot) for robot in request.robots]
@@ -137,8 +128,8 @@ def make_folder(path: Path, request: Request, size: TaskSize) -> None:
     attributes = {
         **FORMAT.attributes(f"Sweep of {len(request):,} requests"),
         "digest": _digest(texts, options, request),
-        "task_poses": size.poses,
-        "task_wrenches": size.wrenches,
+        "task_poses": size[0],
+        "task_wrenches": size[1],
         "robots": texts,
         **options,
     }
@@ -179,7 +170,7 @@ def open_folder(path: Path) -> SweepFolder:
             around=_set_of(attributes["around"]),
             moment_arm=attributes["moment_arm"],
         )
-        size = TaskSize(int(attributes["task_poses"]), int(attributes["task_wrenches"]))
+        size = int(attributes["task_poses"]), int(attributes["task_wrenches"])
         made_by, digest = str(attributes["source"]), str(attributes["digest"])
     except (KeyError, ValueError, TypeError, RuntimeError, OSError) as error:
         if isinstance(error, InvalidValueError):
@@ -245,7 +236,7 @@ def _arrays(request: Request) -> dict[str, NDArray[np.float64]]:
     return dict(zip(GIVEN, (request.poses.position, request.poses.quaternion, request.wrenches), strict=True))
 
 
-def _fill(place: Path, request: Request, size: TaskSize, attributes: dict[str, Any]) -> None:
+def _fill(place: Path, request: Request, size: tuple[int, int], attributes: dict[str, Any]) -> None:
     import zarr
     from zarr.codecs import Crc32cCodec, ZstdCodec
 
@@ -262,25 +253,28 @@ def _fill(place: Path, request: Request, size: TaskSize, attributes: dict[str, A
             attributes={"units": unit},
         )
     for variable in variables_of(request.quantities):
-        cables = (request.cable_count,) if variable.a_cable else ()
+        cables = (request.cable_count,) * len(variable.parts)
         group.create_array(
             variable.name,
             shape=(*request.shape, *cables),
-            dtype=variable.type,
+            dtype=variable.type.name,
             chunks=(1, *size, *cables),
             compressors=codecs,
-            fill_value=UNASKED if variable.type == "int8" else math.nan,
-            dimension_names=(*DIMENSIONS, *["cable"] * variable.a_cable),
+            fill_value=unknown_value(variable),
+            dimension_names=(*DIMENSIONS, *variable.parts),
             attributes=_attributes(variable),
         )
 
 
-def _attributes(variable: SweepArray) -> dict[str, Any]:
-    """Attributes of a variable by the CF conventions."""
-    found: dict[str, Any] = {"long_name": variable.long_name}
-    if variable.unit:
-        found["units"] = variable.unit
+def _attributes(variable: Quantity) -> dict[str, Any]:
+    """Attributes of a variable by the CF conventions, with the status of requests that are not computed yet."""
+    found = variable.attributes
     if variable.codes is not None:
-        found["flag_values"] = [UNASKED, *(int(code) for code in variable.codes)]
-        found["flag_meanings"] = " ".join(["unasked", *(code.name.lower() for code in variable.codes)])
+        found["flag_values"] = [UNASKED, *found["flag_values"].tolist()]
+        found["flag_meanings"] = f"unasked {found['flag_meanings']}"
     return found
+
+
+def unknown_value(variable: Quantity) -> float:
+    """Value of a variable for requests that have not been computed yet."""
+    return UNASKED if variable.type == np.int8 else math.nan

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence, Sized
 from dataclasses import dataclass
-from enum import IntEnum
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
@@ -18,6 +17,7 @@ from sagline.core.arrays import Array, checked, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import counted
 from sagline.core.results import Result, set_fields
+from sagline.files.variables import Quantity
 from sagline.kinematics.status import PoseStatus
 from sagline.kinematics.winding import without_guides
 from sagline.robot.pose import Pose, PoseLike, pose_of
@@ -28,62 +28,31 @@ from sagline.tension.methods import DEFAULT, method_of
 from sagline.workspaces.margin import MarginStatus
 from sagline.workspaces.wrench_sets import WrenchSet, load_of
 
-
-class SweepArray(NamedTuple):
-    """An array of results of a sweep; its first dimensions are robot, pose and wrench.
-
-    Attributes:
-        name: Name of the array.
-        unit: Unit of the values, "" for a plain number.
-        long_name: Description of the array.
-        a_cable: True if the array has a value for each cable, along a fourth dimension.
-        codes: Status type, if the values are codes.
-        whole: True if the values are whole numbers.
-    """
-
-    name: str
-    unit: str
-    long_name: str
-    a_cable: bool = False
-    codes: type[IntEnum] | None = None
-    whole: bool = False
-
-    @property
-    def type(self) -> str:
-        """Type of the values."""
-        return "int8" if self.whole or self.codes is not None else "float64"
-
-
-_STATUS: Final = SweepArray("status", "", "status of each request", codes=PoseStatus)
-_PROOF: Final = SweepArray(
-    "proof", "N", "proved lower bound of the change of force that makes the request feasible, 0 if it is feasible"
-)
+_CABLE: Final = ("cable",)  # dimension after robot, pose and wrench
+_STATUS: Final = Quantity("status", (), "", "status of each request", codes=PoseStatus)
+_CHANGE: Final = "change of force that makes the request feasible"
+_PROOF: Final = Quantity("proof", (), "N", f"proved lower bound of the {_CHANGE}, 0 if it is feasible")
+_TENSION: Final = Quantity("tension", _CABLE, "N", "tension along the chord, T_x / cos phi")
+_LENGTH: Final = Quantity("length", _CABLE, "m", "unstrained length L of the cable off the drum")
+_LIMIT: Final = "cable whose limit has the most effect on the margin, or -1"
 
 QUANTITIES: Final = MappingProxyType(
     {
-        "tension": (
-            _STATUS,
-            _PROOF,
-            SweepArray("tension", "N", "tension along the chord, T_x / cos phi", a_cable=True),
-        ),
-        "length": (
-            _STATUS,
-            _PROOF,
-            SweepArray("length", "m", "unstrained length L of the cable off the drum", a_cable=True),
-        ),
-        "shortfall": (_STATUS, _PROOF, SweepArray("enough", "N", "change of force that makes it feasible")),
+        "tension": (_STATUS, _PROOF, _TENSION),
+        "length": (_STATUS, _PROOF, _LENGTH),
+        "shortfall": (_STATUS, _PROOF, Quantity("enough", (), "N", _CHANGE)),
         "margin": (
-            SweepArray("margin_status", "", "verdict of the margin's bracket", codes=MarginStatus),
-            SweepArray("margin", "N", "additional load that the cables can balance; if negative, load to be removed"),
-            SweepArray("margin_low", "N", "lower bound of the margin; the request is feasible if it is not negative"),
-            SweepArray("margin_high", "N", "upper bound of the margin; the request is infeasible if it is negative"),
-            SweepArray("limiting_cable", "", "cable whose limit has the most effect on the margin, or -1", whole=True),
+            Quantity("margin_status", (), "", "verdict of the margin's bracket", codes=MarginStatus),
+            Quantity("margin", (), "N", "additional load that the cables can balance; if negative, excess load"),
+            Quantity("margin_low", (), "N", "lower bound of the margin; if >= 0, the request is feasible"),
+            Quantity("margin_high", (), "N", "upper bound of the margin; if negative, the request is infeasible"),
+            Quantity("limiting_cable", (), "", _LIMIT, values=np.int8),
         ),
     }
 )
 
 
-def variables_of(quantities: Iterable[str]) -> tuple[SweepArray, ...]:
+def variables_of(quantities: Iterable[str]) -> tuple[Quantity, ...]:
     """Variables of the given quantities, in their order and without repetitions."""
     return tuple(dict.fromkeys(variable for name in quantities for variable in QUANTITIES[name]))
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, Final, NamedTuple
+from typing import IO, TYPE_CHECKING, Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,11 +33,8 @@ NAME: Final = "done"
 HEAD: Final = "#    task  seconds  feasible infeasible   unable     open     lost   progress"
 
 
-class TaskMark(NamedTuple):
-    """Mark of a finished task: its computing time [s], 0 if its chunks existed, and the outcomes of its requests."""
-
-    seconds: float
-    counts: Counts
+# Mark of a finished task: its computing time [s], 0 if its chunks existed, and the outcomes of its requests
+TaskMark: TypeAlias = tuple[float, Counts]
 
 
 def _read_marks(folder: SweepFolder) -> dict[int, TaskMark]:
@@ -63,10 +60,10 @@ class TaskMarks:
     def add(self, number: int, mark: TaskMark, left: float | None) -> None:
         """Add the mark of a task, with the remaining time of the sweep [s] if this is known."""
         self.marks[number] = mark
-        counts = mark.counts
+        seconds, counts = mark
         progress = f"{len(self.marks)} of {self._folder.tasks}"
         progress += "" if left is None else f", {_time_text(left)} left"
-        text = f"{number:9d} {mark.seconds:8.2f} {counts.feasible:9d} {counts.infeasible:10d} "
+        text = f"{number:9d} {seconds:8.2f} {counts.feasible:9d} {counts.infeasible:10d} "
         text += f"{counts.unable:8d} {counts.open:8d} {counts.lost:8d}   {progress}\n"
         self._write(text)
 
@@ -107,7 +104,7 @@ def open_marks(folder: SweepFolder) -> Iterator[TaskMarks]:
 
 def _total_of(marks: Mapping[int, TaskMark]) -> Counts:
     """Sum of the counts of all marks."""
-    counts = np.array([mark.counts for mark in marks.values()], dtype=np.int64).reshape(-1, len(Counts._fields))
+    counts = np.array([counts for _, counts in marks.values()], dtype=np.int64).reshape(-1, len(Counts._fields))
     return Counts(*counts.sum(axis=0).tolist())
 
 
@@ -124,7 +121,7 @@ def _mark(line: str) -> tuple[int, TaskMark] | None:
         number, seconds, counts = int(words[0]), float(words[1]), Counts(*map(int, words[2:7]))
     except (ValueError, IndexError, TypeError):
         return None
-    return (number, TaskMark(seconds, counts)) if number >= 0 else None
+    return (number, (seconds, counts)) if number >= 0 else None
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -232,5 +229,5 @@ def load(folder: os.PathLike[str] | str) -> Sweep:
     check_package("zarr", "sweeps")
     opened = open_folder(path)
     marks = _read_marks(opened)
-    seconds = sum(mark.seconds for mark in marks.values())
+    seconds = sum(seconds for seconds, _ in marks.values())
     return Sweep(path, opened.request, opened.tasks, len(marks), _total_of(marks), seconds)

@@ -30,7 +30,7 @@ from sagline.sweep.folder import (
     request_digest,
 )
 from sagline.sweep.request import Request
-from sagline.sweep.result import Sweep, TaskMark, TaskMarks, load, open_marks
+from sagline.sweep.result import Sweep, TaskMarks, load, open_marks
 from sagline.sweep.work import Counts, found_counts, measured_size, task
 
 MOST_WORKERS: Final = 1024
@@ -102,7 +102,7 @@ def run(
             nonlocal done
             done += 1
             left = (time.monotonic() - start) / done * (len(waiting) - done)
-            marks.add(number, TaskMark(seconds, Counts(*counts)), left)
+            marks.add(number, (seconds, Counts(*counts)), left)
             if report is not None:
                 report(len(marks.marks), opened.tasks)
 
@@ -150,7 +150,7 @@ def _waiting(folder: SweepFolder, marks: TaskMarks) -> list[int]:
             marks.marks.pop(number, None)
             waiting.append(number)
         elif number not in marks.marks:
-            marks.add(number, TaskMark(0.0, counts), None)
+            marks.add(number, (0.0, counts), None)
     return waiting
 
 

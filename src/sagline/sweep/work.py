@@ -19,8 +19,8 @@ from sagline.kinematics.status import PoseStatus
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.tables import robot_terms
-from sagline.sweep.folder import SweepFolder, TaskSize, check_made_here, open_folder
-from sagline.sweep.request import Request, RequestBox, SweepArray, variables_of
+from sagline.sweep.folder import SweepFolder, check_made_here, open_folder, unknown_value
+from sagline.sweep.request import Request, RequestBox, variables_of
 from sagline.tension.method import Options, kernel_options
 from sagline.workspaces.margin import MarginStatus
 from sagline.workspaces.margin_rows import MarginRows
@@ -53,7 +53,10 @@ def compute_variables(request: Request, part: RequestBox) -> dict[str, NDArray[n
     """All variables of a part, by name, (poses, wrenches[, cables]); missing cables and results have NaN."""
     variables = variables_of(request.quantities)
     shape = part.shape
-    filled: dict[str, NDArray[np.generic]] = {each.name: _empty(each, shape, request.cable_count) for each in variables}
+    filled: dict[str, NDArray[np.generic]] = {}
+    for one in variables:
+        whole = (*shape, request.cable_count)[: 2 + len(one.parts)]
+        filled[one.name] = np.full(whole, unknown_value(one), dtype=one.type)
     robot = request.robots[part.robot]
     solvers = [kind(request, robot) for kind, names in SOLVERS.items() if names.intersection(request.quantities)]
     for piece in part.pieces(ROWS):
@@ -132,11 +135,6 @@ def _rows(poses: Pose, part: slice) -> Array:
     return locked(np.concatenate((poses.position[part], poses.quaternion[part]), axis=1))
 
 
-def _empty(variable: SweepArray, shape: tuple[int, int], cables: int) -> NDArray[np.generic]:
-    whole = (*shape, cables) if variable.a_cable else shape
-    return np.full(whole, -1 if variable.type == "int8" else np.nan, dtype=variable.type)
-
-
 # solvers and their quantities
 SOLVERS: Final[dict[type[_Inverse | _Margins], frozenset[str]]] = {
     _Inverse: frozenset({"tension", "length", "shortfall"}),
@@ -180,8 +178,8 @@ def found_counts(folder: SweepFolder, number: int) -> Counts | None:
     return None if numbers is None else count_outcomes(numbers)
 
 
-def measured_size(request: Request) -> TaskSize:
-    """Task size that gives a suitable duration, from the measured time of some requests."""
+def measured_size(request: Request) -> tuple[int, int]:
+    """Task size (poses, wrenches) that gives a suitable duration, from the measured time of some requests."""
     places = np.linspace(0, len(request) - 1, min(SAMPLES, len(request))).astype(np.int64)
     parts = [_sample(place, request) for place in np.transpose(np.unravel_index(places, request.shape))]
     compute_variables(request, parts[0])  # the first call loads the machine code
@@ -195,15 +193,15 @@ def measured_size(request: Request) -> TaskSize:
             break
     each = max(seconds / count, 1e-9)
     wanted = min(max(SECONDS, each * len(request) / TASKS), LONGEST)
-    size = sum(8 * (request.cable_count if one.a_cable else 1) for one in variables_of(request.quantities))
+    size = sum(8 * request.cable_count ** len(one.parts) for one in variables_of(request.quantities))
     rows = max(1, min(int(wanted / each), LARGEST // size))
     return _size(rows, *request.shape[1:])
 
 
-def _size(rows: int, poses: int, wrenches: int) -> TaskSize:
+def _size(rows: int, poses: int, wrenches: int) -> tuple[int, int]:
     """Task size for a number of requests; if possible, a task has all wrenches of a pose, because they share proofs."""
     wide = min(wrenches, rows)
-    return TaskSize(min(poses, max(1, rows // wide)), wide)
+    return min(poses, max(1, rows // wide)), wide
 
 
 def _sample(place: Indices, request: Request) -> RequestBox:
