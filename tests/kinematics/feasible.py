@@ -1,4 +1,4 @@
-"""Feasible poses of a robot's test box, and how far poses are apart."""
+"""Feasible poses of the test box of a robot, and distances between poses."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def pose_rows(pose: sl.Pose) -> Array:
 
 
 def by_tier(names: Iterable[str]) -> list[Any]:
-    """Names of robots, of which those with pulleys belong to the second tier: the first does not compile for them."""
+    """Names of robots; those with pulleys belong to the second tier, which compiles their kernels."""
     return [pytest.param(name, marks=extended) if "pulleys" in name else name for name in names]
 
 
@@ -43,7 +43,7 @@ def feasible_plan(robot: sl.Robot, count: int, seed: int, model: sl.CableModel |
 
 
 def moved(pose: sl.Pose, distance: float, degrees: float, seed: int) -> sl.Pose:
-    """Every pose displaced and turned by the same amounts in random directions."""
+    """Displace and rotate every pose by the same amounts in random directions."""
     rng = np.random.default_rng(seed)
     steps, axes = rng.normal(size=(2, *pose.position.shape))
     steps *= distance / np.linalg.norm(steps, axis=-1, keepdims=True)
@@ -82,7 +82,7 @@ def motion_between(before: sl.ForwardSolution, after: sl.ForwardSolution) -> Arr
 def unbalance(
     robot: sl.Robot, model: sl.CableModel, lengths: Array, position: Array, rotation: Rotation, wrench: Array
 ) -> Array:
-    """The whole wrench on the platform about its center of mass, written out with the public cable models."""
+    """Residual wrench on the platform about its center of mass, computed with the public cable models."""
     lever = rotation.apply(robot.platform_anchors - robot.center_of_mass)
     reach = position + rotation.apply(robot.platform_anchors.copy()) - robot.frame_anchors
     span = np.hypot(reach[:, 0], reach[:, 1])

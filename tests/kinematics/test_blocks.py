@@ -1,4 +1,4 @@
-"""Long work in blocks: the same answers, interrupts heard in between, progress told."""
+"""Long computations in blocks: the same results, interrupts between blocks, and progress."""
 
 import signal
 import sys
@@ -20,7 +20,7 @@ PATH = sl.article_path(rate=2.0)
 LENGTHS = sl.inverse(ROBOT, PATH).unstrained_length
 
 
-def in_blocks_of(samples: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def with_block_size(samples: int, monkeypatch: pytest.MonkeyPatch) -> None:
     for module in (forward_rows, sys.modules[sl.forward.__module__]):
         monkeypatch.setattr(module, "BLOCK", samples * ROBOT.cable_count)
 
@@ -28,9 +28,9 @@ def in_blocks_of(samples: int, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("samples", [1, 7])
 def test_a_trajectory_in_blocks_is_the_same_trajectory(samples: int, monkeypatch: pytest.MonkeyPatch) -> None:
     lengths = LENGTHS.copy()
-    lengths[6:9] = np.nan  # the next block has to start at what was solved before
+    lengths[6:9] = np.nan  # the next block starts at the previous solution
     whole = sl.forward(ROBOT, lengths, start=PATH.pose[0])
-    in_blocks_of(samples, monkeypatch)
+    with_block_size(samples, monkeypatch)
     found = sl.forward(ROBOT, lengths, start=PATH.pose[0])
     np.testing.assert_array_equal(found.pose.position, whole.pose.position)
     np.testing.assert_array_equal(found.pose.quaternion, whole.pose.quaternion)
@@ -57,9 +57,7 @@ def test_a_block_starts_at_the_last_sample_that_converged(monkeypatch: pytest.Mo
 
 
 @pytest.mark.parametrize("model", [sl.Catenary(), sl.Empirical(), sl.Straight()])
-def test_samples_that_stand_alone_are_the_same_to_rounding(
-    model: sl.CableModel, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_independent_samples_agree_to_rounding(model: sl.CableModel, monkeypatch: pytest.MonkeyPatch) -> None:
     wrench = np.random.default_rng(0).normal(size=(len(PATH), 6))
 
     def solved() -> list[sl.ForwardSolution]:
@@ -69,7 +67,7 @@ def test_samples_that_stand_alone_are_the_same_to_rounding(
         ]
 
     whole = solved()
-    in_blocks_of(7, monkeypatch)
+    with_block_size(7, monkeypatch)
     for one, other in zip(whole, solved(), strict=True):
         np.testing.assert_allclose(one.pose.position, other.pose.position, rtol=0.0, atol=1e-13)
         np.testing.assert_allclose(one.pose.quaternion, other.pose.quaternion, rtol=0.0, atol=1e-13)
@@ -77,7 +75,7 @@ def test_samples_that_stand_alone_are_the_same_to_rounding(
 
 
 def test_progress_counts_up_to_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    in_blocks_of(7, monkeypatch)
+    with_block_size(7, monkeypatch)
     monkeypatch.setattr(inverting, "BLOCK", 10)
     monkeypatch.setattr(sys.modules[sl.confirm.__module__], "BLOCK", 20)
     position = np.random.default_rng(1).uniform((-12.0, -9.0, 0.5), (12.0, 9.0, 5.0), (43, 3))
@@ -85,7 +83,7 @@ def test_progress_counts_up_to_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
     plan = sl.inverse(ROBOT, poses)
     assert 5 < np.count_nonzero(plan.status == sl.PoseStatus.INFEASIBLE) < 38
 
-    def told(work: Callable[[Callable[[int, int], None]], object]) -> list[int]:
+    def reported_progress(work: Callable[[Callable[[int, int], None]], object]) -> list[int]:
         heard: list[tuple[int, int]] = []
         work(lambda done, total: heard.append((done, total)))
         counts = [done for done, _ in heard]
@@ -94,18 +92,18 @@ def test_progress_counts_up_to_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
         assert counts[-1] == 43
         return counts
 
-    assert len(told(lambda tell: sl.inverse(ROBOT, poses, progress=tell))) > 5
-    assert told(lambda tell: sl.confirm(plan, progress=tell)) == [7, 14, 20, 27, 34, 40, 43]
+    assert len(reported_progress(lambda tell: sl.inverse(ROBOT, poses, progress=tell))) > 5
+    assert reported_progress(lambda tell: sl.confirm(plan, progress=tell)) == [7, 14, 20, 27, 34, 40, 43]
     lengths = np.where(plan.feasible[:, None], plan.unstrained_length, np.nan)
     for where in (None, poses[0], poses):
-        counts = told(lambda tell, where=where: sl.forward(ROBOT, lengths, start=where, progress=tell))  # type: ignore[misc]
+        counts = reported_progress(lambda tell, where=where: sl.forward(ROBOT, lengths, start=where, progress=tell))  # type: ignore[misc]
         assert counts == [7, 14, 21, 28, 35, 42, 43]
 
 
 @extended
 @pytest.mark.skipif(sys.platform == "win32", reason="no timer of processor time")
 @pytest.mark.parametrize("work", ["feasible", "infeasible", "slow sharing", "tracking", "from each pose", "search"])
-def test_an_interrupt_is_heard_within_a_fifth_of_a_second(work: str) -> None:
+def test_an_interrupt_is_handled_within_a_fifth_of_a_second(work: str) -> None:
     rng = np.random.default_rng(2)
     count = {"feasible": 300_000, "infeasible": 30_000, "slow sharing": 100_000, "search": 20_000}.get(work, 300_000)
     low, high = ((-5.0, -3.5, 1.0), (5.0, 3.5, 4.0)) if work != "infeasible" else ((20.0, 20.0, 1.0), (40.0, 40.0, 4.0))
@@ -124,20 +122,20 @@ def test_an_interrupt_is_heard_within_a_fifth_of_a_second(work: str) -> None:
     }
     call = calls.get(work, lambda: sl.inverse(ROBOT, some, tension=method))
     longest = longest_wait(call)
-    if longest > 0.2:  # or the machine is slow now, or garbage was looked for
+    if longest > 0.2:  # unless the machine is slow or garbage is collected
         longest = longest_wait(call) / slowness()
     assert longest < 0.2
 
 
 def longest_wait(call: Callable[[], object]) -> float:
-    """The longest processor time for which no signal is heard [s]."""
+    """Longest processor time without handling of signals [s]."""
     moments: list[float] = []
 
     def hear(number: int, frame: FrameType | None) -> None:
         moments.append(time.process_time())
 
     before = signal.signal(signal.SIGPROF, hear)
-    signal.setitimer(signal.ITIMER_PROF, 0.005, 0.005)  # processor time: other programs do not matter
+    signal.setitimer(signal.ITIMER_PROF, 0.005, 0.005)  # processor time excludes other programs
     try:
         call()
     finally:

@@ -9,7 +9,7 @@ SUSPENDED = sl.load_robot("article-suspended")
 PATH = sl.article_path(rate=2.0)
 
 
-def test_exact_lengths_lead_to_the_planned_poses() -> None:
+def test_exact_lengths_give_the_planned_poses() -> None:
     proof = sl.confirm(sl.inverse(SUSPENDED, PATH))
     assert proof.held.all()
     assert np.abs(proof.position_error).max() < 1e-12
@@ -17,14 +17,14 @@ def test_exact_lengths_lead_to_the_planned_poses() -> None:
     assert proof.wrench_residual.max() < 1e-8
 
 
-def test_straight_lengths_let_the_platform_hang_lower() -> None:
+def test_lengths_of_straight_cables_lower_the_platform() -> None:
     proof = sl.confirm(sl.inverse(SUSPENDED, PATH, model=sl.Straight()))
     assert proof.held.all()
-    assert proof.position_error[:, 2].max() < -0.02  # cables that stretch: tensions of 100 N and more, EA of 44 kN
+    assert proof.position_error[:, 2].max() < -0.02  # cables stretch: tensions of 100 N and more, EA of 44 kN
 
 
 @pytest.mark.parametrize("block", [1, 7, 1000])
-def test_blocks_do_not_matter(monkeypatch: pytest.MonkeyPatch, block: int) -> None:
+def test_the_block_size_has_no_influence(monkeypatch: pytest.MonkeyPatch, block: int) -> None:
     plan = sl.inverse(SUSPENDED, PATH, model=sl.Empirical())
     whole = sl.forward(SUSPENDED, plan.unstrained_length, start=PATH.pose, wrench=plan.state.wrench)
     monkeypatch.setattr(sys.modules[sl.confirm.__module__], "BLOCK", block)
@@ -43,7 +43,7 @@ def test_a_single_pose() -> None:
     assert float(proof.rotation_error) < 1e-12
 
 
-def test_poses_without_an_answer_stay_without() -> None:
+def test_poses_without_lengths_have_no_confirmation() -> None:
     poses = sl.Pose.from_euler([(0.0, 0.0, 1.5), (0.0, 0.0, 7.0)], 0.0, 0.0, 0.0)
     proof = sl.confirm(sl.inverse(SUSPENDED, poses))
     assert list(proof.status) == [sl.ForwardStatus.SOLVED, sl.ForwardStatus.NO_LENGTHS]

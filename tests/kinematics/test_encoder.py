@@ -1,4 +1,4 @@
-"""Counts of encoders: both ways, over layers, with memory, warmth and creep."""
+"""Encoder counts in both directions: layers, remembered winding, temperature and creep."""
 
 from typing import Any
 
@@ -26,7 +26,7 @@ def plan(robot: sl.Robot) -> sl.Plan:
     return sl.inverse(robot, sl.quintic_path([(0, 0, 1.5), (3, 1, 2.5), (-3, -1, 1.5)], durations=3.0, rate=20.0))
 
 
-def test_a_million_counts_come_back_over_four_layers(robot: sl.Robot) -> None:
+def test_a_million_counts_are_recovered_over_four_layers(robot: sl.Robot) -> None:
     drums = drums_of(robot)
     assert drums.most[0] == pytest.approx(80.0)
     rng = np.random.default_rng(5)
@@ -40,7 +40,7 @@ def test_a_million_counts_come_back_over_four_layers(robot: sl.Robot) -> None:
     assert [np.ptp(counts[:, i]) > 79.9 * 12 * 4096 for i in range(2)] == [True, True]
 
 
-def test_a_plan_comes_back_to_half_a_count(robot: sl.Robot, plan: sl.Plan) -> None:
+def test_a_plan_is_recovered_to_half_a_count(robot: sl.Robot, plan: sl.Plan) -> None:
     counts = sl.encoder_counts(plan)
     np.testing.assert_array_equal(counts, np.rint(counts))
     back = sl.lengths_from_counts(robot, counts)
@@ -49,7 +49,7 @@ def test_a_plan_comes_back_to_half_a_count(robot: sl.Robot, plan: sl.Plan) -> No
     np.testing.assert_array_equal(sl.encoder_counts(sl.inverse(robot, plan.state.pose[0])), counts[0])
 
 
-def test_one_layer_with_a_fixed_exit_is_a_line() -> None:
+def test_one_layer_with_a_fixed_exit_is_linear() -> None:
     robot = wound(drum_width=None, layers=None, drum_distance=None, cable_length=None, gear=-3.0)
     plan = sl.inverse(robot, POSE)
     turns = (plan.unstrained_length * (1.0 + 160.0 / robot.cables.axial_stiffness) - 10.0) / np.hypot(
@@ -58,7 +58,7 @@ def test_one_layer_with_a_fixed_exit_is_a_line() -> None:
     np.testing.assert_array_equal(sl.encoder_counts(plan), np.rint(1e5 - turns * 3.0 * 4096))
 
 
-def test_counts_rise_with_the_length_where_the_gear_is_positive_and_fall_where_it_is_not(plan: sl.Plan) -> None:
+def test_the_sign_of_the_gear_is_that_of_counts(plan: sl.Plan) -> None:
     counts = sl.encoder_counts(plan)
     with np.errstate(invalid="ignore"):
         way = np.sign(np.diff(counts, axis=0)) * np.sign(np.diff(plan.unstrained_length, axis=0))
@@ -66,7 +66,7 @@ def test_counts_rise_with_the_length_where_the_gear_is_positive_and_fall_where_i
     assert set(way[:, 1].tolist()) <= {-1.0, 0.0}
 
 
-def test_at_home_the_counts_are_those_that_were_read(robot: sl.Robot) -> None:
+def test_counts_at_the_home_pose_are_the_given_ones(robot: sl.Robot) -> None:
     read = np.arange(8) * 1000.0 - 3500.0
     at_home = sl.inverse(robot, POSE)
     tension = at_home.state.cables.frame_end_tension
@@ -76,7 +76,7 @@ def test_at_home_the_counts_are_those_that_were_read(robot: sl.Robot) -> None:
         sl.lengths_from_counts(zeroed, read, temperature=10.0), at_home.unstrained_length, rtol=1e-13
     )
     assert robot.winches is not None
-    np.testing.assert_array_equal(robot.winches.count_zero, np.full(8, 1e5))  # the one given stays as it is
+    np.testing.assert_array_equal(robot.winches.count_zero, np.full(8, 1e5))  # the given robot is unchanged
 
 
 @pytest.mark.parametrize("name", ["cogiro", "article-prototype", "article-mixed", "ipanema-1"])
@@ -103,7 +103,7 @@ def test_homing_finds_the_lengths_of_a_plan_from_its_tensions(name: str, winch: 
 
 
 @extended
-def test_over_pulleys_and_dead_cable_counts_lead_back_to_the_pose() -> None:
+def test_counts_with_pulleys_and_dead_length_give_the_pose() -> None:
     behind: dict[str, Any] = {
         "pulley_radius": 0.05,
         "dead_cable": 5.0,
@@ -140,8 +140,8 @@ def test_crept_cables_are_longer(robot: sl.Robot, plan: sl.Plan) -> None:
     np.testing.assert_allclose(back, plan.unstrained_length, rtol=0.0, atol=4e-6)
 
 
-def test_over_pulleys_cables_creep_with_the_tension_that_is_shared() -> None:
-    """Over wide pulleys the free cable has another chord, and a slightly other tension along it."""
+def test_creep_over_pulleys_is_that_of_the_chord_tension() -> None:
+    """Over wide pulleys the free cable has another chord, and a slightly different chord tension."""
     robot = wound(pulley_radius=0.3, counts_per_turn=1e9)
     plan = sl.inverse(robot, sl.quintic_path([(0, 0, 1.5), (3, 1, 2.5)], durations=3.0, rate=20.0))
     creep = sl.Creep(3e4, 2.0)
@@ -153,7 +153,7 @@ def test_over_pulleys_cables_creep_with_the_tension_that_is_shared() -> None:
     assert np.abs(crept * off - plan.unstrained_length).max() > 1e-8
 
 
-def test_memory_both_ways(robot: sl.Robot, plan: sl.Plan) -> None:
+def test_remembered_winding_in_both_directions(robot: sl.Robot, plan: sl.Plan) -> None:
     counts = sl.encoder_counts(plan, "remembered")
     assert np.abs(counts - sl.encoder_counts(plan)).max() > 10.0
     tension = sl.winch_rates(plan).drum_tension
@@ -161,8 +161,8 @@ def test_memory_both_ways(robot: sl.Robot, plan: sl.Plan) -> None:
     np.testing.assert_allclose(back, plan.unstrained_length, rtol=0.0, atol=4e-6)
 
 
-def memory_matters(plan: Plan, winding_tension: float) -> float:
-    """Largest difference that the drums' memory makes along a plan [m]."""
+def effect_of_remembered_winding(plan: Plan, winding_tension: float) -> float:
+    """Largest difference of lengths along a plan due to remembered winding [m]."""
     robot = plan.state.one_robot
     winch = sl.Winch(
         drum_radius=0.05,
@@ -178,17 +178,17 @@ def memory_matters(plan: Plan, winding_tension: float) -> float:
     return float(np.abs(off - plan.unstrained_length).max())
 
 
-def test_on_the_prototypes_tour_the_memory_is_worth_twelve_millimeters() -> None:
+def test_remembered_winding_changes_lengths_of_the_prototype_by_twelve_millimeters() -> None:
     plan, _ = tour()
     tension = plan.state.cables.frame_end_tension
     assert (tension.min(), tension.max()) == pytest.approx((71.0, 768.0), abs=0.5)
     assert plan.state.one_robot.cables.axial_stiffness == pytest.approx(14e3)
-    # wound at the mean tension of the home pose, and at that of the whole tour
-    assert 1e3 * memory_matters(plan, tension[0].mean()) == pytest.approx(10.8, abs=0.1)
-    assert 1e3 * memory_matters(plan, tension.mean()) == pytest.approx(13.6, abs=0.1)
+    # wound at the mean tension of the home pose, and at that of the whole path
+    assert 1e3 * effect_of_remembered_winding(plan, tension[0].mean()) == pytest.approx(10.8, abs=0.1)
+    assert 1e3 * effect_of_remembered_winding(plan, tension.mean()) == pytest.approx(13.6, abs=0.1)
 
 
-def test_poses_without_an_answer_have_no_counts(robot: sl.Robot) -> None:
+def test_poses_without_lengths_have_no_counts(robot: sl.Robot) -> None:
     poses = sl.Pose.from_euler([[1.0, 1.0, 2.0], [30.0, 0.0, 2.0], [0.0, 1.0, 2.0]], 0.0, 0.0, 0.0)
     counts = sl.encoder_counts(sl.inverse(robot, poses))
     assert np.isnan(counts).all(axis=1).tolist() == [False, True, False]
@@ -224,14 +224,16 @@ def test_poses_without_an_answer_have_no_counts(robot: sl.Robot) -> None:
         ),
     ],
 )
-def test_what_is_missing_or_does_not_fit_is_named(changes: dict[str, Any], parts: tuple[str, ...], step: str) -> None:
+def test_missing_or_inconsistent_arguments_are_named(
+    changes: dict[str, Any], parts: tuple[str, ...], step: str
+) -> None:
     poses = sl.Pose.from_euler([[0.0, 0.0, 2.0], [4.0, 3.0, 2.0]], 0.0, 0.0, 0.0)
     with refused(*parts, kind=sl.InvalidValueError) as caught:
         sl.encoder_counts(sl.inverse(wound(**changes), poses))
     assert step in caught.value.next_step
 
 
-def test_a_robot_without_winches_or_diameter_says_what_it_lacks() -> None:
+def test_missing_winches_or_diameters_are_named() -> None:
     robot = sl.load_robot("cogiro")
     with refused("the robot", "without winches: drum_radius, groove_pitch, cables: diameter"):
         sl.encoder_counts(sl.inverse(robot, POSE))
@@ -246,13 +248,13 @@ def test_a_robot_without_winches_or_diameter_says_what_it_lacks() -> None:
         sl.lengths_from_counts(cold, np.full(8, 1e5), temperature=3.0)
 
 
-def test_counts_that_run_off_the_drum_are_told_with_what_it_takes(robot: sl.Robot) -> None:
+def test_counts_beyond_the_drum_are_refused_with_the_limit(robot: sl.Robot) -> None:
     counts = np.full((3, 8), 1e5)
     counts[2, 1] = -5e6
     with refused("sample 2, cable 1: count", "-5000000") as caught:
         sl.lengths_from_counts(robot, counts)
     low, high = (float(word) for word in caught.value.allowed.split(" to "))
-    for end in (low, high):  # as far as the message says one may go
+    for end in (low, high):  # up to the limit in the message
         counts[2, 1] = end
         sl.lengths_from_counts(robot, counts)
     for end in (low - 1.0, high + 1.0):
@@ -262,7 +264,7 @@ def test_counts_that_run_off_the_drum_are_told_with_what_it_takes(robot: sl.Robo
 
 
 @pytest.mark.parametrize("tension", [1e-3, 1.0])
-def test_no_cable_hangs_with_less_tension_than_its_own_weight_gives(robot: sl.Robot, tension: float) -> None:
+def test_tensions_below_the_least_catenary_tension_are_refused(robot: sl.Robot, tension: float) -> None:
     run = POSE.transform(robot.platform_anchors)[0] - robot.frame_anchors[0]
     span, rise = float(np.hypot(*run[:2])), float(run[2])
     cable = sl.Cable(robot.cables.linear_density[0], robot.cables.axial_stiffness[0])
@@ -276,7 +278,7 @@ def test_no_cable_hangs_with_less_tension_than_its_own_weight_gives(robot: sl.Ro
     assert least <= told <= 1.0003 * least
 
 
-def test_memory_needs_tensions_and_constant_winding_none(robot: sl.Robot) -> None:
+def test_remembered_winding_requires_tensions(robot: sl.Robot) -> None:
     with refused("drum_tension", "not given") as caught:
         sl.lengths_from_counts(robot, np.full(8, 1e5), "remembered")
     assert "winch_rates(plan).drum_tension" in caught.value.next_step

@@ -1,4 +1,4 @@
-"""Searching for every equilibrium: what symmetry demands must be there."""
+"""Search for all equilibria: symmetric equilibria are found."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from tests.kinematics.feasible import feasible_plan
 SUSPENDED = sl.load_robot("article-suspended")
 
 
-def test_the_planned_pose_is_among_them_and_the_lowest_comes_first() -> None:
+def test_the_planned_pose_is_found_and_the_lowest_energy_is_first() -> None:
     robot = sl.load_robot("cogiro")
     plan = feasible_plan(robot, 3, seed=1)
     for i in range(3):
@@ -24,13 +24,13 @@ def test_the_planned_pose_is_among_them_and_the_lowest_comes_first() -> None:
 
 
 def test_a_symmetric_robot_has_symmetric_equilibria() -> None:
-    # half a turn about z maps robot and lengths onto themselves: each equilibrium has its image, of the same energy
+    # a half turn about z maps robot and lengths onto themselves: the image of each equilibrium has the same energy
     plan = sl.inverse(SUSPENDED, sl.Pose((0.0, 0.0, 2.0), np.eye(3)), tension=sl.MinimumNorm())
     found = sl.equilibria(SUSPENDED, plan.unstrained_length, starts=400)
     assert len(found) >= 3
     half = Rotation.from_rotvec([0.0, 0.0, np.pi])
     for pose, energy in zip(found.solutions.pose, found.solutions.energy, strict=True):
-        # turned platform, relabelled by half a turn about its own z
+        # rotated platform, with cables renumbered by a half turn about its own z
         image = half.as_matrix() @ pose.matrix @ half.as_matrix()
         position = half.apply(pose.position.copy())
         same = np.abs(found.solutions.pose.position - position).max(axis=1) < 1e-7
@@ -39,7 +39,7 @@ def test_a_symmetric_robot_has_symmetric_equilibria() -> None:
         assert found.solutions.energy[same][0] == pytest.approx(energy, abs=1e-7)
 
 
-def test_a_planar_robot_finds_itself_and_its_twisted_twins() -> None:
+def test_a_planar_robot_has_twisted_equilibria() -> None:
     corners = np.array([[1.0, 0, 1], [-1, 0, 1], [-1, 0, -1], [1, 0, -1]])
     robot = sl.Robot(
         "planar", 3 * corners, 0.3 * corners[:, ::-1], sl.Cable(0.01, 5e4), 3.0, np.eye(3),
@@ -48,16 +48,16 @@ def test_a_planar_robot_finds_itself_and_its_twisted_twins() -> None:
     pose = sl.Pose.from_euler((-0.4, 0.0, -0.3), 0.0, 0.1, 0.0)
     plan = sl.inverse(robot, pose)
     found = sl.equilibria(robot, plan.unstrained_length)
-    assert len(found) == 2  # the pose and the one turned the other way, of nearly the same energy
+    assert len(found) == 2  # the pose and the one with opposite rotation, with nearly the same energy
     assert found.reached.sum() == found.starts
     distance = np.linalg.norm(found.solutions.pose.position - pose.position, axis=1)
     assert distance.min() < 1e-9
     assert distance.max() > 5e-3
-    assert np.abs(found.solutions.pose.position[:, 1]).max() < 1e-12  # nothing leaves the plane
+    assert np.abs(found.solutions.pose.position[:, 1]).max() < 1e-12  # all poses are in the plane
     np.testing.assert_allclose(found.solutions.pose.matrix[:, 1], [[0, 1, 0]] * len(found), atol=1e-12)
 
 
-def test_without_an_energy_the_one_that_most_starts_reach_comes_first() -> None:
+def test_without_an_energy_the_most_frequent_pose_is_first() -> None:
     plan = sl.inverse(SUSPENDED, sl.Pose((0.0, 0.0, 2.0), np.eye(3)), sl.Parabolic(), sl.MinimumNorm())
     found = sl.equilibria(SUSPENDED, plan.unstrained_length, sl.Parabolic(), starts=200)
     assert np.isnan(found.solutions.energy).all()
@@ -76,7 +76,7 @@ def test_straight_cables_have_mirrored_poses() -> None:
     np.testing.assert_allclose(above.pose.position, [0.5, -0.4, 6.5], atol=1e-9)  # mirrored at z = 4
 
 
-def test_bad_questions() -> None:
+def test_bad_arguments() -> None:
     with pytest.raises(sl.InvalidValueError, match="starts"):
         sl.equilibria(SUSPENDED, [7.0] * 8, starts=0)
     with pytest.raises(sl.InvalidValueError, match="unstrained_length"):

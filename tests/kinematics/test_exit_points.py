@@ -1,4 +1,4 @@
-"""Slack and steep cables over large pulleys leave them where their force points, checked by quadrature."""
+"""Slack and steep cables leave large pulleys in the direction of their force, compared with quadrature."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import sagline as sl
 from sagline.core.arrays import Array
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(40)
-PIECES = 60  # the cable is cut at points that are dense near its lowest point
+PIECES = 60  # the cable is divided into pieces that are short near its lowest point
 
 
 def integral(values: Array, size: Array) -> Array:
@@ -18,7 +18,7 @@ def integral(values: Array, size: Array) -> Array:
 
 
 def closure(robot: sl.Robot, plan: sl.Plan) -> Array:
-    """Distance of each platform end from the end of its cable, which begins where its force leads, (N, m) [m]."""
+    """Distance of each platform end from the end of its cable, integrated from the exit point, (N, m) [m]."""
     state = plan.state[plan.feasible]
     cables, contact = state.cables, state.contact
     assert contact is not None
@@ -30,7 +30,7 @@ def closure(robot: sl.Robot, plan: sl.Plan) -> Array:
     free = state.unstrained_length - (contact.wrapped_length + contact.dead_length)
     at_exit = z - weight * free
     angle = np.arctan2(x, entry * at_exit)
-    # material points where the vertical force grows in equal steps of asinh(V/T_x)
+    # material points at equal steps of asinh(V/T_x), where V is the vertical force
     edges = np.linspace(np.arcsinh(at_exit / x), np.arcsinh(z / x), PIECES + 1, axis=-1)
     vertical = x[..., None] * np.sinh(edges)
     step = np.diff(vertical, axis=-1) / weight[..., None]

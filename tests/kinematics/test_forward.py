@@ -1,4 +1,4 @@
-"""Forward kinematics: against plans, against SciPy on an independent balance, and from bad starts."""
+"""Forward kinematics compared with plans, with SciPy and an independent balance, and from distant starts."""
 
 from dataclasses import replace
 from typing import Literal
@@ -20,12 +20,12 @@ Status = sl.ForwardStatus
 
 
 def newtons(robot: sl.Robot) -> float:
-    """Residual that rounding of the pose alone leaves, with a margin: 1e-8 N, more for the 30-tonne cabin."""
+    """Residual due to rounding of the pose alone, with a margin: 1e-8 N, more for the cabin of 30 t."""
     return max(1e-8, 2e-12 * float(robot.tension_max.max()))
 
 
 @pytest.mark.parametrize("name", by_tier(sl.robot_names()))
-def test_plans_are_confirmed_and_found_again_without_a_start(name: str) -> None:
+def test_plans_are_confirmed_and_found_without_a_start(name: str) -> None:
     robot = sl.load_robot(name)
     plan = feasible_plan(robot, 60, seed=7)
     pose = plan.state.pose
@@ -57,7 +57,7 @@ def test_every_model_inverts_its_own_plan_under_load(model: sl.CableModel) -> No
 
 
 def scipy_pose(robot: sl.Robot, lengths: Array, guess: sl.Pose, wrench: Array) -> tuple[Array, Rotation]:
-    """MINPACK on the balance of the public catenary, in position and rotation vector from the guess."""
+    """MINPACK with the balance of the public catenary, in position and rotation vector from the initial pose."""
     base = Rotation.from_quat(guess.quaternion.copy())
 
     def balance(x: Array) -> Array:
@@ -71,7 +71,7 @@ def test_scipy_finds_the_same_pose() -> None:
     plan = feasible_plan(COGIRO, 5, seed=10)
     rng = np.random.default_rng(11)
     wrench = np.array([10.0, 20.0, -30.0, 3.0, 4.0, -5.0])
-    lengths = plan.unstrained_length + rng.normal(scale=2e-3, size=(5, 8))  # lengths no plan made
+    lengths = plan.unstrained_length + rng.normal(scale=2e-3, size=(5, 8))  # arbitrary lengths
     found = sl.forward(COGIRO, lengths, plan.state.pose, wrench=wrench)
     for i in range(5):
         position, rotation = scipy_pose(COGIRO, lengths[i], plan.state.pose[i], wrench)
@@ -90,7 +90,7 @@ def test_a_start_off_by_a_meter(degrees: float, share: float) -> None:
     assert found.iterations.max() < 60
 
 
-def test_a_trajectory_follows_from_its_first_start() -> None:
+def test_a_trajectory_continues_from_its_first_pose() -> None:
     path = sl.article_path(rate=100.0)
     plan = sl.inverse(SUSPENDED, path)
     found = sl.forward(SUSPENDED, plan.unstrained_length, path.pose[0], wrench=plan.state.wrench)
@@ -99,11 +99,11 @@ def test_a_trajectory_follows_from_its_first_start() -> None:
 
 
 @pytest.mark.parametrize("model", MODELS, ids=lambda m: type(m).__name__)
-def test_a_chain_answers_what_each_sample_would_from_the_pose_before(model: sl.CableModel) -> None:
+def test_a_trajectory_agrees_with_steps_from_the_previous_pose(model: sl.CableModel) -> None:
     plan = feasible_plan(COGIRO, 1, seed=24, model=model)
     rng = np.random.default_rng(25)
-    steps = rng.normal(scale=np.geomspace(1e-6, 3e-2, 40)[:, None], size=(40, 8))  # from nothing to jumps
-    lengths = np.insert(plan.unstrained_length[0] + steps, [3, 20], np.nan, axis=0)  # two samples without an answer
+    steps = rng.normal(scale=np.geomspace(1e-6, 3e-2, 40)[:, None], size=(40, 8))  # jumps in different directions
+    lengths = np.insert(plan.unstrained_length[0] + steps, [3, 20], np.nan, axis=0)  # two samples without a solution
     loads = rng.normal(scale=np.tile([0.0, 40.0], 21)[:, None], size=(42, 6))
     chain = sl.forward(COGIRO, lengths, plan.state.pose[0], model, loads)
     at = plan.state.pose[0]
@@ -126,7 +126,7 @@ def test_a_step_of_a_trajectory_takes_two_newton_steps() -> None:
     plan = sl.inverse(COGIRO, pose, tension=sl.MinimumNorm())
     assert plan.feasible.all()
     found = sl.forward(COGIRO, plan.unstrained_length, pose[0])
-    assert found.iterations.max() <= 2  # three without the first-order answer to the new lengths
+    assert found.iterations.max() <= 2  # three without the first-order prediction for the new lengths
     assert position_error(found, pose).max() < 1e-12
 
 
@@ -149,11 +149,11 @@ def test_samples_of_a_batch_do_not_depend_on_each_other() -> None:
     assert alone.state.cables.shape == (8,)
 
 
-def test_the_energy_is_least_at_the_solution() -> None:
+def test_the_energy_is_minimal_at_the_solution() -> None:
     plan = feasible_plan(COGIRO, 1, seed=15)
     found = sl.forward(COGIRO, plan.unstrained_length[0])
     held = []
-    for k in range(200):  # the pose held by a wrench that balances it there: its energy is what forward reports
+    for k in range(200):  # the pose with a wrench that balances it there: its energy is that of forward
         near = moved(found.pose, 1e-3, 0.05, seed=k)
         rotation = Rotation.from_quat(near.quaternion.copy())
         wrench = -unbalance(COGIRO, sl.Catenary(), plan.unstrained_length[0], near.position, rotation, np.zeros(6))
@@ -163,7 +163,7 @@ def test_the_energy_is_least_at_the_solution() -> None:
     assert min(held) > float(found.energy)
 
 
-def test_a_rigid_motion_of_the_world_moves_the_answer_with_it() -> None:
+def test_a_rigid_motion_of_the_world_moves_the_solution() -> None:
     plan = feasible_plan(COGIRO, 3, seed=16)
     turn, shift = Rotation.from_rotvec([0.0, 0.0, 0.7]), np.array([1.0, -2.0, 5.0])
     robot = COGIRO.replace(frame_anchors=turn.apply(COGIRO.frame_anchors.copy()) + shift)
@@ -182,7 +182,7 @@ def test_cables_without_weight_are_elastic() -> None:
     assert position_error(heavy, elastic.pose) > 1e-5
 
 
-# what else can happen
+# possible failures
 
 
 def test_lengths_too_short_to_meet() -> None:
@@ -193,7 +193,7 @@ def test_lengths_too_short_to_meet() -> None:
     assert found.wrench_residual.max() < 1e-4
 
 
-def test_lengths_too_long_let_it_hang_on_few_cables() -> None:
+def test_long_lengths_leave_few_taut_cables() -> None:
     lengths = sl.inverse(COGIRO, sl.Pose((0, 0, 2.0), np.eye(3))).unstrained_length
     lengths = lengths + 6.0 * np.array([0, 1, 1, 0, 1, 1, 0, 1])
     found = sl.forward(COGIRO, lengths)
@@ -215,7 +215,7 @@ def test_a_cable_is_slack_below_half_the_weight_of_its_chord() -> None:
     assert replace(found, state=replace(found.state, cables=weightless)).slack.tolist() == [True] + [False] * 7
 
 
-def test_rows_without_lengths_are_left_out() -> None:
+def test_rows_without_lengths_have_no_solution() -> None:
     pose = sl.Pose([[0, 0, 1.5], [0, 0, 9.0], [0.5, 0, 1.5]], np.tile(np.eye(3), (3, 1, 1)))
     plan = sl.inverse(SUSPENDED, pose)
     assert plan.feasible.tolist() == [True, False, True]
@@ -258,7 +258,7 @@ def top_heavy() -> sl.Robot:
     return SUSPENDED.replace(center_of_mass=(0.0, 0.0, 3.0), tension_min=0.0)
 
 
-def test_an_unstable_equilibrium_is_returned_as_such_and_left_without_a_start() -> None:
+def test_an_unstable_equilibrium_has_a_status_and_is_avoided_without_a_start() -> None:
     robot = top_heavy()
     pose = sl.Pose((0.0, 0.0, 1.5), np.eye(3))
     plan = sl.inverse(robot, pose)
@@ -274,7 +274,7 @@ def test_an_unstable_equilibrium_is_returned_as_such_and_left_without_a_start() 
     assert angle_error(elsewhere, pose) > 0.3
 
 
-def test_the_number_of_steps_is_bounded_from_any_start() -> None:
+def test_the_number_of_steps_is_bounded_for_any_start() -> None:
     plan = feasible_plan(COGIRO, 100, seed=18)
     rng = np.random.default_rng(19)
     count = len(plan.unstrained_length)
@@ -289,7 +289,7 @@ def test_the_number_of_steps_is_bounded_from_any_start() -> None:
 # other robots
 
 
-def test_four_cables_let_the_platform_swing_to_its_equilibrium() -> None:
+def test_a_platform_on_four_cables_finds_its_equilibrium() -> None:
     frame = [[20, 15, 12], [-20, 15, 12], [-20, -15, 12], [20, -15, 12]]
     platform = [[0.2, 0.2, 0.1], [-0.2, 0.2, 0.1], [-0.2, -0.2, 0.1], [0.2, -0.2, 0.1]]
     robot = sl.Robot(
@@ -332,7 +332,7 @@ def planar(normal: tuple[float, float, float], pattern: Literal["1R2T", "2T"]) -
 
 @pytest.mark.parametrize("normal", [(0, 0, 1), (0, 1, 0), (1, 2, 0), (0.3, -0.2, 1.0)])
 @pytest.mark.parametrize("pattern", ["1R2T", "2T"])
-def test_planar_robots_there_and_back(pattern: Literal["1R2T", "2T"], normal: tuple[float, float, float]) -> None:
+def test_planar_robots_recover_their_poses(pattern: Literal["1R2T", "2T"], normal: tuple[float, float, float]) -> None:
     robot = planar(normal, pattern)
     at = robot.freedom[:2, :3]
     turn = Rotation.from_rotvec(0.1 * np.asarray(robot.plane_normal)) if pattern == "1R2T" else Rotation.identity()
@@ -348,7 +348,7 @@ def test_planar_robots_there_and_back(pattern: Literal["1R2T", "2T"], normal: tu
         assert len(sl.equilibria(robot, plan.unstrained_length)) == 1
 
 
-def test_a_level_plane_feels_no_weight() -> None:
+def test_weight_has_no_influence_in_a_level_plane() -> None:
     pose = sl.Pose((0.3, -0.4, 0.0), np.eye(3))
     light = planar((0, 0, 1), "2T")
     lengths = sl.inverse(light, pose).unstrained_length
@@ -357,7 +357,7 @@ def test_a_level_plane_feels_no_weight() -> None:
     np.testing.assert_allclose(found.pose.position, pose.position, atol=1e-9)
 
 
-def test_a_point_mass_there_and_back_has_one_equilibrium() -> None:
+def test_a_point_mass_recovers_its_position_and_has_one_equilibrium() -> None:
     robot = point_mass()
     pose = sl.Pose((0.7, -0.5, 1.2), np.eye(3))
     plan = sl.inverse(robot, pose)
@@ -367,7 +367,7 @@ def test_a_point_mass_there_and_back_has_one_equilibrium() -> None:
     assert found.starts == 1
     np.testing.assert_allclose(found.solutions.pose.position, [pose.position], atol=1e-9)
     with_moment = sl.forward(robot, plan.unstrained_length, wrench=(0, 0, 0, 5.0, 5.0, 5.0))
-    np.testing.assert_allclose(with_moment.pose.position, pose.position, atol=1e-9)  # a point does not feel it
+    np.testing.assert_allclose(with_moment.pose.position, pose.position, atol=1e-9)  # no influence on a point mass
 
 
 # straight cables
@@ -389,7 +389,7 @@ def test_straight_cables_are_fitted() -> None:
     assert np.isnan(found.state.cables.chord_tension).all()
 
 
-def test_scipy_fits_straight_cables_alike() -> None:
+def test_fits_of_straight_cables_agree_with_scipy() -> None:
     pose = box_poses(COGIRO, 4, seed=22)
     lengths = chords(COGIRO, pose) + np.random.default_rng(23).normal(scale=0.01, size=(4, 8))
     found = sl.forward(COGIRO, lengths, pose, sl.Straight())

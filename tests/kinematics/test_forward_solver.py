@@ -1,4 +1,4 @@
-"""The solver of a control loop answers what `forward` answers."""
+"""The solver of a control loop agrees with `forward`."""
 
 from typing import Any
 
@@ -17,7 +17,7 @@ def test_steps_equal_the_batch() -> None:
     plan = feasible_plan(COGIRO, 1, seed=1)
     lengths = plan.unstrained_length[0] + 0.002 * np.arange(30)[:, None] * np.linspace(-1, 1, 8)
     batch = sl.forward(COGIRO, lengths, plan.state.pose[0])
-    solver = sl.ForwardSolver(COGIRO)  # without a start: the first step searches
+    solver = sl.ForwardSolver(COGIRO)  # without an initial pose: the first step searches
     position, quaternion = np.empty(3), np.empty(4)
     for i, row in enumerate(lengths):
         step = solver.step(row)
@@ -30,7 +30,7 @@ def test_steps_equal_the_batch() -> None:
         np.testing.assert_allclose(quaternion, step.quaternion, atol=1e-12)
 
 
-def test_it_searches_once_and_again_when_told_to_forget(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_it_searches_once_and_again_after_a_reset(monkeypatch: pytest.MonkeyPatch) -> None:
     plan = feasible_plan(COGIRO, 1, seed=4)
     solver, searches = sl.ForwardSolver(COGIRO), []
 
@@ -50,7 +50,7 @@ def test_it_searches_once_and_again_when_told_to_forget(monkeypatch: pytest.Monk
     assert len(searches) == 2
 
 
-def test_results_belong_to_the_caller_and_the_wrench_counts() -> None:
+def test_results_are_copies_and_the_wrench_is_used() -> None:
     plan = feasible_plan(COGIRO, 1, seed=2)
     solver = sl.ForwardSolver(COGIRO, start=plan.state.pose[0])
     first = solver.step(plan.unstrained_length[0])
@@ -61,7 +61,7 @@ def test_results_belong_to_the_caller_and_the_wrench_counts() -> None:
     np.testing.assert_allclose(solver.step(plan.unstrained_length[0]).position, kept, atol=1e-12)
 
 
-def test_a_lost_step_does_not_lose_the_pose() -> None:
+def test_a_failed_step_keeps_the_previous_pose() -> None:
     plan = feasible_plan(COGIRO, 1, seed=3)
     solver = sl.ForwardSolver(COGIRO, start=plan.state.pose[0])
     lengths = plan.unstrained_length[0].copy()
@@ -71,14 +71,14 @@ def test_a_lost_step_does_not_lose_the_pose() -> None:
     np.testing.assert_allclose(solver.step(lengths).position, plan.state.pose.position[0], atol=1e-9)
 
 
-def test_what_it_remembers_does_not_outlive_a_reset_or_a_loss() -> None:
+def test_the_previous_solution_is_discarded_by_a_reset_or_a_failure() -> None:
     plan = feasible_plan(COGIRO, 2, seed=4)
     (first, second), lengths = plan.state.pose, plan.unstrained_length
     solver = sl.ForwardSolver(COGIRO, start=first)
     np.testing.assert_allclose(solver.step(lengths[0]).position, first.position, atol=1e-11)
     solver.reset(second)
     np.testing.assert_allclose(solver.step(lengths[1]).position, second.position, atol=1e-11)
-    solver.step(np.full(8, 1e-3))  # too short to meet
+    solver.step(np.full(8, 1e-3))  # lengths that are too short
     solver.reset(first)
     np.testing.assert_allclose(solver.step(lengths[0]).position, first.position, atol=1e-11)
 

@@ -49,7 +49,7 @@ def test_cables_balance_weight_and_wrench(name: str, model: CableModel) -> None:
     load[:, 3:] *= np.ptp(robot.platform_anchors, axis=0).max()
     plan = inverse(robot, poses, model=model, tension=MinimumNorm(), wrench=load)
     assert plan.feasible.sum() > 100
-    scale = max(1.0, 1e-6 * robot.tension_max.max())  # forces of FAST: meganewtons
+    scale = max(1.0, 1e-6 * robot.tension_max.max())  # forces of FAST are meganewtons
     left = np.abs(unbalanced(plan)[plan.feasible])
     assert left.max() <= 1e-8 * scale
     assert plan.wrench_residual[plan.feasible].max() <= 1e-8 * scale
@@ -59,7 +59,7 @@ def test_cables_balance_weight_and_wrench(name: str, model: CableModel) -> None:
     assert (tensions <= robot.tension_max + slack).all()
 
 
-def test_kernel_balance_is_written_out_and_article_balance_is_it_too() -> None:
+def test_kernel_balance_and_article_balance_agree_with_the_definition() -> None:
     robot = load_robot("article-mixed").replace(center_of_mass=[0.02, -0.01, 0.05])
     poses = random_poses(robot, 30, np.random.default_rng(2))
     matrices, article = structure_matrix(robot, poses), article_balance(robot, poses)
@@ -104,7 +104,7 @@ def test_minimum_norm_and_closest_are_those_of_a_quadratic_program(name: str, va
             at_limits += int((np.abs(plan.chord_tension[i] - robot.tension_min) < 1e-9).any())
             np.testing.assert_allclose(found, best, atol=1e-6 * found.max())
             before = found
-    assert at_limits > 0 or name in ("article-suspended", "cogiro")  # whose limits are far in the box
+    assert at_limits > 0 or name in ("article-suspended", "cogiro")  # with limits far inside of the box
 
 
 def test_closest_depends_on_the_path_and_minimum_norm_does_not() -> None:
@@ -116,7 +116,7 @@ def test_closest_depends_on_the_path_and_minimum_norm_does_not() -> None:
     assert np.abs(closest.chord_tension[0] - closest.chord_tension[-1]).max() > 1.0
 
 
-def test_a_batch_of_poses_stands_alone_and_previous_continues() -> None:
+def test_poses_of_a_batch_are_independent_and_previous_continues() -> None:
     robot, path = load_robot("article-suspended"), article_path(rate=10)
     alone = inverse(robot, path.pose)
     np.testing.assert_array_equal(alone.chord_tension, inverse(robot, path.pose, tension=MinimumNorm()).chord_tension)
@@ -142,7 +142,7 @@ def test_limits_at_the_frame_end_are_met_exactly(model: CableModel, variable: Va
 
 
 @pytest.mark.parametrize("share", np.linspace(0.2, 1.5, 14))
-def test_limits_at_the_frame_end_near_the_least_that_hanging_cables_have(share: float) -> None:
+def test_frame_end_limits_near_the_least_catenary_tension(share: float) -> None:
     robot = load_robot("ipanema-1").replace(cables=Cable(0.07, 24e3), tension_limits_of="frame_end", tension_min=0.0)
     pose = Pose([0.0, 0.0, 1.2], LEVEL)
     chord = np.linalg.norm(pose.transform(robot.platform_anchors) - robot.frame_anchors, axis=1)
@@ -151,7 +151,7 @@ def test_limits_at_the_frame_end_near_the_least_that_hanging_cables_have(share: 
     low = inverse(robot.replace(tension_min=limit), pose)
     assert low.feasible
     assert (low.state.cables.frame_end_tension >= limit - 1e-9).all()
-    # an upper limit that no hanging cable keeps is kept by no plan
+    # no plan keeps an upper limit below the tension of every catenary
     high = inverse(robot.replace(tension_max=np.where(floor, limit, 720.0)), pose)
     assert high.feasible == (share > 1.05)
     assert high.feasible or high.status == PoseStatus.INFEASIBLE
@@ -172,7 +172,7 @@ def test_article_bound_keeps_the_lowest_point_outside_the_span() -> None:
     assert not (state.status[bound.feasible] == CableStatus.BELOW_VALIDITY).any()
 
 
-def test_infeasible_poses_keep_nothing_but_the_reason() -> None:
+def test_infeasible_poses_have_only_the_reason() -> None:
     robot = load_robot("article-suspended")
     path = quintic_path([(0, 0, 1.5), (7.4, 0, 1.5), (0, 0, 1.5), (7.45, 0, 1.5)], durations=[5, 5, 5], rate=20)
     plan = inverse(robot, path)
@@ -190,7 +190,7 @@ def test_infeasible_poses_keep_nothing_but_the_reason() -> None:
         assert gap.shortfall == plan.shortfall[gap.first : gap.last + 1].max()
         assert gap.cables
     after, before = plan.gaps[0].last + 1, plan.gaps[0].first - 1
-    # the last feasible set is the reference after the gap: a solver that never saw the gap agrees
+    # the last feasible set is the reference after the gap, as for a solver without the gap
     solver = InverseSolver(robot)
     for i in (*range(before + 1), after):
         step = solver.step(path.pose.position[i], path.pose.quaternion[i], plan.state.wrench[i])
@@ -203,7 +203,7 @@ def test_known_answer_of_a_planar_robot() -> None:
     np.testing.assert_allclose(plan.chord_tension, [5.209314465, 3.8, 3.8, 6.876421727], atol=2e-9)
 
 
-def test_equal_limits_leave_one_answer() -> None:
+def test_equal_limits_leave_one_solution() -> None:
     robot = planar(tension_min=10.0, tension_max=10.0)
     centered = inverse(robot, Pose(np.zeros(3), LEVEL), tension=MinimumNorm())
     np.testing.assert_allclose(centered.chord_tension, 10.0, rtol=1e-12)
@@ -222,7 +222,7 @@ def test_no_upper_limit() -> None:
 
 
 @pytest.mark.parametrize("variable", ["chord", "horizontal", "frame_end"])
-def test_closest_to_tensions_that_will_do_are_these_tensions(variable: Variable) -> None:
+def test_closest_to_feasible_tensions_are_these_tensions(variable: Variable) -> None:
     robot = load_robot("article-mixed")
     pose = random_poses(robot, 1, np.random.default_rng(3))[0]
     before = inverse(robot, pose, tension=AnalyticCenter())
@@ -231,7 +231,7 @@ def test_closest_to_tensions_that_will_do_are_these_tensions(variable: Variable)
     assert np.abs(inverse(robot, pose, tension=Closest(variable)).chord_tension - before.chord_tension).max() > 1.0
 
 
-def test_the_solver_forgets_the_wrench_of_the_step_before() -> None:
+def test_the_solver_does_not_keep_the_previous_wrench() -> None:
     robot, pose = load_robot("article-suspended"), Pose([1.0, 0.5, 2.0], np.eye(3))
     wrench = np.array([30.0, -20.0, -100.0, 1.0, 2.0, 3.0])
     solver = InverseSolver(robot, tension=MinimumNorm())
@@ -242,7 +242,7 @@ def test_the_solver_forgets_the_wrench_of_the_step_before() -> None:
     assert np.abs(free - loaded).max() > 1.0
 
 
-def test_solver_repeats_inverse() -> None:
+def test_solver_agrees_with_inverse() -> None:
     robot, path = load_robot("article-suspended"), article_path(rate=5)
     plan = inverse(robot, path.pose, previous=inverse(robot, path.pose[0]))
     solver = InverseSolver(robot)
@@ -265,7 +265,7 @@ def test_solver_repeats_inverse() -> None:
 
 
 def test_singular_pose() -> None:
-    # all cables meet the axis through the center of mass: no cable resists turning about it
+    # all cables meet the axis through the center of mass: no cable resists a rotation about it
     corners = np.array([[3.0, 3, 3], [-3, 3, 3], [-3, -3, 3], [3, -3, 3]])
     frame = np.concatenate((corners, corners * [1, 1, -1]))
     ends = np.repeat([[0.0, 0, 0.2], [0, 0, -0.2]], 4, axis=0)
@@ -296,7 +296,7 @@ def test_bad_input() -> None:
         inverse(robot, Pose(robot.frame_anchors[0] - robot.platform_anchors[0], Rotation.identity()))
 
 
-def test_empirical_model_below_its_range_is_told_and_not_changed() -> None:
+def test_empirical_model_below_its_range_is_reported_and_unchanged() -> None:
     robot = load_robot("article-mixed").replace(tension_min=1.0)
     poses = random_poses(robot, 50, np.random.default_rng(8))
     plan = inverse(robot, poses, model=Empirical(), tension=MinimumNorm())
@@ -310,11 +310,11 @@ def test_empirical_model_below_its_range_is_told_and_not_changed() -> None:
     assert np.nanmin(plan.chord_tension) == pytest.approx(1.0)
     exact = inverse(robot, poses, tension=MinimumNorm())
     assert exact.at_border is not None
-    # one pose was found by searching at the border, which is all that is told of the exact model
+    # one pose was found by a search at the boundary, which is the only information on the exact model
     assert [text.split(" are at")[0] for text in exact.warnings] == [f"{exact.at_border.sum()} of 50 poses"]
 
 
-def test_tensions_continue_as_their_plan_does() -> None:
+def test_tensions_continue_along_the_plan() -> None:
     robot = load_robot("cogiro")
     poses = Pose.from_euler([[0.0, 0.0, 2.0], [0.4, 0.1, 2.1]], 0.0, 0.0, 0.0)
     before = inverse(robot, poses[0], tension=LowestSum())

@@ -1,4 +1,4 @@
-"""A control loop is told what is no pose, and gets no lengths for it."""
+"""The solver of a control loop returns a status and no lengths for invalid inputs."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ NO_ROTATIONS = [(0, 0, 0, 5.0), (0, 0, 0, 0), (0, 0, 0, 1.00001), (NAN, 0, 0, 1)
     "quaternion", [(0, 0, 0, 5.0), (0, 0, 0, 0), (0, 0, 0, 1.00001), (NAN, 0, 0, 1), (0, 0, 0, 1e300)]
 )
 @pytest.mark.parametrize("kind", [tuple, np.array])
-def test_what_is_no_rotation_has_a_status_and_no_lengths(quaternion: tuple[float, ...], kind: type) -> None:
+def test_an_invalid_rotation_has_a_status_and_no_lengths(quaternion: tuple[float, ...], kind: type) -> None:
     solver, lengths = sl.InverseSolver(ROBOT), np.ones(8)
     assert solver.step_into(POSITION, kind(quaternion), lengths) is sl.PoseStatus.NO_POSE
     assert np.isnan(lengths).all()
@@ -52,7 +52,7 @@ def test_a_quaternion_that_is_nearly_of_length_one_is_normalized(factor: float) 
     np.testing.assert_allclose(lengths, expected, rtol=0.0, atol=2e-14)
 
 
-def test_a_wrench_that_is_refused_leaves_nothing_behind() -> None:
+def test_a_refused_wrench_has_no_later_effect() -> None:
     solver, expected, lengths = sl.InverseSolver(ROBOT), np.empty(8), np.empty(8)
     solver.step_into(POSITION, (0, 0, 0, 1), expected)
     with pytest.raises(sl.InvalidValueError, match="wrench"):

@@ -1,4 +1,4 @@
-"""N robots, one per pose, against N single calls: the same answers to the last bit."""
+"""N robots, one per pose, compared with N single calls: equal to the last bit."""
 
 from typing import Any
 
@@ -19,7 +19,7 @@ COUNT = 50
 
 
 def perturbed(robot: sl.Robot, count: int, seed: int) -> list[sl.Robot]:
-    """Robots that differ in all that may differ: anchors, material, mass, center of mass, inertia and limits."""
+    """Robots with different anchors, material, mass, center of mass, inertia and limits."""
     rng = np.random.default_rng(seed)
 
     def factor(*shape: int) -> Array:
@@ -56,7 +56,7 @@ def assert_same(batch: dict[str, Array], singles: list[dict[str, Array]]) -> Non
         np.testing.assert_array_equal(values, np.stack([single[name] for single in singles]), err_msg=name)
 
 
-def test_inverse_of_many_robots_is_the_loop_of_single_ones() -> None:
+def test_inverse_of_many_robots_agrees_with_single_calls() -> None:
     robots, pose = perturbed(COGIRO, COUNT, seed=1), box_poses(COGIRO, COUNT, seed=2)
     wrench = np.random.default_rng(3).normal(size=(COUNT, 6)) * 300.0
     plan = sl.inverse(robots, pose, wrench=wrench)
@@ -100,7 +100,7 @@ def test_limit_margins_are_those_of_each_robot(limits_of: str) -> None:
 
 
 @pytest.mark.parametrize("begun", wide(["apart", "chained", "searched"], first=2))
-def test_forward_of_many_robots_is_the_loop_of_single_ones(begun: str) -> None:
+def test_forward_of_many_robots_agrees_with_single_calls(begun: str) -> None:
     robots = perturbed(COGIRO, COUNT, seed=7)
     plan = feasible_plan(COGIRO, COUNT, seed=8)
     robots, lengths = robots[: len(plan.state.pose)], plan.unstrained_length
@@ -118,7 +118,7 @@ def test_forward_of_many_robots_is_the_loop_of_single_ones(begun: str) -> None:
     else:
         found = sl.forward(robots, lengths, wrench=wrench)
         singles = [sl.forward(robots[i], lengths[i], wrench=wrench[i]) for i in range(len(robots))]
-    if begun == "chained":  # the cables' memory goes on in a chain, which rounding may see
+    if begun == "chained":  # cables keep their previous state in a chain, which changes rounding
         positions = np.stack([single.pose.position for single in singles])
         np.testing.assert_allclose(found.pose.position, positions, rtol=0.0, atol=1e-11)
     else:
@@ -129,8 +129,8 @@ def test_forward_of_many_robots_is_the_loop_of_single_ones(begun: str) -> None:
     assert found.state.robot == tuple(robots)
 
 
-def test_a_search_that_tilts_again_takes_the_right_robots_along() -> None:
-    # cables 2 % too long leave some slack: those samples are tried again from tilted starts
+def test_a_repeated_search_uses_the_robot_of_each_sample() -> None:
+    # cables that are 2 % too long are partly slack: those samples are repeated from tilted initial poses
     robots = perturbed(COGIRO, 6, seed=11)
     lengths = feasible_plan(COGIRO, 12, seed=12).unstrained_length[:6].copy()
     lengths[[1, 4]] *= 1.02
@@ -153,7 +153,7 @@ def test_a_search_judges_each_sample_by_the_limits_and_cables_of_its_robot(limit
     found = solve_forward_rows(tuple(robots), sl.Catenary(), lengths, rows, none)
     cables = found.solution(tuple(robots), sl.Catenary(), none[0], (len(lengths),)).state.cables
     tension = np.sort(cables.frame_end_tension if limits_of == "frame_end" else cables.chord_tension, axis=1)
-    # limits 5 % beside the tensions of each robot leave out as many cables as are asked for
+    # limits 5 % beside the tensions of each robot exclude the requested number of cables
     low = [1.05 * row[k] for row, k in zip(tension, (0, 1, 2, 0, 0, 3), strict=True)]
     robots = [robot.replace(tension_min=value) for robot, value in zip(robots, low, strict=True)]
     singles = [outside_limits(robot, sl.Catenary(), found.part(np.array([i])))[0] for i, robot in enumerate(robots)]
@@ -169,7 +169,7 @@ def test_straight_cables_are_fitted_robot_by_robot() -> None:
     np.testing.assert_allclose(found.pose.position, pose.position, atol=1e-10)
 
 
-def test_a_path_of_many_robots_carries_the_inertia_of_each() -> None:
+def test_a_path_of_many_robots_uses_the_inertia_of_each() -> None:
     waypoints = sl.Pose.from_euler([[0, 0, 3.0], [1, 0.5, 3.5]], [0.0, 0.3], [0.0, 0.1], 0.0)
     path = sl.quintic_path(waypoints, durations=2.0, rate=10.0)
     robots = perturbed(COGIRO, len(path), seed=16)
@@ -244,7 +244,7 @@ def test_a_method_that_one_of_the_robots_cannot_use_names_it() -> None:
         sl.inverse([COGIRO, open_ended], box_poses(COGIRO, 2, seed=0), tension=sl.ClosedForm())
 
 
-def test_a_plan_of_many_robots_is_not_saved_by_halves(tmp_path: object) -> None:
+def test_a_plan_of_many_robots_is_not_saved(tmp_path: object) -> None:
     from pathlib import Path
 
     file = Path(str(tmp_path)) / "run.nc"
@@ -256,7 +256,7 @@ def test_a_plan_of_many_robots_is_not_saved_by_halves(tmp_path: object) -> None:
 
 @extended
 def test_robots_with_and_without_pulleys_in_one_batch(monkeypatch: pytest.MonkeyPatch) -> None:
-    """In memory that others have used: what a kernel does not write must not be told."""
+    """In reused memory: values that a kernel does not write must not appear in results."""
     empty = np.empty
     plain = sl.load_robot("article-prototype")
     robots = [plain, plain.replace(winches=sl.Winch(pulley_radius=0.05, dead_cable=2.0)), plain]
@@ -271,7 +271,10 @@ def test_robots_with_and_without_pulleys_in_one_batch(monkeypatch: pytest.Monkey
         found = sl.forward(robots, lengths, start=poses)
     for k, robot in enumerate(robots):
         alone = sl.forward(robot, lengths[k], start=poses[k])
-        for name in ("unstrained_length", "horizontal_tension"):  # beside pulleys a bare cable rounds differently
+        for name in (
+            "unstrained_length",
+            "horizontal_tension",
+        ):  # a cable without pulley is rounded differently beside pulleys
             together, single = getattr(found.state.cables, name)[k], getattr(alone.state.cables, name)
             np.testing.assert_allclose(together, single, rtol=1e-12)
     assert found.state.contact is not None

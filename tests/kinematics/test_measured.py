@@ -1,4 +1,4 @@
-"""Noisy lengths and load cells: the corrected pose is better, and its covariance is honest."""
+"""Noisy lengths and load cells: the corrected pose is more accurate, and its covariance is correct."""
 
 import numpy as np
 import pytest
@@ -25,12 +25,12 @@ def test_the_covariance_is_that_of_the_errors() -> None:
     assert found.covariance is not None
     error = motion_between(TRUE, found)
     squares = np.einsum("ni,ni->n", error, np.linalg.solve(found.covariance, error[..., None])[..., 0])
-    # the sum has a chi-square distribution: five of its standard deviations
+    # the sum has a chi-square distribution; five of its standard deviations
     assert abs(squares.sum() - 6 * COUNT) < 5 * np.sqrt(2 * 6 * COUNT)
     assert np.median(position_error(found, PLAN.state.pose)) < 0.95 * np.median(position_error(plain, PLAN.state.pose))
 
 
-def test_without_readings_the_lengths_alone_count() -> None:
+def test_without_readings_only_the_lengths_are_used() -> None:
     lengths = PLAN.unstrained_length[:3]
     blind = sl.MeasuredTension(np.full(8, np.nan), 5.0, 0.003)
     found = sl.forward(COGIRO, lengths, PLAN.state.pose[:3], tension_measured=blind)
@@ -40,7 +40,7 @@ def test_without_readings_the_lengths_alone_count() -> None:
     np.testing.assert_allclose(found.covariance, 0.003**2 * by_length @ np.swapaxes(by_length, 1, 2), rtol=1e-6)
 
 
-def test_every_cable_has_deviations_of_its_own() -> None:
+def test_deviations_per_cable() -> None:
     """Covariance of the least-squares fit, B (1/sigma_L^2 + S^T S/sigma_T^2)^-1 B^T, cable by cable."""
     by_tension, by_length = np.geomspace(0.3, 10.0, 8), np.linspace(0.001, 0.004, 8)
     measured = sl.MeasuredTension(TENSIONS[0], by_tension, by_length)
@@ -54,7 +54,7 @@ def test_every_cable_has_deviations_of_its_own() -> None:
 
 
 def test_exact_readings_correct_wrong_lengths() -> None:
-    # one encoder is off by 20 mm, and is known to be poor; all load cells are good
+    # one encoder has an error of 20 mm and a large deviation; all load cells are good
     wrong = PLAN.unstrained_length[0].copy()
     wrong[3] += 0.02
     deviation = np.full(8, 1e-5)
@@ -81,7 +81,7 @@ def test_the_slopes_of_the_frame_end_tensions_are_those_of_the_forward_solution(
     for j in range(8):
         step = 2e-4 * np.eye(8)[j]
         expected = (4.0 * central(0.5 * step) - central(step)) / 3.0
-        # the weight of new cable is 1e-5 of these slopes
+        # the weight of additional cable is 1e-5 of these slopes
         np.testing.assert_allclose(found[:, j], expected, atol=1e-7 * np.abs(expected).max())
 
 

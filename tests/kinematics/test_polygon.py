@@ -24,7 +24,7 @@ def shoelace(corners: np.ndarray) -> float:
 
 @pytest.mark.parametrize("name", wide(["article-mixed", "cogiro", "article-suspended", "ipanema-1"]))
 @pytest.mark.parametrize("variable", ["chord", "horizontal"])
-def test_polygon_holds_the_feasible_tensions_and_no_others(name: str, variable: Variable) -> None:
+def test_polygon_contains_exactly_the_feasible_tensions(name: str, variable: Variable) -> None:
     robot = load_robot(name)
     for pose in random_poses(robot, 4, np.random.default_rng(1)):
         polygon = tension_polygon(robot, pose, variable=variable)
@@ -41,7 +41,7 @@ def test_polygon_holds_the_feasible_tensions_and_no_others(name: str, variable: 
         radius = float(np.abs(polygon.vertices).max()) * 1.1
         area = shoelace(polygon.vertices)
         assert area == pytest.approx(area_by_sampling(low, high, polygon.basis, polygon.origin, radius), rel=0.02)
-        for k, side in enumerate(polygon.sides):  # both ends of a side are at its limit
+        for k, side in enumerate(polygon.sides):  # both ends of an edge are at its limit
             assert side is not None
             limit = (low if side.limit == "min" else high)[side.cable]
             ends = polygon.tensions[[k, (k + 1) % len(polygon.sides)], side.cable]
@@ -54,7 +54,7 @@ def test_polygon_contains_the_plan() -> None:
     polygon, plan = tension_polygon(robot, pose), inverse(robot, pose, tension=MinimumNorm())
     point = polygon.coordinates(plan.chord_tension)
     np.testing.assert_allclose(polygon.origin + point @ polygon.basis, plan.chord_tension, atol=1e-9)
-    # the point nearest to the origin: on the boundary, every corner lies beyond the line through it
+    # the point nearest to the origin is on the boundary: all corners are beyond the line through it
     assert ((polygon.vertices - point) @ point >= -1e-6 * point @ point).all()
 
 
@@ -88,7 +88,7 @@ def test_interval_and_point() -> None:
     np.testing.assert_allclose(point.tensions[0], inverse(fast, pose).chord_tension, rtol=1e-12)
 
 
-def test_unbounded_polygon_says_so() -> None:
+def test_an_unbounded_polygon_is_marked() -> None:
     robot = planar(tension_max=np.inf)
     polygon = tension_polygon(robot, Pose(np.zeros(3), np.eye(3)))
     assert not polygon.bounded

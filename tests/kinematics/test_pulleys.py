@@ -1,4 +1,4 @@
-"""Robots whose cables run over pulleys and have dead cable behind them: there and back, energy, and derivatives."""
+"""Robots with pulleys and dead length: forward of inverse, energy, and derivatives."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def cogiro(winch: sl.Winch, softer: float = 1.0) -> sl.Robot:
     return robot.replace(winches=winch, cables=cables, tension_min=100.0)
 
 
-def test_nothing_behind_leaves_every_number_as_it_was() -> None:
+def test_winches_without_pulleys_and_dead_length_change_no_number() -> None:
     for robot in (sl.load_robot("cogiro"), sl.load_robot("article-mixed")):
         bare, idle = (
             sl.inverse(one, random_poses(robot, 50, np.random.default_rng(1)))
@@ -45,7 +45,7 @@ def test_nothing_behind_leaves_every_number_as_it_was() -> None:
 
 @pytest.mark.parametrize("winch", WINCHES)
 @pytest.mark.parametrize("model", wide([sl.Straight(), sl.Elastic(), sl.Empirical(), sl.Parabolic(), sl.Catenary()]))
-def test_lengths_lead_back_to_the_pose(winch: sl.Winch, model: sl.CableModel) -> None:
+def test_lengths_give_the_pose(winch: sl.Winch, model: sl.CableModel) -> None:
     plan = sl.inverse(cogiro(winch), POSE, model)
     assert plan.feasible
     start = sl.Pose((1.0, 1.5, 2.2), np.eye(3))
@@ -59,8 +59,8 @@ def test_lengths_lead_back_to_the_pose(winch: sl.Winch, model: sl.CableModel) ->
 
 @extended
 @pytest.mark.parametrize("robot", presets(), ids=lambda robot: robot.name)
-def test_far_starts_find_every_preset_with_pulleys_and_dead_cable(robot: sl.Robot) -> None:
-    """Starts 20 degrees and a meter off, or a tenth of a small robot's frame."""
+def test_distant_starts_converge_with_pulleys_and_dead_length(robot: sl.Robot) -> None:
+    """Initial poses off by 20 degrees and a meter, or by a tenth of the frame of a small robot."""
     rng = np.random.default_rng(4)
     poses = random_poses(robot, 20, rng)
     plan = sl.inverse(robot.replace(winches=sl.Winch(0.05, dead_cable=5.0)), poses)
@@ -87,7 +87,7 @@ def test_forces_balance_the_platform(winch: sl.Winch) -> None:
 
 @pytest.mark.parametrize("winch", WINCHES[:3])
 def test_cables_leave_along_their_force(winch: sl.Winch) -> None:
-    """The free span starts on the pulley, tangent to it, and closes on the platform end."""
+    """The free span begins on the pulley, tangent to it, and ends at the platform."""
     plan = sl.inverse(cogiro(winch, softer=0.02), POSE)
     robot, cables = plan.state.one_robot, plan.state.cables
     assert cables.closure_residual.max() < 1e-9
@@ -108,7 +108,7 @@ def test_cables_leave_along_their_force(winch: sl.Winch) -> None:
 @extended
 @pytest.mark.parametrize("winch", WINCHES)
 @pytest.mark.parametrize("model", [sl.Elastic(), sl.Catenary()])
-def test_the_energy_s_slopes_are_the_position_and_the_tensions(winch: sl.Winch, model: sl.CableModel) -> None:
+def test_slopes_of_the_energy_are_position_and_tensions(winch: sl.Winch, model: sl.CableModel) -> None:
     """At an equilibrium dE/d(force) is minus the position and dE/dL minus H = T + T^2/(2 EA) - w z."""
     robot = cogiro(winch, softer=0.02)
     plan = sl.inverse(robot, POSE, model)
@@ -135,17 +135,17 @@ def test_the_energy_s_slopes_are_the_position_and_the_tensions(winch: sl.Winch, 
     for i in (0, 5):
         step = np.eye(8)[i]
         found = slope(partial(energy_by, length=step), 1e-4)
-        # the frame end, where the energy counts from, is where the weight of what is let out comes from
+        # the frame end, the zero of the energy, is the source of the weight of released cable
         assert found == pytest.approx(-whole[i], rel=2e-6)
 
 
 def slope(of: Callable[[float], float], step: float) -> float:
-    """Central difference, freed of its first error."""
+    """Central difference with extrapolation of the first error term."""
     return float((8.0 * (of(0.5 * step) - of(-0.5 * step)) - (of(step) - of(-step))) / (6.0 * step))
 
 
 def motion(robot: sl.Robot, lengths: Array, wrench: Array | None = None) -> Array:
-    """Displacement of the center of mass, and half the skew part of the turn, from POSE."""
+    """Displacement of the center of mass, and half of the skew part of the rotation, relative to POSE."""
     found = sl.forward(robot, lengths, start=POSE, wrench=wrench)
     assert found.solved
     turn = found.pose.matrix @ POSE.matrix.T
@@ -159,7 +159,7 @@ def slopes(of: Callable[[float], Array], step: float) -> Array:
 
 @extended
 @pytest.mark.parametrize("winch", WINCHES)
-def test_the_platform_follows_its_data_as_differences_say(winch: sl.Winch) -> None:
+def test_sensitivities_of_the_pose_agree_with_differences(winch: sl.Winch) -> None:
     robot = cogiro(winch, softer=0.05)
     plan = sl.inverse(robot, POSE)
     found, lengths, cable = sl.stiffness(plan.state), plan.unstrained_length, np.eye(8)[2]
@@ -191,7 +191,7 @@ def test_the_platform_follows_its_data_as_differences_say(winch: sl.Winch) -> No
     for name, expected in differences.items():
         column = getattr(found, name)[:, 2]
         column = column[:, 0] if name == "frame_anchor_sensitivity" else column
-        # what is neglected on the pulley is of the order of beta = w R/EA, here 1e-6 times its share of the cable
+        # the neglected terms on the pulley are of the order of beta = w R/EA, here 1e-6 times the share of the cable
         np.testing.assert_allclose(column, expected, rtol=0.0, atol=3e-7 * np.abs(expected).max(), err_msg=name)
     for k in range(6):
         wrench = np.eye(6)[k]
@@ -204,7 +204,7 @@ def test_the_platform_follows_its_data_as_differences_say(winch: sl.Winch) -> No
 
 @extended
 @pytest.mark.parametrize("winch", WINCHES)
-def test_tensions_where_cables_leave_follow_the_lengths_as_differences_say(winch: sl.Winch) -> None:
+def test_sensitivities_of_tensions_agree_with_differences(winch: sl.Winch) -> None:
     robot = cogiro(winch, softer=0.05)
     plan = sl.inverse(robot, POSE)
     lengths, cable = plan.unstrained_length, np.eye(8)[3]
@@ -217,7 +217,7 @@ def test_tensions_where_cables_leave_follow_the_lengths_as_differences_say(winch
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=3e-7 * np.abs(expected).max())
 
 
-def test_a_radius_that_vanishes_leaves_the_cable_at_its_anchor() -> None:
+def test_a_vanishing_radius_gives_a_cable_from_its_anchor() -> None:
     bare = sl.inverse(cogiro(sl.Winch()), POSE)
     errors = [
         np.abs(sl.inverse(cogiro(sl.Winch(radius)), POSE).unstrained_length - bare.unstrained_length).max()
@@ -228,8 +228,8 @@ def test_a_radius_that_vanishes_leaves_the_cable_at_its_anchor() -> None:
 
 
 @extended
-def test_what_a_first_pulley_would_do_is_known_without_one() -> None:
-    """By R at R = 0, of a robot without winches, against small pulleys at the same lengths: a one-sided difference."""
+def test_slopes_by_the_radius_exist_at_radius_zero() -> None:
+    """Slopes by R at R = 0 of a robot without winches, by one-sided differences at the same lengths."""
     robot = sl.load_robot("cogiro")
     plan, cable = sl.inverse(robot, POSE), np.eye(8)[2]
     still, near, far = (
@@ -240,7 +240,7 @@ def test_what_a_first_pulley_would_do_is_known_without_one() -> None:
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-6 * np.abs(expected).max())
 
 
-def test_turned_and_moved_robots_need_the_same_lengths() -> None:
+def test_rotated_and_shifted_robots_need_the_same_lengths() -> None:
     robot = cogiro(WINCHES[1])
     turn, shift = Rotation.from_rotvec([0.0, 0.0, 0.7]), np.array([10.0, -5.0, 3.0])
     other = robot.replace(frame_anchors=robot.frame_anchors @ turn.as_matrix().T + shift)
@@ -250,8 +250,8 @@ def test_turned_and_moved_robots_need_the_same_lengths() -> None:
 
 
 @extended
-def test_left_out_pulleys_cost_what_the_documentation_says() -> None:
-    """A pulley of 25 to 50 mm that the plan does not know, where cables are wound from the middle of the box."""
+def test_errors_of_omitted_pulleys_agree_with_the_documentation() -> None:
+    """A pulley of 25 to 50 mm that is missing in the plan, with lengths counted from the middle of the box."""
     robot = sl.load_robot("cogiro")
     poses = random_poses(robot, 40, np.random.default_rng(7))
     home = sl.Pose((0.0, 0.0, 2.0), np.eye(3))
@@ -278,7 +278,7 @@ def test_the_rate_of_winding_is_the_slope_of_the_lengths() -> None:
     assert np.abs(rates[2:-2] - inner).max() < 2e-5 * np.abs(rates).max()
 
 
-def test_the_rate_where_a_cable_is_held_at_its_limit_is_that_without_a_pulley() -> None:
+def test_rates_of_a_cable_at_its_limit_agree_with_the_limit_without_pulley() -> None:
     robot = sl.load_robot("cogiro").replace(tension_min=150.0)
     points = [(0.0, 0.0, 1.5), (3.0, 1.0, 2.5), (-3.0, 2.0, 3.0), (4.0, -2.0, 1.2)]
     path = sl.quintic_path(points, durations=[3.0] * 3, rate=20)
@@ -291,7 +291,7 @@ def test_the_rate_where_a_cable_is_held_at_its_limit_is_that_without_a_pulley() 
 
 
 def formula_error(robot: sl.Robot, poses: sl.Pose) -> float:
-    """By how much the straight cable's exit and wrap, and the exact catenary from there, miss exact lengths [m]."""
+    """Length errors if exit point and wrap are those of the straight cable, with the exact catenary from there [m]."""
     plan, winches = sl.inverse(robot, poses), robot.winches
     assert winches is not None
     reach = -ropes(robot, poses.position[:, None] + robot.platform_anchors @ np.swapaxes(poses.matrix, 1, 2))
@@ -304,7 +304,7 @@ def formula_error(robot: sl.Robot, poses: sl.Pose) -> float:
     return float(np.nanmax(np.abs(lengths - plan.unstrained_length)))
 
 
-def test_the_straight_cable_s_exit_is_off_by_micrometers() -> None:
+def test_the_exit_point_of_a_straight_cable_is_wrong_by_micrometers() -> None:
     robot = sl.load_robot("cogiro")
     poses = random_poses(robot, 60, np.random.default_rng(1))
     bare, dead = (
@@ -314,8 +314,8 @@ def test_the_straight_cable_s_exit_is_off_by_micrometers() -> None:
     assert bare < dead < 3e-4
 
 
-def test_dead_cable_stretches_as_a_spring() -> None:
-    """Weightless cables: what the dead part gives is T D/EA, so that its unstrained length is D/(1 + T/EA)."""
+def test_dead_length_stretches_as_a_spring() -> None:
+    """Weightless cables: the stretch of the dead part is T D/EA, so its unstrained length is D/(1 + T/EA)."""
     plan = sl.inverse(cogiro(sl.Winch(dead_cable=4.0)), POSE, sl.Elastic())
     contact = plan.state.contact
     assert contact is not None
@@ -324,7 +324,7 @@ def test_dead_cable_stretches_as_a_spring() -> None:
     np.testing.assert_array_equal(contact.wrapped_length, 0.0)
 
 
-def test_the_tension_at_the_pulley_is_limited_where_the_limits_name_it() -> None:
+def test_limits_of_the_frame_end_apply_at_the_pulley() -> None:
     robot = cogiro(WINCHES[1]).replace(tension_limits_of="frame_end", tension_min=400.0, tension_max=1200.0)
     plan = sl.inverse(robot, random_poses(robot, 30, np.random.default_rng(3)), tension=sl.LowestSum())
     tension = plan.state.cables.frame_end_tension[plan.feasible]
@@ -335,8 +335,8 @@ def test_the_tension_at_the_pulley_is_limited_where_the_limits_name_it() -> None
 
 
 @pytest.mark.parametrize("direction", [0, 1, 4])
-def test_the_border_of_feasibility_is_where_the_tangents_put_it(direction: int) -> None:
-    """The load at which the verdict of weightless cables turns, against a linear program over the load itself."""
+def test_the_boundary_of_feasibility_agrees_with_tangents(direction: int) -> None:
+    """The largest load of weightless cables by verdicts, compared with a linear program for the load."""
     robot = cogiro(WINCHES[0]).replace(tension_min=0.0, tension_max=800.0)
     matrix, along = structure(robot, POSE), np.eye(6)[direction]
     most = linprog(

@@ -1,4 +1,4 @@
-"""Rates of the lengths against differences of finely sampled plans, and of straight cables against the chord's own."""
+"""Rates of lengths compared with differences of finely sampled plans, and with chord rates of straight cables."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ DURATIONS = {"article-suspended": 6.0, "article-mixed": 6.0, "cogiro": 6.0, "ipa
 
 
 def tour(robot: sl.Robot, rate: float, slower: float = 1.0) -> sl.Path:
-    """From rest to rest with a turn."""
+    """From rest to rest with a rotation."""
     ends = sl.Pose.from_euler(WAYS[robot.name], [0.0, 0.1], [0.0, -0.04], [0.02, 0.0])
     return sl.septic_path(ends, durations=slower * DURATIONS[robot.name], rate=rate)
 
@@ -34,7 +34,7 @@ def part(path: sl.Path, index: Indices) -> sl.Path:
 
 
 def missed(rates: Array, expected: Array) -> Array:
-    """Largest error of each sample, over the largest rate."""
+    """Largest error of each sample relative to the largest rate."""
     error: Array = np.abs(rates - expected).max(axis=1) / np.nanmax(np.abs(expected))
     return error
 
@@ -57,13 +57,13 @@ def test_methods_without_memory(robot: sl.Robot, method: type[sl.TensionMethod])
     known = plan.feasible & np.all([one.feasible for one in near.values()], axis=0)
     assert known.sum() > 50
     errors = missed(rates[known], central[known])
-    # a sample or two stand where the active limits change, and with them the rate
+    # at a few samples the active limits change, and with them the rate
     assert (errors > 1e-8).sum() <= 2
     np.testing.assert_array_equal(np.isnan(rates).all(axis=1), ~plan.feasible)
 
 
 def followed(robot: sl.Robot, method: sl.Closest) -> tuple[Array, Array, list[sl.Equilibrium]]:
-    """Rates of `Closest` along a path, what differences of single steps make of them, and the states.
+    """Rates of `Closest` along a path, differences of single steps, and the states.
 
     A step from a state to an instant later, nearest to its tensions, and one twice as long: their slopes, extrapolated
     to no step at all, err by the square of the step.
@@ -88,7 +88,7 @@ def followed(robot: sl.Robot, method: sl.Closest) -> tuple[Array, Array, list[sl
 
 
 def held_at(states: list[sl.Equilibrium], limit: Array, quantity: str = "chord_tension") -> Array:
-    """How many cables of each state are at a limit."""
+    """Number of cables of each state at a limit."""
     tension = np.array([getattr(state.cables, quantity) for state in states])
     count: Array = np.isclose(tension, limit, rtol=1e-9).sum(axis=1)
     return count
@@ -105,11 +105,11 @@ def test_closest_follows_its_tensions(robot: sl.Robot, most: int, variable: Vari
     assert len(states) > 50
     assert held_at(states, robot.tension_min).max() == most
     errors = missed(rates, slopes)
-    assert (errors > 5e-8).sum() <= 1  # where an instant later another cable comes to its limit
+    assert (errors > 5e-8).sum() <= 1  # another cable reaches its limit immediately afterwards
 
 
 @pytest.mark.parametrize("limits_of", wide(["frame_end", "chord"]))
-def test_cables_that_are_held_stay_at_their_limits(limits_of: str) -> None:
+def test_cables_at_their_limits_stay_there(limits_of: str) -> None:
     robot = MIXED.replace(tension_limits_of=limits_of, tension_min=60.0)
     rates, slopes, states = followed(robot, sl.Closest())
     held = held_at(states, robot.tension_min, f"{limits_of}_tension")
@@ -119,7 +119,7 @@ def test_cables_that_are_held_stay_at_their_limits(limits_of: str) -> None:
 
 
 @pytest.mark.parametrize(("robot", "margin"), wide([(SUSPENDED, 60.0), (MIXED, 60.0), (COGIRO, 300.0)]))
-def test_the_lowest_point_bound_is_a_limit_that_moves(robot: sl.Robot, margin: float) -> None:
+def test_the_lowest_point_bound_is_a_moving_limit(robot: sl.Robot, margin: float) -> None:
     rates, slopes, states = followed(robot, sl.Closest(lowest_point_margin=margin))
     cables = [state.cables for state in states]
     weight = np.array([0.5 * c.cable.linear_density * c.gravity * c.chord for c in cables])
@@ -131,7 +131,7 @@ def test_the_lowest_point_bound_is_a_limit_that_moves(robot: sl.Robot, margin: f
 
 @extended
 @pytest.mark.parametrize("method", [sl.Closest(), sl.Closest("horizontal")], ids=lambda m: m.variable)
-def test_a_plan_of_closest_comes_near_its_rates_as_the_samples_do(method: sl.TensionMethod) -> None:
+def test_rates_of_closest_converge_with_the_sampling(method: sl.TensionMethod) -> None:
     errors = []
     for step in (2e-3, 1e-3, 5e-4):
         plan = sl.inverse(COGIRO, tour(COGIRO, 1.0 / step), tension=method)
@@ -166,7 +166,7 @@ def test_a_straight_cable_winds_as_its_chord_changes(method: sl.TensionMethod) -
 
 
 @pytest.mark.parametrize("method", [sl.Closest(), sl.MinimumNorm()], ids=lambda m: type(m).__name__)
-def test_a_cable_may_be_vertical_on_the_way(method: sl.TensionMethod) -> None:
+def test_a_cable_may_become_vertical(method: sl.TensionMethod) -> None:
     frame = [[1.0, 0, 4], [-3.0, 2, 4], [-3.0, -2, 4], [4.0, 2, 4], [4.0, -2, 4]]
     robot = sl.Robot("crane", frame, np.zeros((5, 3)), sl.Cable(0.1, 4e4), 20.0, motion_pattern="3T", tension_min=5.0)
     step = 1e-3
@@ -181,7 +181,7 @@ def test_a_cable_may_be_vertical_on_the_way(method: sl.TensionMethod) -> None:
 
 
 @pytest.mark.parametrize("method", wide([sl.MinimumNorm(), sl.Closest()]), ids=lambda m: type(m).__name__)
-def test_a_wrench_that_changes_along_the_path_turns_the_winches_too(method: sl.TensionMethod) -> None:
+def test_a_changing_wrench_contributes_to_rates(method: sl.TensionMethod) -> None:
     step = 5e-4
     path = tour(COGIRO, 1.0 / step)
     shaken = np.sin(3.0 * path.time[:, None] + np.arange(6.0)) * [300.0, 300.0, 300.0, 50.0, 50.0, 50.0]
@@ -194,7 +194,7 @@ def test_a_wrench_that_changes_along_the_path_turns_the_winches_too(method: sl.T
     assert missed(plan.length_rate, steady).max() > 1e-4
 
 
-def test_a_wrench_that_changes_while_the_platform_stands_still() -> None:
+def test_a_changing_wrench_of_a_resting_platform() -> None:
     step = 1e-2
     dwell = sl.septic_path([(0, 0, 3.0), (0, 0, 3.0)], durations=2.0, rate=1.0 / step)
     shaken = np.sin(3.0 * dwell.time[:, None]) * [300.0, 0.0, 300.0, 50.0, 0.0, 0.0]
@@ -211,7 +211,7 @@ def test_a_sampled_path_is_completed_by_a_spline() -> None:
     exact, found = sl.inverse(COGIRO, path).length_rate, sl.inverse(COGIRO, sampled).length_rate
     assert exact is not None
     assert found is not None
-    assert missed(found, exact)[5:-5].max() < 1e-6  # the spline's third derivative is poor at its ends
+    assert missed(found, exact)[5:-5].max() < 1e-6  # the third derivative of the spline is inaccurate at its ends
     assert missed(found, exact).max() < 1e-3
     two = sl.path_from_samples(path.time[:2], path.pose[:2])
     rates = sl.inverse(COGIRO, two).length_rate
@@ -242,14 +242,14 @@ def test_rates_of_many_robots_are_those_of_each() -> None:
     ],
     ids=lambda value: getattr(value, "name", None),
 )
-def test_how_much_of_the_rate_comes_from_changing_tensions(
+def test_share_of_the_rate_due_to_changing_tensions(
     robot: sl.Robot, way: list[tuple[float, float, float]], speed: float, percent: float
 ) -> None:
     path = sl.septic_path(way, speed=speed)
     plan = sl.inverse(robot, path)
     rates = plan.length_rate
     assert rates is not None
-    # lengths a moment before and after, of cables that keep their tensions
+    # lengths before and after, of cables with constant tensions
     h, kept = 1e-5, []
     for side in (-h, h):
         position = path.pose.position + side * path.twist[:, :3]
@@ -261,14 +261,14 @@ def test_how_much_of_the_rate_comes_from_changing_tensions(
     assert round(100.0 * share, 1) == percent  # docs/model.md, section 7
 
 
-def test_a_slow_motion_loses_no_digits() -> None:
+def test_rates_of_a_slow_motion_are_accurate() -> None:
     fast, slow = (sl.inverse(COGIRO, tour(COGIRO, 10.0 / scale, scale), sl.Straight()) for scale in (1.0, 1e4))
     assert fast.length_rate is not None
     assert slow.length_rate is not None
     assert missed(1e4 * slow.length_rate, fast.length_rate).max() < 1e-8
 
 
-def test_poses_alone_have_no_rate_and_a_dwell_none_but_zero() -> None:
+def test_poses_have_no_rate_and_a_dwell_has_zero_rates() -> None:
     pose = sl.Pose.from_euler([[0, 0, 3.0], [1, 0, 3.0]], 0.0, 0.0, 0.0)
     assert sl.inverse(COGIRO, pose).length_rate is None
     assert sl.inverse(COGIRO, pose[0]).length_rate is None

@@ -1,4 +1,4 @@
-"""A plan states which of its equilibria are unstable, and whoever would move a robot along it refuses them."""
+"""Plans mark unstable equilibria, and commands that move a robot refuse such plans."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from tests.kinematics.feasible import box_poses
 LOW = sl.load_robot("article-mixed").replace(tension_min=1.0)
 POSE = sl.Pose.from_euler((2.0, 1.0, 1.5), 0.0, 0.0, 0.0)
 METHOD = sl.MinimumNorm()
-TOP = (4.0, 2.0, 5.0)  # half the size of the region of poses [m], from the floor up
+TOP = (4.0, 2.0, 5.0)  # half the size of the region of poses [m], above the floor
 
 
 def planar(moment: float = 0.0) -> sl.Robot:
-    """A platform whose four cables press it together, so that low tensions cannot keep it from turning."""
+    """A platform compressed by its four cables: low tensions cannot prevent its rotation."""
     frame = [[3.0, 0.0, 3.0], [-3.0, 0.0, 3.0], [-3.0, 0.0, 0.0], [3.0, 0.0, 0.0]]
     ends = [[-0.4, 0.0, 0.1], [0.4, 0.0, 0.1], [0.4, 0.0, -0.1], [-0.4, 0.0, -0.1]]
     return sl.Robot(
@@ -89,7 +89,7 @@ def test_an_unstable_plan_has_values_and_its_platform_leaves() -> None:
     assert higher.stiffness_min > 0.0
 
 
-def test_the_check_can_be_left_out_and_changes_no_number() -> None:
+def test_the_check_is_optional_and_changes_no_number() -> None:
     poses = poses_of(LOW, 100)
     checked, plain = (sl.inverse(LOW, poses, tension=METHOD, stability=each) for each in (True, False))
     assert (checked.status == sl.PoseStatus.UNSTABLE).any()
@@ -112,7 +112,7 @@ def test_a_solver_agrees_with_the_batch(stability: bool) -> None:
 
 @pytest.mark.parametrize("name", [name for name in sl.robot_names() if name != "article-mixed"])
 def test_presets_need_no_eigenvalues(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The proof from the solution costs a tenth of the inverse; eigenvalues would cost half of it."""
+    """The proof from the solution takes a tenth of the time of the inverse; eigenvalues would take half of it."""
     monkeypatch.setattr(inverse_rows, "stabilities_of_poses", None)
     robot = sl.load_robot(name)
     plan = sl.inverse(robot, box_poses(robot, 300, seed=3))
@@ -133,7 +133,7 @@ def test_gaps_separate_infeasible_and_unstable_poses() -> None:
     np.testing.assert_array_equal(covered, np.flatnonzero(~plan.solved))
 
 
-def test_an_unstable_plan_survives_its_file(tmp_path: Any) -> None:
+def test_an_unstable_plan_is_saved_and_loaded(tmp_path: Any) -> None:
     plan = sl.inverse(LOW, poses_of(LOW, 50), tension=METHOD)
     plan.save(tmp_path / "run.nc")
     again = sl.load_plan(tmp_path / "run.nc")

@@ -1,4 +1,4 @@
-"""The start that forward kinematics makes from lengths alone, and how its answers are judged."""
+"""Initial poses of forward kinematics from lengths alone, and the ranking of solutions."""
 
 import numpy as np
 import pytest
@@ -38,7 +38,7 @@ def test_a_platform_in_a_level_plane_starts_in_it() -> None:
     )
 
 
-def test_the_tilts_are_about_the_axes_the_platform_turns_about() -> None:
+def test_tilts_are_about_the_free_axes_of_the_platform() -> None:
     turns = Rotation.from_quat(start_quaternions(COGIRO)).as_rotvec(degrees=True)
     np.testing.assert_allclose(turns[0], 0.0, atol=1e-12)
     assert sorted(map(tuple, np.round(turns[1:], 9) + 0.0)) == sorted(
@@ -49,21 +49,21 @@ def test_the_tilts_are_about_the_axes_the_platform_turns_about() -> None:
 @pytest.mark.parametrize(
     ("limits_of", "model"), [("chord", sl.Catenary()), ("frame_end", sl.Catenary()), ("frame_end", sl.Elastic())]
 )
-def test_cables_are_counted_outside_the_limits_of_the_tension_that_is_limited(
-    limits_of: str, model: sl.CableModel
-) -> None:
+def test_violated_limits_are_counted_for_the_limited_tension(limits_of: str, model: sl.CableModel) -> None:
     pose = sl.Pose((1.0, 0.5, 1.5), np.eye(3))
     plan = sl.inverse(COGIRO, pose, model)
     chord = plan.chord_tension
     density = 0.0 if isinstance(model, sl.Elastic) else COGIRO.cables.linear_density
     weight = density * 9.81 * plan.unstrained_length
-    winch = np.hypot(plan.horizontal_tension, plan.vertical_force - weight)  # above the platform: it carries the cable
-    # lower limits of three cables between both tensions, upper limits of two others; a hundredth is forgiven
+    winch = np.hypot(
+        plan.horizontal_tension, plan.vertical_force - weight
+    )  # above the platform, the platform suspends the cable
+    # lower limits of three cables between both tensions, upper limits of two others; a hundredth is tolerated
     between = 0.5 * (chord + winch) + 1e-4
     low = np.where(np.arange(8) < 3, between / 0.99, 0.0)
     high = np.where(np.arange(8) > 5, between / 1.01, np.inf)
     robot = COGIRO.replace(tension_limits_of=limits_of, tension_min=low, tension_max=high)
     found = solve_forward_rows(robot, model, plan.unstrained_length[None], pose_rows(pose), locked(np.zeros((1, 6))))
-    # a chord tension is below, one at a winch above what lies between them; without weight both are one
+    # a chord tension is below the interval and a frame-end tension above it; without weight both are equal
     expected = 2 if limits_of == "frame_end" and not isinstance(model, sl.Elastic) else 3
     assert outside_limits(robot, model, found).tolist() == [expected]

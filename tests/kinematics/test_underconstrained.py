@@ -38,7 +38,7 @@ def places(m: int, count: int = 60) -> Array:
 @pytest.mark.parametrize("density", [0.001, 0.1, 0.5])
 @pytest.mark.parametrize("m", [2, 3, 4])
 def test_the_forward_solution_of_the_lengths_is_the_found_pose(m: int, density: float, radius: float | None) -> None:
-    """The forward calculation minimizes the energy at given lengths, and shares no equation with the balance."""
+    """The forward calculation minimizes the energy at given lengths and uses no equation of the balance."""
     robot, wanted = suspended(m, density, radius), places(m)
     plan = sl.inverse(robot, wanted, given=("x", "z") if m == 2 else None)
     assert plan.solved.all()
@@ -68,7 +68,7 @@ def structure_matrix(robot: sl.Robot, position: Array) -> Array:
 
 
 @pytest.mark.parametrize("level", [0.0, 8.0, -5.0])
-def test_the_tension_level_is_the_share_of_the_tensions_that_hardly_loads_the_platform(level: float) -> None:
+def test_the_tension_level_is_the_direction_of_least_load_on_the_platform(level: float) -> None:
     robot, wanted = suspended(4), places(4, 20)
     plan = sl.inverse(robot, wanted, level=level)
     assert plan.solved.all()
@@ -77,8 +77,8 @@ def test_the_tension_level_is_the_share_of_the_tensions_that_hardly_loads_the_pl
         assert abs(weakest @ tension) == pytest.approx(abs(level), abs=1e-6)
 
 
-def test_a_given_yaw_is_kept() -> None:
-    """The yaw of the answer with level 0 is commanded; the answer is then the same."""
+def test_a_given_yaw_is_reached() -> None:
+    """The yaw of the solution with level 0 is prescribed; the solution is the same."""
     robot, wanted = suspended(4), places(4, 20)
     free = sl.inverse(robot, wanted)
     yaw = free.state.pose.rotation.as_euler("ZYX")[:, 0]

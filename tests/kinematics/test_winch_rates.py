@@ -1,4 +1,4 @@
-"""Speeds against differences of counts, torques against the balance of power."""
+"""Speeds compared with differences of counts, torques with the balance of power."""
 
 from typing import Any
 
@@ -38,7 +38,7 @@ def test_speeds_are_differences_of_counts(plan: sl.Plan, rates: sl.WinchRates) -
     off = np.abs(differences(plan, counts) - rates.count_rate[1:-1])
     turns, _ = drums.turns(plan.unstrained_length * (1.0 + drums.rest_strain))
     layer = np.floor(turns / 20.0)
-    same = layer[2:] == layer[:-2]  # where a layer ends the speed jumps
+    same = layer[2:] == layer[:-2]  # the speed jumps at the end of a layer
     assert not same.all()
     assert off[same].max() < 2e-4 * scale
     np.testing.assert_allclose(rates.count_rate, rates.motor_speed / (2.0 * np.pi) * 4096.0, rtol=1e-14)
@@ -49,7 +49,7 @@ def test_speeds_are_differences_of_counts(plan: sl.Plan, rates: sl.WinchRates) -
     )  # fmt: skip
 
 
-def test_power_goes_into_cable_friction_and_inertia(plan: sl.Plan, rates: sl.WinchRates) -> None:
+def test_power_is_that_of_cable_friction_and_inertia(plan: sl.Plan, rates: sl.WinchRates) -> None:
     assert rates.motor_torque is not None
     assert plan.length_rate is not None
     pull = plan.length_rate * (1.0 + 160.0 / plan.state.one_robot.cables.axial_stiffness)
@@ -59,7 +59,7 @@ def test_power_goes_into_cable_friction_and_inertia(plan: sl.Plan, rates: sl.Win
     assert np.abs(spent + rates.drum_tension * pull).max() > 0.02 * np.abs(motor).max()
 
 
-def test_the_motor_holds_the_cable_with_the_radius_of_its_layer(plan: sl.Plan, rates: sl.WinchRates) -> None:
+def test_the_torque_has_the_radius_of_the_layer(plan: sl.Plan, rates: sl.WinchRates) -> None:
     assert rates.motor_torque is not None
     drums = drums_of(plan.state.one_robot)
     turns, _ = drums.turns(plan.unstrained_length * (1.0 + drums.rest_strain))
@@ -68,11 +68,11 @@ def test_the_motor_holds_the_cable_with_the_radius_of_its_layer(plan: sl.Plan, r
     pull = 15.0 * np.sign(rates.drum_speed) - rates.drum_tension
     expected = 2e-4 * rates.motor_acceleration + pull * radius / np.array([12.0, -12.0] * 4)
     np.testing.assert_allclose(rates.motor_torque, expected, rtol=1e-3, atol=1e-3)
-    # without pulleys and dead cable the tension at the drum is that at the frame end
+    # without pulleys and dead length the tension at the drum is the frame-end tension
     np.testing.assert_allclose(rates.drum_tension, plan.state.cables.frame_end_tension, rtol=1e-14)
 
 
-def test_what_exceeds_a_limit_is_told(rates: sl.WinchRates) -> None:
+def test_exceeded_limits_are_marked(rates: sl.WinchRates) -> None:
     assert rates.too_fast is not None
     assert rates.too_strong is not None
     assert rates.motor_torque is not None
@@ -83,7 +83,7 @@ def test_what_exceeds_a_limit_is_told(rates: sl.WinchRates) -> None:
     np.testing.assert_array_equal(rates.exceeding, (rates.too_fast | rates.too_strong).any(axis=1))
 
 
-def test_what_is_not_known_is_none(plan: sl.Plan) -> None:
+def test_unknown_quantities_are_none(plan: sl.Plan) -> None:
     robot = wound(counts_per_turn=None, length_zero=None)
     rates = sl.winch_rates(sl.inverse(robot, plan.path))  # type: ignore[arg-type]
     assert (rates.motor_torque, rates.count_rate, rates.too_fast, rates.too_strong) == (None,) * 4
@@ -91,7 +91,7 @@ def test_what_is_not_known_is_none(plan: sl.Plan) -> None:
     np.testing.assert_array_equal(rates.drum_speed, sl.winch_rates(plan).drum_speed)
 
 
-def test_samples_without_an_answer_have_no_rates() -> None:
+def test_samples_without_lengths_have_no_rates() -> None:
     path = sl.quintic_path([(0, 0, 1.5), (9, 1, 2.5), (0, 0, 1.5)], durations=3.0, rate=20.0)
     plan = sl.inverse(wound(**LIMITS), path)
     assert 0 < plan.feasible.sum() < plan.feasible.size
@@ -107,8 +107,8 @@ def test_poses_without_times_have_no_rates(plan: sl.Plan) -> None:
         sl.winch_rates(sl.inverse(wound(), plan.state.pose[0]))
 
 
-def test_the_lever_differs_from_the_radius_by_what_the_docstring_says() -> None:
-    """Of a drum of one layer whose exit wanders from 40 mm on one side of the pulley to 40 mm on the other."""
+def test_the_lever_arm_differs_from_the_radius_as_documented() -> None:
+    """A drum with one layer whose exit point moves from 40 mm on one side of the pulley to 40 mm on the other."""
     robot = wound(drum_width=0.08, layers=1, cable_length=12.0, length_zero=10.0)
     drums = drums_of(robot)
     turns = np.linspace(0.0, 20.0, 201)[:, None] * np.ones(8)
@@ -119,7 +119,7 @@ def test_the_lever_differs_from_the_radius_by_what_the_docstring_says() -> None:
     assert 100.0 * np.abs(off - helix).max() == pytest.approx(0.06, abs=0.005)
 
 
-def test_a_preset_whose_drums_have_a_radius_alone_has_rates() -> None:
+def test_a_preset_with_only_a_drum_radius_has_rates() -> None:
     robot = sl.load_robot("article-prototype")
     plan = sl.inverse(robot, sl.quintic_path([(0.0, 0.0, 1.5), (0.5, 0.5, 1.5)], durations=2.0))
     rates = sl.winch_rates(plan)

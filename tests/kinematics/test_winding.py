@@ -1,4 +1,4 @@
-"""There and back over guides and with friction, along paths, in files, and what is refused."""
+"""Forward of inverse with guides and friction, along paths and in files; refusals."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tests.tiers import extended, wide
 
 
 def eyelets(robot: sl.Robot) -> Array:
-    """From a drum on the floor outside over an eyelet to one above the frame anchor."""
+    """From a drum on the floor outside, over an eyelet, to an eyelet above the frame anchor."""
     top = robot.frame_anchors
     out = top * np.array([1.1, 1.1, 0.0])
     ways = (out, np.array([0.3, 0.2, 0.1])), (out, np.array([0.0, 0.0, 2.5])), (top, np.array([0.0, 0.1, 0.4]))
@@ -45,7 +45,7 @@ CASES: list[dict[str, Any]] = [
 @extended
 @pytest.mark.parametrize("name", ["cogiro", "article-prototype"])
 @pytest.mark.parametrize("fields", CASES)
-def test_lengths_with_friction_and_guides_lead_back_to_the_pose(name: str, fields: dict[str, Any]) -> None:
+def test_lengths_with_friction_and_guides_give_the_pose(name: str, fields: dict[str, Any]) -> None:
     robot, rng = machine(name, **fields), np.random.default_rng(5)
     poses = random_poses(robot, 12, rng)
     for winding in (None, rng.integers(-1, 2, (12, robot.cable_count)).astype(float), np.ones(robot.cable_count)):
@@ -67,8 +67,8 @@ def test_lengths_with_friction_and_guides_lead_back_to_the_pose(name: str, field
 @extended
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("name", ["cogiro", "article-prototype"])
-def test_much_friction_settles_too(name: str, sign: float) -> None:
-    """Five radians at 0.3: four and a half times the tension at the drum, where plain rounds would not settle."""
+def test_high_friction_converges(name: str, sign: float) -> None:
+    """Five radians at 0.3: the tension ratio is 4.5, for which simple iterations do not converge."""
     robot = machine(name, pulley_friction=0.3)
     poses, winding = random_poses(robot, 12, np.random.default_rng(5)), np.full(robot.cable_count, sign)
     plan = sl.inverse(robot, poses, winding=winding)
@@ -76,12 +76,12 @@ def test_much_friction_settles_too(name: str, sign: float) -> None:
     assert kept.sum() > 4
     assert sl.confirm(plan).position_error[kept].max() < 1e-11
     found = sl.forward(robot, plan.unstrained_length[kept], poses[kept], winding=winding)
-    assert found.solved.all()  # there are other poses with the same lengths near by
+    assert found.solved.all()  # other poses with the same lengths are near
     np.testing.assert_allclose(found.state.unstrained_length, plan.unstrained_length[kept], rtol=0.0, atol=5e-12)
 
 
 @extended
-def test_a_lone_sample_and_a_chain_are_answered_alike() -> None:
+def test_a_single_sample_and_a_chain_agree() -> None:
     robot = machine("cogiro")
     poses = sl.Pose.from_euler([[0.5, 0.5, 2.0], [0.6, 0.5, 2.0], [0.7, 0.6, 2.1]], 0.0, 0.0, 0.0)
     winding = np.array([1.0, -1.0, 0.0, 1.0, 1.0, -1.0, -1.0, 0.0])
@@ -110,7 +110,7 @@ def test_many_starts_find_the_pose_over_guides() -> None:
 
 
 @extended
-def test_along_a_path_the_lengths_say_which_way() -> None:
+def test_along_a_path_the_direction_of_winding_follows_from_lengths() -> None:
     robot = machine("cogiro")
     path = sl.quintic_path([(0, 0, 2), (1, 0.5, 2.5)], durations=2.0, rate=20.0)
     plain = sl.inverse(robot, path)
@@ -148,13 +148,13 @@ def test_the_tension_at_the_drum_has_the_friction() -> None:
     ratio = with_.drum_tension / without.drum_tension
     assert state.contact is not None
     expected = np.exp(-0.1 * np.sign(without.drum_speed) * state.contact.wrap_angle)
-    np.testing.assert_allclose(ratio[1:-1], expected[1:-1], rtol=5e-3)  # but for the weight on the pulley
+    np.testing.assert_allclose(ratio[1:-1], expected[1:-1], rtol=5e-3)  # except for the weight on the pulley
     plan = sl.inverse(robot, path, winding=np.zeros(8))
     np.testing.assert_allclose(sl.winch_rates(plan).drum_tension, without.drum_tension, rtol=1e-9)
 
 
 @extended
-def test_a_plan_comes_back_from_its_file_with_its_winding(tmp_path: Path) -> None:
+def test_a_plan_file_contains_the_winding(tmp_path: Path) -> None:
     path = sl.quintic_path([(0, 0, 2), (1, 0.5, 2.5)], durations=2.0, rate=5.0)
     for winding in (None, "path"):
         plan = sl.inverse(machine("cogiro"), path, winding=winding)
@@ -171,7 +171,7 @@ def test_a_plan_comes_back_from_its_file_with_its_winding(tmp_path: Path) -> Non
         assert (part.winding is None) == (winding is None)
 
 
-def test_robots_with_guides_come_back_to_the_last_bit(tmp_path: Path) -> None:
+def test_robots_with_guides_are_saved_exactly(tmp_path: Path) -> None:
     def parsed(text: str) -> sl.Robot:
         file = tmp_path / "robot.yaml"
         file.write_text(text, encoding="utf-8")
@@ -190,7 +190,7 @@ def test_robots_with_guides_come_back_to_the_last_bit(tmp_path: Path) -> None:
     np.testing.assert_array_equal(winches.guides, np.tile([[[0.0, 9.0, 0.1], [0.0, 9.0, 3.0]]], (8, 1, 1)))
 
 
-def test_dead_cable_follows_from_guides() -> None:
+def test_dead_length_follows_from_guides() -> None:
     robot = sl.load_robot("cogiro")
     points = eyelets(robot)
     guided = robot.replace(winches=sl.Winch(0.05, guides=points))
@@ -215,7 +215,7 @@ def test_dead_cable_follows_from_guides() -> None:
 
 
 def wrong_guides() -> list[tuple[Any, str, *tuple[str, ...]]]:
-    """Guides that nothing passes, for one cable or in one of eight; parts of the error."""
+    """Impossible guides, for one cable or in one of eight; parts of the error."""
     good = eyelets(sl.load_robot("cogiro"))
     shape = "shape (k, 3) or (m, k, 3), k >= 1"
     found: list[tuple[Any, str, *tuple[str, ...]]] = [
@@ -245,7 +245,7 @@ def wrong_guides() -> list[tuple[Any, str, *tuple[str, ...]]]:
     return found
 
 
-def test_guides_that_nothing_passes_are_refused_by_name() -> None:
+def test_impossible_guides_are_refused_by_name() -> None:
     robot = sl.load_robot("cogiro")
     for guides, item, *parts in wrong_guides():
         with refused(f"winches: {item}", *parts, kind=sl.InvalidValueError) as caught:
@@ -279,7 +279,7 @@ def test_guides_that_nothing_passes_are_refused_by_name() -> None:
         ("in", ("winding", "'in'")),
     ],
 )
-def test_windings_that_are_none_are_refused(winding: Any, parts: tuple[str, ...]) -> None:
+def test_unknown_windings_are_refused(winding: Any, parts: tuple[str, ...]) -> None:
     robot = machine("cogiro")
     poses = sl.Pose.from_euler([[0.5, 0.5, 2.0], [0.6, 0.5, 2.0]], 0.0, 0.0, 0.0)
     with refused(*parts):
@@ -288,7 +288,7 @@ def test_windings_that_are_none_are_refused(winding: Any, parts: tuple[str, ...]
         sl.forward(robot, np.full((2, 8), 9.0), winding=winding)
 
 
-def test_what_does_not_take_guides_says_so() -> None:
+def test_functions_without_guides_refuse_them() -> None:
     robot = machine("cogiro")
     pose = sl.Pose.from_euler([0.5, 0.5, 2.0], 0.0, 0.0, 0.0)
     with refused("winding", "'path' for poses without a path"):

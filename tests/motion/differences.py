@@ -1,4 +1,4 @@
-"""Velocities and accelerations from poses alone, by central differences: the tests' independent reference."""
+"""Velocities and accelerations from poses by central differences, the independent reference of the tests."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation

@@ -17,7 +17,7 @@ def test_length_and_duration() -> None:
     assert path.duration == 2.0
 
 
-def test_fields_are_copies_that_cannot_be_written() -> None:
+def test_fields_are_read_only_copies() -> None:
     time, twist = np.array([0.0, 1.0]), np.ones((2, 6))
     path = Path(time, still(2), twist, np.zeros((2, 6)))
     time[0], twist[0, 0] = -5.0, 7.0
@@ -36,7 +36,7 @@ def test_pickling_keeps_every_field() -> None:
     assert not path.twist.flags.writeable
 
 
-def test_a_path_may_know_its_jerk_or_not() -> None:
+def test_the_jerk_of_a_path_is_optional() -> None:
     twist = np.arange(12.0).reshape(2, 6)
     without = Path([0.0, 1.0], still(2), twist, -twist)
     assert without.jerk is None
@@ -61,7 +61,7 @@ def test_a_path_may_know_its_jerk_or_not() -> None:
         ([], "time"),
     ],
 )
-def test_times_that_are_none(time: object, item: str) -> None:
+def test_invalid_times(time: object, item: str) -> None:
     with pytest.raises(InvalidValueError) as caught:
         Path(time, still(3), np.zeros((3, 6)), np.zeros((3, 6)))  # type: ignore[arg-type]
     assert caught.value.item == item
@@ -78,7 +78,7 @@ def test_times_that_are_none(time: object, item: str) -> None:
         (still(3), np.zeros((3, 6)), np.full((3, 6), np.inf), "twist_rate[0, 0]"),
     ],
 )
-def test_fields_that_do_not_fit(pose: Pose, twist: np.ndarray, twist_rate: np.ndarray, item: str) -> None:
+def test_inconsistent_fields(pose: Pose, twist: np.ndarray, twist_rate: np.ndarray, item: str) -> None:
     with pytest.raises(InvalidValueError) as caught:
         Path([0.0, 1.0, 2.0], pose, twist, twist_rate)
     assert caught.value.item == item

@@ -19,5 +19,5 @@ def test_the_planar_path_of_the_comparison() -> None:
     assert np.linalg.norm(path.twist_rate[:, :3], axis=1).max() == pytest.approx(0.477, abs=1e-3)
 
 
-def test_the_rate_is_the_users() -> None:
+def test_the_rate_is_an_argument() -> None:
     assert len(article_path(rate=10.0)) == 601

@@ -47,7 +47,7 @@ def test_twist_and_its_rate_are_the_derivatives_of_the_pose() -> None:
     omega = angular_velocity(path.pose.quaternion, step)
     np.testing.assert_allclose(path.twist[1:-1, :3], velocity, atol=2e-4)
     np.testing.assert_allclose(path.twist[1:-1, 3:], omega, atol=2e-4)
-    # At the joints the acceleration has a kink, so differences across them see a first-order error.
+    # the acceleration has a corner at waypoints, so differences across them have a first-order error
     np.testing.assert_allclose(path.twist_rate[1:-1], slope(path.twist, step), atol=0.15)
     inner = np.all([np.abs(path.time[1:-1] - t) > 2 * step for t in (1.0, 3.0)], axis=0)
     np.testing.assert_allclose(path.twist_rate[1:-1][inner], slope(path.twist, step)[inner], atol=3e-4)
@@ -56,13 +56,15 @@ def test_twist_and_its_rate_are_the_derivatives_of_the_pose() -> None:
 @pytest.mark.parametrize(("make", "fifth"), [(quintic_path, 720.0), (septic_path, 10_080.0)])
 def test_jerk_is_the_derivative_of_the_twist_rate(make: Maker, fifth: float) -> None:
     step = 1e-3
-    most = 1.02 * step**2 / 6.0 * fifth * 5.0  # what differences miss: by the share's fifth derivative, of 5 m in 1 s
+    most = (
+        1.02 * step**2 / 6.0 * fifth * 5.0
+    )  # error of differences: the fifth derivative of the profile, of 5 m in 1 s
     path = make(tour(), durations=[1.0, 2.0, 1.5], rate=1.0 / step)
     assert path.jerk is not None
     inner = np.all([np.abs(path.time[1:-1] - t) > 2 * step for t in (1.0, 3.0)], axis=0)
     np.testing.assert_allclose(path.jerk[1:-1][inner], slope(path.twist_rate, step)[inner], atol=most)
     assert np.abs(path.jerk).max() > 50.0
-    # a tenth of the step: a hundredth of the error
+    # a tenth of the step gives a hundredth of the error
     fine = make(tour()[:2], durations=1.0, rate=10.0 / step)
     assert fine.jerk is not None
     np.testing.assert_allclose(fine.jerk[1:-1], slope(fine.twist_rate, 0.1 * step), atol=most / 100)
@@ -77,7 +79,7 @@ def test_the_septic_is_the_published_polynomial_and_its_twist_the_derivative() -
     path = septic_path(tour(), durations=[1.0, 2.0, 1.5], rate=1.0 / step)
     np.testing.assert_allclose(path.twist[1:-1, :3], slope(path.pose.position, step), atol=3e-4)
     np.testing.assert_allclose(path.twist[1:-1, 3:], angular_velocity(path.pose.quaternion, step), atol=3e-4)
-    np.testing.assert_allclose(path.twist_rate[1:-1], slope(path.twist, step), atol=5e-3)  # at the joints too
+    np.testing.assert_allclose(path.twist_rate[1:-1], slope(path.twist, step), atol=5e-3)  # also at waypoints
 
 
 def test_the_jerk_of_a_septic_path_is_continuous_and_that_of_a_quintic_jumps() -> None:
@@ -86,8 +88,8 @@ def test_the_jerk_of_a_septic_path_is_continuous_and_that_of_a_quintic_jumps() -
         path = make(tour(), durations=[1.0, 2.0, 1.5], rate=1e4)
         assert path.jerk is not None
         jumps.append(np.abs(np.diff(path.jerk, axis=0)).max())
-    assert jumps[0] > 100.0  # 60 way/T^3 at either side of a waypoint
-    assert jumps[1] < 0.5  # 840 way/T^4 a second
+    assert jumps[0] > 100.0  # 60 distance/T^3 on both sides of a waypoint
+    assert jumps[1] < 0.5  # 840 distance/T^4 per second
     path = septic_path(tour(), durations=[1.0, 2.0, 1.5], rate=100.0)
     stops = np.array([0, 100, 300, 450])
     for rates in (path.twist, path.twist_rate, path.jerk):
@@ -194,7 +196,7 @@ def test_the_slower_of_translation_and_rotation_decides_segment_by_segment() -> 
             np.sqrt(10 / np.sqrt(3) * angles / 0.3),
         ]
     )
-    assert set(candidates.argmax(axis=0)) >= {0, 2}  # the example exercises both
+    assert set(candidates.argmax(axis=0)) >= {0, 2}  # the example has both cases
     assert path.duration == pytest.approx(candidates.max(axis=0).sum(), rel=1e-13)
     peaks = [peak(path, field, columns) for columns in (slice(3), slice(3, 6)) for field in ("twist", "twist_rate")]
     ratios = np.array(peaks) / list(limits.values())
@@ -214,13 +216,13 @@ def test_the_grid_ends_exactly_at_the_end(total: float, samples: int) -> None:
 
 @pytest.mark.parametrize("durations", [[0.003, 1.0], [1.0, 0.003], [0.01, 1.0], [1.0, 1e-9]])
 @pytest.mark.parametrize("make", [quintic_path, septic_path])
-def test_a_motion_that_no_sample_sees_is_refused(make: Maker, durations: list[float]) -> None:
+def test_a_motion_without_a_sample_is_refused(make: Maker, durations: list[float]) -> None:
     k = int(np.argmin(durations))
     with refused(f"the time from waypoints[{k}] to waypoints[{k + 1}]", kind=InvalidValueError) as caught:
         make(CORNERS[:3], durations=durations, rate=100.0)
     assert caught.value.value.startswith(f"{durations[k]:g} s, ")
     dwell = [CORNERS[0], CORNERS[1], CORNERS[1]] if k else [CORNERS[0], CORNERS[0], CORNERS[1]]
-    assert len(make(dwell, durations=durations, rate=100.0)) >= 101  # a rest has nothing to be seen
+    assert len(make(dwell, durations=durations, rate=100.0)) >= 101  # a rest needs no sample
 
 
 def test_the_grid_is_one_for_all_segments() -> None:
@@ -236,7 +238,7 @@ def test_a_waypoint_given_twice_is_a_dwell() -> None:
     assert path.duration == 1.5
 
 
-def test_a_half_turn_goes_the_whole_way_about_one_axis() -> None:
+def test_a_half_turn_is_about_one_axis() -> None:
     half = Pose.from_euler([[0.0, 0.0, 0.0], [0.0, 0.0, 0.0]], [0.0, np.pi], 0.0, 0.0)
     path = quintic_path(half, durations=1.0, rate=10.0)
     assert path.pose.rotation[5].magnitude() == pytest.approx(np.pi / 2.0, rel=1e-14)
@@ -254,7 +256,7 @@ def test_batch_sequence_and_positions_are_the_same_waypoints() -> None:
     np.testing.assert_array_equal(paths[2].pose.quaternion, np.tile([0.0, 0.0, 0.0, 1.0], (len(paths[2]), 1)))
 
 
-def test_blocks_join_without_a_seam() -> None:
+def test_blocks_are_continuous() -> None:
     path = quintic_path(tour(), durations=[1.0, 2.0, 1.5], rate=40_000.0)
     every_hundredth = quintic_path(tour(), durations=[1.0, 2.0, 1.5], rate=400.0)
     assert len(path) == 180_001
@@ -263,7 +265,7 @@ def test_blocks_join_without_a_seam() -> None:
 
 
 @extended
-def test_memory_beyond_the_path_itself_is_that_of_one_copy() -> None:
+def test_memory_is_that_of_the_path_and_one_copy() -> None:
     stops = tour()
     tracemalloc.start()
     path = quintic_path(stops, durations=[1.0, 2.0, 1.5], rate=100_000.0)

@@ -9,14 +9,14 @@ NODES = np.sort(np.concatenate((np.linspace(0.0, 2.0, 81), [0.012, 0.711, 1.3333
 
 
 def tumbling(time: np.ndarray) -> Rotation:
-    """A rotation whose axis and speed change, in motion at both ends."""
+    """A rotation with varying axis and speed, in motion at both ends."""
     inner = np.stack([0.1 * time**2, np.zeros_like(time), 0.4 * time], axis=-1)
     outer = np.stack([0.3 * np.sin(time), 0.5 * time, 0.2 * np.cos(2 * time)], axis=-1)
     return Rotation.from_rotvec(outer) * Rotation.from_rotvec(inner)
 
 
 def reference_rates(time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Angular velocity and acceleration in world axes, by differences of the rotation itself."""
+    """Angular velocity and acceleration in world axes by differences of the rotation."""
 
     def omega(t: np.ndarray, h: float = 1e-4) -> np.ndarray:
         rates: np.ndarray = (tumbling(t + h) * tumbling(t - h).inv()).as_rotvec() / (2 * h)
@@ -31,13 +31,13 @@ def test_angular_rates_are_in_world_axes_up_to_the_ends() -> None:
     np.testing.assert_allclose(path.twist[:, 3:], omega, atol=3e-5)
     np.testing.assert_allclose(path.twist_rate[:, 3:], alpha, atol=5e-3)
     body = tumbling(NODES).inv().apply(omega)
-    assert np.abs(path.twist[:, 3:] - body).max() > 0.1  # the frames differ here, so the test above can tell them apart
+    assert np.abs(path.twist[:, 3:] - body).max() > 0.1  # the frames differ here, so the test above distinguishes them
 
 
-def test_coarse_samples_get_the_rates_of_the_very_spline_through_them() -> None:
+def test_coarse_samples_have_the_rates_of_their_spline() -> None:
     time = np.array([0.0, 0.5, 0.9, 1.5, 2.1, 2.4])  # up to 60 degrees apart
     rotation = Rotation.from_rotvec(np.outer(np.sin(1.7 * time), [1.5, 0.0, 0.3])) * tumbling(time)
-    spline = CubicSpline(time, rotation.as_quat())  # Rotation normalizes what lies between the samples
+    spline = CubicSpline(time, rotation.as_quat())  # Rotation normalizes the interpolated quaternions
     before, at, after = (Rotation.from_quat(spline(time + h)) for h in (-1e-4, 0.0, 1e-4))
     path = path_from_samples(time, Pose(np.zeros((6, 3)), rotation))
     np.testing.assert_allclose(path.twist[:, 3:], (after * before.inv()).as_rotvec() / 2e-4, atol=1e-6)
@@ -45,7 +45,7 @@ def test_coarse_samples_get_the_rates_of_the_very_spline_through_them() -> None:
     np.testing.assert_allclose(path.twist_rate[:, 3:], alpha, atol=2e-3)
 
 
-def test_inside_it_agrees_with_scipys_rotation_spline() -> None:
+def test_inner_samples_agree_with_scipys_rotation_spline() -> None:
     time = np.linspace(0.0, 2.0, 201)
     rotation = tumbling(time)
     spline = RotationSpline(time, rotation)  # its rates are in body axes
@@ -55,8 +55,8 @@ def test_inside_it_agrees_with_scipys_rotation_spline() -> None:
     np.testing.assert_allclose(path.twist_rate[inner, 3:], rotation.apply(spline(time, 2))[inner], atol=1e-4)
 
 
-def test_rotation_spline_has_wrong_accelerations_at_the_ends_that_this_has_not() -> None:
-    """Why the quaternion spline: the error of scipy's does not fall with the step."""
+def test_end_accelerations_are_correct_unlike_those_of_scipy() -> None:
+    """The reason for the quaternion spline: the error of scipy's spline does not decrease with the step."""
     for samples, bound in ((101, 2e-3), (201, 5e-4)):
         time = np.linspace(0.0, 2.0, samples)
         rotation, (_, alpha) = tumbling(time), reference_rates(time)
@@ -66,7 +66,7 @@ def test_rotation_spline_has_wrong_accelerations_at_the_ends_that_this_has_not()
         assert np.abs(ours - alpha).max() < bound
 
 
-def test_positions_that_are_cubics_are_met_exactly() -> None:
+def test_cubic_positions_are_reproduced_exactly() -> None:
     coefficients = np.array([[1.0, -2.0, 0.5], [0.3, 0.1, -0.4], [0.2, -0.7, 0.9], [-0.1, 0.4, 0.2]])
     power = NODES[:, None]
     position = np.polynomial.polynomial.polyval(NODES, coefficients).T
@@ -77,7 +77,7 @@ def test_positions_that_are_cubics_are_met_exactly() -> None:
     np.testing.assert_array_equal(path.pose.position, position)
 
 
-def test_a_sampled_quintic_path_gets_its_rates_back() -> None:
+def test_rates_of_a_sampled_quintic_path() -> None:
     stops = Pose.from_euler([(0.0, 0.0, 1.0), (2.0, 1.0, 1.5)], [0.0, 2.5], [0.0, -0.5], [0.0, 0.4])
     path = quintic_path(stops, durations=3.0, rate=100.0)
     again = path_from_samples(path.time, path.pose)
@@ -85,7 +85,7 @@ def test_a_sampled_quintic_path_gets_its_rates_back() -> None:
     np.testing.assert_allclose(again.twist_rate, path.twist_rate, atol=2e-3)
 
 
-def test_the_sign_of_a_quaternion_does_not_matter() -> None:
+def test_the_sign_of_a_quaternion_has_no_influence() -> None:
     time = np.linspace(0.0, 4.0, 401)  # the z angle passes 360 degrees
     quaternion = Rotation.from_rotvec(np.outer(2.0 * time, [0.0, 0.0, 1.0])).as_quat()
     quaternion[np.random.default_rng(7).random(401) < 0.5] *= -1.0

@@ -1,4 +1,4 @@
-"""Vibrations and simulations made by hand, so that a figure can be compared with numbers that are known."""
+"""Artificial vibrations and simulations with known numbers, for comparison with figures."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def vibration(
     status: VibrationStatus = VibrationStatus.SOLVED,
     **changed: Any,
 ) -> Vibration:
-    """Modes of these frequencies and shares; the platform moves as in the massless modes, one after another."""
+    """Modes with given frequencies and shares; the platform moves as in the massless modes."""
     found = sl.modes(state)
     damping = damping or Damping(modal_damping=0.01)
     m, count = state.one_robot.cable_count, len(frequency)
@@ -58,7 +58,7 @@ def vibration(
 
 
 def simulation(count: int = 200) -> Simulation:
-    """A platform that swings up and down with a friction that is not real, and a cable that breaks after 1 s."""
+    """A platform that swings vertically with artificial damping, and a cable that breaks after 1 s."""
     state = state_at()
     time = np.linspace(0.0, 2.0, count)
     swing = np.sin(2.0 * np.pi * time)

@@ -1,4 +1,4 @@
-"""Defects that a reader of a figure sees: axes without numbers or unit; small, cut or overlapping text; equal looks."""
+"""Defects of figures for a reader: axes without numbers or unit, small, cut or overlapping text, equal looks."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from matplotlib.transforms import Bbox
 UNIT = re.compile(r"\[[^\]]+\]")
 NUMBER = re.compile(r"[-−\d.,]+(e[-−]?\d+)?|\$\\mathdefault.*")
 WITHOUT_UNIT = re.compile(r"pose|candidate|row of the log|factor\b.*|correlation|workspace share\b.*")
-TOUCHING = 1.0  # pixels that two texts may share
+TOUCHING = 1.0  # pixels of permitted overlap of two texts
 SHOWN, SMALLEST = 8.0 / 2.54, 6.0  # width of a figure on a phone or in a column [in], and its smallest text [pt]
 
 
 def defects(figure: Figure, shown: float = SHOWN) -> list[str]:
-    """All defects of a figure of a width of `shown` [in], or of its own width if that is less, one sentence each."""
+    """Defects of a figure at a width of `shown` [in], or at its own width if that is smaller, one sentence each."""
     texts = drawn_texts(figure)
     return [
         *bare_axes(figure),
@@ -34,7 +34,7 @@ def defects(figure: Figure, shown: float = SHOWN) -> list[str]:
 
 
 def drawn_texts(figure: Figure) -> list[tuple[str, Bbox]]:
-    """All texts that a drawing contains, with their boxes in pixels."""
+    """All texts of a drawing with their boxes in pixels."""
     canvas, drawn, draw = FigureCanvasAgg(figure), dict[int, tuple[str, Bbox]](), Text.draw
 
     def note(text: Text, renderer: Any) -> None:
@@ -51,7 +51,7 @@ def drawn_texts(figure: Figure) -> list[tuple[str, Bbox]]:
 
 
 def bare_axes(figure: Figure) -> Iterator[str]:
-    """Axes with neither numbers and a unit of their own nor those of axes that share them; words need no unit."""
+    """Axes without numbers and unit of their own or of axes that share them; words need no unit."""
     common = {"x": figure.get_supxlabel(), "y": figure.get_supylabel()}
     flat = [ax for ax in figure.axes if ax.get_visible() and ax.axison and ax.name == "rectilinear"]
     for number, ax in enumerate(flat):
@@ -60,7 +60,7 @@ def bare_axes(figure: Figure) -> Iterator[str]:
             ticks = [text for other in group for text in tick_texts(other, axis)]
             labels = [text for text in (*(label_of(other, axis) for other in group), common[axis]) if text]
             if not ticks and (ax.get_label() == "<colorbar>" or ax.images or not ax.spines["left"].get_visible()):
-                continue  # the narrow side of a color bar; the rows of a matrix have names; a band has no scale
+                continue  # the narrow side of a color bar; rows of a matrix have names; a band has no scale
             if not ticks or not (labels or any(map(without_number, ticks))):
                 yield f"axes {number}: {axis} has no {'label' if ticks else 'numbers'}"
             elif all(NUMBER.fullmatch(text) for text in ticks) and not any(map(has_unit, labels)):
@@ -96,7 +96,7 @@ def cut_texts(figure: Figure, texts: list[tuple[str, Bbox]]) -> Iterator[str]:
 
 
 def small_texts(figure: Figure, shown: float) -> Iterator[str]:
-    """Texts too small to read at the width at which the figure is shown."""
+    """Texts that are too small at the shown width."""
     scale = min(1.0, shown / figure.get_figwidth())
     texts: list[Any] = figure.findobj(Text)
     for text in texts:
@@ -106,14 +106,14 @@ def small_texts(figure: Figure, shown: float) -> Iterator[str]:
 
 
 def overlaps(texts: list[tuple[str, Bbox]]) -> Iterator[str]:
-    """Texts over one another."""
+    """Overlapping texts."""
     for (one, a), (other, b) in combinations(texts, 2):
         if min(a.x1, b.x1) - max(a.x0, b.x0) > TOUCHING and min(a.y1, b.y1) - max(a.y0, b.y0) > TOUCHING:
             yield f"{one!r} is over {other!r}"
 
 
 def equal_looks(figure: Figure) -> Iterator[str]:
-    """Entries of a legend that look alike."""
+    """Entries of a legend with equal looks."""
     for legend in figure.findobj(Legend):
         looks: dict[str, str] = {}
         for handle, text in zip(legend.legend_handles, legend.get_texts(), strict=True):

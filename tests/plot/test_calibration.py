@@ -1,4 +1,4 @@
-"""Figures of a calibration hold what they claim to show: residuals, what does not fit, correlations and maps."""
+"""Figures of a calibration show the correct residuals, outliers, correlations and maps."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -24,13 +24,11 @@ def found() -> sl.Calibration:
 
 
 def lines_of(ax: Any, label: str) -> Array:
-    """The points of a line."""
+    """Points of a line."""
     return np.asarray(next(line for line in ax.get_lines() if line.get_label() == label).get_xydata())
 
 
-def test_residuals_stand_at_their_rows_in_standard_deviations(
-    found: sl.Calibration, snapshot: SnapshotAssertion
-) -> None:
+def test_residuals_are_at_their_rows_in_standard_deviations(found: sl.Calibration, snapshot: SnapshotAssertion) -> None:
     lengths, cells, places = plot.calibration(found, "residuals").axes
     for ax, first, deviation, names in (
         (lengths, 0, 5e-4, [f"cable {k}" for k in range(8)]),
@@ -49,7 +47,7 @@ def test_residuals_stand_at_their_rows_in_standard_deviations(
     assert places.get_xlabel() == snapshot
 
 
-def test_what_does_not_fit_has_a_ring_and_its_size(found: sl.Calibration) -> None:
+def test_outliers_have_a_ring_and_a_number(found: sl.Calibration) -> None:
     lengths, cells, _ = plot.calibration(found, "residuals").axes
     rings = [line for line in lengths.get_lines() if line.get_markerfacecolor() == "none"]
     assert [tuple(np.asarray(ring.get_xydata())[0]) for ring in rings] == [(4.0, REACH), (17.0, -REACH)]
@@ -60,13 +58,13 @@ def test_what_does_not_fit_has_a_ring_and_its_size(found: sl.Calibration) -> Non
     assert not cells.texts
 
 
-def test_what_nobody_read_has_no_panel(found: sl.Calibration) -> None:
+def test_missing_sensors_have_no_panel(found: sl.Calibration) -> None:
     some = np.array(found.residuals)
     some[:, 8:] = np.nan
     assert len(plot.calibration(replace(found, residuals=some), "residuals").axes) == 1
 
 
-def test_of_many_poses_some_are_drawn_and_all_that_do_not_fit(found: sl.Calibration) -> None:
+def test_a_selection_of_many_poses_and_all_outliers_are_drawn(found: sl.Calibration) -> None:
     count = 5 * MOST_POSES
     rows = np.arange(count)
     long = replace(
@@ -106,7 +104,7 @@ def test_maps_are_the_expected_errors_before_and_after(
     found: sl.Calibration, monkeypatch: pytest.MonkeyPatch, snapshot: SnapshotAssertion
 ) -> None:
     def errors(self: Calibration, pose: sl.Pose) -> SimpleNamespace:
-        """Half of the mean standard error at the middle, more with the distance; without a shift a tenth of it."""
+        """Half of the mean standard error in the middle, more with the distance; a tenth of it without a shift."""
         size = np.mean(self.standard_error[:24]) * (0.5 + np.linalg.norm(pose.position, axis=-1))
         return SimpleNamespace(position=size, own_position=0.1 * size)
 
@@ -124,7 +122,7 @@ def test_maps_are_the_expected_errors_before_and_after(
         assert [figure.subfigs[0].get_suptitle(), figure.axes[2].get_ylabel()] == snapshot
 
 
-def test_maps_of_errors_without_bound_say_that_nothing_tells(
+def test_maps_of_undetermined_errors_have_a_note(
     found: sl.Calibration, monkeypatch: pytest.MonkeyPatch, snapshot: SnapshotAssertion
 ) -> None:
     def expected(_: sl.Calibration, poses: sl.Pose) -> Any:
@@ -144,13 +142,13 @@ def test_maps_of_errors_without_bound_say_that_nothing_tells(
         ({"height": "up"}, "height", None),
     ],
 )
-def test_parts_and_heights_that_are_none_are_refused(
+def test_invalid_parts_and_heights_are_refused(
     found: sl.Calibration, arguments: dict[str, Any], item: str, value: str | None
 ) -> None:
     with refused(item, value, kind=sl.InvalidValueError):
         plot.calibration(found, **{"part": "errors"} | arguments)
 
 
-def test_what_is_no_calibration_is_refused() -> None:
+def test_other_objects_are_refused() -> None:
     with refused("found", kind=sl.InvalidValueError):
         plot.calibration("found.nc")  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""A robot drawn for print: what is where, which is which, and what it says where nothing holds it."""
+"""A robot drawn for print: positions, numbers of cables, and poses without equilibrium."""
 
 from pathlib import Path as FilePath
 from typing import Any
@@ -18,15 +18,15 @@ from tests.tiers import extended, wide
 
 ROBOT = sl.load_robot("article-mixed")
 POSE = sl.Pose.from_euler((1.0, 0.5, 1.7), 0.1, 0.0, 0.2)
-SOME = ("falcon-7", "fast", "ipanema-3-pulleys")  # the others in a long run
+SOME = ("falcon-7", "fast", "ipanema-3-pulleys")  # all others in a long run
 
 
 def strokes(ax: Axes) -> list[LineCollection]:
     return [each for each in ax.collections if isinstance(each, LineCollection)]
 
 
-def lying_on(points: np.ndarray, course: np.ndarray) -> float:
-    """The largest distance of points from a polyline."""
+def distance_from_line(points: np.ndarray, course: np.ndarray) -> float:
+    """Largest distance of points from a polyline."""
     starts, steps = course[:-1], np.diff(course, axis=0)
     away = points[:, None] - starts
     square = np.maximum(np.einsum("sc,sc->s", steps, steps), 1e-30)
@@ -35,7 +35,7 @@ def lying_on(points: np.ndarray, course: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize(("azimuth", "elevation"), wide([(2.3, 0.9), (-1.0, 0.4), (0.0, 0.0), (0.4, 0.5 * np.pi)]))
-def test_cables_hang_where_they_hang_in_the_color_of_their_tension(azimuth: float, elevation: float) -> None:
+def test_cables_have_their_shape_and_the_color_of_their_tension(azimuth: float, elevation: float) -> None:
     ax = plot.drawing(ROBOT, POSE, azimuth, elevation)
     plan = sl.inverse(ROBOT, POSE)
     right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
@@ -44,18 +44,18 @@ def test_cables_hang_where_they_hang_in_the_color_of_their_tension(azimuth: floa
     ends = POSE.transform(ROBOT.platform_anchors)
     for i, drawn in enumerate(strokes(ax)[:8]):
         np.testing.assert_allclose(np.asarray(drawn.get_colors())[0, :3], colors[i], atol=1e-12)
-        profile = plan.state.cables[i].points(41)  # along the cable's own plane, from its frame end
+        profile = plan.state.cables[i].points(41)  # in the plane of the cable, from its frame end
         level = (ends[i] - ROBOT.frame_anchors[i])[:2]
         level = level / np.linalg.norm(level)
         course = ROBOT.frame_anchors[i] + np.column_stack((profile[:, :1] * level, profile[:, 1]))
         picture = np.column_stack((course @ right, course @ up))
         parts = [np.asarray(path.vertices) for path in drawn.get_paths()]
         assert parts
-        assert max(lying_on(part, picture) for part in parts) < 1e-9
+        assert max(distance_from_line(part, picture) for part in parts) < 1e-9
 
 
 @extended
-def test_each_number_is_nearest_to_its_own_cable() -> None:
+def test_each_number_is_nearest_to_its_cable() -> None:
     for name in ("article-mixed", "cogiro", "ipanema-2"):
         robot = sl.load_robot(name)
         ax = plot.drawing(robot)
@@ -64,17 +64,17 @@ def test_each_number_is_nearest_to_its_own_cable() -> None:
         places = np.array([text.get_position() for text in texts], dtype=np.float64)
         courses = [np.concatenate([np.asarray(path.vertices) for path in each.get_paths()]) for each in strokes(ax)[:8]]
         for i, place in enumerate(places):
-            nearest = [lying_on(place[None], course) for course in courses]
+            nearest = [distance_from_line(place[None], course) for course in courses]
             assert nearest[i] <= min(nearest) + 1e-9, (name, i)
         room = 8.0 * np.ptp(ax.get_xlim()) / (ax.bbox.width / ax.figure.dpi * 72.0)
         gaps = np.linalg.norm(places[:, None] - places, axis=2) + 9e9 * np.eye(8)
         assert gaps.min() > 0.9 * room, name  # numbers do not meet
 
 
-def test_where_nothing_holds_it_cables_are_straight_dashed_and_gray(snapshot: SnapshotAssertion) -> None:
+def test_cables_without_equilibrium_are_straight_dashed_and_gray(snapshot: SnapshotAssertion) -> None:
     ax = plot.drawing(ROBOT, sl.Pose([0.0, 0.0, 9.0], np.eye(3)))
     assert ax.get_title() == snapshot
-    assert len(ax.figure.axes) == 1  # no bar: there are no tensions
+    assert len(ax.figure.axes) == 1  # no color bar without tensions
     for drawn in strokes(ax)[:8]:
         dashes: Any = drawn.get_linestyle()
         assert dashes[0][1] is not None
@@ -82,7 +82,7 @@ def test_where_nothing_holds_it_cables_are_straight_dashed_and_gray(snapshot: Sn
 
 
 @pytest.mark.parametrize("elevation", [-0.1, 1.6])
-def test_nobody_looks_from_under_the_ground(elevation: float) -> None:
+def test_the_direction_of_view_is_from_above_the_ground(elevation: float) -> None:
     with refused("elevation", f"{elevation:g} rad", "0 to pi / 2", kind=InvalidValueError):
         plot.drawing(ROBOT, POSE, elevation=elevation)
 
@@ -106,7 +106,7 @@ def test_every_robot_is_drawn_within_its_figure(name: str, tmp_path: FilePath) -
     assert "chord tension" in text
 
 
-def test_axes_of_the_caller_are_used_and_a_point_has_no_faces() -> None:
+def test_axes_of_the_caller_are_used_and_a_point_mass_has_no_faces() -> None:
     point = sl.Robot(
         "point", [[3, 0, 3], [-2, 2, 3], [-2, -2, 3]], np.zeros((3, 3)), sl.Cable(0.05, 5e4), 10.0, motion_pattern="3T"
     )

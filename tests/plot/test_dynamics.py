@@ -1,4 +1,4 @@
-"""Figures of vibrations and simulations hold the numbers they claim to show."""
+"""Figures of vibrations and simulations show the correct numbers."""
 
 import re
 from dataclasses import replace
@@ -25,7 +25,7 @@ SHARE = np.array([1.0, 0.25, 0.5, 0.0])
 DIRECTIONS = "x, y, z, about x, about y, about z"
 
 
-def test_the_response_on_cables_that_hardly_weigh_is_that_of_a_platform_on_springs(snapshot: SnapshotAssertion) -> None:
+def test_the_response_on_light_cables_is_that_of_a_platform_on_springs(snapshot: SnapshotAssertion) -> None:
     light = made.ROBOT.replace(cables=made.ROBOT.cables.replace(linear_density=1e-6))
     state = sl.inverse(light, sl.Pose([1.0, 0.5, 1.5], np.eye(3)), tension=sl.MinimumNorm()).state
     found = sl.modes(state)
@@ -35,7 +35,7 @@ def test_the_response_on_cables_that_hardly_weigh_is_that_of_a_platform_on_sprin
     assert (with_mass.get_label(), massless.get_label()) == snapshot
     np.testing.assert_allclose(np.asarray(with_mass.get_ydata()), np.asarray(massless.get_ydata()), rtol=1e-3)
     frequency = np.asarray(with_mass.get_xdata())
-    # modal damping is a loss factor, twice as large, of the stiffness; the inverse of the whole matrix, not a sum
+    # modal damping is a loss factor of the stiffness, twice as large; the inverse of the whole matrix, not a sum
     mass = np.linalg.inv(found.shape @ found.shape.T)
     square = mass @ found.shape @ np.diag((2.0 * np.pi * found.frequency) ** 2) @ found.shape.T @ mass
     for k in (0, 200, 500, frequency.size - 1):
@@ -46,8 +46,8 @@ def test_the_response_on_cables_that_hardly_weigh_is_that_of_a_platform_on_sprin
     assert ax.get_title(loc="right") == "modal damping 2 %"
 
 
-def test_losses_that_couple_modes_are_in_the_response() -> None:
-    """Of platform and cables together, by their exact stiffness: sums over modes are 8 times too large in places."""
+def test_the_response_includes_losses_that_couple_modes() -> None:
+    """Exact stiffness of platform and cables: sums over modes are wrong by a factor of 8 in places."""
     state, losses = made.state_at(2.0, 1.0), Damping(loss_time=1e-3, air_damping=0.01)
     with_mass = plot.response(sl.vibration(state, up_to=8.0, damping=losses), "z").get_lines()[0]
     frequency, answer = np.asarray(with_mass.get_xdata()), np.asarray(with_mass.get_ydata())
@@ -76,7 +76,7 @@ def test_the_response_below_all_modes_is_the_compliance(snapshot: SnapshotAssert
 
 
 def test_the_loss_in_the_stretch_damps_the_massless_robot_too() -> None:
-    """Of cables that are taut all the elastic energy of the stiffest mode is stretch: half the loss factor."""
+    """Taut cables store the elastic energy of the stiffest mode as stretch: half of the loss factor."""
     light = made.ROBOT.replace(cables=made.ROBOT.cables.replace(linear_density=1e-6))
     state = sl.inverse(light, sl.Pose([1.0, 0.5, 1.5], np.eye(3))).state
     found = sl.modes(state)
@@ -84,7 +84,7 @@ def test_the_loss_in_the_stretch_damps_the_massless_robot_too() -> None:
     ax = plot.response(made.vibration(state, found.frequency, np.ones(6), Damping(loss_time=eta)), "z")
     massless = ax.get_lines()[1]
     frequency, answer = np.asarray(massless.get_xdata()), np.asarray(massless.get_ydata())
-    # K(EA (1 + i omega eta)) of straight springs: geometric stiffness stays, the rest turns
+    # K(EA (1 + i omega eta)) of straight springs: the geometric stiffness is unchanged
     geometric = sl.stiffness(state).matrix - _elastic(state)
     mass = np.linalg.inv(found.shape @ found.shape.T)
     k = int(np.argmin(np.abs(frequency - found.frequency[np.argmax(np.abs(found.shape[2]))])))
@@ -103,7 +103,7 @@ def _elastic(state: sl.Equilibrium) -> np.ndarray:
 
 
 def test_the_response_with_cable_mass_is_that_of_the_exact_stiffness_of_the_cables() -> None:
-    """To the width of a line: modes beyond the highest stand still, and a ratio damps modes here, all forces there."""
+    """To the width of a line: omitted modes are quasi-static, and damping ratios apply to modes only."""
     state, damping = made.state_at(3.0, 2.0), Damping(modal_damping=0.01)
     ax = plot.response(sl.vibration(state, up_to=8.0, damping=damping), "x")
     frequency, answer = (np.asarray(each)[::150] for each in ax.get_lines()[0].get_data())
@@ -111,9 +111,9 @@ def test_the_response_with_cable_mass_is_that_of_the_exact_stiffness_of_the_cabl
     np.testing.assert_allclose(answer, np.abs(exact), rtol=0.02)
 
 
-def test_what_frequency_response_found_is_drawn_where_it_was_asked_for(snapshot: SnapshotAssertion) -> None:
+def test_results_of_frequency_response_are_drawn_at_their_frequencies(snapshot: SnapshotAssertion) -> None:
     state, damping = made.state_at(3.0, 2.0), Damping(modal_damping=0.02, loss_time=1e-4)
-    frequency = np.concatenate(([0.0], np.geomspace(8.0, 0.5, 40)))  # in any order, and at rest
+    frequency = np.concatenate(([0.0], np.geomspace(8.0, 0.5, 40)))  # in any order, and at zero frequency
     found = sl.frequency_response(state, frequency, damping)
     ax = plot.response(found, "about y", "x")
     for line, answer in zip(ax.get_lines(), (found.compliance, found.massless_compliance), strict=True):
@@ -138,14 +138,14 @@ def test_a_response_needs_modes_and_a_motion() -> None:
         plot.response(made.vibration(state, FREQUENCY, SHARE), "w")
 
 
-def test_undamped_peaks_are_cut_and_told(snapshot: SnapshotAssertion) -> None:
+def test_undamped_peaks_are_cut_and_stated(snapshot: SnapshotAssertion) -> None:
     state = made.state_at()
     ax = plot.response(made.vibration(state, FREQUENCY, SHARE, Damping()))
     assert ax.get_title(loc="right") == snapshot
     assert ax.get_ylim()[1] <= 300.0 * sl.stiffness(state).compliance[0, 0]
 
 
-def test_frequencies_along_a_path_are_as_wide_as_the_platforms_share(snapshot: SnapshotAssertion) -> None:
+def test_line_widths_of_frequencies_are_shares_of_the_platform(snapshot: SnapshotAssertion) -> None:
     clock = np.array([0.0, 0.5, 2.0])
     states = [
         made.vibration(made.state_at(x), FREQUENCY[: 4 - (k == 1)] + 0.1 * k, (SHARE + 0.1 * k)[: 4 - (k == 1)] / 1.2)
@@ -154,7 +154,7 @@ def test_frequencies_along_a_path_are_as_wide_as_the_platforms_share(snapshot: S
     ax = plot.frequencies(states, clock)
     (lines,) = (drawn for drawn in ax.collections if isinstance(drawn, LineCollection))
     segments = np.array(lines.get_segments())
-    assert segments.shape == (6, 2, 2)  # the fourth mode of the second state lies beyond
+    assert segments.shape == (6, 2, 2)  # the fourth mode of the second state is outside of the range
     np.testing.assert_allclose(segments[0], [(0.0, 1.5), (0.5, 1.6)], rtol=1e-12)
     np.testing.assert_allclose(segments[5], [(0.5, 3.0), (2.0, 3.1)], rtol=1e-12)
     shares = np.array([(SHARE[k] + 0.05 + 0.1 * j) / 1.2 for j in (0, 1) for k in range(3)])
@@ -207,7 +207,7 @@ def test_axes_of_the_caller_are_used() -> None:
     assert plot.frequencies([one, one], ax=right) is right
 
 
-def test_a_map_has_the_value_of_a_pose_where_the_pose_is(snapshot: SnapshotAssertion) -> None:
+def test_a_map_has_values_at_their_poses(snapshot: SnapshotAssertion) -> None:
     x, y, z = np.meshgrid([-1.0, 0.5, 2.0], [0.0, 1.0], [1.5, 2.0], indexing="ij")
     order = np.random.default_rng(4).permutation(x.size)
     poses = sl.Pose(np.stack((x, y, z), axis=-1).reshape(-1, 3)[order], np.eye(3))
@@ -229,23 +229,23 @@ def test_a_map_has_the_value_of_a_pose_where_the_pose_is(snapshot: SnapshotAsser
         plot.frequency_map(found, "mode")
 
 
-def test_a_film_says_whose_the_energy_is() -> None:
-    def told(cable: int | None, share: float) -> str:
+def test_a_film_names_the_source_of_energy() -> None:
+    def noted_text(cable: int | None, share: float) -> str:
         return energy_shares(ListedMode(1, "with cable mass", 2.0, 1.0 - share, cable, share, 0.01))
 
-    assert re.findall(r"\d+", told(3, 0.25)) == ["75", "3", "25"]
-    assert told(3, 0.004) == told(None, 0.004)
-    assert re.findall(r"\d+", told(3, 0.004)) == ["100", "1"]
+    assert re.findall(r"\d+", noted_text(3, 0.25)) == ["75", "3", "25"]
+    assert noted_text(3, 0.004) == noted_text(None, 0.004)
+    assert re.findall(r"\d+", noted_text(3, 0.004)) == ["100", "1"]
 
 
 @extended
 def test_a_film_lasts_ten_seconds_and_is_a_gif(tmp_path: Path) -> None:
     found = sl.vibration(made.state_at(), up_to=2.0)
-    told: list[tuple[int, int]] = []
-    plot.film(found, 1, tmp_path / "mode.gif", progress=lambda done, total: told.append((done, total)))
+    noted_text: list[tuple[int, int]] = []
+    plot.film(found, 1, tmp_path / "mode.gif", progress=lambda done, total: noted_text.append((done, total)))
     with Image.open(tmp_path / "mode.gif") as film:
         assert film.n_frames * film.info["duration"] == 10_000  # type: ignore[attr-defined]
-    assert told[-1] == (25, 25)
+    assert noted_text[-1] == (25, 25)
     with refused("number", "99", f"1 to {found.frequency.size}, modes with cable mass", kind=sl.InvalidValueError):
         plot.film(found, 99, tmp_path / "mode.gif")
     with refused(kind=sl.FileError, file=tmp_path / "mode.mp4", next_step="Name it .gif."):

@@ -1,4 +1,4 @@
-"""Figures of an execution: what they draw is what was recorded."""
+"""Figures of an execution show the recorded numbers."""
 
 import sys
 
@@ -23,7 +23,7 @@ def test_four_panels_with_units_and_a_line_at_each_fault(snapshot: SnapshotAsser
     assert [text.get_text() for text in band.texts] == ["cell stuck"]
 
 
-def test_lines_are_the_numbers_that_were_recorded() -> None:
+def test_lines_are_the_recorded_numbers() -> None:
     done = execution()
     lines = sl.plot.measured_tensions(done).lines
     assert len(lines) == 16
@@ -37,7 +37,7 @@ def test_lines_are_the_numbers_that_were_recorded() -> None:
     assert np.array_equal(np.asarray(mendable.get_ydata()), sl.control.null_space_error(done)[:, 3])
 
 
-def test_the_band_has_each_state_for_as_long_as_it_lasted() -> None:
+def test_the_band_shows_each_state_for_its_duration() -> None:
     parts = {name: getattr(execution(), name) for name in execution().__slots__}
     states = np.repeat([State.IDLE, State.MOVING, State.FAULT, State.READY], [20, 100, 41, 40]).astype(np.int8)
     ax = sl.plot.states(Execution(**parts | {"state": states}))
@@ -47,7 +47,7 @@ def test_the_band_has_each_state_for_as_long_as_it_lasted() -> None:
     assert widths == pytest.approx({"MOVING": 1.0, "FAULT": 0.41, "standing": 0.6})
 
 
-def test_long_courses_keep_their_peaks(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_long_recordings_keep_their_peaks(monkeypatch: pytest.MonkeyPatch) -> None:
     done = execution()
     monkeypatch.setattr(sys.modules["sagline.plot.sheet"], "MOST_POINTS", 20)
     line = sl.plot.measured_tensions(done).lines[2]
@@ -61,7 +61,7 @@ def test_long_courses_keep_their_peaks(monkeypatch: pytest.MonkeyPatch) -> None:
 @extended
 @pytest.mark.parametrize("width", [80.0, 120.0])
 def test_a_panel_fits_paper(width: float) -> None:
-    """Nothing is drawn beyond the sheet [mm]."""
+    """All parts are on the sheet [mm]."""
     from sagline.plot.sheet import sheet
 
     figure = sheet(2.2)

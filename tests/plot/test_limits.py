@@ -1,4 +1,4 @@
-"""Triangles cut where the limit changes: their areas are those of the regions, not of whole triangles."""
+"""Triangles divided where the limit changes: areas of regions agree with exact ones."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from scipy.spatial import Delaunay
 from sagline.core.arrays import Array, Indices
 from sagline.plot.limits import Find, cut_at_limits
 
-LINE = np.array([1.0, 0.6]), 0.8  # a border that meets no grid point
+LINE = np.array([1.0, 0.6]), 0.8  # a boundary that meets no grid point
 
 
 def sides(points: Array) -> Indices:
@@ -37,7 +37,7 @@ def test_regions_have_their_areas(find: Find, exact: list[float]) -> None:
     np.testing.assert_allclose(areas(corners, limits, len(exact)), exact, atol=0.01)
 
 
-def test_triangles_of_one_limit_stay() -> None:
+def test_triangles_of_one_limit_are_not_divided() -> None:
     points = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     corners, limits = cut_at_limits(points, np.array([[0, 1, 2]]), np.array([4, 4, 4]), sides)
     np.testing.assert_array_equal(corners, points[None])

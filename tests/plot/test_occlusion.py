@@ -1,4 +1,4 @@
-"""What a drawing leaves out is what a ray toward the viewer meets: tried point by point, by other formulas."""
+"""Hidden parts of a drawing, compared point by point with rays toward the viewer and other formulas."""
 
 from itertools import combinations, pairwise, product
 
@@ -10,7 +10,7 @@ from sagline.plot.occlusion import ALONG, FlatLine, view_axes, visible_parts
 from tests.tiers import wide
 
 HALF, GAP = 0.02, 0.05
-NEAR = 1e-3  # of a place where something begins to be hidden: there both answers are right
+NEAR = 1e-3  # from the beginning of a hidden part, where both results are correct
 
 
 def box_faces(middle: Array, size: Array, turn: Array) -> list[Array]:
@@ -26,7 +26,7 @@ def box_faces(middle: Array, size: Array, turn: Array) -> list[Array]:
 
 
 def ray_meets_box(start: Array, toward: Array, middle: Array, size: Array, turn: Array) -> bool:
-    """Kay and Kajiya 1986: between pairs of planes, in the axes of the box."""
+    """Kay and Kajiya 1986: intervals between pairs of planes in the axes of the box."""
     begin, along = (start - middle) @ turn, toward @ turn
     with np.errstate(divide="ignore"):
         one, other = (-0.5 * size - begin) / along, (0.5 * size - begin) / along
@@ -35,7 +35,7 @@ def ray_meets_box(start: Array, toward: Array, middle: Array, size: Array, turn:
 
 
 def passes(start: Array, toward: Array, one: Array, other: Array) -> tuple[float, float, float]:
-    """How far a ray passes from a straight line, how far along the ray that is, and where on the line, 0 to 1."""
+    """Distance of a ray from a straight line, position along the ray, and position on the line, 0 to 1."""
     step, away = other - one, start - one
     matrix = np.array([[toward @ toward, -toward @ step], [toward @ step, -step @ step]])
     if abs(np.linalg.det(matrix)) < 1e-12:
@@ -50,7 +50,7 @@ def turned(generator: np.random.Generator) -> Array:
 
 
 class Scene:
-    """Curved lines through and around boxes, some of them meeting, seen from a chosen side."""
+    """Curved lines through and around boxes, some of them with common points, seen from a direction."""
 
     def __init__(self, seed: int) -> None:
         generator = np.random.default_rng(seed)
@@ -75,7 +75,7 @@ class Scene:
         return visible_parts(drawn, [face @ self.view.T for box in self.boxes for face in box_faces(*box)])
 
     def hidden(self, number: int, point: Array) -> bool:
-        """Whether a ray toward the viewer meets a box, a cable as thick as drawn, or one that crosses close by."""
+        """True if a ray toward the viewer meets a box, a cable with its drawn width, or a cable that crosses nearby."""
         if any(ray_meets_box(point, self.toward, *box) for box in self.boxes):
             return True
         for other, line in enumerate(self.lines):
@@ -92,7 +92,7 @@ class Scene:
         return False
 
     def crosses_near(self, number: int, one: Array, end: Array, share: float) -> bool:
-        """Whether the line crosses the segment in the picture, behind it, near a place on it."""
+        """True if the line crosses the segment in the picture, behind it, near the place."""
         length = np.linalg.norm((end - one) @ self.view[:2].T)
         for begin, stop in zip(self.lines[number][:-1], self.lines[number][1:], strict=True):
             distance, where, other = crossing(begin, stop, one, end, self.toward)
@@ -102,13 +102,13 @@ class Scene:
 
 
 def crossing(one: Array, end: Array, two: Array, stop: Array, toward: Array) -> tuple[float, float, float]:
-    """How far the second segment is before the first where both are on one ray, and where; nothing if they are not."""
+    """Distance of the second segment in front of the first on a common ray, with the place; None without such a ray."""
     share, other, distance = np.linalg.solve(np.column_stack((end - one, two - stop, toward)), two - one)
     return (float(distance) if 0.0 <= other <= 1.0 else -1.0), float(share), float(other)
 
 
 def distance_to(parts: list[Array], point: Array) -> float:
-    """How far a point of the picture is from the nearest of parts of lines."""
+    """Distance of a point of the picture from the nearest of the parts of lines."""
     least = np.inf
     for part in parts:
         for one, end in pairwise(part):
@@ -119,7 +119,7 @@ def distance_to(parts: list[Array], point: Array) -> float:
 
 
 @pytest.mark.parametrize("seed", wide([0, 1, *(pytest.param(k, marks=pytest.mark.soak) for k in range(2, 40))]))
-def test_what_is_left_out_is_what_a_ray_finds_hidden(seed: int) -> None:
+def test_omitted_parts_are_hidden_for_a_ray(seed: int) -> None:
     scene = Scene(seed)
     generator = np.random.default_rng(100 + seed)
     found = {True: 0, False: 0}
@@ -131,7 +131,7 @@ def test_what_is_left_out_is_what_a_ray_finds_hidden(seed: int) -> None:
             around = [point + side * NEAR * (line[k + 1] - line[k]) for side in (-1.0, 0.0, 1.0)]
             verdicts = {scene.hidden(number, each) for each in around}
             if len(verdicts) == 2:
-                continue  # at an end of a part
+                continue  # at the end of a part
             hidden = verdicts.pop()
             shown = distance_to(parts, point @ scene.view.T) < 1e-9
             assert shown != hidden, (seed, number, place)
@@ -140,7 +140,7 @@ def test_what_is_left_out_is_what_a_ray_finds_hidden(seed: int) -> None:
 
 
 def test_three_cables_that_each_pass_before_the_next_are_each_cut_once() -> None:
-    """No order in which whole lines are painted over one another draws this."""
+    """No order of painting whole lines gives this picture."""
     ends = [np.array([np.cos(a), np.sin(a), 0.0]) for a in np.radians([90.0, 210.0, 330.0])]
     lines = []
     for one, other in ((0, 1), (1, 2), (2, 0)):
@@ -159,8 +159,8 @@ def test_lines_that_meet_at_an_anchor_meet_in_the_picture() -> None:
     assert [len(parts) for parts in visible_parts([FlatLine(line, 0.005, 0.01) for line in fan], [])] == [1] * 5
 
 
-def test_edges_of_a_box_that_are_seen() -> None:
-    """Nine of twelve, from all sides but straight on."""
+def test_visible_edges_of_a_box() -> None:
+    """Nine of twelve, from all directions except along an axis."""
     generator = np.random.default_rng(5)
     for _ in range(20):
         turn, size = turned(generator), generator.uniform(0.4, 2.0, 3)

@@ -1,4 +1,4 @@
-"""Figures hold the numbers they claim to show, in the units on their axes."""
+"""Figures show the correct numbers in the units of their axes."""
 
 from dataclasses import replace
 from io import BytesIO
@@ -88,7 +88,7 @@ def test_overview_shows_the_four_quantities() -> None:
 
 def test_infeasible_spans_are_shaded_up_to_halfway_to_the_feasible_samples() -> None:
     times = np.array([0.0, 1.0, 2.0, 4.0, 5.0, 6.0])
-    x = np.array([0.0, 0.0, 7.3, 7.3, 0.0, 7.3])  # outside at the third, fourth and last sample
+    x = np.array([0.0, 0.0, 7.3, 7.3, 0.0, 7.3])  # infeasible at the third, fourth and last sample
     still = np.zeros((6, 6))
     places = sl.Pose.from_euler(np.stack((x, 0.0 * x, 0.0 * x + 1.5), axis=1), 0.0, 0.0, 0.0)
     plan = sl.inverse(SUSPENDED, sl.Path(times, places, still, still))
@@ -114,10 +114,10 @@ def test_path_from_above_with_arrows_along_the_motion() -> None:
     arrows = [np.subtract(text.xy, text.xyann) for text in ax.texts if isinstance(text, Annotation)]
     directions = [arrow / np.linalg.norm(arrow) for arrow in arrows]
     c, s = 5.0 / np.hypot(5.0, 3.5), 3.5 / np.hypot(5.0, 3.5)
-    expected = [(c, s), (-1, 0), (0, -1), (1, 0), (0, 1), (-c, -s)]  # the article's path, move by move
+    expected = [(c, s), (-1, 0), (0, -1), (1, 0), (0, 1), (-c, -s)]  # each motion of the path of the article
     np.testing.assert_allclose(directions, expected, atol=1e-6)
     assert ax.get_title(loc="right") == "$z$ = 1.5 m"
-    assert len(ax.figure.axes) == 1  # a level path needs no panel of heights
+    assert len(ax.figure.axes) == 1  # a level path has no panel of heights
 
 
 def test_the_height_of_a_path_is_drawn_over_time() -> None:
@@ -147,10 +147,10 @@ def test_errors_are_in_millimetres_on_one_scale() -> None:
     assert left.get_ylabel().endswith("error [mm]")
     alone = plot.error(exact)
     low, high = alone.get_ylim()
-    assert (low, high) == (-1e-3, 1e-3)  # rounding is not blown up to fill the figure
+    assert (low, high) == (-1e-3, 1e-3)  # rounding is not enlarged to fill the figure
 
 
-def test_errors_too_small_to_see_are_told() -> None:
+def test_errors_that_are_too_small_to_see_are_stated() -> None:
     straight, exact = (sl.confirm(sl.inverse(SUSPENDED, PATH, model=m)) for m in (sl.Straight(), sl.Catenary()))
     assert [text.get_text() for text in plot.error(exact).texts] == ["largest: 0 (rounding)", "$x$", "$y$", "$z$"]
     left, right = plot.errors(straight, exact).axes
@@ -173,7 +173,7 @@ def test_poses_without_confirmed_equilibrium_are_shaded() -> None:
     assert legend(ax)[-1] == "not confirmed"
 
 
-def test_a_sample_between_two_gaps_is_seen() -> None:
+def test_a_sample_between_two_gaps_is_visible() -> None:
     times = np.arange(5.0)
     x = np.array([0.0, 7.3, 0.0, 7.3, 7.3])
     places = sl.Pose.from_euler(np.stack((x, 0.0 * x, 0.0 * x + 1.5), axis=1), 0.0, 0.0, 0.0)
@@ -183,7 +183,7 @@ def test_a_sample_between_two_gaps_is_seen() -> None:
         assert (line.get_marker(), line.get_markevery()) == ("o", [0, 2])
 
 
-def test_the_robot_hangs_between_its_anchors() -> None:
+def test_cables_end_at_the_anchors() -> None:
     pose = sl.Pose.from_euler((1.0, 2.0, 1.7), 0.3, 0.0, 0.0)
     ax = plot.robot(SUSPENDED, pose)
     cables = [np.array(line.get_data_3d()).T for line in ax.get_lines()[:8]]
@@ -194,7 +194,7 @@ def test_the_robot_hangs_between_its_anchors() -> None:
     for cable, sag in zip(cables, plan.state.cables.sag, strict=True):
         share = np.linalg.norm((cable - cable[0])[:, :2], axis=1) / np.linalg.norm((cable[-1] - cable[0])[:2])
         drop = cable[0, 2] + share * (cable[-1, 2] - cable[0, 2]) - cable[:, 2]
-        assert drop.max() == pytest.approx(sag, rel=2e-3)  # of 50 points one is near the lowest
+        assert drop.max() == pytest.approx(sag, rel=2e-3)  # one of 50 points is near the lowest one
 
 
 def test_cables_have_the_color_of_their_tension_and_their_numbers() -> None:
@@ -206,14 +206,14 @@ def test_cables_have_the_color_of_their_tension_and_their_numbers() -> None:
     (bar,) = [other for other in ax.figure.axes if other is not ax]
     assert bar.get_ylabel() == TENSIONS["chord_tension"]
     (mesh,) = [drawn for drawn in bar.collections if isinstance(drawn, QuadMesh)]
-    np.testing.assert_allclose(mesh.to_rgba(tension)[:, :3], colors, atol=0.02)  # the bar says what colors mean
+    np.testing.assert_allclose(mesh.to_rgba(tension)[:, :3], colors, atol=0.02)  # the color bar names the colors
     assert [text.get_text() for text in ax.texts] == [str(k) for k in range(8)]
     for text, anchor in zip(ax.texts, robot.frame_anchors, strict=True):
         assert np.linalg.norm(np.array(text.get_position_3d()) - anchor) < 1.0
 
 
 @pytest.mark.parametrize("name", wide(sl.robot_names()))
-def test_numbers_on_the_axes_of_a_robot_do_not_meet(name: str) -> None:
+def test_numbers_on_the_axes_of_a_robot_do_not_overlap(name: str) -> None:
     ax = plot.robot(sl.load_robot(name))
     figure = ax.figure
     figure.draw_without_rendering()
@@ -229,7 +229,7 @@ def test_numbers_on_the_axes_of_a_robot_do_not_meet(name: str) -> None:
 
 
 def outline(text: Text) -> OutlinePath:
-    """The box of a text, turned as it is."""
+    """The box of a text with its rotation."""
     turned = text.get_rotation()
     middle = text.get_window_extent()
     text.set_rotation(0.0)
@@ -263,7 +263,7 @@ def test_robots_without_width_are_drawn(pattern: Literal["3T", "2T"], size: tupl
     ax = plot.robot(robot, sl.Pose([0.2, 0.0, 1.5], np.eye(3)))
     ax.figure.draw_without_rendering()
     low, high = ax.get_ylim3d()
-    assert high - low >= 0.79  # a tenth of its length, so that it can be seen
+    assert high - low >= 0.79  # a tenth of the length, so that it is visible
 
 
 def test_the_platform_stands_over_its_shadow() -> None:
@@ -313,7 +313,7 @@ def test_figures_are_saved_the_same_each_time(tmp_path: FilePath, suffix: str, s
         assert content == (tmp_path / f"b.{suffix}").read_bytes()
 
 
-def test_a_suffix_that_no_figure_has(tmp_path: FilePath) -> None:
+def test_an_unknown_suffix(tmp_path: FilePath) -> None:
     with refused(kind=FileError, file=tmp_path / "a.xyz") as caught:
         plot.save(plot.overview(made.plan()), tmp_path / "a.xyz")
     assert ".xyz" in caught.value.reason
@@ -331,7 +331,7 @@ def test_a_notebook_shows_the_figure() -> None:
 
 
 @extended
-def test_a_path_of_a_hundred_thousand_stops_has_as_many_arrows_as_can_be_told_apart() -> None:
+def test_a_path_of_a_hundred_thousand_stops_has_distinguishable_arrows() -> None:
     count = 200_000
     moving = (np.arange(count) % 2)[:, None] * np.ones((count, 6))
     angle = np.linspace(0.0, 6.0, count)
@@ -339,7 +339,7 @@ def test_a_path_of_a_hundred_thousand_stops_has_as_many_arrows_as_can_be_told_ap
     ax = plot.path(sl.Path(np.arange(count) / 1e3, sl.Pose(place, np.eye(3)), moving, 0.0 * moving))
     begins = np.array([child.xy for child in ax.get_children() if isinstance(child, Annotation)])
     assert len(begins) == 100
-    assert np.ptp(np.diff(np.unwrap(np.arctan2(begins[:, 1], begins[:, 0])))) < 1e-3  # evenly
+    assert np.ptp(np.diff(np.unwrap(np.arctan2(begins[:, 1], begins[:, 0])))) < 1e-3  # equally spaced
 
 
 def test_pulleys_are_drawn_as_circles_and_cables_leave_them_at_their_exit_points() -> None:

@@ -33,11 +33,11 @@ def test_polygon_shows_corners_limits_and_methods() -> None:
 
 
 @extended
-def test_sides_without_length_have_names_too() -> None:
-    """Where three limits meet in one corner two of them have a side of no length; names must still not meet."""
+def test_edges_of_zero_length_have_names() -> None:
+    """At a common corner of three limits, two of them have an edge of zero length; their names do not overlap."""
     shape = sl.tension_polygon(MIXED, POSE)
     corner = shape.vertices[0]
-    vertices = np.vstack((corner, corner + 1e-12, corner, shape.vertices[1:]))  # one points where it should not
+    vertices = np.vstack((corner, corner + 1e-12, corner, shape.vertices[1:]))  # a limit with a wrong direction
     touched = replace(shape, vertices=vertices, sides=(shape.sides[0], shape.sides[0], *shape.sides))
     check_names(plot.polygon(touched), touched, "three in a corner")
 
@@ -48,7 +48,7 @@ def test_nothing_to_draw() -> None:
 
 
 def poses(count: int) -> list[tuple[str, sl.TensionPolygon]]:
-    """Polygons of many shapes: presets with two redundant cables, at random poses; small and long sides included."""
+    """Polygons of many shapes: presets with two redundant cables at random poses, small and long edges."""
     random = np.random.default_rng(5)
     found = []
     for name in ("article-mixed", "article-suspended", "ipanema-1", "ipanema-2", "copacabana", "cogiro", "caroca"):
@@ -78,7 +78,7 @@ def check_names(ax: Axes, shape: sl.TensionPolygon, where: str) -> None:
 
 
 @extended
-def test_no_name_is_struck_through_or_over_another() -> None:
+def test_names_do_not_overlap_lines_or_names() -> None:
     cases = poses(3)
     assert len(cases) > 15
     for where, shape in cases:
@@ -86,14 +86,14 @@ def test_no_name_is_struck_through_or_over_another() -> None:
 
 
 @pytest.mark.soak
-def test_no_name_of_many_polygons_is_struck_through() -> None:
+def test_names_of_many_polygons_do_not_overlap() -> None:
     for where, shape in poses(100):
         check_names(plot.polygon(shape), shape, where)
 
 
 @extended
 @pytest.mark.parametrize("size", [1e-6, 100.0, 1e9])
-def test_names_at_the_tip_of_a_flat_polygon_find_their_ways(size: float) -> None:
+def test_names_at_the_tip_of_a_flat_polygon_are_placed(size: float) -> None:
     shape = sl.tension_polygon(MIXED, POSE)
     corners = size * np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 0.0], [1.0, 0.0], [0.0, 0.0]])
     flat = replace(shape, vertices=corners, tensions=np.zeros((5, 8)), sides=(shape.sides[0],) * 5)

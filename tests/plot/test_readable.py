@@ -1,4 +1,4 @@
-"""Figures of every command and of every example: axes with units, and texts that are neither cut nor over others."""
+"""Figures of all commands and examples: axes with units, and texts that are neither cut nor overlapping."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ COMMANDS = {
 
 @pytest.fixture
 def figures(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
-    """All figures that are written during the test."""
+    """All figures written during the test."""
     found, plain = list[Figure](), Figure.savefig
 
     def note(figure: Figure, *arguments: Any, **named: Any) -> None:
@@ -101,7 +101,7 @@ def test_every_figure_is_tested() -> None:
 
 
 def figure_of(value: object) -> Figure | None:
-    """The figure of an object that is one or belongs to one."""
+    """The figure of an object that is a figure or belongs to one."""
     if isinstance(value, Axes):
         return value.get_figure(root=True)
     return value if isinstance(value, Figure) else None
@@ -119,7 +119,7 @@ def figure_of(value: object) -> Figure | None:
         (lambda figure: figure.axes[0].legend([figure.axes[0].lines[0]] * 2, ["one", "other"]), "looks like"),
     ],
 )
-def test_a_spoiled_figure_has_its_defect(spoil: Any, part: str) -> None:
+def test_a_deliberate_defect_is_found(spoil: Any, part: str) -> None:
     plan = sl.inverse(sl.load_robot("cogiro"), sl.quintic_path([(0, 0, 1.5), (2, 1, 2.5)], speed=1.0))
     figure = sl.plot.overview(plan)
     assert defects(figure) == []

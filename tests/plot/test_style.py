@@ -1,4 +1,4 @@
-"""Figures of journals and slides: their widths and fonts, names at the ends of lines, and text that stays text."""
+"""Figures of journals and slides: widths, fonts, names at the ends of lines, and text as text."""
 
 import re
 import zlib
@@ -25,7 +25,7 @@ from tests.tiers import extended, wide
 
 ROBOT = sl.load_robot("article-suspended")
 PATH = sl.article_path(rate=5.0)
-WIDTHS = {  # in, of the publishers' instructions: 394.36 pt and 525.5 pt of 1/72.27 in for MDPI
+WIDTHS = {  # in, from the instructions of publishers: 394.36 pt and 525.5 pt of 1/72.27 in for MDPI
     ("ieee", 1): 3.5, ("ieee", 2): 7.16, ("mdpi", 1): 394.36 / 72.27, ("mdpi", 2): 525.5 / 72.27,
 }  # fmt: skip
 
@@ -58,22 +58,22 @@ def test_figures_have_the_width_of_the_column(name: str, columns: int) -> None:
 
 
 @pytest.mark.parametrize("name", wide(["slides", "ieee", "mdpi"]))
-def test_text_is_large_enough_and_of_a_font_that_is_there(name: str) -> None:
+def test_text_is_large_enough_and_its_font_exists(name: str) -> None:
     with plot.style(name) as look:
         figure = figure_of(plot.tensions(made.plan()))
-    figure.draw_without_rendering()  # numbers of ticks are made here, after the style is left
+    figure.draw_without_rendering()  # tick labels are created here, after the style has ended
     texts: list[Any] = [text for text in figure.findobj(Text) if text.get_text()]
     assert {text.get_fontfamily()[0] for text in texts} == {look.font}
     assert {text.get_fontsize() for text in texts} == {look.label, look.tick}
     assert min(look.label, look.tick) >= (14.0 if name == "slides" else 8.0)
 
 
-def test_what_was_before_is_back_afterwards() -> None:
+def test_previous_settings_are_restored() -> None:
     before, plain = dict(matplotlib.rcParams), figure_of(plot.velocity(PATH)).get_figwidth()
     ieee = plot.style("ieee")
     with pytest.raises(ZeroDivisionError), ieee:
         _ = 1 / 0
-    with ieee, plot.style("slides"), ieee:  # the same one again, and inside itself
+    with ieee, plot.style("slides"), ieee:  # the same style again, also inside itself
         assert figure_of(plot.velocity(PATH)).get_figwidth() == 3.5
     assert dict(matplotlib.rcParams) == before
     assert figure_of(plot.velocity(PATH)).get_figwidth() == plain == 4.7
@@ -93,12 +93,12 @@ def test_what_was_before_is_back_afterwards() -> None:
         ("ieee", 1.5, "columns", "1.5", "a whole number, 1 to 2"),
     ],
 )
-def test_styles_that_there_are_not(name: str, columns: int, item: str, value: str, allowed: str) -> None:
+def test_unknown_styles(name: str, columns: int, item: str, value: str, allowed: str) -> None:
     with refused(item, value, allowed, kind=InvalidValueError):
-        plot.style(name, columns)  # at once, not when it is used
+        plot.style(name, columns)  # at once, before it is used
 
 
-def test_lines_carry_their_names_at_their_ends() -> None:
+def test_names_are_at_the_ends_of_lines() -> None:
     with plot.style("ieee"):
         ax = plot.tensions(made.plan())
     assert ax.get_legend() is None
@@ -113,13 +113,13 @@ def test_lines_carry_their_names_at_their_ends() -> None:
         assert boxes[name].x0 > ax.bbox.x1  # beside the axes, not on the lines
     middles = {name: 0.5 * (box.y0 + box.y1) for name, box in boxes.items() if name != "cable"}
     last = [float(np.asarray(lines[name].get_ydata())[-1]) for name in sorted(middles, key=middles.__getitem__)]
-    assert np.diff(last).min() > -1e-9 * last[-1]  # in the order of the lines; cables 0 and 4 end alike
-    assert np.diff(sorted(middles.values())).min() > 0.9 * 8.0 * figure_of(ax).dpi / 72.0  # apart by their height
+    assert np.diff(last).min() > -1e-9 * last[-1]  # in the order of the lines; cables 0 and 4 have the same end
+    assert np.diff(sorted(middles.values())).min() > 0.9 * 8.0 * figure_of(ax).dpi / 72.0  # separated by their height
 
 
 @extended
-def test_a_legend_stands_where_lines_end_elsewhere() -> None:
-    x = np.array([0.0, 7.3])  # m: outside at the end, so that lines end before it
+def test_a_legend_is_drawn_if_lines_end_elsewhere() -> None:
+    x = np.array([0.0, 7.3])  # m: outside at the end, so that lines end earlier
     times, count = np.linspace(0.0, 1.0, 8), 8
     places = np.column_stack((np.repeat(x, [4, 4]), np.zeros(count), np.full(count, 1.5)))
     plan = sl.inverse(ROBOT, sl.Path(times, sl.Pose(places, np.eye(3)), np.zeros((8, 6)), np.zeros((8, 6))))
@@ -136,7 +136,7 @@ def test_a_legend_stands_where_lines_end_elsewhere() -> None:
     assert box.y0 >= ax.bbox.y1
 
 
-def test_names_are_as_near_as_can_be() -> None:
+def test_names_are_as_near_as_possible() -> None:
     generator = np.random.default_rng(8)
     for count in (1, 2, 5, 8):
         for _ in range(20):
@@ -144,7 +144,7 @@ def test_names_are_as_near_as_can_be() -> None:
             spacing = float(generator.uniform(0.02, 0.99 / count))
             placed = spread_heights(heights, spacing)
             order = np.argsort(heights, kind="stable")
-            # the lowest, and how much more than the spacing lies between neighbors; the top bounds their sum
+            # the lowest one, and gaps between neighbors beyond the spacing; the upper end bounds their sum
             free = np.tril(np.ones((count, count)))
             steps = spacing * np.arange(count)
             best = lsq_linear(free, heights[order] - steps, bounds=([-9.0] + [0.0] * (count - 1), np.inf), tol=1e-13).x
@@ -174,7 +174,7 @@ def test_lines_of_slides_are_thicker_once() -> None:
 
 
 @extended
-def test_text_of_an_svg_is_text_and_its_letters_are_inside(tmp_path: FilePath) -> None:
+def test_text_of_an_svg_is_text_with_an_embedded_font(tmp_path: FilePath) -> None:
     with plot.style("ieee"):
         ax = plot.tensions(made.plan(), "horizontal_tension")
     plot.save(ax, tmp_path / "a.svg")
@@ -191,19 +191,19 @@ def test_text_of_an_svg_is_text_and_its_letters_are_inside(tmp_path: FilePath) -
 
 
 @extended
-def test_text_of_a_pdf_is_text_in_fonts_that_are_inside(tmp_path: FilePath) -> None:
+def test_text_of_a_pdf_is_text_with_embedded_fonts(tmp_path: FilePath) -> None:
     with plot.style("ieee"):
         ax = plot.velocity(PATH)
     plot.save(ax, tmp_path / "a.pdf")
     content = (tmp_path / "a.pdf").read_bytes()
     assert b"/Type3" not in content.replace(b" ", b"")
-    assert len(re.findall(rb"/FontFile2 \d+ 0 R", content)) == 2  # upright and slanted
+    assert len(re.findall(rb"/FontFile2 \d+ 0 R", content)) == 2  # upright and italic
     assert re.search(rb"/MediaBox \[ 0 0 252 ", content)  # 3.5 in
     streams = [
         zlib.decompressobj().decompress(part) for part in re.findall(rb"stream\r?\n(x.*?)endstream", content, re.S)
     ]
     page = b"".join(part for part in streams if b" Tf" in part)
-    assert len(re.findall(rb"T[jJ]\b", page)) >= 10  # its labels and numbers are shown as text
+    assert len(re.findall(rb"T[jJ]\b", page)) >= 10  # labels and numbers are text
 
 
 def test_small_multiples_show_each_cable_before_all_others() -> None:
@@ -218,7 +218,7 @@ def test_small_multiples_show_each_cable_before_all_others() -> None:
 
 
 @extended
-def test_limits_in_sight_are_dotted() -> None:
+def test_limits_within_the_axes_are_dotted() -> None:
     tight = ROBOT.replace(tension_max=float(made.plan().chord_tension.max()) * 1.001)
     figure = plot.small_multiples(sl.inverse(tight, PATH))
     heights = [np.asarray(line.get_ydata())[0] for line in figure.axes[0].get_lines() if line.get_linestyle() == ":"]

@@ -1,4 +1,4 @@
-"""Figures of workspaces hold what they claim to show: boundaries, margins, limits and fronts."""
+"""Figures of workspaces show the correct boundaries, margins, limits and fronts."""
 
 import sys
 from typing import Any, cast
@@ -41,7 +41,7 @@ def test_the_bold_line_is_the_boundary_and_thin_ones_are_round_margins(space: sl
     ends = np.concatenate([path.vertices for path in bold.get_paths()])[::10]
     poses = sl.Pose.from_euler(np.column_stack((ends, np.full(len(ends), 2.0))), 0.0, 0.0, 0.0)
     away = np.abs(sl.margin(ROBOT, poses, LOADS).value)
-    assert np.quantile(away, 0.9) < 0.5  # N, of 50 a meter, between points 75 mm apart
+    assert np.quantile(away, 0.9) < 0.5  # N, with 50 N per meter and points 75 mm apart
     for level, path in zip(margins.levels, margins.get_paths(), strict=True):
         points = path.vertices[::10]
         poses = sl.Pose.from_euler(np.column_stack((points, np.full(len(points), 2.0))), 0.0, 0.0, 0.0)
@@ -78,7 +78,7 @@ def test_a_plane_of_symmetry_has_regions_rather_than_noise(space: sl.Workspace) 
 
 
 @extended
-def test_a_plane_is_looked_at_once(space: sl.Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_plane_is_evaluated_once(space: sl.Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
     module = sys.modules["sagline.plot.workspace"]
     look = Mock(wraps=module.slice_of)
     monkeypatch.setattr(module, "slice_of", look)
@@ -86,9 +86,7 @@ def test_a_plane_is_looked_at_once(space: sl.Workspace, monkeypatch: pytest.Monk
     assert look.call_count == 1
 
 
-def test_a_slice_beside_the_workspace_says_that_nothing_is_there(
-    space: sl.Workspace, snapshot: SnapshotAssertion
-) -> None:
+def test_a_slice_outside_of_the_workspace_has_a_note(space: sl.Workspace, snapshot: SnapshotAssertion) -> None:
     ax = plot.slice(space, "x", at=7.5)
     assert [text.get_text() for text in ax.texts] == snapshot
 
@@ -101,14 +99,14 @@ def test_a_slice_beside_the_workspace_says_that_nothing_is_there(
         ("q", None, "normal", "'q'", None),
     ],
 )
-def test_planes_that_are_none_are_refused(
+def test_invalid_planes_are_refused(
     space: sl.Workspace, normal: str, at: float | None, item: str, value: str | None, allowed: str | None
 ) -> None:
     with refused(item, value, allowed, kind=sl.InvalidValueError):
         plot.slice(space, normal, at)
 
 
-def test_the_hull_is_all_there_and_its_bars_are_the_limits(space: sl.Workspace) -> None:
+def test_the_hull_is_complete_and_its_bars_are_the_limits(space: sl.Workspace) -> None:
     figure = plot.workspace(space)
     assert isinstance(figure, Figure)
     ax, bars = figure.axes
@@ -138,7 +136,7 @@ def test_an_empty_workspace_is_a_figure_too(
     assert [text.get_text() for text in plot.slice(empty).texts] == snapshot
 
 
-def test_of_a_planar_robot_the_slice_is_drawn() -> None:
+def test_a_planar_robot_is_drawn_as_a_slice() -> None:
     flat = sl.workspace(planar((0.0, 1.0, 0.0)), cells=12)
     assert plot.workspace(flat).axes[0].get_ylabel() == "$z$ [m]"
     with refused("normal", kind=sl.InvalidValueError):
@@ -151,7 +149,7 @@ def test_round_levels_are_few_and_round() -> None:
 
 
 def front_of(*kinds: str, count: int = 30) -> Front:
-    """Candidates whose second goal is worse where the first is better; every fifth is no robot."""
+    """Candidates whose second goal is worse if the first is better; every fifth is not a robot."""
     first = np.linspace(1.0, 2.0, count)
     values = np.column_stack([first, *(3.0 - (k + 1) * first for k in range(len(kinds) - 1))])
     values[::5] = np.nan
@@ -172,7 +170,7 @@ def test_a_front_joins_the_better_robots_and_marks_the_start(snapshot: SnapshotA
     assert figure.axes[1].get_ylabel() == snapshot
 
 
-def test_of_one_goal_the_course_is_drawn() -> None:
+def test_a_search_with_one_goal_is_drawn_over_time() -> None:
     found = front_of("mean_margin")
     _, best, start = plot.front(found).axes[0].get_lines()
     assert np.asarray(best.get_ydata())[-1] == np.nanmax(found.evaluated_values)

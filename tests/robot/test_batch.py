@@ -1,4 +1,4 @@
-"""Where pulleys stand and cables lie on them: circles and their tangents."""
+"""Positions of pulleys and cables on them: circles and tangents."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def pose_of(seed: int) -> sl.Pose:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_pulleys_stand_beside_their_anchors_towards_the_platform(seed: int) -> None:
+def test_pulleys_are_beside_their_anchors_towards_the_platform(seed: int) -> None:
     pose = pose_of(seed)
     ends = pose.transform(ROBOT.platform_anchors)
     away = pulley_centers(ROBOT, pose) - ROBOT.frame_anchors
@@ -31,7 +31,7 @@ def test_pulleys_stand_beside_their_anchors_towards_the_platform(seed: int) -> N
 
 @pytest.mark.parametrize("seed", range(5))
 def test_cables_leave_their_pulleys_along_the_force_there(seed: int) -> None:
-    """The exit point lies on the circle, and the cable goes on in the direction in which the circle does."""
+    """The exit point is on the circle, and the cable continues in the direction of its tangent."""
     pose = pose_of(seed)
     plan = sl.inverse(ROBOT, pose)
     assert plan.feasible
@@ -55,6 +55,6 @@ def test_cables_enter_upward_or_downward_at_their_anchors() -> None:
     np.testing.assert_allclose(first, np.array(RADII)[:, None] * WINCH.swivel_axis, atol=1e-6)
 
 
-def test_dead_cable_of_one_robot_and_of_several() -> None:
+def test_dead_length_of_one_robot_and_of_several() -> None:
     np.testing.assert_array_equal(dead_cable(ROBOT), np.arange(8.0))
     np.testing.assert_array_equal(dead_cable((ROBOT, BASE)), [np.arange(8.0), np.zeros(8)])

@@ -12,7 +12,7 @@ from tests.refusal import refused
 from tests.tiers import extended, wide
 
 PUBLISHED = {
-    # name: mass, density, stiffness, tension limits, a frame anchor, a platform anchor, the fields that are ours
+    # name: mass, density, stiffness, tension limits, a frame anchor, a platform anchor, the assumed fields
     "caroca": (150.0, 0.14, 1.5e6, (50, 10000), (7, [3.5, 2, 3.5]), (7, [-0.6, 0.3, -0.2])),
     "cogiro": (91.058, 0.065, 7e5, (100, 5000), (4, [7.2398, 5.3759, 5.4093]), (6, [0.5021, 0.275, -0.0007])),
     "cogiro-2014": (91.058, 0.065, 7e5, (100, 5000), (7, [7.161, -5.27, 5.497]), (1, [-0.51, 0.351, 0.998])),
@@ -27,7 +27,7 @@ PUBLISHED = {
     "expo2015-lucia": (
         130.0,
         0.198,
-        272470.3308,  # 1.77 GPa times the section of radius 7 mm; the source's 272 kN
+        272470.3308,  # 1.77 GPa times a section with a radius of 7 mm; the source has 272 kN
         (50, 5000),
         (0, [2.026688, -6.930677, 7.081188]),
         (7, [0.682028, 0.439835, 0.272427]),
@@ -66,7 +66,7 @@ def test_the_same_robot_with_its_pulleys(name: str) -> None:
 
 
 def test_the_servos_of_the_prototype() -> None:
-    """The article's 400 W; 3.82 N m, 3000 turns a minute and 0.277 kg cm^2 are those of a common motor of the class.
+    """The 400 W of the article; 3.82 N m, 3000 rev/min and 0.277 kg cm^2 are typical of this class of motors.
 
     With gear and drum the inertia is 1.15 times as large, and a tenth of the torque is lost in the gear.
     """
@@ -105,7 +105,7 @@ def test_inertia_of_the_measured_robots() -> None:
 
 
 @pytest.mark.parametrize("name", ARTICLE)
-def test_article_robots_are_those_of_table_1(name: str) -> None:
+def test_article_robots_have_the_data_of_table_1(name: str) -> None:
     frame, density, stiffness = ARTICLE[name]
     robot = load_robot(name)
     assert robot.mass == 50.0
@@ -123,7 +123,7 @@ def test_suspended_cables_cross_to_the_neighboring_corners() -> None:
     robot = load_robot("article-suspended")
     np.testing.assert_array_equal(robot.frame_anchors[:, 2], 6.0)
     for frame, platform in zip(robot.frame_anchors, robot.platform_anchors, strict=True):
-        turn = frame[0] * platform[1] - frame[1] * platform[0]  # > 0: the platform corner lies counter-clockwise
+        turn = frame[0] * platform[1] - frame[1] * platform[0]  # > 0: the platform corner is counter-clockwise
         assert np.sign(turn) == np.sign(platform[2])
 
 
@@ -134,7 +134,7 @@ def test_mixed_cables_run_straight_down_and_up() -> None:
 
 
 def wrench_feasible(robot: Robot, position: Array, rotation: Array) -> bool:
-    """A linear program over chord tensions, half of each cable's weight hung on the platform."""
+    """A linear program for chord tensions, with half of the weight of each cable on the platform."""
     arm = (robot.platform_anchors - robot.center_of_mass) @ rotation.T
     chord = position + robot.platform_anchors @ rotation.T - robot.frame_anchors
     length = np.linalg.norm(chord, axis=1)
@@ -166,7 +166,7 @@ def test_box_is_feasible(name: str) -> None:
     turns = Rotation.from_rotvec(axes * angles).as_matrix()
     positions = rng.uniform(box.low, box.high, size=(count, 3))
     feasible = [wrench_feasible(robot, *pose) for pose in zip(positions, turns, strict=True)]
-    assert np.mean(feasible) >= 0.9  # 95 % of all poses, and of 60 of them at least 90 %
+    assert np.mean(feasible) >= 0.9  # 95 % of all poses; at least 90 % of 60
 
 
 @pytest.mark.parametrize("name", ["article-mixed", "article-suspended"])
@@ -184,7 +184,7 @@ def test_an_unknown_preset_suggests_the_nearest() -> None:
 
 @extended
 @pytest.mark.parametrize("name", PULLEYS)
-def test_the_platform_rests_where_lengths_over_pulleys_put_it(name: str) -> None:
+def test_lengths_over_pulleys_give_the_pose(name: str) -> None:
     robot, rng = load_robot(f"{name}-pulleys"), np.random.default_rng(12)
     box = robot.test_box
     assert box is not None
@@ -195,7 +195,7 @@ def test_the_platform_rests_where_lengths_over_pulleys_put_it(name: str) -> None
     found = forward(robot, plan.unstrained_length[plan.feasible], start=away)
     assert found.solved.all()
     np.testing.assert_allclose(found.pose.position, positions[plan.feasible], rtol=0, atol=1e-9)
-    # the cable lies on the pulley: it is longer than from the anchor, by less than half the pulley's circumference
+    # the cable on the pulley is longer than from the anchor, by less than half the circumference of the pulley
     points = inverse(load_robot(name), Pose.from_euler(positions, 0.0, 0.0, 0.0), tension=plan.tension)
     longer = (plan.unstrained_length - points.unstrained_length)[plan.feasible & points.feasible]
     assert (np.abs(longer) < np.pi * PULLEYS[name]).all()

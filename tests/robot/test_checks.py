@@ -12,7 +12,7 @@ Z = np.array([0.0, 0.0, 1.0])
     ("moments", "pattern", "normal", "good"),
     [
         ((1.0, 1.0, 2.0), "3R3T", None, True),  # a thin plate
-        ((0.333, 0.333, 0.667), "3R3T", None, True),  # one printed with three digits
+        ((0.333, 0.333, 0.667), "3R3T", None, True),  # a value printed with three digits
         ((1.0, 1.0, 2.1), "3R3T", None, False),
         ((1.0, -1e-6, 1.0), "3R3T", None, False),
         ((1.0, -0.1, 1.0), "3R3T", None, False),
@@ -24,10 +24,10 @@ Z = np.array([0.0, 0.0, 1.0])
         ((0.0, 0.0, -0.3), "3T", None, False),
     ],
 )
-def test_which_inertia_a_platform_can_have(
+def test_possible_inertias(
     moments: tuple[float, float, float], pattern: str, normal: np.ndarray | None, good: bool
 ) -> None:
-    # turned about the normal, which a planar platform may be, and anyhow where it turns about every axis
+    # rotated about the normal, which is free for a planar platform, and any rotation for a spatial one
     turn = np.array([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
     for matrix in (np.diag(moments), turn @ np.diag(moments) @ turn.T):
         if good:

@@ -1,4 +1,4 @@
-"""Tension at the drum against the cable's own differential equation; what the tables of drums hold."""
+"""Tension at the drum compared with the differential equation of the cable; tables of drums."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from tests.kinematics.winches import wound
 
 
 @pytest.mark.parametrize("rise", [3.0, -2.5])
-def test_the_tension_at_the_drum_is_that_of_a_guided_cable(rise: float) -> None:
+def test_the_tension_at_the_drum_agrees_with_a_guided_cable(rise: float) -> None:
     robot = wound("article-prototype", dead_cable=3.5, dead_rise=rise)
     state = sl.inverse(robot, sl.Pose.from_euler([0.3, 0.2, 1.5], 0, 0, 0)).state
     weight, stiffness = robot.cables.linear_density * robot.gravity, robot.cables.axial_stiffness
@@ -20,14 +20,14 @@ def test_the_tension_at_the_drum_is_that_of_a_guided_cable(rise: float) -> None:
     )
     np.testing.assert_allclose(drum_tension(state), along.y[:, -1], rtol=1e-10)
     assert np.sign(drum_tension(state) - begin) == pytest.approx(-np.sign(rise))
-    # the dead cable is as long as its tensions say: strains between that of the frame end and that of the drum
+    # the dead length follows from its tensions: strains between those of the frame end and the drum
     assert state.contact is not None
     mean = 3.5 / (1.0 + 0.5 * (begin + drum_tension(state)) / stiffness)
     np.testing.assert_allclose(state.contact.dead_length, mean, rtol=1e-7)
 
 
 @pytest.mark.parametrize("axis", [1.0, -1.0])
-def test_over_a_pulley_the_tension_goes_with_the_height_of_the_exit(axis: float) -> None:
+def test_the_tension_over_a_pulley_changes_with_the_height_of_the_exit(axis: float) -> None:
     robot = wound("article-prototype", pulley_radius=0.2, swivel_axis=[0.0, 0.0, axis])
     state = sl.inverse(robot, sl.Pose.from_euler([0.3, 0.2, 1.5], 0, 0, 0)).state
     weight = robot.cables.linear_density * robot.gravity
@@ -41,7 +41,7 @@ def test_over_a_pulley_the_tension_goes_with_the_height_of_the_exit(axis: float)
 
 @pytest.mark.parametrize("model", [sl.Straight(), sl.Elastic(), sl.Parabolic(), sl.Empirical(0.5, 0.5)], ids=repr)
 @pytest.mark.parametrize("radius", [0.0, 0.2])
-def test_behind_a_shallow_cable_is_its_chord_tension(model: sl.CableModel, radius: float) -> None:
+def test_the_dead_part_of_a_shallow_cable_has_its_chord_tension(model: sl.CableModel, radius: float) -> None:
     robot = wound("article-prototype", pulley_radius=radius, dead_cable=3.5, dead_rise=3.0)
     state = sl.inverse(robot, sl.Pose.from_euler([0.3, 0.2, 1.5], 0, 0, 0), model).state
     assert state.contact is not None
@@ -49,12 +49,12 @@ def test_behind_a_shallow_cable_is_its_chord_tension(model: sl.CableModel, radiu
         np.testing.assert_array_equal(state.contact.dead_length, 3.5)
         strain = state.chord_tension / robot.cables.axial_stiffness
     else:
-        strain = 3.5 / state.contact.dead_length - 1.0  # the length behind says what tension it has
+        strain = 3.5 / state.contact.dead_length - 1.0  # the dead length determines its tension
     np.testing.assert_allclose(drum_tension(state), strain * robot.cables.axial_stiffness, rtol=1e-9)
 
 
-def test_a_cable_pressed_to_less_than_nothing_has_no_tension() -> None:
-    """At a drum 3 m below, a rope of EA = 14 kN that weighs 3 kN/m would be shorter than nothing."""
+def test_a_cable_of_negative_length_has_no_tension() -> None:
+    """At a drum 3 m below, a rope with EA = 14 kN and 3 kN/m would have a negative length."""
     robot = wound("article-prototype")
     state = sl.inverse(robot, sl.Pose.from_euler([0.3, 0.2, 1.5], 0, 0, 0)).state
     heavy = robot.replace(
@@ -64,16 +64,16 @@ def test_a_cable_pressed_to_less_than_nothing_has_no_tension() -> None:
     assert np.isnan(drum_tension(sl.Equilibrium(heavy, state.pose, state.wrench, state.cables))).all()
 
 
-def test_where_layers_begin() -> None:
+def test_beginnings_of_layers() -> None:
     drums = drums_of(wound())
     assert drums.starts.shape == (8, 5)
     np.testing.assert_allclose(drums.lengths(np.full((1, 8), 40.0))[0], drums.starts[:, 2], rtol=1e-15)
     np.testing.assert_allclose(drums.turns(drums.starts[:, 1:2].T)[0][0], 20.0, rtol=1e-14)
-    # nested in an equilateral triangle, four millimeters of rope on a pitch radius of fifty: 6.9 % a layer
+    # nested in an equilateral triangle, rope of 4 mm on a pitch radius of 50 mm: 6.9 % per layer
     assert drums.table[0, 1] / drums.table[0, 0] == pytest.approx(0.069, abs=5e-4)
 
 
-def test_every_cable_has_its_own_drum() -> None:
+def test_drums_of_different_cables() -> None:
     layers = np.array([4, 4, 5, 4, 6, 4, 4, 4])
     robot = wound(layers=layers, drum_radius=np.linspace(0.048, 0.08, 8))
     drums = drums_of(robot)
@@ -84,7 +84,7 @@ def test_every_cable_has_its_own_drum() -> None:
 
 
 @pytest.mark.parametrize("offset", [-0.11, 0.0, 0.05])
-def test_nothing_jumps_where_a_layer_ends(offset: float) -> None:
+def test_lengths_are_continuous_at_the_end_of_a_layer(offset: float) -> None:
     drums = drums_of(wound(drum_offset=offset))
     ends = 20.0 * np.arange(1, 4)[:, None] * np.ones(8)
     before, after = drums.lengths(ends - 1e-9), drums.lengths(ends + 1e-9)

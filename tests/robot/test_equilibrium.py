@@ -1,4 +1,4 @@
-"""Parts of a batch: the same numbers, the same memory where it can be, and locked."""
+"""Parts of a batch: the same numbers, shared memory where possible, and read-only."""
 
 from dataclasses import fields
 from typing import Any
@@ -28,7 +28,7 @@ def arrays(cables: sl.CableState) -> dict[str, Array]:
 
 
 @pytest.mark.parametrize("index", INDICES, ids=str)
-def test_a_part_of_a_batch_holds_the_entries_of_its_arrays(index: int) -> None:
+def test_a_part_of_a_batch_has_the_entries_of_its_arrays(index: int) -> None:
     batch = state()
     part = batch[index]
     np.testing.assert_array_equal(part.pose.position, batch.pose.position[index])
@@ -55,7 +55,7 @@ def test_slices_share_the_memory_of_the_batch_and_masks_do_not() -> None:
         assert part.cables.cable is ROBOT.cables
 
 
-def test_what_takes_a_batch_takes_its_parts() -> None:
+def test_functions_accept_parts_of_a_batch() -> None:
     batch = state()
     np.testing.assert_array_equal(sl.stiffness(batch).matrix[1:], sl.stiffness(batch[1:]).matrix)
     np.testing.assert_array_equal(sl.stiffness(batch).matrix[-1], sl.stiffness(batch[-1]).matrix)
@@ -78,7 +78,7 @@ def test_a_batch_has_a_length_and_a_single_equilibrium_has_none() -> None:
         batch[4]
 
 
-def test_material_that_differs_within_a_batch_is_taken_along() -> None:
+def test_material_of_a_batch_is_selected_with_its_parts() -> None:
     density = np.array([[0.1], [0.2], [0.3]]) * np.ones(2)
     cables = sl.Catenary().from_tension(sl.Cable(density, 5e4), 10.0, -2.0, [[100.0, 200.0]] * 3)
     part = cables[1:]
@@ -98,7 +98,7 @@ def test_material_given_once_for_a_batch_is_spread() -> None:
     assert sl.Catenary().from_tension(sl.Cable(0.1, 5e4), 10.0, 1.0, [9.0, 8.0])[1].cable.linear_density.shape == ()
 
 
-def test_several_robots_are_taken_along_and_not_mistaken_for_one() -> None:
+def test_robots_of_a_batch_are_selected_with_its_parts() -> None:
     robots = [ROBOT.replace(mass=ROBOT.mass + k) for k in range(4)]
     batch = sl.inverse(robots, POSE).state
     assert batch[MASK].robot == (robots[0], robots[2], robots[3])
@@ -111,7 +111,7 @@ def test_several_robots_are_taken_along_and_not_mistaken_for_one() -> None:
         sl.stiffness(batch[np.zeros(4, dtype=bool)])
 
 
-def test_functions_of_an_equilibrium_take_every_kind_of_start() -> None:
+def test_functions_of_an_equilibrium_accept_every_kind_of_start() -> None:
     here = (1.0, 1.0, 1.5)
     plan = sl.inverse(ROBOT, here)
     ball = sl.Sphere((0.0, 0.0, 0.2), radius=0.1)

@@ -18,7 +18,7 @@ ANGLE = st.floats(-7.0, 7.0)
 
 
 def euler_matrix(alpha: float, beta: float, gamma: float) -> Array:
-    """The article's (9), multiplied out by hand."""
+    """(9) of the article, multiplied by hand."""
     (sa, sb, sg), (ca, cb, cg) = np.sin((alpha, beta, gamma)), np.cos((alpha, beta, gamma))
     return np.array(
         [
@@ -65,7 +65,7 @@ def test_a_batch_gives_its_poses_by_index_slice_and_iteration() -> None:
         len(poses[0])
 
 
-def test_the_callers_array_is_copied_and_ours_is_locked() -> None:
+def test_the_given_array_is_copied_and_the_field_is_read_only() -> None:
     position = np.zeros((2, 3))
     poses = Pose(position, Rotation.identity())
     position[0, 0] = 5.0
@@ -76,7 +76,7 @@ def test_the_callers_array_is_copied_and_ours_is_locked() -> None:
 
 
 @given(st.integers(0, 2**32 - 1))
-def test_pickling_keeps_every_bit_and_the_lock(seed: int) -> None:
+def test_pickling_keeps_all_bits_and_read_only_arrays(seed: int) -> None:
     rng = np.random.default_rng(seed)
     poses = Pose.from_euler(rng.normal(size=(20, 3)), *rng.uniform(-3, 3, size=(3, 20)))
     copy = pickle.loads(pickle.dumps(poses))
@@ -101,12 +101,12 @@ def test_a_printed_quaternion_is_normalized() -> None:
         (np.zeros(4), ("rotation", "of shape (4,)")),
     ],
 )
-def test_matrices_that_are_no_rotations_are_refused(matrix: Array, parts: tuple[str, ...]) -> None:
+def test_matrices_other_than_rotations_are_refused(matrix: Array, parts: tuple[str, ...]) -> None:
     with refused(*parts, kind=InvalidValueError):
         Pose(np.zeros(3), matrix)
 
 
-def test_a_matrix_good_to_the_tolerance_passes() -> None:
+def test_a_matrix_within_the_tolerance_is_accepted() -> None:
     pose = Pose([0, 0, 0], np.diag([1.0, 1.0, 1.0 + 2e-10]))
     np.testing.assert_allclose(pose.matrix, np.eye(3), atol=1e-15)
 
@@ -131,13 +131,13 @@ def test_a_million_poses_take_no_python_loop() -> None:
     rng = np.random.default_rng(5)
     position, angles = rng.normal(size=(10**6, 3)), rng.uniform(-1, 1, size=(3, 10**6))
     poses = Pose.from_euler(position, *angles)
-    # seen: 0.2 s; a loop in Python takes more than 10 s
+    # typical: 0.2 s; a loop in Python takes more than 10 s
     assert least_seconds(lambda: Pose.from_euler(position, *angles), 5.0) < 5.0
     np.testing.assert_allclose(poses[-1].matrix, euler_matrix(*angles[:, -1]), atol=2e-15)
 
 
 @given(st.integers(1, 4), st.integers(1, 3), st.integers(0, 2**32 - 1))
-def test_points_go_with_every_pose_as_scipy_turns_them(count: int, points: int, seed: int) -> None:
+def test_points_are_transformed_as_by_scipy(count: int, points: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     poses = Pose(rng.uniform(-9, 9, (count, 3)), Rotation.random(count, rng))
     given_points = rng.uniform(-3, 3, (2, points, 3))
@@ -156,13 +156,13 @@ def test_points_go_with_every_pose_as_scipy_turns_them(count: int, points: int, 
     assert not poses.transform(given_points).flags.writeable
 
 
-def test_as_many_points_as_poses_still_go_with_every_pose() -> None:
+def test_n_points_and_n_poses_give_all_combinations() -> None:
     poses = Pose.from_euler([[1.0, 0, 0], [0, 5.0, 0]], [0.0, np.pi / 2], 0.0, 0.0)
     expected = [[[2, 0, 0], [1, 2, 0]], [[0, 6, 0], [-2, 5, 0]]]  # by hand
     np.testing.assert_allclose(poses.transform([[1, 0, 0], [0, 2, 0]]), expected, atol=1e-15)
 
 
-def test_points_are_checked_and_a_lost_pose_has_none() -> None:
+def test_points_are_checked_and_nan_poses_give_nan() -> None:
     with refused("points", "of shape (2,)", kind=InvalidValueError):
         Pose([0, 0, 0], np.eye(3)).transform([1.0, 2.0])
     with refused("points[0]", "nan m", kind=InvalidValueError):
@@ -184,7 +184,7 @@ def test_a_position_alone_is_a_level_pose() -> None:
         Pose([1, 2], [1, 2, 3], 0)
 
 
-def test_positions_and_lists_of_poses_take_the_place_of_a_pose() -> None:
+def test_positions_and_lists_of_poses_are_accepted() -> None:
     turned = Pose.from_euler((0.0, 0.0, 1.0), 0.5, 0.0, 0.0)
     both = pose_of([turned, Pose(1, 0, 1)])
     np.testing.assert_array_equal(both.position, [(0, 0, 1), (1, 0, 1)])

@@ -1,4 +1,4 @@
-"""Poses that a motion pattern does not have."""
+"""Poses outside of a motion pattern."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def robot(pattern: Any) -> sl.Robot:
 
 
 def poses(turn: Rotation, shift: np.ndarray) -> sl.Pose:
-    """Two poses, the second turned and shifted from a first that is oblique."""
+    """Two poses; the second is rotated and shifted relative to the first, an oblique one."""
     first = Rotation.from_rotvec([0.3, -0.2, 0.5])
     turns = Rotation.from_quat([first.as_quat(), (turn * first).as_quat()])
     return sl.Pose(np.array([[0.1, 0.2, 0.3], np.array([0.1, 0.2, 0.3]) + shift]), turns)
@@ -49,7 +49,7 @@ NONE = Rotation.identity()
         ("2T", NONE, -1e-3 * NORMAL, "-0.001 m along plane_normal", "0 m"),
     ],
 )
-def test_poses_between_which_no_motion_leads_are_refused(
+def test_poses_that_no_motion_connects_are_refused(
     pattern: str, turn: Rotation, shift: np.ndarray, value: str, allowed: str
 ) -> None:
     batch = poses(turn, shift)
@@ -60,11 +60,11 @@ def test_poses_between_which_no_motion_leads_are_refused(
         sl.inverse(robot(pattern), batch)
     assert caught.value.value.startswith(value)
     assert caught.value.allowed.startswith(allowed)
-    for k in range(2):  # each alone is where somebody built the robot
+    for k in range(2):  # each alone is the pose of a possible installation
         sl.inverse(robot(pattern), batch[k])
 
 
-def test_a_pose_that_the_pattern_cannot_have_brought_about_is_told() -> None:
+def test_a_pose_outside_of_the_motion_pattern_is_reported() -> None:
     turned = sl.Pose([0.0, 0.0, 0.0], Rotation.from_rotvec([0.0, 0.0, np.radians(90.0)]))
     (text,) = sl.inverse(robot("3T"), turned).warnings
     for fact in ("turned by 90 deg", "(0, 0, 1)", "motion_pattern 3T"):
@@ -72,7 +72,7 @@ def test_a_pose_that_the_pattern_cannot_have_brought_about_is_told() -> None:
     assert sl.inverse(robot("3R3T"), turned).warnings == ()
 
 
-def test_a_planar_robot_out_of_its_plane_is_told() -> None:
+def test_a_planar_robot_out_of_its_plane_is_reported() -> None:
     flat = sl.Robot("flat", [[-3, 0.5, 3], [3, 0.5, 3], [0, 0.5, 0]], np.zeros((3, 3)), sl.Cable(0.05, 5e4), 10.0,
                     motion_pattern="2T", plane_normal=[0, 1, 0], tension_min=1.0)  # fmt: skip
     assert sl.inverse(flat, sl.Pose([0.0, 0.5, 1.5], np.eye(3))).warnings == ()

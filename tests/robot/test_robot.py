@@ -27,7 +27,7 @@ def tripod(**changes: Any) -> Robot:
     return Robot(**{**FIELDS, **changes})
 
 
-def test_values_for_all_cables_are_spread_over_the_cables() -> None:
+def test_common_values_are_repeated_for_all_cables() -> None:
     robot = tripod(tension_min=5.0, tension_max=[10.0, np.inf, 30.0])
     np.testing.assert_array_equal(robot.cables.linear_density, [0.05, 0.05, 0.05])
     np.testing.assert_array_equal(robot.cables.axial_stiffness, [1e5, 1e5, 1e5])
@@ -37,10 +37,10 @@ def test_values_for_all_cables_are_spread_over_the_cables() -> None:
     assert (robot.cable_count, robot.gravity, robot.tension_limits_of) == (3, 9.81, "chord")
 
 
-def test_freedom_by_hand() -> None:
+def test_free_directions_by_hand() -> None:
     np.testing.assert_array_equal(tripod().freedom, np.eye(6))
     np.testing.assert_array_equal(tripod(motion_pattern="3T").freedom, np.eye(6)[:3])
-    # the plane of x and z: its normal is -y, since x cross z = -y
+    # the plane of x and z: its normal is -y, because x cross z = -y
     planar = tripod(motion_pattern="1R2T", plane_normal=[0, -3, 0])
     np.testing.assert_array_equal(planar.plane_normal, [0, -1, 0])
     np.testing.assert_array_equal(planar.freedom, [[1, 0, 0, 0, 0, 0], [0, 0, 1, 0, 0, 0], [0, 0, 0, 0, -1, 0]])
@@ -52,18 +52,18 @@ def test_freedom_by_hand() -> None:
 
 
 @given(st.lists(st.floats(-1, 1), min_size=3, max_size=3).filter(lambda v: np.linalg.norm(v) > 1e-3))
-@example([0.0, 6e-8, 1.0])  # nearly level, and yet it has a direction that is up
+@example([0.0, 6e-8, 1.0])  # nearly level, with a unique direction upward
 def test_planar_axes_are_right_handed_about_the_normal(normal: list[float]) -> None:
     rows = tripod(motion_pattern="1R2T", plane_normal=normal).freedom
     np.testing.assert_allclose(rows @ rows.T, np.eye(3), atol=1e-12)
     np.testing.assert_allclose(
         np.cross(rows[0, :3], rows[1, :3]), np.array(normal) / np.linalg.norm(normal), atol=1e-12
     )
-    assert rows[1, 2] >= -1e-12 or rows[2, 5] < 0  # up, unless a level plane is seen from below
+    assert rows[1, 2] >= -1e-12 or rows[2, 5] < 0  # upward, except for a level plane seen from below
 
 
 def test_inertia_of_simple_bodies() -> None:
-    # 12 kg: one twelfth of the mass is 1, so that the edges can be read off
+    # 12 kg: a twelfth of the mass is 1, so that the numbers show the edges
     np.testing.assert_array_equal(box_inertia(12.0, 1.0, 2.0, 3.0), np.diag([13.0, 10.0, 5.0]))
     np.testing.assert_array_equal(cylinder_inertia(12.0, 2.0, 3.0), np.diag([21.0, 21.0, 24.0]))
 
@@ -92,7 +92,7 @@ def test_a_payload_is_a_point_or_has_the_shape_of_the_platform() -> None:
     np.testing.assert_allclose(loaded.center_of_mass, (4.0 * own.center_of_mass + 2.0 * place) / 6.0, atol=1e-15)
 
     def about_center(mass: float, center: Array) -> Array:
-        x, y, z = center - loaded.center_of_mass  # Steiner, written out
+        x, y, z = center - loaded.center_of_mass  # Steiner's theorem
         return mass * np.array(
             [[y * y + z * z, -x * y, -x * z], [-x * y, x * x + z * z, -y * z], [-x * z, -y * z, x * x + y * y]]
         )
@@ -110,7 +110,7 @@ def test_a_body_that_cannot_turn_needs_no_inertia() -> None:
     np.testing.assert_array_equal(tripod(motion_pattern="3T", inertia=None).inertia, np.zeros((3, 3)))
 
 
-def test_replace_checks_again_and_leaves_the_original() -> None:
+def test_replace_checks_the_fields_and_keeps_the_original() -> None:
     robot = tripod()
     heavier = robot.replace(mass=9.0)
     assert (heavier.mass, robot.mass) == (9.0, 4.0)
@@ -121,7 +121,7 @@ def test_replace_checks_again_and_leaves_the_original() -> None:
         robot.replace(weight=1.0)
 
 
-def test_pickling_and_locks() -> None:
+def test_pickling_and_read_only_arrays() -> None:
     robot = tripod(assumed={"mass": "a guess"}, test_box=PoseBox([0, 0, 1], [1, 1, 2], 0.1))
     copy = pickle.loads(pickle.dumps(robot))
     np.testing.assert_array_equal(copy.inertia, robot.inertia)
@@ -174,7 +174,7 @@ def test_a_wrong_field_is_named(changes: dict[str, Any], parts: tuple[str, ...])
         tripod(**changes)
 
 
-def test_two_cables_may_share_one_end() -> None:
+def test_two_cables_may_have_a_common_end() -> None:
     robot = tripod(frame_anchors=CORNERS[[0, 0, 1]], platform_anchors=[[0, 0, 0], [0, 0, 1], [0, 0, 0]])
     assert robot.cable_count == 3
 
@@ -184,14 +184,14 @@ def test_a_flat_box_is_a_box() -> None:
     np.testing.assert_array_equal(box.high, [1, 1, 1])
 
 
-def test_a_crossed_box_is_refused() -> None:
+def test_a_box_with_exchanged_corners_is_refused() -> None:
     with refused("test_box: high[2]", "0 m", ">= low, 1 m", kind=InvalidValueError):
         PoseBox([0, 0, 1], [1, 1, 0])
 
 
 def test_the_inertia_of_any_body_is_taken() -> None:
     generator = np.random.default_rng(5)
-    for flat in (False, True) * 100:  # a few masses, turned anyhow
+    for flat in (False, True) * 100:  # a few masses with any rotation
         masses, places = generator.uniform(0.1, 2.0, 6), generator.normal(size=(6, 3)) * (1.0, 1.0, float(not flat))
         places = (places - masses @ places / masses.sum()) @ Rotation.random(rng=generator).as_matrix().T
         square = np.einsum("k,ki,kj->ij", masses, places, places)
@@ -199,7 +199,7 @@ def test_the_inertia_of_any_body_is_taken() -> None:
 
 
 @pytest.mark.parametrize("moments", [(1.0, 1.0, 2.03), (0.1, 1.0, 1.2), (5.0, 1.0, 1.0)])
-def test_moments_that_no_body_has_are_refused_whatever_the_axes(moments: tuple[float, float, float]) -> None:
+def test_impossible_moments_of_inertia_are_refused_in_any_axes(moments: tuple[float, float, float]) -> None:
     turn = Rotation.from_rotvec([0.3, -1.0, 0.4]).as_matrix()
     small, middle, large = sorted(moments)
     with refused("inertia", allowed="none larger than the sum of the other two", kind=InvalidValueError) as caught:

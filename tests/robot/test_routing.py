@@ -1,4 +1,4 @@
-"""Friction and hanging guides behind the last pulley, against references written here."""
+"""Friction and sagging guides after the last pulley, compared with references written here."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tests.tiers import extended
 DENSITY, STIFFNESS, GRAVITY = 0.4, 5e4, 9.81
 WEIGHT = DENSITY * GRAVITY
 ANCHORS = np.array([[3.0, 0.0, 3.0], [-2.0, 2.0, 3.5], [-2.0, -2.0, 3.0]])
-# eyelets from the drum on: slanted spans, a plumb one, a drum above
+# eyelets from the drum on: slanted spans, a vertical one, a drum above
 GUIDES = np.array(
     [
         [[4.0, 1.0, 0.0], [6.0, 0.5, 2.0]],
@@ -63,22 +63,22 @@ def catenary_ends(forces: Array, length: float) -> tuple[float, float]:
     return span, rise
 
 
-def plumb(rise: float, tension: float) -> tuple[float, float]:
-    """Length of a plumb cable below its upper end, and the tension at the lower one: rise = L + (T L - w L^2/2)/EA."""
+def vertical_length(rise: float, tension: float) -> tuple[float, float]:
+    """Length of a vertical cable below its upper end, and its lower tension: rise = L + (T L - w L^2/2)/EA."""
     strained = 1.0 + tension / STIFFNESS
     length = 2.0 * rise / (strained + np.sqrt(strained**2 - 2.0 * WEIGHT * rise / STIFFNESS))
     return length, tension - WEIGHT * length
 
 
-def hung(step: Array, tension: float) -> tuple[float, float]:
-    """Length of a catenary over a step (to its upper end) with this tension there, and that at its other end."""
+def catenary_length(step: Array, tension: float) -> tuple[float, float]:
+    """Length of a catenary over a step with a given tension at its upper end, and the tension at the other end."""
     if np.hypot(step[0], step[1]) == 0.0:
-        return plumb(float(step[2]), tension)
-    level, top, length = hung_forces(step, tension)
+        return vertical_length(float(step[2]), tension)
+    level, top, length = catenary_forces(step, tension)
     return length, float(np.hypot(level, top - WEIGHT * length))
 
 
-def hung_forces(step: Array, tension: float) -> tuple[float, float, float]:
+def catenary_forces(step: Array, tension: float) -> tuple[float, float, float]:
     """Horizontal tension, vertical force at the upper end, and length of that catenary."""
     span, rise = float(np.hypot(step[0], step[1])), float(step[2])
     chord = np.hypot(span, rise)
@@ -101,13 +101,13 @@ def steps_of(cable: int) -> Array:
     return found
 
 
-def test_spans_between_guides_are_catenaries_with_the_tension_of_the_one_before() -> None:
+def test_spans_between_guides_are_catenaries_with_equal_tensions_at_guides() -> None:
     state = held(guides=GUIDES)
     drums = drum_tension(state)
     for i, tension in enumerate(state.cables.frame_end_tension):
         whole, end = 0.0, float(tension)
         for step in steps_of(i):
-            length, end = hung(step, end)
+            length, end = catenary_length(step, end)
             whole += length
         assert contact_of(state).dead_length[i] == pytest.approx(whole, abs=2e-11)
         assert drums[i] == pytest.approx(end, rel=1e-10)
@@ -115,7 +115,7 @@ def test_spans_between_guides_are_catenaries_with_the_tension_of_the_one_before(
 
 
 def energy(step: Array, length: float) -> float:
-    """Of a catenary of given length over a step, counted from its upper end: lifting and stretching, by quadrature."""
+    """Energy of a catenary of given length over a step, zero at its upper end: weight and stretch, by quadrature."""
     span, rise = float(np.hypot(step[0], step[1])), float(step[2])
 
     def missed(forces: Array) -> Array:
@@ -131,12 +131,12 @@ def energy(step: Array, length: float) -> float:
     return float(quad(density, 0.0, length, epsabs=1e-12, epsrel=1e-12)[0])
 
 
-def test_an_eyelet_shares_the_cable_with_the_least_energy() -> None:
-    """Of all ways to share what is behind the frame anchor over the eyelet, ours costs least."""
+def test_the_distribution_over_an_eyelet_has_the_least_energy() -> None:
+    """The distribution of the dead length over the eyelet has the smallest energy of all distributions."""
     state = held(guides=GUIDES)
     first, second = steps_of(0)
     whole = float(contact_of(state).dead_length[0])
-    near = hung(first, float(state.cables.frame_end_tension[0]))[0]
+    near = catenary_length(first, float(state.cables.frame_end_tension[0]))[0]
 
     def cost(length: float) -> float:
         lowered = WEIGHT * (whole - length) * float(first[2])
@@ -167,8 +167,8 @@ def test_friction_on_the_pulley_is_that_of_the_differential_equation(sign: float
 
 
 @pytest.mark.parametrize("radius", [0.0, 0.1])
-def test_every_bend_rubs_by_its_angle(radius: float) -> None:
-    """Weightless, so that spans are straight and the bends known: at an eyelet from the span to the cable itself."""
+def test_friction_of_a_bend_depends_on_its_angle(radius: float) -> None:
+    """Weightless cables with straight spans and known bends; at an eyelet from the span to the free cable."""
     mu = 0.15
     state = held(sl.Elastic(), np.ones(3), pulley_radius=radius, pulley_friction=mu, guides=GUIDES)
     for i, tension in enumerate(state.cables.frame_end_tension):
@@ -190,8 +190,8 @@ def between(one: Array, other: Array) -> float:
     return float(np.arccos(one @ other / np.linalg.norm(one) / np.linalg.norm(other)))
 
 
-def test_bends_are_those_of_hanging_cables() -> None:
-    """Heavy: tensions from bends and bends from tensions in turn, with spans found by a root-finder."""
+def test_bends_are_those_of_sagging_cables() -> None:
+    """Heavy cables: tensions from bends and bends from tensions in turn, with spans by a root finder."""
     mu = 0.15
     state = held(None, np.ones(3), pulley_friction=mu, guides=GUIDES)
     for i in (0, 2):
@@ -203,9 +203,9 @@ def test_bends_are_those_of_hanging_cables() -> None:
         first = second = 0.0
         for _ in range(40):
             entering = np.linalg.norm(leaving) * np.exp(mu * first)
-            level_1, top_1, length_1 = hung_forces(near, float(entering))
+            level_1, top_1, length_1 = catenary_forces(near, float(entering))
             low_1 = top_1 - WEIGHT * length_1
-            level_2, top_2, length_2 = hung_forces(far, float(np.hypot(level_1, low_1) * np.exp(mu * second)))
+            level_2, top_2, length_2 = catenary_forces(far, float(np.hypot(level_1, low_1) * np.exp(mu * second)))
             along_1, along_2 = (step[:2] / np.linalg.norm(step[:2]) for step in (near, far))
             first = between(np.append(level_1 * along_1, top_1), leaving)
             second = between(np.append(level_2 * along_2, top_2), np.append(level_1 * along_1, low_1))
@@ -214,13 +214,13 @@ def test_bends_are_those_of_hanging_cables() -> None:
         assert drum_tension(state)[i] == pytest.approx(drum, rel=1e-9)
 
 
-def test_winding_in_pulls_harder_at_the_drum() -> None:
+def test_winding_in_increases_the_tension_at_the_drum() -> None:
     fields = {"pulley_radius": 0.1, "pulley_friction": 0.1, "guides": GUIDES}
     none, in_, out, mixed = (held(None, w, **fields) for w in (None, np.ones(3), -np.ones(3), np.array([1.0, -1, 0])))
     drums = [drum_tension(state) for state in (out, none, in_)]
     assert (np.diff(drums, axis=0) > 1.0).all()
     lengths = [state.unstrained_length for state in (in_, none, out)]
-    assert (np.diff(lengths, axis=0) > 0.0).all()  # more tension, less unstrained cable in the same place
+    assert (np.diff(lengths, axis=0) > 0.0).all()  # a higher tension means less unstrained cable in the same place
     picked = [in_.unstrained_length[0], out.unstrained_length[1], none.unstrained_length[2]]
     np.testing.assert_allclose(mixed.unstrained_length, picked, rtol=0.0, atol=1e-14)
     for state in (in_, out, mixed):
@@ -229,7 +229,7 @@ def test_winding_in_pulls_harder_at_the_drum() -> None:
 
 
 @pytest.mark.parametrize("model", [sl.Straight(), sl.Elastic(), sl.Parabolic(), sl.Empirical()])
-def test_without_weight_guides_are_a_straight_run(model: sl.CableModel) -> None:
+def test_weightless_guides_are_straight(model: sl.CableModel) -> None:
     guided = held(model, guides=GUIDES)
     winches = guided.one_robot.winches
     assert winches is not None
@@ -238,8 +238,8 @@ def test_without_weight_guides_are_a_straight_run(model: sl.CableModel) -> None:
 
 
 @extended
-def test_the_energy_knows_neither_friction_nor_sag() -> None:
-    """Stiffness and sensitivities are those of a straight guided run at the same pose and tensions."""
+def test_the_energy_neglects_friction_and_sag_of_guides() -> None:
+    """Stiffness and sensitivities are those of straight guides at the same pose and tensions."""
     state = held(None, np.ones(3), pulley_radius=0.1, pulley_friction=0.2, guides=GUIDES)
     winches = state.one_robot.winches
     assert winches is not None
@@ -251,8 +251,8 @@ def test_the_energy_knows_neither_friction_nor_sag() -> None:
     np.testing.assert_allclose(ours.length_sensitivity, theirs.length_sensitivity, rtol=1e-9, atol=1e-12)
 
 
-def test_a_cable_too_slack_to_hang_between_its_guides_is_no_answer() -> None:
-    """Below 0.754 w D, the least end tension of a level catenary, it would run out of the drum by itself."""
+def test_a_cable_that_is_too_slack_between_guides_has_no_solution() -> None:
+    """Below 0.754 w D, the least end tension of a level catenary, the cable would run off the drum by itself."""
     level = ANCHORS + 60.0 * np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0]])
     light = {"mass": 12.0, "cables": sl.Cable(DENSITY, STIFFNESS)}
     robot = tripod(guides=level[:, None]).replace(**light)
@@ -269,7 +269,7 @@ def test_a_cable_too_slack_to_hang_between_its_guides_is_no_answer() -> None:
 
 
 @extended
-def test_forward_does_not_converge_where_a_cable_is_too_slack_between_its_guides() -> None:
+def test_forward_does_not_converge_if_a_cable_is_too_slack_between_guides() -> None:
     level = ANCHORS + 60.0 * np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0]])
     light = {"mass": 12.0, "cables": sl.Cable(DENSITY, STIFFNESS)}
     held_straight = sl.inverse(tripod(dead_cable=60.0).replace(**light), POSE)

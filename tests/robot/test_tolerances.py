@@ -10,7 +10,7 @@ from sagline.calibration.parameters import KINDS
 from sagline.robot.tolerances import UNCERTAIN, Provenance, value_of
 from tests.refusal import refused
 
-OUTSIDE = {"measuring_frame", "target"}  # kinds of unknowns that no robot has
+OUTSIDE = {"measuring_frame", "target"}  # kinds of unknowns that are not fields of a robot
 
 
 def four(**changes: Any) -> Robot:
@@ -20,7 +20,7 @@ def four(**changes: Any) -> Robot:
     return Robot("four", anchors, np.zeros((4, 3)), cables, 10.0, motion_pattern="3T", winches=winches, **changes)
 
 
-def test_names_units_and_shapes_are_those_of_what_a_calibration_finds() -> None:
+def test_names_units_and_shapes_are_those_of_calibrated_parameters() -> None:
     assert list(UNCERTAIN) == [name for name in KINDS if name not in OUTSIDE]
     for name, what in UNCERTAIN.items():
         kind = KINDS[name]
@@ -29,7 +29,7 @@ def test_names_units_and_shapes_are_those_of_what_a_calibration_finds() -> None:
 
 
 @pytest.mark.parametrize("name", UNCERTAIN)
-def test_a_tolerance_has_the_shape_of_its_field_however_it_is_given(name: str) -> None:
+def test_a_tolerance_has_the_shape_of_its_field(name: str) -> None:
     robot, what = four(), UNCERTAIN[name]
     value = value_of(robot, name)
     assert value is not None
@@ -49,7 +49,7 @@ def test_a_wrong_tolerance_is_named(name: str, wrong: Any) -> None:
         four(tolerances={name: wrong})
     assert re.fullmatch(rf"tolerances: {name}(\[\d+\])?", caught.value.item)
     assert len(str(caught.value)) < 300
-    if isinstance(wrong, float) and wrong == 0.0:  # a standard error may be as good as none
+    if isinstance(wrong, float) and wrong == 0.0:  # a standard error can be zero
         assert four(calibration=Provenance("", "2026-01-01", {name: wrong})).calibration is not None
         return
     with pytest.raises(InvalidValueError) as caught:
@@ -58,7 +58,7 @@ def test_a_wrong_tolerance_is_named(name: str, wrong: Any) -> None:
 
 
 @pytest.mark.parametrize("wrong", ["frame_anchors", 3, None, [("mass", 1.0)], {"masss": 1.0}, {3: 1.0}, {"target": 1}])
-def test_what_are_no_tolerances_is_refused(wrong: Any) -> None:
+def test_other_objects_are_refused(wrong: Any) -> None:
     with pytest.raises(InvalidValueError) as caught:
         four(tolerances=wrong)
     assert caught.value.item.startswith("tolerances")
@@ -67,12 +67,12 @@ def test_what_are_no_tolerances_is_refused(wrong: Any) -> None:
     assert caught.value.item.startswith("calibration: standard_error")
 
 
-def test_infinite_says_that_nothing_is_known() -> None:
+def test_an_infinite_tolerance_means_unknown() -> None:
     assert np.isinf(four(tolerances={"mass": np.inf}).tolerances["mass"])
 
 
 @pytest.mark.parametrize("wrong", ["yesterday", "", "2026-13-01", None, 20260301])
-def test_a_date_that_is_none(wrong: Any) -> None:
+def test_an_invalid_date(wrong: Any) -> None:
     with refused("calibration: date", kind=InvalidValueError) as caught:
         Provenance("log.csv", wrong)
     assert "ISO 8601" in str(caught.value)
@@ -92,7 +92,7 @@ def test_tolerances_and_calibration_stay_with_the_robot() -> None:
 
 
 @pytest.mark.parametrize("name", UNCERTAIN)
-def test_a_number_that_is_replaced_loses_its_standard_error_and_no_other_does(name: str) -> None:
+def test_a_replaced_value_loses_its_standard_error(name: str) -> None:
     errors: Any = dict.fromkeys(UNCERTAIN, 0.1)
     robot = four(calibration=Provenance("", "2026-01-01", errors))
     part, _, inner = UNCERTAIN[name].place.partition(".")
@@ -102,12 +102,12 @@ def test_a_number_that_is_replaced_loses_its_standard_error_and_no_other_does(na
     assert set(other.calibration.standard_error) == set(UNCERTAIN) - {name}
     assert robot.calibration is not None
     assert set(robot.calibration.standard_error) == set(UNCERTAIN)
-    again = robot.replace(mass=11.0, calibration=robot.calibration)  # whoever says so knows
+    again = robot.replace(mass=11.0, calibration=robot.calibration)  # the caller provides them
     assert again.calibration is not None
     assert "mass" in again.calibration.standard_error
 
 
-def test_winches_that_go_take_their_standard_errors_along() -> None:
+def test_removed_winches_lose_their_standard_errors() -> None:
     robot = four(calibration=Provenance("", "2026-01-01", {"drum_radius": 1e-4, "mass": 0.1}))
     bare = robot.replace(winches=None).calibration
     assert bare is not None

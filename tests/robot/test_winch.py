@@ -1,4 +1,4 @@
-"""The machine between encoder and cable, as data."""
+"""Data of the machine between encoder and cable."""
 
 import pickle
 from typing import Any, NamedTuple
@@ -11,11 +11,11 @@ from sagline import Cable, InvalidValueError, Robot, Winch, load_robot, without_
 from sagline.robot.batch import cables_of
 from tests.refusal import refused
 
-# the fields that hold a number for each cable
+# fields with a number for each cable
 RULES = {field.name: field for field in attrs.fields(Winch) if field.name not in ("swivel_axis", "guides")}
-# beside a value of 2 or 3 for every field: what else must be there
+# required in addition to a value of 2 or 3 for every field
 BESIDE: dict[str, dict[str, float]] = {"dead_rise": {"dead_cable": 5.0}}
-# which values a field refuses, by hand from what it is
+# values that a field refuses
 NEVER_NEGATIVE = (
     *("pulley_radius", "pulley_friction", "rolling_friction", "dead_cable", "drum_radius", "drum_width"),
     *(
@@ -53,7 +53,7 @@ def assert_same(winch: Winch, other: Winch) -> None:
         np.testing.assert_array_equal(getattr(other, name), field, err_msg=name)
 
 
-def test_a_winch_of_nothing_is_an_eyelet_that_counts_turns() -> None:
+def test_a_winch_without_data_is_an_eyelet_with_counted_turns() -> None:
     found = {name: field for name, field in fields_of(Winch()).items() if field is not None}
     assert set(RULES) - set(found) == set(UNKNOWN)
     assert {name for name, field in found.items() if field.ndim == 0 and field == 1.0} == {
@@ -66,7 +66,7 @@ def test_a_winch_of_nothing_is_an_eyelet_that_counts_turns() -> None:
 
 
 @pytest.mark.parametrize("name", [name for name in RULES if name != "rolling_friction"])
-def test_every_field_holds_what_it_is_given(name: str) -> None:
+def test_every_field_has_the_given_value(name: str) -> None:
     beside: dict[str, Any] = BESIDE.get(name, {})
     assert getattr(Winch(**beside, **{name: 2}), name).tolist() == 2.0
     several = Winch(**beside, **{name: [2, 3, 2]})
@@ -79,7 +79,7 @@ def test_every_field_holds_what_it_is_given(name: str) -> None:
 
 
 class Case(NamedTuple):
-    """A field, a value that it refuses, and parts of the error: value, beginning of the range, element."""
+    """A field, a refused value, and parts of the error: value, beginning of the range, element."""
 
     name: str
     value: Any
@@ -130,7 +130,7 @@ def cases() -> list[Case]:
 @pytest.mark.parametrize(
     "case", cases(), ids=lambda case: f"{case.name}{case.element}-{case.shown.partition(' at ')[0]}"
 )
-def test_values_that_no_winch_has_are_refused_by_name(case: Case) -> None:
+def test_impossible_values_are_refused_by_name(case: Case) -> None:
     with refused(f"winches: {case.name}{case.element}", case.shown, kind=InvalidValueError) as found:
         Winch(**{**BESIDE.get(case.name, {}), case.name: case.value})
     allowed = found.value.allowed
@@ -148,7 +148,7 @@ def test_seven_of_eight_rows_are_named(name: str) -> None:
         Winch([0.05] * 8, **{name: [2.0] * 7})
 
 
-def test_the_longest_block_counts() -> None:
+def test_the_longest_field_determines_the_size() -> None:
     with refused("winches: pulley_radius", "7 values", "one value, or 8, as gear has", kind=InvalidValueError):
         Winch([0.05] * 7, gear=[1.0] * 8)
     with refused("winches: swivel_axis", "2 values", "one value, or 3, as pulley_radius has", kind=InvalidValueError):
@@ -156,13 +156,13 @@ def test_the_longest_block_counts() -> None:
     assert Winch([0.05], gear=[1.0, 2.0]).pulley_radius.tolist() == [0.05, 0.05]
 
 
-def test_a_run_rises_by_no_more_than_its_length() -> None:
+def test_the_rise_of_a_dead_length_is_at_most_its_length() -> None:
     assert Winch(dead_cable=[2.0, 3.0], dead_rise=[-2.0, 3.0]).dead_rise.tolist() == [-2.0, 3.0]
     with refused("winches: dead_rise[1]", "-3.1 m", "within +-3 m, its dead_cable", kind=InvalidValueError):
         Winch(dead_cable=3.0, dead_rise=[3.0, -3.1])
 
 
-def test_a_cable_is_no_shorter_than_its_run() -> None:
+def test_dead_length_is_at_least_the_straight_distance() -> None:
     assert Winch(dead_cable=[2.0, 3.0], cable_length=3.0).dead_cable.tolist() == [2.0, 3.0]
     with refused("winches: cable_length[1]", "2.9 m", ">= 3 m, its dead_cable", kind=InvalidValueError):
         Winch(dead_cable=[2.0, 3.0], cable_length=2.9)
@@ -176,7 +176,7 @@ def test_the_field_with_too_few_values_for_a_robot_is_named(name: str) -> None:
     with refused(f"winches: {name}", "7 values", ONE_OR_8, kind=InvalidValueError):
         COGIRO.replace(winches=Winch(**beside, **other, **{name: [two, three, two, three, two, three, two]}))
     with refused("winches", "7 values", ONE_OR_8, kind=InvalidValueError):
-        COGIRO.replace(winches=Winch(**beside, **other, **{name: [two] * 7}))  # nothing tells which it was
+        COGIRO.replace(winches=Winch(**beside, **other, **{name: [two] * 7}))  # the cable is unknown
 
 
 def test_a_block_of_seven_winches_is_named_in_one_line() -> None:
@@ -188,7 +188,7 @@ def test_a_block_of_seven_winches_is_named_in_one_line() -> None:
         COGIRO.replace(winches=Winch(**seven, swivel_axis=[[0, 0, 1]] * 6 + [[0, 0, -1]]))
     assert len(str(found.value)) < 300
     with refused("winches", "7 values", kind=InvalidValueError):
-        COGIRO.replace(winches=Winch([0.0] * 7))  # seven times what it is anyway
+        COGIRO.replace(winches=Winch([0.0] * 7))  # seven times the size of one
 
 
 def test_axes_of_any_length_become_vertical_unit_vectors() -> None:
@@ -196,7 +196,7 @@ def test_axes_of_any_length_become_vertical_unit_vectors() -> None:
     np.testing.assert_array_equal(axes, [[0, 0, 1], [0, 0, -1], [0, 0, 1]])
 
 
-def test_one_winch_is_spread_over_the_cables() -> None:
+def test_one_winch_is_repeated_for_all_cables() -> None:
     one = Winch(0.05, drum_radius=0.06, swivel_axis=[0, 0, -1])
     spread = one.per_cable(3)
     assert spread.pulley_radius.tolist() == [0.05] * 3
@@ -216,7 +216,7 @@ def test_one_winch_is_spread_over_the_cables() -> None:
         one.per_cable(10**14)
 
 
-def test_replace_checks_again_and_leaves_the_original() -> None:
+def test_replace_checks_the_fields_and_keeps_the_original() -> None:
     winch = Winch([0.05, 0.06], gear=-20, swivel_axis=[[0, 0, 1], [0, 0, -1]], inertia=1e-3)
     changed = winch.replace(gear=12, inertia=None)
     assert (changed.gear.tolist(), changed.inertia) == ([12.0, 12.0], None)
@@ -229,7 +229,7 @@ def test_replace_checks_again_and_leaves_the_original() -> None:
     assert set(caught.value.allowed.split(", ")) == set(Winch.__slots__)
 
 
-def test_pickling_goes_through_the_constructor() -> None:
+def test_pickling_uses_the_constructor() -> None:
     winch = Winch([0.05, 0.06], dead_cable=4, dead_rise=[-1, 2], swivel_axis=[[0, 0, 1], [0, 0, -1]], speed_limit=300)
     copy = pickle.loads(pickle.dumps(winch))
     assert_same(winch, copy)
@@ -263,7 +263,7 @@ def test_a_robot_takes_as_many_winches_as_cables() -> None:
     assert_same(wound().winches or Winch(), copy.winches)
 
 
-def test_cables_that_are_left_keep_their_winches() -> None:
+def test_remaining_cables_keep_their_winches() -> None:
     left, kept = without_cables(wound(), 2, 5), np.array([0, 1, 3, 4, 6, 7])
     assert left.winches is not None
     np.testing.assert_array_equal(left.winches.pulley_radius, np.linspace(0.01, 0.08, 8)[kept])
@@ -273,7 +273,7 @@ def test_cables_that_are_left_keep_their_winches() -> None:
     np.testing.assert_array_equal(left.cables.expansion, [1.2e-5] * 6)
 
 
-def test_what_all_cables_of_several_robots_know() -> None:
+def test_common_fields_of_the_winches_of_several_robots() -> None:
     thin = wound().replace(cables=wound().cables.replace(expansion=None))
     both = cables_of((wound(), thin))
     assert both.expansion is None

@@ -1,4 +1,4 @@
-"""The catalogue of drives against what its sheets say in other words: other units, efficiencies, accelerations."""
+"""The catalogue of drives compared with other numbers of the data sheets: other units, efficiencies, accelerations."""
 
 from collections.abc import Callable
 
@@ -38,7 +38,7 @@ SHEET_SGMAH = {
 
 
 @pytest.mark.parametrize("model", SHEET_SGMSH)
-def test_motors_are_those_of_the_sheet_in_its_other_units(model: str) -> None:
+def test_motors_agree_with_the_sheet_in_other_units(model: str) -> None:
     rated, peak, inertia, acceleration = SHEET_SGMSH[model]
     drive = sl.winch_drive(f"yaskawa-sgmsh-{model}")
     assert drive.rated_torque == pytest.approx(rated * POUND_INCH, rel=1e-2)
@@ -49,7 +49,7 @@ def test_motors_are_those_of_the_sheet_in_its_other_units(model: str) -> None:
 
 
 @pytest.mark.parametrize("model", SHEET_SGMAH)
-def test_geared_motors_are_those_of_the_sheet_through_their_gear(model: str) -> None:
+def test_geared_motors_agree_with_the_sheet(model: str) -> None:
     rated, efficiency, of_gear, fastest = SHEET_SGMAH[model]
     drive = sl.winch_drive(f"yaskawa-sgmah-{model}")
     assert drive.rated_torque == pytest.approx(rated * efficiency, rel=1e-2)
@@ -58,7 +58,7 @@ def test_geared_motors_are_those_of_the_sheet_through_their_gear(model: str) -> 
     assert drive.inertia == pytest.approx(alone + 1e-4 * of_gear, abs=0.7e-7)
 
 
-def test_every_drive_of_the_sheets_is_there_with_its_source() -> None:
+def test_every_drive_has_its_source() -> None:
     names = {f"yaskawa-sgmah-{model}" for model in SHEET_SGMAH} | {f"yaskawa-sgmsh-{model}" for model in SHEET_SGMSH}
     assert set(sl.winch_drive_names()) == names
     assert all(sl.winch_drive(name).source.startswith("Yaskawa") for name in names)
@@ -75,7 +75,7 @@ def test_a_winch_has_the_drive_and_its_drum() -> None:
     assert winch.drum_radius == 0.04
 
 
-def test_what_is_refused() -> None:
+def test_refusals() -> None:
     drive = sl.winch_drive("yaskawa-sgmsh-10aa")
     known = "one of the 19 drives of the catalogue"
     others = "a field of Winch other than gear, inertia, torque_limit, speed_limit"
