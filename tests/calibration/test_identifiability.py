@@ -9,9 +9,9 @@ import pytest
 
 import sagline as sl
 from sagline.calibration.findings import Direction
-from sagline.calibration.identifiability import append_rows, gauge_of, numerical_rank, prior_units
+from sagline.calibration.identifiability import append_rows, gauge_of, numerical_rank
 from sagline.calibration.observations import predicted_rows
-from sagline.calibration.parameters import KINDS, Parameters
+from sagline.calibration.parameters import KINDS, Parameters, prior_units
 from sagline.core.arrays import Array
 from tests.calibration import reference
 from tests.calibration.machines import Standing, robots, standing, with_drums

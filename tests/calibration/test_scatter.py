@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import minimize
 
 import sagline as sl
-from sagline.calibration.scatter import variance_factors
+from sagline.calibration.findings import variance_factors
 from sagline.core.arrays import Array
 from tests.calibration.four_cables import CELL_NOISE, LENGTH_NOISE, drawn_robot, log_of_twin, twin_of
 from tests.calibration.synthetic import log_of, true_robot

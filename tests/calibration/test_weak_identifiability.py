@@ -8,9 +8,9 @@ import pytest
 
 import sagline as sl
 from sagline.calibration.findings import Direction
-from sagline.calibration.identifiability import append_rows, gauge_of, prior_units
+from sagline.calibration.identifiability import append_rows, gauge_of
 from sagline.calibration.observations import predicted_rows
-from sagline.calibration.parameters import Parameters
+from sagline.calibration.parameters import Parameters, prior_units
 from sagline.calibration.weak_identifiability import weak_directions
 from sagline.core.arrays import Array
 from tests.calibration import reference

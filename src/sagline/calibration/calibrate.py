@@ -34,7 +34,7 @@ from sagline.calibration.result import Calibration
 from sagline.calibration.screening import reading_count, screen
 from sagline.calibration.search import cross_validate, search_from_priors
 from sagline.core.arguments import callback, flag, instance, whole_number
-from sagline.core.arrays import Indices
+from sagline.core.arrays import Indices, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import counted
 from sagline.core.progress import Progress
@@ -118,18 +118,19 @@ def calibrate(
     _check_count(fit_log, parameters, left_out, freely=checked is not None)
     problem = FitProblem(robot, model, sensors, parameters, readings_table(fit_log))
     try:
-        found = search_from_priors(problem, fit_log.commanded, robust=robust, progress=progress)
+        fit, kept, lost = search_from_priors(problem, fit_log.commanded, robust=robust, progress=progress)
     except InvalidValueError:
         _refuse_mistakes(robot, log, fit_log, parameters, model)
         raise
-    departure = float(np.abs(problem.missed(found.fit.state.numbers)).max())
-    if not found.fit.converged or misfit(found.fit.normal) > GOOD or departure > STRANGE:
+    departure = float(np.abs(problem.missed(fit.state.numbers)).max())
+    if not fit.converged or misfit(fit.normal) > GOOD or departure > STRANGE:
         _refuse_mistakes(robot, log, fit_log, parameters, model)
-    elif Omission.OTHER_EQUILIBRIUM in found.left_out:
-        lost = found.left_out[Omission.OTHER_EQUILIBRIUM]
-        _refuse(measured_pose_mistakes(robot, fit_log, lost, parameters.names, model))
-    validation = cross_validate(problem, found, folds, robust=robust, progress=progress) if folds else None
-    return calibration_of(problem, asked, found, rows, left_out, log.source, validation)
+    elif Omission.OTHER_EQUILIBRIUM in lost:
+        elsewhere = lost[Omission.OTHER_EQUILIBRIUM]
+        _refuse(measured_pose_mistakes(robot, fit_log, elsewhere, parameters.names, model))
+    validation = cross_validate(problem, fit, kept, folds, robust=robust, progress=progress) if folds else None
+    omitted = {**left_out, **{reason: locked(rows[which]) for reason, which in lost.items()}}
+    return calibration_of(problem, asked, fit, kept, rows, omitted, log.source, validation)
 
 
 def active_sensors(log: WinchLog) -> Sensors:

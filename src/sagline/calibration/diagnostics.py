@@ -1,4 +1,4 @@
-"""Diagnostics of a log before a calibration: units, columns, signs, times and zeros."""
+"""Diagnostics of a log before a calibration: units, columns, signs, times, zeros, and axes of measured positions."""
 
 from __future__ import annotations
 
@@ -7,15 +7,16 @@ from itertools import combinations
 from typing import Final
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary, model_of
 from sagline.calibration.hypotheses import CELL_UNITS, LENGTH_UNITS, Hypothesis, Trial
 from sagline.calibration.log import WinchLog, load_cells_of
-from sagline.calibration.measuring_axes import frame_mismatch, left_handed
 from sagline.calibration.screening import screen
 from sagline.core.arguments import instance
 from sagline.core.arrays import Array, Flags, Indices
+from sagline.core.numbers import n
 from sagline.robot.robot import Robot
 
 _CATENARY = Catenary()
@@ -114,7 +115,7 @@ def measured_pose_mistakes(
     if log.position is not None:
         placed = np.flatnonzero(~np.isnan(log.position).any(axis=1))
         points = Trial(robot, model, log, placed).measured_points() if placed.size else points
-    sentence = left_handed(*points) or frame_mismatch(log, left_out, asked, points)
+    sentence = _left_handed(*points) or _frame_mismatch(log, left_out, asked, points)
     if sentence is not None:
         yield sentence
 
@@ -254,3 +255,74 @@ def _change_text(change: Hypothesis, log: WinchLog) -> str:
 def _misfit_text(quality: float) -> str:
     """Text of a quality in standard deviations."""
     return f"{np.sqrt(quality):.3g} standard deviations" if np.isfinite(quality) else "without bound"
+
+
+FEWEST: Final = 4  # number of measured points that show a reflection
+CLEARLY: Final = 0.2  # largest ratio of the distances after and before an explanation
+FLAT: Final = 0.05  # points are coplanar if their extent along an axis is a smaller share of the largest extent
+
+
+def _aligned(there: Array, measured: Array, *, reflected: bool) -> tuple[Array, float]:
+    """Rotation (3, 3) of measured points (N, 3) onto others, and the root mean square distance [m] (Kabsch 1976)."""
+    first, other = there - there.mean(axis=0), measured - measured.mean(axis=0)
+    left, _, right = np.linalg.svd(first.T @ other)
+    sign = np.sign(np.linalg.det(left @ right)) * (-1.0 if reflected else 1.0)
+    matrix = left @ np.diag([1.0, 1.0, sign]) @ right
+    return matrix, float(np.sqrt(np.mean(np.sum((first - other @ matrix.T) ** 2, axis=1))))
+
+
+def _left_handed(there: Array, measured: Array) -> str | None:
+    """Sentence about left-handed axes, if only a reflection maps the measured points (N, 3) to the expected ones."""
+    if len(there) < FEWEST or (extent := _extents(there))[2] < FLAT * extent[0]:
+        return None
+    (_, plain), (matrix, mirrored) = (_aligned(there, measured, reflected=reflected) for reflected in (False, True))
+    if mirrored > CLEARLY * plain:
+        return None
+    signs = np.diag(matrix)
+    axes = [axis for axis, sign in zip("xyz", signs, strict=True) if sign < 0.0]
+    which = f"column {axes[0]}" if len(axes) == 1 and np.abs(signs).min() > 0.9 else "one column, or exchange two"
+    return (
+        f"the axes of the measured positions seem to be left-handed: with a reflection they agree to "
+        f"{n(mirrored, '.2g', 'm')}, without to {n(plain, '.2g', 'm')}; change the sign of {which}"
+    )
+
+
+def _other_axes(there: Array, measured: Array) -> str | None:
+    """Text of the motion that explains the measured points (N, 3); None if no motion explains them."""
+    if len(there) < 3 or _extents(there)[1] < FLAT * _extents(there)[0]:
+        return None
+    before = float(np.sqrt(np.mean(np.sum((there - measured) ** 2, axis=1))))
+    matrix, after = _aligned(there, measured, reflected=False)
+    if after > CLEARLY * before:
+        return None
+    turn = n(np.degrees(Rotation.from_matrix(matrix).magnitude()), ".2g", "°")
+    return f"by {n(before, '.2g', 'm')}, in other axes (turned by {turn}) by {n(after, '.2g', 'm')}"
+
+
+def _extents(points: Array) -> Array:
+    """Extents of points (N, 3) along their principal axes [m], decreasing."""
+    return np.asarray(np.linalg.svd(points - points.mean(axis=0), compute_uv=False))
+
+
+def _frame_mismatch(
+    log: WinchLog, left_out: Indices, asked: Collection[str], points: tuple[Array, Array]
+) -> str | None:
+    """Sentence about measured poses (rows `left_out`) that disagree with the lengths while all other readings fit.
+
+    points: expected and measured positions, each (N, 3) [m].
+    """
+    measured = np.zeros(len(log), dtype=np.bool_)
+    for read in (log.position, log.rotation):
+        if read is not None:
+            measured |= ~np.isnan(read).all(axis=1)
+    lost, count = int(np.count_nonzero(measured[left_out])), int(np.count_nonzero(measured))
+    if 2 * lost <= count:
+        return None
+    what = f"{lost} of {count} measured poses disagree with the lengths"
+    unknowns = [name for name in ("measuring_frame", "target") if name not in asked and (log.position is not None)]
+    more = " and ".join(unknowns or ["measuring_frame"] * ("measuring_frame" not in asked))
+    step = f"{f'add the unknowns {more}' if more else 'correct them'}, or write '# frame: ...' above the columns"
+    evidence = _other_axes(*points)
+    if evidence is not None:
+        return f"{what} {evidence}; {step}"
+    return f"{what}, the cause is not known; {step}, or leave the measured poses out"

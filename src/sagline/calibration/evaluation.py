@@ -1,8 +1,8 @@
-"""The result of a search: covariance, residuals, status and provenance."""
+"""The result of a search: covariance, criticism of the parameters that were not estimated, status and provenance."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Final
@@ -10,25 +10,21 @@ from typing import Final
 import numpy as np
 from scipy.special import chdtr, chdtrc
 
-from sagline.calibration.criticism import (
-    considered_covariance,
-    criticisms_of,
-    fixed_terms,
-    last_readings,
-    with_fixed_parameters,
-)
 from sagline.calibration.findings import CalibrationStatus, Criticism, CrossValidation, Omission
 from sagline.calibration.identifiability import OPEN, append_rows, gauge_of
-from sagline.calibration.least_squares import QUANTILE, exceeded_with
+from sagline.calibration.least_squares import QUANTILE, exceeded_with, whitened_at
+from sagline.calibration.observations import BLOCK, with_parameters
 from sagline.calibration.outliers import misfitting, outliers_in
-from sagline.calibration.parameters import KINDS, Parameters, Unknown, external
-from sagline.calibration.problem import FitProblem
+from sagline.calibration.parameters import KINDS, OF_CELLS, Parameters, Unknown, external, parameters_of, quantities_of
+from sagline.calibration.problem import Fit, FitProblem, reported_lengths
 from sagline.calibration.result import Calibration
-from sagline.calibration.search import SearchResult
 from sagline.calibration.weak_identifiability import weak_directions
-from sagline.core.arrays import Array, Indices, locked
+from sagline.core.arrays import Array, Flags, Indices, locked
+from sagline.core.errors import InvalidValueError
+from sagline.core.progress import blocks
 from sagline.robot.pose import Pose
-from sagline.robot.tolerances import UNCERTAIN, Provenance
+from sagline.robot.tolerances import Provenance
+from sagline.robot.winch import Winch
 
 # smallest probability of such a chi squared by chance; with a smaller probability, the result is doubtful
 DOUBTFUL: Final = 1e-4
@@ -37,37 +33,34 @@ ODD_WEIGHT: Final = 0.5  # a pose with a lower weight fits badly
 TOLERATED: Final = 1.1  # largest accepted ratio of chi squared to its expected value, because no model is exact
 HARMLESS: Final = 1.0  # standard errors: a criticism with smaller changes of all values does not make a result doubtful
 LITTLE: Final = 1e-6  # smallest component of an unobservable direction for a parameter to count as unobservable
+CHANCE: Final = 0.01  # probability that a log without errors fails a score test
 
 
 def calibration_of(
     problem: FitProblem,
     unknowns: Sequence[Unknown],
-    found: SearchResult,
+    fit: Fit,
+    kept: Flags,
     rows: Indices,
     left_out: Mapping[Omission, Indices],
     source: str,
     validation: CrossValidation | None,
 ) -> Calibration:
-    """Calibration from a search; rows: indices of the used rows of the log, (N,); left_out: omitted rows by reason."""
-    fit, kept, parameters = found.fit, found.kept, problem.parameters
-    numbers, machine, normal = fit.state.numbers, fit.state.machine, fit.normal
-    wider, count = with_fixed_parameters(problem, unknowns), len(numbers)
-    residuals, factor = last_readings(problem, wider, fit)
+    """Calibration from a fit to the poses `kept` (N,); rows: their rows of the log, (N,); left_out: omitted rows."""
+    parameters, numbers, machine, normal = problem.parameters, fit.state.numbers, fit.state.machine, fit.normal
+    wider, count = _with_fixed_parameters(problem, unknowns), len(numbers)
+    residuals, factor = _last_readings(problem, wider, fit)
     triangle = factor[:count, :count]
     values = external(parameters, numbers)
     gauge = gauge_of(triangle, parameters, values, machine.robot, machine.sensors)
     covariance, rank = covariance_of(problem, triangle, machine.slopes)
     criticisms: tuple[Criticism, ...] = ()
     if len(wider.parameters.names) > count:
-        fixed = fixed_terms(problem, wider, fit, factor)
-        covariance = covariance + considered_covariance(fixed)
-        criticisms = criticisms_of(fixed, np.sqrt(np.diagonal(covariance)))
+        considered, criticisms = _criticism(problem, wider, fit, factor, covariance)
+        covariance = covariance + considered
     whole, missed = kept & (normal.weights == 1.0), problem.missed(numbers)
-    chi_squared = float(normal.squares[whole].sum() + missed @ missed)
-    freedoms = int(normal.readings[whole].sum()) + int(np.isfinite(problem.prior_deviation).sum()) - rank
     bad = misfitting(np.where(kept, normal.squares, np.nan), normal.readings)
-    poses = fit.state.poses[kept]
-    date, errors = datetime.now(UTC).date().isoformat(), np.sqrt(np.diagonal(covariance))
+    poses, date = fit.state.poses[kept], datetime.now(UTC).date().isoformat()
     result = Calibration(
         robot=machine.robot,
         before=problem.robot,
@@ -77,10 +70,10 @@ def calibration_of(
         parameters=parameters,
         values=locked(values),
         covariance=locked(covariance),
-        chi_squared=chi_squared,
-        degrees_of_freedom=freedoms,
+        chi_squared=float(normal.squares[whole].sum() + missed @ missed),
+        degrees_of_freedom=int(normal.readings[whole].sum()) + int(np.isfinite(problem.prior_deviation).sum()) - rank,
         rows=locked(rows[kept]),
-        left_out={**left_out, **{reason: locked(rows[which]) for reason, which in found.left_out.items()}},
+        left_out=left_out,
         poses=Pose._adopt(locked(poses[:, :3].copy()), locked(poses[:, 3:].copy())),
         unstrained_length=locked(fit.state.lengths[kept]),
         residuals=locked(residuals[kept]),
@@ -96,24 +89,25 @@ def calibration_of(
         log=source,
         date=date,
     )
-    status = _status(found, result)
-    provenance = provenance_of(parameters, errors, status, source, date)
+    status = _status(fit, kept, result)
+    provenance = provenance_of(parameters, result.standard_error, status, source, date)
     return replace(result, status=status, robot=machine.robot.replace(calibration=provenance))
 
 
-def _status(found: SearchResult, result: Calibration) -> CalibrationStatus:
-    """Status of a search, from the poses of full weight, from all poses without outliers, and from the criticisms."""
-    kept, weights = found.kept, found.fit.normal.weights
-    if not found.fit.converged:
+def _status(fit: Fit, kept: Flags, result: Calibration) -> CalibrationStatus:
+    """Status of a fit, from the poses of full weight, from all poses without outliers, and from the criticisms."""
+    if not fit.converged:
         return CalibrationStatus.NOT_CONVERGED
-    readings, reduced = found.fit.normal.readings[kept & (weights == 1.0)], bool((weights[kept] < 1.0).any())
-    elsewhere = len(found.left_out.get(Omission.OTHER_EQUILIBRIUM, ()))
+    weights, elsewhere = fit.normal.weights, len(result.left_out.get(Omission.OTHER_EQUILIBRIUM, ()))
+    readings, reduced = fit.normal.readings[kept & (weights == 1.0)], bool((weights[kept] < 1.0).any())
     odd = np.count_nonzero(kept & (weights < ODD_WEIGHT)) + elsewhere
-    doubt = _is_doubtful(result.chi_squared, result.degrees_of_freedom, readings, robust=reduced)
-    doubt = doubt or _is_doubtful(*result.chi_squared_of_all, readings[:0], robust=False)
-    doubt = doubt or any(one.deviations > HARMLESS for one in result.criticisms)
-    doubt = doubt or bool(odd > ODD * (np.count_nonzero(kept) + elsewhere))
-    return CalibrationStatus.DOUBTFUL if doubt else CalibrationStatus.FOUND
+    doubtful = (
+        _is_doubtful(result.chi_squared, result.degrees_of_freedom, readings, robust=reduced)
+        or _is_doubtful(*result.chi_squared_of_all, readings[:0], robust=False)
+        or any(one.deviations > HARMLESS for one in result.criticisms)
+        or odd > ODD * (np.count_nonzero(kept) + elsewhere)
+    )
+    return CalibrationStatus.DOUBTFUL if doubtful else CalibrationStatus.FOUND
 
 
 def covariance_of(problem: FitProblem, triangle: Array, slopes: Array) -> tuple[Array, int]:
@@ -149,12 +143,101 @@ def provenance_of(
     parameters: Parameters, standard_error: Array, status: CalibrationStatus, log: str, date: str
 ) -> Provenance:
     """Provenance of the values of a calibrated robot, each with its standard error (P,); date in ISO 8601."""
-    errors: dict[str, Array] = {}
-    for name in dict.fromkeys(parameters.names):
-        if name not in UNCERTAIN or (name == "length_zero" and not parameters.counted):
+    note = "" if status is CalibrationStatus.FOUND else status.text
+    return Provenance(log, date, quantities_of(parameters, standard_error), note)
+
+
+def _with_fixed_parameters(problem: FitProblem, unknowns: Sequence[Unknown]) -> FitProblem:
+    """Problem with all observable parameters; the parameters that were not estimated are the last ones.
+
+    These are the kinds that the robot has and the readings observe, with one value per cable.
+    """
+    robot = problem.robot if problem.robot.winches is not None else problem.robot.replace(winches=Winch())
+    every, sensors, counted = list(unknowns), problem.sensors, problem.parameters.counted
+    for name, kind in KINDS.items():
+        if name in problem.parameters.names:
             continue
-        first, axes = KINDS[name].first, len(KINDS[name].axes)
-        error = standard_error[np.asarray(parameters.where[first : first + axes], dtype=np.int64)].T
-        own = error if UNCERTAIN[name].each else error[0]
-        errors[name] = own if UNCERTAIN[name].axes else own[..., 0]
-    return Provenance(log, date, errors, "" if status is CalibrationStatus.FOUND else status.text)
+        other = Unknown(name, shared=False if kind.each else None)
+        try:
+            parameters = parameters_of(robot, [other], sensors, counted=counted)
+        except InvalidValueError:
+            continue
+        if not (parameters.logarithmic & (parameters.prior <= 0.0)).any() and (parameters.prior_deviation > 0.0).all():
+            every.append(other)
+    return problem._replace(robot=robot, parameters=parameters_of(robot, every, sensors, counted=counted))
+
+
+def _last_readings(problem: FitProblem, wider: FitProblem, fit: Fit) -> tuple[Array, Array]:
+    """Residuals and triangular factor at the end of a fit; wider: problem with fixed parameters.
+
+    The residuals have the shape (N, 2 m + 6) [m, N, m, rad]; they are NaN if missing. The columns of the factor are the
+    weighted whitened slopes by all P + F parameters, and the misfit: (at most P + F + 1, P + F + 1).
+    """
+    fitted = fit.state
+    machine = with_parameters(fitted.machine, wider.parameters)
+    numbers = np.concatenate((fitted.numbers, wider.prior[len(fitted.numbers) :]))
+    state, residuals = fitted._replace(numbers=numbers, machine=machine), []
+    triangle = np.zeros((0, numbers.size + 1))
+    for part in blocks(len(state.poses), BLOCK):
+        reported = reported_lengths(problem, machine, part)
+        rows = whitened_at(wider, state, reported, part, free_of_noise=True)
+        residuals.append(np.hstack((reported - state.lengths[part], rows.residual)))
+        columns = np.concatenate((rows.matrix, rows.misfit[..., None]), axis=-1)
+        triangle = append_rows(triangle, columns * np.sqrt(fit.normal.weights[part])[:, None, None])
+    return np.concatenate(residuals), triangle
+
+
+def _criticism(
+    problem: FitProblem, wider: FitProblem, fit: Fit, triangle: Array, covariance: Array
+) -> tuple[Array, tuple[Criticism, ...]]:
+    """Covariance (P, P) due to the stated tolerances of fixed parameters (Schmidt), and the contradicted parameters.
+
+    The readings contradict fixed parameters if their estimation would reduce chi squared more than by chance. The test
+    is the score test with the priors of the fixed parameters. A kind is tested with a value for each cable, and with a
+    common value. Kinds of load cells are also tested for single cables. The test with the best information criterion
+    (AIC) is kept. The largest reduction comes first. triangle: factor of `_last_readings`; covariance: of the estimated
+    parameters.
+    """
+    count, parameters = len(problem.parameters.names), wider.parameters
+    priors = np.zeros((count, triangle.shape[1]))
+    priors[:, :count] = problem.prior_root
+    priors[:, -1] = -problem.missed(fit.state.numbers)
+    whole, scale = np.vstack((triangle, priors)), problem.scale
+    left, sizes, right = np.linalg.svd(whole[:, :count] * scale, full_matrices=False)
+    seen = sizes > OPEN * sizes[0]
+    left, known_part = left[:, seen], left[:, seen].T @ whole[:, count:]
+    rest = whole[:, count:] - left @ known_part  # without the part that a step of the estimated parameters reproduces
+    steps = scale[:, None] * (right[seen].T / sizes[seen] @ known_part[:, :-1])
+    shifts = -fit.state.machine.slopes[:, None] * steps  # change of the P values by the internal fixed parameters
+    stated, deviation = np.flatnonzero(parameters.stated[count:]), wider.prior_deviation[count:]
+    effect = shifts[:, stated] * deviation[stated]
+    considered = np.asarray(effect @ effect.T)
+    standard_error = np.sqrt(np.diagonal(covariance + considered))
+    groups, best = list(_groups(parameters, count)), dict[str, tuple[float, Criticism]]()
+    for kind, name, which, common in groups:
+        columns = np.ones((which.size, 1)) if common else np.eye(which.size)
+        slopes, prior = rest[:, which] @ columns, deviation[which][: columns.shape[1]]
+        score = slopes.T @ rest[:, -1]
+        step = np.linalg.solve(slopes.T @ slopes + np.diag(1.0 / prior**2), score)
+        fall = max(float(score @ step), 0.0)
+        chance, worth = float(chdtrc(step.size, fall)), fall - 2.0 * step.size
+        if chance < CHANCE / len(groups) and (kind not in best or worth > best[kind][0]):
+            shift = shifts[:, which] @ columns @ step
+            moved = np.divide(np.abs(shift), standard_error, out=np.zeros(count), where=standard_error > 0.0)
+            most = int(np.argmax(moved))
+            label = parameters.labels[most]
+            best[kind] = worth, Criticism(name, kind, fall, chance, label, float(shift[most]), float(moved[most]))
+    return considered, tuple(one for _, one in sorted(best.values(), key=lambda pair: -pair[0]))
+
+
+def _groups(parameters: Parameters, first: int) -> Iterator[tuple[str, str, Indices, bool]]:
+    """Kind, name and indices of each group of fixed parameters; True if they have one value."""
+    names, cables = np.array(parameters.names[first:]), parameters.cables[first:]
+    for name in dict.fromkeys(names.tolist()):
+        which = np.flatnonzero(names == name)
+        yield name, name, which, False
+        if KINDS[name].each and len(KINDS[name].axes) == 1:
+            yield name, f"{name} common to all cables", which, True
+        if name in OF_CELLS:  # also tested for single cables
+            for k in which:
+                yield name, f"{name}[{cables[k]}]", np.array([k]), False

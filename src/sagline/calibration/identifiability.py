@@ -1,41 +1,30 @@
-"""Unobservable directions of the parameters: combinations that change no reading, each with its name."""
+"""Unobservable directions of the parameters: combinations that change no reading, each with its name.
+
+Some of them are symmetries. The origins of the world and of the platform frame, the meter and the newton are
+conventions. Another convention changes parameters, but no reading. See docs/model.md, section 14.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import Final, NamedTuple
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from sagline.calibration.findings import Direction
 from sagline.calibration.log import Sensors
-from sagline.calibration.parameters import KINDS, Parameters
-from sagline.calibration.symmetries import Generator, Symmetries, symmetries
-from sagline.core.arrays import Array, Indices, locked
+from sagline.calibration.parameters import Parameters, PriorUnits, left_jacobian, prior_units
+from sagline.core.arrays import Array, Flags, Indices, locked
+from sagline.core.errors import InvalidValueError
 from sagline.kernels.calibration import kinds
+from sagline.robot.drum import drums_of
 from sagline.robot.robot import Robot
 
 OPEN: Final = 1e-12  # rounding error of slopes that cancel, relative to the largest singular value
 _SPREAD: Final = 1e-9  # a direction with a larger singular value, relative to the largest, is always observable
-_FIXED: Final = 5e-2  # a parameter counts as known if its stated deviation, relative to the usual deviation, is smaller
-_WIDE: Final = 1e3  # largest prior deviation, relative to the usual deviation of an unknown value
 _SAME: Final = 1e-6  # two directions count as equal below this sine of the angle between them
 _TINY: Final = 1e-300
 _NAMED: Final = 3  # number of parameters in the text of a direction that is not a symmetry
-
-
-class PriorUnits(NamedTuple):
-    """Unknowns in standard deviations of their priors.
-
-    Attributes:
-        scale: One standard deviation in the internal parameters, (P,).
-        units: One standard deviation in the units of the parameters, (P,).
-        free: Indices of the parameters that do not count as known.
-    """
-
-    scale: Array
-    units: Array
-    free: Indices
 
 
 def append_rows(triangle: Array, matrix: Array) -> Array:
@@ -46,21 +35,6 @@ def append_rows(triangle: Array, matrix: Array) -> Array:
     rows = matrix.reshape(-1, matrix.shape[-1])
     rows = rows[~np.isnan(rows).any(axis=1) & rows.any(axis=1)]
     return np.asarray(np.linalg.qr(np.vstack((triangle, rows)), mode="r"))
-
-
-def prior_units(parameters: Parameters) -> PriorUnits:
-    """Units of the directions: prior deviations, or the usual deviation of an unknown value if there is no prior.
-
-    A larger prior deviation is reduced to `_WIDE`, because rounding would otherwise hide the other parameters.
-    """
-    usual = np.array([KINDS[name].assumed for name in parameters.names])
-    usual = np.where(parameters.logarithmic, usual * np.abs(parameters.prior), usual)
-    units = np.where(np.isfinite(parameters.prior_deviation), parameters.prior_deviation, usual)
-    units = np.minimum(units, _WIDE * usual)
-    scale = units / np.where(parameters.logarithmic, np.abs(parameters.prior), 1.0)
-    common = np.array([KINDS[name].deviation for name in parameters.names])
-    fixed = parameters.stated & (scale < _FIXED * common)
-    return PriorUnits(scale, units, np.flatnonzero(~fixed).astype(np.int64))
 
 
 def _open_directions(triangle: Array, frame: PriorUnits) -> Array:
@@ -115,7 +89,7 @@ def gauge_of(
 
 def _rotation_of_frame(parameters: Parameters, values: Array) -> Array:
     """Rotation vector of the measuring system, if it is estimated [rad], (3,); zero if it is known."""
-    where = parameters.where[kinds.TURN : kinds.TURN + 3, 0]
+    where = parameters.where[_TURN, 0]
     return np.where(where >= 0, values[where], 0.0)
 
 
@@ -238,3 +212,130 @@ def measurement_rank(name: str) -> int:
 def easiest_measurement(names: Iterable[str]) -> str:
     """Easiest measurement that separates parameters of some kinds."""
     return STEPS[min(names, key=measurement_rank)]
+
+
+_FRAME, _PLATFORM, _CENTER, _SHIFT, _TURN, _TARGET = (
+    slice(first, first + 3)
+    for first in (kinds.FRAME, kinds.PLATFORM, kinds.CENTER, kinds.SHIFT, kinds.TURN, kinds.TARGET)
+)
+_WORLD: Final = "fix a frame anchor, or measure 3 points"
+_YAW: Final = "fix a second frame anchor, or measure 3 points"
+_TILT: Final = "give a platform anchor a small tolerance, or measure rotations"
+_ORIGIN: Final = (
+    "give a platform anchor or the center of mass a small tolerance, or measure positions of a known target"
+)
+_BOTH: Final = "measure the platform's anchors"
+_SCALE: Final = "weigh some meters of the cable, measure a distance between anchors, or measure the drum"
+_FORCE: Final = "weigh the platform, or check a load cell with a known weight"
+
+
+class Generator(NamedTuple):
+    """A change of the parameters that changes no reading, if all parameters are unknowns.
+
+    Attributes:
+        name: Name of the quantity.
+        step: Measurement that fixes the quantity.
+        change: Change of every row of `kernels.calibration.kinds`, (KIND_ROWS, m); relative where the logarithm is
+            estimated.
+        lengths: Relative change of the lengths off the drums.
+    """
+
+    name: str
+    step: str
+    change: Array
+    lengths: float = 0.0
+
+
+class Symmetries(NamedTuple):
+    """The g symmetries of a robot, including changes of the zeros and radii of its drums.
+
+    Attributes:
+        each: Symmetries with a name; the columns of the drums follow after these.
+        table: Change of every row of `kinds`, (KIND_ROWS, m, g).
+        lengths: Lengths that the drums pay out minus required lengths, (2 m, g); a combination must make them zero.
+        matters: True for parameters that a symmetry must not change if they are known, (KIND_ROWS, m).
+    """
+
+    each: tuple[Generator, ...]
+    table: Array
+    lengths: Array
+    matters: Flags
+
+
+def _generators(robot: Robot, sensors: Sensors, turn: Array) -> Iterator[Generator]:
+    """Symmetries with a name; turn: rotation vector of the measuring system [rad], (3,)."""
+    m, winches, center, place = robot.cable_count, robot.winches, robot.center_of_mass, sensors.frame.position
+
+    def generator(name: str, step: str, *changes: tuple[Any, Array | float], lengths: float = 0.0) -> Generator:
+        change = np.zeros((kinds.KIND_ROWS, m))
+        for rows, values in changes:
+            change[rows] = values
+        return Generator(name, step, change, lengths)
+
+    # the cables become lighter per meter, so that forces do not change
+    scaled = [(_FRAME, robot.frame_anchors.T), (_PLATFORM, robot.platform_anchors.T), (kinds.DENSITY, -1.0)]
+    if winches is not None:
+        scaled += [(kinds.RADIUS, winches.pulley_radius), (kinds.DEAD, winches.dead_cable)]
+    scaled += [(_CENTER, center[:, None]), (_SHIFT, place[:, None]), (_TARGET, sensors.target[:, None])]
+    yield generator("the scale: a larger robot with lighter cables", _SCALE, *scaled, lengths=1.0)
+    gain = 1.0 if winches is None else winches.load_cell_gain
+    forces = ([kinds.DENSITY, kinds.STIFFNESS, kinds.MASS], 1.0)
+    yield generator("larger forces, and load cells with a smaller gain", _FORCE, forces, (kinds.GAIN, -gain))
+    up = np.array([0.0, 0.0, 1.0])
+    moved = [(_FRAME, np.cross(up, robot.frame_anchors).T), (_SHIFT, np.cross(up, place)[:, None])]
+    turned = np.linalg.solve(left_jacobian(turn), up)[:, None]
+    yield generator("the world turned about the vertical", _YAW, *moved, (_TURN, turned))
+    for axis, unit in zip("xyz", np.eye(3), strict=True):  # about the center of mass
+        anchors, target = np.cross(unit, robot.platform_anchors - center).T, np.cross(unit, sensors.target - center)
+        changes = ((_PLATFORM, anchors), (_TARGET, target[:, None]))
+        yield generator(f"the platform's frame turned about its {axis}", _TILT, *changes)
+    if robot.freedom[:, 3:].any():
+        for k, axis in enumerate("xyz"):
+            rows = [kinds.PLATFORM + k, kinds.CENTER + k, kinds.TARGET + k]
+            yield generator(f"the platform's frame shifted along its {axis}", _ORIGIN, (rows, 1.0))
+    else:
+        for cable in range(m):
+            for k, axis in enumerate("xyz"):
+                ends = ([kinds.FRAME + k, kinds.PLATFORM + k], cable)
+                yield generator(f"both anchors of cable {cable} shifted along {axis}", _BOTH, (ends, 1.0))
+    for k, axis in enumerate("xyz"):
+        yield generator(f"the world shifted along {axis}", _WORLD, ([kinds.FRAME + k, kinds.SHIFT + k], 1.0))
+
+
+def symmetries(robot: Robot, sensors: Sensors, turn: Array, *, counted: bool) -> Symmetries:
+    """Symmetries of a robot and its sensors; turn: rotation vector of the measuring system [rad], (3,)."""
+    m, each = robot.cable_count, tuple(_generators(robot, sensors, turn))
+    drums = np.zeros((kinds.KIND_ROWS, m, 2 * m))
+    drums[kinds.ZERO, np.arange(m), np.arange(m)] = 1.0
+    drums[kinds.DRUM, np.arange(m), m + np.arange(m)] = 1.0
+    table = np.concatenate((np.stack([one.change for one in each], axis=-1), drums), axis=-1)
+    asked = np.concatenate(([one.lengths for one in each], np.zeros(2 * m)))
+    shift, share = (np.einsum("rm,rmg->mg", term, table) for term in _length_terms(robot, counted))
+    matters = np.ones((kinds.KIND_ROWS, m), dtype=np.bool_)
+    matters[kinds.PER_CABLE :, 1:] = False
+    # measuring system and target may change, because a few measured points do not determine them
+    matters[kinds.SHIFT :] = False
+    if sensors.tension_deviation is None:
+        matters[[kinds.GAIN, kinds.BIAS]] = False
+    if not robot.freedom[:, 3:].any():  # without rotations, the center of mass has no effect
+        matters[_CENTER] = False
+    return Symmetries(each, table, np.concatenate((shift, share - asked)), matters)
+
+
+def _length_terms(robot: Robot, counted: bool) -> tuple[Array, Array]:
+    """Derivatives a + b L of the length L off each drum, by each row of `kinds`: a [m] and b, (KIND_ROWS, m)."""
+    shift, share = np.zeros((2, kinds.KIND_ROWS, robot.cable_count))
+    if not counted:
+        shift[kinds.ZERO] = 1.0
+        return shift, share
+    drums = drums_of(robot)
+    stretch, zero = 1.0 + drums.rest_strain, drums.winches.length_zero
+    radius, diameter, pitch = drums.winches.drum_radius, robot.cables.diameter, drums.winches.groove_pitch
+    if zero is None or radius is None or diameter is None or pitch is None:  # counts need these data
+        raise InvalidValueError("robot", "without counts", "with drums and their zeros", "Give them in the robot file.")
+    circle = (2.0 * np.pi * (radius + 0.5 * diameter)) ** 2
+    by_radius = circle / (circle + pitch**2) * radius / (radius + 0.5 * diameter)  # by the log of the radius
+    shift[kinds.ZERO] = 1.0 / stretch
+    shift[kinds.DRUM], share[kinds.DRUM] = -by_radius * zero / stretch, by_radius
+    share[kinds.STIFFNESS] = drums.rest_strain / stretch
+    return shift, share

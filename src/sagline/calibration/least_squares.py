@@ -68,19 +68,19 @@ def whitened_at(
     at the true lengths. At the reported lengths, the scale of all lengths would seem observable, because it also scales
     the noise.
     """
-    log, parameters, machine = problem.log, problem.parameters, state.machine
+    log, machine = problem.log, state.machine
     counts, along = (None if log.counts is None else log.counts[part]), reported
     if free_of_noise and machine.drums is not None:
         along = state.lengths[part]
         counts = counts_at(machine.drums, along)
-    slopes = winch_slopes(machine.robot, parameters, counts, along)
+    slopes = winch_slopes(machine.robot, problem.parameters, counts, along)
     readings = PoseReadings(reported, log.cells[part], log.positions[part], log.rotations[part])
-    turning = parameters.where[kinds.TURN : kinds.TURN + 3, 0]
+    turning = problem.parameters.where[kinds.TURN : kinds.TURN + 3, 0]
     turn = left_jacobian(state.numbers[turning]) if turning[0] >= 0 else None
     if direction is not None and turn is not None:
         direction = direction.copy()
         direction[turning] = turn @ direction[turning]
-    rows = whitened_rows(machine, parameters, readings, slopes, state.poses[part], state.lengths[part], direction)
+    rows = whitened_rows(machine, readings, slopes, state.poses[part], state.lengths[part], direction)
     if direction is None and turn is not None:
         rows.matrix[..., turning] = rows.matrix[..., turning] @ turn
     return rows

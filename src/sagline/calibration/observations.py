@@ -9,7 +9,7 @@ import numpy as np
 from sagline.cables.cable import Cable
 from sagline.cables.model import CableModel
 from sagline.calibration.log import Sensors, load_cells_of
-from sagline.calibration.parameters import Parameters, Unknown, parameters_of, slopes_of_values
+from sagline.calibration.parameters import Parameters, slopes_of_values
 from sagline.core.arrays import Array, kernel_input, locked
 from sagline.core.progress import blocks
 from sagline.kernels.calibration import kinds
@@ -129,6 +129,8 @@ class MachineTerms(NamedTuple):
     """A robot with parameter values and its sensors, in the form of the kernel.
 
     Attributes:
+        model: Cable model.
+        parameters: The parameters.
         robot: The robot with the parameter values.
         sensors: The sensors.
         offset: Offset of reported lengths [m], (m,).
@@ -140,6 +142,8 @@ class MachineTerms(NamedTuple):
         slopes: Derivatives of the values by the internal parameters, (P,).
     """
 
+    model: CableModel
+    parameters: Parameters
     robot: Robot
     sensors: Sensors
     offset: Array
@@ -156,6 +160,8 @@ def machine_of(
 ) -> MachineTerms:
     """A robot and its sensors in the form of the kernel; raises an error if drum data for counts are missing."""
     machine = MachineTerms(
+        model,
+        parameters,
         robot,
         sensors,
         offset,
@@ -166,19 +172,18 @@ def machine_of(
         _sensor_arrays(robot, sensors),
         np.zeros(0),
     )
-    return with_slopes(machine, parameters)
+    return with_parameters(machine, parameters)
 
 
-def with_slopes(machine: MachineTerms, parameters: Parameters) -> MachineTerms:
+def with_parameters(machine: MachineTerms, parameters: Parameters) -> MachineTerms:
     """The same machine for other parameters; unknown pulleys and dead lengths need routing, even with zero values."""
     routed = machine.terms[-1] or bool((parameters.where[[kinds.RADIUS, kinds.DEAD]] >= 0).any())
     terms = (*machine.terms[:-1], routed or None)
-    return machine._replace(terms=terms, slopes=slopes_of_values(machine.robot, parameters))
+    return machine._replace(parameters=parameters, terms=terms, slopes=slopes_of_values(machine.robot, parameters))
 
 
 def whitened_rows(
     machine: MachineTerms,
-    parameters: Parameters,
     readings: PoseReadings,
     slopes: Array,
     poses: Array,
@@ -191,13 +196,12 @@ def whitened_rows(
     along it are computed, and P is 1 in the result.
     """
     count, m = lengths.shape
-    factor, width = machine.slopes, len(parameters.names)
+    parameters, factor, width = machine.parameters, machine.slopes, len(machine.slopes)
     where = locked(np.ascontiguousarray(parameters.where).view())
     if direction is not None:
         factor, width = factor * direction, 1
         where = locked(np.minimum(where, 0))
-    given = machine.sensors
-    measured = given.position_deviation is not None or given.rotation_deviation is not None
+    measured = machine.sensors.position_deviation is not None or machine.sensors.rotation_deviation is not None
     rows = m + BESIDE if measured else m
     found = WhitenedRows(
         np.empty((count, rows, width)),
@@ -210,12 +214,7 @@ def whitened_rows(
         machine.terms,
         (machine.robot.freedom, machine.body, machine.cables, _locked_view(lengths), _locked_view(poses), NO_LOAD),
         machine.sensing,
-        (
-            _locked_view(readings.lengths),
-            _locked_view(readings.cells),
-            _locked_view(readings.positions),
-            _locked_view(readings.rotations),
-        ),
+        tuple(map(_locked_view, readings)),
         (where, locked(np.where(parameters.where >= 0, factor[parameters.where], 0.0)), _locked_view(slopes)),
         memory_for(m),
         (*found, np.empty((rows + 6, width))),
@@ -232,16 +231,16 @@ def predicted_rows(
     slopes, count = winch_slopes(robot, parameters, counts, lengths), len(lengths)
     aligned = np.tile([0.0, 0.0, 0.0, 1.0], (count, 1))
     readings = PoseReadings(lengths, np.zeros(lengths.shape), np.zeros((count, 3)), aligned)
-    rows = whitened_rows(machine, parameters, readings, slopes, poses, lengths)
+    rows = whitened_rows(machine, readings, slopes, poses, lengths)
     return rows._replace(misfit=np.where(np.isnan(rows.misfit), np.nan, 0.0))
 
 
-_EXACT: Final = 1e-10  # [m], deviation of lengths; it is too small to have an effect on the whitening
+EXACT: Final = 1e-10  # [m], deviation of lengths; it is too small to have an effect on the whitening
 
 
-def _unit_sensors(sensors: Sensors) -> Sensors:
+def unit_sensors(sensors: Sensors) -> Sensors:
     """Sensors for all readings, each with a standard deviation of 1 in SI units, and with exact lengths."""
-    return Sensors(_EXACT, 1.0, 1.0, 1.0, frame=sensors.frame, target=sensors.target)
+    return Sensors(EXACT, 1.0, 1.0, 1.0, frame=sensors.frame, target=sensors.target)
 
 
 def unwhitened_slopes(
@@ -251,35 +250,7 @@ def unwhitened_slopes(
     count, m = lengths.shape
     by_values, by_length = np.empty((count, m + 6, len(parameters.names))), np.empty((count, m + 6, m))
     for part in blocks(count, BLOCK):
-        rows = predicted_rows(robot, model, parameters, _unit_sensors(sensors), poses[part], lengths[part])
+        rows = predicted_rows(robot, model, parameters, unit_sensors(sensors), poses[part], lengths[part])
         by_values[part] = rows.matrix / slopes_of_values(robot, parameters)
-        by_length[part] = np.swapaxes(rows.back, 1, 2) / _EXACT**2
+        by_length[part] = np.swapaxes(rows.back, 1, 2) / EXACT**2
     return by_values, by_length
-
-
-class Reference(NamedTuple):
-    """A robot and its sensors in SI units, for comparison with readings.
-
-    Attributes:
-        model: Cable model.
-        machine: The robot with its sensors, in the form of the kernel.
-        parameters: Parameters that the kernel requires; their slopes are not used.
-    """
-
-    model: CableModel
-    machine: MachineTerms
-    parameters: Parameters
-
-
-def reference_of(robot: Robot, model: CableModel, sensors: Sensors) -> Reference:
-    """A robot and its sensors, for comparison with readings."""
-    exact = _unit_sensors(sensors)
-    parameters = parameters_of(robot, (Unknown("mass", deviation=1.0),), exact, counted=False)
-    return Reference(model, machine_of(robot, model, parameters, exact, np.zeros(robot.cable_count)), parameters)
-
-
-def misfit_at(reference: Reference, readings: PoseReadings, pose: Array, lengths: Array) -> tuple[Array, Array]:
-    """Residuals at one equilibrium [N, m, rad], (m + 6,), NaN if missing; slopes by length (m + 6, m)."""
-    slopes = np.zeros((SLOPES, 1, lengths.shape[1]))
-    rows = whitened_rows(reference.machine, reference.parameters, readings, slopes, pose, lengths)
-    return rows.residual[0], rows.back[0].T / _EXACT**2

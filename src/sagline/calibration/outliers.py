@@ -9,10 +9,19 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.special import chdtrc, gammaln
 
-from sagline.calibration.findings import Outlier
+from sagline.calibration.findings import QUANTITIES, Outlier
 from sagline.calibration.least_squares import exceeded_with
 from sagline.calibration.log import reading_deviations
-from sagline.calibration.observations import NO_LOAD, Reference, misfit_at, reference_of
+from sagline.calibration.observations import (
+    EXACT,
+    NO_LOAD,
+    SLOPES,
+    MachineTerms,
+    machine_of,
+    unit_sensors,
+    whitened_rows,
+)
+from sagline.calibration.parameters import Unknown, parameters_of
 from sagline.calibration.problem import FitProblem, SearchState, reported_lengths
 from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.kernels.calibration.terms import PoseReadings
@@ -27,7 +36,6 @@ _WORTH: Final = 20.0  # an explanation is not computed exactly if its linear log
 _NONLINEAR: Final = 0.6  # ratio of squares after and before a linear fit below which large errors are fitted exactly
 _DROP: Final = 500.0  # quantile of chi squared
 _ITERATIONS: Final = 10
-_QUANTITIES: Final = ("length", "load cell", "position", "rotation")
 _TOLERANCE: Final = 1e-3  # relative tolerance of the sum of squares
 _HALVINGS: Final = 6
 
@@ -64,7 +72,7 @@ class _Case(NamedTuple):
     """One pose of the log.
 
     Attributes:
-        reference: The robot and its sensors.
+        machine: The robot with sensors in SI units.
         deviation: Standard deviations of lengths and readings, (2 m + 6,).
         readings: Readings at the pose, one row.
         pose: Pose row, (1, POSE_COLUMNS).
@@ -72,7 +80,7 @@ class _Case(NamedTuple):
         read: Flags of the available readings, (m + 6,).
     """
 
-    reference: Reference
+    machine: MachineTerms
     deviation: Array
     readings: PoseReadings
     pose: Array
@@ -81,8 +89,10 @@ class _Case(NamedTuple):
 
     def misses(self) -> tuple[Array, Array]:
         """Reported minus true lengths, and readings minus predictions, (2 m + 6,); slopes by length, (m + 6, m)."""
-        residual, by_length = misfit_at(self.reference, self.readings, self.pose, self.lengths)
-        return np.concatenate((self.readings.lengths[0] - self.lengths[0], residual)), by_length
+        slopes = np.zeros((SLOPES, 1, self.lengths.shape[1]))
+        rows = whitened_rows(self.machine, self.readings, slopes, self.pose, self.lengths)
+        off = np.concatenate((self.readings.lengths[0] - self.lengths[0], rows.residual[0]))
+        return off, rows.back[0].T / EXACT**2
 
 
 def _fit_suspects(case: _Case, taken: Sequence[_Suspect], iterations: int) -> _SuspectFit:
@@ -100,11 +110,6 @@ def _fit_suspects(case: _Case, taken: Sequence[_Suspect], iterations: int) -> _S
         if before - squares < _TOLERANCE:
             break
     return fit if iterations == 1 else fit._replace(squares=squares)
-
-
-def _squares(case: _Case, counts: Flags) -> float:
-    """Sum of squares of all terms except the terms of the suspects."""
-    return float(np.sum((case.misses()[0] / case.deviation)[counts] ** 2))
 
 
 def _linear_fit(
@@ -136,17 +141,15 @@ def _linear_fit(
 
 def _improved(case: _Case, counts: Flags, wanted: Array, squares: float) -> _Case | None:
     """Case with a smaller sum of squares, at lengths between the present lengths and `target`; None if not found."""
-    reference = case.reference
+    robot, model = case.machine.robot, case.machine.model
     for halving in range(_HALVINGS):
         lengths = case.lengths + 0.5**halving * (wanted - case.lengths)
         if (lengths <= 0.0).any():
             continue
-        found = solve_forward_rows(
-            reference.machine.robot, reference.model, locked(lengths), locked(case.pose.copy()), NO_LOAD
-        )
+        found = solve_forward_rows(robot, model, locked(lengths), locked(case.pose.copy()), NO_LOAD)
         if found.stable[0]:
             new = case._replace(pose=found.poses, lengths=lengths)
-            if _squares(new, counts) < squares:
+            if np.sum((new.misses()[0] / new.deviation)[counts] ** 2) < squares:
                 return new
     return None
 
@@ -171,12 +174,14 @@ def outliers_in(
     reported = reported_lengths(problem, machine, slice(None))
     deviation = reading_deviations(machine.sensors, m)
     read = ~np.isnan(np.hstack((log.cells, log.positions, log.rotations[:, :3]))) & np.isfinite(deviation[m:])
-    reference = reference_of(machine.robot, problem.model, machine.sensors)
+    exact = unit_sensors(machine.sensors)
+    parameters = parameters_of(machine.robot, (Unknown("mass", deviation=1.0),), exact, counted=False)  # not used
+    exactly = machine_of(machine.robot, problem.model, parameters, exact, np.zeros(m))
     found: list[Outlier] = []
     for k, row in zip(which.tolist(), rows.tolist(), strict=True):
         one = slice(k, k + 1)
         readings = PoseReadings(reported[one], log.cells[one], log.positions[one], log.rotations[one])
-        case = _Case(reference, deviation, readings, state.poses[one], state.lengths[one], read[k])
+        case = _Case(exactly, deviation, readings, state.poses[one], state.lengths[one], read[k])
         found += _outliers_at(case, row, count)
     return tuple(found)
 
@@ -251,5 +256,5 @@ def _whole(case: _Case, row: int, squares: float) -> Outlier:
     shares = [float(np.nansum((off[part] / case.deviation[part]) ** 2)) for part in parts]
     worst = int(np.argmax(shares))
     return Outlier(
-        row, None, _QUANTITIES[worst], float(np.sqrt(np.nansum(off[parts[worst]] ** 2))), float(np.sqrt(squares))
+        row, None, QUANTITIES[worst], float(np.sqrt(np.nansum(off[parts[worst]] ** 2))), float(np.sqrt(squares))
     )

@@ -16,7 +16,8 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.results import Result
 from sagline.kernels.calibration import kinds
 from sagline.robot.pose import Pose
-from sagline.robot.robot import Robot
+from sagline.robot.robot import Robot, with_quantities
+from sagline.robot.tolerances import UNCERTAIN, value_of
 from sagline.robot.winch import Winch
 
 
@@ -201,18 +202,15 @@ def _value(robot: Robot, sensors: Sensors, name: str, counted: bool) -> Array:
         step = f"Add {kind.owner}: {{{name}: {begin}}} to the robot file, or leave the unknown out."
         raise InvalidValueError(f"unknown: {name}", f"no number of {robot.name}", "a number that the robot has", step)
     if kind.owner == "robot":
-        return np.asarray(value, dtype=np.float64).reshape(-1, len(kind.axes))
+        return value.reshape(-1, len(kind.axes))
     return np.broadcast_to(value, (m,))[:, None]
 
 
 def _field(robot: Robot, name: str) -> Array | None:
     """Values of a kind in a robot; None if the robot does not have them."""
-    owner = KINDS[name].owner
-    part = robot if owner == "robot" else getattr(robot, owner)
-    if part is None and name in OF_CELLS:  # load cells without winches read the tension
-        part = Winch()
-    value: Array | None = None if part is None else getattr(part, name)
-    return value
+    if robot.winches is None and name in OF_CELLS:  # load cells without winches read the tension
+        return np.asarray(getattr(Winch(), name))
+    return value_of(robot, name)
 
 
 def is_observed(kind: Kind, sensors: Sensors, counted: bool) -> bool:
@@ -305,22 +303,22 @@ def slopes_of_values(robot: Robot, parameters: Parameters) -> Array:
     return slopes
 
 
+def quantities_of(parameters: Parameters, numbers: Array) -> dict[str, Array]:
+    """Numbers of the parameters (P,) by quantity of the robot, each in the shape of the quantity."""
+    found = {}
+    for name in dict.fromkeys(parameters.names):
+        if name not in UNCERTAIN or (name == "length_zero" and not parameters.counted):
+            continue
+        kind = KINDS[name]
+        rows = numbers[parameters.where[kind.first : kind.first + len(kind.axes)]].T
+        own = rows if kind.each else rows[0]
+        found[name] = own if len(kind.axes) > 1 else own[..., 0]
+    return found
+
+
 def with_values(robot: Robot, parameters: Parameters, values: Array) -> Robot:
     """Robot with other parameter values (P,); an error if they are invalid."""
-    changes: dict[str, dict[str, Any]] = {"cables": {}, "winches": {}, "robot": {}}
-    for name in dict.fromkeys(parameters.names):
-        kind = KINDS[name]
-        if kind.owner == "system" or (name == "length_zero" and not parameters.counted):
-            continue
-        value = np.stack([values[parameters.where[kind.first + axis]] for axis in range(len(kind.axes))], axis=-1)
-        value = value if len(kind.axes) > 1 else value[:, 0]
-        changes[kind.owner][name] = value if kind.each else value[0]
-    parts = {
-        owner: (getattr(robot, owner) or Winch()).replace(**changes[owner])
-        for owner in ("cables", "winches")
-        if changes[owner]
-    }
-    return robot.replace(**parts, **changes["robot"])
+    return with_quantities(robot, quantities_of(parameters, values))
 
 
 def sensors_with(sensors: Sensors, parameters: Parameters, values: Array) -> Sensors:
@@ -357,3 +355,36 @@ def left_jacobian(vector: Array) -> Array:
     else:
         first, second = (1.0 - np.cos(angle)) / angle**2, (angle - np.sin(angle)) / angle**3
     return np.asarray(np.eye(3) + first * cross + second * cross @ cross)
+
+
+_FIXED: Final = 5e-2  # a parameter counts as known if its stated deviation, relative to the usual deviation, is smaller
+_WIDE: Final = 1e3  # largest prior deviation, relative to the usual deviation of an unknown value
+
+
+class PriorUnits(NamedTuple):
+    """Unknowns in standard deviations of their priors.
+
+    Attributes:
+        scale: One standard deviation in the internal parameters, (P,).
+        units: One standard deviation in the units of the parameters, (P,).
+        free: Indices of the parameters that do not count as known.
+    """
+
+    scale: Array
+    units: Array
+    free: Indices
+
+
+def prior_units(parameters: Parameters) -> PriorUnits:
+    """Units of the directions: prior deviations, or the usual deviation of an unknown value if there is no prior.
+
+    A larger prior deviation is reduced to `_WIDE`, because rounding would otherwise hide the other parameters.
+    """
+    usual = np.array([KINDS[name].assumed for name in parameters.names])
+    usual = np.where(parameters.logarithmic, usual * np.abs(parameters.prior), usual)
+    units = np.where(np.isfinite(parameters.prior_deviation), parameters.prior_deviation, usual)
+    units = np.minimum(units, _WIDE * usual)
+    scale = units / np.where(parameters.logarithmic, np.abs(parameters.prior), 1.0)
+    common = np.array([KINDS[name].deviation for name in parameters.names])
+    fixed = parameters.stated & (scale < _FIXED * common)
+    return PriorUnits(scale, units, np.flatnonzero(~fixed).astype(np.int64))

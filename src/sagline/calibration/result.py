@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.cables.model import CableModel
-from sagline.calibration import scatter, summary
+from sagline.calibration import findings, summary
 from sagline.calibration.findings import Findings, SensorDeviation
 from sagline.calibration.log import Sensors
 from sagline.calibration.observations import unwhitened_slopes
@@ -245,7 +245,7 @@ class Calibration(Findings, Saved):
         Returns:
             One deviation per kind of sensor, or per sensor; empty if lengths are the only readings.
         """
-        return scatter.sensor_deviations(self, per_cable=flag(per_cable, "per_cable"))
+        return findings.sensor_deviations(self, per_cable=flag(per_cable, "per_cable"))
 
     def table(self) -> str:
         """Every value with its standard error, its prior and its change, one per line."""

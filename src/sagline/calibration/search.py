@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -36,24 +35,13 @@ FEW: Final = 0.1  # largest share of poses with an error of a single cable; more
 FAR: Final = 0.03  # [m], at a larger distance from the pose by the reported lengths, a pose is another equilibrium
 
 
-class SearchResult(NamedTuple):
-    """Result of the search for all parameters.
-
-    Attributes:
-        fit: Last fit.
-        kept: Flags of the poses that are used, (N,).
-        left_out: Omitted poses, by reason.
-    """
-
-    fit: Fit
-    kept: Flags
-    left_out: Mapping[Omission, Indices]
-
-
 def search_from_priors(
     problem: FitProblem, commanded: Pose | None, *, robust: bool, progress: Progress | None = None
-) -> SearchResult:
-    """Search from the priors; a pose that converges to another equilibrium is restarted once, then omitted."""
+) -> tuple[Fit, Flags, dict[Omission, Indices]]:
+    """Search from the priors; a pose that converges to another equilibrium is restarted once, then omitted.
+
+    Returns the last fit, the flags of the used poses (N,), and the indices of the omitted poses by reason.
+    """
     state = start_of(problem, commanded)
     kept = np.ones(len(state.poses), dtype=np.bool_)
     current = evaluate_step(problem, state, None, kept)
@@ -83,7 +71,7 @@ def search_from_priors(
                 raise InvalidValueError("log", "without a pose that explains the readings", "one at least", step)
             current = evaluate_step(problem, fit.state, None, kept)
             fit = solve(problem, current, kept, robust=robust, progress=progress)
-    return SearchResult(fit, kept, left_out)
+    return fit, kept, left_out
 
 
 def _without_equilibrium(current: Evaluated) -> Flags:
@@ -127,28 +115,28 @@ def _other_equilibrium(problem: FitProblem, state: SearchState, which: Flags) ->
 
 
 def cross_validate(
-    problem: FitProblem, found: SearchResult, folds: int, *, robust: bool, progress: Progress | None = None
+    problem: FitProblem, found: Fit, kept: Flags, folds: int, *, robust: bool, progress: Progress | None = None
 ) -> CrossValidation | None:
     """Cross-validation: calibrate without each part of the poses, and predict the part's readings from its lengths.
 
     Parts consist of consecutive poses, so that rows of one pose with different tensions are in the same part. The
     result is None for fewer than two poses.
     """
-    places = np.flatnonzero(found.kept)
+    places = np.flatnonzero(kept)
     folds = min(folds, len(places))
     if folds < 2:
         return None
     now, before = np.zeros((2, 4))
     nominal = machine_at(problem, problem.prior)
     for part in np.array_split(places, folds):
-        left = np.zeros(len(found.kept), dtype=np.bool_)
+        left = np.zeros(len(kept), dtype=np.bool_)
         left[part] = True
-        rest = found.kept & ~left
-        current = evaluate_step(problem, found.fit.state, None, rest, progress=progress)
+        rest = kept & ~left
+        current = evaluate_step(problem, found.state, None, rest, progress=progress)
         fit = solve(problem, current, rest, robust=robust, progress=progress)
         whole = slice(int(part[0]), int(part[-1]) + 1)
-        now += _prediction_errors(problem, fit.state.machine, found.fit.state.poses, left, whole)
-        before += _prediction_errors(problem, nominal, found.fit.state.poses, left, whole)
+        now += _prediction_errors(problem, fit.state.machine, found.state.poses, left, whole)
+        before += _prediction_errors(problem, nominal, found.state.poses, left, whole)
     tension, position = _root_mean_squares(now)
     tension_before, position_before = _root_mean_squares(before)
     if (problem.parameters.where[kinds.SHIFT : kinds.TARGET + 3, 0] >= 0).any():

@@ -9,10 +9,9 @@ from typing import Final, Literal
 import numpy as np
 from scipy.special import bdtrc
 
-from sagline.calibration.findings import CalibrationStatus, Direction, Findings, Outlier
+from sagline.calibration.findings import CalibrationStatus, Direction, Findings, Outlier, sensor_deviations
 from sagline.calibration.identifiability import easiest_measurement
 from sagline.calibration.parameters import KINDS, Parameters, internal, is_observed, prior_root
-from sagline.calibration.scatter import sensor_deviations
 from sagline.core.arrays import Array, Indices
 from sagline.core.numbers import SPACE, counted, n, plus_minus
 

@@ -9,8 +9,8 @@ from typing import Final
 import numpy as np
 
 from sagline.calibration.findings import Direction
-from sagline.calibration.identifiability import PriorUnits, easiest_measurement, measurement_rank, prior_units
-from sagline.calibration.parameters import Parameters
+from sagline.calibration.identifiability import easiest_measurement, measurement_rank
+from sagline.calibration.parameters import Parameters, PriorUnits, prior_units
 from sagline.core.arrays import Array, Flags, Indices, locked
 
 LITTLE: Final = 0.5  # the readings are not informative if more than this share of the prior deviation remains

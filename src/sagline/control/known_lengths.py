@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -16,8 +16,8 @@ from sagline.kinematics.home import home
 from sagline.robot.drum import drum_lever
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
-from sagline.robot.robot import Robot
-from sagline.robot.tolerances import UNCERTAIN
+from sagline.robot.robot import Robot, with_quantities
+from sagline.robot.tolerances import UNCERTAIN, value_of
 from sagline.robot.winch import Winch
 
 _SHARE: Final = 1e-3  # step of the numerical derivatives, in standard deviations
@@ -88,12 +88,8 @@ def _standard_errors(robot: Robot) -> dict[str, Array]:
 
 def _varied(robot: Robot, name: str, change: Array) -> Robot:
     """Copy of the robot in which `change` is added to the quantity `name`."""
-    owner, _, field = UNCERTAIN[name].place.rpartition(".")
-    part: Any = getattr(robot, owner) if owner else robot
-    if getattr(part, field) is None:
-        return robot
-    new: Any = part.replace(**{field: getattr(part, field) + change})
-    return robot.replace(**{owner: new}) if owner else new
+    value = value_of(robot, name)
+    return robot if value is None else with_quantities(robot, {name: value + change})
 
 
 def place_of(robot: Robot, length: Array, stated: Pose, model: CableModel) -> str:

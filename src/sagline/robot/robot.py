@@ -19,7 +19,7 @@ from sagline.core.results import Shown, set_fields
 from sagline.robot import checks
 from sagline.robot.pattern import MOTION_PATTERNS, MotionPattern, freedom_matrix
 from sagline.robot.pose import PoseBox
-from sagline.robot.tolerances import Provenance, deviations, value_of
+from sagline.robot.tolerances import UNCERTAIN, Provenance, deviations, value_of
 from sagline.robot.winch import Winch
 
 TensionLimitsOf = Literal["chord", "frame_end"]
@@ -219,6 +219,17 @@ class Robot(Shown):
         return evolve(self, calibration=evolve(self.calibration, standard_error=same))
 
     __reduce__ = reduced
+
+
+def with_quantities(robot: Robot, values: Mapping[str, Array]) -> Robot:
+    """Robot with other values of some quantities of `UNCERTAIN`; winches are added if a quantity belongs to them."""
+    owned: dict[str, dict[str, Any]] = {}
+    for name, value in values.items():
+        owner, _, field = UNCERTAIN[name].place.rpartition(".")
+        owned.setdefault(owner, {})[field] = value
+    changes = owned.pop("", {})
+    parts = {owner: (getattr(robot, owner) or Winch()).replace(**own) for owner, own in owned.items()}
+    return robot.replace(**parts, **changes)
 
 
 def _alike(one: Array | None, other: Array | None) -> bool:
