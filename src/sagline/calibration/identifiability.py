@@ -273,7 +273,8 @@ def _generators(robot: Robot, sensors: Sensors, turn: Array) -> Iterator[Generat
         return Generator(name, step, change, lengths)
 
     # the cables become lighter per meter, so that forces do not change
-    scaled = [(_FRAME, robot.frame_anchors.T), (_PLATFORM, robot.platform_anchors.T), (kinds.DENSITY, -1.0)]
+    scaled: list[tuple[Any, Array | float]] = [(_FRAME, robot.frame_anchors.T), (_PLATFORM, robot.platform_anchors.T)]
+    scaled += [(kinds.DENSITY, -1.0)]
     if winches is not None:
         scaled += [(kinds.RADIUS, winches.pulley_radius), (kinds.DEAD, winches.dead_cable)]
     scaled += [(_CENTER, center[:, None]), (_SHIFT, place[:, None]), (_TARGET, sensors.target[:, None])]

@@ -214,7 +214,7 @@ def whitened_rows(
         machine.terms,
         (machine.robot.freedom, machine.body, machine.cables, _locked_view(lengths), _locked_view(poses), NO_LOAD),
         machine.sensing,
-        tuple(map(_locked_view, readings)),
+        PoseReadings(*map(_locked_view, readings)),
         (where, locked(np.where(parameters.where >= 0, factor[parameters.where], 0.0)), _locked_view(slopes)),
         memory_for(m),
         (*found, np.empty((rows + 6, width))),

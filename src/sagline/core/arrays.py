@@ -103,6 +103,16 @@ def exactly(value: ArrayLike, item: str, unit: str, shape: tuple[int, ...], **li
     return array
 
 
+def refuse_first(
+    wrong: Flags, item: str, values: Array, unit: str, allowed: str, step: str, limits: Array | None = None
+) -> None:
+    """Refuse the first of `values` for which `wrong` is True; {i} and {limit} in `allowed` are its index and limit."""
+    if wrong.any():
+        k, index = int(np.argmax(wrong)), ", ".join(str(i) for i in np.argwhere(wrong)[0])
+        where, limit = f"{item}[{index}]" if index else item, np.nan if limits is None else limits.flat[k]
+        raise InvalidValueError(where, f"{values.flat[k]:g} {unit}".rstrip(), allowed.format(i=k, limit=limit), step)
+
+
 def kernel_input(value: ArrayLike, shape: tuple[int, ...]) -> Array:
     """Broadcast `value` to `shape` in the memory layout of the kernels. A copy is made only if necessary."""
     array = np.asarray(value, dtype=np.float64, order="C")

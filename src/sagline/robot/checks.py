@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from sagline.cables.cable import Cable
 from sagline.core.arguments import instance, optional
-from sagline.core.arrays import SMALLEST, Array, checked, exactly, locked
+from sagline.core.arrays import SMALLEST, Array, checked, exactly, locked, refuse_first
 from sagline.core.errors import InvalidValueError
 from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.pose import unit
@@ -24,17 +24,13 @@ def anchors(frame: ArrayLike, platform: ArrayLike) -> tuple[Array, Array]:
     for value, item in ((frame, "frame_anchors"), (platform, "platform_anchors")):
         array = checked(value, item, "m", shape=(None, 3))
         if array.ndim != 2 or len(array) == 0:
-            raise InvalidValueError(
-                item, f"of shape {array.shape}", "shape (m, 3), m >= 1", "Give one point per cable."
-            )
+            allowed, step = "shape (m, 3), m >= 1", "Give one point per cable."
+            raise InvalidValueError(item, f"of shape {array.shape}", allowed, step)
         pair.append(array)
     if len(pair[0]) != len(pair[1]):
-        raise InvalidValueError(
-            "platform_anchors",
-            f"{len(pair[1])} points",
-            f"as many as frame_anchors, {len(pair[0])}",
-            "Give each cable a point on the frame and a point on the platform.",
-        )
+        allowed = f"as many as frame_anchors, {len(pair[0])}"
+        step = "Give each cable a point on the frame and a point on the platform."
+        raise InvalidValueError("platform_anchors", f"{len(pair[1])} points", allowed, step)
     _refuse_twins(np.hstack(pair))
     return pair[0], pair[1]
 
@@ -47,25 +43,18 @@ def _refuse_twins(ends: Array) -> None:
     twins = np.flatnonzero(twin_of != np.arange(len(ends)))
     if twins.size:
         second = int(twins[0])
-        raise InvalidValueError(
-            f"cable {second}",
-            f"between the same two points as cable {int(twin_of[second])}",
-            "cables that differ in at least one end",
-            f"Remove one of them, or correct frame_anchors[{second}] or platform_anchors[{second}].",
-        )
+        value = f"between the same two points as cable {int(twin_of[second])}"
+        step = f"Remove one of them, or correct frame_anchors[{second}] or platform_anchors[{second}]."
+        raise InvalidValueError(f"cable {second}", value, "cables that differ in at least one end", step)
 
 
 def cables(given: Cable, count: int) -> Cable:
     """The material of the cables with fields of shape (m,); each linear density is positive."""
     instance(given, Cable, "cables")
     fields = {name: per_cable(field, f"cables: {name}", count) for name, field in given.known().items()}
-    if not (density := fields["linear_density"]).all():
-        raise InvalidValueError(
-            f"cables: linear_density[{int(np.argmin(density))}]",
-            "0 kg/m",
-            "> 0 kg/m",
-            "Give the mass per length of the cable; to neglect its weight, use the model Elastic or Straight.",
-        )
+    step = "Give the mass per length of the cable; to neglect its weight, use the model Elastic or Straight."
+    density = fields["linear_density"]
+    refuse_first(density == 0.0, "cables: linear_density", np.abs(density), "kg/m", "> 0 kg/m", step)
     return given if given.linear_density.shape == (count,) else given.replace(**fields)
 
 
@@ -86,50 +75,34 @@ def inertia(given: ArrayLike | None, pattern: str, normal: Array | None) -> Arra
     of the plane of a planar pattern, shape (3,); None for the other patterns. Returns a matrix of shape (3, 3).
     """
     if given is None and pattern in ROTATING:
-        raise InvalidValueError(
-            "inertia",
-            "missing",
-            "a symmetric matrix of shape (3, 3)",
-            f"The motion pattern {pattern} has a rotation; give the inertia.",
-        )
+        step = f"The motion pattern {pattern} has a rotation; give the inertia."
+        raise InvalidValueError("inertia", "missing", "a symmetric matrix of shape (3, 3)", step)
     matrix = exactly(np.zeros((3, 3)) if given is None else given, "inertia", "kg m^2", (3, 3))
     skew = np.abs(matrix - matrix.T)
     if skew.max() > _SYMMETRY * np.abs(matrix).max():
         row, column = (int(i) for i in np.argwhere(skew == skew.max())[0])
-        raise InvalidValueError(
-            f"inertia[{row}, {column}]",
-            f"{matrix[row, column]:g} kg m^2",
-            f"the same as inertia[{column}, {row}], {matrix[column, row]:g} kg m^2",
-            "An inertia matrix is symmetric; correct one of the two elements.",
-        )
+        allowed = f"the same as inertia[{column}, {row}], {matrix[column, row]:g} kg m^2"
+        step = "An inertia matrix is symmetric; correct one of the two elements."
+        raise InvalidValueError(f"inertia[{row}, {column}]", f"{matrix[row, column]:g} kg m^2", allowed, step)
     _check_moments(np.linalg.eigvalsh(matrix).astype(np.float64), everywhere=pattern in ROTATING and normal is None)
     if pattern in ROTATING and normal is not None and not (about := float(normal @ matrix @ normal)) > 0.0:
-        raise InvalidValueError(
-            "inertia",
-            f"a matrix with {about:g} kg m^2 about plane_normal",
-            "> 0 kg m^2",
-            "Give the moment about the platform's axis of rotation.",
-        )
+        value = f"a matrix with {about:g} kg m^2 about plane_normal"
+        step = "Give the moment about the platform's axis of rotation."
+        raise InvalidValueError("inertia", value, "> 0 kg m^2", step)
     return matrix
 
 
 def _check_moments(moments: Array, *, everywhere: bool) -> None:
     """Refuse impossible principal moments [kg m^2], in increasing order; everywhere: True if all rotations are free."""
     least = 0.0 if everywhere else np.nextafter(-_SYMMETRY * abs(moments[2]), -1.0)
+    step = "the inertia about the center of mass, in the platform frame."
     if moments[0] <= least:
-        raise InvalidValueError(
-            "inertia",
-            f"a matrix with the principal moment {moments[0]:g} kg m^2",
-            f"principal moments {'>' if everywhere else '>='} 0 kg m^2",
-            "Give the inertia about the center of mass, in the platform frame.",
-        )
+        value, allowed = f"a matrix with the principal moment {moments[0]:g} kg m^2", ">" if everywhere else ">="
+        raise InvalidValueError("inertia", value, f"principal moments {allowed} 0 kg m^2", f"Give {step}")
     if everywhere and moments[2] > (1.0 + _ROUNDED) * (moments[0] + moments[1]):
-        raise InvalidValueError(
-            "inertia",
-            f"a matrix with the principal moments {', '.join(f'{moment:g}' for moment in moments)} kg m^2",
-            "none larger than the sum of the other two",
-            "Such a body does not exist; give the inertia about the center of mass, in the platform frame.",
-        )
+        value = f"a matrix with the principal moments {', '.join(f'{moment:g}' for moment in moments)} kg m^2"
+        step, allowed = f"Such a body does not exist; give {step}", "none larger than the sum of the other two"
+        raise InvalidValueError("inertia", value, allowed, step)
 
 
 def plane_normal(given: ArrayLike | None, pattern: str) -> Array | None:
@@ -137,9 +110,8 @@ def plane_normal(given: ArrayLike | None, pattern: str) -> Array | None:
     if (given is None) == (pattern in PLANAR):
         has = "not given" if given is None else "given"
         allowed = "a vector of three numbers" if given is None else "nothing"
-        raise InvalidValueError(
-            "plane_normal", f"{has} for motion_pattern {pattern}", allowed, "Correct plane_normal or motion_pattern."
-        )
+        step = "Correct plane_normal or motion_pattern."
+        raise InvalidValueError("plane_normal", f"{has} for motion_pattern {pattern}", allowed, step)
     if given is None:
         return None
     normal = exactly(given, "plane_normal", "", (3,))
@@ -152,15 +124,8 @@ def limits_of_each_cable(low: ArrayLike, high: ArrayLike, count: int) -> tuple[A
     """Lower and upper tension limits [N], (m,). No limit is negative; a lower limit is at most the upper limit."""
     lower = per_cable(checked(low, "tension_min", "N", low=0.0), "tension_min", count)
     upper = per_cable(checked(high, "tension_max", "N", low=0.0, infinite=True), "tension_max", count)
-    crossed = np.flatnonzero(lower > upper)
-    if crossed.size:
-        i = int(crossed[0])
-        raise InvalidValueError(
-            f"tension_min[{i}]",
-            f"{lower[i]:g} N",
-            f"<= tension_max[{i}], {upper[i]:g} N",
-            "Lower this limit, or raise the other one.",
-        )
+    allowed, step = "<= tension_max[{i}], {limit:g} N", "Lower this limit, or raise the other one."
+    refuse_first(lower > upper, "tension_min", lower, "N", allowed, step, upper)
     return lower, upper
 
 

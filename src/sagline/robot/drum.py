@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from sagline.core.arrays import Array, checked, kernel_input, locked
+from sagline.core.arrays import Array, checked, kernel_input, locked, refuse_first
 from sagline.core.errors import InvalidValueError
 from sagline.kernels.cable import drum
 from sagline.kernels.codes import CATENARY
@@ -247,10 +247,8 @@ def warmth(robot: Robot, temperature: Any) -> Array | float:
     """
     difference = checked(temperature, "temperature", "K")
     if difference.shape not in ((), (robot.cable_count,)):
-        allowed = f"shape () or ({robot.cable_count},)"
-        raise InvalidValueError(
-            "temperature", f"of shape {difference.shape}", allowed, "Give one value, or one value per cable."
-        )
+        allowed, step = f"shape () or ({robot.cable_count},)", "Give one value, or one value per cable."
+        raise InvalidValueError("temperature", f"of shape {difference.shape}", allowed, step)
     if not difference.any():
         return 1.0
     if robot.cables.expansion is None:
@@ -258,13 +256,8 @@ def warmth(robot: Robot, temperature: Any) -> Array | float:
         raise InvalidValueError("cables: expansion", "not given", "known if a temperature is given", step)
     factor: Array = 1.0 + robot.cables.expansion * difference
     if not (factor > 0.0).all():
-        shown = f"{np.ravel(difference)[0]:g} K"
-        raise InvalidValueError(
-            "temperature",
-            shown,
-            "a temperature at which cables have a positive length",
-            "Correct the temperature, or expansion.",
-        )
+        shown, allowed = f"{np.ravel(difference)[0]:g} K", "a temperature at which cables have a positive length"
+        raise InvalidValueError("temperature", shown, allowed, "Correct the temperature, or expansion.")
     return factor
 
 
@@ -276,14 +269,12 @@ def _given(winches: Winch, name: str, step: str = "Give it in the robot's winche
 
 
 def _check_width(winches: Winch, pitch: Array) -> None:
-    if winches.drum_width is not None and (narrow := winches.drum_width < pitch).any():
-        i = int(np.argmax(narrow))
-        raise InvalidValueError(
-            f"winches: drum_width[{i}]",
-            f"{winches.drum_width[i]:g} m",
-            f">= {pitch[i]:g} m, its groove_pitch",
+    if (width := winches.drum_width) is not None:
+        allowed, step = (
+            ">= {limit:g} m, its groove_pitch",
             "A layer has at least one turn; correct one of the two values.",
         )
+        refuse_first(width < pitch, "winches: drum_width", width, "m", allowed, step, pitch)
 
 
 def _at(item: str, sample: int, cable: int, samples: int) -> str:

@@ -9,7 +9,7 @@ from attrs import Attribute, evolve, field, fields_dict, frozen
 from numpy.typing import ArrayLike, NDArray
 
 from sagline.core.arguments import choice, whole_number
-from sagline.core.arrays import SMALLEST, Array, checked, locked, spread
+from sagline.core.arrays import SMALLEST, Array, checked, locked, refuse_first, spread
 from sagline.core.errors import InvalidValueError
 from sagline.core.fields import given, if_known, reduced, rule
 from sagline.core.memory import check_memory
@@ -142,9 +142,7 @@ class Winch:
         shape = _shape({name: value.shape[: batch[name]] for name, value in values.items()})
         for name, value in values.items():
             object.__setattr__(self, name, spread(value, (*shape, *value.shape[batch[name] :])))
-        _check_rise(self.dead_cable, self.dead_rise)
-        _check_rolling(self.rolling_friction)
-        _check_whole(self.dead_cable, self.cable_length)
+        _check_pairs(*map(np.atleast_1d, (self.dead_cable, self.dead_rise, self.rolling_friction)), self.cable_length)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -237,24 +235,16 @@ class Winch:
         spans = np.linalg.norm(np.diff(points, axis=1), axis=-1)
         length = spans.sum(axis=1)
         if (same := spans[:, -1] < SMALLEST).any():
-            i = int(np.argmax(same))
-            raise InvalidValueError(
-                f"winches: guides[{i}, {self.guides.shape[1] - 1}]",
-                "at the frame anchor",
-                "points before it",
-                "List the guides in order, starting at the drum, without the frame anchor.",
-            )
+            item = f"winches: guides[{int(np.argmax(same))}, {self.guides.shape[1] - 1}]"
+            step = "List the guides in order, starting at the drum, without the frame anchor."
+            raise InvalidValueError(item, "at the frame anchor", "points before it", step)
         # at most the length, despite rounding
         rise = np.clip(frame_anchors[:, 2] - self.guides[:, 0, 2], -length, length)
         for name, own, follows in (("dead_cable", self.dead_cable, length), ("dead_rise", self.dead_rise, rise)):
             if (wrong := (own != 0.0) & (np.abs(own - follows) > _AGREEING * length)).any():
                 i = int(np.argmax(wrong))
-                raise InvalidValueError(
-                    f"winches: {name}[{i}]",
-                    f"{own[i]:.9g} m",
-                    f"{follows[i]:.9g} m, from the guides, or 0",
-                    "Omit it if guides are given.",
-                )
+                item, allowed = f"winches: {name}[{i}]", f"{follows[i]:.9g} m, from the guides, or 0"
+                raise InvalidValueError(item, f"{own[i]:.9g} m", allowed, "Omit it if guides are given.")
         return evolve(self, dead_cable=length, dead_rise=rise)
 
     def known(self) -> dict[str, Array]:
@@ -281,29 +271,17 @@ def _checked(value: ArrayLike, about: Attribute[Any]) -> Array:
             return _vertical(array)
         case "guides":
             return _points(array)
-        case "layers" if (wrong := array != np.floor(array)).any():
-            item, index = _element(item, wrong)
-            raise InvalidValueError(
-                item, f"{array[index]:g}", "whole numbers", "Give the number of layers on the drum."
-            )
-        case "layers" if (wrong := array > MOST_LAYERS).any():
-            item, index = _element(item, wrong)
+        case "layers":
             step = "Give the number of layers on the drum."
-            raise InvalidValueError(item, f"{array[index]:g}", f"1 to {MOST_LAYERS}", step)
-        case "pulley_radius" if (wrong := array > LARGEST_PULLEY).any():
-            item, index = _element(item, wrong)
-            allowed = f"0 to {LARGEST_PULLEY:g} m"
-            raise InvalidValueError(item, f"{array[index]:g} m", allowed, "Give the radius in meters.")
-        case "gear" if (wrong := array == 0.0).any():
+            refuse_first(array != np.floor(array), item, array, "", "whole numbers", step)
+            refuse_first(array > MOST_LAYERS, item, array, "", f"1 to {MOST_LAYERS}", step)
+        case "pulley_radius":
+            allowed, step = f"0 to {LARGEST_PULLEY:g} m", "Give the radius in meters."
+            refuse_first(array > LARGEST_PULLEY, item, array, "m", allowed, step)
+        case "gear":
             step = "Give the encoder turns per drum turn; negative if counts decrease when cable is paid out."
-            raise InvalidValueError(_element(item, wrong)[0], "0", "not 0", step)
+            refuse_first(array == 0.0, item, np.abs(array), "", "not 0", step)
     return array
-
-
-def _element(item: str, wrong: NDArray[np.bool_]) -> tuple[str, tuple[int, ...]]:
-    """The first wrong element of a field: its name and its index."""
-    index = tuple(int(i) for i in np.argwhere(wrong)[0])
-    return (f"{item}[{', '.join(map(str, index))}]" if index else item), index
 
 
 def _points(points: Array) -> Array:
@@ -314,14 +292,9 @@ def _points(points: Array) -> Array:
         raise InvalidValueError("winches: guides", f"of shape {points.shape}", allowed, step)
     same = np.linalg.norm(np.diff(points, axis=-2), axis=-1) < SMALLEST
     if same.any():
-        index = tuple(int(i) for i in np.argwhere(same)[0])
-        index = (*index[:-1], index[-1] + 1)
-        raise InvalidValueError(
-            f"winches: guides[{', '.join(map(str, index))}]",
-            "at the guide before it",
-            "points apart",
-            "Omit one of the two guides.",
-        )
+        *cable, before = map(int, np.argwhere(same)[0])
+        item = f"winches: guides[{', '.join(map(str, (*cable, before + 1)))}]"
+        raise InvalidValueError(item, "at the guide before it", "points apart", "Omit one of the two guides.")
     return points
 
 
@@ -341,52 +314,27 @@ def _shape(shapes: dict[str, tuple[int, ...]]) -> tuple[int, ...]:
 def _vertical(axis: Array) -> Array:
     """Unit vectors of the swivel axes; refuses an axis that is not vertical."""
     length = np.linalg.norm(axis, axis=-1)
+    item, step = "winches: swivel_axis", "Give [0, 0, 1] or [0, 0, -1]."
     if not length.all():
-        raise InvalidValueError(
-            "winches: swivel_axis", "the zero vector", "up or down", "Give [0, 0, 1] or [0, 0, -1]."
-        )
+        raise InvalidValueError(item, "the zero vector", "up or down", step)
     axis = unit(axis)
-    if (np.hypot(axis[..., 0], axis[..., 1]) > UPRIGHT).any():
-        slanted = axis.reshape(-1, 3)[np.argmax(np.hypot(axis[..., 0], axis[..., 1]).reshape(-1))]
-        raise InvalidValueError(
-            "winches: swivel_axis",
-            f"({', '.join(f'{x:.3g}' for x in slanted)})",
-            "up or down",
-            "Only pulleys with a vertical swivel axis are modeled. Give [0, 0, 1] or [0, 0, -1].",
-        )
+    if ((slant := np.hypot(axis[..., 0], axis[..., 1])) > UPRIGHT).any():
+        shown = ", ".join(f"{x:.3g}" for x in axis.reshape(-1, 3)[np.argmax(slant)])
+        step = f"Only pulleys with a vertical swivel axis are modeled. {step}"
+        raise InvalidValueError(item, f"({shown})", "up or down", step)
     upright = np.zeros(axis.shape)
     upright[..., 2] = np.sign(axis[..., 2])
     return locked(upright)
 
 
-def _check_rolling(rolling_friction: Array) -> None:
-    if (much := rolling_friction >= 1.0).any():
-        i = int(np.argmax(much))
-        item, shown = f"winches: rolling_friction[{i}]", f"{rolling_friction.flat[i]:g}"
-        raise InvalidValueError(item, shown, ">= 0, < 1", "A bearing takes only part of the tension; correct it.")
-
-
-def _check_rise(dead_cable: Array, dead_rise: Array) -> None:
-    steep = np.flatnonzero(np.abs(dead_rise) > dead_cable)
-    if steep.size:
-        i = int(steep[0])
-        raise InvalidValueError(
-            f"winches: dead_rise[{i}]",
-            f"{dead_rise.flat[i]:g} m",
-            f"within +-{dead_cable.flat[i]:g} m, its dead_cable",
-            "A straight cable rises by at most its length; correct one of the two values.",
-        )
-
-
-def _check_whole(dead_cable: Array, cable_length: Array | None) -> None:
-    if cable_length is None:
-        return
-    short = np.flatnonzero(cable_length < dead_cable)
-    if short.size:
-        i = int(short[0])
-        raise InvalidValueError(
-            f"winches: cable_length[{i}]",
-            f"{cable_length.flat[i]:g} m",
-            f">= {dead_cable.flat[i]:g} m, its dead_cable",
-            "The cable must be longer than the distance from drum to pulley; correct one of the two values.",
-        )
+def _check_pairs(dead_cable: Array, dead_rise: Array, rolling_friction: Array, cable_length: Array | None) -> None:
+    """Refuse values that contradict each other, and a bearing that takes the whole tension."""
+    steep, allowed = np.abs(dead_rise) > dead_cable, "within +-{limit:g} m, its dead_cable"
+    step = "A straight cable rises by at most its length; correct one of the two values."
+    refuse_first(steep, "winches: dead_rise", dead_rise, "m", allowed, step, dead_cable)
+    step = "A bearing takes only part of the tension; correct it."
+    refuse_first(rolling_friction >= 1.0, "winches: rolling_friction", rolling_friction, "", ">= 0, < 1", step)
+    if cable_length is not None:
+        short, allowed = np.atleast_1d(cable_length < dead_cable), ">= {limit:g} m, its dead_cable"
+        step = "The cable must be longer than the distance from drum to pulley; correct one of the two values."
+        refuse_first(short, "winches: cable_length", cable_length, "m", allowed, step, dead_cable)
