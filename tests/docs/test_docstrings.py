@@ -172,7 +172,7 @@ def test_public_functions_have_an_example() -> None:
     wanted |= {f"sagline.statics.stiffness.{name}" for name in ("stiffness", "modes")}
     wanted |= {f"sagline.motion.rest_to_rest.{name}" for name in ("quintic_path", "septic_path")}
     wanted |= {f"sagline.kinematics.{name}.{name}" for name in ("confirm", "forward", "inverse")}
-    wanted |= {"sagline.motion.sampled.path_from_samples", "sagline.files.robot_file.load_robot"}
+    wanted |= {"sagline.motion.path.path_from_samples", "sagline.files.robot_file.load_robot"}
     wanted |= {"Robot", "InverseSolver"}
     wanted |= {"sagline.kinematics.polygon.tension_polygon"}
     assert wanted <= EXAMPLES.keys()

@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from sagline import InvalidValueError, Path, Pose, quintic_path, septic_path
-from sagline.motion.segments import QUINTIC, SEPTIC, RestProfile
+from sagline.motion.rest_to_rest import QUINTIC, SEPTIC, RestProfile
 from tests.motion.differences import angular_velocity, slope
 from tests.refusal import refused
 from tests.tiers import extended

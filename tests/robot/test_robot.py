@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from sagline import Cable, InvalidValueError, PoseBox, Robot
 from sagline.core.arrays import Array
-from sagline.robot.inertia import box_inertia, cylinder_inertia, with_mass
+from sagline.robot.robot import box_inertia, cylinder_inertia, with_mass
 from tests.refusal import refused
 
 CORNERS = np.array([[2.0, 0, 3], [0, 2, 3], [-2, -2, 3]])

@@ -24,7 +24,7 @@ from sagline.article.machine import (
 from sagline.article.sampling import FittedLine, fit_line
 from sagline.article.table2 import Table2, table2
 from sagline.core.arrays import Array, locked
-from sagline.motion.segments import QUINTIC
+from sagline.motion.rest_to_rest import QUINTIC
 
 HOME = (0.0, 0.0, 1.5)  # home position of the prototype [m]
 METHOD = sl.MinimumNorm("horizontal")

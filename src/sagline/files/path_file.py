@@ -18,9 +18,8 @@ from sagline.files.reading import read_text, value_errors
 from sagline.files.table import TABLE_LIMIT, CsvTable, line_error
 from sagline.files.writing import write_text
 from sagline.files.yaml_text import YAML_LIMIT, YamlEntry, dump_mapping, parse_mapping, validate
-from sagline.motion.path import Path
+from sagline.motion.path import Path, path_from_samples
 from sagline.motion.rest_to_rest import quintic_path, septic_path
-from sagline.motion.sampled import path_from_samples
 from sagline.robot.drum import drums_of
 from sagline.robot.pose import Pose
 

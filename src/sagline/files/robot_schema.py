@@ -16,9 +16,8 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.fields import units
 from sagline.files.quantity import plain_number
 from sagline.files.yaml_text import YamlEntry
-from sagline.robot.inertia import box_inertia, cylinder_inertia
 from sagline.robot.pose import Pose, PoseBox
-from sagline.robot.robot import Robot
+from sagline.robot.robot import Robot, box_inertia, cylinder_inertia
 from sagline.robot.tolerances import UNCERTAIN, Provenance, of_share, value_of
 from sagline.robot.winch import Winch
 

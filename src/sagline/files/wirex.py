@@ -24,9 +24,8 @@ from sagline.files.robot_xml import (
     vertical_axis,
     with_losses,
 )
-from sagline.robot.inertia import box_inertia
 from sagline.robot.pattern import MOTION_PATTERNS, PLANAR, ROTATING, MotionPattern
-from sagline.robot.robot import Robot
+from sagline.robot.robot import Robot, box_inertia
 from sagline.robot.winch import Winch
 
 _AXES: Final = ("x", "y", "z")

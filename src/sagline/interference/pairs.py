@@ -13,7 +13,7 @@ from sagline.interference.mesh import Mesh
 from sagline.interference.obstacles import Box, Capsule, Sphere
 from sagline.kernels.codes import CATENARY
 from sagline.kernels.interference import shapes
-from sagline.robot.batch import Robots, anchors_of
+from sagline.robot.batch import Robots, robot_fields
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 
@@ -54,7 +54,7 @@ def cable_rows(state: Equilibrium, radius: Array) -> Array:
 
 def _platform_ends(state: Equilibrium) -> Array:
     """Platform ends of the cables in the world [m], shape (m, 3) or (N, m, 3)."""
-    anchors = anchors_of(state.robot).platform
+    (anchors,) = robot_fields(state.robot, "platform_anchors")
     if anchors.ndim == 2:
         return state.pose.transform(anchors)
     turned = np.einsum("nij,nmj->nmi", state.pose.matrix, anchors)
@@ -130,7 +130,7 @@ def pairs_of(
     robot: Robots, obstacles: tuple[Obstacle, ...], platform: Box | Mesh | None, *, from_anchor: bool
 ) -> Pairs:
     """All pairs of a robot and its obstacles. Without `from_anchor`, pairs with a common anchor are omitted."""
-    at_frame, at_platform = (_together(anchors) for anchors in anchors_of(robot))
+    at_frame, at_platform = (_together(anchors) for anchors in robot_fields(robot, "frame_anchors", "platform_anchors"))
     cables = range(len(at_frame))
     found: list[tuple[Body, Body]] = []  # part of a cable, -1 for the platform, or number of an obstacle
     left_out: list[str] = []

@@ -22,12 +22,11 @@ from sagline.kinematics.measured import MeasuredTension, fit_measurements
 from sagline.kinematics.winding import checked_winding, iterate_routing
 from sagline.robot.batch import (
     Robots,
-    anchors_of,
     check_count,
     dead_cable,
     first_of,
     has_routing,
-    limits_of,
+    robot_fields,
     robots_at,
     together,
 )
@@ -128,11 +127,11 @@ def centered_positions(robot: Robots, quaternion: Array) -> Array:
     quaternion: orientation of the platform, shape (4,) or (N, 4). Returns position of the platform origin [m], shape
     (3,) or (N, 3).
     """
-    anchors = anchors_of(robot)
-    ends = anchors.platform.mean(axis=-2)
+    frame, platform = robot_fields(robot, "frame_anchors", "platform_anchors")
+    ends = platform.mean(axis=-2)
     vector, scalar = quaternion[..., :3], quaternion[..., 3:]
     turn = 2.0 * np.cross(vector, ends)
-    position: Array = anchors.frame.mean(axis=-2) - (ends + scalar * turn + np.cross(vector, turn))
+    position: Array = frame.mean(axis=-2) - (ends + scalar * turn + np.cross(vector, turn))
     return position
 
 
@@ -154,11 +153,11 @@ def outside_limits(robot: Robots, model: CableModel, found: ForwardRows) -> Indi
 
     Returns counts (N,); 0 for straight cables, whose tensions are unknown.
     """
-    limits = limits_of(robot)
+    least, most = robot_fields(robot, "tension_min", "tension_max")
     cables, contact = cables_of_results(robot, model, found.results, found.cable_status, found.pose_status.shape)
     tension = limited_tension(robot, cables, contact)
-    low = (1.0 - _LIMIT_SLACK) * limits.low
-    high = (1.0 + _LIMIT_SLACK) * limits.high
+    low = (1.0 - _LIMIT_SLACK) * least
+    high = (1.0 + _LIMIT_SLACK) * most
     count: Indices = ((tension < low) | (tension > high)).sum(axis=1)
     return count
 

@@ -9,8 +9,7 @@ import numpy as np
 from sagline.core.arrays import Array, Flags, locked
 from sagline.kernels import tables
 from sagline.kinematics.inverse_rows import solve_inverse_rows
-from sagline.motion.path import Path
-from sagline.motion.sampled import spline_rates
+from sagline.motion.path import Path, spline_rates
 from sagline.robot.batch import Robots, first_of
 from sagline.robot.equilibrium import Equilibrium, cables_of_results
 from sagline.robot.pose import Pose

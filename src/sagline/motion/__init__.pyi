@@ -1,7 +1,7 @@
 """Public names of `sagline.motion`."""
 
 from .path import Path as Path
+from .path import path_from_samples as path_from_samples
 from .rest_to_rest import article_path as article_path
 from .rest_to_rest import quintic_path as quintic_path
 from .rest_to_rest import septic_path as septic_path
-from .sampled import path_from_samples as path_from_samples

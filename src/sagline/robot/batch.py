@@ -92,29 +92,9 @@ def has_routing(robot: Robots) -> bool:
     return any(one.winches is not None and one.winches.anything_behind for one in robots)
 
 
-class _Bodies(NamedTuple):
-    """Inertia data of the platform; the arrays of several robots have a leading axis N."""
-
-    mass: Array  # [kg], shape () or (N,)
-    center_of_mass: Array  # in the platform frame [m], shape (3,) or (N, 3)
-    inertia: Array  # about the center of mass, in the platform frame [kg m^2], shape (3, 3) or (N, 3, 3)
-
-
-def bodies_of(robot: Robots) -> _Bodies:
-    """Mass, center of mass and inertia of the platform or platforms."""
-    return _Bodies(*_each(robot, lambda one: (np.asarray(one.mass), one.center_of_mass, one.inertia)))
-
-
-class _Anchors(NamedTuple):
-    """Anchors of the cables."""
-
-    frame: Array  # frame anchors in the world [m], shape (m, 3) or, for several robots, (N, m, 3)
-    platform: Array  # platform anchors in the platform frame [m], of the same shape
-
-
-def anchors_of(robot: Robots) -> _Anchors:
-    """Anchors of the robot or robots."""
-    return _Anchors(*_each(robot, lambda one: (one.frame_anchors, one.platform_anchors)))
+def robot_fields(robot: Robots, *names: str) -> tuple[Array, ...]:
+    """Fields of a robot; fields of several robots are stacked along a leading axis N."""
+    return _each(robot, lambda one: tuple(np.asarray(getattr(one, name)) for name in names))
 
 
 class _Pulleys(NamedTuple):
@@ -133,18 +113,6 @@ def pulleys_of(robot: Robots) -> _Pulleys:
         return one.winches.pulley_radius, one.winches.swivel_axis[:, 2]
 
     return _Pulleys(*_each(robot, own))
-
-
-class _Limits(NamedTuple):
-    """Tension limits of the cables."""
-
-    low: Array  # lower limits [N], shape (m,) or, for several robots, (N, m)
-    high: Array  # upper limits [N], of the same shape
-
-
-def limits_of(robot: Robots) -> _Limits:
-    """Tension limits of the robot or robots."""
-    return _Limits(*_each(robot, lambda one: (one.tension_min, one.tension_max)))
 
 
 def _each(robot: Robots, own: Callable[[Robot], tuple[Array, ...]]) -> tuple[Array, ...]:
@@ -175,9 +143,9 @@ _TINY = 1e-300
 
 def outward(robot: Robots, pose: Pose) -> Array:
     """Horizontal unit vectors from frame anchors to platform ends, (..., m, 2); zero for a vertical cable."""
-    anchors = anchors_of(robot)
-    ends = pose.position[..., None, :] + anchors.platform @ np.swapaxes(pose.matrix, -1, -2)
-    level = (ends - anchors.frame)[..., :2]
+    frame, platform = robot_fields(robot, "frame_anchors", "platform_anchors")
+    ends = pose.position[..., None, :] + platform @ np.swapaxes(pose.matrix, -1, -2)
+    level = (ends - frame)[..., :2]
     unit: Array = level / np.maximum(np.linalg.norm(level, axis=-1, keepdims=True), _TINY)
     return unit
 
@@ -192,7 +160,8 @@ def points_on_pulleys(robot: Robots, pose: Pose, angle: Array) -> Array:
     radius, entry = pulleys_of(robot)
     away = outward(robot, pose) * (radius * (1.0 - np.cos(angle)))[..., None]
     up = (radius * entry * np.sin(angle))[..., None]
-    return np.asarray(anchors_of(robot).frame + np.concatenate((away, up), axis=-1))
+    (frame,) = robot_fields(robot, "frame_anchors")
+    return np.asarray(frame + np.concatenate((away, up), axis=-1))
 
 
 def pulley_centers(robot: Robot, pose: Pose) -> Array:

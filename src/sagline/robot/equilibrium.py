@@ -21,11 +21,11 @@ from sagline.kernels import tables
 from sagline.robot.batch import (
     Index,
     Robots,
-    anchors_of,
     cables_of,
     first_of,
     has_routing,
     points_on_pulleys,
+    robot_fields,
     robots_at,
 )
 from sagline.robot.pose import Pose, PoseLike
@@ -122,7 +122,8 @@ class Equilibrium(Result, Tabular):
     def exit_point(self) -> Array:
         """Exit points of the cables on pulleys, or frame anchors, world axes [m], shape (m, 3) or (N, m, 3)."""
         if self.contact is None:
-            return locked(np.array(np.broadcast_to(anchors_of(self.robot).frame, (*self.cables.shape, 3))))
+            (anchors,) = robot_fields(self.robot, "frame_anchors")
+            return locked(np.array(np.broadcast_to(anchors, (*self.cables.shape, 3))))
         return locked(points_on_pulleys(self.robot, self.pose, self.contact.wrap_angle))
 
     @property

@@ -13,7 +13,7 @@ from sagline.core.arrays import Array, checked, exactly, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.kernels.cable import geometry as rows
 from sagline.kernels.statics import structure_matrices
-from sagline.robot.batch import Robots, bodies_of, first_of, one_a_pose
+from sagline.robot.batch import Robots, first_of, one_a_pose, robot_fields
 from sagline.robot.pose import Pose, PoseLike, pose_of
 from sagline.robot.robot import Robot
 from sagline.statics.tables import chord_geometry, refuse_missing_chords
@@ -47,7 +47,7 @@ def inertial_wrench(robot: Robot | Sequence[Robot], pose: PoseLike, twist: Array
     pose = pose_of(pose)
     if not pose.shape:
         raise InvalidValueError("pose", "a single pose", "a batch of N poses", "Take Pose(position[None], rotation).")
-    body = bodies_of(one_a_pose(robot, len(pose)))
+    mass, center, own = robot_fields(one_a_pose(robot, len(pose)), "mass", "center_of_mass", "inertia")
     twist = exactly(twist, "twist", "m/s or rad/s", (len(pose), 6))
     twist_rate = exactly(twist_rate, "twist_rate", "m/s^2 or rad/s^2", (len(pose), 6))
     spin, spin_rate = twist[:, 3:], twist_rate[:, 3:]
@@ -56,12 +56,12 @@ def inertial_wrench(robot: Robot | Sequence[Robot], pose: PoseLike, twist: Array
     wrench[:, 3:] = 0.0
     if np.any(spin) or np.any(spin_rate):
         rotation = pose.matrix
-        lever = (rotation @ body.center_of_mass[..., None])[..., 0]
+        lever = (rotation @ center[..., None])[..., 0]
         wrench[:, :3] += np.cross(spin_rate, lever) + np.cross(spin, np.cross(spin, lever))
-        inertia = rotation @ body.inertia @ np.swapaxes(rotation, 1, 2)
+        inertia = rotation @ own @ np.swapaxes(rotation, 1, 2)
         momentum = np.einsum("nij,nj->ni", inertia, spin)
         wrench[:, 3:] = -np.einsum("nij,nj->ni", inertia, spin_rate) - np.cross(spin, momentum)
-    wrench[:, :3] *= -body.mass[..., None]
+    wrench[:, :3] *= -mass[..., None]
     return locked(wrench)
 
 

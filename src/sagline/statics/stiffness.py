@@ -11,7 +11,7 @@ from sagline.core.arrays import Array, Flags, locked
 from sagline.core.memory import check_memory
 from sagline.core.results import Result
 from sagline.core.table import Columns, Tabular
-from sagline.robot.batch import bodies_of, first_of
+from sagline.robot.batch import first_of, robot_fields
 from sagline.robot.equilibrium import Equilibrium, of_equilibrium
 from sagline.statics.slopes import CableSlopes, cable_slopes, on_platform, tension_slopes
 from sagline.statics.strings import strings_below, strings_of
@@ -273,8 +273,8 @@ def _inverse(matrix: Array) -> Array:
 def mass_matrix(state: Equilibrium) -> Array:
     """Mass and inertia of the platform about the center of mass, in world axes, (..., 6, 6) [kg, kg m^2]."""
     rotation = state.pose.matrix
-    body = bodies_of(state.robot)
+    own, inertia = robot_fields(state.robot, "mass", "inertia")
     mass = np.zeros((*state.pose.shape, 6, 6))
-    mass[..., :3, :3] = body.mass[..., None, None] * np.eye(3)
-    mass[..., 3:, 3:] = rotation @ body.inertia @ np.swapaxes(rotation, -1, -2)
+    mass[..., :3, :3] = own[..., None, None] * np.eye(3)
+    mass[..., 3:, 3:] = rotation @ inertia @ np.swapaxes(rotation, -1, -2)
     return mass

@@ -13,7 +13,7 @@ from sagline.kernels.dynamics import collocation
 from sagline.kernels.dynamics import string as columns
 from sagline.kernels.dynamics.collocation import dynamic_stiffnesses
 from sagline.kernels.dynamics.string import fill_routing_compliance
-from sagline.robot.batch import anchors_of, cables_of, first_of
+from sagline.robot.batch import cables_of, first_of, robot_fields
 from sagline.robot.equilibrium import Equilibrium
 from sagline.statics.tables import cable_table
 
@@ -86,9 +86,9 @@ def undamped(frequency: Array) -> Array:
 
 def _axes(state: Equilibrium) -> Array:
     """Axes of each cable, one per row, shape (..., m, 3, 3); world axes for a vertical cable."""
-    anchors = anchors_of(state.robot)
-    turned = anchors.platform @ np.swapaxes(state.pose.matrix, -1, -2)
-    level = (state.pose.position[..., None, :] + turned - anchors.frame)[..., :2]
+    frame, platform = robot_fields(state.robot, "frame_anchors", "platform_anchors")
+    turned = platform @ np.swapaxes(state.pose.matrix, -1, -2)
+    level = (state.pose.position[..., None, :] + turned - frame)[..., :2]
     length = np.hypot(level[..., 0], level[..., 1])
     upright = length == 0.0
     cosine = np.where(upright, 1.0, level[..., 0] / np.maximum(length, _TINY))

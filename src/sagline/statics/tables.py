@@ -9,7 +9,7 @@ from sagline.core.errors import CableGeometryError
 from sagline.kernels.cable import geometry as rows
 from sagline.kernels.cable.geometry import cable_geometries
 from sagline.kernels.statics import SHORTEST_CHORD
-from sagline.robot.batch import Robots, anchors_of, first_of, pulleys_of
+from sagline.robot.batch import Robots, first_of, pulleys_of
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
@@ -97,8 +97,7 @@ def refuse_missing_chords(robot: Robots, pose: Pose, geometry: Array | None = No
 
 def _inside_pulley(item: str, robot: Robot, pose: Pose, cable: int, radius: float) -> CableGeometryError:
     """Error for a platform end inside or on its pulley, for which no tangent to the pulley exists."""
-    anchors = anchors_of(robot)
-    away = pose.transform(anchors.platform)[cable] - anchors.frame[cable]
+    away = pose.transform(robot.platform_anchors)[cable] - robot.frame_anchors[cable]
     ahead = float(pulleys_of(robot).entry[cable] * away[2])  # direction from drum to pulley at the entry
     half = np.sqrt(max(radius**2 - max(ahead, 0.0) ** 2, 0.0))
     near = f"< {radius - half:.6g} m or " if ahead > 0.0 else ""

@@ -8,7 +8,7 @@ from sagline.core.arrays import Array, locked
 from sagline.core.progress import blocks, rows_of
 from sagline.kernels.inverse.feasibility import margins_of_poses
 from sagline.kernels.memory import memory_for
-from sagline.robot.batch import first_of, limits_of
+from sagline.robot.batch import first_of, robot_fields
 from sagline.robot.equilibrium import Equilibrium, of_equilibrium
 from sagline.statics.tables import pose_rows, robot_terms
 from sagline.tension.method import LIMITS_OF
@@ -43,8 +43,8 @@ def limit_margin(state: Equilibrium) -> Array:
 
 def cable_margins(state: Equilibrium) -> Array:
     """Distance between the tension of each cable and its nearest limit, (m,) or (N, m) [N]."""
-    tension, limits = state.limited_tension, limits_of(state.robot)
-    margins: Array = np.minimum(tension - limits.low, limits.high - tension)
+    tension, (low, high) = state.limited_tension, robot_fields(state.robot, "tension_min", "tension_max")
+    margins: Array = np.minimum(tension - low, high - tension)
     return margins
 
 

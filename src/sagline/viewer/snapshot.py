@@ -17,9 +17,8 @@ from sagline.kinematics.confirm import confirm
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
-from sagline.robot.inertia import with_mass
 from sagline.robot.pose import Pose
-from sagline.robot.robot import Robot
+from sagline.robot.robot import Robot, with_mass
 from sagline.tension.margin import cable_margins
 from sagline.tension.method import TensionMethod, shared_tension
 from sagline.tension.methods import DEFAULT

@@ -14,8 +14,7 @@ from scipy.spatial.transform import Rotation
 from sagline.cables.model import CableModel
 from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.core.numbers import counted, n
-from sagline.robot.inertia import without_cables
-from sagline.robot.robot import Robot
+from sagline.robot.robot import Robot, without_cables
 from sagline.tension.methods import MinimumNorm
 from sagline.viewer.readout import color_key, html_block
 from sagline.viewer.robot_scene import Nodes

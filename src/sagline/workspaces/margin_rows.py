@@ -17,7 +17,7 @@ from sagline.kernels import tables
 from sagline.kernels.memory import memory_for
 from sagline.kernels.workspaces.signed_margin import FACET_SIZE, signed_margins
 from sagline.kernels.workspaces.wrench_set import SetTerms
-from sagline.robot.batch import bodies_of, first_of, together
+from sagline.robot.batch import first_of, robot_fields, together
 from sagline.robot.reach import check_cable_count
 from sagline.robot.robot import Robot
 from sagline.statics.tables import robot_terms
@@ -83,7 +83,7 @@ class MarginRows:
             )
         self.robot_count = len(table)
         limits = (LIMITS_OF[shared.tension_limits_of], np.nan)
-        inertias = bodies_of(robots).inertia
+        (inertias,) = robot_fields(robots, "inertia")
         terms = (freedom, bodies, table)
         arms = _arms(table, bodies, moment_arm)
         self._given = (

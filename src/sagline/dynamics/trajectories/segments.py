@@ -13,8 +13,7 @@ import numpy as np
 from sagline.core.arrays import Array, locked
 from sagline.core.errors import InvalidValueError
 from sagline.motion.path import Path
-from sagline.motion.rest_to_rest import time_grid
-from sagline.motion.segments import QUINTIC, Segments
+from sagline.motion.rest_to_rest import QUINTIC, Segments, time_grid
 from sagline.robot.pose import Pose
 
 _STOPPED: Final = 1e-6  # largest speed at a stop, as a share of the path's largest speed
