@@ -142,7 +142,7 @@ class Winch:
         shape = _shape({name: value.shape[: batch[name]] for name, value in values.items()})
         for name, value in values.items():
             object.__setattr__(self, name, spread(value, (*shape, *value.shape[batch[name] :])))
-        _check_pairs(*map(np.atleast_1d, (self.dead_cable, self.dead_rise, self.rolling_friction)), self.cable_length)
+        _check_pairs(self)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -327,14 +327,15 @@ def _vertical(axis: Array) -> Array:
     return locked(upright)
 
 
-def _check_pairs(dead_cable: Array, dead_rise: Array, rolling_friction: Array, cable_length: Array | None) -> None:
+def _check_pairs(winch: Winch) -> None:
     """Refuse values that contradict each other, and a bearing that takes the whole tension."""
+    dead_cable, dead_rise, friction = map(np.atleast_1d, (winch.dead_cable, winch.dead_rise, winch.rolling_friction))
     steep, allowed = np.abs(dead_rise) > dead_cable, "within +-{limit:g} m, its dead_cable"
     step = "A straight cable rises by at most its length; correct one of the two values."
     refuse_first(steep, "winches: dead_rise", dead_rise, "m", allowed, step, dead_cable)
     step = "A bearing takes only part of the tension; correct it."
-    refuse_first(rolling_friction >= 1.0, "winches: rolling_friction", rolling_friction, "", ">= 0, < 1", step)
-    if cable_length is not None:
-        short, allowed = np.atleast_1d(cable_length < dead_cable), ">= {limit:g} m, its dead_cable"
+    refuse_first(friction >= 1.0, "winches: rolling_friction", friction, "", ">= 0, < 1", step)
+    if winch.cable_length is not None:
+        short, allowed = winch.cable_length < dead_cable, ">= {limit:g} m, its dead_cable"
         step = "The cable must be longer than the distance from drum to pulley; correct one of the two values."
-        refuse_first(short, "winches: cable_length", cable_length, "m", allowed, step, dead_cable)
+        refuse_first(short, "winches: cable_length", winch.cable_length, "m", allowed, step, dead_cable)
