@@ -25,7 +25,7 @@ FORWARD: Final = 10  # added to the codes of ForwardStatus that are not zero
 
 @cache
 def compiler() -> str:
-    """The C compiler; a machine without one fails, because nothing else can tell whether the source is right."""
+    """The C compiler; a machine without one fails, because no other test checks the source."""
     found = shutil.which("gcc") or shutil.which("cc")
     if found is None:
         pytest.fail("no C compiler: install gcc (apt-get install gcc libc6-dev)", pytrace=False)
@@ -33,7 +33,7 @@ def compiler() -> str:
 
 
 def compiled(source: Path, target: Path, *options: str, command: Sequence[str] = ()) -> Path:
-    """A source compiled with the strict flags; a warning is an error."""
+    """A compiled source, with strict flags and warnings as errors."""
     words = [*(command or (compiler(),)), *STRICT, *EXACT, *options, str(source), "-o", str(target)]
     done = subprocess.run([*words, "-lm"] if "-c" not in options else words, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
@@ -62,7 +62,7 @@ class Program:
         self.work = ctypes.create_string_buffer(1 << 18)
 
     def inverse(self, pose: sl.Pose, wrench: Array | None = None, method: int = 0, *, follow: bool = False) -> Results:
-        """Poses one by one; follow: each stays nearest to the tensions of the pose before."""
+        """Poses one by one; with `follow`, each is nearest to the tensions of the previous pose."""
         count = len(pose)
         status, tension = np.zeros(count, int), np.full((count, self.cables), np.nan, self.kind)
         length, previous = tension.copy(), np.full(self.cables, np.nan, self.kind)
@@ -76,7 +76,7 @@ class Program:
         return Results(status, tension, length)
 
     def forward(self, lengths: Array, start: sl.Pose | None, wrench: Array | None = None) -> Results:
-        """Samples one by one: from a start each, or by a search."""
+        """Samples one by one, each from an initial pose or by a search."""
         count = len(lengths)
         status, tension = np.zeros(count, int), np.full((count, self.cables), np.nan, self.kind)
         poses = np.full((count, 7), np.nan, self.kind)
@@ -97,7 +97,7 @@ class Program:
 
 
 class Sizes(NamedTuple):
-    """Sizes of an object file [bytes]; the stack is that of the deepest chain of calls, without the C library."""
+    """Sizes of an object file [bytes]; the stack is that of the deepest chain of calls without the C library."""
 
     code: int
     constants: int
@@ -107,7 +107,7 @@ class Sizes(NamedTuple):
 
 CORES: Final = {
     "Cortex-M4F": ("-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16"),  # single precision in hardware
-    "Cortex-M7": ("-mcpu=cortex-m7", "-mfpu=fpv5-d16"),  # double precision too
+    "Cortex-M7": ("-mcpu=cortex-m7", "-mfpu=fpv5-d16"),  # double precision as well
 }
 
 

@@ -1,4 +1,4 @@
-"""Executions made by hand: a robot that follows a plan, with everything that a log must keep."""
+"""Artificial executions: a robot follows a plan, with all quantities that a log contains."""
 
 from collections.abc import Iterator
 from functools import cache
@@ -21,7 +21,7 @@ def plan_of(seconds: float = 2.0) -> Plan:
 
 
 def cycles_of(plan: Plan, count: int | None = None, seed: int = 0) -> Iterator[Recorded]:
-    """Cycles of a machine that follows, with noise; every 50th is without an answer, the last without a command."""
+    """Cycles of a machine with noise; every 50th has no solution, and the last one has no command."""
     assert plan.path is not None
     rng, m = np.random.default_rng(seed), plan.state.one_robot.cable_count
     groups = len(groups_of(m))

@@ -1,4 +1,4 @@
-"""Plans to be saved, and whether two are the same."""
+"""Plans for files, and their comparison."""
 
 from operator import attrgetter
 
@@ -8,7 +8,7 @@ import sagline as sl
 from sagline import dump_robot
 
 SUSPENDED = sl.load_robot("article-suspended")
-OUTSIDE = sl.quintic_path([(0.0, 0.0, 1.5), (7.2, 3.0, 1.5)], durations=5.0, rate=8.0)  # ends outside
+OUTSIDE = sl.quintic_path([(0.0, 0.0, 1.5), (7.2, 3.0, 1.5)], durations=5.0, rate=8.0)  # the last one is infeasible
 
 PLACES = (
     *(

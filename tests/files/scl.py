@@ -1,4 +1,4 @@
-"""SCL without a compiler: a function block's statements as Python's, data blocks laid out as TIA Portal does."""
+"""SCL without a compiler: statements of a function block in Python, and data blocks with the layout of TIA Portal."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ STATEMENT = re.compile(r"\s*(IF\b.*?\bTHEN|ELSIF\b.*?\bTHEN|ELSE\b|FOR\b.*?\bDO\
 
 
 class Array(list[Any]):
-    """An array from 1."""
+    """An array with indices from 1."""
 
     def __getitem__(self, index: Any) -> Any:
         assert 1 <= index <= len(self)
@@ -39,7 +39,7 @@ def without_comments(text: str) -> str:
 
 
 def data_block(text: str, name: str) -> tuple[dict[str, tuple[str, int]], int]:
-    """Type and offset of each value of a block, and its size: each begins at a word, a structure ends at one."""
+    """Type and offset of each value of a block, and its size: it begins at a word, and a structure ends at one."""
     body = without_comments(text).partition(f'DATA_BLOCK "{name}"')[2].partition("END_DATA_BLOCK")[0]
     assert "S7_Optimized_Access := 'FALSE'" in body
     rows = re.findall(r"(\w+) : (Array\[1\.\.(\d+)\] of Struct|\w+)|(END_STRUCT);", body.partition("STRUCT")[2])
@@ -65,7 +65,7 @@ def data_block(text: str, name: str) -> tuple[dict[str, tuple[str, int]], int]:
 
 
 def variables(text: str, name: str) -> SimpleNamespace:
-    """The variables of a function block, as it begins."""
+    """Variables of a function block with their initial values."""
     head = without_comments(text).partition(f'FUNCTION_BLOCK "{name}"')[2].partition("\nBEGIN\n")[0]
     head = head.partition("VAR_INPUT")[2]
     declared = r"(\w+) : (?:Array\[1\.\.(\d+)\] of )?(\w+)(?: := ([^;]+))?|END_STRUCT"
@@ -85,7 +85,7 @@ def variables(text: str, name: str) -> SimpleNamespace:
 
 
 def function_block(text: str, name: str) -> Callable[[SimpleNamespace, SimpleNamespace], None]:
-    """Its statements as a function of its variables and the data blocks; whatever it does not know is an error."""
+    """Statements as a function of the variables and data blocks; unknown statements are errors."""
     body = text.partition(f'FUNCTION_BLOCK "{name}"')[2].partition("\nBEGIN\n")[2].partition("END_FUNCTION_BLOCK")[0]
     lines, depth = ["def block(v, db):"], 1
     for statement in STATEMENT.findall(without_comments(body)):

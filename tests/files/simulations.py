@@ -1,4 +1,4 @@
-"""Simulations to be saved, and whether two are the same; of numbers that no integrator gave."""
+"""Artificial simulations for files, and their comparison."""
 
 from operator import attrgetter
 
@@ -50,7 +50,7 @@ def a_simulation(
 
 
 def balance(kinetic: Array, potential: Array, supplied: Array, lost: Array, removed: Array) -> sl.EnergyBalance:
-    """Energies [J] whose error is what the others leave."""
+    """Energies [J] whose error is the sum of the others."""
     total = kinetic + potential - supplied + lost + removed
     return sl.EnergyBalance(kinetic, potential, supplied, lost, removed, total - total[0])
 
@@ -64,7 +64,7 @@ def assert_same(simulation: sl.Simulation, other: sl.Simulation) -> None:
         assert mine.tobytes() == theirs.tobytes(), quantity.place
         assert not theirs.flags.writeable, quantity.place
     assert (simulation.nodes is None) == (other.nodes is None)
-    assert repr(simulation.events) == repr(other.events)  # NaN is NaN, a number of Python one of Python
+    assert repr(simulation.events) == repr(other.events)  # NaN equals NaN; numbers of Python stay numbers of Python
     for name in ("cable_mass", "step", "integrator", "winches", "winding", "damping"):
         mine, theirs = (getattr(one, name) for one in (simulation, other))
         assert (mine, type(mine)) == (theirs, type(theirs)), name

@@ -1,4 +1,4 @@
-"""C source of a robot against the package: inverse and forward solutions, methods, pulleys, precisions, refusals."""
+"""C source of a robot compared with the package: inverse, forward, methods, pulleys, precisions, refusals."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from tests.tiers import extended, wide
 
 PAGE = Path(__file__).parents[2] / "docs" / "howto" / "microcontroller.md"
 PROTOTYPE = "article-prototype"
-UNDECIDED = (codes.POSE_INFEASIBLE, codes.POSE_NOT_CONVERGED)  # the package goes on to prove these
+UNDECIDED = (codes.POSE_INFEASIBLE, codes.POSE_NOT_CONVERGED)  # the package continues with a proof for these
 
 
 def planar() -> sl.Robot:
-    """A point on four cables in a plane that is none of the axes'."""
+    """A point mass on four cables in a plane that is not parallel to an axis."""
     normal = np.array([0.6, -0.8, 0.0])
     along = np.array([0.8, 0.6, 0.0])
     corners = [s * 3.0 * along + np.array([0.0, 0.0, z]) for s, z in ((-1, 0.0), (1, 0.0), (1, 4.0), (-1, 4.0))]
@@ -35,7 +35,7 @@ def planar() -> sl.Robot:
 
 
 def ten_cables() -> sl.Robot:
-    """The prototype with two more cables, from the middle of two sides of the floor."""
+    """The prototype with two additional cables from the middle of two sides of the floor."""
     robot = sl.load_robot(PROTOTYPE)
     frame = np.vstack((robot.frame_anchors, [[2.0, 0.0, 0.0], [-2.0, 0.0, 0.0]]))
     platform = np.vstack((robot.platform_anchors, [[0.2, 0.0, -0.2], [-0.2, 0.0, -0.2]]))
@@ -53,25 +53,25 @@ def robot_of(name: str) -> sl.Robot:
 
 
 def poses_of(robot: sl.Robot, count: int, rng: np.random.Generator) -> sl.Pose:
-    """Poses of the test box of a robot, in its free motions."""
+    """Poses of the test box of a robot in its free motions."""
     if robot.name == "planar":
         s, z = rng.uniform(-2.5, 2.5, count), rng.uniform(0.3, 3.7, count)
         return sl.Pose(np.stack([0.8 * s, 0.6 * s, z], axis=1), np.broadcast_to(np.eye(3), (count, 3, 3)))
     if robot.name == "ten":
         angles = rng.uniform(-0.1, 0.1, (3, count))
         return sl.Pose.from_euler(rng.uniform([-0.5, -0.5, 1.0], [0.5, 0.5, 2.0], (count, 3)), *angles)
-    from tests.tension.reference import random_poses  # imports solvers, which the first tier does not need
+    from tests.tension.reference import random_poses  # imports solvers that the first tier does not need
 
     return random_poses(robot, count, rng)
 
 
 def moved(pose: sl.Pose, robot: sl.Robot) -> sl.Pose:
-    """Poses a centimeter away, along the free motions."""
+    """Poses at a distance of a centimeter along the free motions."""
     return sl.Pose(pose.position + 0.01 * robot.freedom[:, :3].sum(axis=0), pose.matrix)
 
 
 def assert_inverse(program: Program, robot: sl.Robot, pose: sl.Pose, load: Array | None, method: int, plan: Any) -> int:
-    """Equal to the last bit, except at poses that the package decides by a proof; returns the number of solved ones."""
+    """Equal to the last bit, except at poses that a proof decides; returns the number of solved poses."""
     found = program.inverse(pose, load, method)
     solved = found.status == SOLVED
     at = f"{robot.name}, method {method}"
@@ -83,7 +83,7 @@ def assert_inverse(program: Program, robot: sl.Robot, pose: sl.Pose, load: Array
 
 
 def assert_forward(program: Program, robot: sl.Robot, plan: sl.Plan, load: Array | None) -> None:
-    """From a start equal to the last bit; without one the pose of the plan."""
+    """Equal to the last bit from an initial pose; without one, the pose of the plan."""
     good = np.flatnonzero(plan.feasible)
     lengths, pose = plan.unstrained_length[good], plan.state.pose[good]
     loads = None if load is None else load[good]
@@ -101,7 +101,7 @@ def assert_forward(program: Program, robot: sl.Robot, plan: sl.Plan, load: Array
     assert np.median(np.abs(found.found[stable, :3] - pose.position[stable]).max(axis=1)) < 1e-9
 
 
-def test_results_are_those_of_the_package_to_the_last_bit(tmp_path: Path) -> None:
+def test_results_agree_with_the_package_to_the_last_bit(tmp_path: Path) -> None:
     """A small case of the next test for the first tier, with the center of mass off the origin."""
     robot = sl.load_robot(PROTOTYPE).replace(center_of_mass=(0.05, -0.03, 0.1))
     program = Program(robot, tmp_path, "-O0", forward=True)
@@ -116,7 +116,7 @@ def test_results_are_those_of_the_package_to_the_last_bit(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     "name", [PROTOTYPE, "cogiro", "article-mixed", "falcon-7", "fast", "ipanema-3-pulleys", "planar", "ten"]
 )
-def test_every_method_and_the_forward_solution_over_pulleys_too(name: str, tmp_path: Path) -> None:
+def test_all_methods_and_forward_with_pulleys(name: str, tmp_path: Path) -> None:
     rng = np.random.default_rng(7)
     robot = robot_of(name)
     redundant = robot.cable_count - robot.degrees_of_freedom
@@ -146,11 +146,11 @@ def test_tensions_follow_a_path_as_closest_does(tmp_path: Path) -> None:
     assert plan.feasible.all()
     np.testing.assert_array_equal(found.found, plan.unstrained_length)
     alone = sl.inverse(robot, path, tension=sl.MinimumNorm())
-    assert np.abs(alone.unstrained_length - plan.unstrained_length).max() > 1e-4  # there is something to follow
+    assert np.abs(alone.unstrained_length - plan.unstrained_length).max() > 1e-4  # at least one sample follows
 
 
 def stated_errors() -> list[tuple[str, float, float, float, float]]:
-    """Largest errors in single precision on the page about microcontrollers."""
+    """Largest errors in single precision, as on the page on microcontrollers."""
     rows = re.findall(r"^\| `([\w-]+)`, \d+ m \| (.*) \|$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
     units = {"µm": 1e-6, "mN": 1e-3, "N": 1.0}
     pairs = [(name, [cell.split() for cell in cells.split(" | ")]) for name, cells in rows]
@@ -212,7 +212,7 @@ def test_wrong_input_has_a_status_and_leaves_the_last_result(tmp_path: Path) -> 
 
 
 class _Poses(list[Array]):
-    """Positions and quaternions that `Pose` would refuse."""
+    """Positions and quaternions that `Pose` refuses."""
 
     position: Array
     quaternion: Array
@@ -227,7 +227,7 @@ def unchecked(position: Array, quaternion: Array) -> Any:
 @extended
 def test_a_pose_without_full_rank_is_singular(tmp_path: Path) -> None:
     robot = sl.load_robot(PROTOTYPE)
-    straight = robot.replace(platform_anchors=[[0.0, 0.0, z] for z in (0.25, -0.25) * 4])  # free to turn about z
+    straight = robot.replace(platform_anchors=[[0.0, 0.0, z] for z in (0.25, -0.25) * 4])  # free to rotate about z
     assert Program(straight, tmp_path).inverse(sl.Pose([[0.0, 0.0, 1.5]], np.eye(3)[None])).status[0] == SINGULAR
 
 
@@ -248,7 +248,7 @@ def test_the_source_has_no_recursion_heap_or_loop_without_a_bound(tmp_path: Path
     assert "_Complex" not in text
 
 
-def test_only_what_is_asked_for_is_written(tmp_path: Path) -> None:
+def test_only_requested_functions_are_written(tmp_path: Path) -> None:
     robot = sl.load_robot(PROTOTYPE)
     least = sl.export_c(robot, tmp_path / "s.c")[0].read_text()
     forward = sl.export_c(robot, tmp_path / "s.c", forward=True)[0].read_text()
@@ -258,7 +258,7 @@ def test_only_what_is_asked_for_is_written(tmp_path: Path) -> None:
     assert "polygon" not in forward.lower()
 
 
-def test_what_is_not_covered_is_refused(tmp_path: Path) -> None:
+def test_unsupported_robots_are_refused(tmp_path: Path) -> None:
     robot = sl.load_robot(PROTOTYPE)
     changes: list[tuple[dict[str, Any], dict[str, Any], str, str | None]] = [
         ({"tension_max": np.inf}, {"tension": sl.ClosedForm()}, "article-prototype: tension_max[0]", None),
@@ -274,7 +274,9 @@ def test_what_is_not_covered_is_refused(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_a_package_that_was_not_built_says_how_to_build_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_a_package_without_compiled_kernels_names_the_next_step(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     monkeypatch.setattr(c_source, "KERNELS", "c/nothing.json")
     with pytest.raises(sl.FileError, match=r"python -m tools\.build"):
         sl.export_c(sl.load_robot(PROTOTYPE), tmp_path / "sagline.c")
@@ -294,7 +296,7 @@ def test_every_preset_is_exported(name: str, tmp_path: Path) -> None:
 
 @extended
 @pytest.mark.parametrize("name", ["evil */ int main(void) {", "what??/", 'a "b" \\', "@mass@", "Ärger /*"])
-def test_any_name_stays_in_its_comment(name: str, tmp_path: Path) -> None:
+def test_names_stay_within_their_comment(name: str, tmp_path: Path) -> None:
     robot = sl.load_robot(PROTOTYPE).replace(name=name, tension_max=np.inf)
     source, header, _ = sl.export_c(robot, tmp_path / "sagline.c")
     compiled(source, tmp_path / "sagline.o", "-O0", "-c")

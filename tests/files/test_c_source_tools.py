@@ -1,4 +1,4 @@
-"""C source of a robot under sanitizers, the analyzer and a compiler for microcontrollers; the program of its page."""
+"""C source of a robot with sanitizers, the analyzer and a compiler for microcontrollers; the program on its page."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ pytestmark = extended
 
 PAGE = Path(__file__).parents[2] / "docs" / "howto" / "microcontroller.md"
 EVERY = [make() for make in tension_methods.METHODS.values()]
-# every method at poses inside and outside, then forward from there and without a start
+# all methods at feasible and infeasible poses, then forward with and without an initial pose
 MAIN = """\
 #include <stdio.h>
 #include "sagline.h"
@@ -54,7 +54,7 @@ int main(void)
 
 @pytest.mark.parametrize("single", [False, True])
 @pytest.mark.parametrize("name", ["article-prototype", "ipanema-3-pulleys"])
-def test_no_access_outside_an_array_and_nothing_undefined(name: str, single: bool, tmp_path: Path) -> None:
+def test_sanitizers_find_no_invalid_access_and_no_undefined_behavior(name: str, single: bool, tmp_path: Path) -> None:
     robot = sl.load_robot(name)
     source, _, _ = sl.export_c(robot, tmp_path / "sagline.c", tension=EVERY, forward=True, single_precision=single)
     (tmp_path / "main.c").write_text(MAIN)
@@ -71,8 +71,8 @@ def test_the_analyzer_finds_nothing(tmp_path: Path) -> None:
     compiled(source, tmp_path / "sagline.o", "-O0", "-fanalyzer", "-c")
 
 
-def test_a_microcontroller_of_single_precision_needs_no_other(tmp_path: Path) -> None:
-    """Sizes with arm-none-eabi-gcc if it is installed; else zig's compiler shows that the source compiles."""
+def test_single_precision_source_uses_no_double_precision(tmp_path: Path) -> None:
+    """Sizes with arm-none-eabi-gcc if it is installed; otherwise the compiler of zig compiles the source."""
     robot = sl.load_robot("article-prototype")
     source, _, _ = sl.export_c(robot, tmp_path / "sagline.c", forward=True, single_precision=True)
     if shutil.which("arm-none-eabi-gcc") is None:
@@ -83,7 +83,7 @@ def test_a_microcontroller_of_single_precision_needs_no_other(tmp_path: Path) ->
         sizes = arm_sizes(source, core, "-Os", "-Wdouble-promotion")
         assert sizes.code < 36_000
         assert sizes.constants < 2_000
-        assert sizes.variables == 0  # no state
+        assert sizes.variables == 0  # no state variables
         assert sizes.stack < 8_000
     called = subprocess.run(["nm", "-u", str(tmp_path / "sagline.o")], check=True, capture_output=True, text=True)
     names = set(called.stdout.split()) - {"U"}
@@ -103,7 +103,7 @@ def test_the_sizes_on_the_page(functions: str, asked: dict[str, Any], single: bo
     assert (sizes.code + sizes.constants) / 1000.0 == pytest.approx(float(stated), rel=0.1)
 
 
-def test_the_program_on_its_page_prints_what_the_page_says(tmp_path: Path) -> None:
+def test_the_program_on_its_page_prints_the_output_on_the_page(tmp_path: Path) -> None:
     page = PAGE.read_text()
     (program,) = re.findall(r"```c\n(.*?)```", page, re.DOTALL)
     (tmp_path / "program.c").write_text(program)
@@ -113,8 +113,8 @@ def test_the_program_on_its_page_prints_what_the_page_says(tmp_path: Path) -> No
     assert printed in re.findall(r'```text title="output"\n(.*?)\n```', page, re.DOTALL)
 
 
-def test_the_flags_for_speed_change_no_digit(tmp_path: Path) -> None:
-    """-O3 with AVX2, as the compiled kernels have it: -mno-fma keeps the rounding of every operation."""
+def test_optimization_flags_change_no_digit(tmp_path: Path) -> None:
+    """-O3 with AVX2, as for the compiled kernels: -mno-fma keeps the rounding of all operations."""
     robot = sl.load_robot("cogiro")
     poses = sl.Pose.from_euler(
         np.random.default_rng(1).uniform(-1.0, 1.0, (50, 3)) + np.array((0.0, 0.0, 2.0)), 0.1, 0.0, 0.05

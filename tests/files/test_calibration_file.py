@@ -59,7 +59,7 @@ def calibration(name: str) -> sl.Calibration:
 
 
 def assert_same(one: Any, other: Any, place: str = "calibration") -> None:
-    """Both have the same fields of the same kinds to the last bit, and what can be locked is."""
+    """Both have equal fields of equal types to the last bit, and arrays are read-only."""
     if isinstance(one, sl.Robot):
         assert dump_robot(one) == dump_robot(other), place
     elif isinstance(one, np.ndarray):
@@ -84,14 +84,14 @@ def assert_same(one: Any, other: Any, place: str = "calibration") -> None:
 
 
 @pytest.mark.parametrize("name", wide(["everything else", *list(DETAILS)[:-1]]))
-def test_what_is_read_back_is_the_same(name: str, tmp_path: Path) -> None:
+def test_a_loaded_calibration_is_equal(name: str, tmp_path: Path) -> None:
     found = calibration(name)
     found.save(tmp_path / "found.nc")
     assert_same(found, sl.load_calibration(tmp_path / "found.nc"))
     assert_same(found, pickle.loads(pickle.dumps(found)))
 
 
-def test_numbers_stand_in_the_file_with_their_units(tmp_path: Path) -> None:
+def test_numbers_in_the_file_have_units(tmp_path: Path) -> None:
     found = calibration("as usual")
     found.save(tmp_path / "found.nc")
     with xarray.open_dataset(tmp_path / "found.nc", engine="h5netcdf") as data:
@@ -131,7 +131,7 @@ def one_too_few(data: xarray.Dataset, name: str) -> xarray.Dataset:
 
 
 def far_out(data: xarray.Dataset, name: str) -> xarray.Dataset:
-    """A value that none of its kind has: NaN or below zero, an index far off, a word that is none."""
+    """An impossible value: NaN, negative, an index out of range, or an unknown word."""
     old = data[name]
     values = old.values.copy()
     kind = values.dtype.kind
@@ -140,7 +140,7 @@ def far_out(data: xarray.Dataset, name: str) -> xarray.Dataset:
 
 
 EDITS = (renamed, gone, of_other_unit, of_other_type, one_too_few, far_out)
-FREE = {  # what may have any value: text, counts
+FREE = {  # fields with arbitrary values: text, counts
     (far_out, name) for name in ("degrees_of_freedom", "iterations", "folds", "logarithmic", "prior_stated")
 } | {
     (of_other_type, name)
@@ -149,12 +149,12 @@ FREE = {  # what may have any value: text, counts
 FREE |= {(of_other_type, "cannot_tell_apart_step"), (far_out, "covariance"), (far_out, "prior_deviation")}
 
 
-OPTIONAL = {"rotation_deviation", "tension_deviation", "position_deviation", "folds"}  # a sensor, a check less
+OPTIONAL = {"rotation_deviation", "tension_deviation", "position_deviation", "folds"}  # a sensor or a check is missing
 
 
 @pytest.fixture
 def read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[xarray.Dataset], sl.Calibration]:
-    """Read a data set as from a file that somebody edited and sealed anew: only checks of the content are left."""
+    """Read a data set as from an edited file with a valid digest: only checks of the content remain."""
 
     monkeypatch.setattr(calibration_file, "parse_robot", cache(parse_robot))
 
@@ -226,7 +226,7 @@ def test_other_files_are_refused(tmp_path: Path, snapshot: SnapshotAssertion) ->
             sl.load_calibration(tmp_path / name)
 
 
-def test_a_model_of_ones_own_cannot_be_read_back(tmp_path: Path) -> None:
+def test_a_custom_model_cannot_be_loaded(tmp_path: Path) -> None:
     class Own(sl.Catenary):
         pass
 

@@ -18,7 +18,7 @@ def chosen(count: int, drums: bool) -> sl.CalibrationPoses:
 
 
 @pytest.mark.parametrize("drums", [True, False])
-def test_poses_stand_in_the_file_with_how_to_reach_them(drums: bool, tmp_path: Path) -> None:
+def test_the_file_contains_poses_with_lengths_and_counts(drums: bool, tmp_path: Path) -> None:
     plan = chosen(5, drums)
     plan.save(tmp_path / "poses.yaml")
     text = (tmp_path / "poses.yaml").read_text()
@@ -43,7 +43,7 @@ def test_poses_stand_in_the_file_with_how_to_reach_them(drums: bool, tmp_path: P
     assert "mass [kg]" in about["expected_error"]
 
 
-def test_the_file_is_a_path_that_rests_at_every_pose(tmp_path: Path) -> None:
+def test_the_file_is_a_path_with_rests_at_all_poses(tmp_path: Path) -> None:
     plan = chosen(5, True)
     plan.save(tmp_path / "poses.yaml")
     path = sl.load_path(tmp_path / "poses.yaml")
@@ -61,14 +61,14 @@ def test_the_file_is_a_path_that_rests_at_every_pose(tmp_path: Path) -> None:
     assert np.diff(times).min() >= 2.0
 
 
-def test_one_pose_is_no_path_but_a_file(tmp_path: Path) -> None:
+def test_a_single_pose_is_saved_without_a_path(tmp_path: Path) -> None:
     chosen(1, False).save(tmp_path / "poses.yaml")
     assert len(parse_mapping((tmp_path / "poses.yaml").read_text(), "")["waypoints"]) == 1
     with pytest.raises(sl.FileError, match=r"poses\.yaml"):
         sl.load_path(tmp_path / "poses.yaml")
 
 
-def test_a_file_that_cannot_be_written_stays_as_it_was(tmp_path: Path) -> None:
+def test_a_file_that_cannot_be_written_is_unchanged(tmp_path: Path) -> None:
     (tmp_path / "poses.yaml").mkdir()
     with pytest.raises(sl.FileError, match="folder"):
         chosen(1, False).save(tmp_path / "poses.yaml")

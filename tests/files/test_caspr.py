@@ -74,10 +74,10 @@ def test_a_robot_in_full(folder: Path) -> None:
     robot = imported.robot
     assert (robot.name, robot.mass, robot.motion_pattern) == ("gondola", 8.0, "3R3T")
     np.testing.assert_array_equal(robot.frame_anchors, [[-3, 0, 4], [3, 0, 4], [0, 2, 4]])
-    # the second cable's end is given from the center of mass, (0.1, 0, -0.2)
+    # the end of the second cable is given from the center of mass, (0.1, 0, -0.2)
     np.testing.assert_allclose(robot.platform_anchors, [[-0.2, 0, 0.1], [0.3, 0, -0.1], [0, 0.2, 0]], atol=1e-15)
     np.testing.assert_array_equal(robot.center_of_mass, [0.1, 0.0, -0.2])
-    # Steiner by hand: 8 kg at (0.1, 0, -0.2) takes 0.32, 0.40, 0.08 and adds 8 * 0.1 * -0.2 to Ixz
+    # Steiner's theorem by hand: 8 kg at (0.1, 0, -0.2) takes 0.32, 0.40, 0.08 and adds 8 * 0.1 * -0.2 to Ixz
     np.testing.assert_allclose(robot.inertia, [[0.5, 0, 0], [0, 0.6, 0], [0, 0, 0.4]], atol=1e-15)
     np.testing.assert_array_equal(robot.tension_min, [5, 5, 5])
     np.testing.assert_array_equal(robot.tension_max, [300, 300, 300])
@@ -86,7 +86,7 @@ def test_a_robot_in_full(folder: Path) -> None:
     assert "4 mm" in robot.assumed["cables"]
 
 
-def test_what_was_lost_is_told(folder: Path, snapshot: SnapshotAssertion) -> None:
+def test_lost_data_are_listed(folder: Path, snapshot: SnapshotAssertion) -> None:
     imported = load_caspr(folder)
     assert imported.robot.notes.endswith(" ".join(imported.lost))
     assert imported.lost == snapshot
@@ -100,7 +100,7 @@ def entered(vector: str, radius: str = "0.04", tag: str = "attachment_base_pulle
 
 
 @pytest.mark.parametrize(("vector", "axis"), [("0 0 1", 1.0), ("0.0 0 -2", -1.0), ("0 -0 0.5", 1.0)])
-def test_a_pulley_that_is_entered_vertically(folder: Path, vector: str, axis: float) -> None:
+def test_a_pulley_with_a_vertical_cable_is_converted(folder: Path, vector: str, axis: float) -> None:
     (folder / "cables" / "gondola_cables.xml").write_text(cables_file(IDEAL, SPRING, entered(vector)))
     imported = load_caspr(folder)
     winches = imported.robot.winches
@@ -122,7 +122,7 @@ def test_a_pulley_that_is_entered_vertically(folder: Path, vector: str, axis: fl
     ],
     ids=["level", "tilted", "no direction", "roller", "no direction given"],
 )
-def test_a_pulley_that_is_not_ours_is_lost_and_told(folder: Path, pulley: str, snapshot: SnapshotAssertion) -> None:
+def test_an_unsupported_pulley_is_listed_as_lost(folder: Path, pulley: str, snapshot: SnapshotAssertion) -> None:
     (folder / "cables" / "gondola_cables.xml").write_text(cables_file(IDEAL, SPRING, pulley))
     imported = load_caspr(folder)
     assert imported.robot.winches is None
@@ -137,18 +137,18 @@ def test_a_pulley_that_is_not_ours_is_lost_and_told(folder: Path, pulley: str, s
         (entered("0 0 1", "-0.1"), ("winches: pulley_radius[2]", "-0.1 m", ">= 0 m, finite")),
     ],
 )
-def test_a_pulley_that_will_not_do(folder: Path, pulley: str, parts: tuple[str, ...]) -> None:
+def test_an_invalid_pulley_is_refused(folder: Path, pulley: str, parts: tuple[str, ...]) -> None:
     (folder / "cables" / "gondola_cables.xml").write_text(cables_file(IDEAL, SPRING, pulley))
     with refused(*parts, kind=FileError):
         load_caspr(folder)
 
 
 @pytest.mark.parametrize("file", ["gondola_bodies.xml", "cables/gondola_cables.xml"])
-def test_either_file_finds_the_other(folder: Path, file: str) -> None:
+def test_each_file_finds_the_other(folder: Path, file: str) -> None:
     assert load_caspr(folder / file).robot.cable_count == 3
 
 
-def test_the_file_named_wins_over_others(folder: Path) -> None:
+def test_the_named_file_has_priority(folder: Path) -> None:
     (folder / "other_cables.xml").write_text(cables_file(IDEAL))
     assert load_caspr(folder / "other_cables.xml").robot.cable_count == 1
     with refused("CASPR files of cables", kind=FileError, file=folder) as caught:
@@ -156,7 +156,7 @@ def test_the_file_named_wins_over_others(folder: Path) -> None:
     assert "(gondola_cables.xml, other_cables.xml)" in caught.value.reason
 
 
-def test_set_and_material_of_choice(folder: Path) -> None:
+def test_choice_of_cable_set_and_material(folder: Path) -> None:
     imported = load_caspr(folder, Cable(0.02, 5e4), "one")
     assert imported.robot.cable_count == 1
     assert imported.robot.cables.linear_density.tolist() == [0.02]
@@ -202,7 +202,7 @@ def test_joints_become_patterns(folder: Path, joint: str, pattern: str, normal: 
         ("<Ixx>0.82</Ixx>", "<Ixx>0.1</Ixx>", ("inertia", "a matrix with the principal moment -0.22 kg m^2")),
     ],
 )
-def test_bodies_that_will_not_do(folder: Path, old: str, new: str, parts: tuple[str, ...]) -> None:
+def test_invalid_bodies_are_refused(folder: Path, old: str, new: str, parts: tuple[str, ...]) -> None:
     (folder / "gondola_bodies.xml").write_text(BODIES.replace(old, new))
     with refused(*parts, kind=FileError):
         load_caspr(folder)
@@ -225,13 +225,13 @@ def test_bodies_that_will_not_do(folder: Path, old: str, new: str, parts: tuple[
         ("cable_set", "group", ("cable set", "''", "none")),
     ],
 )
-def test_cables_that_will_not_do(folder: Path, old: str, new: str, parts: tuple[str, ...]) -> None:
+def test_invalid_cables_are_refused(folder: Path, old: str, new: str, parts: tuple[str, ...]) -> None:
     (folder / "cables" / "gondola_cables.xml").write_text(cables_file(IDEAL, SPRING).replace(old, new))
     with refused(*parts, kind=FileError):
         load_caspr(folder)
 
 
-def test_files_that_are_not_there(folder: Path, snapshot: SnapshotAssertion) -> None:
+def test_missing_files_are_refused(folder: Path, snapshot: SnapshotAssertion) -> None:
     for name in ("none", "gondola_trajectories.xml"):
         with refused(kind=FileError, file=folder / name) as caught:
             load_caspr(folder / name)
@@ -242,7 +242,7 @@ def test_files_that_are_not_there(folder: Path, snapshot: SnapshotAssertion) -> 
     assert "(none)" in caught.value.reason
 
 
-# the four ways in which CASPR's own planar models give an inertia: zero about what they never turn about
+# the four inertias of CASPR's own planar models: zero about axes without rotation
 @pytest.mark.parametrize(
     ("joint", "moments", "turns"),
     [
@@ -255,7 +255,7 @@ def test_files_that_are_not_there(folder: Path, snapshot: SnapshotAssertion) -> 
         ("T_XYZ", (0.0, 0.0, 0.0), False),
     ],
 )
-def test_only_the_moment_that_counts_must_be_positive(
+def test_only_the_used_moment_of_inertia_must_be_positive(
     folder: Path, joint: str, moments: tuple[float, float, float], turns: bool
 ) -> None:
     given = "".join(f"<I{a}{a}>{moment}</I{a}{a}>" for a, moment in zip("xyz", moments, strict=True))
@@ -284,7 +284,7 @@ def test_a_solid_turning_about_every_axis_has_all_moments(folder: Path) -> None:
             load_caspr(folder)
 
 
-def test_other_heads_comments_and_laws(folder: Path) -> None:
+def test_other_headers_comments_and_cable_laws(folder: Path) -> None:
     body = BODIES[BODIES.index("<links") :]
     for head, tail in (
         ('<?xml version="1.0" encoding="utf-8"?>\n<!DOCTYPE bodies_system SYSTEM "../../t/bodies.dtd">\n<bodies_system>'

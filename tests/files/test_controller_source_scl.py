@@ -1,4 +1,4 @@
-"""The SCL source for PLCs, which nothing here compiles: its offsets, and its statements against the twin's program."""
+"""SCL source for PLCs, not compiled here: its offsets, and its statements compared with the program of the twin."""
 
 from __future__ import annotations
 
@@ -32,20 +32,20 @@ def text() -> str:
 
 
 @pytest.mark.parametrize("block", BLOCKS, ids=lambda block: block.name)
-def test_offsets_in_scl_are_those_of_packing(block: Block) -> None:
+def test_offsets_in_scl_agree_with_packing(block: Block) -> None:
     rows, size = data_block(text(), block.name)
     assert rows == {name: (kind, offset) for name, kind, offset in block.rows}
     assert size == block.size == block.packer.size
     values = {name: i + 1 for i, (name, _, _) in enumerate(block.rows) if name not in ("magic", "version")}
     data = block.pack(values)
-    for name, (kind, offset) in rows.items():  # and mirrors hold these bytes as they are
+    for name, (kind, offset) in rows.items():  # and the servers contain these bytes unchanged
         if name in values:
             code = {"LReal": ">f8", "Real": ">f4", "UInt": ">u2", "DInt": ">i4", "Time": ">i4"}.get(kind, ">u4")
             assert np.frombuffer(data, code, 1, offset)[0] == values[name]
 
 
 def namespace(block: Block, data: bytes | None = None) -> SimpleNamespace:
-    """A data block with what some bytes say."""
+    """A data block with the values of the given bytes."""
     values = block.read(data) if data else {name: 0 for name, _, _ in block.rows}
     assert isinstance(values, dict)
     found = SimpleNamespace(winch=Array([SimpleNamespace(), SimpleNamespace()]))
@@ -56,7 +56,7 @@ def namespace(block: Block, data: bytes | None = None) -> SimpleNamespace:
 
 
 class Bench:
-    """The program of the twin and the statements of the source, side by side."""
+    """The program of the twin and the statements of the source with equal inputs."""
 
     def __init__(self, count: int) -> None:
         self.count = count
@@ -81,10 +81,10 @@ class Bench:
     def command(self, values: dict[str, Any]) -> None:
         data = TO_PLC.pack(values)
         if data == self.order:
-            return  # what stands there is looked at once
+            return  # the next scan reads the claim at once
         self.order = data
         self.db.sagline_to_plc = namespace(TO_PLC, data)
-        read = TO_PLC.read(data)  # rates and tensions in single precision, as they go over the wire
+        read = TO_PLC.read(data)  # rates and tensions in single precision, as transmitted
         assert isinstance(read, dict)
         columns = [
             [read[f"winch[{i + 1}].{name}"] for i in range(self.count)]
@@ -131,7 +131,7 @@ def pad(values: list[Any]) -> list[Any]:
 
 
 def drive(bench: Bench, seed: int, scans: int) -> dict[str, int]:
-    """Do this and that to both; how often what came about."""
+    """Apply random inputs to both, and count the events."""
     random, seen = np.random.default_rng(seed), dict[str, int]()
     last: dict[str, Any] = {}
     counter, silent, slips, asked = int(random.integers(1, 2**31 - 1)), 0, 0, list(bench.encoder)
@@ -165,7 +165,7 @@ def drive(bench: Bench, seed: int, scans: int) -> dict[str, int]:
         bench.encoder = [to if random.random() < 0.9 else there for to, there in moved]
         if random.random() < 0.002:
             slips = 3
-        if slips:  # and again, though its set point follows it
+        if slips:  # again, although its set point follows it
             slips -= 1
             bench.encoder = [there + 0.02 for there in bench.encoder]
         program.contact = bool(random.random() >= (0.05 if slips else 0.001))
@@ -185,25 +185,25 @@ def drive(bench: Bench, seed: int, scans: int) -> dict[str, int]:
     return seen
 
 
-def test_the_source_does_what_the_twins_program_does_for_a_few_seconds() -> None:
+def test_the_source_agrees_with_the_program_of_the_twin_for_a_few_seconds() -> None:
     drive(Bench(2), seed=2, scans=1_000)
 
 
 @extended
 @pytest.mark.parametrize("count", [2, 1])
-def test_the_source_does_what_the_twins_program_does(count: int) -> None:
+def test_the_source_agrees_with_the_program_of_the_twin(count: int) -> None:
     seen = drive(Bench(count), seed=count + 4, scans=8_000)
     assert set(seen) >= {each.name for each in GroupFault}
     assert set(seen) >= {f"status {code}" for code in (1, 2, 3, 5, 9, 17, 35, 98)}
 
 
 @pytest.mark.soak
-def test_the_source_does_what_the_twins_program_does_for_long() -> None:
+def test_the_source_agrees_with_the_program_of_the_twin_for_a_long_time() -> None:
     for seed in range(40):
         drive(Bench(2), seed, 20_000)
 
 
-@pytest.mark.parametrize("far", [0.02, 0.05])  # m from the end of the range, reached before the ramp, and in it
+@pytest.mark.parametrize("far", [0.02, 0.05])  # m from the end of the range, reached before the ramp and in it
 @pytest.mark.parametrize(("end", "rate"), [(2.7, -0.375), (3.5, 0.375)])
 def test_the_source_keeps_set_points_in_their_range_without_commands(end: float, rate: float, far: float) -> None:
     bench = Bench(1)
@@ -224,7 +224,7 @@ def test_the_source_keeps_set_points_in_their_range_without_commands(end: float,
     assert bench.v.length[1] == end
 
 
-def test_the_file_names_what_is_to_be_set_and_that_it_is_not_compiled(tmp_path: Path) -> None:
+def test_the_file_names_its_settings_and_that_it_is_not_compiled(tmp_path: Path) -> None:
     path = sl.export_scl(ROBOT, tmp_path / "plc.scl")
     written = path.read_bytes().decode()
     assert written.replace("\r\n", "\n") == text()
@@ -239,7 +239,7 @@ def test_the_file_names_what_is_to_be_set_and_that_it_is_not_compiled(tmp_path: 
     assert speed == pytest.approx(drums.speed_limit * drums.drum_radius / drums.gear, rel=1e-3)  # type: ignore[operator]
 
 
-def test_what_it_cannot_be_written_for_is_told(tmp_path: Path) -> None:
+def test_unsupported_robots_are_refused(tmp_path: Path) -> None:
     with refused(next_step="Let it end in .scl: plc.scl.", kind=sl.FileError):
         sl.export_scl(ROBOT, tmp_path / "plc.txt")
     with pytest.raises(sl.InvalidValueError, match="winches"):

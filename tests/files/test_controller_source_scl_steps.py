@@ -1,4 +1,4 @@
-"""P3 in SCL, which nothing here compiles: its statements are run one by one as Python's, and compared."""
+"""SCL of the elastic cable (P3), not compiled here: its statements are executed in Python and compared."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ CABLES = 4_000
 
 
 def any_cables(rng: np.random.Generator) -> tuple[Array, ...]:
-    """Span, rise, tension, weight and stiffness: every slope, upright ones too, to the borders of what is covered."""
+    """Span, rise, tension, weight and stiffness: all slopes including vertical ones, up to the limits of the block."""
     chord = 10.0 ** rng.uniform(-0.5, 1.5, CABLES)
     angle = rng.uniform(-np.pi / 2, np.pi / 2, CABLES)
     weight, stiffness = 10.0 ** rng.uniform(-2, 1, CABLES), 10.0 ** rng.uniform(3.5, 6.5, CABLES)
@@ -36,7 +36,7 @@ def reference(cables: tuple[Array, ...]) -> sl.CableState:
 
 
 def as_python(scl: str) -> Callable[..., dict[str, Any]]:
-    """The block as a function of its inputs; what is no statement of the few that it uses is an error."""
+    """The block as a function of its inputs; unknown statements are errors."""
     body = scl.partition("\nBEGIN\n")[2].partition("END_FUNCTION")[0]
     words = re.sub(r"//[^\n]*", "", body).replace("#", "")
     words = re.sub(r"\bSQRT\b", "sqrt", words)
@@ -70,7 +70,7 @@ def text(tmp_path_factory: pytest.TempPathFactory) -> str:
     return sl.export_c(sl.load_robot("article-prototype"), folder / "sagline.c")[2].read_text()
 
 
-def test_its_numbers_are_those_of_the_kernels(text: str) -> None:
+def test_its_numbers_agree_with_the_kernels(text: str) -> None:
     block = as_python(text)
     cables = any_cables(np.random.default_rng(2))
     state = reference(cables)
@@ -84,11 +84,11 @@ def test_its_numbers_are_those_of_the_kernels(text: str) -> None:
 @pytest.mark.parametrize(
     ("tension", "status"), [(-1.0, 1), (0.0, 1), (0.5, 2), (0.89, 2), (0.91, 0), (1400.0, 0), (1500.0, 3)]
 )
-def test_what_it_does_not_cover_has_a_status(text: str, tension: float, status: int) -> None:
+def test_unsupported_cables_have_a_status(text: str, tension: float, status: int) -> None:
     assert as_python(text)(4.0, 0.0, tension, 0.9, 14e3)["SaglineLength"] == status
 
 
-def test_every_variable_is_declared_and_it_says_that_it_is_not_compiled(text: str) -> None:
+def test_variables_are_declared_and_a_comment_says_that_it_is_not_compiled(text: str) -> None:
     head, _, body = text.partition("\nBEGIN\n")
     declared = set(re.findall(r"^\s+(\w+) : (?:LReal|Int);", head, re.MULTILINE))
     used = set(re.findall(r"#(\w+)", body)) - {"SaglineLength"}

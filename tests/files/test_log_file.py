@@ -1,4 +1,4 @@
-"""Logs of winches in CSV: what is written is read again to the last bit, and what is wrong is told by its line."""
+"""Logs of winches in CSV: written logs are read exactly, and errors are reported with their line."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def read(folder: Path, text: str, sensors: sl.Sensors | None = None) -> sl.Winch
 
 @pytest.mark.parametrize("robot", [sl.load_robot("cogiro"), with_drums()], ids=["lengths", "counts"])
 @pytest.mark.parametrize("measured", [0, 4])
-def test_what_is_saved_is_read_again(robot: sl.Robot, measured: int, tmp_path: Path) -> None:
+def test_a_saved_log_is_read_exactly(robot: sl.Robot, measured: int, tmp_path: Path) -> None:
     truth = true_robot(robot, seed=2, sensors=SENSORS)
     log = log_of(truth, 12, seed=2, positions=measured, rotations=measured).log
     assert log.load_cells is not None
@@ -76,7 +76,7 @@ WHOLE = """\
 """
 
 
-def test_columns_come_in_any_order_with_units_and_gaps(tmp_path: Path) -> None:
+def test_columns_in_any_order_with_units_and_gaps(tmp_path: Path) -> None:
     log = read(tmp_path, WHOLE)
     nan = np.nan
     assert log.counts is None
@@ -102,7 +102,7 @@ def test_columns_come_in_any_order_with_units_and_gaps(tmp_path: Path) -> None:
     np.testing.assert_array_equal(sensors.target, [0, 0, 0.1])
 
 
-def test_sensors_that_are_given_stand_in_place_of_the_comments(tmp_path: Path) -> None:
+def test_given_sensors_replace_those_of_the_comments(tmp_path: Path) -> None:
     given = sl.Sensors(tension_deviation=1.0, position_deviation=1.0, rotation_deviation=1.0)
     assert read(tmp_path, WHOLE, given).sensors is given
     with refused("sensors: tension_deviation", "of shape (3,)", kind=sl.InvalidValueError):
@@ -111,7 +111,7 @@ def test_sensors_that_are_given_stand_in_place_of_the_comments(tmp_path: Path) -
         read(tmp_path, WHOLE, 5.0)  # type: ignore[arg-type]
 
 
-def test_a_log_of_counts_alone_needs_no_comment(tmp_path: Path) -> None:
+def test_a_log_with_only_counts_needs_no_comment(tmp_path: Path) -> None:
     log = read(tmp_path, "count_0,count_1,time [ms]\n1,2,0\n-3,4.5,500\r\n")
     np.testing.assert_array_equal(log.counts, [[1, 2], [-3, 4.5]])
     np.testing.assert_array_equal(log.time, [0.0, 0.5])
@@ -204,13 +204,13 @@ COMMANDED = "length_0,x_commanded,y_commanded,z_commanded"
         (CELLS + "# target: [0, 0]\n" + ROWS, ("target", "of shape (2,)", "shape (3,)")),
     ],
 )
-def test_what_is_wrong_is_told_by_its_line_or_key(text: str, parts: tuple[str, ...], tmp_path: Path) -> None:
+def test_errors_are_reported_with_line_or_key(text: str, parts: tuple[str, ...], tmp_path: Path) -> None:
     with refused(*parts, kind=sl.FileError, file=tmp_path / "log.csv") as caught:
         read(tmp_path, text)
     assert len(str(caught.value)) < 300
 
 
-def test_a_log_is_written_whole_or_not_at_all(tmp_path: Path, snapshot: SnapshotAssertion) -> None:
+def test_a_log_is_written_atomically(tmp_path: Path, snapshot: SnapshotAssertion) -> None:
     log = sl.WinchLog(counts=[[1.0]])
     (tmp_path / "taken").mkdir()
     for place in (tmp_path / "taken", tmp_path / "none" / "log.csv"):
@@ -226,7 +226,7 @@ def test_a_log_is_written_whole_or_not_at_all(tmp_path: Path, snapshot: Snapshot
     assert again.tobytes() == odd.counts.tobytes()
 
 
-def test_quaternions_of_few_decimals_are_normalized(tmp_path: Path) -> None:
+def test_quaternions_with_few_decimals_are_normalized(tmp_path: Path) -> None:
     comment = "# rotation_deviation: 0.1 deg\n"
     turned = read(tmp_path, f"{comment}length_0,qx,qy,qz,qw\n1,0.5001,0.5,0.5,0.5\n").rotation
     assert turned is not None

@@ -1,4 +1,4 @@
-"""Logs in MCAP: everything of an execution, also where the writer was killed or the disk was full."""
+"""Logs in MCAP: all data of an execution, also after a kill of the writer and on a full disk."""
 
 import json
 import re
@@ -58,21 +58,21 @@ def recorded(file: Path, count: int = 201, epoch: int = 0) -> None:
     assert "closed" in recorder.stopped
 
 
-def test_an_execution_comes_back_to_the_last_bit(tmp_path: Path) -> None:
+def test_an_execution_is_saved_exactly(tmp_path: Path) -> None:
     execution().save(tmp_path / "run.mcap")
     assert_same(execution(), sl.load_execution(tmp_path / "run.mcap"))
     execution().save(tmp_path / "again.mcap")
     assert (tmp_path / "again.mcap").read_bytes() == (tmp_path / "run.mcap").read_bytes()
 
 
-def test_nothing_of_an_execution_is_left_out() -> None:
+def test_all_fields_of_an_execution_are_saved() -> None:
     places = {quantity.place for quantity in EVERY}
     own = {field.name for field in fields(Execution)} - {"samples", "robot", "plan", "status", "reason", "period"}
     samples = {f"samples.{field.name}" for field in fields(Samples)} - {"samples.time"}
     assert places == (own - {"zero", "events"}) | samples
 
 
-def test_a_recorder_keeps_the_digits_that_are_told(tmp_path: Path) -> None:
+def test_a_recorder_keeps_the_requested_digits(tmp_path: Path) -> None:
     recorded(tmp_path / "run.mcap")
     found, given = columns_of(sl.load_execution(tmp_path / "run.mcap")), columns_of(execution())
     for name, values in given.items():
@@ -87,7 +87,7 @@ def test_a_recorder_keeps_the_digits_that_are_told(tmp_path: Path) -> None:
     assert_same(done, sl.load_execution(tmp_path / "again.mcap"))
 
 
-def test_a_session_of_several_plans_is_read_whole_or_plan_by_plan(tmp_path: Path) -> None:
+def test_a_session_with_several_plans_is_read_completely_or_by_plan(tmp_path: Path) -> None:
     plans = (plan_of(), plan_of(1.0))
     with mcap_writer.Recorder(tmp_path / "run.mcap", ROBOT, epoch=0) as recorder:
         for k, plan in enumerate(plans):
@@ -122,7 +122,7 @@ def test_other_tools_read_cycles_events_transforms_and_scenes(tmp_path: Path) ->
     assert seen["state"] == "MOVING"
     assert seen["tension"] == np.round(done.tension[120], 1).tolist()
     assert seen["length_error"] == np.round(1e3 * (done.set_length - done.length)[120], 2).tolist()
-    assert "position" not in cycles[49]  # there was no answer: no NaN, which JSON does not know
+    assert "position" not in cycles[49]  # no solution: null, because JSON has no NaN
     assert set(seen) - {"degraded"} <= json.loads(schemas["cycle"][1])["properties"].keys()
     assert [event["text"] for event in events] == [event.text for event in events_of()]
     stamp, transform = transforms[5]
@@ -150,7 +150,7 @@ def test_a_chunk_is_closed_every_second_and_is_in_the_file_at_once(tmp_path: Pat
             time.sleep(0.02)
             reader.more()
         waited = time.monotonic() - handed
-    assert waited < 1.2  # the machine that runs the tests may be slow
+    assert waited < 1.2  # the machine of the tests can be slow
     assert not reader.log.complete
     assert len(reader.log.blocks[0]["time"]) == 7
     reader.more()
@@ -178,7 +178,7 @@ for cycle in cycles_of(plan, 100000):
 
 
 def lost_when_killed(file: Path, lives: float) -> float:
-    """How much of a recording is lost [s] whose process is killed some time [s] after its first cycle."""
+    """Duration of the lost end of a recording [s] whose process is killed at a time [s] after its first cycle."""
     root = Path(__file__).parents[2]
     words = (sys.executable, "-c", VICTIM.format(root=str(root), file=str(file)))
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
@@ -201,13 +201,13 @@ def lost_when_killed(file: Path, lives: float) -> float:
 
 @extended
 @pytest.mark.parametrize("lives", [1.6, pytest.param(30.0, marks=pytest.mark.soak)])
-def test_of_a_process_that_is_killed_no_more_than_a_second_is_lost(tmp_path: Path, lives: float) -> None:
+def test_a_killed_process_loses_at_most_a_second(tmp_path: Path, lives: float) -> None:
     tries = (lost_when_killed(tmp_path / f"{k}.mcap", lives) for k in range(AGAIN))
-    assert any(lost <= 1.0 + 0.15 for lost in tries)  # s: a promise of a machine that is not busy with other tests
+    assert any(lost <= 1.0 + 0.15 for lost in tries)  # s: the limit of a machine without other load
 
 
 class Disk(RawIOBase):
-    """A disk with room for so many bytes."""
+    """A disk with space for a number of bytes."""
 
     def __init__(self, room: int) -> None:
         self.content, self._room = bytearray(), room
@@ -228,7 +228,7 @@ def stopped(recorder: Recorder) -> str:
     return recorder.stopped
 
 
-def test_a_full_disk_stops_recording_and_nothing_else(tmp_path: Path) -> None:
+def test_a_full_disk_stops_only_the_recording(tmp_path: Path) -> None:
     disk = Disk(20_000)
     recorder = mcap_writer.Recorder(tmp_path / "run.mcap", ROBOT, epoch=0, stream=disk)
     for cycle in cycles_of(plan_of()):
@@ -248,7 +248,7 @@ def test_a_full_disk_stops_recording_and_nothing_else(tmp_path: Path) -> None:
     assert not read_log(tmp_path / "left.mcap").complete
 
 
-def test_a_device_that_is_full_is_told_before_anything_moves(tmp_path: Path) -> None:
+def test_a_full_device_is_reported_before_the_motion(tmp_path: Path) -> None:
     with refused(kind=sl.FileError, file=tmp_path / "run.mcap") as caught:
         mcap_writer.Recorder(tmp_path / "run.mcap", ROBOT, stream=Disk(10))
     assert "No space" in caught.value.reason
@@ -285,7 +285,7 @@ def test_a_full_queue_stops_recording_without_waiting(tmp_path: Path, monkeypatc
     assert sum(len(block["time"]) for block in log.blocks) in (19, 20, 21)  # the thread may have taken some
 
 
-def test_the_truth_of_a_twin_is_kept_to_the_last_bit(tmp_path: Path) -> None:
+def test_true_values_of_a_twin_are_saved_exactly(tmp_path: Path) -> None:
     rng = np.random.default_rng(3)
     rows = [(0.01 * k, rng.normal(size=3), rng.normal(size=4)) for k in range(150)]
     with mcap_writer.Recorder(tmp_path / "twin.mcap", ROBOT, epoch=5_000_000_000) as recorder:
@@ -299,7 +299,9 @@ def test_the_truth_of_a_twin_is_kept_to_the_last_bit(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("package", PACKAGES)
-def test_a_missing_package_is_one_sentence(tmp_path: Path, package: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_package_is_reported_in_one_sentence(
+    tmp_path: Path, package: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("sagline.files.mcap_writer.find_spec", lambda name: None if name == package else object())
     (tmp_path / "run.mcap").write_bytes(b"before")
     for use in (execution().save, lambda file: mcap_writer.Recorder(file, ROBOT), sl.load_execution):
@@ -310,7 +312,7 @@ def test_a_missing_package_is_one_sentence(tmp_path: Path, package: str, monkeyp
 
 
 @pytest.mark.soak
-def test_fourteen_minutes_with_the_plan_inside_are_twenty_megabytes(tmp_path: Path) -> None:
+def test_fourteen_minutes_with_the_plan_take_twenty_megabytes(tmp_path: Path) -> None:
     from sagline.article.table2 import table2
     from sagline.article.ten_poses import HOME
 
@@ -329,8 +331,8 @@ def test_fourteen_minutes_with_the_plan_inside_are_twenty_megabytes(tmp_path: Pa
     assert len(sl.load_execution(tmp_path / "run.mcap")) == 84_000
 
 
-def test_a_plan_whose_checksum_is_wrong_is_refused(tmp_path: Path) -> None:
-    """A log cut off before its end has no digest of the whole: the attachment's own checksum shows the damage."""
+def test_a_plan_with_a_wrong_checksum_is_refused(tmp_path: Path) -> None:
+    """A log without its end has no digest of the whole: the checksum of the attachment shows the damage."""
     recorded(tmp_path / "run.mcap")
     data = bytearray((tmp_path / "run.mcap").read_bytes())
     with (tmp_path / "run.mcap").open("rb") as file:
@@ -349,7 +351,7 @@ def test_a_plan_whose_checksum_is_wrong_is_refused(tmp_path: Path) -> None:
 
 
 def test_times_of_day_are_those_of_cycles(tmp_path: Path) -> None:
-    """An event before the first of them has the time 0 of a link that was made long before."""
+    """An event before the first cycle has time 0 of a link that was created long before."""
     early = events_of(0.0)[0]
     (first,) = cycles_of(plan_of(), 1)
     with mcap_writer.Recorder(tmp_path / "run.mcap", ROBOT) as log:

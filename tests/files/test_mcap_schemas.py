@@ -1,4 +1,4 @@
-"""Messages of a log against the schemas of the log itself."""
+"""Messages of a log checked with the schemas in the log."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ PLAIN: dict[str, tuple[type, ...]] = {"string": (str,), "integer": (int,), "numb
 
 
 def errors(schema: dict[str, Any], value: Any, place: str = "") -> list[str]:
-    """Places of a value that contradict a schema; a schema may use only what Foxglove reads: one type for a value."""
+    """Places of a value that contradict a schema; only constructs that Foxglove reads are valid."""
     assert schema.keys() <= KEYS
     if schema["type"] == "object":
         if not isinstance(value, dict):
@@ -41,7 +41,7 @@ def no_constant(text: str) -> float:
     raise ValueError(f"{text} is not JSON")
 
 
-def test_a_schema_is_held_against_a_message() -> None:
+def test_a_schema_finds_errors_of_a_message() -> None:
     schema = {
         "type": "object",
         "properties": {"a": {"type": "array", "items": {"type": "number"}}, "b": {"type": "string"}},
@@ -51,7 +51,7 @@ def test_a_schema_is_held_against_a_message() -> None:
     assert errors(schema, {"a": [1, None, True], "c": 1}) == ["/b", "/c", "/a/1", "/a/2"]
 
 
-def test_every_message_of_a_run_that_loses_a_cell_is_valid(tmp_path: Path) -> None:
+def test_messages_of_a_run_with_a_failing_cell_are_valid(tmp_path: Path) -> None:
     machine = sl.twin.Machine(ROBOT, start=HOME, seed=1, faults="cell 5 fails at 1.5 s")
     with Recorder(tmp_path / "run.mcap", ROBOT) as record:
         control = sl.control.Controller(ROBOT, machine.link(), seed=2, record=record)

@@ -35,6 +35,6 @@ def test_columns_in_any_order_with_their_units(tmp_path: Path) -> None:
         ("span,rise,length,tension\n1,0,1,5\n0,1,1,5\n", ("line 3", "span is 0 m", "> 0 m")),
     ],
 )
-def test_what_is_wrong_is_said_with_its_line(tmp_path: Path, text: str, parts: tuple[str, ...]) -> None:
+def test_errors_are_reported_with_their_line(tmp_path: Path, text: str, parts: tuple[str, ...]) -> None:
     with refused(*parts, kind=sl.FileError):
         sl.load_measurements(written(tmp_path, text))

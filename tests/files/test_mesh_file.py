@@ -47,26 +47,26 @@ def test_meshes_of_every_kind_are_read_in_meters_with_z_up(tmp_path: Path, kind:
     found = sl.load_mesh(file, unit="cm")
     assert found.name == "ring"
     assert found.volume == pytest.approx(mesh.volume * 1e-6, rel=1e-6)
-    tall = 1 if kind == "glb" else 2  # y is up in a GLB, which was not told so here
+    tall = 1 if kind == "glb" else 2  # y is up in a GLB, which this call does not say
     assert np.ptp(found.bounds, axis=0)[tall] == pytest.approx(0.03, abs=1e-8)
     assert found.encloses([0.0, 0.0, 0.0]) == np.False_
 
 
 @pytest.mark.parametrize("kind", ["stl", "ply", "obj", "glb"])
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e38, -1e10, 1.001e7])
-def test_corners_that_are_nowhere_are_refused_without_a_warning(tmp_path: Path, kind: str, value: float) -> None:
+def test_corners_that_are_not_finite_are_refused_without_a_warning(tmp_path: Path, kind: str, value: float) -> None:
     import trimesh
 
     box = trimesh.creation.box((1.0, 1.0, 1.0))
     for corners in (np.where(np.arange(8)[:, None] == 3, value, box.vertices), value * box.vertices):
-        with warnings.catch_warnings():  # of the writer
+        with warnings.catch_warnings():  # a warning of the writer
             warnings.simplefilter("ignore")
             file = written(tmp_path, trimesh.Trimesh(corners, box.faces, process=False), f"box.{kind}")
         with pytest.raises(sl.FileError, match=r"numbers|1e\+06"):
             sl.load_mesh(file)
 
 
-def test_the_unit_decides_what_is_too_far_away(tmp_path: Path) -> None:
+def test_the_limit_of_coordinates_depends_on_the_unit(tmp_path: Path) -> None:
     import trimesh
 
     file = written(tmp_path, trimesh.creation.box((3e6, 1.0, 1.0)), "box.stl")
@@ -79,7 +79,7 @@ def test_the_unit_decides_what_is_too_far_away(tmp_path: Path) -> None:
     ("face", "line"),
     [("f 0 1 2", 9), ("f 1/1 2/2 0/3", 9), (" f\t3 00 1", 9), ("f 1 2 -0", 9), ("f 1 2 3\r\nf 0 2 3", 10)],
 )
-def test_faces_of_an_obj_count_corners_from_one(tmp_path: Path, face: str, line: int) -> None:
+def test_faces_of_an_obj_have_indices_from_one(tmp_path: Path, face: str, line: int) -> None:
     corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
     faces = "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 -1\n"
     file = tmp_path / "wedge.obj"
@@ -91,7 +91,7 @@ def test_faces_of_an_obj_count_corners_from_one(tmp_path: Path, face: str, line:
 
 
 def test_a_glb_is_read_with_its_y_axis_up(tmp_path: Path) -> None:
-    """(x, y, z) of glTF is (x, -z, y) here: the box tells top from bottom and front from back."""
+    """(x, y, z) of glTF is (x, -z, y) here: the box distinguishes top from bottom and front from back."""
     import trimesh
 
     box = trimesh.creation.box(bounds=[(1.0, 2.0, 3.0), (1.5, 2.6, 3.7)])
@@ -114,7 +114,7 @@ def test_meshes_that_are_open_or_cross_themselves_are_refused_with_their_extent(
         assert re.search(facts, caught.value.reason)
 
 
-def test_where_a_surface_crosses_itself_is_on_both_of_its_parts() -> None:
+def test_points_of_self_intersection_are_on_both_surfaces() -> None:
     mesh = overlapping()
     point = first_crossing(sl.Mesh(mesh.vertices, mesh.faces))
     assert point is not None
@@ -141,9 +141,7 @@ def test_larger_meshes_are_not_searched_for_crossings(tmp_path: Path, monkeypatc
     ],
     ids=["garbage STL", "garbage GLB", "empty STL", "short OBJ", "short PLY", "STEP"],
 )
-def test_files_that_are_no_meshes_are_refused(
-    tmp_path: Path, name: str, content: bytes, snapshot: SnapshotAssertion
-) -> None:
+def test_other_files_are_refused(tmp_path: Path, name: str, content: bytes, snapshot: SnapshotAssertion) -> None:
     (tmp_path / name).write_bytes(content)
     with refused(kind=sl.FileError, file=tmp_path / name) as caught:
         sl.load_mesh(tmp_path / name)
@@ -152,7 +150,7 @@ def test_files_that_are_no_meshes_are_refused(
 
 
 @pytest.mark.parametrize("unit", ["kg", "", "5 mm", "parsnip"])
-def test_what_is_no_unit_of_length_is_refused(tmp_path: Path, unit: str) -> None:
+def test_invalid_units_of_length_are_refused(tmp_path: Path, unit: str) -> None:
     import trimesh
 
     file = written(tmp_path, trimesh.creation.box(), "box.stl")

@@ -18,7 +18,7 @@ SURFACE = Surface(BOX.vertices, BOX.faces)
 
 
 @pytest.mark.parametrize("ending", ["stl", "glb", "ply"])
-def test_what_is_read_back_has_the_same_volume_and_is_closed(ending: str, tmp_path: Path) -> None:
+def test_a_loaded_surface_has_the_same_volume_and_is_closed(ending: str, tmp_path: Path) -> None:
     import trimesh
 
     file = tmp_path / f"hull.{ending.upper()}"
@@ -36,7 +36,7 @@ def test_what_is_read_back_has_the_same_volume_and_is_closed(ending: str, tmp_pa
 
 
 @pytest.mark.parametrize("distance", [1e-9, 1e-30])
-def test_stl_has_no_triangle_that_its_numbers_flatten(distance: float, tmp_path: Path) -> None:
+def test_stl_has_no_degenerate_triangles_after_rounding(distance: float, tmp_path: Path) -> None:
     import trimesh
 
     vertices = np.array([[1, 0, 0], [1, distance, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1.0]])
@@ -51,7 +51,7 @@ def test_stl_has_no_triangle_that_its_numbers_flatten(distance: float, tmp_path:
 
 
 @pytest.mark.parametrize("ending", ["glb", "ply"])
-def test_colors_of_vertices_are_there(ending: str, tmp_path: Path) -> None:
+def test_vertices_have_colors(ending: str, tmp_path: Path) -> None:
     import trimesh
 
     colors = np.random.default_rng(2).integers(0, 256, (len(SURFACE.vertices), 3))
@@ -63,9 +63,7 @@ def test_colors_of_vertices_are_there(ending: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("ending", ["vtk", "vtu"])
-def test_vtk_is_left_to_the_package_that_is_installed(
-    ending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_vtk_is_written_by_an_installed_package(ending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     class Mesh:
         def __init__(self, points: np.ndarray, cells: list[tuple[str, np.ndarray]]) -> None:
             self.text = f"{points.shape} {cells[0][0]} {cells[0][1].shape}"
@@ -96,7 +94,7 @@ def test_vtk_is_left_to_the_package_that_is_installed(
         assert not list(tmp_path.iterdir())
 
 
-def test_what_cannot_be_written_is_said_and_what_was_there_stays(
+def test_errors_are_reported_and_the_existing_file_is_unchanged(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with refused(next_step="Use .stl, .glb, .ply, .vtk, .vtu.", kind=sl.FileError, file=tmp_path / "hull.obj"):

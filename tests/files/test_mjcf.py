@@ -42,12 +42,12 @@ def opened(text: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
     return model, data
 
 
-def settled(text: str) -> mujoco.MjData:
-    """The state in which MuJoCo's platform comes to rest, by letting it swing out."""
+def rest_state(text: str) -> mujoco.MjData:
+    """The state in which the platform of MuJoCo comes to rest after damped motion."""
     import mujoco
 
     model, data = opened(text)
-    model.dof_damping[:] = 3.0 * model.dof_M0  # 1/s of each motion's mass or moment: no motion lags
+    model.dof_damping[:] = 3.0 * model.dof_M0  # 1/s of the mass or moment of each motion: equal decay of all motions
     for _ in range(STEPS):
         mujoco.mj_step(model, data)
     assert np.abs(data.qvel).max() < 1e-9
@@ -60,7 +60,7 @@ def rotation_of(data: mujoco.MjData) -> Rotation:
 
 
 @pytest.mark.parametrize("name", wide(["article-suspended", "ipanema-1"]))
-def test_planned_lengths_hold_the_platform_where_it_is(name: str) -> None:
+def test_planned_lengths_keep_the_platform_at_rest(name: str) -> None:
     robot = load_robot(name)
     assert robot.test_box is not None
     pose = Pose.from_euler(0.5 * (robot.test_box.low + robot.test_box.high), 0.05, 0.02, -0.03)
@@ -72,19 +72,19 @@ def test_planned_lengths_hold_the_platform_where_it_is(name: str) -> None:
     np.testing.assert_allclose(data.qacc, 0.0, atol=1e-9)
 
 
-def test_other_lengths_settle_in_the_equilibrium_of_the_elastic_model() -> None:
+def test_other_lengths_lead_to_the_equilibrium_of_the_elastic_model() -> None:
     robot = load_robot("article-suspended")
     lengths = inverse(robot, POSE, model=Elastic()).unstrained_length * np.linspace(0.985, 1.005, 8)
     expected = forward(robot, lengths, start=POSE, model=Elastic())
     assert expected.solved
-    assert np.linalg.norm(expected.pose.position - POSE.position) > 0.05  # it has moved, and turned
-    data = settled(dump_mjcf(robot, POSE, lengths))
+    assert np.linalg.norm(expected.pose.position - POSE.position) > 0.05  # it has moved and rotated
+    data = rest_state(dump_mjcf(robot, POSE, lengths))
     np.testing.assert_allclose(data.qpos[:3], expected.pose.position, atol=1e-7)
     turn = expected.pose.rotation.inv() * rotation_of(data)
     assert turn.magnitude() < 1e-7
 
 
-def test_mass_and_inertia_are_the_robots() -> None:
+def test_mass_and_inertia_agree_with_the_robot() -> None:
     inertia = np.array([[1.2, 0.1, -0.2], [0.1, 1.5, 0.3], [-0.2, 0.3, 2.0]])
     robot = load_robot("article-suspended").replace(inertia=inertia, center_of_mass=(0.1, -0.05, 0.02), mass=12.0)
     model, _ = opened(dump_mjcf(robot, POSE, [7.0] * 8))
@@ -103,13 +103,13 @@ def test_a_slack_cable_does_not_push() -> None:
     taut = model.tendon_lengthspring[:, 1] < data.ten_length
     assert taut.tolist() == [True] * 3 + [False] + [True] * 4
     expected = forward(robot, lengths, start=POSE, model=Elastic())
-    data = settled(dump_mjcf(robot, POSE, lengths))
+    data = rest_state(dump_mjcf(robot, POSE, lengths))
     np.testing.assert_allclose(data.qpos[:3], expected.pose.position, atol=1e-7)
 
 
 def planar() -> Robot:
     return Robot(
-        "slice -- one",  # two hyphens would end an XML comment
+        "slice -- one",  # an XML comment must not contain two hyphens
         [(-2, 0.3, 3), (2, 0.3, 3), (-2, 0.3, 0), (2, 0.3, 0)],
         [(-0.2, 0, 0.1), (0.2, 0, 0.1), (-0.2, 0, -0.1), (0.2, 0, -0.1)],
         Cable(0.01, 3e4),
@@ -123,19 +123,19 @@ def planar() -> Robot:
     )
 
 
-def test_a_planar_platform_turned_out_of_line() -> None:
+def test_a_planar_platform_with_a_rotation() -> None:
     robot, pose = planar(), Pose.from_euler((0.2, 0.3, 1.4), 0.3, -0.1, 0.0)
     lengths = inverse(robot, pose, model=Elastic()).unstrained_length * np.array([0.99, 1.0, 1.001, 0.995])
     expected = forward(robot, lengths, start=pose, model=Elastic())
     assert expected.solved
-    data = settled(dump_mjcf(robot, pose, lengths))
+    data = rest_state(dump_mjcf(robot, pose, lengths))
     platform = data.body("platform")
     np.testing.assert_allclose(platform.xpos, expected.pose.position, atol=1e-7)
     np.testing.assert_allclose(platform.xmat.reshape(3, 3), expected.pose.rotation.as_matrix(), atol=1e-7)
 
 
 @extended
-def test_a_point_mass_slides_only() -> None:
+def test_a_point_mass_only_translates() -> None:
     robot = Robot(
         "bob",
         [(-1, -1, 2), (1, -1, 2), (0, 1, 2)],
@@ -148,7 +148,7 @@ def test_a_point_mass_slides_only() -> None:
     pose = Pose.from_euler((0.1, 0.0, 1.0), 0.0, 0.0, 0.0)
     lengths = inverse(robot, pose, model=Elastic()).unstrained_length * np.array([1.0, 1.01, 0.99])
     expected = forward(robot, lengths, start=pose, model=Elastic())
-    data = settled(dump_mjcf(robot, pose, lengths))
+    data = rest_state(dump_mjcf(robot, pose, lengths))
     np.testing.assert_allclose(data.body("platform").xpos, expected.pose.position, atol=1e-7)
 
 
@@ -161,18 +161,18 @@ def test_a_point_mass_slides_only() -> None:
         (POSE, [1.0] * 7 + [0.0], ("unstrained_length[7]", "0 m")),
     ],
 )
-def test_what_is_refused(pose: Pose, lengths: list[float] | None, parts: tuple[str, ...]) -> None:
+def test_refusals(pose: Pose, lengths: list[float] | None, parts: tuple[str, ...]) -> None:
     with refused(*parts, kind=InvalidValueError):
         dump_mjcf(load_robot("article-suspended"), pose, lengths)
 
 
 def sentences(text: str, word: str) -> list[str]:
-    """The sentences of the comment that have a word."""
+    """Sentences of the comment that contain a word."""
     (comment,) = re.findall("<!--(.*?)-->", text, re.DOTALL)
     return [sentence for sentence in " ".join(comment.split()).split(". ") if word in sentence]
 
 
-def test_the_file_says_what_is_not_in_it(snapshot: SnapshotAssertion) -> None:
+def test_the_file_lists_omitted_data(snapshot: SnapshotAssertion) -> None:
     assert sentences(dump_mjcf(load_robot("article-suspended"), POSE), "sag,") == snapshot
 
 
@@ -186,8 +186,8 @@ OVER_PULLEYS = load_robot("article-suspended").replace(
 
 
 @pytest.mark.parametrize("seed", wide(range(5)))
-def test_over_pulleys_forces_and_stiffness_are_those_of_pulleys_that_swivel(seed: int) -> None:
-    """Forces to rounding; where the platform comes to rest with other lengths, to the square of how far that is."""
+def test_forces_and_stiffness_over_pulleys_agree_with_swivelling_pulleys(seed: int) -> None:
+    """Forces to rounding; the rest position with other lengths to the square of its distance."""
     random = np.random.default_rng(seed)
     pose = Pose.from_euler(random.uniform((-3.0, -2.0, 0.5), (3.0, 2.0, 4.0)), *random.uniform(-0.15, 0.15, 3))
     plan = inverse(OVER_PULLEYS, pose, model=Elastic())
@@ -202,13 +202,13 @@ def test_over_pulleys_forces_and_stiffness_are_those_of_pulleys_that_swivel(seed
     expected = forward(OVER_PULLEYS, lengths, start=pose, model=Elastic())
     away = float(np.linalg.norm(expected.pose.position - pose.position))
     assert away > 1e-5
-    data = settled(dump_mjcf(OVER_PULLEYS, pose, lengths))
+    data = rest_state(dump_mjcf(OVER_PULLEYS, pose, lengths))
     np.testing.assert_allclose(data.qpos[:3], expected.pose.position, atol=1e-4 * away)
 
 
 @extended
-def test_over_pulleys_lengths_are_off_by_little_nearby_and_by_millimeters_in_the_corners() -> None:
-    """How far they are off for the cylinders not to swivel, of ipanema-2-pulleys, and for exit points that stay."""
+def test_length_errors_over_pulleys_are_small_nearby_and_millimeters_in_corners() -> None:
+    """Length errors of fixed cylinders, which do not swivel, of ipanema-2-pulleys, and of fixed exit points."""
     import mujoco
 
     robot = load_robot("ipanema-2-pulleys")
@@ -236,10 +236,10 @@ def test_over_pulleys_lengths_are_off_by_little_nearby_and_by_millimeters_in_the
 
 
 def tangent_lengths(reach: Array, radius: float) -> Array:
-    """Cable from where it enters a pulley from below to a point: arc and tangent, by the angles of a right triangle."""
+    """Length from the entry on a pulley to a point: arc and tangent, by the angles of a right triangle."""
     across, up = np.hypot(reach[:, 0], reach[:, 1]) - radius, reach[:, 2]
     distance = np.hypot(across, up)
-    touches = np.arctan2(up, across) + np.arccos(radius / distance)  # of the radius there, from level outward
+    touches = np.arctan2(up, across) + np.arccos(radius / distance)  # angle of the radius there, from level outward
     return np.asarray(radius * (np.pi - touches) + np.sqrt(distance**2 - radius**2))
 
 
@@ -254,6 +254,6 @@ def test_a_platform_end_in_a_pulley_is_refused() -> None:
         dump_mjcf(OVER_PULLEYS, POSE, [9.0, 9.0, 4.0, 9.0, 9.0, 9.0, 9.0, 9.0])
 
 
-def test_the_file_says_what_pulleys_lose(snapshot: SnapshotAssertion) -> None:
+def test_the_file_states_the_errors_of_pulleys(snapshot: SnapshotAssertion) -> None:
     assert sentences(dump_mjcf(OVER_PULLEYS, POSE), "pulleys") == snapshot
     assert "pulleys" not in dump_mjcf(load_robot("article-suspended"), POSE)

@@ -1,4 +1,4 @@
-"""Models as MuJoCo sees them: stepped, they stay finite and come to rest where straight springs hold the platform."""
+"""Models in MuJoCo: they stay finite and come to rest at the equilibrium of straight springs."""
 
 import mujoco
 import numpy as np
@@ -29,11 +29,11 @@ def run(model: mujoco.MjModel, data: mujoco.MjData, seconds: float) -> None:
     for _ in range(round(seconds / model.opt.timestep)):
         mujoco.mj_step(model, data)
     assert np.isfinite(data.qpos).all()
-    assert data.time == pytest.approx(seconds, rel=1e-2)  # MuJoCo starts again where a number is not finite
+    assert data.time == pytest.approx(seconds, rel=1e-2)  # MuJoCo starts again after a number that is not finite
 
 
 def frequencies(model: mujoco.MjModel, data: mujoco.MjData, step: float) -> Array:
-    """Natural frequencies [Hz] from MuJoCo's own mass matrix and differences of its own forces."""
+    """Natural frequencies [Hz] from the mass matrix of MuJoCo and differences of its forces."""
     mass = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, mass)
     rest, columns = data.qpos.copy(), []
@@ -51,7 +51,7 @@ def frequencies(model: mujoco.MjModel, data: mujoco.MjData, step: float) -> Arra
 
 
 @pytest.mark.parametrize("name", robot_names())
-def test_a_preset_comes_to_rest_where_its_straight_cables_hold_it(name: str) -> None:
+def test_a_preset_comes_to_rest_at_the_equilibrium_of_straight_cables(name: str) -> None:
     robot = load_robot(name)
     pose = middle(robot)
     planned = inverse(robot, pose, model=Elastic()).unstrained_length
@@ -66,7 +66,7 @@ def test_a_preset_comes_to_rest_where_its_straight_cables_hold_it(name: str) -> 
 
 
 @pytest.mark.parametrize("name", robot_names())
-def test_frequencies_and_masses_are_the_robots(name: str) -> None:
+def test_frequencies_and_masses_agree_with_the_robot(name: str) -> None:
     robot = load_robot(name)
     pose = middle(robot)
     model, data = opened(dump_mjcf(robot, pose))
@@ -75,13 +75,13 @@ def test_frequencies_and_masses_are_the_robots(name: str) -> None:
     expected = modes(inverse(robot, pose, model=Elastic()).state).frequency
     np.testing.assert_allclose(found, expected, rtol=1e-4)
     assert model.opt.timestep <= 0.05 / expected.max()
-    assert model.opt.timestep >= min(0.002, 0.01 / expected.max())  # nor shorter than is of use
+    assert model.opt.timestep >= min(0.002, 0.01 / expected.max())  # and not shorter than useful
     assert model.body_mass.sum() == robot.mass
     np.testing.assert_allclose(np.sort(model.body_inertia[1]), np.linalg.eigvalsh(robot.inertia), rtol=1e-9)
 
 
 @pytest.mark.parametrize("name", robot_names())
-def test_the_platform_is_drawn_as_large_as_it_is(name: str) -> None:
+def test_the_platform_is_drawn_in_its_size(name: str) -> None:
     robot = load_robot(name)
     model, _ = opened(dump_mjcf(robot, middle(robot)))
     low, high = robot.platform_anchors.min(axis=0), robot.platform_anchors.max(axis=0)
@@ -94,7 +94,7 @@ def test_the_platform_is_drawn_as_large_as_it_is(name: str) -> None:
 
 
 def any_robot(random: np.random.Generator) -> Robot:
-    """A robot of any size, mass and stiffness, its cables few or many."""
+    """A robot of any size, mass and stiffness, with few or many cables."""
     size, mass = 10.0 ** random.uniform(-1.0, 2.0), 10.0 ** random.uniform(-2.0, 4.0)
     count = int(random.integers(3, 13))
     reach = size * 10.0 ** random.uniform(-2.0, -0.5)
@@ -117,21 +117,21 @@ def assert_it_stays_finite(seed: int) -> None:
     data.qvel[:3] = 0.1 * np.sqrt(9.81 * size) * random.uniform(-1.0, 1.0, 3)
     period = np.sqrt(size / 9.81)
     run(model, data, max(1000, round(10.0 * period / model.opt.timestep)) * model.opt.timestep)
-    assert np.abs(data.qvel[:3]).max() < 3.0 * np.sqrt(9.81 * size)  # no energy out of nothing
+    assert np.abs(data.qvel[:3]).max() < 3.0 * np.sqrt(9.81 * size)  # no energy is generated
 
 
 @pytest.mark.parametrize("seed", range(30))
-def test_any_robot_that_is_kicked_stays_finite(seed: int) -> None:
+def test_any_robot_stays_finite_after_an_impulse(seed: int) -> None:
     assert_it_stays_finite(seed)
 
 
 @pytest.mark.soak
-def test_a_thousand_robots_that_are_kicked_stay_finite() -> None:
+def test_a_thousand_robots_stay_finite_after_an_impulse() -> None:
     for seed in range(1000, 2000):
         assert_it_stays_finite(seed)
 
 
-def test_a_platform_that_swings_comes_to_rest_too() -> None:
+def test_a_swinging_platform_comes_to_rest() -> None:
     corners = np.array([[20, 15, 12], [-20, 15, 12], [-20, -15, 12], [20, -15, 12.0]])
     camera = Robot("camera", corners, 0.01 * corners, Cable(0.03, 2e5), 25.0, np.eye(3), center_of_mass=(0, 0, -0.3))
     lengths = [21.0, 24.0, 29.5, 27.0]
@@ -144,7 +144,7 @@ def test_a_platform_that_swings_comes_to_rest_too() -> None:
 
 
 @pytest.mark.parametrize("moments", [(0.1, 0.7, 0.8), (0.8, 0.7, 0.1), (1.0, 2.0, 3.0)])
-def test_a_flat_platform_is_taken(moments: tuple[float, float, float]) -> None:
+def test_a_flat_platform_is_accepted(moments: tuple[float, float, float]) -> None:
     robot = load_robot("article-suspended").replace(inertia=np.diag(moments))
     model, _ = opened(dump_mjcf(robot, middle(robot)))
     np.testing.assert_allclose(np.sort(model.body_inertia[1]), np.sort(moments), rtol=1e-11)
@@ -158,7 +158,7 @@ def test_a_plane_needs_the_moment_about_its_normal_only() -> None:
         0.1 * np.array(flat),
         Cable(0.01, 3e4),
         6.0,
-        np.diag([0.01, 0.2, 0.01]),  # what no body has, but of no effect on a platform that turns about y alone
+        np.diag([0.01, 0.2, 0.01]),  # impossible for a body, and without effect on a platform that rotates about y only
         motion_pattern="1R2T",
         plane_normal=(0, 1, 0),
     )
@@ -168,7 +168,7 @@ def test_a_plane_needs_the_moment_about_its_normal_only() -> None:
     np.testing.assert_allclose(np.sort(np.linalg.eigvalsh(mass)), [0.2, 6.0, 6.0], rtol=1e-9)
 
 
-def test_a_platform_end_at_its_frame_end_is_taken() -> None:
+def test_a_platform_end_at_its_frame_end_is_accepted() -> None:
     frame = np.array([(-1.0, -1.0, 2.0), (1.0, -1.0, 2.0), (0.0, 1.0, 2.0)])
     bob = Robot("bob", frame, np.zeros((3, 3)), Cable(0.01, 2e4), 2.0, motion_pattern="3T")
     model, data = opened(dump_mjcf(bob, Pose.from_euler(frame[0], 0.0, 0.0, 0.0), [1e-6, 2.0, 2.0]))

@@ -1,4 +1,4 @@
-"""Columns in few bytes: back to the last bit, whatever they hold."""
+"""Compressed columns are decoded exactly for any content."""
 
 import math
 from typing import Any
@@ -24,7 +24,7 @@ def same(one: np.ndarray[Any, Any], other: np.ndarray[Any, Any]) -> bool:
     hnp.arrays(np.int64, hnp.array_shapes(max_dims=2, max_side=9)),
     st.integers(0, 15),
 )
-def test_whatever_floats_and_whole_numbers_come_back(real: Any, whole: Any, decimals: int) -> None:
+def test_all_floats_and_integers_are_decoded_exactly(real: Any, whole: Any, decimals: int) -> None:
     columns = {"real": real, "whole": whole, "rounded": round_decimals(np.nan_to_num(real, posinf=9.0, neginf=-9.0), 2)}
     found = unpack(pack(columns, {"real": decimals, "rounded": decimals}))
     assert list(found) == list(columns)
@@ -37,7 +37,7 @@ def test_codes_and_flags_keep_their_type(kind: Any) -> None:
     assert same(unpack(pack({"a": column}))["a"], column)
 
 
-def test_gaps_stay_among_decimals_and_take_little() -> None:
+def test_gaps_among_decimals_are_kept_and_small() -> None:
     column = round_decimals(np.linspace(0.0, 1.0, 1000), 3)
     column[[3, 40, 500]] = np.nan, np.inf, -np.inf
     packed = pack({"a": column}, {"a": 3})
@@ -45,16 +45,16 @@ def test_gaps_stay_among_decimals_and_take_little() -> None:
     assert len(packed) < 300  # of 8,000
 
 
-def test_a_smooth_course_takes_a_fraction_of_its_bytes() -> None:
+def test_smooth_columns_take_a_fraction_of_their_bytes() -> None:
     time = np.linspace(0.0, 10.0, 2000)
     column = np.sin(time)[:, None] * np.arange(1.0, 9.0)
     assert len(pack({"a": column})) < 0.25 * column.nbytes  # zstandard alone: 0.9
     noise = round_decimals(np.random.default_rng(0).normal(size=(2000, 8)), 2)
-    entropy = np.log2(100.0 * np.sqrt(2.0 * np.pi * math.e)) / 8.0  # bytes of a number of such noise
+    entropy = np.log2(100.0 * np.sqrt(2.0 * np.pi * math.e)) / 8.0  # bytes per number of such noise
     assert len(pack({"a": noise}, {"a": 2})) < 1.15 * entropy * noise.size
 
 
-def test_rounded_numbers_are_those_that_their_digits_are_read_as() -> None:
+def test_rounded_numbers_are_those_of_their_decimal_digits() -> None:
     values = np.random.default_rng(1).uniform(-5000.0, 5000.0, 2000)
     for decimals in (0, 2, 7):
         written = [float(f"{value:.{decimals}f}") + 0.0 for value in values]
@@ -62,13 +62,13 @@ def test_rounded_numbers_are_those_that_their_digits_are_read_as() -> None:
     assert not np.signbit(round_decimals(np.array([-1e-9, -0.0]), 3)).any()
 
 
-def test_what_has_no_such_digits_stays_what_it_is() -> None:
+def test_numbers_without_short_decimals_are_unchanged() -> None:
     values = np.array([1e300, -1e17, np.inf, -np.inf, np.nan])
     assert same(round_decimals(values, 8), values)
     assert same(unpack(pack({"a": values}, {"a": 8}))["a"], values)
 
 
-def test_what_is_none_of_it_is_refused() -> None:
+def test_other_types_are_refused() -> None:
     good = pack({"a": np.arange(5.0)})
     for bad in (b"", b"abc", good[:-3], good + good[:4]):
         with pytest.raises((ValueError, OverflowError)):
@@ -77,7 +77,7 @@ def test_what_is_none_of_it_is_refused() -> None:
         pack({"a": np.arange(5, dtype=np.float32)})
 
 
-def test_heads_that_are_none_are_refused() -> None:
+def test_invalid_headers_are_refused() -> None:
     from zstandard import compress
 
     for head in (

@@ -73,7 +73,7 @@ def test_the_profile_is_quintic_unless_the_file_says_septic(tmp_path: FilePath) 
 @pytest.mark.parametrize(
     ("limits", "duration"),
     [
-        # a way of 1 m and a turn of 0.3 rad: 15/8 way/speed, sqrt(10/sqrt(3) way/acceleration)
+        # a distance of 1 m and a rotation of 0.3 rad: 15/8 distance/speed, sqrt(10/sqrt(3) distance/acceleration)
         ("speed: 50 cm/s\nangular_speed: 5 turn/s", 15 / 8 / 0.5),
         ("speed: 9 km/s\nangular_speed: 30 deg/s", 15 / 8 * 0.3 / np.radians(30.0)),
         ("acceleration: 80 cm/s^2\nangular_speed: 5 turn/s", np.sqrt(10 / np.sqrt(3) / 0.8)),
@@ -81,7 +81,7 @@ def test_the_profile_is_quintic_unless_the_file_says_septic(tmp_path: FilePath) 
         ("durations: 0.05 min", 3.0),
     ],
 )
-def test_every_limit_is_taken_in_its_unit(tmp_path: FilePath, limits: str, duration: float) -> None:
+def test_every_limit_is_read_in_its_unit(tmp_path: FilePath, limits: str, duration: float) -> None:
     way = "waypoints: [{position: [0, 0, 1]}, {position: [1, 0, 1], euler: {alpha: 0.3}}]"
     path = load_path(write(tmp_path, "tour.yaml", f"rate: 30000 1/min\n{limits}\n{way}\n"))
     assert path.duration == pytest.approx(duration, rel=1e-12)
@@ -120,7 +120,7 @@ def test_table_with_units_angles_and_columns_in_any_order(tmp_path: FilePath) ->
     path = load_path(write(tmp_path, "run.csv", circle(header, columns)))
     np.testing.assert_allclose(path.time, CIRCLE, rtol=1e-15)
     np.testing.assert_allclose(path.pose.position, np.stack([CIRCLE**2, zero, CIRCLE], axis=-1), rtol=1e-14)
-    # alpha turns about the world's z, whatever the constant gamma
+    # alpha is a rotation about z of the world, for any constant gamma
     np.testing.assert_allclose(path.twist[:, 3:], np.tile([0.0, 0.0, np.pi / 2], (201, 1)), atol=1e-6)
     first = Rotation.from_rotvec([0.5, 0.0, 0.0])
     assert (path.pose.rotation[0] * first.inv()).magnitude() < 1e-14
@@ -154,7 +154,7 @@ def test_table_as_a_spreadsheet_saves_it(tmp_path: FilePath) -> None:
     np.testing.assert_allclose(path.twist[:, 2], 2.0, rtol=1e-15)
 
 
-def test_a_number_cut_off_in_the_last_row_is_not_guessed(tmp_path: FilePath) -> None:
+def test_a_truncated_number_in_the_last_row_is_refused(tmp_path: FilePath) -> None:
     with refused("line 3", "3 columns", "4, as in the header", kind=FileError):
         load_path(write(tmp_path, "run.csv", "time,x,y,z\n0,1,2,3\n0.5,1,2."))
 
@@ -204,7 +204,9 @@ TWO = "  - position: [0, 0, 1]\n  - position: [1, 0, 1]\n"
         ("rate: 0\n" + HEAD + TWO, ("rate", "0 1/s", "> 0 1/s, finite")),
     ],
 )
-def test_a_wrong_waypoint_file_is_told_by_file_and_key(tmp_path: FilePath, text: str, parts: tuple[str, ...]) -> None:
+def test_an_invalid_waypoint_file_is_reported_with_file_and_key(
+    tmp_path: FilePath, text: str, parts: tuple[str, ...]
+) -> None:
     with refused(*parts, kind=FileError, file=tmp_path / "tour.yaml"):
         load_path(write(tmp_path, "tour.yaml", text))
 
@@ -239,13 +241,13 @@ def test_a_wrong_waypoint_file_is_told_by_file_and_key(tmp_path: FilePath, text:
         ("", ("columns",)),
     ],
 )
-def test_a_wrong_table_is_told_by_file_and_line(tmp_path: FilePath, text: str, parts: tuple[str, ...]) -> None:
+def test_an_invalid_table_is_reported_with_file_and_line(tmp_path: FilePath, text: str, parts: tuple[str, ...]) -> None:
     with refused(*parts, kind=FileError, file=tmp_path / "run.csv"):
         load_path(write(tmp_path, "run.csv", text))
 
 
 @pytest.mark.parametrize("name", ["a.yaml", "a.csv"])
-def test_files_that_are_none(tmp_path: FilePath, name: str, snapshot: SnapshotAssertion) -> None:
+def test_paths_that_are_not_files(tmp_path: FilePath, name: str, snapshot: SnapshotAssertion) -> None:
     (tmp_path / f"bytes_{name}").write_bytes(bytes(range(256)) * 4)
     (tmp_path / f"folder_{name}").mkdir()
     for file in (name, f"bytes_{name}", f"folder_{name}"):
@@ -263,7 +265,7 @@ def test_files_that_are_none(tmp_path: FilePath, name: str, snapshot: SnapshotAs
         ("- 1\n- 2\n", (None, "has no keys at its top level")),
     ],
 )
-def test_text_that_is_no_waypoint_file(tmp_path: FilePath, text: str, parts: tuple[str, ...]) -> None:
+def test_text_other_than_a_waypoint_file(tmp_path: FilePath, text: str, parts: tuple[str, ...]) -> None:
     with refused(*parts, kind=FileError):
         load_path(write(tmp_path, "a.yaml", text))
 
@@ -297,10 +299,10 @@ def test_another_suffix_is_refused(tmp_path: FilePath) -> None:
         (
             "position,x,y,z\n",
             ("line 1", "unknown column 'position'", "time, x, y, z, alpha, beta, gamma, qx, qy, qz, qw"),
-        ),  # and no "did you mean"
+        ),  # without "did you mean"
     ],
 )
-def test_tables_of_other_habits(tmp_path: FilePath, text: str, parts: tuple[str, ...]) -> None:
+def test_tables_in_other_styles(tmp_path: FilePath, text: str, parts: tuple[str, ...]) -> None:
     with refused(*parts, kind=FileError, file=tmp_path / "run.csv"):
         load_path(write(tmp_path, "run.csv", text))
 
@@ -338,7 +340,7 @@ def test_tables_of_other_habits(tmp_path: FilePath, text: str, parts: tuple[str,
         (HEAD + TWO + "  - position: [0, yes, 1]\n", ("waypoints[2].position[1]", "'yes'")),
     ],
 )
-def test_waypoints_of_other_habits(tmp_path: FilePath, text: str, parts: tuple[str, ...]) -> None:
+def test_waypoints_in_other_styles(tmp_path: FilePath, text: str, parts: tuple[str, ...]) -> None:
     with refused(*parts, kind=FileError, file=tmp_path / "tour.yaml") as caught:
         load_path(write(tmp_path, "tour.yaml", text))
     assert "mean" not in caught.value.next_step

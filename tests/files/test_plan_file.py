@@ -49,7 +49,7 @@ def data(content: bytes) -> xr.Dataset:
 
 @pytest.fixture
 def read(monkeypatch: pytest.MonkeyPatch) -> Reader:
-    """Read a data set as from a file that somebody edited and sealed anew."""
+    """Read a data set as from an edited file with a valid digest."""
     monkeypatch.setattr(netcdf, "parse_robot", cache(parse_robot))
 
     def load(data: xr.Dataset) -> sl.Plan:
@@ -61,7 +61,7 @@ def read(monkeypatch: pytest.MonkeyPatch) -> Reader:
 
 @pytest.fixture
 def saved(tmp_path: FilePath, content: bytes) -> FilePath:
-    """A plan's file, to be spoilt."""
+    """File of a plan for modifications."""
     file = tmp_path / "run.nc"
     file.write_bytes(content)
     return file
@@ -69,7 +69,7 @@ def saved(tmp_path: FilePath, content: bytes) -> FilePath:
 
 @pytest.fixture(scope="module")
 def loaded(content: bytes, tmp_path_factory: pytest.TempPathFactory) -> sl.Plan:
-    """The plan of that file."""
+    """Plan of the file."""
     file = tmp_path_factory.mktemp("loaded") / "run.nc"
     file.write_bytes(content)
     return sl.load_plan(file)
@@ -77,8 +77,8 @@ def loaded(content: bytes, tmp_path_factory: pytest.TempPathFactory) -> sl.Plan:
 
 @contextmanager
 def edited(saved: FilePath) -> Iterator[h5py.File]:
-    """The content of a file, which is sealed anew."""
-    with h5py.File(saved, "r+") as file:  # HDF5 cuts off what follows its part
+    """Content of a file with a new digest."""
+    with h5py.File(saved, "r+") as file:  # HDF5 removes bytes after its part
         yield file
     seal(saved)
 
@@ -94,7 +94,7 @@ def edited(saved: FilePath) -> Iterator[h5py.File]:
     ],
     ids=["path", "pose", "poses"],
 )
-def test_a_plan_comes_back_to_the_last_bit(
+def test_a_plan_is_saved_exactly(
     tmp_path: FilePath, motion: sl.Path | sl.Pose, model: sl.CableModel, tension: sl.TensionMethod
 ) -> None:
     plan = sl.inverse(SUSPENDED, motion, model, tension, wrench=(1.0, 2.0, 3.0, 0.1, 0.2, 0.3))
@@ -102,7 +102,7 @@ def test_a_plan_comes_back_to_the_last_bit(
     assert_same(plan, sl.load_plan(str(tmp_path / "run.nc")))
 
 
-def test_winches_and_thick_cables_come_back(tmp_path: FilePath) -> None:
+def test_winches_and_diameters_are_saved(tmp_path: FilePath) -> None:
     winches = sl.Winch(np.linspace(0.03, 0.1, 8), dead_cable=4.1, dead_rise=1 / 3, drum_radius=0.06, gear=-20)
     thick = SUSPENDED.cables.replace(diameter=np.linspace(0.003, 0.004, 8), expansion=-1.1e-5)
     robot = SUSPENDED.replace(winches=winches, cables=thick)
@@ -120,7 +120,7 @@ def test_winches_and_thick_cables_come_back(tmp_path: FilePath) -> None:
     assert loaded.state.cables.cable is read.cables
 
 
-def test_what_a_reader_finds(saved: FilePath) -> None:
+def test_contents_of_the_file(saved: FilePath) -> None:
     plan = a_plan()
     with xr.open_dataset(saved, engine="h5netcdf") as data:
         assert dict(data.sizes) | {"pose": 41, "cable": 8} == dict(data.sizes)
@@ -144,7 +144,7 @@ def test_what_a_reader_finds(saved: FilePath) -> None:
         assert parse_robot(data.attrs["robot"], "robot").name == "article-suspended"
 
 
-def test_a_path_without_jerk_comes_back_without(tmp_path: FilePath) -> None:
+def test_a_path_without_jerk_is_saved(tmp_path: FilePath) -> None:
     sampled = sl.path_from_samples(OUTSIDE.time, OUTSIDE.pose)
     sl.inverse(SUSPENDED, sampled).save(tmp_path / "run.nc")
     with xr.open_dataset(tmp_path / "run.nc", engine="h5netcdf") as data:
@@ -155,7 +155,7 @@ def test_a_path_without_jerk_comes_back_without(tmp_path: FilePath) -> None:
     np.testing.assert_array_equal(loaded.twist_rate, sampled.twist_rate)
 
 
-def test_infeasible_poses_are_kept_and_marked(loaded: sl.Plan) -> None:
+def test_infeasible_poses_are_saved_and_marked(loaded: sl.Plan) -> None:
     (gap,) = loaded.gaps
     assert (gap.first, gap.last, gap.status) == (37, 40, sl.PoseStatus.INFEASIBLE)
     assert gap.shortfall == pytest.approx(np.max(a_plan().shortfall), rel=0.0)
@@ -163,7 +163,7 @@ def test_infeasible_poses_are_kept_and_marked(loaded: sl.Plan) -> None:
     assert np.isfinite(loaded.unstrained_length[:37]).all()
 
 
-def test_the_proofs_are_kept(loaded: sl.Plan, data: xr.Dataset) -> None:
+def test_proofs_are_saved(loaded: sl.Plan, data: xr.Dataset) -> None:
     plan = loaded
     assert plan.farkas is not None
     assert plan.needed is not None
@@ -171,13 +171,13 @@ def test_the_proofs_are_kept(loaded: sl.Plan, data: xr.Dataset) -> None:
     assert whole.bracket is not None
     for name in ("farkas", "needed", "bracket", "relief", "at_border"):
         np.testing.assert_array_equal(getattr(plan, name), getattr(whole, name))
-    assert (whole.bracket[37:, 0] > 0).all()  # there is something to keep
+    assert (whole.bracket[37:, 0] > 0).all()  # at least one proof
     assert np.isnan(plan.farkas[:37]).all()
     assert [data[name].attrs["units"] for name in ("farkas", "needed", "bracket")] == ["1, 1/m", "N, N m", "N"]
 
 
 @extended
-def test_a_file_from_before_proofs_were_kept(saved: FilePath) -> None:
+def test_a_file_of_an_earlier_version_without_proofs(saved: FilePath) -> None:
     with edited(saved) as file:
         del file["farkas"], file["needed"], file["bracket"], file["relief"], file["at_border"]
     plan = sl.load_plan(saved)
@@ -189,9 +189,9 @@ def test_a_file_from_before_proofs_were_kept(saved: FilePath) -> None:
     np.testing.assert_array_equal(again.unstrained_length, a_plan().unstrained_length)
 
 
-def test_a_disk_that_fills_up_leaves_nothing(tmp_path: FilePath) -> None:
+def test_a_full_disk_leaves_no_file(tmp_path: FilePath) -> None:
     plan = a_plan()
-    plan.save(tmp_path / "other.nc")  # everything is loaded before space gets short
+    plan.save(tmp_path / "other.nc")  # all modules are loaded before space is scarce
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, hard))
     try:
@@ -203,7 +203,7 @@ def test_a_disk_that_fills_up_leaves_nothing(tmp_path: FilePath) -> None:
     assert "written" in caught.value.reason
 
 
-def test_a_disk_that_fills_up_in_the_middle(tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_disk_that_becomes_full_during_writing(tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(*_: object, **__: object) -> None:
         raise RuntimeError("Can't decrement id ref count (unable to close file, errno = 28)")
 
@@ -214,7 +214,7 @@ def test_a_disk_that_fills_up_in_the_middle(tmp_path: FilePath, monkeypatch: pyt
     assert list(tmp_path.iterdir()) == []
 
 
-def test_files_that_are_no_plan(tmp_path: FilePath, saved: FilePath, snapshot: SnapshotAssertion) -> None:
+def test_other_files_are_refused(tmp_path: FilePath, saved: FilePath, snapshot: SnapshotAssertion) -> None:
     half, text, other = tmp_path / "half.nc", tmp_path / "text.nc", tmp_path / "other.nc"
     half.write_bytes(saved.read_bytes()[:20_000])
     text.write_text("time,x,y,z\n")
@@ -223,7 +223,7 @@ def test_files_that_are_no_plan(tmp_path: FilePath, saved: FilePath, snapshot: S
     reasons = []
     for file in (
         *(tmp_path / "missing.nc", tmp_path, half, text, other),
-        tmp_path / "pipe.nc",  # opening it would wait for ever
+        tmp_path / "pipe.nc",  # opening it would block
         *(FilePath("/dev/zero"), tmp_path / "zero\0byte.nc", tmp_path / ("x" * 300)),
     ):
         with refused(kind=FileError) as caught:
@@ -315,7 +315,7 @@ def test_another_robot_in_the_file(read: Reader, data: xr.Dataset) -> None:
         ("time", 1e9, ("time[3]", "0.375 s", "> 1000000000.0 s (the one before)")),
     ],
 )
-def test_values_that_no_plan_has(read: Reader, data: xr.Dataset, name: str, value: float, parts: Parts) -> None:
+def test_impossible_values(read: Reader, data: xr.Dataset, name: str, value: float, parts: Parts) -> None:
     values = data[name].values.copy()
     values[(2, *[0] * (values.ndim - 1))] = value
     with refused(*parts, kind=FileError, file="run.nc") as caught:
@@ -323,20 +323,20 @@ def test_values_that_no_plan_has(read: Reader, data: xr.Dataset, name: str, valu
     assert len(str(caught.value)) < 320
 
 
-def test_a_value_that_no_plan_has_in_a_file(saved: FilePath) -> None:
+def test_an_impossible_value_in_a_file(saved: FilePath) -> None:
     with edited(saved) as file:
         file["unstrained_length"][2, 0] = -1.0
     assert_refused(saved, "unstrained_length[2, 0]", "-1")
 
 
-def test_a_length_where_there_is_no_answer(read: Reader, data: xr.Dataset) -> None:
+def test_a_length_at_an_infeasible_pose(read: Reader, data: xr.Dataset) -> None:
     lengths = data["unstrained_length"].copy()
     lengths[-1, 5] = 3.0
     with refused("unstrained_length[40, 5]", "3", ">= 0 m, finite, at the solved poses alone", kind=FileError):
         read(data.assign(unstrained_length=lengths))
 
 
-def test_units_types_shapes_and_meanings_are_those_of_the_layout(read: Reader, data: xr.Dataset) -> None:
+def test_units_types_shapes_and_meanings_agree_with_the_layout(read: Reader, data: xr.Dataset) -> None:
     lengths, twist, status = data["unstrained_length"], data["twist"], data["pose_status"]
     other = status.assign_attrs(flag_meanings="infeasible solved " + "other " * 20)
     edits: tuple[tuple[dict[str, xr.DataArray], Parts], ...] = (
@@ -353,7 +353,7 @@ def test_units_types_shapes_and_meanings_are_those_of_the_layout(read: Reader, d
 
 
 def assert_refused(file: FilePath, *parts: str | None, next_step: str | None = None) -> str:
-    """Expect an error with these parts, and return its wording."""
+    """Expect an error with these parts, and return its text."""
     item, value, allowed, step = (*parts, None, None, None, None)[:4]
     with refused(item, value, allowed, next_step or step, kind=FileError) as caught:
         sl.load_plan(file)
@@ -363,9 +363,9 @@ def assert_refused(file: FilePath, *parts: str | None, next_step: str | None = N
 
 
 @extended
-def test_what_another_program_has_changed_is_told(saved: FilePath, snapshot: SnapshotAssertion) -> None:
+def test_changes_by_another_program_are_reported(saved: FilePath, snapshot: SnapshotAssertion) -> None:
     with h5py.File(saved, "r+") as file:
-        file["unstrained_length"][0, 0] += 1e-12  # HDF5 cuts off what follows its part
+        file["unstrained_length"][0, 0] += 1e-12  # HDF5 removes bytes after its part
     assert assert_refused(saved, "digest") == snapshot
     with xr.open_dataset(saved, engine="h5netcdf") as data:
         data.to_netcdf(saved.with_name("copy.nc"), engine="h5netcdf")
@@ -376,14 +376,14 @@ def test_what_another_program_has_changed_is_told(saved: FilePath, snapshot: Sna
 def test_a_damaged_file_without_its_digest_is_refused_before_anything_is_read(
     saved: FilePath, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """HDF5 may never return from a damaged file."""
+    """HDF5 may not return from a damaged file."""
     saved.write_bytes(saved.read_bytes()[:-SEAL])
     monkeypatch.setattr("h5py.File", None)
     assert_refused(saved, "digest")
     assert not netcdf.is_of(saved, FORMAT)
 
 
-def test_what_was_added_behind_is_told(saved: FilePath, snapshot: SnapshotAssertion) -> None:
+def test_bytes_after_the_end_are_reported(saved: FilePath, snapshot: SnapshotAssertion) -> None:
     content = saved.read_bytes()
     saved.write_bytes(content + b"\n")
     assert_refused(saved, "digest")
@@ -391,13 +391,13 @@ def test_what_was_added_behind_is_told(saved: FilePath, snapshot: SnapshotAssert
     assert assert_refused(saved) == snapshot
 
 
-def test_the_digest_is_that_of_everything_before_it(saved: FilePath) -> None:
+def test_the_digest_covers_all_bytes_before_it(saved: FilePath) -> None:
     content = saved.read_bytes()
     assert content[-SEAL:].decode() == f"\nsagline sha256 {hashlib.sha256(content[:-SEAL]).hexdigest()}\n"
     assert h5py.File(io.BytesIO(content[:-SEAL])).attrs["sagline_format"] == 2
 
 
-def test_what_could_not_be_read_again_is_not_written(tmp_path: FilePath) -> None:
+def test_plans_that_cannot_be_loaded_are_not_written(tmp_path: FilePath) -> None:
     class Own(sl.Catenary):
         pass
 
@@ -423,7 +423,7 @@ def test_what_could_not_be_read_again_is_not_written(tmp_path: FilePath) -> None
     ],
     ids=["YAML", "CSV", "XML", "empty", "NetCDF 3", "damaged"],
 )
-def test_another_file_is_told_by_what_it_is(
+def test_other_files_are_named_by_their_kind(
     tmp_path: FilePath, name: str, data: bytes, snapshot: SnapshotAssertion
 ) -> None:
     (tmp_path / name).write_bytes(data)
@@ -442,7 +442,7 @@ def test_robots_of_any_name(tmp_path: FilePath, name: str) -> None:
 
 
 @extended
-def test_a_folder_of_the_name_of_a_tilde_is_a_folder(tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_folder_named_tilde_is_a_folder(tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     (tmp_path / "~").mkdir()

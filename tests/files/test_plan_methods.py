@@ -15,7 +15,7 @@ METHODS = (
 
 
 @pytest.mark.parametrize("method", wide(METHODS), ids=lambda method: type(method).__name__)
-def test_a_plan_comes_back_with_its_way_of_sharing(method: sl.TensionMethod, tmp_path: Path) -> None:
+def test_a_plan_is_saved_with_its_tension_method(method: sl.TensionMethod, tmp_path: Path) -> None:
     plan = sl.inverse(sl.load_robot("article-mixed"), sl.Pose([1.0, -0.5, 2.5], np.eye(3)), tension=method)
     plan.save(tmp_path / "run.nc")
     loaded = sl.load_plan(tmp_path / "run.nc")

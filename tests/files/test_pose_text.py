@@ -22,7 +22,7 @@ def test_meters_and_degrees() -> None:
      "1e308,2,3", "1,2,3,1e400,0,0", "1.1e6,0,0", "0,0,-2e6", "0,0,0,2e6,0,0", "1,2,",
      "1;2;3", "1 2 3", "1,2,3 m", "𝟙,2,3", "1,2,3\x1b[2J", "1," * 100_000],
 )  # fmt: skip
-def test_what_is_no_pose(text: str) -> None:
+def test_invalid_poses(text: str) -> None:
     with refused("--pose", kind=InvalidValueError) as caught:
         pose_of_text(text)
     assert re.match("(three|decimal)", caught.value.allowed)

@@ -38,7 +38,7 @@ from tests.tiers import extended
         ("2 cNm", "N m", 0.02),
         ("0.5 kNm", "N m", 500.0),
         ("3 Nm/rad", "N m/rad", 3.0),
-        ("2 1/Nm", "1/(N*m)", 2.0),  # the whole of it below the line
+        ("2 1/Nm", "1/(N*m)", 2.0),  # the whole text below the line
         ("5 nm", "m", 5e-9),
         ("180 deg", "rad", 3.141592653589793),
         ("980.665 cm/s^2", "m/s^2", 9.80665),
@@ -49,12 +49,12 @@ def test_quantities_in_si(value: object, unit: str, expected: ArrayLike) -> None
     assert in_si(value, unit, "x") == pytest.approx(expected, rel=1e-15)
 
 
-def test_lists_keep_their_nesting() -> None:
+def test_nested_lists_keep_their_structure() -> None:
     assert in_si([[1, "1 mm"], ["2 km"]], "m", "x") == [[1.0, 0.001], [2000.0]]
 
 
 @given(st.floats(allow_nan=False).filter(lambda number: within_reach(number) or isinf(number)))
-def test_plain_numbers_pass_bit_for_bit(number: float) -> None:
+def test_plain_numbers_are_unchanged(number: float) -> None:
     assert in_si(number, "kg", "x") == number
     assert in_si(repr(number), "kg", "x") == number
 
@@ -81,13 +81,13 @@ def test_plain_numbers_pass_bit_for_bit(number: float) -> None:
         ("5 __import__('os')", "m", ("x", "\"5 __import__('os')\"")),
     ],
 )
-def test_what_is_no_quantity_is_named(value: object, unit: str, parts: tuple[str, ...]) -> None:
+def test_invalid_quantities_are_named(value: object, unit: str, parts: tuple[str, ...]) -> None:
     with refused(*parts, kind=InvalidValueError):
         in_si(value, unit, "x")
 
 
 @pytest.mark.parametrize("value", [1e51, "1e51", "1e400", -1e60, "1e49 km", "-1e300 m"])
-def test_numbers_out_of_reach_are_refused(value: object) -> None:
+def test_numbers_out_of_range_are_refused(value: object) -> None:
     with refused("x", kind=InvalidValueError) as caught:
         in_si(value, "m", "x")
     assert caught.value.allowed
@@ -119,20 +119,20 @@ def test_plain_numbers(text: str, number: float) -> None:
     ["", " ", "1:30", "1_0", "0x10", "0b1", "1e", "e1", ".", "+", "1 0", "1,5", "٣", "１", "²", "1+1j", "infinity",
      "INF.", "1e1e1", "--1", "1d3", "9" * 61],
 )  # fmt: skip
-def test_what_is_no_plain_number(text: str) -> None:
+def test_other_values_than_plain_numbers(text: str) -> None:
     assert plain_number(text) is None
     with pytest.raises(InvalidValueError):
         in_si(text, "m", "x")
 
 
-def test_not_a_number_is_a_word_that_nobody_takes() -> None:
+def test_nan_is_refused() -> None:
     assert isnan(plain_number(".nan") or 0.0)
 
 
 @pytest.mark.parametrize(
     ("text", "unit"),
     [
-        ("5 Hz", "rad/s"),  # to pint both are 1/s
+        ("5 Hz", "rad/s"),  # pint reads both as 1/s
         ("5 rad/s", "1/s"),
         ("5 rpm", "1/s"),
         ("0.5 rad", ""),
@@ -151,13 +151,13 @@ def test_not_a_number_is_a_word_that_nobody_takes() -> None:
         ("5 nm", "N m"),
         ("5 NM", "N m"),
         ("5 Nm", "m"),
-        ("5 Nms", "N m"),  # seconds, or several Nm
+        ("5 Nms", "N m"),  # seconds, or a multiple of Nm
         ("5 Nms", "N m s"),
         ("5 Nm^2", "N m^2"),
         ("5 Nm²", "N m^2"),
     ],
 )
-def test_units_that_will_not_do_are_told_at_once(text: str, unit: str) -> None:
+def test_invalid_units_are_reported_at_once(text: str, unit: str) -> None:
     with refused("x", kind=InvalidValueError) as caught:
         in_si(text, unit, "x")
     assert least_seconds(lambda: in_si(text, unit, "x"), 1.0) < 1.0

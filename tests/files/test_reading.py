@@ -32,7 +32,7 @@ def test_text_in_utf_8(tmp_path: Path, mark: bytes) -> None:
     ],
     ids=["UTF-16", "UTF-16 without a mark", "UTF-32", "Latin-1", "zero byte", "surrogate", "1 MB", "3 MB"],
 )
-def test_what_is_no_such_text(tmp_path: Path, data: bytes, snapshot: SnapshotAssertion) -> None:
+def test_other_content_is_refused(tmp_path: Path, data: bytes, snapshot: SnapshotAssertion) -> None:
     file = tmp_path / "a.txt"
     file.write_bytes(data)
     with refused(kind=FileError, file=file) as caught:
@@ -40,7 +40,7 @@ def test_what_is_no_such_text(tmp_path: Path, data: bytes, snapshot: SnapshotAss
     assert wording(caught.value, tmp_path) == snapshot
 
 
-def test_what_is_no_regular_file_is_not_opened(tmp_path: Path) -> None:
+def test_special_files_are_not_opened(tmp_path: Path) -> None:
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     for path in (pipe, Path("/dev/zero"), Path("/dev/stdin")):
@@ -52,7 +52,7 @@ def test_what_is_no_regular_file_is_not_opened(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["none", "a" * 300, "a\0b", "a\ud800b", "a/" * 3000])
-def test_names_that_no_file_has(tmp_path: Path, name: str) -> None:
+def test_impossible_names(tmp_path: Path, name: str) -> None:
     path = tmp_path / name
     assert not exists(path)
     with refused(kind=FileError, file=path) as caught:
@@ -60,7 +60,7 @@ def test_names_that_no_file_has(tmp_path: Path, name: str) -> None:
     assert len(str(caught.value)) < 300
 
 
-def test_a_file_that_grows_without_saying_its_size_ends() -> None:
+def test_a_growing_file_is_refused() -> None:
     if not Path("/proc/self/pagemap").exists():
         pytest.skip("only Linux has one")
     with pytest.raises(FileError):

@@ -73,7 +73,7 @@ def test_units_become_si() -> None:
     assert (robot.mass, dict(robot.assumed), robot.gravity) == (0.5, {"mass": "a guess"}, 9.81)
 
 
-# the same value in SI and in another unit, for every quantity of a robot file
+# equal values in SI and in another unit, for every quantity of a robot file
 QUANTITIES: dict[str, tuple[Any, Any]] = {
     "frame_anchors": ([[0, 0, 3], [4, 0, 3], [0, 4, 3]], [[0, 0, "300 cm"], ["4 m", 0, 3], [0, "0.004 km", "30 dm"]]),
     "platform_anchors": ([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0]], [[0, 0, 0], ["100 mm", 0, 0], [0, "10 cm", 0]]),
@@ -179,7 +179,7 @@ def with_quantity(key: str, value: Any) -> Robot:
 
 
 @pytest.mark.parametrize("key", wide(QUANTITIES, first=56))
-def test_every_quantity_is_taken_in_its_unit(key: str) -> None:
+def test_every_quantity_is_read_in_its_unit(key: str) -> None:
     plain, other = (arrays_of(with_quantity(key, value)) for value in QUANTITIES[key])
     for name, value in plain.items():
         if isinstance(value, np.ndarray | float):
@@ -208,7 +208,7 @@ def test_the_block_has_every_field_of_the_winch() -> None:
         ({"youngs_modulus": 1e9, "diameter": "4 mm"}, 4e-3),
     ],
 )
-def test_the_diameter_is_known_where_it_is_given(section: dict[str, object], diameter: object) -> None:
+def test_the_diameter_is_read_if_given(section: dict[str, object], diameter: object) -> None:
     found = parse_robot(edited(cables={"linear_density": 0.1, **section}), "robot.yaml").cables.diameter
     if diameter is None:
         assert found is None
@@ -232,7 +232,7 @@ def test_one_block_is_for_all_cables() -> None:
     ("section", "area"),
     [({"section_area": 3e-6}, 3e-6), ({"radius": "2 mm"}, 4e-6 * np.pi), ({"diameter": "2 mm"}, 1e-6 * np.pi)],
 )
-def test_ways_to_give_the_stiffness(section: dict[str, object], area: float) -> None:
+def test_notations_of_the_stiffness(section: dict[str, object], area: float) -> None:
     cables = {"linear_density": [0.1, 0.2, 0.3], "youngs_modulus": "1 GPa", **section}
     robot = parse_robot(edited(cables=cables), "robot.yaml")
     np.testing.assert_array_equal(robot.cables.linear_density, [0.1, 0.2, 0.3])
@@ -248,7 +248,7 @@ def test_ways_to_give_the_stiffness(section: dict[str, object], area: float) -> 
         ({"cylinder_radius": "2 m", "cylinder_height": 6}, np.diag([2.0, 2.0, 1.0])),  # of 0.5 kg
     ],
 )
-def test_ways_to_give_the_inertia(inertia: object, expected: object) -> None:
+def test_notations_of_the_inertia(inertia: object, expected: object) -> None:
     np.testing.assert_allclose(
         parse_robot(edited(inertia=inertia), "robot.yaml").inertia, np.array(expected), rtol=1e-15
     )
@@ -433,7 +433,7 @@ def test_a_wrong_value_is_named_with_its_file(changes: dict[str, Any], parts: tu
         b"name: a\0b\n",
         b"name: \x01\n",
         b"[" * 1000,
-        b"name: 2020-99-99\n",  # a word, no date
+        b"name: 2020-99-99\n",  # a word instead of a date
         TEXT[: TEXT.index("mass: 500")].encode(),
     ],
     ids=range(10),
@@ -446,7 +446,7 @@ def test_a_broken_file_gets_one_clear_message(tmp_path: Path, content: bytes, sn
     assert wording(caught.value, tmp_path) == snapshot
 
 
-def test_what_is_no_file(tmp_path: Path, snapshot: SnapshotAssertion) -> None:
+def test_paths_that_are_not_files(tmp_path: Path, snapshot: SnapshotAssertion) -> None:
     with refused(kind=FileError, file=tmp_path / "missing.yaml") as missing:
         load_robot(tmp_path / "missing.yaml")
     with refused(kind=FileError, file=tmp_path) as folder:
@@ -457,7 +457,7 @@ def test_what_is_no_file(tmp_path: Path, snapshot: SnapshotAssertion) -> None:
     assert "article-mixed?" in preset.value.next_step
 
 
-def test_a_file_in_the_current_folder_goes_by_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_in_the_current_folder_is_found_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "pendulum").write_text(TEXT, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     assert load_robot("pendulum").mass == 0.5
@@ -465,7 +465,7 @@ def test_a_file_in_the_current_folder_goes_by_its_name(tmp_path: Path, monkeypat
 
 
 @pytest.mark.parametrize("name", wide(robot_names(), first=4))
-def test_presets_survive_the_dump_bit_for_bit(name: str) -> None:
+def test_presets_are_saved_exactly(name: str) -> None:
     robot = load_robot(name)
     assert_same(parse_robot(dump_robot(robot), "dump"), robot)
 
@@ -476,7 +476,7 @@ def test_a_file_may_begin_with_a_preset() -> None:
     robot = parse_robot(text, "robot.yaml")
     np.testing.assert_allclose(robot.cables.axial_stiffness, np.full(8, 8e5), rtol=1e-15)
     assert "cables" in cogiro.assumed
-    # what is given now is assumed no more
+    # a given value is no longer assumed
     assert dict(robot.assumed) == {key: why for key, why in cogiro.assumed.items() if key != "cables"} | {
         "mass": "a guess"
     }
@@ -500,7 +500,7 @@ def test_a_file_may_begin_with_a_preset() -> None:
         ("base: cogiro\nname: x\nframe_anchors: [[0, 0, 3]]", ("platform_anchors", "8 points")),
     ],
 )
-def test_a_base_that_will_not_do(text: str, parts: tuple[str, ...]) -> None:
+def test_an_invalid_base_is_refused(text: str, parts: tuple[str, ...]) -> None:
     with refused(*parts, kind=FileError, file="robot.yaml"):
         parse_robot(text, "robot.yaml")
 
@@ -509,7 +509,7 @@ WINCH_KEYS = [key.partition(".")[2] for key in QUANTITIES if key.startswith("win
 
 
 @pytest.mark.parametrize("key", wide(WINCH_KEYS, first=3))
-def test_a_row_too_few_or_a_wrong_unit_of_any_key_of_a_winch_is_named(key: str) -> None:
+def test_missing_rows_and_wrong_units_of_winches_are_named(key: str) -> None:
     good, _ = QUANTITIES[f"winches.{key}"]
     vector = key == "swivel_axis"
     row = good[0] if vector else np.ravel(good)[0].item()
@@ -526,14 +526,14 @@ def test_a_row_too_few_or_a_wrong_unit_of_any_key_of_a_winch_is_named(key: str) 
         assert caught.value.allowed
 
 
-def test_the_blocks_have_every_number_that_may_be_off() -> None:
+def test_the_blocks_have_all_parameters_of_a_calibration() -> None:
     for block in ("tolerances", "calibration.standard_error"):
         keys = [key.removeprefix(f"{block}.") for key in QUANTITIES if key.startswith(block)]
         assert keys == list(UNCERTAIN), block
 
 
 @pytest.mark.parametrize("name", [name for name, what in UNCERTAIN.items() if what.share])
-def test_a_share_is_of_the_robots_own_number(name: str) -> None:
+def test_relative_tolerances_refer_to_the_value_of_the_robot(name: str) -> None:
     winches = {"drum_radius": ["60 mm", 0.07, 0.08], "load_cell_gain": [1.0, 1.1, 0.9]}
     for percent in ("5 %", "5%", " 5.0 %"):
         robot = parse_robot(edited(winches=winches, tolerances={name: percent}), "robot.yaml")
@@ -559,7 +559,7 @@ POSITIVE = st.floats(1e-12, 1e12)
     st.booleans(),
     st.booleans(),
 )
-def test_any_robot_survives_the_dump_bit_for_bit(
+def test_any_robot_is_saved_exactly(
     points: list[float], positive: list[float], text: str, planar: bool, wound: bool
 ) -> None:
     drum: dict[str, Any] = (
@@ -575,7 +575,7 @@ def test_any_robot_survives_the_dump_bit_for_bit(
         positive[4],
         winches=winches if planar or wound else None,
         motion_pattern="2T" if planar else "3T",
-        plane_normal=[1.0, *points[:2]] if planar else None,  # what is all but zero is no direction
+        plane_normal=[1.0, *points[:2]] if planar else None,  # a nearly zero vector has no direction
         center_of_mass=points[3:6],
         gravity=positive[5],
         tension_max=[np.inf, positive[5]],

@@ -26,8 +26,8 @@ def robot_file(folder: Path, scene: str) -> Path:
     return file
 
 
-def test_a_scene_is_read_with_its_units_and_files_beside_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir("/")  # paths are those from the file
+def test_a_scene_is_read_with_its_units_and_mesh_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir("/")  # paths are relative to the file
     table, pole, lamp, hall = sl.load_scene(robot_file(tmp_path, SCENE))
     assert isinstance(table, sl.Box)
     assert table.size == pytest.approx([1.2, 0.8, 0.7])
@@ -40,7 +40,7 @@ def test_a_scene_is_read_with_its_units_and_files_beside_it(tmp_path: Path, monk
     assert hall.bounds == pytest.approx(np.array([[-1.0, -0.5, -2.5], [1.0, 0.5, 0.5]]))
 
 
-def test_a_robot_loads_with_its_scene_and_does_not_keep_it(tmp_path: Path) -> None:
+def test_a_robot_does_not_contain_its_scene(tmp_path: Path) -> None:
     file = robot_file(tmp_path, SCENE)
     robot = sl.load_robot(file)
     assert "scene" not in sl.dump_robot(robot)
@@ -70,9 +70,7 @@ def test_a_robot_loads_with_its_scene_and_does_not_keep_it(tmp_path: Path) -> No
         ("[{name: a, mesh: 3}]", ("scene[0].mesh", "3")),
     ],
 )
-def test_a_scene_that_is_wrong_is_refused_with_the_robot_and_by_itself(
-    tmp_path: Path, scene: str, parts: tuple[str, ...]
-) -> None:
+def test_an_invalid_scene_is_refused_by_both_readers(tmp_path: Path, scene: str, parts: tuple[str, ...]) -> None:
     file = robot_file(tmp_path, f"scene: {scene}\n")
     for load in (sl.load_robot, sl.load_scene):
         with refused(*parts, kind=sl.FileError, file=file) as error:
@@ -80,7 +78,7 @@ def test_a_scene_that_is_wrong_is_refused_with_the_robot_and_by_itself(
         assert len(str(error.value)) < 300
 
 
-def test_a_mesh_that_is_not_there_is_missed_by_the_scene_alone(tmp_path: Path) -> None:
+def test_a_missing_mesh_is_an_error_of_the_scene_only(tmp_path: Path) -> None:
     file = robot_file(tmp_path, "scene: [{name: a, mesh: missing.stl}]\n")
     assert sl.load_robot(file).cable_count == 8
     with refused(kind=sl.FileError, file=tmp_path / "missing.stl"):

@@ -42,7 +42,7 @@ def test_a_document_type_is_skipped_and_not_opened(tmp_path: Path) -> None:
     ],
     ids=range(15),
 )
-def test_what_is_refused(tmp_path: Path, text: bytes, snapshot: SnapshotAssertion) -> None:
+def test_refusals(tmp_path: Path, text: bytes, snapshot: SnapshotAssertion) -> None:
     file = written(tmp_path, text)
     with refused(kind=FileError, file=file) as caught:
         read_xml(file)
@@ -59,6 +59,6 @@ def test_missing_file_and_folder(tmp_path: Path) -> None:
     ("text", "shown"),
     [(None, "missing"), ("  ", "missing"), ("1 2", "'1 2'"), ("1 2 x", "'1 2 x'"), ("1 nan 3", "'1 nan 3'")],
 )
-def test_numbers_that_are_none(text: str | None, shown: str) -> None:
+def test_invalid_numbers(text: str | None, shown: str) -> None:
     with refused("place", shown, "3 numbers between blanks in m", kind=InvalidValueError):
         numbers_of_text(text, 3, "place", "m")

@@ -29,7 +29,7 @@ SEAL = len("\nsagline sha256 \n") + 64  # bytes at the end
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> FilePath:
-    """A simulation's file, to be copied."""
+    """File of a simulation."""
     file = tmp_path_factory.mktemp("simulation") / "sim.nc"
     a_simulation().save(file)
     return file
@@ -37,14 +37,14 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> FilePath:
 
 @pytest.fixture(scope="module")
 def data(whole: FilePath) -> xr.Dataset:
-    """What is in it."""
+    """Its data set."""
     with xr.open_dataset(whole, engine="h5netcdf", decode_times=False, mask_and_scale=False) as data:
         return data.load()
 
 
 @pytest.fixture
 def saved(tmp_path: FilePath, whole: FilePath) -> FilePath:
-    """A copy of it, to be spoilt."""
+    """A copy of it for modifications."""
     return FilePath(shutil.copy(whole, tmp_path))
 
 
@@ -52,7 +52,7 @@ def saved(tmp_path: FilePath, whole: FilePath) -> FilePath:
     ("nodes", "events", "robot"),
     wide(itertools.product((True, False), (HAPPENED, ()), ("article-suspended", "falcon-7"))),
 )
-def test_a_simulation_comes_back_to_the_last_bit(
+def test_a_simulation_is_saved_exactly(
     tmp_path: FilePath, nodes: bool, events: tuple[Occurrence, ...], robot: str
 ) -> None:
     simulation = a_simulation(events, nodes, sl.load_robot(robot))
@@ -61,7 +61,7 @@ def test_a_simulation_comes_back_to_the_last_bit(
 
 
 @pytest.mark.parametrize("cable_mass", wide(["none", "lumped"]))
-def test_a_broken_cable_and_a_dropped_load_come_back(tmp_path: FilePath, cable_mass: Any) -> None:
+def test_a_broken_cable_and_a_dropped_load_are_saved(tmp_path: FilePath, cable_mass: Any) -> None:
     state = sl.inverse(ROBOT, sl.Pose((0.0, 0.0, 1.5), np.eye(3))).state
     events = (sl.Break(cable=3, time=0.02), sl.Drop(mass=5.0, time=0.04))
     settings: dict[str, Any] = {"cable_mass": cable_mass, "nodes": 6, "damping": sl.Damping(1e-4)}
@@ -74,7 +74,7 @@ def test_a_broken_cable_and_a_dropped_load_come_back(tmp_path: FilePath, cable_m
     assert_same(simulation, sl.load_simulation(tmp_path / "sim.nc"))
 
 
-def test_nothing_of_a_simulation_is_left_out() -> None:
+def test_all_fields_of_a_simulation_are_saved() -> None:
     places = {quantity.place.split(".")[0] for quantity in (TIME, *SAMPLES, LARGEST, NODES)}
     told = {"robot", "events", "cable_mass", "step", "integrator", "winches", "winding", "damping"}
     assert places | told == {field.name for field in fields(sl.Simulation)}
@@ -83,7 +83,7 @@ def test_nothing_of_a_simulation_is_left_out() -> None:
     assert {quantity.place for quantity in EVENTS} == {field.name for field in fields(Occurrence)}
 
 
-def test_what_a_reader_finds(saved: FilePath) -> None:
+def test_contents_of_the_file(saved: FilePath) -> None:
     simulation = a_simulation()
     with xr.open_dataset(saved, engine="h5netcdf") as data:
         sizes = {"time": 7, "cable": 8, "node": 5, "event": 3}
@@ -102,7 +102,9 @@ def test_what_a_reader_finds(saved: FilePath) -> None:
         assert data.attrs["source"] == f"sagline {sl.__version__}"
 
 
-def test_plans_and_simulations_are_told_apart(tmp_path: FilePath, saved: FilePath, snapshot: SnapshotAssertion) -> None:
+def test_plans_and_simulations_are_distinguished(
+    tmp_path: FilePath, saved: FilePath, snapshot: SnapshotAssertion
+) -> None:
     a_plan().save(tmp_path / "run.nc")
     (tmp_path / "sim.yaml").write_text("a: 1")
     for load, file in ((sl.load_simulation, "run.nc"), (sl.load_plan, saved.name), (sl.load_simulation, "sim.yaml")):
@@ -111,7 +113,7 @@ def test_plans_and_simulations_are_told_apart(tmp_path: FilePath, saved: FilePat
         assert wording(caught.value, tmp_path) == snapshot
 
 
-def test_what_another_program_has_changed_is_told(saved: FilePath, snapshot: SnapshotAssertion) -> None:
+def test_changes_by_another_program_are_reported(saved: FilePath, snapshot: SnapshotAssertion) -> None:
     content = saved.read_bytes()
     damaged = content[: len(content) // 2] + b"\1" + content[len(content) // 2 :]
     for data in (content[:-SEAL], damaged):
@@ -126,7 +128,7 @@ Reader = Callable[[xr.Dataset], sl.Simulation]
 
 @pytest.fixture
 def read(monkeypatch: pytest.MonkeyPatch) -> Reader:
-    """Read a data set as from a file that somebody edited and sealed anew."""
+    """Read a data set as from an edited file with a valid digest."""
     monkeypatch.setattr(netcdf, "parse_robot", cache(parse_robot))
 
     def load(data: xr.Dataset) -> sl.Simulation:
@@ -185,7 +187,7 @@ def edited(data: xr.Dataset, name: str, index: Any, value: Any) -> xr.Dataset:
         ("axis", 0, "q", ("axis", None, "x, y, z")),
     ],
 )
-def test_values_that_no_simulation_has(
+def test_impossible_values(
     read: Reader, data: xr.Dataset, name: str, index: Any, value: Any, parts: tuple[str, ...]
 ) -> None:
     assert_refused(read, edited(data, name, index, value), parts)
@@ -240,11 +242,11 @@ def test_values_that_no_simulation_has(
         (lambda data: data.assign(length=data["length"].T), ("length: shape", "8 cable × 7 time", "7 time × 8 cable")),
     ],
 )
-def test_files_that_were_written_by_others(read: Reader, data: xr.Dataset, edit: Any, parts: tuple[str, ...]) -> None:
+def test_files_of_other_programs(read: Reader, data: xr.Dataset, edit: Any, parts: tuple[str, ...]) -> None:
     assert_refused(read, edit(data), parts)
 
 
-def test_what_is_edited_above_would_be_read_as_it_is(tmp_path: FilePath, data: xr.Dataset, read: Reader) -> None:
+def test_the_unedited_file_is_valid(tmp_path: FilePath, data: xr.Dataset, read: Reader) -> None:
     sealed(tmp_path / "sim.nc", edited(data, "tensions", (2, 1), -1.0))
     with refused("tensions[2, 1]", "-1", file=tmp_path / "sim.nc"):
         sl.load_simulation(tmp_path / "sim.nc")
@@ -254,7 +256,7 @@ def test_what_is_edited_above_would_be_read_as_it_is(tmp_path: FilePath, data: x
 
 
 def sealed(file: FilePath, data: xr.Dataset) -> None:
-    """A file with the digest that belongs to it, as one who means it would write."""
+    """A file with a valid digest, as by a deliberate change."""
     encoding = {str(name): {"_FillValue": None} for name in data.variables}
     data.to_netcdf(file, engine="h5netcdf", encoding=encoding)
     seal(file)
@@ -267,7 +269,7 @@ def assert_refused(read: Reader, data: xr.Dataset, parts: tuple[str, ...]) -> No
     assert re.match(r".{,299}$", str(caught.value))
 
 
-def test_what_could_not_be_read_again_is_not_written(tmp_path: FilePath) -> None:
+def test_simulations_that_cannot_be_loaded_are_not_written(tmp_path: FilePath) -> None:
     simulation, none, three = a_simulation(), cast("Any", None), cast("Any", 3)
     for wrong, item, value in (
         (replace(simulation, length=-simulation.length), "length[0, 0]", f"{-simulation.length[0, 0]:g}"),
@@ -282,15 +284,15 @@ def test_what_could_not_be_read_again_is_not_written(tmp_path: FilePath) -> None
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_robot_inside_is_the_robot(saved: FilePath) -> None:
+def test_the_file_contains_the_robot(saved: FilePath) -> None:
     loaded = sl.load_simulation(saved).robot
     assert loaded.frame_anchors.tobytes() == ROBOT.frame_anchors.tobytes()
     assert loaded.mass == ROBOT.mass
 
 
 @pytest.mark.parametrize("time", wide([0.0301, 0.0, 0.0333, 0.035]))
-def test_events_at_any_time_leave_a_simulation_that_can_be_saved(tmp_path: FilePath, time: float) -> None:
-    """At the start, between records, at the end, which no record falls on."""
+def test_simulations_with_events_at_any_time_can_be_saved(tmp_path: FilePath, time: float) -> None:
+    """At the start, between records, and at the end, which is not at a record."""
     state = sl.inverse(ROBOT, sl.Pose((0.0, 0.0, 1.5), np.eye(3))).state
     simulation = sl.simulate(
         state, duration=0.035, step=1e-4, events=[sl.Drop(5.0, time), sl.Break(3, time), sl.Break(5, time)]
@@ -301,7 +303,7 @@ def test_events_at_any_time_leave_a_simulation_that_can_be_saved(tmp_path: FileP
 
 
 @extended
-def test_small_motions_come_back(tmp_path: FilePath) -> None:
+def test_small_motions_are_saved(tmp_path: FilePath) -> None:
     state = sl.inverse(sl.load_robot("expo2015-lucia"), sl.Pose([-0.6, 0.0, 3.5], np.eye(3))).state
     damping = sl.Damping(modal_damping=0.01)
     push = ([0.0, 0.1], np.outer([0, 1], [3.0, 2.0, -3.0, 1.0, 0.8, 0.5]))

@@ -59,7 +59,7 @@ def test_a_robot_in_full(tmp_path: Path) -> None:
     assert list(robot.assumed) == ["inertia"]
 
 
-def test_what_was_lost_is_told(tmp_path: Path) -> None:
+def test_lost_data_are_listed(tmp_path: Path) -> None:
     imported = load(tmp_path)
     lost = " ".join(imported.lost)
     assert imported.robot.notes.endswith(lost)
@@ -96,14 +96,14 @@ AROUND = 'a11="0" a12="-1" a13="0" a21="1" a22="0" a23="0" a31="0" a32="0" a33="
         (AXES, 1.0),
         (TURNED, -1.0),
         (AROUND, 1.0),
-        ("", 1.0),  # as WireX itself takes what is not there
+        ("", 1.0),  # the default values of WireX
         ('a11="0" a13="1" a22="1" a31="-1" a33="0"', None),
         ('a11="1" a22="0.995004" a23="-0.099833" a32="0.099833" a33="0.995004"', None),
         ('a11="0" a22="0" a33="0"', None),
         ('a13="0.001" a33="0.9999995"', None),
     ],
 )
-def test_only_pulleys_about_a_vertical_axis_are_taken(tmp_path: Path, matrix: str, axis: float | None) -> None:
+def test_only_pulleys_with_a_vertical_axis_are_converted(tmp_path: Path, matrix: str, axis: float | None) -> None:
     imported = load(tmp_path, (AXES, matrix))
     winches = imported.robot.winches
     assert winches is not None
@@ -113,7 +113,7 @@ def test_only_pulleys_about_a_vertical_axis_are_taken(tmp_path: Path, matrix: st
     assert winches.swivel_axis[0].tolist() == [0.0, 0.0, axis or 1.0]
 
 
-# as WireX 2 writes a winch: all of its attributes, zero where it does not know
+# a winch of WireX 2: all attributes, with zero for unknown ones
 DRIVE = (
     '<winch id="1" name="small" description=""><cable nr_cables="1" f_max="800" l_min="0" max_velocity="4" />'
     '<motor motor_type="servo" inertia="0.002" mass="5" max_power="2000" angular_velocity="300" gear_ratio="0.1" />'
@@ -127,7 +127,7 @@ def test_drum_and_motor_of_the_winch(tmp_path: Path) -> None:
     assert winches is not None
     for name, value in (("drum_radius", 0.06), ("drum_width", 0.24), ("groove_pitch", 0.006), ("inertia", 0.002)):
         np.testing.assert_allclose(getattr(winches, name), [value] * 3, rtol=1e-15, err_msg=name)
-    assert winches.gear.tolist() == [1.0] * 3  # which shaft its ratio turns faster is not said
+    assert winches.gear.tolist() == [1.0] * 3  # the file does not say which shaft is faster
     assert " gear" in imported.lost[0]
 
 
@@ -146,14 +146,14 @@ def test_a_zero_is_no_drum(tmp_path: Path) -> None:
     assert load(tmp_path, (WINCH, zeros), *PULLEYS_GONE).robot.winches is None
 
 
-def test_which_of_several_winches_a_cable_has_is_not_known(tmp_path: Path, snapshot: SnapshotAssertion) -> None:
+def test_the_assignment_of_several_winches_is_unknown(tmp_path: Path, snapshot: SnapshotAssertion) -> None:
     imported = load(tmp_path, (WINCH, DRIVE + DRIVE))
     assert imported.robot.winches is not None
     assert imported.robot.winches.drum_radius is None
     assert imported.lost == snapshot
 
 
-def test_what_is_missing_is_assumed_and_said(tmp_path: Path) -> None:
+def test_missing_data_are_assumed_and_listed(tmp_path: Path) -> None:
     robot = load(
         tmp_path,
         (WINCH, ""),
@@ -171,13 +171,13 @@ def test_what_is_missing_is_assumed_and_said(tmp_path: Path) -> None:
     assert "4 mm" in robot.assumed["cables"]
 
 
-def test_without_a_winch_the_breaking_load_limits(tmp_path: Path) -> None:
+def test_the_breaking_load_is_the_limit_without_a_winch(tmp_path: Path) -> None:
     robot = load(tmp_path, (WINCH, "")).robot
     np.testing.assert_array_equal(robot.tension_max, [900, 2500, 900])
     assert "breaking load" in robot.assumed["tension_max"]
 
 
-def test_a_material_of_choice_replaces_the_file_s(tmp_path: Path) -> None:
+def test_a_given_material_replaces_that_of_the_file(tmp_path: Path) -> None:
     robot = load(tmp_path, cables=Cable(0.02, 5e4)).robot
     assert robot.cables.linear_density.tolist() == [0.02] * 3
 
@@ -219,7 +219,7 @@ def test_planar_robots_get_a_plane(tmp_path: Path) -> None:
         ("</models>", "", ("line 21",)),
     ],
 )
-def test_files_that_will_not_do(tmp_path: Path, old: str, new: str, parts: tuple[str, ...]) -> None:
+def test_invalid_files_are_refused(tmp_path: Path, old: str, new: str, parts: tuple[str, ...]) -> None:
     with refused(*parts, kind=FileError):
         load(tmp_path, (old, new))
 
@@ -230,9 +230,9 @@ TENSOR = '<inertiatensor Ixx="0.5" Ixy="0.01" Ixz="0" Iyy="0.6" Iyz="-0.02" Izz=
 @pytest.mark.parametrize(
     ("tensor", "inertia", "said"),
     [
-        # as WireX 0.4 to 1.1 write it, whatever the platform
+        # WireX 0.4 to 1.1, for any platform
         ('<inertiatensor Ixx="14" />', np.diag([14.0, 14.0, 14.0]), "Ixy, Ixz, Iyy, Iyz, Izz"),
-        # as WireX 2.0 writes it: all nine
+        # WireX 2.0: all nine
         (
             '<inertiatensor Ixx="2.000000" Ixy="0.1" Ixz="0.2" Iyx="0.1" Iyy="3" Iyz="0.3" '
             'Izx="0.2" Izy="0.3" Izz="4.000000" />',
@@ -243,7 +243,7 @@ TENSOR = '<inertiatensor Ixx="0.5" Ixy="0.01" Ixz="0" Iyy="0.6" Iyz="-0.02" Izz=
         ('<inertiatensor Ixx="2" Iyy="3" Izz="4" Iyx="0.1" Izx="0.2" Izy="0.3" />', None, "center of mass"),
         ('<inertiatensor Ixx="2" Iyy="3" Izz="4" />', np.diag([2.0, 3.0, 4.0]), "Ixy, Ixz, Iyz"),
         ('<inertiatensor Iyy="0.2" Ixx="0.5" />', np.diag([0.5, 0.2, 0.5]), "0.5 kg m^2"),
-        # a box of 0.2 x 0.2 x 0.02 m and 12.5 kg: the anchors lie in a plane
+        # a box of 0.2 x 0.2 x 0.02 m and 12.5 kg: the anchors are in a plane
         ("", np.diag([0.0420833333333333, 0.0420833333333333, 0.0833333333333333]), "solid box"),
         ("<inertiatensor />", np.diag([0.0420833333333333, 0.0420833333333333, 0.0833333333333333]), "solid box"),
         (
@@ -261,7 +261,7 @@ def test_every_writer_s_inertia(tmp_path: Path, tensor: str, inertia: ArrayLike 
 
 
 def chain(k: int) -> str:
-    """One chain as WireLib prints it: six decimals, the pulley's axes, a type of winch."""
+    """One chain in the output of WireLib: six decimals, the axes of the pulley, a type of winch."""
     turn = " ".join(f'a{j}{i}="{float(i == j):.6f}"' for i in (1, 2, 3) for j in (1, 2, 3))
     x, y, z = (-1) ** k * 2.0, (-1) ** (k // 2) * 1.5, 2.0 * (k < 4)
     return (
@@ -289,14 +289,14 @@ WINCH_0_4 = '<winch name="w"><cable f_max="0.000000" dl_max="0.000000" /><guidin
 @pytest.mark.parametrize(
     ("version", "attributes", "inside", "after", "limit", "assumed"),
     [
-        # WireLib 0.4 of 2011: no cable, no winch, an application, an attribute that a search and replace broke
+        # WireLib 0.4 of 2011: no cable, no winch, an application, an attribute with a wrong name
         ("0.31", 'name="A" SEGESTA-Winde=""', APPLICATION, "", np.inf, {"cables", "tension_min", "tension_max"}),
-        # the same with a cable without its elasticity, and a winch without a force
+        # the same with a cable without elasticity and a winch without force
         ("0.31", 'name="" id=""', APPLICATION, CABLE_0_4 + WINCH_0_4, 40e3, {"cables", "tension_min", "tension_max"}),
         # WireLib 1.0 and 1.1
         ("0.31", 'name="A" id="1.0"', "", CABLE_1_1 + WINCH_1_1, 720.0, set()),
         ("0.32", 'name="A" id="1.0"', '<controller ipo_clock="4" />', CABLE_1_1 + WINCH_1_1, 720.0, set()),
-        # a Windows build prints what it does not know as 1.#INF00
+        # a Windows build writes unknown numbers as 1.#INF00
         (
             "0.32",
             'name="A"',

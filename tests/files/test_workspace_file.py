@@ -66,7 +66,7 @@ def assert_same(space: sl.Workspace, other: sl.Workspace) -> None:
 
 
 @pytest.mark.parametrize("name", wide(SPACES))
-def test_what_is_read_back_is_the_same(name: str, tmp_path: FilePath) -> None:
+def test_a_loaded_workspace_is_equal(name: str, tmp_path: FilePath) -> None:
     space = space_of(name)
     space.save(tmp_path / "space.nc")
     found = sl.load_workspace(tmp_path / "space.nc")
@@ -77,7 +77,7 @@ def test_what_is_read_back_is_the_same(name: str, tmp_path: FilePath) -> None:
 
 
 @extended
-def test_obstacles_are_read_back(tmp_path: FilePath) -> None:
+def test_obstacles_are_saved(tmp_path: FilePath) -> None:
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
     mesh = Mesh(corners + 9.0, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]], "corner")
     space = sl.workspace(ROBOT, criteria=[sl.Clearance(0.01, (*WALL, mesh))], cells=4)
@@ -102,7 +102,7 @@ def test_other_files_are_refused(tmp_path: FilePath, snapshot: SnapshotAssertion
             sl.load_workspace(tmp_path / name)
 
 
-def test_criteria_of_ones_own_cannot_be_read_back(tmp_path: FilePath) -> None:
+def test_custom_criteria_cannot_be_loaded(tmp_path: FilePath) -> None:
     class Own(sl.MaximumSag):
         pass
 

@@ -32,7 +32,7 @@ def test_a_file_appears_when_it_is_complete(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("trouble", [KeyboardInterrupt, ValueError, OSError(28, "No space left on device")])
-def test_trouble_keeps_what_was_there(tmp_path: Path, trouble: BaseException | type[BaseException]) -> None:
+def test_an_error_keeps_the_existing_file(tmp_path: Path, trouble: BaseException | type[BaseException]) -> None:
     file = tmp_path / "run.nc"
     file.write_bytes(b"before")
 
@@ -62,7 +62,7 @@ def test_a_full_disk_is_named(tmp_path: Path, snapshot: SnapshotAssertion) -> No
     assert not list(tmp_path.iterdir())
 
 
-def test_places_that_cannot_be_written(tmp_path: Path, snapshot: SnapshotAssertion) -> None:
+def test_paths_that_cannot_be_written(tmp_path: Path, snapshot: SnapshotAssertion) -> None:
     (tmp_path / "file").touch()
     entered: list[Path] = []
     for place in (tmp_path, tmp_path / "missing" / "run.nc", tmp_path / "file" / "run.nc"):
@@ -72,7 +72,7 @@ def test_places_that_cannot_be_written(tmp_path: Path, snapshot: SnapshotAsserti
     assert entered == []
 
 
-def test_a_folder_is_checked_without_being_made(tmp_path: Path, snapshot: SnapshotAssertion) -> None:
+def test_a_folder_is_checked_without_creating_it(tmp_path: Path, snapshot: SnapshotAssertion) -> None:
     (tmp_path / "file").touch()
     check_folder(tmp_path / "new" / "deep")
     assert not (tmp_path / "new").exists()
@@ -84,20 +84,20 @@ def test_a_folder_is_checked_without_being_made(tmp_path: Path, snapshot: Snapsh
 
 
 def test_a_folder_without_permission(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("os.access", lambda *_: False)  # root may write anywhere, so it cannot be tried for real
+    monkeypatch.setattr("os.access", lambda *_: False)  # the superuser may write anywhere, so the check is replaced
     with pytest.raises(FileError, match="permission"):
         check_folder(tmp_path / "new")
 
 
-def test_what_takes_the_files_name_is_on_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_content_is_on_the_disk_before_the_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     target, seen = tmp_path / "run.nc", []
     monkeypatch.setattr("os.fsync", lambda handle: seen.append((os.fstat(handle).st_size, target.exists())))
     write_text(target, "whole")
-    assert seen == [(5, False)]  # all of it, before the name
+    assert seen == [(5, False)]  # all content, before the name
     assert target.read_text() == "whole"
 
 
-def test_permissions_stay_and_other_names_keep_what_was_there(tmp_path: Path) -> None:
+def test_permissions_are_kept_and_links_keep_the_old_content(tmp_path: Path) -> None:
     file, other = tmp_path / "run.nc", tmp_path / "other.nc"
     file.write_text("before")
     file.chmod(0o640)
@@ -107,7 +107,7 @@ def test_permissions_stay_and_other_names_keep_what_was_there(tmp_path: Path) ->
     assert stat.S_IMODE(file.stat().st_mode) == 0o640
 
 
-def test_what_is_no_file_is_refused_and_stays(tmp_path: Path, snapshot: SnapshotAssertion) -> None:
+def test_names_of_other_things_are_refused_and_unchanged(tmp_path: Path, snapshot: SnapshotAssertion) -> None:
     reasons = []
     for place, is_there in no_files(tmp_path):
         with refused(kind=FileError) as caught:
@@ -128,13 +128,13 @@ def test_what_is_no_file_is_refused_and_stays(tmp_path: Path, snapshot: Snapshot
 
 
 def no_files(folder: Path) -> list[tuple[Path, Callable[[], bool]]]:
-    """Names that are taken, and whether each is still what it was."""
+    """Names used by other things than files, with a check that they are unchanged."""
     names = ("folder", "pipe", "socket", "device", "data", "to", "nowhere")
     inside, pipe, plug, device, data, to, nowhere = (folder / name for name in names)
     inside.mkdir()
     os.mkfifo(pipe)
     with socket.socket(socket.AF_UNIX) as server, contextlib.chdir(folder):
-        server.bind(plug.name)  # the name of a socket may have no more than about a hundred letters
+        server.bind(plug.name)  # the name of a socket has at most about a hundred characters
     os.symlink(os.devnull, device)
     data.write_text("data")
     to.symlink_to(data)
@@ -152,7 +152,7 @@ def no_files(folder: Path) -> list[tuple[Path, Callable[[], bool]]]:
 
 
 @pytest.mark.parametrize("name", ["a\0b", "\ud800", "x" * 300, "x" * 5000, "data/run.nc", "loop/run.nc"])
-def test_names_that_no_file_can_have(tmp_path: Path, name: str) -> None:
+def test_impossible_names(tmp_path: Path, name: str) -> None:
     (tmp_path / "data").touch()
     (tmp_path / "loop").symlink_to(tmp_path / "loop")
     before = sorted(entry.name for entry in tmp_path.iterdir())
@@ -167,20 +167,20 @@ def test_names_that_no_file_can_have(tmp_path: Path, name: str) -> None:
     assert sorted(entry.name for entry in tmp_path.iterdir()) == before
 
 
-def test_names_as_long_as_the_file_system_takes(tmp_path: Path) -> None:
+def test_names_of_the_largest_length(tmp_path: Path) -> None:
     write_text(tmp_path / ("x" * 255), "text")
     assert (tmp_path / ("x" * 255)).read_text() == "text"
 
 
-def test_a_file_that_is_write_protected(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_write_protected_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "run.nc").write_text("before")
-    monkeypatch.setattr("os.access", lambda *_: False)  # root may write to all
+    monkeypatch.setattr("os.access", lambda *_: False)  # the superuser may write all files
     with pytest.raises(FileError, match="permissions"):
         write_text(tmp_path / "run.nc", "after")
     assert (tmp_path / "run.nc").read_text() == "before"
 
 
-def test_half_a_character_is_refused_before_anything_is_written(tmp_path: Path) -> None:
+def test_half_a_character_is_refused_first(tmp_path: Path) -> None:
     with refused(kind=FileError, file=tmp_path / "run.txt") as caught:
         write_text(tmp_path / "run.txt", "name: \ud800")
     assert "U+D800 in 'name: '" in caught.value.reason
@@ -188,7 +188,7 @@ def test_half_a_character_is_refused_before_anything_is_written(tmp_path: Path) 
 
 
 @pytest.mark.parametrize("trouble", [None, KeyboardInterrupt, OSError(28, "No space left on device")])
-def test_files_that_belong_together(tmp_path: Path, trouble: BaseException | type[BaseException] | None) -> None:
+def test_groups_of_files(tmp_path: Path, trouble: BaseException | type[BaseException] | None) -> None:
     (tmp_path / "page.html").write_text("before")
 
     def write() -> None:
@@ -207,7 +207,7 @@ def test_files_that_belong_together(tmp_path: Path, trouble: BaseException | typ
         assert contents(tmp_path) == {"page.html": "before"}
 
 
-def test_the_file_that_failed_is_named(tmp_path: Path) -> None:
+def test_the_failed_file_is_named(tmp_path: Path) -> None:
     def write() -> None:
         with atomic_files(tmp_path, ["page.html", "page.json"]) as (_, data):
             data.unlink()
@@ -219,7 +219,7 @@ def test_the_file_that_failed_is_named(tmp_path: Path) -> None:
     assert contents(tmp_path) == {}
 
 
-def test_what_was_finished_can_be_named(tmp_path: Path) -> None:
+def test_finished_files_can_be_named(tmp_path: Path) -> None:
     def write() -> None:
         write_text(tmp_path / "a.txt", "a")
         with atomic_files(tmp_path, ["b", "c"]):

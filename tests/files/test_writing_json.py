@@ -23,18 +23,18 @@ MEANT = {
 }
 
 
-def test_numbers_are_numbers_and_what_is_not_finite_is_null() -> None:
+def test_finite_numbers_are_numbers_and_others_null() -> None:
     text = json_text(GIVEN)
     assert json.loads(text, parse_constant=lambda name: pytest.fail(name)) == MEANT
     assert "φ" in text
 
 
-def test_what_json_cannot_hold_is_refused() -> None:
+def test_values_without_json_form_are_refused() -> None:
     with pytest.raises(TypeError, match="serializable"):
         json_text({"what": object()})
 
 
-def test_texts_do_nothing_to_a_terminal_and_come_back() -> None:
+def test_texts_are_safe_for_terminals_and_loaded_exactly() -> None:
     texts = [
         chr(code) for code in (*range(0xA1), *range(0x2000, 0x2100), *range(0xD7F0, 0xE000), 0xFEFF, 0x1F600, 0xE0001)
     ]

@@ -8,9 +8,9 @@ from hypothesis import example, given
 import sagline as sl
 from sagline.files.writing import file_stem
 
-# what Windows keeps for itself, whatever follows the first dot: learn.microsoft.com, "Naming Files, Paths, Namespaces"
+# reserved names of Windows, with any suffix: learn.microsoft.com, "Naming Files, Paths, Namespaces"
 DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{port}{k}" for port in ("COM", "LPT") for k in "0123456789¹²³")}
-ANY_TEXT = st.text(st.characters(exclude_categories=()), max_size=400)  # half characters too
+ANY_TEXT = st.text(st.characters(exclude_categories=()), max_size=400)  # half characters as well
 
 
 def digits(name: str) -> str:
@@ -18,7 +18,7 @@ def digits(name: str) -> str:
 
 
 @pytest.mark.parametrize("name", sl.robot_names())
-def test_names_that_are_fine_stay(name: str) -> None:
+def test_valid_names_are_unchanged(name: str) -> None:
     assert file_stem(name) == name
     assert file_stem(name, "poses") == f"{name}-poses"
 
@@ -38,7 +38,7 @@ def test_names_that_are_fine_stay(name: str) -> None:
         ("a\\b", f"a-b-{digits(chr(97) + chr(92) + 'b')}"),
     ],
 )
-def test_what_becomes_of_others(name: str, stem: str) -> None:
+def test_other_names_are_converted(name: str, stem: str) -> None:
     assert file_stem(name) == stem
     assert file_stem(name, "catenary") == f"{stem}-catenary"
 
@@ -59,7 +59,7 @@ def test_what_becomes_of_others(name: str, stem: str) -> None:
 @example("\u0301")
 @example("_")
 @example("a\u200db")
-def test_whatever_a_robot_is_called(name: str) -> None:
+def test_any_name_of_a_robot(name: str) -> None:
     stem = file_stem(name)
     assert len(stem.encode()) <= 140
     assert not set(stem) & {chr(code) for code in range(33)} | set(stem) & set('/\\:*?"<>|~$')
@@ -73,6 +73,6 @@ def test_whatever_a_robot_is_called(name: str) -> None:
 @example("a/b", "a b")
 @example("a\0", "a")
 @example("x" * 200 + "a", "x" * 200 + "b")
-def test_two_robots_do_not_share_files(one: str, other: str) -> None:
+def test_two_robots_have_different_files(one: str, other: str) -> None:
     same = unicodedata.normalize("NFC", one).replace(" ", "-") == unicodedata.normalize("NFC", other).replace(" ", "-")
     assert (file_stem(one) == file_stem(other)) <= same

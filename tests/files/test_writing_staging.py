@@ -22,7 +22,7 @@ with atomic_file(Path(sys.argv[1])) as partial:
 
 @pytest.fixture
 def writer(tmp_path: Path) -> "subprocess.Popen[str]":
-    """A process in the middle of writing a file."""
+    """A process during the writing of a file."""
     command = [sys.executable, "-c", WRITER, str(tmp_path / "other.nc")]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
@@ -39,14 +39,16 @@ def names(folder: Path) -> list[str]:
     return sorted(entry.name for entry in folder.iterdir())
 
 
-def test_what_a_killed_process_leaves_goes_with_the_next_file(tmp_path: Path, writer: "subprocess.Popen[str]") -> None:
+def test_remains_of_a_killed_process_are_removed_with_the_next_file(
+    tmp_path: Path, writer: "subprocess.Popen[str]"
+) -> None:
     ended(writer)
     assert len(names(tmp_path)) == 1
     write_text(tmp_path / "run.nc", "whole")
     assert names(tmp_path) == ["run.nc"]
 
 
-def test_what_another_process_is_writing_stays(tmp_path: Path, writer: "subprocess.Popen[str]") -> None:
+def test_files_of_a_running_process_are_kept(tmp_path: Path, writer: "subprocess.Popen[str]") -> None:
     try:
         before = names(tmp_path)
         write_text(tmp_path / "run.nc", "whole")
@@ -62,7 +64,7 @@ def test_two_files_at_once_in_one_process(tmp_path: Path) -> None:
     assert names(tmp_path) == []
 
 
-def test_what_killed_processes_leave_in_any_state(tmp_path: Path) -> None:
+def test_remains_in_any_state_are_removed(tmp_path: Path) -> None:
     empty, without_lock, full = (tmp_path / f".sagline-{name}.part" for name in ("empty", "data", "full"))
     for place in (empty, without_lock, full):
         place.mkdir()
@@ -74,7 +76,7 @@ def test_what_killed_processes_leave_in_any_state(tmp_path: Path) -> None:
     assert names(tmp_path) == []
 
 
-def test_what_only_looks_like_a_leftover_stays(tmp_path: Path) -> None:
+def test_files_similar_to_remains_are_kept(tmp_path: Path) -> None:
     kept = tmp_path / "kept"
     kept.mkdir()
     (kept / "data").write_text("data")
@@ -83,14 +85,14 @@ def test_what_only_looks_like_a_leftover_stays(tmp_path: Path) -> None:
     (tmp_path / ".sagline-mine").mkdir()
     planted = tmp_path / ".sagline-pipe.part"
     planted.mkdir()
-    os.mkfifo(planted / LOCK)  # opening it to write would wait for a reader
+    os.mkfifo(planted / LOCK)  # opening it for writing would wait for a reader
     write_text(tmp_path / "run.nc", "whole")
     assert (kept / "data").read_text() == "data"
     assert names(kept) == ["data"]
     assert {".sagline-link.part", ".sagline-file.part", ".sagline-mine"} < set(names(tmp_path))
 
 
-def test_a_folder_taken_for_left_is_replaced_by_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_folder_removed_by_another_process_is_created_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made, original = [], tempfile.mkdtemp
 
     def taken_away_twice(**keywords: object) -> str:
@@ -106,7 +108,7 @@ def test_a_folder_taken_for_left_is_replaced_by_another(tmp_path: Path, monkeypa
 
 
 @pytest.mark.parametrize("error", [OSError(37, "No locks available")])
-def test_without_locks_files_are_written_and_nothing_is_removed(
+def test_without_locks_files_are_written_and_remains_are_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: OSError
 ) -> None:
     def none(*_: object) -> None:

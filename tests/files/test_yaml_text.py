@@ -20,7 +20,7 @@ from tests.tiers import extended
         ("10", 10),
         ("+010", 10),  # YAML 1.1 reads 8
         ("-2.50", -2.5),
-        ("1e3", 1000.0),  # YAML 1.1 reads a text
+        ("1e3", 1000.0),  # YAML 1.1 reads text
         (".5E-1", 0.05),
         ("2.", 2.0),
         (".inf", math.inf),
@@ -56,7 +56,7 @@ def test_a_number_is_a_plain_number_and_a_word_is_a_word(text: str, value: objec
     assert type(found) is type(value)
 
 
-def test_aliases_and_merges_in_measure() -> None:
+def test_limited_aliases_and_merges() -> None:
     text = "base: &b {x: 1, y: [1, 2]}\nsame: *b\nmore: {<<: *b, x: 3}\n"
     assert parse_mapping(text, "x.yaml")["more"] == {"x": 3, "y": [1, 2]}
     assert parse_mapping(text, "x.yaml")["same"] == {"x": 1, "y": [1, 2]}
@@ -89,7 +89,7 @@ def _bomb(first: str, item: str, between: str) -> str:
         pytest.param("a: [" + "[]," * 100_000, marks=extended),
     ],
 )
-def test_nothing_grows_while_it_is_read(text: str) -> None:
+def test_reading_does_not_expand_the_text(text: str) -> None:
     def read() -> None:
         with pytest.raises(FileError) as caught:
             parse_mapping(text, "x.yaml")
@@ -133,7 +133,7 @@ def test_nothing_grows_while_it_is_read(text: str) -> None:
     ],
     ids=range(27),
 )
-def test_what_is_no_such_yaml(text: str, snapshot: SnapshotAssertion) -> None:
+def test_other_yaml_is_refused(text: str, snapshot: SnapshotAssertion) -> None:
     with refused(kind=FileError, file="x.yaml") as caught:
         parse_mapping(text, "x.yaml")
     assert wording(caught.value, Path()) == snapshot
@@ -195,7 +195,7 @@ WORDS = (
 
 
 @pytest.mark.parametrize("word", WORDS)
-def test_a_text_stays_a_text(word: str) -> None:
+def test_texts_are_kept(word: str) -> None:
     data = {"name": word, word: [word, {"in": word}]}
     for given in (data, {"outer": data}):
         text = dump_mapping(given)
@@ -204,7 +204,7 @@ def test_a_text_stays_a_text(word: str) -> None:
         assert "!!" not in text
 
 
-def test_a_number_stays_that_number() -> None:
+def test_numbers_are_kept() -> None:
     numbers = [1e5, -0.0, 0.1 + 0.2, 1e-320, 1e22, 1e300, 5e-324, float("inf"), 12, -7, True, False, None]
     found = parse_mapping(dump_mapping({"numbers": numbers}), "here")["numbers"]
     assert repr(found) == repr(numbers)

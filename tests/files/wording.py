@@ -1,4 +1,4 @@
-"""Messages about a whole file, to be compared with a snapshot."""
+"""Messages on whole files for comparison with a snapshot."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What Jupyter shows of robots, plans and results: the verdict, a drawing in the page's colors, and never an error."""
+"""Jupyter shows robots, plans and results: the verdict, a drawing in the colors of the page, and never an error."""
 
 import re
 import subprocess
@@ -42,7 +42,7 @@ def drawing(text: str) -> ElementTree.Element:
 
 
 class Balanced(HTMLParser):
-    """Finds tags that are not closed."""
+    """Parser that finds tags that are not closed."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -94,7 +94,7 @@ def once(name: str) -> str:
 
 
 @pytest.mark.parametrize("name", wide(THINGS))
-def test_a_page_gets_whole_html_of_reasonable_size_in_reasonable_time(name: str) -> None:
+def test_html_is_complete_small_and_fast(name: str) -> None:
     thing = thing_of(name)
     text = once(name)
     verdict = summary_of(thing)
@@ -104,7 +104,7 @@ def test_a_page_gets_whole_html_of_reasonable_size_in_reasonable_time(name: str)
     assert len(text.encode()) < LARGEST + 10_000
     assert ("<svg" in text) == (name in DRAWN)
     assert least_seconds(lambda: shown(thing), LONGEST) < LONGEST
-    assert not re.search(r"""(?:src|href)=["']?(?!#|data:)\w""", text)  # nothing is loaded from elsewhere
+    assert not re.search(r"""(?:src|href)=["']?(?!#|data:)\w""", text)  # no external resources
 
 
 def test_verdicts(snapshot: SnapshotAssertion) -> None:
@@ -120,7 +120,9 @@ def test_verdicts(snapshot: SnapshotAssertion) -> None:
 
 
 @pytest.mark.parametrize(("pattern", "freedoms"), [("3T", 3), ("1R2T", 3), ("3R3T", 6)])
-def test_freedoms_are_those_of_the_motion_pattern(pattern: Literal["3T", "1R2T", "3R3T"], freedoms: int) -> None:
+def test_degrees_of_freedom_are_those_of_the_motion_pattern(
+    pattern: Literal["3T", "1R2T", "3R3T"], freedoms: int
+) -> None:
     robot = sl.Robot("any", ROBOT.frame_anchors, ROBOT.platform_anchors, ROBOT.cables, 10.0, ROBOT.inertia,
                      motion_pattern=pattern, plane_normal=[0, 1, 0] if pattern == "1R2T" else None)  # fmt: skip
     assert f"8 cables, {freedoms} freedoms ({pattern})" in re.sub(r"<[^>]+>", "", shown(robot))
@@ -128,18 +130,20 @@ def test_freedoms_are_those_of_the_motion_pattern(pattern: Literal["3T", "1R2T",
 
 @pytest.mark.parametrize("name", wide(DRAWN))
 def test_drawings_have_the_colors_of_the_page(name: str) -> None:
-    """So that they are read in Jupyter's dark theme: what is black or gray takes the color of the page's text."""
+    """Readable in the dark theme of Jupyter: black and gray take the text color of the page."""
     text = once(name)
     picture = drawing(text)
     assert "currentColor" in text
     looks = " ".join(element.get("style", "") for element in picture.iter())
     for red, green, blue in re.findall(r"#([0-9a-f]{2})([0-9a-f]{2})([0-9a-f]{2})\b", looks):
         assert not red == green == blue, name
-    assert "style" not in {element.tag.rpartition("}")[2] for element in picture.iter()}  # would hold for all the page
+    assert "style" not in {
+        element.tag.rpartition("}")[2] for element in picture.iter()
+    }  # would apply to the whole page
 
 
 @extended
-def test_names_in_drawings_are_their_own() -> None:
+def test_ids_in_drawings_are_unique() -> None:
     texts = [once(name) for name in DRAWN]
     names = [re.findall(r'\bid="([^"]+)"', text) for text in texts]
     assert sum(map(len, names)) == len({name for each in names for name in each}) > 0
@@ -147,7 +151,7 @@ def test_names_in_drawings_are_their_own() -> None:
         assert set(re.findall(r'(?:href="#|url\(#)([^")]+)', text)) == set(own)
 
 
-def test_what_is_written_is_text() -> None:
+def test_values_are_escaped_text() -> None:
     texts = [element for element in drawing(once("plan")).iter() if element.tag.endswith("text")]
     words = " ".join("".join(text.itertext()) for text in texts)
     assert "time [s]" in words
@@ -172,10 +176,10 @@ def test_long_plans_and_many_marks_stay_small() -> None:
     figure = figures.figure_of(plan)
     assert figure is not None
     drawn = [np.nanmax(np.asarray(line.get_ydata(), dtype=float)) for line in figure.axes[0].get_lines()]
-    np.testing.assert_array_equal(drawn, peaks)  # thinned, but not its peaks
+    np.testing.assert_array_equal(drawn, peaks)  # thinned, but with its peaks
 
 
-def test_what_cannot_be_drawn_is_told_without_a_figure(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_results_without_a_drawing_have_a_text(monkeypatch: pytest.MonkeyPatch) -> None:
     def fails(thing: object) -> None:
         raise RuntimeError("no fonts")
 
@@ -185,20 +189,22 @@ def test_what_cannot_be_drawn_is_told_without_a_figure(monkeypatch: pytest.Monke
     assert "<svg" not in text
 
 
-def test_what_cannot_be_told_has_its_ordinary_text(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_results_without_a_summary_have_their_ordinary_text(monkeypatch: pytest.MonkeyPatch) -> None:
     def fails(thing: object) -> None:
         raise RuntimeError("broken")
 
     monkeypatch.setattr(html, "summary_of", fails)
-    assert made.plan()._repr_html_() is None  # Jupyter shows repr() then
+    assert made.plan()._repr_html_() is None  # Jupyter then shows repr()
     monkeypatch.undo()
     assert made.plan().state.cables._repr_html_() is None
-    broken = replace(made.plan(), status=np.full(3, 77, dtype=np.int8))  # no such code, and none of that number
+    broken = replace(
+        made.plan(), status=np.full(3, 77, dtype=np.int8)
+    )  # no code of a status, and without a number for it
     assert broken._repr_html_() is None or "<svg" not in shown(broken) or Balanced(shown(broken)).open == []
 
 
 @extended
-def test_figures_too_large_become_pictures_and_then_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_large_figures_become_pictures_or_are_omitted(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = once("plan")
     monkeypatch.setattr(figures, "LARGEST", len(whole) // 3)
     assert "<svg" not in shown(made.plan())
@@ -227,7 +233,7 @@ print("<svg" in text, "article-suspended" in text)
     ("before", "said"),
     [pytest.param("", "True True", marks=pytest.mark.soak), ("sys.modules['matplotlib'] = None", "False True")],
 )
-def test_without_matplotlib_there_is_the_verdict_alone(before: str, said: str) -> None:
+def test_without_matplotlib_only_the_verdict_is_shown(before: str, said: str) -> None:
     code = WITHOUT.format(before=before)
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == said

@@ -1,7 +1,7 @@
-"""A weight on two weightless cables: the one robot whose best anchors are known in closed form.
+"""A weight on two weightless cables, the robot with a closed form of the best anchors.
 
-Anchors at +-x, height h above the weight; tensions from 0 to T; weight G. With theta the cables' angle from the plumb
-line, the margin is min(G sin theta, sin theta (2 T cos theta - G)): it is largest where the two are equal, at
+Anchors at +-x, height h above the weight; tensions from 0 to T; weight G. With the angle theta of the cables from the
+vertical, the margin is min(G sin theta, sin theta (2 T cos theta - G)): it is largest if both are equal, at
 cos theta = G/T if G/T < sqrt(2/3).
 """
 

@@ -1,4 +1,4 @@
-"""Searches against an optimum in closed form; seeds, beginnings and ends."""
+"""Searches compared with an optimum in closed form; seeds, initial robots and results."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tests.optimization.pair import BEST, MARGIN, UNDER, WEIGHT, apart, pair
 from tests.refusal import refused
 from tests.tiers import extended, wide
 
-OPTIMIZERS = {"cma": 1e-6, "differential_evolution": 1e-6, "nsga2": 5e-3}  # and how near 600 robots lead [m]
+OPTIMIZERS = {"cma": 1e-6, "differential_evolution": 1e-6, "nsga2": 5e-3}  # and accuracy of 600 candidates [m]
 
 
 def search(robot: sl.Robot, free: Any, goals: Any = ("least_margin",), **more: Any) -> sl.Front:
@@ -29,17 +29,17 @@ def test_every_optimizer_finds_the_best_anchors(optimizer: str) -> None:
     assert len(front.evaluated) <= 600
     np.testing.assert_allclose(front.best.frame_anchors[:, 0], [BEST, -BEST], atol=near)
     np.testing.assert_allclose(front.values[0], MARGIN, atol=near)
-    np.testing.assert_allclose(front.start_values, WEIGHT / np.sqrt(5.0), rtol=1e-12)  # sin of the first angle
+    np.testing.assert_allclose(front.start_values, WEIGHT / np.sqrt(5.0), rtol=1e-12)  # sine of the initial angle
 
 
-def test_the_margin_is_that_of_the_robot_found() -> None:
+def test_the_margin_is_that_of_the_best_robot() -> None:
     front = search(pair(), [apart()], evaluations=60)
     own = sl.margin(front.best, UNDER, model=sl.Straight(), moment_arm=1.0)
     np.testing.assert_allclose(front.values[0, 0], own.value, rtol=1e-12)
 
 
 def test_two_free_numbers_lead_to_the_same_angle() -> None:
-    """Lower or wider: what counts is the angle, and every pair of anchors at 60 degrees is as good."""
+    """Lower or wider anchors: only the angle matters, and all pairs of anchors at 60 degrees are equally good."""
     up = sl.FreeAnchors("frame", -1.0, 3.0, along=[0, 0, 1], symmetry="together")
     front = search(pair(), [apart(), up], evaluations=600)
     x, _, z = front.best.frame_anchors[0]
@@ -67,15 +67,15 @@ def test_a_seed_gives_the_same_robots_bit_for_bit(optimizer: str) -> None:
 
 
 @pytest.mark.parametrize("optimizer", wide(OPTIMIZERS))
-def test_it_begins_with_the_robot_itself_and_stays_within_bounds(optimizer: str) -> None:
+def test_the_search_begins_with_the_robot_and_stays_within_bounds(optimizer: str) -> None:
     front = search(pair(), [apart(-0.25, 0.75)], optimizer=optimizer, evaluations=200)
     assert front.evaluated[0, 0] == 0.0
     assert front.evaluated.min() >= -0.25
     assert front.evaluated.max() <= 0.75
-    np.testing.assert_allclose(front.changed[0], 0.75, atol=2e-3)  # the best lies beyond
+    np.testing.assert_allclose(front.changed[0], 0.75, atol=2e-3)  # the best robot is outside of the bounds
 
 
-def test_where_nothing_is_better_it_says_so() -> None:
+def test_a_search_without_improvement_says_so() -> None:
     front = search(pair(BEST), [apart(-0.5, 0.0)], evaluations=60)
     assert not front.better
     assert front.best is front.start
@@ -83,13 +83,13 @@ def test_where_nothing_is_better_it_says_so() -> None:
     assert str(front) == front.text
 
 
-def test_goals_may_be_turned_round() -> None:
+def test_goals_can_be_reversed() -> None:
     front = search(pair(), [apart(-0.5, 1.0)], [sl.Goal("least_margin", maximize=False)], evaluations=120)
     np.testing.assert_allclose(front.changed[0], -0.5, atol=1e-4)
 
 
 def test_weights_decide_between_goals() -> None:
-    """Wide limits make the margin large and the largest tension too: the heavier goal wins."""
+    """Wide limits increase the margin and also the largest tension: the goal with the larger weight dominates."""
     limit = sl.FreeLimit("tension_max", 12.0, 40.0)
     wide = sl.FreeAnchors("frame", -0.5, 5.0, along=[1, 0, 0], symmetry="x")
 
@@ -100,14 +100,14 @@ def test_weights_decide_between_goals() -> None:
     assert found(100.0) > 3.0 * found(0.01)
 
 
-def test_limits_go_where_the_margin_grows() -> None:
-    """More tension at the top is never worse; the angle of the best anchors follows: cos theta = G/T."""
+def test_limits_move_to_a_larger_margin() -> None:
+    """A larger upper limit is never worse, and the angle of the best anchors follows: cos theta = G/T."""
     front = search(pair(), [apart(-0.5, 9.0), sl.FreeLimit("tension_max", 15.0, 40.0)], evaluations=800)
     assert front.values[0, 0] == pytest.approx(WEIGHT * np.sin(np.arccos(0.25)), rel=1e-4)
     assert front.best.tension_max[0] == pytest.approx(40.0, rel=1e-3)
 
 
-def test_errors_of_anchors_are_the_worst_or_the_mean_of_the_sample() -> None:
+def test_anchor_errors_give_the_worst_or_the_mean_of_samples() -> None:
     poses = sl.Pose(np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.25]]), np.eye(3))
     robot = pair(2.0)
     errors = np.random.default_rng(3).standard_normal((4, 2, 6)) * 0.05
@@ -123,7 +123,7 @@ def test_errors_of_anchors_are_the_worst_or_the_mean_of_the_sample() -> None:
 
 
 def test_moving_anchors_follow_the_platform() -> None:
-    """Both anchors along one rail: the margin is largest where the platform hangs in their middle."""
+    """Both anchors along one rail: the margin is largest if the platform is in the middle."""
     across = np.linspace(-1.5, 1.5, 7)
     poses = sl.Pose(np.column_stack((across, 0.0 * across, 0.0 * across)), np.eye(3))
     rail = sl.FreeAnchors("frame", -2.0, 2.0, along=[1, 0, 0], symmetry="together")
@@ -137,16 +137,16 @@ def test_moving_anchors_follow_the_platform() -> None:
 
 
 @extended
-def test_a_search_with_moving_anchors_knows_that_they_move() -> None:
+def test_a_search_includes_moving_anchors() -> None:
     across = np.array([-1.0, 0.0, 1.0])
     poses = sl.Pose(np.column_stack((across, 0.0 * across, 0.0 * across)), np.eye(3))
     rail = sl.FreeAnchors("frame", -2.0, 2.0, along=[1, 0, 0], symmetry="together")
     front = search(pair(), [apart()], poses=poses, inner=[rail], evaluations=200)
-    np.testing.assert_allclose(front.values[0], MARGIN, atol=1e-3)  # of three poses as of the one
+    np.testing.assert_allclose(front.values[0], MARGIN, atol=1e-3)  # of three poses as of one
     np.testing.assert_allclose(front.best.frame_anchors[0, 0], BEST, atol=1e-2)
 
 
-def test_a_package_that_is_missing_is_named_with_its_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_package_is_named_with_its_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     def gone(module: str) -> None:
         raise ModuleNotFoundError(f"No module named {module!r}", name=module)
 
@@ -158,8 +158,8 @@ def test_a_package_that_is_missing_is_named_with_its_extra(monkeypatch: pytest.M
 
 
 @pytest.mark.soak
-def test_the_article_s_robot_gets_a_seventh_more_workspace() -> None:
-    """Upper and lower cables of each post lower or higher, all posts alike: 600 robots at 315 poses."""
+def test_the_workspace_of_the_article_robot_grows_by_a_seventh() -> None:
+    """Upper and lower cables of all posts lower or higher: 600 candidates at 315 poses."""
     robot, load = sl.load_robot("article-suspended"), sl.WrenchBox(force=50.0, moment=5.0)
     front = sl.design(robot, posts(), ["workspace_share"], load, box=inside(0.3), evaluations=600)
     assert front.values[0, 0] >= 1.07 * front.start_values[0]

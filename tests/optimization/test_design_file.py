@@ -1,4 +1,4 @@
-"""Design files: what they say is what `design` is given, and what is wrong in them is told with its key."""
+"""Design files contain the arguments of `design`, and errors are reported with their key."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def loaded(tmp_path: Path, text: str) -> dict[str, Any]:
     return sl.load_design(tmp_path / "design.yaml")
 
 
-def test_every_key_arrives_in_si(tmp_path: Path) -> None:
+def test_every_key_is_converted_to_si(tmp_path: Path) -> None:
     asked = loaded(tmp_path, WHOLE)
     box, platform, largest, least, cable = asked["free"]
     np.testing.assert_allclose(box.low, [-1.0, -1.0, 0.0])
@@ -73,7 +73,7 @@ def test_every_key_arrives_in_si(tmp_path: Path) -> None:
     assert (asked["optimizer"], asked["evaluations"], asked["seed"]) == ("differential_evolution", 99, 7)
 
 
-def test_what_is_left_out_is_left_to_design(tmp_path: Path) -> None:
+def test_omitted_keys_have_the_defaults_of_design(tmp_path: Path) -> None:
     asked = loaded(tmp_path, "free: [{tension_max: {low: 1, high: 1 kN}}]\ngoals: [least_margin]\n")
     assert sorted(asked) == ["evaluations", "free", "goals", "optimizer", "seed"]
     assert (asked["evaluations"], asked["optimizer"], asked["seed"]) == (600, "cma", 0)
@@ -139,7 +139,7 @@ WRONG: dict[str, tuple[str, tuple[str, ...]]] = {
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_what_is_wrong_is_told_with_its_key(tmp_path: Path, name: str) -> None:
+def test_errors_are_reported_with_their_key(tmp_path: Path, name: str) -> None:
     text, parts = WRONG[name]
     with refused(*parts, kind=FileError, file=tmp_path / "design.yaml") as caught:
         loaded(tmp_path, text)
@@ -149,7 +149,7 @@ def test_what_is_wrong_is_told_with_its_key(tmp_path: Path, name: str) -> None:
 
 
 @extended
-def test_the_example_is_one(tmp_path: Path) -> None:
+def test_the_example_is_valid(tmp_path: Path) -> None:
     examples = Path(__file__).parents[2] / "examples"
     robot, asked = sl.load_robot(examples / "own_robot.yaml"), sl.load_design(examples / "design.yaml")
     front = sl.design(robot, **asked)

@@ -1,4 +1,4 @@
-"""The folder of a search: gone on with bit for bit, whatever became of it, and never with another one."""
+"""The folder of a search: continued exactly after every interruption, and never with another search."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def search(folder: Path | None, robot: sl.Robot | None = None, **more: Any) -> s
 
 
 class StoppedError(Exception):
-    """What an interrupt is here."""
+    """Replacement of an interrupt."""
 
 
 def stopped_after(count: int) -> Any:
@@ -48,19 +48,19 @@ def same(one: sl.Front, other: sl.Front) -> bool:
 
 
 @pytest.mark.parametrize("optimizer", wide(["differential_evolution", "cma", "nsga2"]))
-def test_an_interrupted_search_ends_as_if_it_had_not_been(tmp_path: Path, optimizer: str) -> None:
+def test_an_interrupted_search_gives_the_same_result(tmp_path: Path, optimizer: str) -> None:
     whole = search(None, optimizer=optimizer)
     kept = []
     for count in (1, 40, 80):
         with pytest.raises(StoppedError):
             search(tmp_path, optimizer=optimizer, progress=stopped_after(count))
         kept.append(len((tmp_path / EVALUATIONS).read_text().splitlines()))
-    assert kept[0] > 1  # nothing that was rated is lost
+    assert kept[0] > 1  # all computed values are kept
     assert kept == sorted(set(kept))
     assert same(search(tmp_path, optimizer=optimizer), whole)
 
 
-def test_what_is_known_is_not_rated_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_known_candidates_are_not_evaluated_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = search(tmp_path)
     size = (tmp_path / EVALUATIONS).stat().st_size
     rate, rated = Rating.__call__, [0]
@@ -75,7 +75,7 @@ def test_what_is_known_is_not_rated_again(tmp_path: Path, monkeypatch: pytest.Mo
     assert (tmp_path / EVALUATIONS).stat().st_size == size
 
 
-def test_more_evaluations_go_on_from_there(tmp_path: Path) -> None:
+def test_more_evaluations_continue_the_search(tmp_path: Path) -> None:
     first = search(tmp_path, evaluations=60)
     further = search(tmp_path, evaluations=180)
     assert same(further, search(None, evaluations=180))
@@ -83,21 +83,21 @@ def test_more_evaluations_go_on_from_there(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("lost", wide([30, 1, 200]))
-def test_a_torn_end_is_cut_off_and_worked_out_again(tmp_path: Path, lost: int) -> None:
+def test_a_partial_last_row_is_computed_again(tmp_path: Path, lost: int) -> None:
     whole = search(tmp_path)
     file = tmp_path / EVALUATIONS
     file.write_bytes(file.read_bytes()[:-lost])
     assert same(search(tmp_path), whole)
-    assert same(search(tmp_path), whole)  # what was appended stands on lines of its own
+    assert same(search(tmp_path), whole)  # appended rows are on new lines
 
 
-def test_a_file_of_nothing_begins_anew(tmp_path: Path) -> None:
+def test_an_empty_file_starts_again(tmp_path: Path) -> None:
     whole = search(tmp_path)
     (tmp_path / EVALUATIONS).write_bytes(b"")
     assert same(search(tmp_path), whole)
 
 
-def test_a_changed_line_is_told(tmp_path: Path) -> None:
+def test_a_changed_line_is_reported(tmp_path: Path) -> None:
     search(tmp_path)
     file = tmp_path / EVALUATIONS
     lines = file.read_text().splitlines(keepends=True)
@@ -141,7 +141,7 @@ def test_a_folder_that_is_in_use_is_refused(tmp_path: Path) -> None:
     assert said
 
 
-def test_evaluations_of_nobody_knows_what_are_refused(tmp_path: Path) -> None:
+def test_evaluations_without_a_request_are_refused(tmp_path: Path) -> None:
     search(tmp_path)
     (tmp_path / REQUEST).unlink()
     with refused(kind=FileError, file=tmp_path / EVALUATIONS) as caught:
@@ -153,8 +153,8 @@ def test_evaluations_of_nobody_knows_what_are_refused(tmp_path: Path) -> None:
 
 
 @extended
-def test_rows_that_this_search_would_not_ask_for_are_told(tmp_path: Path) -> None:
-    """As another version of an optimizer would: the same request, other robots."""
+def test_rows_of_another_optimizer_are_reported(tmp_path: Path) -> None:
+    """As by another version of an optimizer: the same request, other candidates."""
     search(tmp_path, seed=1, optimizer="cma")
     other = (tmp_path / EVALUATIONS).read_bytes()
     search(tmp_path / "own", optimizer="cma")
@@ -163,7 +163,7 @@ def test_rows_that_this_search_would_not_ask_for_are_told(tmp_path: Path) -> Non
         search(tmp_path / "own", optimizer="cma")
 
 
-def test_a_full_disk_loses_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_loses_no_results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     whole, write = search(None), os.write
     written = [0]
 
@@ -200,7 +200,7 @@ def test_robots_and_table_are_saved(tmp_path: Path) -> None:
         assert again.frame_anchors.tobytes() == robot.frame_anchors.tobytes()
 
 
-def test_a_folder_is_created_but_not_the_one_around_it(tmp_path: Path) -> None:
+def test_a_folder_is_created_without_its_parents(tmp_path: Path) -> None:
     inside = tmp_path / "missing" / "front"
     step = f"Create the folder {inside.parent} first, or name another."
     with refused(next_step=step, kind=FileError, file=inside):
@@ -213,7 +213,7 @@ def test_a_folder_is_created_but_not_the_one_around_it(tmp_path: Path) -> None:
     assert search(inside).save(inside)[0].is_file()
 
 
-def test_what_is_refused_leaves_no_folder(tmp_path: Path) -> None:
+def test_a_refused_search_leaves_no_folder(tmp_path: Path) -> None:
     endless = sl.load_robot("ipanema-1").replace(tension_max=np.inf)
     posts = sl.FreeAnchors("frame", -0.1, 0.1, along=[0, 0, 1], symmetry="together")
     for goal in ("cable_cost", "least_margin"):

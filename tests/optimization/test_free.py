@@ -1,4 +1,4 @@
-"""What may change: how anchors follow each other, where numbers lead, and what is refused."""
+"""Design variables: symmetry of anchors, effects of the numbers, and refusals."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_mirrored_anchors_stay_mirrored() -> None:
     assert (np.abs(found.frame_anchors[:, 0]) == 7.0).all()
 
 
-def test_turned_anchors_stay_on_a_regular_polygon() -> None:
+def test_rotated_anchors_stay_on_a_regular_polygon() -> None:
     angle = 2.0 * np.pi * np.arange(3) / 3.0 + 0.3
     frame = np.column_stack((3.0 * np.cos(angle), 3.0 * np.sin(angle), np.full(3, 4.0)))
     robot = sl.Robot("tripod", frame, np.zeros((3, 3)), sl.Cable(0.05, 5e4), 10.0, motion_pattern="3T")
@@ -56,7 +56,7 @@ def test_platform_anchors_move_in_the_platform_frame_and_together() -> None:
     assert found.frame_anchors is ROBOT.frame_anchors or np.array_equal(found.frame_anchors, ROBOT.frame_anchors)
 
 
-def test_anchors_without_symmetry_are_free_by_themselves() -> None:
+def test_anchors_without_symmetry_are_independent() -> None:
     candidates = Candidates(ROBOT, [sl.FreeAnchors("frame", [-1, 0, 0], [1, 0, 0.5], cables=[2, 5])])
     names = ["frame_anchors[2] x", "frame_anchors[2] z", "frame_anchors[5] x", "frame_anchors[5] z"]
     assert [part.name for part in candidates.parts] == names
@@ -68,7 +68,7 @@ def test_anchors_without_symmetry_are_free_by_themselves() -> None:
     assert np.count_nonzero(found) == 4
 
 
-def test_cables_and_limits_go_into_the_robot() -> None:
+def test_cables_and_limits_of_the_robot_change() -> None:
     strong = sl.CableChoice("strong", sl.Cable(0.2, 9e5, diameter=0.01), tension_max=4000.0)
     candidates = Candidates(ROBOT, [sl.FreeCable([LIGHT, OWN, strong]), sl.FreeLimit("tension_min", 10.0, 80.0)])
     assert candidates.start.tolist() == [1.0, 25.0]
@@ -83,7 +83,7 @@ def test_cables_and_limits_go_into_the_robot() -> None:
     assert candidates.values(np.array([[1.0, 0.0], [0.0, 1.0]])).tolist() == [[2.0, 10.0], [0.0, 80.0]]
 
 
-def test_what_is_no_robot_is_known_without_making_one() -> None:
+def test_impossible_robots_are_recognized_without_creating_them() -> None:
     frame = sl.FreeAnchors("frame", [-1, 0, 0], [0, 0, 0], cables=[1])
     platform = sl.FreeAnchors("platform", [-1, 0, -1], [1, 1, 1], cables=[1])
     limit = sl.FreeLimit("tension_min", 0.0, 3000.0)
@@ -105,7 +105,7 @@ def asked(**changes: Any) -> sl.Front:
     return sl.design(pair(), **{**given, **changes})
 
 
-REFUSED: dict[str, tuple[Callable[[], object], tuple[str, ...]]] = {  # item, value and what is allowed
+REFUSED: dict[str, tuple[Callable[[], object], tuple[str, ...]]] = {  # item, value and allowed range
     "unknown goal": (
         lambda: asked(goals=["workspace"]),
         (
@@ -171,7 +171,7 @@ REFUSED: dict[str, tuple[Callable[[], object], tuple[str, ...]]] = {  # item, va
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_what_cannot_be_searched_is_refused_in_one_line(name: str) -> None:
+def test_invalid_design_variables_are_refused_in_one_line(name: str) -> None:
     make, parts = REFUSED[name]
     with refused(*parts, kind=InvalidValueError) as caught:
         make()
@@ -193,7 +193,7 @@ def test_candidates_with_an_anchor_inside_the_platform_are_dropped() -> None:
     assert np.array_equal(dropped, np.abs(height) < half)
 
 
-def test_moving_anchors_leave_the_platform() -> None:
+def test_moving_anchors_keep_the_platform_anchors() -> None:
     up = sl.FreeAnchors("frame", -3.0, 3.0, along=[0, 0, 1], symmetry="together")
     poses = sl.Pose([[7.4, 5.4, 5.9], [0.0, 0.0, 3.0]], np.stack([np.eye(3)] * 2))
     found = sl.moving_anchors(ROBOT, [up], poses=poses)
@@ -214,7 +214,7 @@ def _each(poses: sl.Pose) -> list[PlatformBox]:
     return [PlatformBox(ROBOT, poses[k : k + 1]) for k in range(len(poses))]
 
 
-def test_the_share_of_a_robot_that_nothing_limits_is_a_number() -> None:
+def test_shares_of_a_robot_without_limits_are_finite() -> None:
     front = sl.design(UNLIMITED, [POSTS], ["workspace_share"], evaluations=16, grid=(2, 2, 2))
     assert front.start_values[0] == 1.0
     assert not front.better

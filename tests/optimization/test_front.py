@@ -1,4 +1,4 @@
-"""Fronts: none of their robots is beaten, and everything that is beaten is."""
+"""Fronts: no candidate dominates another one of the front, and all other candidates are dominated."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tests.optimization.pair import UNDER, apart, pair
 from tests.tiers import extended
 
 
-def test_a_front_is_what_no_other_beats() -> None:
+def test_a_front_contains_the_nondominated_candidates() -> None:
     random = np.random.default_rng(5)
     for size in (1, 2, 30, 200):
         costs = random.integers(0, 12, (size, 3)).astype(float)
@@ -22,7 +22,7 @@ def test_a_front_is_what_no_other_beats() -> None:
         assert len(found) == len({tuple(costs[k]) for k in found})
 
 
-def test_costs_are_finite_whatever_the_values() -> None:
+def test_costs_are_finite_for_all_values() -> None:
     goals = (sl.Goal("mean_margin"), sl.Goal("largest_sag", scale=0.5))
     values = np.array([[4.0, 0.25], [np.nan, np.nan], [np.inf, np.inf], [-np.inf, 1.0]])
     costs = costs_of(values, goals, values[0])
@@ -34,7 +34,7 @@ def test_costs_are_finite_whatever_the_values() -> None:
 
 @extended
 def test_wider_anchors_trade_margin_for_tension() -> None:
-    """Two goals with a known front: the wider the angle, up to 60 degrees, the more margin and the more tension."""
+    """Two goals with a known front: a larger angle, up to 60 degrees, gives a larger margin and a larger tension."""
     goals = [sl.Goal("least_margin"), sl.Goal("largest_tension")]
     front = sl.design(pair(), [apart()], goals, poses=UNDER, model=sl.Straight(), optimizer="nsga2", evaluations=960)
     assert len(front.robots) > 10
@@ -42,7 +42,7 @@ def test_wider_anchors_trade_margin_for_tension() -> None:
     order = np.argsort(margin)
     assert (np.diff(tension[order]) > 0.0).all()
     theta = np.arctan2([one.frame_anchors[0, 0] for one in front.robots], 2.0)
-    np.testing.assert_allclose(margin, 10.0 * np.sin(theta), rtol=1e-9)  # all of them at 60 degrees or less
+    np.testing.assert_allclose(margin, 10.0 * np.sin(theta), rtol=1e-9)  # all at 60 degrees or less
     np.testing.assert_allclose(tension, 5.0 / np.cos(theta), rtol=1e-9)
     assert margin[0] == margin.max()
     names = [one.name for one in front.robots]

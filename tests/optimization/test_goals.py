@@ -1,4 +1,4 @@
-"""Values of all goals against the functions of which each is one number."""
+"""Values of all goals compared with the functions that compute them."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ PRESETS = ("article-suspended", "cogiro", "ipanema-1", PULLEYS, "fast", "copacab
 
 
 @pytest.mark.parametrize("name", PRESETS)
-def test_what_is_planned_of_tables_is_what_inverse_plans_of_robots(name: str) -> None:
+def test_plans_of_tables_agree_with_inverse(name: str) -> None:
     robot, seed = sl.load_robot(name), np.random.default_rng(4)
     poses = random_poses(robot, 30, seed)
     wrench = robot.freedom.T @ robot.freedom @ np.array([5.0, -3.0, 8.0, 0.5, -0.25, 0.75])
     lift = sl.FreeAnchors("frame", -0.1, 0.1, along=[0, 0, 1], symmetry="together")
-    table = Candidates(robot, [lift]).cables(np.zeros((len(poses), 1)))  # the robot's own
+    table = Candidates(robot, [lift]).cables(np.zeros((len(poses), 1)))  # limits of the robot
     rows = np.hstack((poses.position, poses.quaternion))
     tension, sag, stiffness = distribute(robot, sl.Catenary(), table, rows, wrench, stiffness=True)
     plan = sl.inverse(robot, poses, tension=sl.MinimumNorm(), wrench=wrench)
@@ -47,7 +47,7 @@ MIDDLE = [0.0, 0.0, -50.0, 0.0, 0.0, 0.0]  # of both sets of loads
         pytest.param(BOX + sl.WrenchPolytope([[0.0] * 6, [0.0, 0.0, -100.0, 0.0, 0.0, 0.0]]), id="polytope"),
     ],
 )
-def test_every_goal_is_what_it_says(load: sl.WrenchSet) -> None:
+def test_values_of_goals_agree_with_functions(load: sl.WrenchSet) -> None:
     robot = sl.load_robot("cogiro")
     poses = random_poses(robot, 20, np.random.default_rng(2))
     own = sl.Cable(robot.cables.linear_density[0], robot.cables.axial_stiffness[0])
@@ -71,12 +71,12 @@ def test_every_goal_is_what_it_says(load: sl.WrenchSet) -> None:
             longest * (3.0 if robot_found is front.start else 1.0),
         ]
         np.testing.assert_allclose(values, expected, rtol=1e-6)
-    assert front.better  # the thin cable costs a third
+    assert front.better  # the cost of the thin cable is a third
     assert front.best.cables.linear_density[0] == 0.03
 
 
-def test_a_robot_that_loses_a_pose_is_no_candidate() -> None:
-    """With less and less tension_max more and more poses are lost: none of these robots has a value."""
+def test_a_robot_with_an_infeasible_pose_is_no_candidate() -> None:
+    """With smaller tension_max more and more poses become infeasible: none of these robots has a value."""
     robot = sl.load_robot("cogiro")
     poses = random_poses(robot, 10, np.random.default_rng(2))
     robot = robot.replace(tension_max=2000.0)
@@ -91,7 +91,7 @@ def test_a_robot_that_loses_a_pose_is_no_candidate() -> None:
     assert front.best.tension_max[0] == limits[np.nanargmin(values)]
 
 
-def test_poses_that_the_first_robot_does_not_hold_do_not_count() -> None:
+def test_infeasible_poses_of_the_first_robot_are_excluded() -> None:
     robot = sl.load_robot("cogiro")
     inside = random_poses(robot, 6, np.random.default_rng(2))
     far = np.concatenate((inside.position, [[60.0, 0.0, 2.0]]))

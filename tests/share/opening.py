@@ -1,4 +1,4 @@
-"""Pages in headless Chromium, opened from the disk: they complain of nothing and ask for nothing."""
+"""Pages in headless Chromium, opened from the disk, without errors and external requests."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -25,7 +25,7 @@ def opened(
     theme: Literal["light", "dark"] = "light",
     touch: bool = False,
 ) -> Iterator[Page]:
-    """A page when it has begun."""
+    """A page after its start."""
     complaints: list[str] = []
     asked: list[str] = []
     context = browser.new_context(
@@ -45,5 +45,5 @@ def opened(
 
 
 def asking(page: Page, what: str, *given: Any) -> Any:
-    """What a page that has begun answers; `it` is what `share.ready` resolves with."""
+    """Answer of a page after its start; `it` is the value with which `share.ready` resolves."""
     return page.evaluate(f"async (given) => {{ const it = await share.ready; return {what}; }}", *given)

@@ -1,4 +1,4 @@
-"""The kernels of a shared page in node and in a native program of the same C library; both return their memory."""
+"""Kernels of a shared page in node and in a native program with the same C library; both return their memory."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ int main(void) {{
 
 
 def in_node(machine: dict[str, Any], rows: Rows, folder: Path, repeat: int | None = None) -> bytes:
-    """Output of node.js; repeat: how often the time of all rows is taken."""
+    """Output of node.js; with `repeat`, all rows are timed repeatedly."""
     assert shutil.which("node"), "These tests need node: install it (apt-get install nodejs)."
     page, scripts = files("sagline.share").joinpath("page"), folder / "scripts.js"
     text = "\n".join(page.joinpath(name).read_text(encoding="utf-8") for name in SCRIPTS)
@@ -81,13 +81,13 @@ def linked_program(library: Path, kernels: dict[str, Any], names: tuple[str, ...
 
 
 def in_program(program: Path, rows: Rows) -> bytes:
-    """Output of the program; its names are those of the rows."""
+    """Output of the program, with the names of the rows."""
     numbers: Array = np.array([[number for part in row.values() for number in part] for row in rows])
     return subprocess.run([program], input=numbers.tobytes(), capture_output=True, check=True).stdout
 
 
 def patterns(output: bytes) -> Images:
-    """All 64-bit patterns; those of NaN are one, because WebAssembly leaves its sign and payload open."""
+    """64-bit patterns; those of NaN are equal, because WebAssembly does not define its sign and payload."""
     found = np.frombuffer(output, dtype=np.uint64).copy()
     found[np.isnan(found.view(np.float64))] = np.array(np.nan).view(np.uint64)
     return found

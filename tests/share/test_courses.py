@@ -1,4 +1,4 @@
-"""Points of cables in shared pages: those of the solved states, straight without tensions."""
+"""Points of cables in shared pages: those of the solved states, and straight lines without tensions."""
 
 import numpy as np
 import pytest

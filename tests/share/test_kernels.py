@@ -1,4 +1,4 @@
-"""Kernels of shared pages in node: WebAssembly and native C are bit-equal, and both are what the library computes."""
+"""Kernels of shared pages in node: WebAssembly and native C are equal to the last bit and agree with the library."""
 
 import json
 from pathlib import Path
@@ -24,13 +24,13 @@ pytestmark = extended
 
 
 def frame_end_limited() -> sl.Robot:
-    """Limits where the load cells sit: the lower one is what many cables would hang below."""
+    """Frame-end limits, with a lower limit above the least tension of many cables."""
     robot = sl.load_robot("ipanema-2-pulleys")
     return robot.replace(name="frame-end", tension_limits_of="frame_end")
 
 
 def planar() -> sl.Robot:
-    """Three freedoms, four cables, no upper limits."""
+    """Three degrees of freedom, four cables, no upper limits."""
     frame = [[-3.0, 0.0, 0.0], [3.0, 0.0, 0.0], [-3.0, 0.0, 4.0], [3.0, 0.0, 4.0]]
     platform = [[-0.2, 0.0, 0.1], [0.2, 0.0, 0.1], [-0.2, 0.0, -0.1], [0.2, 0.0, -0.1]]
     return sl.Robot(
@@ -46,7 +46,7 @@ CHOSEN = ("falcon-7", "cogiro", "fast", "ipanema-2-pulleys", "frame-end", "plana
 
 
 def poses(robot: sl.Robot, count: int) -> sl.Pose:
-    """Within the box that the robot stands in, half of them where it is meant to work; a little turned."""
+    """Poses in the box around the frame, half of them in the test box, slightly rotated."""
     rng = np.random.default_rng(7)
     low, high = bounds(robot)
     inside = (low, high) if robot.test_box is None else (robot.test_box.low, robot.test_box.high)
@@ -57,7 +57,7 @@ def poses(robot: sl.Robot, count: int) -> sl.Pose:
 
 
 def rows_of(plan: sl.Plan) -> Rows:
-    """Poses, lengths that differ from the planned ones by up to 1 mm, and chord tensions; NaN if not feasible."""
+    """Poses, lengths that differ from the planned ones by up to 1 mm, and chord tensions; NaN if infeasible."""
     rng = np.random.default_rng(8)
     lengths = np.where(plan.feasible[:, None], plan.unstrained_length, 1.0)
     lengths = lengths + rng.uniform(-1e-3, 1e-3, lengths.shape)
@@ -66,7 +66,7 @@ def rows_of(plan: sl.Plan) -> Rows:
     return [{"pose": p.tolist(), "given": g.tolist(), "drawn": d.tolist()} for p, g, d in columns]
 
 
-def test_the_module_of_the_package_is_that_of_the_kernels(tmp_path: Path) -> None:
+def test_the_module_of_the_package_is_current(tmp_path: Path) -> None:
     folder = tmp_path / wasm.MODULE.parent
     folder.mkdir(parents=True)
     wasm.build(tmp_path)
@@ -88,7 +88,7 @@ def test_wasm_and_native_c_are_bit_equal(name: str, native: Path, tmp_path: Path
 
 
 class Answers:
-    """Answers of robot.js at poses, and those of the library."""
+    """Results of robot.js at poses, and those of the library."""
 
     def __init__(self, name: str, count: int, folder: Path) -> None:
         self.robot = ROBOTS[name]
@@ -109,7 +109,7 @@ def answers(request: pytest.FixtureRequest, tmp_path: Path) -> Answers:
     return Answers(request.param, 60, tmp_path)
 
 
-def test_the_page_computes_what_the_library_does(answers: Answers) -> None:
+def test_the_page_agrees_with_the_library(answers: Answers) -> None:
     plan, found, held = answers.plan, answers.found, answers.held
     assert [one["status"] for one in found] == plan.status.tolist()
     assert 1 < len(held) < len(found)
@@ -131,7 +131,7 @@ def test_the_page_computes_what_the_library_does(answers: Answers) -> None:
     assert 1e6 / sum(min(times) for times in answers.times.values()) > UPDATES
 
 
-def test_a_platform_at_an_anchor_is_told(tmp_path: Path) -> None:
+def test_a_platform_end_at_an_anchor_is_reported(tmp_path: Path) -> None:
     robot = ROBOTS["falcon-7"]
     at = robot.frame_anchors[3] - robot.platform_anchors[3]
     row = {"pose": [*at.tolist(), 0.0, 0.0, 0.0, 1.0]}

@@ -65,7 +65,7 @@ def test_the_title_and_the_notes_of_a_run() -> None:
     assert found.texts["title"] == [NAME]
     assert set(found.texts["h1"]) == {NAME}
     assert NAME in found.texts["p"]
-    assert sum(NAME in text for text in found.texts["p"]) == 3  # the note, and what the page is about, twice
+    assert sum(NAME in text for text in found.texts["p"]) == 3  # the note, and the description of the page, twice
     assert sum(text.startswith(NAME) for text in found.descriptions) == 2
 
 

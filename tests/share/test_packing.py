@@ -1,4 +1,4 @@
-"""What a page carries, decoded as page/states.js decodes it, and how little it is."""
+"""Data of a page, decoded as in page/states.js, and their size."""
 
 import re
 import zlib
@@ -15,11 +15,11 @@ from sagline.share.packing import PackedColumn, encode_columns
 from sagline.share.page import course_page
 from tests.tiers import extended
 
-MOST = 3_000_000  # bytes of a page with a minute of run
+MOST = 3_000_000  # bytes of a page with a run of a minute
 
 
 def unpacked(header: dict[str, Any], text: str) -> dict[str, Array]:
-    """By planes of bytes and cumulative sums, written here once more."""
+    """By planes of bytes and cumulative sums, written here again."""
     data, place, found = zlib.decompress(b64decode(text)), 0, {}
     for channel in header["channels"]:
         columns = []
@@ -37,7 +37,7 @@ def unpacked(header: dict[str, Any], text: str) -> dict[str, Array]:
     return found
 
 
-def test_values_come_back_within_half_a_step() -> None:
+def test_values_are_decoded_to_half_a_step() -> None:
     rng = np.random.default_rng(3)
     time = np.linspace(0.0, 60.0, 5000)
     smooth = np.stack((np.sin(time), -1e4 * np.cos(0.1 * time), np.zeros_like(time)), axis=1)
@@ -59,7 +59,7 @@ def test_smooth_motion_takes_less_than_a_byte_a_number() -> None:
 @extended
 @pytest.mark.parametrize("name", ["cogiro", "falcon-7", "fast"])
 def test_a_minute_of_run_is_small(name: str) -> None:
-    """At the rate of control loops, with noise on the tensions, which compresses worst."""
+    """At the rate of control loops, with noise of tensions, the worst case of compression."""
     robot = sl.load_robot(name)
     assert robot.test_box is not None
     low, high = robot.test_box.low, robot.test_box.high
@@ -75,7 +75,7 @@ def test_a_minute_of_run_is_small(name: str) -> None:
     assert size < MOST / 4
 
 
-def test_faster_runs_are_thinned_and_say_so() -> None:
+def test_faster_runs_are_thinned_with_a_note() -> None:
     robot = sl.load_robot("cogiro")
     ends = sl.Pose(np.array([[0.0, 0.0, 2.0], [1.0, 0.0, 2.0]]), np.stack([np.eye(3)] * 2))
     course = of_plan(sl.inverse(robot, sl.quintic_path(ends, durations=[4.0], rate=1000)))

@@ -1,4 +1,4 @@
-"""Shared pages in headless Chromium: runs play and robots are dragged, on phones too, in both themes."""
+"""Shared pages in headless Chromium: runs play and robots can be dragged, also on phones, in both themes."""
 
 import functools
 from collections.abc import Iterator
@@ -49,7 +49,7 @@ def browser() -> Iterator[Browser]:
 
 @functools.cache
 def run_of(name: str) -> sl.Plan:
-    """A way out of the region where the robot can work, and back."""
+    """A path that leaves the feasible region and returns."""
     robot = sl.load_robot(name)
     assert robot.test_box is not None
     low, high = robot.test_box.low, robot.test_box.high
@@ -62,7 +62,7 @@ def run_of(name: str) -> sl.Plan:
 
 
 def check_look(page: Page) -> None:
-    """Every text is read, every control has a name, nothing overflows."""
+    """Text is readable, controls have names, and no content overflows."""
     texts = page.evaluate(CONTRAST)
     assert len(texts) > 20
     assert {(text["words"], round(text["ratio"], 2)) for text in texts if not text["ratio"] >= 4.5} == set()
@@ -71,7 +71,7 @@ def check_look(page: Page) -> None:
 
 
 def pixels(page: Page) -> bytes:
-    """The picture, once what was asked for is in it: a page draws with its next frame."""
+    """The picture after the next frame of the page."""
     page.evaluate("new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn)))")
     return page.locator("canvas").screenshot()
 
@@ -106,7 +106,7 @@ def test_a_run_plays(
 
 
 def check_states(plan: sl.Plan, page: Page) -> None:
-    """What is decoded is what was planned, within half a step of what was said."""
+    """Decoded states agree with the plan within half of the stated step."""
     states = {key: np.array(columns, dtype=np.float64).T for key, columns in asking(page, STATES).items()}
     assert plan.path is not None
     exact = {
@@ -172,12 +172,12 @@ def test_straight_cables_are_drawn_while_kernels_load(browser: Browser, tmp_path
     expect(page.get_by_role("status")).to_have_text("Feasible")
     sagging = pixels(page)
     context.close()
-    assert len(straight) > 0.5 * len(sagging)  # a picture of the robot, not an empty one
+    assert len(straight) > 0.5 * len(sagging)  # a picture with the robot
     assert straight != sagging
 
 
 @pytest.mark.parametrize("height", [640, 844])
-def test_a_platform_that_stands_out_of_its_frame_is_seen_whole(browser: Browser, tmp_path: Path, height: int) -> None:
+def test_a_platform_outside_of_its_frame_is_completely_visible(browser: Browser, tmp_path: Path, height: int) -> None:
     robot = sl.load_robot("falcon-7")
     corners = home_pose(robot).transform(platform_solid(robot).vertices)
     assert corners[:, 2].max() > 1.2 * robot.frame_anchors[:, 2].max()
@@ -196,7 +196,7 @@ def check_balance(page: Page, robot: sl.Robot, position: Array) -> None:
 
 
 def check_winch(page: Page, robot: sl.Robot) -> None:
-    """A longer cable: the platform comes to rest where the library says, and returns with the slider."""
+    """A longer cable: the platform moves to the equilibrium of the library, and returns with the slider."""
     planned = sl.Pose(asking(page, "it.moment().pose.position"), np.eye(3))
     before = np.array(asking(page, "it.moment().length"))
     page.get_by_label("Cable to wind").select_option("1")

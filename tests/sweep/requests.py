@@ -15,7 +15,7 @@ PLANAR = Path(__file__).parents[2] / "examples" / "own_planar.yaml"
 
 
 def planar(poses: int = 40, wrenches: int = 25, quantities: tuple[str, ...] = ("tension",)) -> sl.sweep.Request:
-    """A planar robot of four cables all over its plane, under forces and moments: half of it is out of reach."""
+    """A planar robot of four cables over its plane, with forces and moments: half of the requests are infeasible."""
     rng = np.random.default_rng(5)
     place = rng.uniform((0.4, 0.0, 0.4), (3.6, 0.0, 2.6), (poses, 3))
     loads = rng.uniform(-80.0, 80.0, (wrenches, 6)) * [1, 0, 1, 0, 0.03, 0]
@@ -23,13 +23,13 @@ def planar(poses: int = 40, wrenches: int = 25, quantities: tuple[str, ...] = ("
 
 
 def in_tasks(folder: Path, request: sl.sweep.Request, size: tuple[int, int]) -> Path:
-    """The folder of a sweep whose tasks have a size of their own."""
+    """Folder of a sweep with a chosen size of tasks."""
     sweep_folder.make_folder(folder, request, size)
     return folder
 
 
 def chunks(folder: Path, request: sl.sweep.Request) -> dict[str, tuple[int, int]]:
-    """When each chunk on the disk was written, and in which file: what is written anew is another."""
+    """File and time of each chunk on the disk; a rewritten chunk differs."""
     found = {}
     for variable in variables_of(request.quantities):
         for file in sorted((folder / sweep_folder.GROUP / variable.name / "c").rglob("*")):
@@ -39,7 +39,7 @@ def chunks(folder: Path, request: sl.sweep.Request) -> dict[str, tuple[int, int]
 
 
 def marked(folder: Path) -> list[int]:
-    """Tasks of the file `done`, in its order."""
+    """Tasks in the file `done`, in its order."""
     lines = (folder / sweep_result.NAME).read_text().splitlines()
     return [int(line.split()[0]) for line in lines if line and not line.startswith("#")]
 

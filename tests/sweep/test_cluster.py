@@ -1,4 +1,4 @@
-"""Sweeps on workers of Dask: real processes, one of which is killed."""
+"""Sweeps with workers of Dask in real processes, one of which is killed."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ TASKS = 100
 
 
 def worker_pids() -> list[int]:
-    """Processes that this one has started and that work."""
+    """Running child processes of this process."""
     children = psutil.Process().children(recursive=True)
     return [child.pid for child in children if "spawn_main" in " ".join(_command(child))]
 
@@ -40,7 +40,7 @@ def _command(process: psutil.Process) -> list[str]:
 
 
 def listening() -> set[str]:
-    """Addresses at which this process and its workers listen."""
+    """Addresses of the listening sockets of this process and its workers."""
     processes = [psutil.Process(), *psutil.Process().children(recursive=True)]
     found = [one for process in processes for one in process.net_connections("inet")]
     return {one.laddr.ip for one in found if one.status == psutil.CONN_LISTEN}
@@ -52,17 +52,17 @@ def reference(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
     return bits(sl.sweep.run(planar(), folder, workers=1))
 
 
-def test_killed_workers_and_a_stop_lose_nothing(
+def test_killed_workers_and_a_stop_lose_no_results(
     tmp_path: Path, reference: dict[str, bytes], capfd: pytest.CaptureFixture[str], snapshot: SnapshotAssertion
 ) -> None:
-    """Both workers are killed by their pids; the sweep goes on, is stopped, and is taken up again."""
+    """Both workers are killed by their pids; the sweep continues, is stopped, and is continued again."""
     folder, told, killed, heard = in_tasks(tmp_path / "sweep", planar(), SIZE), list[str](), list[int](), set[str]()
 
     def disturb(done: int, total: int) -> None:
         if done >= 10 and not killed:
             heard.update(listening())
             killed.extend(worker_pids())
-            time.sleep(0.5)  # they finish the tasks they have; the results are not fetched, and lost with them
+            time.sleep(0.5)  # workers finish their tasks; the results are lost with them
             for pid in killed:
                 os.kill(pid, signal.SIGKILL)
             time.sleep(0.5)
@@ -76,7 +76,7 @@ def test_killed_workers_and_a_stop_lose_nothing(
         assert len(killed) == 2
         assert worker_pids() == []
         part = sl.sweep.load(folder)
-        assert 40 <= part.done < 60  # those that were with the workers are finished
+        assert 40 <= part.done < 60  # tasks of the workers are finished
         before = chunks(folder, planar())
         found = sl.sweep.run(planar(), folder, workers=1)
     assert found.complete
@@ -93,7 +93,7 @@ def test_killed_workers_and_a_stop_lose_nothing(
 
 @contextmanager
 def scheduler(folder: Path, workers: int = 1) -> Iterator[tuple[str, Callable[[], None]]]:
-    """A scheduler of its own with workers, and how to kill it."""
+    """A new scheduler with workers, and a function that kills it."""
     file = folder / "scheduler.json"
     file.unlink(missing_ok=True)
     here = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0"]
@@ -118,7 +118,7 @@ def scheduler(folder: Path, workers: int = 1) -> Iterator[tuple[str, Callable[[]
 
 
 @pytest.mark.soak
-def test_a_scheduler_that_dies_loses_nothing(tmp_path: Path, reference: dict[str, bytes]) -> None:
+def test_a_killed_scheduler_loses_no_results(tmp_path: Path, reference: dict[str, bytes]) -> None:
     folder = in_tasks(tmp_path / "sweep", planar(), SIZE)
     with scheduler(tmp_path, workers=2) as (address, kill):
         with pytest.raises(sl.SaglineError, match="is gone"):
@@ -131,7 +131,7 @@ def test_a_scheduler_that_dies_loses_nothing(tmp_path: Path, reference: dict[str
 
 
 @pytest.mark.soak
-def test_a_scheduler_without_workers_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_scheduler_without_workers_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cluster, "PATIENCE", 3.0)
     with (
         scheduler(tmp_path, workers=0) as (address, _),
@@ -140,7 +140,7 @@ def test_a_scheduler_without_workers_is_told(tmp_path: Path, monkeypatch: pytest
         sl.sweep.run(planar(), tmp_path / "sweep", scheduler=address)
 
 
-def test_where_nobody_listens_a_sentence_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_address_without_a_scheduler_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cluster, "PATIENCE", 0.5)
     with pytest.raises(sl.SaglineError, match=r"tcp://127\.0\.0\.1:9") as error:
         sl.sweep.run(planar(3, 2), tmp_path / "sweep", scheduler="tcp://127.0.0.1:9")
@@ -149,7 +149,7 @@ def test_where_nobody_listens_a_sentence_says_so(tmp_path: Path, monkeypatch: py
 
 
 @pytest.mark.soak
-def test_a_script_without_a_guard_is_told_to_have_one(tmp_path: Path) -> None:
+def test_a_script_without_a_main_guard_is_reported(tmp_path: Path) -> None:
     script = "import sagline as sl\nfrom tests.sweep.requests import in_tasks, planar\nfrom pathlib import Path\n"
     script += "sl.sweep.run(planar(), Path('sweep'), workers=2)\n"
     in_tasks(tmp_path / "sweep", planar(), SIZE)

@@ -1,4 +1,4 @@
-"""Sweeps in one process: what is stopped or damaged goes on, to the last bit, and nothing is done twice."""
+"""Sweeps in one process: stopped or damaged sweeps continue exactly, and no task is computed twice."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ INSTALL = 'Install it: pip install "sagline[sweep]".'
 
 
 class Stop:
-    """Stands for somebody who presses Ctrl-C when so many tasks are done."""
+    """Replacement of Ctrl-C after a number of tasks."""
 
     def __init__(self, after: int) -> None:
         self.after = after
@@ -38,12 +38,12 @@ class Stop:
 
 @pytest.fixture(scope="module")
 def reference(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
-    """All numbers of the sweep, by one run without a stop."""
+    """Numbers of the sweep by one run without a stop."""
     folder = in_tasks(tmp_path_factory.mktemp("reference") / "sweep", planar(), SIZE)
     return bits(sl.sweep.run(planar(), folder, workers=1))
 
 
-def test_a_sweep_is_what_its_parts_are(tmp_path: Path, reference: dict[str, bytes]) -> None:
+def test_a_sweep_agrees_with_its_parts(tmp_path: Path, reference: dict[str, bytes]) -> None:
     told: list[tuple[int, int]] = []
     found = sl.sweep.run(planar(), tmp_path / "sweep", workers=1, progress=lambda *now: told.append(now))
     assert bits(found)["status"] == reference["status"]
@@ -55,7 +55,7 @@ def test_a_sweep_is_what_its_parts_are(tmp_path: Path, reference: dict[str, byte
 
 
 @pytest.mark.parametrize("after", wide([1, 14]))
-def test_what_was_stopped_goes_on_to_the_last_bit(tmp_path: Path, reference: dict[str, bytes], after: int) -> None:
+def test_a_stopped_sweep_continues_exactly(tmp_path: Path, reference: dict[str, bytes], after: int) -> None:
     folder = in_tasks(tmp_path / "sweep", planar(), SIZE)
     with pytest.raises(KeyboardInterrupt):
         sl.sweep.run(planar(), folder, workers=1, progress=Stop(after))
@@ -73,7 +73,7 @@ def test_what_was_stopped_goes_on_to_the_last_bit(tmp_path: Path, reference: dic
 
 
 @extended
-def test_what_is_done_is_not_done_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_finished_tasks_are_not_repeated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = in_tasks(tmp_path / "sweep", planar(), SIZE)
     first = sl.sweep.run(planar(), folder, workers=1)
     monkeypatch.setattr(running, "task", None)  # would fail
@@ -85,7 +85,7 @@ def test_what_is_done_is_not_done_again(tmp_path: Path, monkeypatch: pytest.Monk
     ("index", "value"),
     wide([((0, 99), "99"), ((0, 0, 0, 0, 0), "(0, 0, 0, ...)"), (0.5, "0.5"), (None, "None"), ("x", "'x'")]),
 )
-def test_an_index_that_is_none_is_told(tmp_path: Path, index: Any, value: str) -> None:
+def test_an_invalid_index_is_reported(tmp_path: Path, index: Any, value: str) -> None:
     found = sl.sweep.run(planar(2, 2), tmp_path / "sweep", workers=1)
     with refused("index", value=value, kind=sl.InvalidValueError):
         found.values("status", index)
@@ -102,7 +102,7 @@ DAMAGES: dict[str, Any] = {
 
 
 @pytest.mark.parametrize(("damage", "variable"), wide(zip(DAMAGES, 3 * ("status", "tension"), strict=True)))
-def test_a_chunk_that_is_torn_is_done_again(
+def test_a_damaged_chunk_is_computed_again(
     tmp_path: Path, reference: dict[str, bytes], damage: str, variable: str
 ) -> None:
     folder = in_tasks(tmp_path / "sweep", planar(), SIZE)
@@ -124,7 +124,7 @@ def test_a_chunk_that_is_torn_is_done_again(
 
 @extended
 @pytest.mark.parametrize("text", wide(["nonsense\n\0\xff\n3 0.1 1 2", "", "99 0.1 1 2 3 4 5\n-1 0 0 0 0 0 0\n"]))
-def test_what_the_marks_say_is_found_again_on_the_disk(tmp_path: Path, reference: dict[str, bytes], text: str) -> None:
+def test_marks_agree_with_the_chunks_on_the_disk(tmp_path: Path, reference: dict[str, bytes], text: str) -> None:
     folder = in_tasks(tmp_path / "sweep", planar(), SIZE)
     first = sl.sweep.run(planar(), folder, workers=1)
     before = chunks(folder, planar())
@@ -155,7 +155,7 @@ def test_the_folder_of_another_sweep_is_refused(tmp_path: Path) -> None:
     assert sl.sweep.run(request, folder, workers=1).complete
 
 
-def test_a_request_is_read_back_as_it_was(tmp_path: Path) -> None:
+def test_a_request_is_saved_exactly(tmp_path: Path) -> None:
     given = planar()
     request = sl.sweep.Request(
         [given.robots[0], given.robots[0].replace(mass=11.0)],
@@ -176,7 +176,7 @@ def test_a_request_is_read_back_as_it_was(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("what", ["a file", "a full folder", "no parent", "another sagline", "an edited request"])
-def test_what_is_no_folder_of_this_sweep_is_left_as_it_is(tmp_path: Path, what: str) -> None:
+def test_other_folders_are_not_changed(tmp_path: Path, what: str) -> None:
     folder = tmp_path / "sweep"
     if what == "a file":
         folder.write_text("mine")
@@ -204,7 +204,7 @@ def test_one_process_at_a_time_works_on_a_sweep(tmp_path: Path, snapshot: Snapsh
 
 
 @extended
-def test_a_disk_that_is_full_loses_nothing(
+def test_a_full_disk_loses_no_results(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, reference: dict[str, bytes]
 ) -> None:
     import zarr.storage._local as store
@@ -227,7 +227,7 @@ def test_a_disk_that_is_full_loses_nothing(
 
 
 @pytest.mark.parametrize("same", [True, False])
-def test_of_two_that_begin_at_once_the_later_one_takes_the_folder_of_the_earlier(
+def test_of_two_simultaneous_sweeps_the_later_one_uses_the_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, same: bool
 ) -> None:
     fill, folder = sweep_folder._fill, tmp_path / "sweep"
@@ -246,7 +246,7 @@ def test_of_two_that_begin_at_once_the_later_one_takes_the_folder_of_the_earlier
     assert [path.name for path in tmp_path.iterdir()] == ["sweep"]
 
 
-def test_without_dask_tasks_are_done_one_after_the_other(
+def test_without_dask_tasks_run_in_order(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, reference: dict[str, bytes]
 ) -> None:
     monkeypatch.setattr(sweep_folder, "find_spec", lambda name: None if name == "distributed" else find_spec(name))
@@ -263,12 +263,12 @@ def test_without_dask_tasks_are_done_one_after_the_other(
     ["", "127.0.0.1:8786", "tcp://", "tcp://a", "tcp://a:0", "tcp://a:65536", "tcp://:1", "tcp://a b:1", "http://a:1",
      "tcp://a:1\n", "tcp://\x1b:1", "inproc://a:1", 3, None, b"tcp://a:1"],
 )  # fmt: skip
-def test_what_is_no_address_is_refused(address: object) -> None:
+def test_invalid_addresses_are_refused(address: object) -> None:
     with refused("scheduler", repr(address), "an address, tcp://HOST:PORT", kind=sl.InvalidValueError):
         running.check_address(address)
 
 
-def test_without_zarr_a_sentence_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_zarr_is_reported_with_the_next_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sweep_folder, "find_spec", lambda name: None)
     with refused("the package zarr", next_step=INSTALL, kind=sl.InvalidValueError):
         sl.sweep.run(planar(), tmp_path / "sweep")
@@ -276,7 +276,7 @@ def test_without_zarr_a_sentence_says_what_to_install(tmp_path: Path, monkeypatc
         sl.sweep.load(tmp_path)
 
 
-def test_tasks_take_as_long_as_they_should(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_tasks_have_the_intended_duration(monkeypatch: pytest.MonkeyPatch) -> None:
     times = iter(np.repeat(np.arange(0.0, 1e3, 0.01), 1))
     monkeypatch.setattr(work, "compute_variables", lambda request, part: {})
     monkeypatch.setattr("sagline.sweep.work.time.process_time", lambda: next(times))

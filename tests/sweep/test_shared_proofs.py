@@ -1,4 +1,4 @@
-"""The proof that one load is infeasible decides others of its pose, but none within rounding of the border."""
+"""A proof of infeasibility of one load decides other loads at its pose, except within rounding of the boundary."""
 
 from pathlib import Path
 
@@ -7,8 +7,8 @@ import numpy as np
 import sagline as sl
 
 
-def test_a_shared_proof_leaves_loads_at_the_border_to_their_own_verdict(tmp_path: Path) -> None:
-    """With straight cables a proof is exact: at the border its gap is zero but for rounding."""
+def test_a_shared_proof_does_not_decide_loads_at_the_boundary(tmp_path: Path) -> None:
+    """A proof is exact for straight cables: at the boundary its gap is zero except for rounding."""
     robot, position, model = sl.load_robot("cogiro"), np.array([0.0, 0.0, 2.0]), sl.Straight()
     load = robot.mass * robot.gravity * np.array([0.4, 0.3, 0.2, 0.0, 0.0, 0.0])
     inside, outside = 0.0, 20.0

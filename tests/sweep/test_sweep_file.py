@@ -1,4 +1,4 @@
-"""What a sweep file asks, with units, and what is wrong with others."""
+"""Sweep files with units, and invalid ones."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_every_key_with_its_unit(tmp_path: Path) -> None:
     assert isinstance(found.tension, sl.AnalyticCenter)
 
 
-def test_rows_paths_and_what_is_left_out(tmp_path: Path) -> None:
+def test_rows_paths_and_omitted_keys(tmp_path: Path) -> None:
     (tmp_path / "path.yaml").write_text(
         "durations: 1\nrate: 4\nwaypoints: [{position: [0, 0, 1]}, {position: [0, 0, 2]}]\n"
     )
@@ -115,13 +115,13 @@ START = "robots: cogiro\nposes: {grid: {x: 0, y: 0, z: 2}}\n"
         (START + "workers: 3\n", ("workers", "an unknown key")),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_told_by_its_key(tmp_path: Path, text: str, parts: tuple[str, ...]) -> None:
+def test_errors_are_reported_with_their_key(tmp_path: Path, text: str, parts: tuple[str, ...]) -> None:
     with refused(*parts) as error:
         sl.load_sweep(written(tmp_path, text))
     assert len(str(error.value)) < 300
 
 
-def test_a_robot_file_that_is_missing_is_named(tmp_path: Path) -> None:
+def test_a_missing_robot_file_is_named(tmp_path: Path) -> None:
     with refused(kind=sl.FileError, file=tmp_path / "nothing.yaml"):
         sl.load_sweep(written(tmp_path, START.replace("cogiro", "nothing.yaml")))
 

@@ -1,4 +1,4 @@
-"""The numbers of a sweep are those of the functions that answer one request."""
+"""Numbers of a sweep agree with the functions for a single request."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def whole(request: sl.sweep.Request, robot: int = 0) -> dict[str, Any]:
 
 
 def one_by_one(request: sl.sweep.Request, robot: int = 0) -> sl.Plan:
-    """All requests of a robot as a batch, the wrench fastest."""
+    """All requests of a robot as a batch; the wrench index changes fastest."""
     _, poses, wrenches = request.shape
     pose = request.poses[np.repeat(np.arange(poses), wrenches)]
     loads = np.tile(request.wrenches, (poses, 1))
@@ -39,7 +39,7 @@ def spatial(name: str, quantities: tuple[str, ...] = QUANTITIES) -> sl.sweep.Req
 
 
 @pytest.mark.parametrize("request_", [planar(quantities=QUANTITIES), spatial("cogiro"), spatial("ipanema-2-pulleys")])
-def test_every_number_is_that_of_inverse_and_margin(request_: sl.sweep.Request) -> None:
+def test_numbers_agree_with_inverse_and_margin(request_: sl.sweep.Request) -> None:
     found, plan = whole(request_), one_by_one(request_)
     shape = request_.shape[1:]
     np.testing.assert_array_equal(found["status"], plan.status.reshape(shape))
@@ -57,7 +57,7 @@ def test_every_number_is_that_of_inverse_and_margin(request_: sl.sweep.Request) 
         np.testing.assert_array_equal(found["margin_status"][:, k], margin.status)
 
 
-def test_the_margin_is_of_the_set_around_each_wrench() -> None:
+def test_the_margin_is_that_of_the_set_around_each_wrench() -> None:
     given, around = planar(5, 3), sl.WrenchBox(force=[10.0, 0.0, 20.0], moment=[0.0, 2.0, 0.0])
     request = sl.sweep.Request(
         given.robots, given.poses, given.wrenches, "margin", around=around, moment_arm=0.25, model=sl.Straight()
@@ -71,8 +71,8 @@ def test_the_margin_is_of_the_set_around_each_wrench() -> None:
 
 @pytest.mark.parametrize("count", [400, pytest.param(40_000, marks=pytest.mark.soak)])
 @pytest.mark.parametrize("name", wide([PLANAR, "cogiro", "article-mixed", "ipanema-1", "point"]))
-def test_a_proof_that_is_shared_contradicts_no_verdict(name: str, count: int) -> None:
-    """At the border too: loads on rays through it, ever nearer to it."""
+def test_a_shared_proof_contradicts_no_verdict(name: str, count: int) -> None:
+    """Including the boundary: loads on rays through it, at decreasing distances."""
     robot, rng = some_robot(name), np.random.default_rng(11)
     box = robot.test_box
     low, high = (box.low, box.high) if box is not None else ((0.4, 0.0, 0.4), (3.6, 0.0, 2.6))
@@ -103,7 +103,7 @@ def some_robot(name: Any) -> sl.Robot:
 
 
 def _border(robot: sl.Robot, pose: sl.Pose, direction: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-    """Loads along a direction beside the border of feasibility, at distances from a millionth to rounding."""
+    """Loads along a direction near the boundary of feasibility, at distances from a millionth to rounding."""
     inside, outside = 0.0, 20.0
     for _ in range(50):
         middle = 0.5 * (inside + outside)
@@ -112,7 +112,7 @@ def _border(robot: sl.Robot, pose: sl.Pose, direction: np.ndarray[Any, Any]) -> 
     return np.array([direction * inside * (1.0 + sign * 10.0**-k) for k in (6, 9, 12, 15) for sign in (-1, 1)])
 
 
-def test_robots_with_fewer_cables_leave_the_others_empty() -> None:
+def test_robots_with_fewer_cables_have_empty_columns() -> None:
     eight, pose = sl.load_robot("cogiro"), sl.Pose.from_euler([[0.0, 0.0, 2.0]], 0.0, 0.0, 0.0)
     seven = sl.without_cables(eight, 2)
     request = sl.sweep.Request([seven, eight], pose, quantities=("tension", "length"))
@@ -124,7 +124,7 @@ def test_robots_with_fewer_cables_leave_the_others_empty() -> None:
     assert not np.isnan(whole(request, 1)["tension"]).any()
 
 
-def test_parts_together_are_the_whole() -> None:
+def test_all_parts_give_the_whole_sweep() -> None:
     request = planar()
     all_of_it = whole(request)
     for rows, columns in ((slice(3, 20), slice(5, 6)), (slice(0, 1), slice(0, 25))):
@@ -133,7 +133,7 @@ def test_parts_together_are_the_whole() -> None:
             np.testing.assert_array_equal(part[name], all_of_it[name][rows, columns])
 
 
-def test_large_parts_are_worked_out_in_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_large_parts_are_computed_in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     request = planar()
     before = whole(request)
     monkeypatch.setattr("sagline.sweep.work.ROWS", 7)
