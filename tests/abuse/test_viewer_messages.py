@@ -65,7 +65,7 @@ def press(count: int, seed: int) -> None:
     """Send a number of invalid messages, and check between them that the next client is served."""
     generator = np.random.default_rng(seed)
     ends = sl.Pose(np.array([[0.0, 0.0, 1.5], [1.0, 0.0, 1.5]]), np.stack([np.eye(3)] * 2))
-    run = PlayedPlan.of(sl.inverse(ROBOT, sl.quintic_path(ends, durations=[1.0], rate=20)))
+    run = PlayedPlan(sl.inverse(ROBOT, sl.quintic_path(ends, durations=[1.0], rate=20)))
     server = start_server(port=0)
     viewer = Page(server, FEATURES, ROBOT, run)
     thread = threading.Thread(target=viewer.serve)

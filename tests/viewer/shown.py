@@ -26,7 +26,7 @@ PATH = sl.quintic_path(
 
 def a_run() -> PlayedPlan:
     """A run of 2 s along `PATH`, whose approximate model makes the platform rest beside it."""
-    return PlayedPlan.of(sl.inverse(ROBOT, PATH, model=sl.Empirical()))
+    return PlayedPlan(sl.inverse(ROBOT, PATH, model=sl.Empirical()))
 
 
 def with_mass(robot: sl.Robot, mass: float) -> sl.Robot:

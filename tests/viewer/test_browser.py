@@ -168,7 +168,7 @@ def test_the_platform_is_lit_without_a_picture_of_surroundings(browser: Browser)
 def test_a_run_plays_in_the_page(browser: Browser) -> None:
     robot = sl.load_robot("article-suspended")
     ends = sl.Pose(np.array([[0.0, 0.0, 1.5], [2.0, 1.0, 1.5]]), np.stack([np.eye(3)] * 2))
-    run = PlayedPlan.of(sl.inverse(robot, sl.quintic_path(ends, durations=[2.0], rate=50), model=sl.Empirical()))
+    run = PlayedPlan(sl.inverse(robot, sl.quintic_path(ends, durations=[2.0], rate=50), model=sl.Empirical()))
     with opened(browser, robot, run) as (page, viewer):
         page.get_by_role("button", name="Play").click()
         await_that(page, lambda: viewer.view is not None and viewer.view.snapshot.pose.position[0] == 2.0)
@@ -214,7 +214,7 @@ def least_contrast(page: Page) -> float:
 def test_every_text_can_be_read(browser: Browser, theme: Literal["light", "dark"], width: int) -> None:
     robot = sl.load_robot("article-mixed")
     ends = sl.Pose(np.array([[0.0, 0.0, 1.5], [2.0, 1.0, 1.5]]), np.stack([np.eye(3)] * 2))
-    run = PlayedPlan.of(sl.inverse(robot, sl.quintic_path(ends, durations=[2.0], rate=50), model=sl.Empirical()))
+    run = PlayedPlan(sl.inverse(robot, sl.quintic_path(ends, durations=[2.0], rate=50), model=sl.Empirical()))
     with opened(browser, robot, run, width=width, theme=theme, complains=True) as (page, viewer):
         assert page.evaluate("document.documentElement.dataset.mantineColorScheme") == theme
         least_contrast(page)
@@ -334,7 +334,7 @@ def test_a_cable_is_cut_and_the_break_is_played(browser: Browser) -> None:
         page.get_by_role("heading", name="Simulated").wait_for()
         page.get_by_text("break of cable 0 at 0.000 s").wait_for()
         assert viewer.player.played is not None
-        await_that(page, lambda: viewer.player.clock.time == viewer.player.played.duration)  # type: ignore[union-attr]
+        await_that(page, lambda: viewer.player.time == viewer.player.played.duration)  # type: ignore[union-attr]
         page.get_by_role("button", name="Play").wait_for()
         least_contrast(page)
         assert page.evaluate(OVERFLOWING) == []

@@ -61,7 +61,7 @@ def a_run(name: str) -> PlayedPlan:
     """A run from left to right through the middle of a robot's room."""
     robot = sl.load_robot(name)
     aside = 0.06 * size_of(robot) * np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
-    return PlayedPlan.of(sl.inverse(robot, sl.Pose(home_pose(robot).position + aside, np.stack([np.eye(3)] * 3))))
+    return PlayedPlan(sl.inverse(robot, sl.Pose(home_pose(robot).position + aside, np.stack([np.eye(3)] * 3))))
 
 
 def played(page: Page, file: FilePath) -> tuple[float, list[Any]]:

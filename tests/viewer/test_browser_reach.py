@@ -115,7 +115,7 @@ def keys_move(page: Page, viewer: ViewerPage) -> None:
 def test_all_is_reached_named_and_said(browser: Browser) -> None:
     robot = sl.load_robot("article-suspended")
     ends = sl.Pose(np.array([[0.0, 0.0, 1.5], [2.0, 1.0, 1.5]]), np.stack([np.eye(3)] * 2))
-    run = PlayedPlan.of(sl.inverse(robot, sl.quintic_path(ends, durations=[2.0], rate=20)))
+    run = PlayedPlan(sl.inverse(robot, sl.quintic_path(ends, durations=[2.0], rate=20)))
     with opened(browser, robot, run) as (page, viewer):
         check_all(page, walking=False)
         await_that(page, lambda: said(page).startswith("Feasible, tensions "))

@@ -35,7 +35,7 @@ def run_of(robot: sl.Robot) -> PlayedPlan:
     assert box is not None
     middle, aside = 0.5 * (box.low + box.high), np.zeros(3)
     aside[np.argmax(box.high - box.low)] = 0.2 * float(np.max(box.high - box.low))
-    return PlayedPlan.of(
+    return PlayedPlan(
         sl.inverse(robot, sl.quintic_path([tuple(middle), tuple(middle + aside)], durations=[2.0], rate=40))
     )
 

@@ -112,7 +112,7 @@ def test_a_mouse_pulls_cuts_and_shakes(browser: Browser, name: str, size: tuple[
         page.mouse.click(x, y)
         await_that(page, lambda: viewer.feature(CutFeature)._is_marked)
         page.get_by_role("button", name="Cut cable").click()
-        await_that(page, lambda: viewer.player.played is not None and viewer.player.clock.time > 0.5)
+        await_that(page, lambda: viewer.player.played is not None and viewer.player.time > 0.5)
         page.get_by_role("heading", name="Simulated").wait_for()
         page.get_by_role("button", name="Undo cut").click()
         await_that(page, lambda: viewer.player.played is None)

@@ -113,7 +113,7 @@ def test_what_was_put_on_meanwhile_is_not_played_over() -> None:
         given, first, second = PlayedSimulation(made.simulation()), made.simulation(50), made.simulation(60)
         viewer = Page(server, FEATURES, given.robot, given)
         cuts, player = viewer.feature(CutFeature), viewer.player
-        cuts._requested, before = 1, (given.home, player.save())
+        cuts._requested, before = 1, (given.at(0.0).pose, player.save())
         cuts._play(1, first, 3, before)
         cuts._play(1, second, 3, before)
         assert isinstance(player.played, PlayedSimulation)
@@ -133,7 +133,7 @@ def test_cut_by_cut_all_is_put_back() -> None:
         cuts, player = viewer.feature(CutFeature), viewer.player
         for number in (1, 2):
             cuts._requested = number
-            cuts._play(number, made.simulation(50), 3, (given.home, player.save()))
+            cuts._play(number, made.simulation(50), 3, (given.at(0.0).pose, player.save()))
         first = cuts._before[-1][1].played
         cuts.undo()
         assert player.played is first
@@ -167,13 +167,13 @@ def test_a_clock_at_the_end_of_what_is_known_waits_and_goes_on() -> None:
     whole = made.simulation()
     player.play(PlayedSimulation(whole), at_once=True)
     player.advance(5.0)
-    ended = player.clock
+    ended = player.playing
     player.grow(PlayedSimulation(whole))
-    assert (ended.playing, player.clock.playing) == (False, True)
-    assert player.clock.time == player.clock.duration == 2.0
+    assert (ended, player.playing) == (False, True)
+    assert player.time == player.duration == 2.0
     player.scrub_to(1.0)
     player.grow(PlayedSimulation(whole))
-    assert (player.clock.time, player.clock.playing) == (1.0, False)
+    assert (player.time, player.playing) == (1.0, False)
 
 
 def test_what_was_played_is_put_back_where_its_clock_stood() -> None:
@@ -186,9 +186,9 @@ def test_what_was_played_is_put_back_where_its_clock_stood() -> None:
     player.advance(0.5)
     player.restore(kept)
     assert player.played is run
-    assert (player.clock.time, player.clock.playing, player.following) == (0.7, True, True)
+    assert (player.time, player.playing, player.following) == (0.7, True, True)
     player.leave()
     kept = player.save()
     player.play(PlayedSimulation(made.simulation(50)), at_once=True)
     player.restore(kept)
-    assert (player.clock.time, player.clock.playing, player.following) == (0.7, False, False)
+    assert (player.time, player.playing, player.following) == (0.7, False, False)

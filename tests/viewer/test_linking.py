@@ -239,7 +239,7 @@ def test_payload_wrench_and_tensions_by_hand_come_with_it() -> None:
 def test_a_moment_of_a_run() -> None:
     robot = sl.load_robot("article-suspended")
     ends = sl.Pose(np.array([[0.0, 0.0, 1.5], [2.0, 1.0, 1.5]]), np.stack([np.eye(3)] * 2))
-    run = PlayedPlan.of(sl.inverse(robot, sl.quintic_path(ends, durations=[2.00000000000777], rate=20)))
+    run = PlayedPlan(sl.inverse(robot, sl.quintic_path(ends, durations=[2.00000000000777], rate=20)))
     with a_page(robot, played=run) as here, a_page(robot, played=run) as there, a_page(robot) as alone:
         with asking(here) as asker:
             tell(here, asker.client, "scrub", 1.25)

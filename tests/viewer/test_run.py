@@ -5,14 +5,14 @@ import pytest
 
 import sagline as sl
 from sagline.viewer.playback import PlayedPlan
-from sagline.viewer.player import Timeline
+from sagline.viewer.player import Player
 
 ROBOT = sl.load_robot("article-mixed")
 PATH = sl.quintic_path(
     sl.Pose(np.array([[0.0, 0.0, 1.5], [6.9, 3.0, 1.5]]), np.stack([np.eye(3)] * 2)), durations=[4.0], rate=10
 )
 PLAN = sl.inverse(ROBOT, PATH, model=sl.Empirical())
-RUN = PlayedPlan.of(PLAN)
+RUN = PlayedPlan(PLAN)
 
 
 def test_samples_are_those_of_the_plan() -> None:
@@ -48,16 +48,28 @@ def test_traces_draw_the_error_times_its_scale() -> None:
 
 def test_plan_of_a_single_pose_is_no_run() -> None:
     with pytest.raises(sl.InvalidValueError, match="single pose"):
-        PlayedPlan.of(sl.inverse(ROBOT, sl.Pose([0.0, 0.0, 1.5], np.eye(3))))
+        PlayedPlan(sl.inverse(ROBOT, sl.Pose([0.0, 0.0, 1.5], np.eye(3))))
 
 
 def test_clock_plays_pauses_scrubs_and_stops_at_the_end() -> None:
-    clock = Timeline(10.0)
-    assert clock.advanced(1.0, 1.0).time == 0.0
-    playing = clock.toggled()
-    assert playing.advanced(0.5, 4.0) == Timeline(10.0, 2.0, True)
-    assert playing.advanced(99.0, 1.0) == Timeline(10.0, 10.0, False)
-    assert Timeline(10.0, 10.0, False).toggled() == Timeline(10.0, 0.0, True)
-    assert playing.scrubbed(3.0) == Timeline(10.0, 3.0, False)
-    assert playing.scrubbed(-3.0).time == 0.0
-    assert playing.advanced(-5.0, 1.0).time == 0.0
+    player = Player(RUN, lambda _: None)
+
+    def clock() -> tuple[float, bool]:
+        return player.time, player.playing
+
+    player.advance(1.0)
+    assert clock() == (0.0, False)
+    player.toggle()
+    player.speed = 4.0
+    player.advance(0.5)
+    assert clock() == (2.0, True)
+    player.advance(-5.0)
+    assert clock() == (2.0, True)
+    player.advance(99.0)
+    assert clock() == (4.0, False)
+    player.toggle()
+    assert clock() == (0.0, True)
+    player.scrub_to(3.0)
+    assert clock() == (3.0, False)
+    player.scrub_to(-3.0)
+    assert clock() == (0.0, False)

@@ -1,6 +1,7 @@
 """A log as the page shows it: platforms, words, and what is added while it grows."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +14,15 @@ from sagline.control import Event, EventKind, State
 from sagline.files.mcap_writer import Recorder
 from sagline.viewer.features import FEATURES
 from sagline.viewer.page import Page
-from sagline.viewer.player import InMotion, Timeline
+from sagline.viewer.playback import PlayedSimulation
+from sagline.viewer.player import InMotion, Player
 from sagline.viewer.readout import css_color
 from sagline.viewer.robot_scene import ACTUAL, INFEASIBLE, PLATFORM, TRUTH, scaled_position
 from sagline.viewer.server import start_server, stop_server
 from sagline.viewer.session import LogFollower, PlayedLog
 from sagline.viewer.tension_scale import TensionScale
 from tests.files.executions import cycles_of, events_of, execution, plan_of
+from tests.plot import made
 from tests.tiers import extended, wide
 
 ROBOT = sl.load_robot("article-prototype")
@@ -87,8 +90,7 @@ def test_the_panel_tells_state_errors_and_what_happened(log: Path, truth: Path) 
 def test_a_text_from_a_log_is_text_on_the_page(log: Path) -> None:
     session = session_of(log)
     evil = Event(1000.0, 0, EventKind.NOTE, "x", State.MOVING, "<script>alert(1)</script>")
-    parts = {name: getattr(session, name) for name in session.__slots__ if name != "shown"}
-    text = PlayedLog(**parts | {"events": (evil,)}).at(1.0).verdict
+    text = replace(session, events=(evil,)).at(1.0).verdict
     assert "<script>" not in text
     assert "&lt;script&gt;" in text
 
@@ -96,8 +98,7 @@ def test_a_text_from_a_log_is_text_on_the_page(log: Path) -> None:
 @pytest.mark.parametrize("state", wide([State.FAULT, State.MOVING, State.EMERGENCY]))
 def test_a_fault_is_red_with_its_name(log: Path, state: State) -> None:
     session = session_of(log)
-    parts = {name: getattr(session, name) for name in session.__slots__ if name != "shown"}
-    wrong = PlayedLog(**parts | {"state": np.full(201, state, dtype=np.int8)})
+    wrong = replace(session, state=np.full(201, state, dtype=np.int8))
     server = start_server(port=0)
     try:
         viewer = Page(server, FEATURES, ROBOT, wrong)
@@ -143,15 +144,18 @@ def test_the_page_shows_three_platforms_and_goes_on_with_the_log(tmp_path: Path,
         viewer._work_off()
         viewer._update()
         assert viewer.view.snapshot.index == 200  # who looked at the end sees the new end
-        assert viewer.player.clock.time == pytest.approx(2.0)
+        assert viewer.player.time == pytest.approx(2.0)
     finally:
         stop_server(server)
 
 
 def test_a_timeline_that_grows_keeps_its_place_but_at_its_end() -> None:
-    assert Timeline(5.0, 5.0).extended(7.0) == Timeline(7.0, 7.0)
-    assert Timeline(5.0, 3.0).extended(7.0) == Timeline(7.0, 3.0)
-    assert Timeline(5.0, 3.0, True).extended(7.0) == Timeline(7.0, 3.0, True)
+    part, whole = PlayedSimulation(made.simulation(50)), PlayedSimulation(made.simulation())
+    for before, playing, after in ((part.duration, False, 2.0), (0.5, False, 0.5), (0.5, True, 0.5)):
+        player = Player(part, lambda _: None)
+        player.time, player.playing = before, playing
+        player.extend(whole)
+        assert (player.duration, player.time, player.playing) == (2.0, after, playing)
 
 
 def test_what_is_planned_estimated_and_true_has_a_color_of_its_own() -> None:
@@ -176,14 +180,13 @@ def contrast(one: np.ndarray, other: np.ndarray) -> float:
 
 def test_before_the_place_is_known_the_platform_is_shown_in_the_middle(log: Path) -> None:
     session = session_of(log)
-    parts = {name: getattr(session, name) for name in session.__slots__ if name != "shown"}
     unknown = np.full((201, 3), np.nan)
-    lost = PlayedLog(**parts | {"position": unknown, "planned": unknown})
+    lost = replace(session, position=unknown, planned=unknown)
     assert ROBOT.test_box is not None
-    assert np.allclose(lost.home.position, 0.5 * (ROBOT.test_box.low + ROBOT.test_box.high))
+    assert np.allclose(lost.at(0.0).pose.position, 0.5 * (ROBOT.test_box.low + ROBOT.test_box.high))
     later = unknown.copy()
     later[100:120] = [0.1, 0.2, 1.4]
-    known = PlayedLog(**parts | {"position": later, "planned": unknown})
+    known = replace(session, position=later, planned=unknown)
     assert np.array_equal(known.at(1.5).pose.position, [0.1, 0.2, 1.4])  # the last that was known
     assert known.track().spans == ()
     assert known.traces(50, 1.0)[1].shape == (50, 3)

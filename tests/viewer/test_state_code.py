@@ -132,7 +132,7 @@ def path_of(robot: sl.Robot) -> sl.Path:
 def test_a_sample_of_a_run_in_a_file(tmp_path: Path) -> None:
     robot, file = sl.load_robot("article-suspended"), tmp_path / "a 'run'.nc"
     sl.inverse(robot, path_of(robot), model=sl.Empirical()).save(file)
-    run = PlayedPlan.of(sl.load_plan(file))
+    run = PlayedPlan(sl.load_plan(file))
     for time in (0.0, 0.52, 9.0):
         view = View(run.at(time), Settings(robot.mass), TensionScale.of(robot), False, None, run)
         names = executed(code_of(view, robot, Source.of_file("plan", file), time))
@@ -243,6 +243,6 @@ def test_questions_that_are_none_are_not_answered(page: Shown, value: Any) -> No
 @extended
 def test_what_is_in_no_file_is_refused_in_a_line() -> None:
     robot = sl.load_robot("article-suspended")
-    run = PlayedPlan.of(sl.inverse(robot, path_of(robot)))
+    run = PlayedPlan(sl.inverse(robot, path_of(robot)))
     with contextmanager(shown)(lambda server: Page(server, FEATURES, robot, run)) as page:
         assert asked(page, "copy", "code", "c")["refused"].startswith("the run ")

@@ -3,6 +3,7 @@
 import json
 import re
 from collections.abc import Iterator
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -22,8 +23,6 @@ from sagline.viewer.timeline import MOST_COLUMNS as MOST_COLUMNS
 from sagline.viewer.timeline import (
     MOST_SPANS,
     Chart,
-    ChartLimit,
-    TimelineMark,
     Track,
     columns,
     limit_violations,
@@ -44,8 +43,8 @@ UNIT = ForceUnit("N", 1.0, ".1f")
 
 @pytest.fixture(scope="module")
 def page() -> Iterator[Shown]:
-    beside = Beside(PlayedPlan.of(OTHER), ("a.nc", "b.nc"))
-    yield from shown(lambda server: Page(server, FEATURES, ROBOT, PlayedPlan.of(PLAN), beside=beside))
+    beside = Beside(PlayedPlan(OTHER), ("a.nc", "b.nc"))
+    yield from shown(lambda server: Page(server, FEATURES, ROBOT, PlayedPlan(PLAN), beside=beside))
 
 
 @pytest.fixture(scope="module")
@@ -58,14 +57,17 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> PlayedLog:
 
 
 def changed(session: PlayedLog, **changes: Any) -> PlayedLog:
-    parts = {name: getattr(session, name) for name in session.__slots__ if name != "shown"}
-    return PlayedLog(**parts | changes)
+    return replace(session, **changes)
 
 
 @pytest.fixture
 def growing(log: PlayedLog) -> Iterator[Shown]:
     """The first hundred cycles of the log."""
-    cycles = {name: value[:100] for name in log.__slots__ if isinstance(value := getattr(log, name), np.ndarray)}
+    cycles = {
+        name: value[:100]
+        for name in (each.name for each in fields(log))
+        if isinstance(value := getattr(log, name), np.ndarray)
+    }
     del cycles["shown"]
     yield from shown(lambda server: Page(server, FEATURES, log.robot, changed(log, **cycles)))
 
@@ -77,16 +79,16 @@ def test_columns_hold_the_extremes_of_their_samples(seed: int) -> None:
     time = np.cumsum(generator.uniform(1e-3, 1.0, count))
     values = generator.normal(size=(count, 3))
     values[generator.random((count, 3)) < 0.3] = np.nan
-    found = columns(time, values, most)
-    assert len(found.time) == min(count, most)
-    assert found.time[0] == time[0]
-    ends = [*np.searchsorted(time, found.time), count]
-    for k in range(len(found.time)):
+    starts, low, high = columns(time, values, most)
+    assert len(starts) == min(count, most)
+    assert starts[0] == time[0]
+    ends = [*np.searchsorted(time, starts), count]
+    for k in range(len(starts)):
         for line in range(3):
             part = values[ends[k] : ends[k + 1], line]
             known = part[~np.isnan(part)]
             expected = (known.min(), known.max()) if known.size else (np.nan, np.nan)
-            assert np.array_equal([found.low[k, line], found.high[k, line]], expected, equal_nan=True)
+            assert np.array_equal([low[k, line], high[k, line]], expected, equal_nan=True)
 
 
 @pytest.mark.parametrize("seed", wide(range(20), 5))
@@ -97,12 +99,12 @@ def test_spans_cover_all_that_is_wrong_and_no_more_than_their_pixels(seed: int) 
     wrong = generator.random(count) < generator.uniform(0.0, 0.3)
     spans = spans_of(time, wrong, lambda rows: f"{rows.start} {rows.stop}")
     covered = np.zeros(count, dtype=bool)
-    for span in spans:
-        first, stop = map(int, span.why.split())
+    for start, end, why in spans:
+        first, stop = map(int, why.split())
         assert wrong[first]
         assert wrong[stop - 1]
-        assert span.start == time[first]
-        assert span.end == time[min(stop, count - 1)]  # a sample lasts until the next
+        assert start == time[first]
+        assert end == time[min(stop, count - 1)]  # a sample lasts until the next
         covered[first:stop] = True
         good = np.flatnonzero(~wrong[first:stop]) + first
         near = (time[-1] - time[0]) / MOST_SPANS
@@ -112,25 +114,25 @@ def test_spans_cover_all_that_is_wrong_and_no_more_than_their_pixels(seed: int) 
 
 
 def test_a_plan_says_where_it_has_no_answer_and_why() -> None:
-    track = PlayedPlan.of(PLAN).track()
+    track = PlayedPlan(PLAN).track()
     gaps = PLAN.gaps
-    (before, gap, after), (span,) = gaps, track.spans
+    (before, gap, after), ((start, end, why),) = gaps, track.spans
     assert before.status is after.status is sl.PoseStatus.UNSTABLE
     time = track.time
-    assert (span.start, span.end) == (time[before.first], time[after.last + 1])
+    assert (start, end) == (time[before.first], time[after.last + 1])
     cables = ", ".join(map(str, gap.cables))
-    assert f" {gap.shortfall:.1f} N; " in span.why
-    assert span.why.endswith(f"cables {cables}")
+    assert f" {gap.shortfall:.1f} N; " in why
+    assert why.endswith(f"cables {cables}")
 
 
 def test_what_a_page_is_told_are_the_numbers_of_the_plan() -> None:
-    track = PlayedPlan.of(PLAN).track()
+    track = PlayedPlan(PLAN).track()
     (part,) = timeline_message([("run", track)], 0, 8.0)["tracks"]
     low = np.array(part["low"], dtype=float)  # None as NaN
     np.testing.assert_allclose(low.T, PLAN.state.limited_tension, rtol=0.0, atol=0.5001e-2)
     assert part["high"] is None  # a column a sample
     assert np.array_equal(part["times"], np.round(PLAN.path.time, 9))  # type: ignore[union-attr]
-    assert [limit[:2] for limit in part["limits"]] == [[25.0, "lowest allowed"], [2000.0, "highest allowed"]]
+    assert [limit[:2] for limit in part["limits"]] == [(25.0, "lowest allowed"), (2000.0, "highest allowed")]
     lengths = timeline_message([("run", track)], 1, 8.0)["tracks"][0]
     np.testing.assert_allclose(
         np.array(lengths["low"], dtype=float).T, PLAN.unstrained_length, rtol=0.0, atol=0.5001e-5
@@ -141,12 +143,12 @@ def test_what_a_page_is_told_are_the_numbers_of_the_plan() -> None:
 def test_limits_are_drawn_where_they_are_near_and_told_where_not() -> None:
     time, limits = (
         np.linspace(0.0, 1.0, 11),
-        (ChartLimit(25.0, "lowest", upper=False), ChartLimit(2000.0, "highest", upper=True)),
+        ((25.0, "lowest", False), (2000.0, "highest", True)),
     )
     chart = Chart("Tension", "N", 1, ("0",), lambda rows: 30.0 + 20.0 * time[rows, None], limits)
     page = timeline_message([("a", Track(time, (chart,)))], 0, 1.0)
     assert page["range"] == pytest.approx([25.0 - 1.0, 50.0 + 1.0])
-    assert page["tracks"][0]["limits"] == [[25.0, "lowest", False]]
+    assert page["tracks"][0]["limits"] == [(25.0, "lowest", False)]
     assert page["tracks"][0]["far"] == "highest 2000 N"
 
 
@@ -188,33 +190,33 @@ def test_a_simulation_says_when_it_broke_and_draws_nothing_of_a_broken_cable() -
     state = sl.inverse(sl.load_robot("cogiro"), sl.Pose([0.0, 0.0, 2.0], np.eye(3))).state
     cut = sl.simulate(state, duration=1.0, events=sl.Break(cable=3, time=0.5))
     track = PlayedSimulation(cut).track()
-    (event,) = [mark for mark in track.marks if mark.text.startswith("break of cable 3")]
-    assert event.time == pytest.approx(0.5)
-    assert event.bad
+    ((time, _, bad),) = [mark for mark in track.marks if mark[1].startswith("break of cable 3")]
+    assert time == pytest.approx(0.5)
+    assert bad
     values = track.charts[0].values(slice(None))
     assert np.array_equal(np.isnan(values[:, 3]), cut.time >= 0.5)
     assert np.array_equal(values[:, :3], cut.tensions[:, :3])
-    assert not any(" 3" in span.why.split(" below")[0] for span in track.spans)
+    assert not any(" 3" in why.split(" below")[0] for _, _, why in track.spans)
 
 
 def test_tensions_beyond_their_limits_are_spans_with_their_worst() -> None:
     robot = ROBOT.replace(tension_min=20.0, tension_max=500.0)
     tension = np.full((6, 8), 100.0)
     tension[1:3, 4], tension[2, 5], tension[4, 0] = [12.0, 14.0], 700.0, np.nan
-    (span,) = limit_violations(robot, np.arange(6.0), tension, UNIT)
-    assert (span.start, span.end) == (1.0, 3.0)
-    told = re.findall(r"cable (\d) (below|above) ([\d.]+) N: ([\d.]+) N[\w ]+winch", span.why)
+    ((*ends, why),) = limit_violations(robot, np.arange(6.0), tension, UNIT)
+    assert ends == [1.0, 3.0]
+    told = re.findall(r"cable (\d) (below|above) ([\d.]+) N: ([\d.]+) N[\w ]+winch", why)
     assert told == [("4", "below", "20.0", "12.0"), ("5", "above", "500.0", "700.0")]
 
 
 def test_a_log_marks_its_events_and_shades_its_faults(log: PlayedLog) -> None:
     marks = log.track().marks
-    assert [(mark.time, mark.bad) for mark in marks] == [(0.0, False), (0.5, True)]
-    assert [mark.text for mark in marks] == [f"{event.name}: {event.text}" for event in events_of()]
+    assert [(time, bad) for time, _, bad in marks] == [(0.0, False), (0.5, True)]
+    assert [text for _, text, _ in marks] == [f"{event.name}: {event.text}" for event in events_of()]
     state = np.where((log.time >= 0.8) & (log.time < 1.2), State.FAULT, State.MOVING)
-    (span,) = changed(log, state=state.astype(np.int8)).track().spans
-    assert (span.start, span.end) == pytest.approx((0.8, 1.2))
-    assert span.why == "FAULT"
+    ((*ends, why),) = changed(log, state=state.astype(np.int8)).track().spans
+    assert ends == pytest.approx([0.8, 1.2])
+    assert why == "FAULT"
 
 
 def test_steps_go_from_sample_to_sample() -> None:
@@ -306,7 +308,7 @@ def test_a_window_is_looked_at_and_the_whole_again(page: Shown) -> None:
 def test_a_window_follows_a_clock_to_its_end_however_long_nobody_looked() -> None:
     server = start_server(port=0)
     try:
-        page = Page(server, (), ROBOT, PlayedPlan.of(PLAN))
+        page = Page(server, (), ROBOT, PlayedPlan(PLAN))
         channel, player = page.channel, page.player
         show = TimelineFeature(page)
 
@@ -321,7 +323,7 @@ def test_a_window_follows_a_clock_to_its_end_however_long_nobody_looked() -> Non
         player.advance(1.0)
         assert window() == [3.5, 5.5]  # it turned the page
         player.advance(100.0)  # just after that
-        assert not player.clock.playing
+        assert not player.playing
         assert window() == [6.0, 8.0]
         player.scrub_to(0.0)
         assert window() == [6.0, 8.0]  # who looks elsewhere does so by hand
@@ -373,14 +375,14 @@ def test_nonsense_changes_nothing(page: Shown) -> None:
 
 
 def test_what_a_cut_brought_is_played_alone_and_given_back_with_its_second_run() -> None:
-    run, other = PlayedPlan.of(PLAN), Beside(PlayedPlan.of(OTHER), ("a", "b"))
+    run, other = PlayedPlan(PLAN), Beside(PlayedPlan(OTHER), ("a", "b"))
     player = Player(run, lambda *_: None, other)
-    assert (player.beside, player.clock.duration) == (other, 9.0)
-    player.play(PlayedPlan.of(PLAN))
-    assert (player.beside, player.clock.duration) == (None, 8.0)
+    assert (player.beside, player.duration) == (other, 9.0)
+    player.play(PlayedPlan(PLAN))
+    assert (player.beside, player.duration) == (None, 8.0)
     player.extend(run)
     player.play(run)
-    assert (player.beside, player.clock.duration) == (other, 9.0)
+    assert (player.beside, player.duration) == (other, 9.0)
 
 
 @extended
@@ -388,7 +390,7 @@ def test_a_long_run_is_told_at_once() -> None:
     """600,000 samples of eight cables: the page is told in a blink."""
     time = np.linspace(0.0, 600.0, 600_000)
     values = np.random.default_rng(1).normal(size=(600_000, 8))
-    marks = tuple(TimelineMark(float(k), "x", bad=False) for k in range(1000))
+    marks = tuple((float(k), "x", False) for k in range(1000))
     track = Track(time, (Chart("Tension", "N", 1, tuple("01234567"), values.__getitem__),), (), marks)
     assert least_seconds(lambda: timeline_message([("run", track)], 0, 600.0), 0.5) < 0.5
     assert len(json.dumps(timeline_message([("run", track)], 0, 600.0))) < 400_000

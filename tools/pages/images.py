@@ -112,7 +112,7 @@ def viewer_of_run(server: PageServer) -> Page:
     from sagline.viewer.playback import PlayedPlan
 
     plan = sl.inverse(sl.load_robot("article-suspended"), sl.article_path(), sl.Empirical())
-    return Page(server, FEATURES, plan.state.one_robot, PlayedPlan.of(plan))
+    return Page(server, FEATURES, plan.state.one_robot, PlayedPlan(plan))
 
 
 def viewer_of_calibration(server: PageServer) -> Page:

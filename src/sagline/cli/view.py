@@ -233,7 +233,7 @@ def played_in(robot: Robot, file: Path) -> Played:
     _check_robot(file, "run", made_for, robot)
     count = len(plan.state.pose) if plan.state.pose.shape else 1
     with working(f"{made_for.name}: confirming {count:,} poses") as line:
-        return PlayedPlan.of(plan, line.progress)
+        return PlayedPlan(plan, line.progress)
 
 
 def played_beside(robot: Robot, first: Path, second: Path) -> Beside:

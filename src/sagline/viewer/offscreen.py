@@ -110,7 +110,7 @@ class _OffscreenScene:
         """Build the scene of the played motion, or of the view."""
         self._client, self._shot = client, shot
         snapshot = view.snapshot
-        robot, home = (snapshot.robot, snapshot.pose) if played is None else (played.robot, played.home)
+        robot, home = (snapshot.robot, snapshot.pose) if played is None else (played.robot, played.at(0.0).pose)
         self._robot_scene = RobotScene(client.scene, robot, home, live=False, pixel=line_width * shot.pixel)
         if played is not None:
             self._robot_scene.show_traces(*played.traces(TRACE_POINTS, view.settings.error_scale))

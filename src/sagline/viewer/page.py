@@ -111,7 +111,7 @@ class Page:
         self.channel = Channel(server.gui, self.later)
         server.on_client_connect(self.channel.connect)
         server.on_client_disconnect(self.channel.disconnect)
-        home = home_pose(robot) if played is None else played.home
+        home = home_pose(robot) if played is None else played.at(0.0).pose
         self.home = home if pose is None else pose
         self.panel = ControlPanel(server, robot, self.scale, self.refresh, lambda: self.later(self._forget))
         self.scene = RobotScene(server.scene, robot, self.home)
@@ -140,7 +140,7 @@ class Page:
             if rest > 0.0:
                 time.sleep(rest)
             now = time.monotonic()
-            if self._wake.is_set() or self.player.clock.playing or self._tasks:
+            if self._wake.is_set() or self.player.playing or self._tasks:
                 self._wake.clear()
                 self.player.advance(now - last)
                 self._work_off()
@@ -209,7 +209,7 @@ class Page:
     @property
     def _pace(self) -> float:
         """Longest wait until the next update [s]."""
-        if self.player.clock.playing or any(feature.moving for feature in self.features):
+        if self.player.playing or any(feature.moving for feature in self.features):
             return FRAME_TIME
         return SOON if any(feature.waiting for feature in self.features) else IDLE
 
@@ -256,7 +256,7 @@ class Page:
             return
         played = player.played if player.following else None
         self.panel.show_what_if("" if played is None else played.unchanged)
-        playing, scale = player.clock.playing, self.panel.color_scale(snapshot.tension)
+        playing, scale = player.playing, self.panel.color_scale(snapshot.tension)
         missing = None if isinstance(snapshot, InMotion) or snapshot.feasible else missing_of(snapshot)
         self._show(View(snapshot, settings, scale, self.panel.ghost, self.wrench, played, missing, playing=playing))
 

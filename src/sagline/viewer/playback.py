@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from typing import Final
 
 import numpy as np
@@ -12,18 +12,15 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
 from sagline.core.progress import Progress
 from sagline.dynamics.simulation.results import Occurrence, Simulation
-from sagline.kinematics.confirm import Confirmation, confirm
+from sagline.kinematics.confirm import confirm
 from sagline.kinematics.plan import Plan
-from sagline.robot.pose import Pose
-from sagline.robot.robot import Robot
-from sagline.viewer.player import InMotion
+from sagline.viewer.player import InMotion, Played
 from sagline.viewer.readout import definitions, verdict_box
 from sagline.viewer.robot_scene import ACTUAL, WANTED
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.tension_scale import ForceUnit, force_unit, number_text
 from sagline.viewer.timeline import (
     Chart,
-    TimelineMark,
     Track,
     cable_names,
     chart_limits,
@@ -46,45 +43,21 @@ def _event_text(event: Occurrence, unit: ForceUnit) -> str:
     return f"{what} at {event.time:.3f} s: {before} before, then at most {after}"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class PlayedPlan:
-    """A plan of N poses, with its poses confirmed by forward kinematics."""
-
-    plan: Plan
-    confirmation: Confirmation  # confirmed poses with exact cables
-    time: Array  # times of the samples from 0 [s], shape (N,); one second per pose without a path
+class PlayedPlan(Played):
+    """A plan of N poses, with its poses confirmed by forward kinematics; one second per pose without a path."""
 
     name = "run"
     unchanged = "A run keeps its robot and loads; drag the platform to change them."
 
-    @classmethod
-    def of(cls, plan: Plan, progress: Progress | None = None) -> PlayedPlan:
-        """The run of a plan."""
+    def __init__(self, plan: Plan, progress: Progress | None = None) -> None:
+        """Confirm the poses with exact cables."""
         if not plan.state.pose.shape:
             raise InvalidValueError(
                 "run", "a plan of a single pose", "a plan of poses in a row", "Save a plan of a path."
             )
         time = np.arange(len(plan.state.pose), dtype=np.float64) if plan.path is None else plan.path.time
-        return cls(plan, confirm(plan, progress=progress), time - time[0])
-
-    @property
-    def robot(self) -> Robot:
-        """The robot."""
-        return self.plan.state.one_robot
-
-    @property
-    def home(self) -> Pose:
-        """The first pose."""
-        return self.plan.state.pose[0]
-
-    @property
-    def duration(self) -> float:
-        """Time of the last sample [s]."""
-        return float(self.time[-1])
-
-    def index_at(self, time: float) -> int:
-        """Index of the sample at or before a time [s]."""
-        return _sample_at(self.time, time)
+        self.plan, self.robot, self.time = plan, plan.state.one_robot, time - time[0]
+        self.confirmation = confirm(plan, progress=progress)
 
     def at(self, time: float) -> Snapshot:
         """The sample at or before a time [s]."""
@@ -117,7 +90,7 @@ class PlayedPlan:
 
     def traces(self, most: int, error_scale: float) -> tuple[Array, Array]:
         """Desired and actual positions (n, 3), n <= `most`, with a scaled error; NaN in gaps."""
-        rows = np.unique(np.linspace(0, len(self.time) - 1, most).astype(np.intp))
+        rows = self.traced_samples(most)
         wanted = self.plan.state.pose.position[rows]
         return wanted, wanted + error_scale * self.confirmation.position_error[rows]
 
@@ -132,38 +105,20 @@ def _sample(plan: Plan, i: int) -> Plan:
 FAILURES: Final = ("break", "stall", "slack", "saturate")  # kinds of events
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class PlayedSimulation:
+class PlayedSimulation(Played):
     """A simulation with N samples; its times begin at 0."""
-
-    simulation: Simulation
 
     name = "simulation"
     unchanged = "A simulation keeps its robot and loads; drag the platform to change them."
 
-    @property
-    def robot(self) -> Robot:
-        """The robot."""
-        return self.simulation.robot
-
-    @property
-    def home(self) -> Pose:
-        """The first pose."""
-        return self.simulation.pose[0]
-
-    @property
-    def time(self) -> Array:
-        """Times of the samples from 0 [s], shape (N,)."""
-        return np.asarray(self.simulation.time - self.simulation.time[0])
-
-    @property
-    def duration(self) -> float:
-        """Time of the last sample [s]."""
-        return float(self.time[-1])
+    def __init__(self, simulation: Simulation) -> None:
+        """Play a simulation."""
+        self.simulation, self.robot = simulation, simulation.robot
+        self.time = np.asarray(simulation.time - simulation.time[0])
 
     def at(self, time: float) -> InMotion:
         """The sample at or before a time [s]."""
-        simulation, unit, k = self.simulation, force_unit(self.robot), _sample_at(self.time, time)
+        simulation, unit, k = self.simulation, force_unit(self.robot), self.index_at(time)
         now = float(simulation.time[k])
         past = [event for event in simulation.events if event.time <= now]
         broken = [event.cable for event in past if event.kind == "break" and event.cable is not None]
@@ -190,7 +145,7 @@ class PlayedSimulation:
 
     def code(self, source: str, time: float) -> list[str]:
         """Lines of Python that reproduce a sample; `source` is an expression of the simulation."""
-        index = _sample_at(self.time, time)
+        index = self.index_at(time)
         return [
             f"simulation = {source}",
             f"index = {index}  # {self.time[index]:g} s",
@@ -200,7 +155,7 @@ class PlayedSimulation:
 
     def traces(self, most: int, error_scale: float) -> tuple[Array, Array]:
         """Desired positions, all NaN, and actual positions, both of shape (n, 3) with n <= `most`."""
-        rows = np.unique(np.linspace(0, self.time.size - 1, most).astype(np.intp))
+        rows = self.traced_samples(most)
         actual = self.simulation.pose.position[rows]
         return np.full_like(actual, np.nan), actual
 
@@ -210,22 +165,15 @@ class PlayedSimulation:
         limits = chart_limits(robot, unit.newtons, at="frame_end")
         tension_rows = self._tensions()
         cables = cable_names(robot)
-        tension = Chart(
-            "Tension at the winch",
-            unit.name,
-            unit.decimals,
-            cables,
-            lambda rows: tension_rows[rows] / unit.newtons,
-            limits,
-        )
+        winch, newtons = "Tension at the winch", unit.newtons
+        tension = Chart(winch, unit.name, unit.decimals, cables, lambda rows: tension_rows[rows] / newtons, limits)
         position = simulation.pose.position
         away = Chart(
             "Motion along x, y, z", "mm", 1, ("x", "y", "z"), lambda rows: 1e3 * (position[rows] - position[0])
         )
         began = float(simulation.time[0])
         marks = tuple(
-            TimelineMark(event.time - began, _event_text(event, unit), bad=event.kind in FAILURES)
-            for event in simulation.events
+            (event.time - began, _event_text(event, unit), event.kind in FAILURES) for event in simulation.events
         )
         spans = limit_violations(robot, self.time, tension_rows, unit)
         return Track(self.time, (tension, away), spans, marks, (("actual", ACTUAL),))
@@ -237,8 +185,3 @@ class PlayedSimulation:
             if event.kind == "break":
                 tension[simulation.time >= event.time, event.cable] = np.nan
         return tension
-
-
-def _sample_at(times: Array, time: float) -> int:
-    """Index of the last sample at or before a time; 0 for earlier times."""
-    return int(np.clip(np.searchsorted(times, time, side="right") - 1, 0, len(times) - 1))

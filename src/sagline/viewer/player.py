@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple, Protocol, TypeAlias
+from typing import ClassVar, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 
 from sagline.cables.models import Catenary
-from sagline.core.arrays import Array
+from sagline.core.arrays import Array, Indices
 from sagline.robot.batch import dead_cable, pulleys_of
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
@@ -80,30 +80,29 @@ Configuration: TypeAlias = Snapshot | InMotion
 
 
 class Played(Protocol):
-    """Played motion: a run, a simulation or a log."""
+    """Base of a played motion: a run, a simulation or a log."""
 
-    @property
-    def name(self) -> str:
-        """Name of the kind of motion."""
+    name: ClassVar[str]  # name of the kind of motion
+    unchanged: ClassVar[str]  # text that replaces the controls for changes of the robot
 
-    @property
-    def robot(self) -> Robot:
-        """The robot."""
-
-    @property
-    def home(self) -> Pose:
-        """The first pose."""
+    robot: Robot
+    time: Array  # times of the samples from 0 [s], shape (N,)
 
     @property
     def duration(self) -> float:
-        """Time of the end [s]."""
+        """Time of the last sample [s]."""
+        return float(self.time[-1])
 
-    @property
-    def unchanged(self) -> str:
-        """Text that replaces the controls for changes of the robot."""
+    def index_at(self, time: float) -> int:
+        """Index of the last sample at or before a time [s]; 0 for earlier times."""
+        return max(int(np.searchsorted(self.time, time, side="right")) - 1, 0)
+
+    def traced_samples(self, most: int) -> Indices:
+        """Indices of at most `most` evenly distributed samples."""
+        return np.unique(np.linspace(0, self.time.size - 1, most).astype(np.int64))
 
     def at(self, time: float) -> Configuration:
-        """Configuration at a time [s]."""
+        """The sample at or before a time [s]."""
 
     def code(self, source: str, time: float) -> list[str]:
         """Lines of Python that reproduce the sample at a time [s]; `source` is an expression of the motion."""
@@ -112,7 +111,7 @@ class Played(Protocol):
         """Desired and actual positions (n, 3), n <= `most`, with a scaled error; NaN in gaps."""
 
     def track(self) -> Track:
-        """Charts of the timeline."""
+        """Charts, spans and marks of the timeline."""
 
 
 class Beside(NamedTuple):
@@ -122,42 +121,13 @@ class Beside(NamedTuple):
     names: tuple[str, str]  # names of both runs on the timeline, the second run last
 
 
-@dataclass(frozen=True, slots=True)
-class Timeline:
-    """Clock of a playback."""
-
-    duration: float  # time of the end [s]
-    time: float = 0.0  # shown time [s], 0 to duration
-    playing: bool = False  # True if the clock runs
-
-    def advanced(self, elapsed: float, speed: float) -> Timeline:
-        """Clock after an interval of real time [s] at a speed (ratio of the times); it stops at the end."""
-        if not self.playing:
-            return self
-        time = self.time + max(elapsed, 0.0) * speed
-        return Timeline(self.duration, min(time, self.duration), time < self.duration)
-
-    def extended(self, duration: float) -> Timeline:
-        """Clock with the later end `duration` [s]. A paused clock at the former end moves to the new end."""
-        time = duration if self.time >= self.duration and not self.playing else self.time
-        return Timeline(duration, time, self.playing)
-
-    def toggled(self) -> Timeline:
-        """Clock after the play button. A running clock is paused. A paused clock runs; at its end, it starts again."""
-        time = 0.0 if not self.playing and self.time >= self.duration else self.time
-        return Timeline(self.duration, time, not self.playing)
-
-    def scrubbed(self, time: float) -> Timeline:
-        """Paused clock at another time [s], limited to its ends."""
-        return Timeline(self.duration, min(max(time, 0.0), self.duration), False)
-
-
 class PlayerState(NamedTuple):
     """State of a player."""
 
     played: Played | None
     original: bool  # True if the page was opened with it
-    clock: Timeline
+    time: float  # shown time [s]
+    playing: bool  # True if the clock runs
     following: bool  # True if the motion was shown, False for a pose of the user
 
 
@@ -166,7 +136,9 @@ class Player:
 
     Attributes:
         played: Played motion; None if there is none.
-        clock: Clock of the motion.
+        time: Shown time of the motion [s], 0 to duration.
+        duration: Time of the end [s].
+        playing: True if the clock runs.
         following: True if the motion is shown, False for a pose of the user.
         speed: Ratio of the time of the motion to real time.
         number: Number of the played motion; a longer version has the same number.
@@ -195,66 +167,67 @@ class Player:
 
     def play(self, played: Played | None, *, at_once: bool = False) -> None:
         """Play another motion, or stop playing."""
-        self.played = played
+        self._replace(played)
+        self.time, self.playing, self.following = 0.0, at_once, played is not None
         self.number += 1
-        self.following = played is not None
-        self.clock = Timeline(self._duration(), 0.0, at_once)
         self._put_on(played)
 
     def extend(self, played: Played) -> None:
-        """Replace the original motion by `played`, a longer version. A clock at the former end moves to the new end."""
+        """Replace the original motion by a longer version. A paused clock at the former end moves to the new end."""
         shown = self.is_original  # otherwise the simulation of a cut is shown
         self._original = played
         if shown:
-            self.played = played
-            self.clock = self.clock.extended(self._duration())
+            moves = self.time >= self.duration and not self.playing
+            self._replace(played)
+            self.time = self.duration if moves else self.time
 
     def grow(self, played: Played) -> None:
-        """Replace the simulation of a cut by `played`, a longer version. A clock at the former end continues."""
-        waits = self.clock.time >= self.clock.duration
-        self.played = played
-        self.clock = Timeline(self._duration(), self.clock.time, self.clock.playing or waits)
+        """Replace the simulation of a cut by a longer version. A clock at the former end continues."""
+        self.playing = self.playing or self.time >= self.duration
+        self._replace(played)
 
     def save(self) -> PlayerState:
         """State to return to later."""
-        return PlayerState(self.played, self.is_original, self.clock, self.following)
+        return PlayerState(self.played, self.is_original, self.time, self.playing, self.following)
 
     def restore(self, kept: PlayerState) -> None:
         """Return to the stored state `kept`. The original motion keeps its later extensions."""
         self.play(self._original if kept.original else kept.played)
-        self.clock = self.clock.scrubbed(kept.clock.time)
-        if kept.clock.playing:
-            self.clock = self.clock.toggled()
-        self.following = kept.following
+        self.time, self.playing, self.following = kept.time, kept.playing, kept.following
 
     def advance(self, elapsed: float) -> None:
-        """Advance the clock by an interval of real time [s]."""
-        self.clock = self.clock.advanced(elapsed, self.speed)
+        """Advance a running clock by an interval of real time [s]; it stops at the end."""
+        if self.playing:
+            self.time = min(self.time + max(elapsed, 0.0) * self.speed, self.duration)
+            self.playing = self.time < self.duration
 
     def now(self) -> Configuration:
         """Configuration at the present time."""
         assert self.played is not None
-        return self.played.at(self.clock.time)
+        return self.played.at(self.time)
 
     def leave(self) -> None:
         """Pause, and show a pose of the user."""
-        self.clock = self.clock.scrubbed(self.clock.time)
-        self.following = False
+        self.playing = self.following = False
 
     def follow(self) -> None:
         """Show the played motion, if there is one."""
         self.following = self.played is not None
 
     def toggle(self) -> None:
-        """Play or pause."""
-        self.clock = self.clock.toggled()
+        """Pause, or play; at its end, the clock starts again."""
+        if not self.playing and self.time >= self.duration:
+            self.time = 0.0
+        self.playing = not self.playing
         self.follow()
 
     def scrub_to(self, time: float) -> None:
-        """Pause at another time [s]."""
-        self.clock = self.clock.scrubbed(time)
+        """Pause at another time [s], limited to the ends of the clock."""
+        self.time, self.playing = min(max(time, 0.0), self.duration), False
         self.follow()
 
-    def _duration(self) -> float:
-        parts = [part.duration for part in (self.played, self.beside and self.beside.played) if part is not None]
-        return max(parts, default=0.0)
+    def _replace(self, played: Played | None) -> None:
+        """Replace the played motion. The clock ends with it or with the second run, whichever is later."""
+        self.played = played
+        parts = [part.duration for part in (played, self.beside and self.beside.played) if part is not None]
+        self.duration = max(parts, default=0.0)

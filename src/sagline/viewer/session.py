@@ -19,14 +19,13 @@ from sagline.files.mcap_layout import NANO
 from sagline.files.mcap_reader import LogReader, RecordedLog
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.viewer.player import InMotion
+from sagline.viewer.player import InMotion, Played
 from sagline.viewer.readout import definitions, verdict_box
 from sagline.viewer.robot_scene import ACTUAL, TRUTH, WANTED
 from sagline.viewer.tension_scale import force_unit, number_text
 from sagline.viewer.timeline import (
     Chart,
     Span,
-    TimelineMark,
     Track,
     cable_names,
     chart_limits,
@@ -41,7 +40,7 @@ WRONG = (State.FAULT, State.EMERGENCY)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PlayedLog:
+class PlayedLog(Played):
     """N cycles of a controller; their times begin at 0."""
 
     robot: Robot
@@ -72,16 +71,6 @@ class PlayedLog:
         rows = known[np.maximum(last, 0)] if known.size else np.full(len(self.time), -1)
         object.__setattr__(self, "shown", rows)
 
-    @property
-    def home(self) -> Pose:
-        """The first pose."""
-        return self.pose_at(0)
-
-    @property
-    def duration(self) -> float:
-        """Time of the last cycle [s]."""
-        return float(self.time[-1])
-
     def pose_at(self, index: int) -> Pose:
         """Planned pose of the cycle `index`. Without a plan, its estimated pose, or the last known pose."""
         if np.isfinite(self.planned[index]).all():
@@ -94,7 +83,7 @@ class PlayedLog:
 
     def at(self, time: float) -> InMotion:
         """The cycle at or before a time [s]."""
-        k, unit = self._index_at(time), force_unit(self.robot)
+        k, unit = self.index_at(time), force_unit(self.robot)
         state, tension = State(int(self.state[k])), np.asarray(self.tension[k])
         rest, truth = self._pose(self.position, self.quaternion, k), self._pose(self.true, self.true_quaternion, k)
         rows = [("Time", f"{self.time[k]:.2f} s"), ("Cycle late", n(self.late[k], ".2g", "s"))]
@@ -136,16 +125,12 @@ class PlayedLog:
 
     def code(self, source: str, time: float) -> list[str]:
         """Lines of Python for a cycle; `source` is an expression for the execution."""
-        index = self._index_at(time)
+        index = self.index_at(time)
         return [
             f"log = {source}",
             f"index = {index}  # {self.time[index]:g} s",
             "robot, tension = log.robot, log.samples.tension[index]",
         ]
-
-    def _index_at(self, time: float) -> int:
-        index = int(np.searchsorted(self.time, time, side="right")) - 1
-        return min(max(index, 0), self.time.size - 1)
 
     @staticmethod
     def _pose(positions: Array | None, quaternions: Array | None, k: int) -> Pose | None:
@@ -156,7 +141,7 @@ class PlayedLog:
 
     def traces(self, most: int, error_scale: float) -> tuple[Array, Array]:
         """Planned and estimated positions (n, 3), n <= `most`."""
-        rows = np.unique(np.linspace(0, self.time.size - 1, most).astype(np.intp))
+        rows = self.traced_samples(most)
         planned, actual = self.planned[rows], self.position[rows]
         away = actual - planned
         return planned, np.where(np.isfinite(away), planned + error_scale * away, actual)
@@ -181,7 +166,7 @@ class PlayedLog:
             charts.append(Chart("True minus planned", "mm", 2, axes, error(self.true, self.planned)))
             paths.append(("true", TRUTH))
         marks = tuple(
-            TimelineMark(event.time - self.began, f"{event.name}: {event.text}", bad=event.kind is EventKind.FAULT)
+            (event.time - self.began, f"{event.name}: {event.text}", event.kind is EventKind.FAULT)
             for event in self.events
         )
         return Track(self.time, tuple(charts), self._wrong(), marks, tuple(paths))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import isfinite
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,28 +22,12 @@ COLORS: Final = ("#0e9384", "#8a8a12", "#9a6f52", "#1897b8", "#5e9a3c", "#7d8794
 _ENDS: Final = {"chord": "the chord", "frame_end": "the frame end"}
 
 
-class ChartLimit(NamedTuple):
-    """A limit of a chart."""
-
-    value: float  # value in the unit of the chart
-    name: str
-    upper: bool  # True for an upper limit
-
-
-class Span(NamedTuple):
-    """A range of time with an infeasible pose, a violated limit or a fault."""
-
-    start: float  # start [s]
-    end: float  # end [s]
-    why: str  # reason
-
-
-class TimelineMark(NamedTuple):
-    """An event."""
-
-    time: float  # time [s]
-    text: str
-    bad: bool  # True for a fault or a failure
+# in the form of the message to browser/timeline.js
+ChartLimit: TypeAlias = tuple[float, str, bool]  # value in the unit of the chart, name, True for an upper limit
+Span: TypeAlias = tuple[float, float, str]  # start and end [s] and reason: infeasible, a violated limit, a fault
+TimelineMark: TypeAlias = tuple[float, str, bool]  # time of an event [s], text, True for a fault or a failure
+# columns of a chart: starts [s] (C,), smallest and largest value of each line (C, k), NaN for missing values
+Columns: TypeAlias = tuple[Array, Array, Array]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,8 +79,8 @@ def chart_limits(robot: Robot, newtons: float, *, at: str) -> tuple[ChartLimit, 
     """The tension limits. If cables have different limits, the tightest limits."""
     low, high = float(robot.tension_min.max()), float(robot.tension_max.min())
     other = "" if at == robot.tension_limits_of else f", of {_ENDS[robot.tension_limits_of]}"
-    lower = (ChartLimit(low / newtons, f"lowest allowed{other}", upper=False),) if low > 0.0 else ()
-    upper = (ChartLimit(high / newtons, f"highest allowed{other}", upper=True),) if isfinite(high) else ()
+    lower = ((low / newtons, f"lowest allowed{other}", False),) if low > 0.0 else ()
+    upper = ((high / newtons, f"highest allowed{other}", True),) if isfinite(high) else ()
     return lower + upper
 
 
@@ -113,7 +97,7 @@ def spans_of(time: Array, wrong: NDArray[np.bool_], why: Callable[[slice], str])
     first = edges[np.concatenate(([True], apart)), 0]
     end = edges[np.concatenate((apart, [True])), 1]
     return tuple(
-        Span(float(time[a]), float(time[min(b, time.size - 1)]), why(slice(int(a), int(b))))
+        (float(time[a]), float(time[min(b, time.size - 1)]), why(slice(int(a), int(b))))
         for a, b in zip(first, end, strict=True)
     )
 
@@ -170,20 +154,17 @@ _NEAR: Final = 0.6  # limits within this distance, relative to the spread of val
 _BORDER: Final = 0.05  # margins above and below, relative to the spread
 
 
-class _Columns(NamedTuple):
-    """Columns of a chart: samples or groups of samples."""
-
-    time: Array  # start of each column [s], shape (C,)
-    low: Array  # smallest value of each line in a column, shape (C, k); NaN for missing values
-    high: Array  # largest value of each line in a column
-
-
-def columns(time: Array, values: Array, most: int = MOST_COLUMNS) -> _Columns:
+def columns(time: Array, values: Array, most: int = MOST_COLUMNS) -> Columns:
     """At most `most` columns with equal numbers of samples; the samples have `time` (N,) and `values` (N, k)."""
     if time.size <= most:
-        return _Columns(time, values, values)
+        return time, values, values
     starts = (np.arange(most) * time.size) // most
-    return _Columns(time[starts], _extremes(np.fmin, values, starts), _extremes(np.fmax, values, starts))
+    # extreme values of the samples from each start to the next one
+    low, high = (
+        np.stack([which.reduceat(np.ascontiguousarray(line), starts) for line in values.T], axis=1)
+        for which in (np.fmin, np.fmax)
+    )
+    return time[starts], low, high
 
 
 def timeline_message(
@@ -192,7 +173,8 @@ def timeline_message(
     """Message to browser/timeline.js: tracks with their names."""
     start, end = (0.0, duration) if window is None else window
     charts = [_matching(track, tracks[0][1].charts[chart], chart) for _, track in tracks]
-    parts = [_columns(track, shown, start, end) for (_, track), shown in zip(tracks, charts, strict=True)]
+    rows = [track.within(start, end) for _, track in tracks]
+    parts = [columns(track.time[k], shown.values(k)) for (_, track), shown, k in zip(tracks, charts, rows, strict=True)]
     low, high, near = _range(parts, charts)
     return {
         "duration": duration,
@@ -207,11 +189,6 @@ def timeline_message(
     }
 
 
-def _columns(track: Track, chart: Chart, start: float, end: float) -> _Columns:
-    rows = track.within(start, end)
-    return columns(track.time[rows], chart.values(rows))
-
-
 def _matching(track: Track, first: Chart, chart: int) -> Chart:
     """The chart of a track for display beside another chart, by its title or its number."""
     same = [each for each in track.charts if each.title == first.title]
@@ -219,10 +196,10 @@ def _matching(track: Track, first: Chart, chart: int) -> Chart:
 
 
 def _track_message(
-    name: str, track: Track, chart: Chart, part: _Columns, near: Sequence[ChartLimit], *, first: bool
+    name: str, track: Track, chart: Chart, part: Columns, near: Sequence[ChartLimit], *, first: bool
 ) -> dict[str, Any]:
-    digits = chart.decimals + 1
-    far = [f"{limit.name} {limit.value:g} {chart.unit}" for limit in chart.limits if limit not in near]
+    digits, (times, low, high) = chart.decimals + 1, part
+    far = [f"{limit[1]} {limit[0]:g} {chart.unit}" for limit in chart.limits if limit not in near]
     return {
         "name": name,
         "title": chart.title,
@@ -231,45 +208,34 @@ def _track_message(
         "cables": chart.of_cables,
         "lines": [[line, COLORS[i % len(COLORS)], i >= len(COLORS)] for i, line in enumerate(chart.names)],
         "end": float(track.time[-1]),
-        "times": np.round(part.time, 9).tolist(),
-        "low": [_finite(line, digits) for line in part.low.T],
-        "high": None if part.high is part.low else [_finite(line, digits) for line in part.high.T],
-        "limits": [[limit.value, limit.name, limit.upper] for limit in chart.limits if limit in near],
+        "times": np.round(times, 9).tolist(),
+        "low": [_finite(line, digits) for line in low.T],
+        "high": None if high is low else [_finite(line, digits) for line in high.T],
+        "limits": [limit for limit in chart.limits if limit in near],
         "far": ", ".join(far) if first else "",
-        "spans": [[span.start, span.end, span.why] for span in track.spans],
-        "marks": [[mark.time, mark.text, mark.bad] for mark in _most_important(track)],
+        "spans": track.spans,
+        "marks": _most_important(track),
         "paths": [[path, f"rgb{color}"] for path, color in track.paths],
     }
 
 
-def _most_important(track: Track) -> list[Any]:
+def _most_important(track: Track) -> list[TimelineMark]:
     """Marks of a track. If there are too many marks, the faults and the last of the other marks."""
-    bad = [mark for mark in track.marks if mark.bad][-MOST_MARKS:]
-    rest = [mark for mark in track.marks if not mark.bad]
+    bad = [mark for mark in track.marks if mark[2]][-MOST_MARKS:]
+    rest = [mark for mark in track.marks if not mark[2]]
     return sorted(bad + rest[len(rest) - (MOST_MARKS - len(bad)) :] if len(track.marks) > MOST_MARKS else track.marks)
 
 
-def _range(parts: Sequence[_Columns], charts: Sequence[Chart]) -> tuple[float, float, list[ChartLimit]]:
+def _range(parts: Sequence[Columns], charts: Sequence[Chart]) -> tuple[float, float, list[ChartLimit]]:
     """Lowest and highest value of the axis, and the limits within this range."""
-    ends = [_extent(part) for part in parts]
-    low, high = min(end[0] for end in ends), max(end[1] for end in ends)
-    if low > high:
-        low, high = 0.0, 1.0
+    lows, highs = (np.concatenate([part[k].ravel() for part in parts]) for k in (1, 2))
+    lows, highs = lows[np.isfinite(lows)], highs[np.isfinite(highs)]
+    low, high = (float(lows.min()), float(highs.max())) if lows.size else (0.0, 1.0)
     spread = max(high - low, 1e-6 * max(abs(high), 1.0))
     limits = [limit for chart in charts for limit in chart.limits]
-    near = [limit for limit in limits if low - _NEAR * spread <= limit.value <= high + _NEAR * spread]
-    low, high = min([low, *(limit.value for limit in near)]), max([high, *(limit.value for limit in near)])
+    near = [limit for limit in limits if low - _NEAR * spread <= limit[0] <= high + _NEAR * spread]
+    low, high = min([low, *(limit[0] for limit in near)]), max([high, *(limit[0] for limit in near)])
     return low - _BORDER * spread, high + _BORDER * spread, near
-
-
-def _extent(part: _Columns) -> tuple[float, float]:
-    low, high = part.low[np.isfinite(part.low)], part.high[np.isfinite(part.high)]
-    return (float(low.min()), float(high.max())) if low.size and high.size else (np.inf, -np.inf)
-
-
-def _extremes(which: np.ufunc, values: Array, starts: Any) -> Array:
-    """Extreme values of the samples from each start to the next one, for each line."""
-    return np.stack([which.reduceat(np.ascontiguousarray(line), starts) for line in values.T], axis=1)
 
 
 def _finite(line: Array, digits: int) -> list[float | None]:

@@ -87,7 +87,7 @@ class StateFeature(Feature):
 
     def follow(self, view: View) -> None:
         """Send the pose."""
-        self._view, self._time = view, self._page.player.clock.time
+        self._view, self._time = view, self._page.player.time
         self._channel.send("pose", _pose_text(view.snapshot.pose))
 
     def tick(self) -> None:
@@ -145,7 +145,7 @@ class StateFeature(Feature):
         """A link to a view with the camera of a client."""
         parts = {"robot": name_of(self._robot)}
         if view.played is not None:
-            parts["time"] = repr(float(self._page.player.clock.time))
+            parts["time"] = repr(float(self._page.player.time))
         else:
             parts["pose"] = pose_part(view.snapshot.pose)
         if view.wrench is not None:
@@ -195,7 +195,7 @@ class StateFeature(Feature):
         if player.played is None:
             step = "Open it with the same run: sagline view ROBOT RUN."
             raise InvalidValueError("the link", "with a time of a run", "a pose, because nothing is played", step)
-        moment = float(numbers_of(time or "", "the time of the link", "s", 1, player.clock.duration)[0])
+        moment = float(numbers_of(time or "", "the time of the link", "s", 1, player.duration)[0])
         return lambda: player.scrub_to(max(moment, 0.0))
 
 

@@ -70,7 +70,7 @@ class TimelineFeature(Feature):
         if beside is None:
             self._nodes.hide("/beside", "/beside_cables")
         else:
-            other = beside.played.at(self._player.clock.time)
+            other = beside.played.at(self._player.time)
             self._nodes.body("/beside", self._body, GHOST, 0.5, other.pose)
             self._nodes.label("/beside/name", beside.names[1], (0.0, 0.0, self._above))
             self._nodes.lines("/beside_cables", cable_segments(other, sag_scale), GHOST, GHOST_WIDTH)
@@ -103,14 +103,14 @@ class TimelineFeature(Feature):
 
     def _move_window(self) -> None:
         """Move the window after the clock has left the window; without delay if the clock has reached its end."""
-        clock = self._player.clock
-        ended, self._was_playing = self._was_playing and clock.time >= clock.duration, clock.playing
-        if self._window is None or not (clock.playing or ended):
+        player = self._player
+        ended, self._was_playing = self._was_playing and player.time >= player.duration, player.playing
+        if self._window is None or not (player.playing or ended):
             return
         start, end = self._window
-        if not start <= clock.time <= end and (ended or time.monotonic() - self._moved_at > TURN):
+        if not start <= player.time <= end and (ended or time.monotonic() - self._moved_at > TURN):
             self._moved_at = time.monotonic()
-            first = min(clock.time, clock.duration - (end - start))
+            first = min(player.time, player.duration - (end - start))
             self._window = (first, first + end - start)
 
     def _send_tracks(self) -> None:
@@ -122,17 +122,12 @@ class TimelineFeature(Feature):
         tracks = [(played.name if beside is None else beside.names[0], track)]
         if beside is not None and self._other is not None:
             tracks.append((beside.names[1], self._other))
-        message = timeline_message(tracks, self._chart, self._player.clock.duration, self._window)
+        message = timeline_message(tracks, self._chart, self._player.duration, self._window)
         self._channel.send("timeline", {"kind": played.name, "speeds": SPEEDS, **message})
 
     def _now(self) -> dict[str, Any]:
         player = self._player
-        return {
-            "time": player.clock.time,
-            "playing": player.clock.playing,
-            "speed": player.speed,
-            "following": player.following,
-        }
+        return {name: getattr(player, name) for name in ("time", "playing", "speed", "following")}
 
     def _on_scrub(self, value: Any, _: int) -> None:
         if self._player.played is not None and _is_number(value):
@@ -140,10 +135,10 @@ class TimelineFeature(Feature):
 
     def _on_step(self, value: Any, _: int) -> None:
         if self._track is not None and _is_number(value) and abs(value) <= _MOST_STEPS:
-            self._player.scrub_to(self._track.step_from(self._player.clock.time, int(value)))
+            self._player.scrub_to(self._track.step_from(self._player.time, int(value)))
 
     def _on_play(self, value: Any, _: int) -> None:
-        if self._player.played is not None and isinstance(value, bool) and value != self._player.clock.playing:
+        if self._player.played is not None and isinstance(value, bool) and value != self._player.playing:
             self._player.toggle()
 
     def _on_speed(self, value: Any, _: int) -> None:
@@ -159,7 +154,7 @@ class TimelineFeature(Feature):
             self._chart = value
 
     def _on_window(self, value: Any, _: int) -> None:
-        duration = self._player.clock.duration
+        duration = self._player.duration
         if value is None:
             self._window = None
         elif isinstance(value, list) and len(value) == 2 and all(map(_is_number, value)):
