@@ -14,7 +14,7 @@ from syrupy.assertion import SnapshotAssertion
 
 import sagline as sl
 from sagline import Damping, VibrationStatus, plot
-from sagline.dynamics.vibration.mode_list import ListedMode
+from sagline.dynamics.vibration.vibration import ListedMode
 from sagline.plot.film import energy_shares
 from tests.plot import made
 from tests.refusal import refused

@@ -45,8 +45,7 @@ from sagline.core.numbers import counted
 if TYPE_CHECKING:
     from sagline.dynamics.vibration.dynamic_stiffness import Damping
     from sagline.dynamics.vibration.frequency_map import FrequencyMap
-    from sagline.dynamics.vibration.mode_list import ListedMode
-    from sagline.dynamics.vibration.vibration import Vibration
+    from sagline.dynamics.vibration.vibration import ListedMode, Vibration
     from sagline.robot.equilibrium import Equilibrium
     from sagline.robot.pose import Pose
     from sagline.robot.robot import Robot
@@ -130,8 +129,7 @@ def vibrate(
     """
     from sagline.cli.values import middle_pose, robot_with_payload
     from sagline.dynamics.vibration.dynamic_stiffness import Damping
-    from sagline.dynamics.vibration.mode_list import listed_modes
-    from sagline.dynamics.vibration.vibration import VibrationStatus, vibration
+    from sagline.dynamics.vibration.vibration import VibrationStatus, listed_modes, vibration
     from sagline.files.writing import file_stem
     from sagline.kinematics.inverse import inverse
 
@@ -182,7 +180,7 @@ def _rows(modes: list[ListedMode]) -> list[list[object]]:
 
 
 def _check_film(film: int | None, modes: list[ListedMode]) -> None:
-    from sagline.dynamics.vibration.mode_list import WITH_MASS
+    from sagline.dynamics.vibration.vibration import WITH_MASS
 
     count = sum(mode.kind == WITH_MASS for mode in modes)
     if film is not None and not 1 <= film <= count:
@@ -191,7 +189,7 @@ def _check_film(film: int | None, modes: list[ListedMode]) -> None:
 
 def _verdict(found: Vibration, modes: list[ListedMode]) -> str:
     """Number of modes with cable mass, and the lowest one."""
-    from sagline.dynamics.vibration.mode_list import WITH_MASS
+    from sagline.dynamics.vibration.vibration import WITH_MASS
 
     frequency = [mode.frequency for mode in modes if mode.kind == WITH_MASS]
     lowest = f", the lowest at {min(frequency):.3f} Hz" if frequency else ""
@@ -201,7 +199,7 @@ def _verdict(found: Vibration, modes: list[ListedMode]) -> str:
 
 def _tell(found: Vibration, modes: list[ListedMode], state: Equilibrium) -> None:
     """Print the table; a massless mode is in the row of the mode that is most similar to it."""
-    from sagline.dynamics.vibration.mode_list import MASSLESS, WITH_MASS, mode_correlation
+    from sagline.dynamics.vibration.vibration import MASSLESS, WITH_MASS, mode_correlation
 
     swinging = [mode for mode in modes if mode.kind == WITH_MASS]
     shares = mode_correlation(found)

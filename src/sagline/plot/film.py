@@ -13,8 +13,7 @@ from PIL import Image
 
 from sagline.core.arguments import callback, file_path, instance, whole_number
 from sagline.core.errors import FileError, InvalidValueError
-from sagline.dynamics.vibration.mode_list import WITH_MASS, ListedMode, listed_modes
-from sagline.dynamics.vibration.vibration import Vibration
+from sagline.dynamics.vibration.vibration import WITH_MASS, ListedMode, Vibration, listed_modes
 from sagline.files.writing import atomic_file
 from sagline.plot.robot import EDGES, fit_space, platform_box
 from sagline.plot.sheet import BLUE, GAP_COLOR, LABEL, TICK, VERMILLION, sheet

@@ -11,7 +11,7 @@ import numpy as np
 
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
-from sagline.dynamics.vibration.mode_list import MASSLESS
+from sagline.dynamics.vibration.vibration import MASSLESS
 from sagline.kinematics.status import PoseStatus
 from sagline.robot.batch import pulleys_of
 from sagline.robot.equilibrium import Equilibrium

@@ -9,14 +9,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from sagline.core.arrays import Array
-from sagline.dynamics.vibration.mode_list import (
-    WITH_MASS,
-    ListedMode,
-    end_displacements,
-    listed_modes,
-    quasi_static_displacements,
-)
-from sagline.dynamics.vibration.vibration import Vibration
+from sagline.dynamics.vibration.flexibility import end_displacements, quasi_static_displacements
+from sagline.dynamics.vibration.vibration import WITH_MASS, ListedMode, Vibration, listed_modes
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.statics.stiffness import modes

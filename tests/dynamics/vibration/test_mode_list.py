@@ -5,13 +5,8 @@ import pytest
 
 import sagline as sl
 from sagline import vibration
-from sagline.dynamics.vibration.mode_list import (
-    end_displacements,
-    listed_modes,
-    mode_correlation,
-    quasi_static_displacements,
-    stretch_losses,
-)
+from sagline.dynamics.vibration.flexibility import end_displacements, quasi_static_displacements, stretch_losses
+from sagline.dynamics.vibration.vibration import listed_modes, mode_correlation
 from tests.tiers import wide
 
 ROBOT = sl.load_robot("article-suspended")

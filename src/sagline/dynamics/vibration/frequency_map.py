@@ -14,7 +14,7 @@ from sagline.core.progress import Progress, blocks
 from sagline.core.results import Result, Saved
 from sagline.core.table import Columns, Tabular
 from sagline.dynamics.vibration.dynamic_stiffness import Damping, check_model
-from sagline.dynamics.vibration.receptance import Receptance, coupled_receptance, modal_receptance, peak_receptance
+from sagline.dynamics.vibration.response import Receptance, coupled_receptance, modal_receptance, peak_receptance
 from sagline.dynamics.vibration.robot_modes import (
     StateModes,
     VibrationModel,

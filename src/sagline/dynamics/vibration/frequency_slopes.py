@@ -15,7 +15,6 @@ from sagline.dynamics.vibration.dynamic_stiffness import check_model, check_solv
 from sagline.dynamics.vibration.flexibility import Flexibility, flexibility
 from sagline.dynamics.vibration.mode_sensitivities import (
     ModeGroup,
-    SquareDerivatives,
     StateSlopes,
     mode_group,
     square_derivatives,
@@ -159,26 +158,17 @@ def _massless(rest: StateSlopes, flexible: Flexibility, motion: Array, square: f
 
 
 def _result(
-    state: Equilibrium, cable_mass: bool, frequency: Array, groups: list[Indices], slopes: list[SquareDerivatives]
+    state: Equilibrium, cable_mass: bool, frequency: Array, groups: list[Indices], slopes: list[dict[str, Array]]
 ) -> FrequencySlopes:
-    def rows(forms: list[Array], *shape: int) -> Array:
-        parts = (_parting(form, frequency[group]) for form, group in zip(forms, groups, strict=True))
-        return locked(np.concatenate((np.empty((0, *shape)), *parts)))
-
     m = state.one_robot.cable_count
-    return FrequencySlopes(
-        state=state,
-        cable_mass=cable_mass,
-        frequency=frequency,
-        group=locked(np.repeat(np.arange(len(groups)), np.array([len(group) for group in groups], dtype=int))),
-        length_sensitivity=rows([one.datum[0] for one in slopes], m),
-        density_sensitivity=rows([one.datum[1] for one in slopes], m),
-        stiffness_sensitivity=rows([one.datum[2] for one in slopes], m),
-        mass_sensitivity=rows([one.mass for one in slopes]),
-        inertia_sensitivity=rows([one.inertia for one in slopes], 3, 3),
-        pose_sensitivity=rows([one.pose for one in slopes], 6),
-        wrench_sensitivity=rows([one.wrench for one in slopes], 6),
-    )
+    by_cable = {f"{name}_sensitivity": (m,) for name in ("length", "density", "stiffness")}
+    on_platform = {"inertia_sensitivity": (3, 3), "pose_sensitivity": (6,), "wrench_sensitivity": (6,)}
+    rows = {}
+    for name, shape in {**by_cable, "mass_sensitivity": (), **on_platform}.items():
+        parts = (_parting(one[name], frequency[group]) for one, group in zip(slopes, groups, strict=True))
+        rows[name] = locked(np.concatenate((np.empty((0, *shape)), *parts)))
+    group = locked(np.repeat(np.arange(len(groups)), np.array([len(each) for each in groups], dtype=int)))
+    return FrequencySlopes(state=state, cable_mass=cable_mass, frequency=frequency, group=group, **rows)
 
 
 def _parting(form: Array, frequency: Array) -> Array:

@@ -125,7 +125,19 @@ def linearized(state: Equilibrium, damping: Damping | None = None, inputs: Input
     damping = Damping() if damping is None else instance(damping, Damping, "damping")
     choice(inputs, "inputs", ("lengths", "speeds"))
     _check(state, damping, inputs)
-    return _system(state, damping, inputs)
+    found = _driven_by_speeds(state, damping)
+    n, m = len(state.one_robot.freedom), state.one_robot.cable_count
+    free = [f"motion {k}" for k in range(n)]
+    lengths = tuple(f"length {k}" for k in range(m))
+    winches, unit = tuple(f"speed {k}" for k in range(m)), "m/s"
+    states = (*free, *(f"rate of {name}" for name in free), *lengths)
+    if inputs == "lengths":
+        found, states, winches, unit = _driven_by_lengths(found, 2 * n), states[: 2 * n], lengths, "m"
+    outputs = (*_MOTIONS, *(f"tension {k}" for k in range(m)), *lengths)
+    output_units = (*_MOTION_UNITS, *("N",) * m, *("m",) * m)
+    names = (states, (*winches, *_WRENCHES), (unit,) * m + _WRENCH_UNITS, outputs, output_units)
+    A, B, C, D = (locked(matrix) for matrix in found)
+    return Linearized(state, damping, A, B, C, D, *names)
 
 
 def _check(state: Equilibrium, damping: Damping, inputs: Inputs) -> None:
@@ -142,31 +154,6 @@ def _check(state: Equilibrium, damping: Damping, inputs: Inputs) -> None:
     if inputs == "lengths":
         allowed = '0 with inputs="lengths": a step of a length would cause infinite tensions'
         raise InvalidValueError(item, value, allowed, 'Use inputs="speeds", or give modal_damping.')
-
-
-def _system(state: Equilibrium, damping: Damping, inputs: Inputs) -> Linearized:
-    found = _driven_by_speeds(state, damping)
-    n, m = len(state.one_robot.freedom), state.one_robot.cable_count
-    free = [f"motion {k}" for k in range(n)]
-    lengths = tuple(f"length {k}" for k in range(m))
-    winches, unit = tuple(f"speed {k}" for k in range(m)), "m/s"
-    states = (*free, *(f"rate of {name}" for name in free), *lengths)
-    if inputs == "lengths":
-        found, states, winches, unit = _driven_by_lengths(found, 2 * n), states[: 2 * n], lengths, "m"
-    A, B, C, D = (locked(matrix) for matrix in found)
-    return Linearized(
-        state,
-        damping,
-        A,
-        B,
-        C,
-        D,
-        state_names=states,
-        input_names=(*winches, *_WRENCHES),
-        input_units=((unit,) * m + _WRENCH_UNITS),
-        output_names=(*_MOTIONS, *(f"tension {k}" for k in range(m)), *lengths),
-        output_units=(*_MOTION_UNITS, *("N",) * m, *("m",) * m),
-    )
 
 
 def _driven_by_speeds(state: Equilibrium, damping: Damping) -> _Matrices:

@@ -37,16 +37,6 @@ class ModeGroup(NamedTuple):
     by_datum: Array  # shape (3, m, g, g)
 
 
-class SquareDerivatives(NamedTuple):
-    """Matrices (..., g, g) whose eigenvalues are the derivatives of the squared angular frequency."""
-
-    datum: Array  # with respect to length, linear density and axial stiffness of each cable, shape (3, m, g, g)
-    pose: Array  # with respect to motions at fixed lengths, shape (6, g, g)
-    wrench: Array  # with respect to the wrench, shape (6, g, g)
-    mass: Array  # with respect to the mass, shape (g, g)
-    inertia: Array  # with respect to the inertia, shape (3, 3, g, g)
-
-
 def state_slopes(state: Equilibrium) -> StateSlopes:
     """Compute force derivatives, compliance and mass of a state."""
     slopes, known = cable_slopes(state), stiffness(state)
@@ -60,8 +50,9 @@ def state_slopes(state: Equilibrium) -> StateSlopes:
     )
 
 
-def square_derivatives(rest: StateSlopes, swings: ModeGroup) -> SquareDerivatives:
-    """Derivatives of a squared angular frequency. They include the motion of the platform to its new equilibrium."""
+def square_derivatives(rest: StateSlopes, swings: ModeGroup) -> dict[str, Array]:
+    """Matrices (..., g, g) by the fields of `FrequencySlopes`; their eigenvalues are derivatives of omega squared."""
+    # the derivatives include the motion of the platform to its new equilibrium
     robot, pose = rest.state.one_robot, _by_pose(rest, swings)
     turns = rest.state.pose.matrix.T @ swings.motion[3:]
     spins = np.einsum("ia,jb->ijab", turns, turns)
@@ -69,13 +60,16 @@ def square_derivatives(rest: StateSlopes, swings: ModeGroup) -> SquareDerivative
     own = -np.einsum("mabc,pmc->pmab", swings.by_force, rest.by_datum) - swings.by_datum
     own = own + _lever_form(swings.motion[3:], rest.slopes.levers, rest.by_datum)
     sink = -robot.gravity * rest.compliance[:, 2]
-    return SquareDerivatives(
-        datum=own + np.einsum("kab,pkm->pmab", pose, rest.settling),
-        pose=pose,
-        wrench=np.einsum("kab,kj->jab", pose, rest.compliance),
-        mass=np.einsum("kab,k->ab", pose, sink) - swings.square * moved.T @ moved,
-        inertia=-0.5 * swings.square * (spins + np.swapaxes(spins, -1, -2)),
-    )
+    length, density, stiff = own + np.einsum("kab,pkm->pmab", pose, rest.settling)
+    return {
+        "length_sensitivity": length,
+        "density_sensitivity": density,
+        "stiffness_sensitivity": stiff,
+        "mass_sensitivity": np.einsum("kab,k->ab", pose, sink) - swings.square * moved.T @ moved,
+        "inertia_sensitivity": -0.5 * swings.square * (spins + np.swapaxes(spins, -1, -2)),
+        "pose_sensitivity": pose,
+        "wrench_sensitivity": np.einsum("kab,kj->jab", pose, rest.compliance),
+    }
 
 
 def _by_pose(rest: StateSlopes, swings: ModeGroup) -> Array:

@@ -1,10 +1,10 @@
-"""All modes of a robot with cable mass below a frequency, and natural frequencies that a path excites most."""
+"""All modes of a robot with cable mass below a frequency, their list, and the frequencies that a path excites most."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import ClassVar, Final
+from typing import ClassVar, Final, NamedTuple
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from sagline.core.table import Columns, Tabular
 from sagline.dynamics.trajectories.segments import RestToRestSegment, segments_of
 from sagline.dynamics.vibration.component_modes import cable_shapes
 from sagline.dynamics.vibration.dynamic_stiffness import Damping, check_model, single_state
+from sagline.dynamics.vibration.flexibility import stretch_losses
 from sagline.dynamics.vibration.robot_modes import (
     cable_shares,
     damping_ratios,
@@ -27,7 +28,7 @@ from sagline.motion.path import Path
 from sagline.robot.equilibrium import Equilibrium, of_equilibrium
 from sagline.robot.robot import Robot
 from sagline.statics.balance import inertial_wrench
-from sagline.statics.stiffness import Modes
+from sagline.statics.stiffness import Modes, modes
 
 
 class VibrationStatus(IntEnum):
@@ -266,3 +267,66 @@ def to_shape(modes: Modes | Vibration, path: Path) -> Array:
         value = f"of {len(state.pose)} states"
         raise InvalidValueError("modes", value, "of a single state", "Use the last pose: modes(plan.state[-1]).")
     return _most_excited(state, modes.frequency, modes.shape, path)
+
+
+WITH_MASS, MASSLESS = "with cable mass", "massless"
+EQUAL: Final = 1e-6  # energy shares with a smaller relative difference count as equal
+
+
+class ListedMode(NamedTuple):
+    """One mode."""
+
+    number: int  # number of the mode within its kind, starting at 1
+    kind: str  # "with cable mass" or "massless"
+    frequency: float  # [Hz]
+    platform_share: float  # platform share of the kinetic energy
+    cable: int | None  # cable with the largest share of the energy; None if no cable has a share
+    cable_share: float  # share of this cable
+    loss: float  # damping ratio
+
+    @property
+    def name(self) -> str:
+        """Name for the selection: "1", "massless 1"."""
+        return f"{self.number}" if self.kind == WITH_MASS else f"{MASSLESS} {self.number}"
+
+    @property
+    def swings(self) -> str:
+        """Name of the platform or cable with the largest share of the kinetic energy."""
+        if self.cable is None or self.platform_share >= self.cable_share:
+            return "platform"
+        return f"cable {self.cable}"
+
+
+def listed_modes(vibration: Vibration) -> list[ListedMode]:
+    """All modes with cable mass, then all massless modes, each in ascending order."""
+    share = vibration.cable_share
+    # the first one if several cables are equal except for rounding
+    most = np.argmax(share >= (1.0 - EQUAL) * share.max(axis=0), axis=0) if vibration.frequency.size else ()
+    swinging = [
+        ListedMode(
+            k + 1,
+            WITH_MASS,
+            float(vibration.frequency[k]),
+            float(vibration.platform_share[k]),
+            int(cable),
+            float(vibration.cable_share[cable, k]),
+            float(vibration.loss[k]),
+        )
+        for k, cable in enumerate(most)
+    ]
+    damping, platform = vibration.damping, modes(vibration.state)
+    losses = damping.modal_damping + stretch_losses(vibration.state, platform, damping.loss_time)
+    return swinging + [
+        ListedMode(k + 1, MASSLESS, float(frequency), 1.0, None, 0.0, float(losses[k]))
+        for k, frequency in enumerate(platform.frequency)
+        if np.isfinite(frequency)
+    ]
+
+
+def mode_correlation(vibration: Vibration) -> Array:
+    """Similarity of each massless mode to each mode with cable mass (a share from 0 to 1), shape (n, K)."""
+    # A share is the squared mass-weighted product of the platform motions of both modes. The sum of the shares of a
+    # massless mode over all modes, including modes above `up_to`, is less than 1 because of the motion of the cables
+    massless = modes(vibration.state).shape
+    mass = np.linalg.pinv(massless @ massless.T)
+    return np.asarray((massless.T @ mass @ vibration.shape) ** 2)

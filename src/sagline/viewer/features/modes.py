@@ -12,9 +12,15 @@ import numpy as np
 
 from sagline.core.arrays import Array
 from sagline.dynamics.vibration.dynamic_stiffness import Damping
-from sagline.dynamics.vibration.mode_list import MASSLESS, ListedMode, listed_modes
 from sagline.dynamics.vibration.response import MOTIONS, ResponseCurves, response_curves
-from sagline.dynamics.vibration.vibration import Vibration, VibrationStatus, vibration
+from sagline.dynamics.vibration.vibration import (
+    MASSLESS,
+    ListedMode,
+    Vibration,
+    VibrationStatus,
+    listed_modes,
+    vibration,
+)
 from sagline.robot.equilibrium import Equilibrium
 from sagline.viewer.feature import BackgroundTask, Feature, View
 from sagline.viewer.page import Page
