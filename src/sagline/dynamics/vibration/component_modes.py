@@ -10,23 +10,16 @@ from numpy.polynomial import legendre
 from scipy.special import roots_jacobi
 
 from sagline.core.arrays import Array, Flags, Indices, locked
+from sagline.kernels.dynamics import spectral
 from sagline.kernels.dynamics import string as columns
-from sagline.kernels.dynamics.spectral import (
-    LARGEST_DEGREE,
-    Lobatto,
-    interpolate,
-    node_counts,
-    spectral_matrices,
-    stretch_matrices,
-)
 from sagline.statics.strings import Strings
 
 
 @cache
-def _lobatto() -> Lobatto:
+def _lobatto() -> spectral.Lobatto:
     """Gauss-Lobatto nodes, weights and matrices."""
-    n = LARGEST_DEGREE + 1
-    rule = Lobatto(np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n, n)), np.zeros((n, n, n)))
+    n = spectral.LARGEST_DEGREE + 1
+    rule = spectral.Lobatto(np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n, n)), np.zeros((n, n, n)))
     for p in range(2, n):
         nodes = np.concatenate(([-1.0], roots_jacobi(p - 1, 1.0, 1.0)[0], [1.0]))
         values = np.asarray(legendre.legvander(nodes, p + 1), dtype=np.float64)
@@ -143,11 +136,11 @@ def component_modes(strings: Strings, row: int, up_to: float) -> CableComponents
     taut = np.flatnonzero(strings.taut[row])
     table, axes = np.ascontiguousarray(strings.table[row, taut]), strings.axes[row, taut]
     counts = np.empty(taut.size, dtype=np.int64)
-    node_counts(table, omega, counts)
+    spectral.node_counts(table, omega, counts)
     t, n = taut.size, int(counts.max(initial=2))
     points, carried, mass = np.empty((t, n, 6)), np.empty((t, n, 5)), np.empty((t, 4))
     plane, normal = np.empty((t, 2 * n, 2 * n)), np.empty((t, n, n))
-    spectral_matrices(table, omega, _lobatto(), points, plane, normal, carried, mass)
+    spectral.spectral_matrices(table, omega, _lobatto(), points, plane, normal, carried, mass)
     free = (np.arange(n) < counts[:, None] - 1)[..., None]  # the platform end is fixed
     first = 0 if table[:, columns.BEHIND_X :].any() else 1  # a frame end without compliance is also fixed
     inside = _motions(plane, carried[:, :, :4].reshape(t, 2 * n, 2), np.repeat(free, 2, axis=1), 2 * first)
@@ -200,7 +193,7 @@ def cable_shapes(components: CableComponents, ends: Array, amplitudes: Array, co
     mesh = components.mesh
     t, n, k = mesh.taut.size, mesh.points.shape[1], ends.shape[2]
     values = np.empty((t, count, n))
-    interpolate(mesh.table, mesh.omega, _lobatto(), mesh.points, values)
+    spectral.interpolate(mesh.table, mesh.omega, _lobatto(), mesh.points, values)
     plane, normal = _node_motion(components, ends, amplitudes)
     inside = plane.reshape(t, n, 2, k)
     behind = mesh.table[:, [columns.BEHIND_X, columns.BEHIND_Z]]
@@ -232,5 +225,5 @@ def stretch_stiffness(components: CableComponents) -> Array:
 def _stretch_matrices(mesh: StringMesh) -> Array:
     n = mesh.points.shape[1]
     matrices = np.empty((mesh.taut.size, 2 * n, 2 * n))
-    stretch_matrices(mesh.table, mesh.omega, _lobatto(), mesh.points, matrices)
+    spectral.stretch_matrices(mesh.table, mesh.omega, _lobatto(), mesh.points, matrices)
     return matrices

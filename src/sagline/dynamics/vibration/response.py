@@ -17,6 +17,7 @@ from sagline.core.memory import check_memory
 from sagline.core.progress import blocks
 from sagline.core.results import Result
 from sagline.core.table import Columns, Tabular
+from sagline.dynamics.vibration import robot_modes
 from sagline.dynamics.vibration.component_modes import CableComponents, PlaneModes, component_modes, stretch_stiffness
 from sagline.dynamics.vibration.dynamic_stiffness import (
     Complex,
@@ -25,14 +26,6 @@ from sagline.dynamics.vibration.dynamic_stiffness import (
     check_solved,
     moving_stiffness,
     single_state,
-)
-from sagline.dynamics.vibration.robot_modes import (
-    StateModes,
-    VibrationModel,
-    check_mode_count,
-    massless_modes,
-    modes_below,
-    vibration_model,
 )
 from sagline.dynamics.vibration.vibration import Vibration, VibrationStatus
 from sagline.robot.equilibrium import Equilibrium, of_equilibrium
@@ -53,7 +46,7 @@ FixedEndModes: TypeAlias = tuple[CableComponents, Array | None]
 class Receptance(NamedTuple):
     """Model of the platform's receptance."""
 
-    model: VibrationModel  # model of one state, with a leading axis 1
+    model: robot_modes.VibrationModel  # model of one state, with a leading axis 1
     matrix: Array  # stiffness of the platform, not symmetric with an external moment, shape (6, 6)
     cables: Array  # stiffness of the cables at their platform ends, shape (m, 3, 3)
     damping: Damping  # energy losses
@@ -149,7 +142,7 @@ CLOSER: Final = 5  # number of new frequencies between two adjacent frequencies
 WIDTHS: Final = np.linspace(-3.0, 3.0, 7)  # search points about a mode, in units of half the peak width
 
 
-def modal_receptance(found: StateModes, rest: Array, ratio: float) -> ForceReceptance:
+def modal_receptance(found: robot_modes.StateModes, rest: Array, ratio: float) -> ForceReceptance:
     """Receptance from the modes of a robot. A common loss factor of the whole stiffness does not couple these modes."""
     # shapes: rest (3, 3)
     natural = (2.0 * np.pi * found.frequency) ** 2
@@ -281,15 +274,16 @@ def frequency_response(state: Equilibrium, frequency: ArrayLike, damping: Dampin
         raise InvalidValueError("frequency", f"of shape {given.shape}", "a list of frequencies", "Give at least one.")
     check_memory(f"{given.size:,} frequencies", _BYTES * given.size, "Split them into parts.")
     known = optional(damping, Damping, "damping") or Damping()
-    model = vibration_model(state)
+    model = robot_modes.vibration_model(state)
     check_solved(state)
-    check_mode_count(modes_below(model, 0, max(float(given.max()), LOWEST)), float(given.max()), "frequency")
-    if massless_modes(model, 0)[1].shape[1]:
+    highest = float(given.max())
+    robot_modes.check_mode_count(robot_modes.modes_below(model, 0, max(highest, LOWEST)), highest, "frequency")
+    if robot_modes.massless_modes(model, 0)[1].shape[1]:
         step = "Simulate it; vibration() names the unstable directions."
         raise InvalidValueError("state", "an unstable equilibrium", "a stable equilibrium, which has a response", step)
     slopes = cable_slopes(state)
     receptance = Receptance(model, slopes.matrix, slopes.blocks, known)
-    compliance, still = receptance.by_modes(given, receptance.fixed_end_modes(float(given.max())))
+    compliance, still = receptance.by_modes(given, receptance.fixed_end_modes(highest))
     some = evenly_spaced(given.size, CHECKS)
     wanted = receptance.exact(given[some])
     off = np.linalg.norm(compliance[some] - wanted, axis=(1, 2)) / np.linalg.norm(wanted, axis=(1, 2))

@@ -14,16 +14,10 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.results import Result
 from sagline.core.table import Columns, Tabular
 from sagline.dynamics.trajectories.segments import RestToRestSegment, segments_of
+from sagline.dynamics.vibration import robot_modes
 from sagline.dynamics.vibration.component_modes import cable_shapes
 from sagline.dynamics.vibration.dynamic_stiffness import Damping, check_model, single_state
 from sagline.dynamics.vibration.flexibility import stretch_losses
-from sagline.dynamics.vibration.robot_modes import (
-    cable_shares,
-    damping_ratios,
-    massless_modes,
-    state_modes,
-    vibration_model,
-)
 from sagline.motion.path import Path
 from sagline.robot.equilibrium import Equilibrium, of_equilibrium
 from sagline.robot.robot import Robot
@@ -196,7 +190,7 @@ def vibration(state: Equilibrium, *, up_to: float = UP_TO, damping: Damping | No
     check_model(single_state(state))
     limit = number(up_to, "up_to", "Hz", above=0.0)
     given = optional(damping, Damping, "damping") or Damping()
-    model = vibration_model(state)
+    model = robot_modes.vibration_model(state)
     slack: tuple[int, ...] = tuple(int(i) for i in np.flatnonzero(~model.strings.taut[0]))
     cables, none = state.cables.shape[-1], np.empty(0)
     arrays = {  # without modes
@@ -210,18 +204,18 @@ def vibration(state: Equilibrium, *, up_to: float = UP_TO, damping: Damping | No
         slack = ()
     else:
         status = VibrationStatus.UNSTABLE
-        arrays["massless_frequency"], arrays["negative_directions"] = massless_modes(model, 0)
+        arrays["massless_frequency"], arrays["negative_directions"] = robot_modes.massless_modes(model, 0)
         if not arrays["negative_directions"].shape[1]:
             status = VibrationStatus.FOLDED if slack else VibrationStatus.SOLVED
-            found = state_modes(model, 0, limit)
-            shares, count = cable_shares(model, 0, found), found.number
+            found = robot_modes.state_modes(model, 0, limit)
+            shares, count = robot_modes.cable_shares(model, 0, found), found.number
             arrays |= {
                 "frequency": found.frequency,
                 "shape": found.platform,
                 "platform_share": np.asarray(1.0 - shares.sum(axis=0)),
                 "cable_share": shares,
                 "cable_shape": cable_shapes(found.components, found.ends, found.amplitudes, POINTS),
-                "loss": damping_ratios(state.one_robot.cables.linear_density, found, shares, given),
+                "loss": robot_modes.damping_ratios(state.one_robot.cables.linear_density, found, shares, given),
             }
     kept = {name: locked(array) for name, array in arrays.items()}
     return Vibration(state=state, up_to=limit, damping=given, status=status, count=count, slack_cables=slack, **kept)

@@ -8,18 +8,11 @@ from typing import Any, Final
 
 import numpy as np
 
+from sagline.calibration import summary
 from sagline.calibration.findings import CalibrationStatus, Direction
 from sagline.calibration.least_squares import exceeded_with
 from sagline.calibration.log import reading_deviations
 from sagline.calibration.result import Calibration
-from sagline.calibration.summary import (
-    Anchors,
-    anchor_covariance,
-    chi_squared_text,
-    outlier_text,
-    relative_covariance,
-    without_motion,
-)
 from sagline.core.arrays import Array, Indices
 from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.core.numbers import counted, n
@@ -37,7 +30,7 @@ LARGEST: Final = 100.0  # largest factor, relative to the initial one
 OPACITY: Final = 0.55
 _DOT: Final = 0.0055  # radius of the dot of a pose, as a share of the robot's size
 _ABOVE: Final = 0.02  # distance of the label of a pose, as a share of the robot's size
-NODES: Final[dict[Anchors, str]] = {"frame_anchors": "", "platform_anchors": "/platform"}
+NODES: Final[dict[summary.Anchors, str]] = {"frame_anchors": "", "platform_anchors": "/platform"}
 MOST_POSES: Final = 2000  # largest number of drawn poses; of more, a regular selection and all outliers are drawn
 MOST_NAMED: Final = 8  # largest number of outliers with labels in the scene
 LARGE: Final = 0.04  # initial size of the largest ellipsoid, as a share of the robot's size
@@ -74,7 +67,7 @@ def verdict_text(found: Calibration) -> str:
     text = "" if kind == "good" else f"{escape(found.status.text)}<br>"
     of = f"{len(found.values)} numbers from {counted(len(found.rows), 'pose')}"
     out = (f"<br>{counted(len(rows), 'row')} left out: {escape(why.text)}" for why, rows in found.left_out.items())
-    return verdict_box(kind, head, f"{text}{of}; {escape(chi_squared_text(found))}{''.join(out)}")
+    return verdict_box(kind, head, f"{text}{of}; {escape(summary.chi_squared_text(found))}{''.join(out)}")
 
 
 def parameters_text(found: Calibration) -> str:
@@ -104,7 +97,7 @@ def _outliers_text(found: Calibration, chosen: int | None) -> str:
         return sentence("No outliers.")
     rows = "".join(
         f'<tr {chosen_by("row", one.row)} class="{"chosen" if one.row == chosen else ""}"><td>'
-        f"<button {chosen_by('row', one.row)}>{escape(outlier_text(one))}</button></td></tr>"
+        f"<button {chosen_by('row', one.row)}>{escape(summary.outlier_text(one))}</button></td></tr>"
         for one in found.outliers[:MOST_LISTED]
     )
     rest = len(found.outliers) - MOST_LISTED
@@ -223,22 +216,22 @@ class CalibrationFeature(Feature):
         """Select a clicked row; a second click removes the selection."""
         self._field.value = "" if str(row) == self._typed else str(row)
 
-    def _anchors(self, which: Anchors, *, relative: bool) -> Ellipsoids:
+    def _anchors(self, which: summary.Anchors, *, relative: bool) -> Ellipsoids:
         """Ellipsoids of the anchors `which`, of frame or platform; none if these anchors were not calibrated."""
         points = getattr(self._found.robot, which)
-        covariance = anchor_covariance(self._found.parameters, self._found.covariance, which)
+        covariance = summary.anchor_covariance(self._found.parameters, self._found.covariance, which)
         if covariance is None:
             return Ellipsoids.of(points, np.zeros((len(points), 3, 3)))
         if relative:
-            covariance = relative_covariance(points, covariance, which)
+            covariance = summary.relative_covariance(points, covariance, which)
         return Ellipsoids.of(points, np.einsum("kikj->kij", covariance))
 
-    def _displacement(self, which: Anchors, *, relative: bool) -> Array:
+    def _displacement(self, which: summary.Anchors, *, relative: bool) -> Array:
         """Change of the anchors `which` by the calibration [m], shape (m, 3)."""
         points = getattr(self._found.robot, which)
         moved = points - getattr(self._found.before, which)
         if relative:
-            moved = (without_motion(points, which) @ moved.reshape(-1)).reshape(-1, 3)
+            moved = (summary.without_motion(points, which) @ moved.reshape(-1)).reshape(-1, 3)
         return np.asarray(moved)
 
     def _follow_ellipsoids(self) -> None:

@@ -12,6 +12,7 @@ from sagline.core.arrays import Array, locked
 from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
+from sagline.viewer import workspace
 from sagline.viewer.feature import BackgroundTask, Feature, View
 from sagline.viewer.features.push import PushFeature
 from sagline.viewer.page import Page
@@ -20,22 +21,6 @@ from sagline.viewer.readout import html_block, refused, sentence
 from sagline.viewer.robot_scene import INFEASIBLE, PLATFORM, REST, Nodes
 from sagline.viewer.slices import MarginScale, Picture, picture_of
 from sagline.viewer.tension_scale import force_unit
-from sagline.viewer.workspace import (
-    CELLS,
-    NAMES,
-    REACH,
-    FreeTravel,
-    Hull,
-    Patch,
-    WorkspaceQuery,
-    draw_patches,
-    free_directions,
-    free_travel,
-    margin_text,
-    near_patches,
-    region_hull,
-    travel_text,
-)
 from sagline.workspaces.levels import Levels
 from sagline.workspaces.region import Plane, Region, region_of, slice_of
 from sagline.workspaces.wrench_sets import WrenchBox
@@ -54,7 +39,7 @@ PLANES: Final = {"level": 2, "upright, along x": 1, "upright, along y": 0}  # na
 _NOTHING: Final = sentence("Choose one or several of these.")
 
 
-_Result = tuple[Hashable, bool, Hull | None]
+_Result = tuple[Hashable, bool, workspace.Hull | None]
 
 
 class _SupersededError(SaglineError):
@@ -63,7 +48,7 @@ class _SupersededError(SaglineError):
 
 def planes_of(robot: Robot) -> tuple[int, ...]:
     """Normals of the planes of possible slices; for a planar robot, only the normal of its plane."""
-    flat = region_of(robot, None, CELLS).flat
+    flat = region_of(robot, None, workspace.CELLS).flat
     return (2, 1, 0) if flat is None else (flat,)
 
 
@@ -75,7 +60,7 @@ class RegionFeature(Feature):
         self._page, self._server, self._size, self._nodes = page, page.server, page.size, Nodes(page.server.scene)
         self._task = BackgroundTask(page.later)
         self._key: Hashable = None  # key of the workspace
-        self._query: WorkspaceQuery | None = None
+        self._query: workspace.WorkspaceQuery | None = None
         self._levels: Levels | None = None
         self._region: Region | None = None
         self._place = np.zeros(3)  # position of the platform [m]
@@ -177,7 +162,7 @@ class RegionFeature(Feature):
     def _refuse(self, message: str) -> None:
         self._hull_html.content, self._margin_html.content = refused(message), ""
 
-    def _query_of(self, view: View) -> WorkspaceQuery:
+    def _query_of(self, view: View) -> workspace.WorkspaceQuery:
         """Robot, model, loads and broken cables of a view; the loads include the force of the user."""
         snapshot, model, wrench = view.snapshot, view.settings.model, view.wrench
         broken: tuple[int, ...] = ()
@@ -189,24 +174,26 @@ class RegionFeature(Feature):
         center = np.zeros(6) if wrench is None else np.array(wrench)
         center += 0.0 if push is None else push.load(snapshot.robot, snapshot.pose)
         loads = WrenchBox(_load(self._force, "N"), _load(self._moment, "N m"), center)
-        return WorkspaceQuery(snapshot.robot, locked(np.array(snapshot.pose.quaternion)), model, loads, broken)
+        return workspace.WorkspaceQuery(
+            snapshot.robot, locked(np.array(snapshot.pose.quaternion)), model, loads, broken
+        )
 
-    def _prepare(self, query: WorkspaceQuery) -> tuple[Levels, Region]:
+    def _prepare(self, query: workspace.WorkspaceQuery) -> tuple[Levels, Region]:
         """Levels and region, created again if the query has changed."""
         robot, loads = query.robot, (query.wrenches.center.tobytes(), query.wrenches.segments.tobytes())
         key = (id(robot), query.quaternion.tobytes(), type(query.model), *loads, query.broken)
         if key != self._key or self._levels is None or self._region is None:
             self._query = query  # keeps the robot alive, so that its id remains unique
-            self._region, self._levels = region_of(robot, None, CELLS), query.levels()
+            self._region, self._levels = region_of(robot, None, workspace.CELLS), query.levels()
             self._key = key
         if self._scale_key != key and self._scaled:
             self._scale_key, self._scale = key, _scale_of(self._levels, self._region)
         return self._levels, self._region
 
-    def _show_hull(self, patches: list[Patch], *, opened: bool = False) -> None:
+    def _show_hull(self, patches: list[workspace.Patch], *, opened: bool = False) -> None:
         """Draw the hull. With `opened`, its front faces are not drawn."""
         with self._server.atomic():
-            draw_patches(self._nodes, "/hull", patches, "back" if opened else "double")
+            workspace.draw_patches(self._nodes, "/hull", patches, "back" if opened else "double")
 
     def _follow_hull(self) -> None:
         """Draw the latest hull, and start the computation of a better one."""
@@ -249,7 +236,9 @@ class RegionFeature(Feature):
                 self._refuse(message)
 
         self._task.start(
-            lambda: region_hull(query, rough, progress), lambda hull: self._receive((key, rough, hull)), failed
+            lambda: workspace.region_hull(query, rough, progress),
+            lambda hull: self._receive((key, rough, hull)),
+            failed,
         )
 
     def _receive(self, result: _Result | None) -> None:
@@ -262,16 +251,16 @@ class RegionFeature(Feature):
     def _follow_wall(self) -> None:
         """Draw the wall near the platform, and write the margin."""
         text = ""
-        patches: list[Patch] = []
+        patches: list[workspace.Patch] = []
         if self._region_box.value and self._levels is not None:
             here = self._levels.details(self._place[None])
-            text = margin_text(float(here.margin[0]), int(here.cable[0]), force_unit(self._levels.robot))
+            text = workspace.margin_text(float(here.margin[0]), int(here.cable[0]), force_unit(self._levels.robot))
             text += self._without
             if self._result is not None and (hull := self._result[2]) is not None:
-                patches = near_patches(hull, self._place, REACH * self._size)
+                patches = workspace.near_patches(hull, self._place, workspace.REACH * self._size)
             self._margin_html.content = html_block(f"<b>Margin here</b>, force with moment: {text}")
         with self._server.atomic():
-            draw_patches(self._nodes, "/wall", patches)
+            workspace.draw_patches(self._nodes, "/wall", patches)
             below = (0.0, 0.0, -_BELOW * self._size)
             self._nodes.label("/platform/left", text, below, "top-center", _TEXT_SCALE)
 
@@ -317,18 +306,18 @@ class RegionFeature(Feature):
         if not self._travel_box.value:
             self._nodes.remove("/travel")
             return
-        which = free_directions(robot, region.flat)
-        travel = free_travel(levels.details, pose.position, which, region.low, region.high)
+        which = workspace.free_directions(robot, region.flat)
+        travel = workspace.free_travel(levels.details, pose.position, which, region.low, region.high)
         self._draw_travel(travel)
-        self._travel_html.content = travel_text(travel, force_unit(robot), self._without)
+        self._travel_html.content = workspace.travel_text(travel, force_unit(robot), self._without)
 
-    def _draw_travel(self, travel: FreeTravel) -> None:
+    def _draw_travel(self, travel: workspace.FreeTravel) -> None:
         """Draw an arrow in each direction. An arrow that ends at the boundary has its length as text."""
         ends = np.stack((np.broadcast_to(travel.start, travel.ends.shape), travel.ends), axis=1)
         self._nodes.arrows("/travel", ends, OUTWARD if travel.inside else INWARD, *(_ARROW * self._size))
         for k, which in enumerate(travel.which):
-            text = f"{NAMES[which]} {travel.distance[k]:.2f} m" if travel.crossed[k] else ""
-            self._nodes.label(f"/travel/{NAMES[which]}", text, travel.ends[k], scale=_TEXT_SCALE)
+            text = f"{workspace.NAMES[which]} {travel.distance[k]:.2f} m" if travel.crossed[k] else ""
+            self._nodes.label(f"/travel/{workspace.NAMES[which]}", text, travel.ends[k], scale=_TEXT_SCALE)
 
     def _clear(self) -> None:
         """Remove the drawing and the stored workspace."""

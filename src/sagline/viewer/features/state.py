@@ -16,20 +16,9 @@ from sagline.files.pose_text import STRONGEST, pose_of_text
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.tension.methods import QuadraticProgram
+from sagline.viewer import link
 from sagline.viewer.by_hand import ByHand
 from sagline.viewer.feature import Feature, View
-from sagline.viewer.link import (
-    STEP,
-    LinkedControls,
-    check_robot,
-    link_text,
-    listed,
-    name_of,
-    numbers_of,
-    parts_of,
-    pose_part,
-    shortest,
-)
 from sagline.viewer.page import Page, Source
 from sagline.viewer.player import InMotion
 from sagline.viewer.readout import html_block
@@ -77,7 +66,7 @@ class StateFeature(Feature):
         """Build the panel after all other controls, because links contain their values."""
         page.server.gui.add_html(_CONTENT, order=FIRST)
         self._page, self._channel, self._robot = page, page.channel, page.robot
-        self.controls = LinkedControls(page.server.gui)
+        self.controls = link.LinkedControls(page.server.gui)
         self._view: View | None = None
         self._time = 0.0
         self._requests: deque[tuple[Any, int]] = deque()  # requests to copy a text, and their clients
@@ -143,37 +132,37 @@ class StateFeature(Feature):
 
     def _link_to(self, view: View, client: int) -> str:
         """A link to a view with the camera of a client."""
-        parts = {"robot": name_of(self._robot)}
+        parts = {"robot": link.name_of(self._robot)}
         if view.played is not None:
             parts["time"] = repr(float(self._page.player.time))
         else:
-            parts["pose"] = pose_part(view.snapshot.pose)
+            parts["pose"] = link.pose_part(view.snapshot.pose)
         if view.wrench is not None:
-            parts["wrench"] = listed(view.wrench)
+            parts["wrench"] = link.listed(view.wrench)
         camera = self._page.framing.moved(client)
         if camera is not None:
-            parts["camera"] = listed(camera)
+            parts["camera"] = link.listed(camera)
         controls = self.controls.changes()
         if MASS in controls or self._page.source.mass is not None:
-            controls[MASS] = shortest(view.settings.mass)
+            controls[MASS] = link.shortest(view.settings.mass)
         if isinstance(view.settings.tension, ByHand):
             controls.pop(SHARING, None)
-            parts[HAND] = listed(np.asarray(view.settings.tension.target))
-        return link_text({**parts, **controls})
+            parts[HAND] = link.listed(np.asarray(view.settings.tension.target))
+        return link.link_text({**parts, **controls})
 
     def _open_link(self, text: str, client: int) -> None:
         """Bring the page and the camera of `client` to the state of a link. An invalid link changes nothing."""
-        parts = parts_of(text)
-        check_robot(parts.pop("robot"), self._robot)
+        parts = link.parts_of(text)
+        link.check_robot(parts.pop("robot"), self._robot)
         place, framing = self._place(parts), self._page.framing
         wrench = _six(parts.pop("wrench", None), "wrench", "N or N m", STRONGEST)
         camera = _six(parts.pop("camera", None), "camera", "m", framing.farthest)
         if camera is not None and np.array_equal(camera[:3], camera[3:]):
-            raise InvalidValueError("the camera of the link", "at its own target", "two different points", STEP)
+            raise InvalidValueError("the camera of the link", "at its own target", "two different points", link.STEP)
         hand = parts.pop(HAND, None)
         method = None
         if hand is not None:
-            method = ByHand(target=numbers_of(hand, HAND, "N", self._robot.cable_count, STRONGEST))
+            method = ByHand(target=link.numbers_of(hand, HAND, "N", self._robot.cable_count, STRONGEST))
         self.controls.read(parts)()
         self._page.wrench = wrench
         if method is not None:
@@ -187,20 +176,20 @@ class StateFeature(Feature):
         """Function that goes to the pose or the time of a link."""
         time, pose, player = parts.pop("time", None), parts.pop("pose", None), self._page.player
         if (time is None) == (pose is None):
-            raise InvalidValueError("the link", "with both or none", "a pose or a time", STEP)
+            raise InvalidValueError("the link", "with both or none", "a pose or a time", link.STEP)
         if pose is not None:
-            target = pose_of_text(pose, "the pose of the link", STEP)
+            target = pose_of_text(pose, "the pose of the link", link.STEP)
             self._page.check_near(target)
             return lambda: self._page.go(target)
         if player.played is None:
             step = "Open it with the same run: sagline view ROBOT RUN."
             raise InvalidValueError("the link", "with a time of a run", "a pose, because nothing is played", step)
-        moment = float(numbers_of(time or "", "the time of the link", "s", 1, player.duration)[0])
+        moment = float(link.numbers_of(time or "", "the time of the link", "s", 1, player.duration)[0])
         return lambda: player.scrub_to(max(moment, 0.0))
 
 
 def _six(text: str | None, item: str, unit: str, largest: float) -> Array | None:
-    return None if text is None else numbers_of(text, f"the {item} of the link", unit, 6, largest)
+    return None if text is None else link.numbers_of(text, f"the {item} of the link", unit, 6, largest)
 
 
 def code_of(view: View, robot: Robot, source: Source, time: float = 0.0) -> str:
