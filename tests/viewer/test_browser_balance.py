@@ -7,10 +7,9 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 import sagline as sl
-from sagline.viewer.by_hand import ByHand
 from sagline.viewer.features.missing import MissingFeature
 from sagline.viewer.page import Page as ViewerPage
-from sagline.viewer.snapshot import Snapshot
+from sagline.viewer.snapshot import ByHand, Snapshot
 from tests.chromium import NEEDED, launched
 from tests.tiers import extended
 from tests.viewer.test_browser import FLAGS, OVERFLOWING, await_that, least_contrast, opened

@@ -13,12 +13,11 @@ import pytest
 from scipy.optimize import minimize
 
 import sagline as sl
-from sagline.viewer.by_hand import BY_HAND, ByHand, DotField
 from sagline.viewer.features import FEATURES
 from sagline.viewer.features.state import code_of
-from sagline.viewer.features.tensions import MethodMarks, dot_field_of, grouped, polygon_figure
+from sagline.viewer.features.tensions import DotField, dot_field_of, grouped, polygon_figure
 from sagline.viewer.page import Page, Source, home_pose
-from sagline.viewer.snapshot import METHODS, Settings, Snapshot, snapshot_at
+from sagline.viewer.snapshot import BY_HAND, METHODS, ByHand, MethodMarks, Settings, Snapshot, snapshot_at
 from tests.effort import best_rate
 from tests.tiers import extended, wide
 from tests.viewer.client import Client, await_that
@@ -261,7 +260,7 @@ def test_marks_of_a_robot_that_is_moved_are_those_of_one_that_is_not(
         calls.append(arguments[1])
         return sl.inverse(*arguments)
 
-    monkeypatch.setattr("sagline.viewer.features.tensions.inverse", counted)
+    monkeypatch.setattr("sagline.viewer.snapshot.inverse", counted)
     home, load = home_pose(robot), np.array([30.0, -20.0, -50.0, 4.0, 2.0, -1.0])
     for k, away in enumerate(([0.0, 0.0, 0.0], [0.4, 0.1, 0.2], [-0.5, 0.3, -0.1], [2.4, 1.3, 0.6])):
         pose = sl.Pose.from_euler(home.position + away, 0.02 * k, -0.03, 0.05)

@@ -11,8 +11,7 @@ from PIL import Image
 
 import sagline as sl
 from sagline.viewer.features import FEATURES
-from sagline.viewer.features.export import ExportFeature, moments
-from sagline.viewer.offscreen import Shot
+from sagline.viewer.features.export import ExportFeature, Shot, moments
 from sagline.viewer.page import Page
 from tests.refusal import refused
 from tests.tiers import extended

@@ -95,18 +95,17 @@ def test_cables_at_limits_stand_there_and_another_limit_would_help(name: str, pl
     assert missing is not None
     assert missing.limits
     before = float(np.linalg.norm(missing.force))
-    for each in missing.limits:
-        limit = (robot.tension_min if each.lower else robot.tension_max)[each.cable]
-        assert missing.state.chord_tension[each.cable] == pytest.approx(limit, rel=2e-3)
+    for cable, lower in missing.limits.items():
+        limit = (robot.tension_min if lower else robot.tension_max)[cable]
+        assert missing.state.chord_tension[cable] == pytest.approx(limit, rel=2e-3)
         low, high = robot.tension_min.copy(), robot.tension_max.copy()
-        if each.lower:
-            low[each.cable] *= 0.9
+        if lower:
+            low[cable] *= 0.9
         else:
-            high[each.cable] *= 1.1
+            high[cable] *= 1.1
         wider = missing_of(at(robot.replace(tension_min=low, tension_max=high), snapshot.pose))
         assert wider is not None
         assert np.linalg.norm(wider.force) < before
-        assert re.findall(r"\d+|lower|upper", each.name) == [str(each.cable), "lower" if each.lower else "upper"]
 
 
 def test_where_no_force_alone_would_do_a_moment_is_told() -> None:
@@ -209,6 +208,12 @@ def test_the_text_says_that_a_search_is_running_until_its_result_is_there(monkey
     with contextmanager(shown)(made) as page:
         assert "searching" in page.text
         assert "none within" not in page.text
+        view = page.viewer.view
+        assert view is not None
+        assert view.missing is not None
+        for k, (cable, lower) in enumerate(view.missing.limits.items()):
+            found = re.findall(r"\d+|lower|upper", page.node(f"/limits_names/{k}").text)
+            assert found == [str(cable), "lower" if lower else "upper"]
         ended.set()
         await_that(lambda: "none within" in page.text)
 

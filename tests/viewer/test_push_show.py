@@ -121,7 +121,7 @@ def test_what_is_behind_the_eye_is_not_held(page: Shown) -> None:
     for away, held in ((5.0, False), (-5.0, True)):
         eye = Camera(part + away * axes[:, 2], axes, np.array([0.4, 0.3]), np.array([WIDE, HIGH], dtype=np.float64))
         await_that(lambda: page.viewer.state is not None)
-        show._grab(eye, (0.5, 0.5), -1)  # nobody, whose leaving would let it go
+        show._grab(eye, np.array([0.5, 0.5]), -1)  # nobody, whose leaving would let it go
         assert (show._hold is not None) == held
     show._hold = None
 

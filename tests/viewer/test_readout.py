@@ -103,7 +103,7 @@ def test_infeasible_pose_shows_a_compromise_or_dashes_and_the_reason() -> None:
     told = np.array([[float(cell) for cell in row[1:]] for row in cells(html)])
     assert told[:, 0] == pytest.approx(missing.state.chord_tension, abs=0.0501)
     assert np.all(told[:, 0] >= ROBOT.tension_min - 0.1)  # the limits hold, and the missing force is not balanced
-    assert told[[each.cable for each in missing.limits], 4] == pytest.approx(0.0, abs=0.1)
+    assert told[list(missing.limits), 4] == pytest.approx(0.0, abs=0.1)
     assert "compromise" in html
     assert all(cell == "–" for row in cells(readout.numbers_html(snapshot, SCALE, None)) for cell in row[1:])
     assert "Not feasible" in readout.verdict(snapshot)

@@ -27,7 +27,7 @@ POSE = sl.Pose([0.5, 0.3, 1.5], np.eye(3))
 @pytest.fixture(scope="module")
 def page() -> Iterator[Page]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sagline.viewer.features.region.region_hull", lambda *_: None)
+        patch.setattr("sagline.viewer.workspace.region_hull", lambda *_: None)
         server = start_server(port=0)
         page = Page(server, FEATURES, ROBOT)
         handle(server, "Region").value = handle(server, "Where can I go").value = True

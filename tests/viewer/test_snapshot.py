@@ -1,7 +1,5 @@
 """One moment of a robot."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -47,12 +45,7 @@ def test_settings_change_the_robot() -> None:
     assert heavier.tension.sum() > 1.4 * snapshot_at(ROBOT, HERE, Settings(mass=50.0), None).tension.sum()
 
 
-@pytest.mark.parametrize(
-    "wrong", [{"density": np.nan}, {"stiffness": 0.0}, {"sag_scale": -1.0}, {"error_scale": np.inf}]
-)
-def test_senseless_settings_are_refused(wrong: dict[str, Any]) -> None:
-    with pytest.raises(sl.InvalidValueError):
-        Settings(mass=50.0, **wrong)
+def test_a_senseless_mass_is_refused() -> None:
     with pytest.raises(sl.InvalidValueError):
         Settings(mass=np.nan).applied(ROBOT)
 

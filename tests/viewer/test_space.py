@@ -48,7 +48,7 @@ MAKER = Maker()
 @pytest.fixture(scope="module")
 def page() -> Iterator[Shown]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sagline.viewer.features.region.region_hull", lambda *arguments: MAKER.hull(*arguments))
+        patch.setattr("sagline.viewer.workspace.region_hull", lambda *arguments: MAKER.hull(*arguments))
         yield from shown(lambda server: Page(server, FEATURES, ROBOT, pose=POSE))
 
 

@@ -208,6 +208,12 @@ def test_what_a_slider_does_not_reach_is_refused_once_and_not_asked_again() -> N
     server = start_server(port=0)
     try:
         viewer = Page(server, FEATURES, ROBOT)
+        factors = {"Cable density ×": np.nan, "Cable stiffness ×": 0.0, "Sag drawn ×": -1.0, "Error drawn ×": np.inf}
+        for label, value in factors.items():
+            handle(server, label).value = value
+            with refused(label):
+                viewer.panel.settings()
+            handle(server, label).value = 1.0
         viewer.panel._mass.value = 1e9  # after the settings were read
         viewer.panel.show_what_if("")
         assert not viewer.panel._forgetting.visible

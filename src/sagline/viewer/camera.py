@@ -7,11 +7,14 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 import viser
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from sagline.core.arrays import Array
 from sagline.viewer.shapes import Solid
+
+OUTSIDE: Final = 10.0  # largest coordinate of a point of a picture; (0, 0) is its upper left, (1, 1) its lower right
 
 
 class Camera(NamedTuple):
@@ -37,7 +40,7 @@ class Camera(NamedTuple):
         axes = Rotation.from_quat(np.roll(turn, -1)).as_matrix()
         return cls(place, axes, high * np.array([pixels[0] / pixels[1], 1.0]), pixels)
 
-    def ray(self, at: tuple[float, float]) -> Array:
+    def ray(self, at: ArrayLike) -> Array:
         """Direction to a point of the picture, at a depth of 1, shape (3,)."""
         across, down = self.reach * (2.0 * np.asarray(at) - 1.0)
         return np.asarray(self.axes @ np.array([across, down, 1.0]))
@@ -80,7 +83,7 @@ def ray_distance(solid: Solid, start: Array, direction: Array) -> float | None:
     return float(far[hit].min()) if hit.any() else None
 
 
-def nearest_line(camera: Camera, at: tuple[float, float], lines: Array, within: float) -> int | None:
+def nearest_line(camera: Camera, at: ArrayLike, lines: Array, within: float) -> int | None:
     """Of all `lines` within `within` [px] of the picture point `at`, the line nearest to the viewer; or None."""
     places, deep = camera.project(lines)
     pixel = np.asarray(at) * camera.pixels
@@ -96,15 +99,6 @@ def nearest_line(camera: Camera, at: tuple[float, float], lines: Array, within: 
     depth = np.take_along_axis(deep, away.argmin(axis=1)[:, None], axis=1)[:, 0]
     as_near = nearest <= nearest.min() + 1.0  # [px], includes cables that cross there
     return int(np.argmin(np.where(as_near, depth, np.inf)))
-
-
-def screen_point(value: Any) -> tuple[float, float] | None:
-    """Point of a picture in a message, from (0, 0) at the upper left to (1, 1) at the lower right; None if invalid."""
-    try:
-        x, y = (float(each) for each in value)
-    except (TypeError, ValueError, OverflowError):
-        return None
-    return (x, y) if abs(x) < 10.0 and abs(y) < 10.0 else None  # also excludes NaN
 
 
 TOWARD: Final = np.array([0.42, -0.86, 0.36]) / np.linalg.norm([0.42, -0.86, 0.36])  # from the box to the camera

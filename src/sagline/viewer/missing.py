@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from sagline.cables.model import CableModel
-from sagline.core.arrays import Array, Flags, locked
+from sagline.core.arrays import Array, locked
 from sagline.core.errors import SaglineError
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan
@@ -20,9 +20,8 @@ from sagline.robot.robot import Robot
 from sagline.statics.balance import structure_matrix
 from sagline.tension.methods import MinimumNorm
 from sagline.viewer.snapshot import Snapshot
-from sagline.viewer.workspace import CELLS, WorkspaceQuery
-from sagline.workspaces.levels import Levels
-from sagline.workspaces.region import Region, region_of
+from sagline.viewer.workspace import CELLS, DIRECTIONS, WorkspaceQuery, free_directions
+from sagline.workspaces.region import region_of
 from sagline.workspaces.wrench_sets import WrenchBox
 
 ATTEMPTS: Final = 4
@@ -31,25 +30,13 @@ NEAR: Final = 1e-4  # relative distance to a limit below which a tension counts 
 _EXPLAINED: Final = (PoseStatus.INFEASIBLE, PoseStatus.BORDERLINE)
 
 
-class _AtLimit(NamedTuple):
-    """A cable at a limit."""
-
-    cable: int  # index of the cable
-    lower: bool  # True for the lower limit, False for the upper limit
-
-    @property
-    def name(self) -> str:
-        """Label at the cable."""
-        return f"{self.cable} at its {'lower' if self.lower else 'upper'} limit"
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class MissingWrench:
     """Smallest wrench that makes a pose feasible; it is a force without moment if a force is sufficient."""
 
     wrench: Array  # missing wrench about the center of mass, world axes [N, N m], shape (6,)
     state: Equilibrium  # plan with this wrench, in which the blocking cables are at their limits
-    limits: tuple[_AtLimit, ...]  # the cables at limits
+    limits: dict[int, bool]  # cables at limits: True at the lower limit, False at the upper limit
 
     @property
     def force(self) -> Array:
@@ -99,14 +86,14 @@ def _step(plan: Plan) -> Array:
     return rest
 
 
-def _limits(plan: Plan, held: Plan) -> tuple[_AtLimit, ...]:
+def _limits(plan: Plan, held: Plan) -> dict[int, bool]:
     """Cables at limits. If a force is sufficient, these are the plan's blocking cables, otherwise those of `held`."""
     robot, tension = plan.state.one_robot, held.state.limited_tension
     to_lower, to_upper = tension - robot.tension_min, robot.tension_max - tension
     which = plan.blocking
     if not np.isfinite(plan.shortfall):
         which = np.minimum(to_lower, to_upper) <= NEAR * tension
-    return tuple(_AtLimit(int(k), bool(to_lower[k] <= to_upper[k])) for k in np.flatnonzero(which))
+    return {int(k): bool(to_lower[k] <= to_upper[k]) for k in np.flatnonzero(which)}
 
 
 NODES: Final = 15  # nodes of the first grid along each axis
@@ -133,8 +120,7 @@ def nearest_feasible(robot: Robot, pose: Pose, model: CableModel, wrench: Array 
         if turned and np.allclose(start.matrix, pose.matrix):
             break
         try:
-            search = _Search(robot, start, model, wrench)
-            found = search.nearest(pose.position)
+            found = _nearest_position(robot, pose.position, start, model, wrench)
         except SaglineError:  # the motion pattern excludes this rotation
             continue
         if found is not None:
@@ -143,71 +129,51 @@ def nearest_feasible(robot: Robot, pose: Pose, model: CableModel, wrench: Array 
     return None
 
 
-class _Search:
-    """Search at one orientation."""
+def _nearest_position(
+    robot: Robot, start: Array, orientation: Pose, model: CableModel, wrench: Array | None
+) -> Array | None:
+    """The feasible position (3,) [m] nearest to `start`, at one orientation; None if none exists."""
+    levels = WorkspaceQuery(robot, orientation.quaternion, model, WrenchBox(center=wrench)).levels()
+    region = region_of(robot, None, CELLS)
+    free = np.flatnonzero(np.any(DIRECTIONS[free_directions(robot, region.flat)] > 0.0, axis=0))
+    size = float(np.max(region.high - region.low))
 
-    def __init__(self, robot: Robot, pose: Pose, model: CableModel, wrench: Array | None) -> None:
-        self._robot, self._model, self._wrench, self._quaternion = robot, model, wrench, pose.quaternion
-        self._levels: Levels = WorkspaceQuery(robot, pose.quaternion, model, WrenchBox(center=wrench)).levels()
-        self._region: Region = region_of(robot, None, CELLS)
-        free = np.abs(robot.freedom[:, :3]).max(axis=0) > 0.5
-        if self._region.flat is not None:
-            free[self._region.flat] = False
-        self._free = np.flatnonzero(free)
-        self._size = float(np.max(self._region.high - self._region.low))
+    def grid(axes: list[Array]) -> Array:
+        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
 
-    def nearest(self, start: Array) -> Array | None:
-        """The nearest feasible position [m], shape (3,)."""
-        low, high = self._region.low, self._region.high
-        axes = [np.linspace(low[axis], high[axis], NODES) for axis in self._free]
-        nodes = np.tile(start, (NODES ** len(axes), 1))
-        nodes[:, self._free] = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
-        inside = nodes[self._feasible(nodes)]
-        if not len(inside):
-            return None
-        order = np.argsort(np.linalg.norm(inside - start, axis=1))[:STARTS]
-        step = (high - low)[self._free] / (NODES - 1)
-        best = min((self._refined(start, node, step) for node in inside[order]), key=lambda at: _distance(at, start))
-        return self._inside(start, best)
+    def feasible(places: Array) -> Array:
+        parts = [places[k : k + BLOCK] for k in range(0, len(places), BLOCK)]
+        held = [np.empty(0, bool), *(levels.details(part).margin >= 0.0 for part in parts)]
+        return np.asarray(places[np.concatenate(held)])
 
-    def _refined(self, start: Array, best: Array, step: Array) -> Array:
-        """The feasible position nearest to `start`, by a search from the feasible `best` on finer and finer grids."""
-        ways = np.linspace(-1.0, 1.0, 2 * AROUND + 1)
-        offsets = np.stack(np.meshgrid(*[ways] * len(step), indexing="ij"), axis=-1).reshape(-1, len(step))
+    def refined(best: Array) -> Array:
+        """The nearest position, by a search from the feasible position `best` on finer and finer grids."""
+        step = (region.high - region.low)[free] / (NODES - 1)
+        offsets = grid([np.linspace(-1.0, 1.0, 2 * AROUND + 1)] * len(free))
         for _ in range(ITERATIONS):
             places = np.tile(best, (len(offsets), 1))
-            places[:, self._free] += offsets * step
-            nearer = places[np.linalg.norm(places - start, axis=1) < _distance(best, start)]
-            held = nearer[self._feasible(nearer)]
+            places[:, free] += offsets * step
+            held = feasible(places[np.linalg.norm(places - start, axis=1) < np.linalg.norm(best - start)])
             if len(held):
                 best = held[np.argmin(np.linalg.norm(held - start, axis=1))]
             else:
                 step = step / AROUND
-                if step.max() < FINEST * self._size:
+                if step.max() < FINEST * size:
                     break
         return best
 
-    def _inside(self, start: Array, best: Array) -> Array | None:
-        """A position slightly inside the boundary, at which `inverse` has a solution."""
-        way = best - start
-        way = way / max(float(np.linalg.norm(way)), 1e-12)
-        for share in INWARD:
-            place = best + share * self._size * way
-            if inverse(self._robot, self._pose(place), self._model, wrench=self._wrench).feasible:
-                return place
+    axes = [np.linspace(region.low[axis], region.high[axis], NODES) for axis in free]
+    nodes = np.tile(start, (NODES ** len(axes), 1))
+    nodes[:, free] = grid(axes)
+    inside = feasible(nodes)
+    if not len(inside):
         return None
-
-    def _feasible(self, places: Array) -> Flags:
-        parts = [self._levels.details(part).margin >= 0.0 for part in _parts(places)]
-        return np.concatenate(parts) if parts else np.zeros(0, dtype=np.bool_)
-
-    def _pose(self, place: Array) -> Pose:
-        return Pose.from_quaternion(place, self._quaternion)
-
-
-def _parts(places: Array) -> list[Array]:
-    return [places[k : k + BLOCK] for k in range(0, len(places), BLOCK)]
-
-
-def _distance(one: Array, other: Array) -> float:
-    return float(np.linalg.norm(one - other))
+    order = np.argsort(np.linalg.norm(inside - start, axis=1))[:STARTS]
+    best = min((refined(node) for node in inside[order]), key=lambda at: float(np.linalg.norm(at - start)))
+    way = best - start
+    way = way / max(float(np.linalg.norm(way)), 1e-12)
+    for share in INWARD:  # slightly inside the boundary, where `inverse` has a solution
+        place = best + share * size * way
+        if inverse(robot, Pose.from_quaternion(place, orientation.quaternion), model, wrench=wrench).feasible:
+            return np.asarray(place)
+    return None

@@ -252,13 +252,14 @@ class Page:
             settings = self.panel.settings()
             snapshot = player.now() if player.following else self._from_gizmo(settings)
         except SaglineError as error:
-            self.panel.refuse(str(error))
+            self.panel.verdict.content = readout.refused(str(error))
             return
         played = player.played if player.following else None
         self.panel.show_what_if("" if played is None else played.unchanged)
         playing, scale = player.playing, self.panel.color_scale(snapshot.tension)
         missing = None if isinstance(snapshot, InMotion) or snapshot.feasible else missing_of(snapshot)
-        self._show(View(snapshot, settings, scale, self.panel.ghost, self.wrench, played, missing, playing=playing))
+        ghost = bool(self.panel.ghost.value)
+        self._show(View(snapshot, settings, scale, ghost, self.wrench, played, missing, playing=playing))
 
     def _from_gizmo(self, settings: Settings) -> Snapshot:
         if self._changed is None or self._changed[0] != settings.changes:
@@ -281,7 +282,7 @@ class Page:
             if played is not None and traced != self._traced:
                 self._traced = traced
                 self.scene.show_traces(*played.traces(TRACE_POINTS, settings.error_scale))
-        self.panel.read_out(*_readings(view))
+        self.panel.verdict.content, self.panel.numbers.content = _readings(view)
         self.panel.show_sag(_largest_sag(snapshot), APART * self.size)
         for feature in self.features:
             key = feature.depends(view)

@@ -14,8 +14,7 @@ from sagline.core.numbers import n
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 from sagline.viewer import readout
-from sagline.viewer.by_hand import BY_HAND, ByHand
-from sagline.viewer.snapshot import METHODS, MODELS, Settings, depends_on_history
+from sagline.viewer.snapshot import BY_HAND, METHODS, MODELS, ByHand, Settings, depends_on_history
 from sagline.viewer.tension_scale import TensionScale
 
 LEFT_WIDTH, RIGHT_WIDTH = 310, 380  # width of the panel [px]
@@ -25,7 +24,17 @@ _LIGHTEST, _HEAVIEST = 0.1, 4.0  # limits relative to the robot's mass
 
 
 class ControlPanel:
-    """Sliders, choices and displayed values."""
+    """Sliders, choices and displayed values.
+
+    Attributes:
+        readings: Panel of the displayed values.
+        verdict: Verdict on the pose, or the reason why a setting is invalid.
+        numbers: Numbers of the pose and of the cables.
+        polygon: Feasible tensions.
+        ghost: Choice of straight cables beside the sagging ones.
+        method: Choice of the tension distribution method.
+        method_name: Name of the last chosen method, except for tensions by hand.
+    """
 
     def __init__(
         self,
@@ -37,9 +46,8 @@ class ControlPanel:
     ) -> None:
         """Build the panels. Any thread calls `changed` after a change of a value, and `forget` to reset the history."""
         self._gui, self._robot, self._limits = server.gui, robot, scale
-        self._changed = changed
-        self._forget = forget
-        self._method_name = next(iter(METHODS))
+        self._changed, self._forget = changed, forget
+        self.method_name = next(iter(METHODS))
         self._by_hand: ByHand | None = None
         self._sliders: dict[str, viser.GuiHtmlHandle] = {}  # sliders of the factors by their labels
         self._gui.main_panel.dock_left()
@@ -48,22 +56,17 @@ class ControlPanel:
         self._build_drawing()
         readings = self.readings = self._gui.add_panel()
         with readings.add_tab("Readings"):
-            self._verdict = self._gui.add_html("")
+            self.verdict = self._gui.add_html("")
             self._explained = self._gui.add_html("", visible=False)
             self._legend = self._gui.add_html(readout.legend(scale, robot))
-            self._numbers = self._gui.add_html("")
+            self.numbers = self._gui.add_html("")
             with self._gui.add_folder("Feasible tensions"):
-                self._polygon = self._gui.add_html("")
+                self.polygon = self._gui.add_html("")
         with readings.add_tab("Control"):  # for small screens; see browser/control.js
             self._gui.add_html(readout.sentence("Pose, push, cut and all other controls are below."))
         readings.dock_right()
         readings.set_width(RIGHT_WIDTH)
         readings.expand()  # closed at first in the bottom sheet of a small screen
-
-    @property
-    def ghost(self) -> bool:
-        """True if straight cables are drawn beside the sagging ones."""
-        return bool(self._ghost.value)
 
     def color_scale(self, tension: Array) -> TensionScale:
         """Show and return the scale of colors for the tensions of a pose."""
@@ -94,60 +97,33 @@ class ControlPanel:
         )
 
     def _tension(self) -> TensionMethod:
-        chosen = self._method.value
+        chosen = self.method.value
         if chosen == BY_HAND and self._by_hand is not None:
             return self._by_hand
-        self._method_name = chosen if chosen in METHODS else next(iter(METHODS))
-        return METHODS[self._method_name]
+        self.method_name = chosen if chosen in METHODS else next(iter(METHODS))
+        return METHODS[self.method_name]
 
     def show_what_if(self, reason: str) -> None:
         """Show the controls that change the robot, or the reason why a played motion does not allow changes."""
         shown = not reason
         factors = (self._sliders[each.label] for each in (self._density, self._stiffness))
-        for handle in (self._mass, *factors, self._model, self._method):
+        for handle in (self._mass, *factors, self._model, self.method):
             handle.visible = shown
         self._of_run.visible = not shown
         self._of_run.content = readout.html_block(f'<div class="quiet">{reason}</div>')
         self._forgetting.visible = shown and depends_on_history(self._tension())
 
-    def read_out(self, verdict: str, numbers: str) -> None:
-        """Show the values."""
-        self._verdict.content = verdict
-        self._numbers.content = numbers
-
     def explain(self, text: str) -> None:
         """Write the reason why a pose is not feasible, and a remedy; "" for no text."""
         self._explained.content, self._explained.visible = text, bool(text)
 
-    def show_polygon(self, polygon: str) -> None:
-        """Show the feasible tensions."""
-        self._polygon.content = polygon
-
-    @property
-    def method_name(self) -> str:
-        """Name of the last chosen tension distribution method."""
-        return self._method_name
-
-    def choose_method(self, name: str) -> None:
-        """Choose a tension distribution method, one of `METHODS`."""
-        self._method.value = name
-
     def choose_by_hand(self, method: ByHand) -> None:
         """Choose tensions by hand, and add this choice to the list of methods."""
         self._by_hand = method
-        if BY_HAND not in self._method.options:
-            self._method.options = (*METHODS, BY_HAND)
-        self._method.value = BY_HAND
+        if BY_HAND not in self.method.options:
+            self.method.options = (*METHODS, BY_HAND)
+        self.method.value = BY_HAND
         self._changed()
-
-    def refuse(self, message: str) -> None:
-        """Write the reason why a setting is invalid."""
-        self._verdict.content = readout.refused(message)
-
-    def watched(self, handle: Any) -> Any:
-        """Make a control call `changed` after every change."""
-        handle.on_update(lambda _: self._changed())
-        return handle
 
     def _build_what_if(self, robot: Robot) -> None:
         gui = self._gui
@@ -155,31 +131,18 @@ class ControlPanel:
             self._of_run = gui.add_html("", visible=False)
             lightest, heaviest, step = mass_range(robot.mass)
             self._own_mass = robot.mass
-            self._mass = self.watched(
-                gui.add_slider(
-                    "Platform + load [kg]", lightest, heaviest, step, written_mass(robot.mass),
-                    hint="Mass of the platform with its load; the inertia scales with it.",
-                )
-            )  # fmt: skip
+            mass = written_mass(robot.mass)
+            hint = "Mass of the platform with its load; the inertia scales with it."
+            self._mass: Any = gui.add_slider("Platform + load [kg]", lightest, heaviest, step, mass, hint=hint)
             self._density = self._add_factor("Cable density ×", 0.1, 10.0, "Factor on the cables' mass per length.")
             self._stiffness = self._add_factor("Cable stiffness ×", 0.1, 10.0, "Factor on the cables' EA.")
-            self._model = self.watched(
-                gui.add_dropdown(
-                    "Cable model",
-                    tuple(MODELS),
-                    hint="With an approximate model, the orange platform shows the pose of equilibrium.",
-                )
-            )
-            self._method = self.watched(
-                gui.add_dropdown("Tensions", tuple(METHODS), hint="Tension distribution method.")
-            )
-            self._forgetting = gui.add_button(
-                "Reset history",
-                icon=viser.Icon.ERASER,
-                visible=False,
-                hint="The tensions depend on earlier poses; start again from this pose.",
-            )
+            hint = "With an approximate model, the orange platform shows the pose of equilibrium."
+            self._model = gui.add_dropdown("Cable model", tuple(MODELS), hint=hint)
+            self.method: Any = gui.add_dropdown("Tensions", tuple(METHODS), hint="Tension distribution method.")
+            hint = "The tensions depend on earlier poses; start again from this pose."
+            self._forgetting = gui.add_button("Reset history", icon=viser.Icon.ERASER, visible=False, hint=hint)
             self._forgetting.on_click(lambda _: self._forget())
+        self._watch(self._mass, self._model, self.method)
 
     def _add_factor(self, label: str, low: float, high: float, hint: str, least: float | None = None) -> Any:
         """Add a factor, initially 1, with a logarithmic slider; its left end is `least` (possibly 0), not `low`.
@@ -188,21 +151,28 @@ class ControlPanel:
         """
         least = low if least is None else least
         self._sliders[label] = self._gui.add_html(readout.factor_slider(label, low, high, least, hint))
-        return self.watched(self._gui.add_number(label, 1.0, min=least, max=high, step=0.1, visible=False))
+        number = self._gui.add_number(label, 1.0, min=least, max=high, step=0.1, visible=False)
+        self._watch(number)
+        return number
+
+    def _watch(self, *handles: Any) -> None:
+        """Make controls call `changed` after every change."""
+        for handle in handles:
+            handle.on_update(lambda _: self._changed())
 
     def _build_drawing(self) -> None:
         gui = self._gui
         with gui.add_folder("Drawing"):
             hint = "Range of the colors: the tension limits, or the tensions of the pose, so that they differ."
-            self._colors = self.watched(gui.add_dropdown("Colors by", (BY_LIMITS, BY_POSE), hint=hint))
+            self._colors = gui.add_dropdown("Colors by", (BY_LIMITS, BY_POSE), hint=hint)
             hint = "Factor on the drawn sag; 0, at the left end, draws straight cables."
             self._sag_scale = self._add_factor("Sag drawn ×", 0.05, 20.0, hint, 0.0)
             self._sag_hint = gui.add_html("", visible=False)
             hint = "Factor on the drawn position error of the orange platform."
             self._error_scale = self._add_factor("Error drawn ×", 1.0, 200.0, hint)
-            self._ghost = self.watched(
-                gui.add_checkbox("Straight cables beside", False, hint="Drawn if the sag of a cable is visible.")
-            )
+            hint = "Drawn if the sag of a cable is visible."
+            self.ghost: Any = gui.add_checkbox("Straight cables beside", False, hint=hint)
+        self._watch(self._colors, self.ghost)
 
 
 def _slid(slider: Any) -> float:

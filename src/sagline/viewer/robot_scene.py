@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 import viser
 
-from sagline.core.arrays import Array
+from sagline.core.arrays import Array, Indices
 from sagline.core.errors import InvalidValueError
 from sagline.robot.batch import pulleys_of
 from sagline.robot.pattern import ROTATING
@@ -49,56 +49,40 @@ class Nodes:
         node.visible = visible
         return node
 
-    def lines(self, name: str, segments: Array, color: Any, width: float) -> None:
+    def lines(self, name: str, segments: Array, color: Any, width: float) -> Any:
         """Draw segments (k, 2, 3) of a width [px], in one color or in the colors of their ends."""
         if not len(segments):
-            self.hide(name)
-            return
+            return self.hide(name)
         units, thickness = ("screen", width) if self._pixel == 0.0 else ("world", width * self._pixel)
-        self.draw(
-            name,
-            self.scene.add_line_segments,
-            points=segments.astype(np.float32),
-            colors=np.asarray(color, dtype=np.uint8),
-            thickness=thickness,
-            thickness_units=units,
-        )
+        looks: dict[str, Any] = {
+            "colors": np.asarray(color, dtype=np.uint8),
+            "thickness": thickness,
+            "thickness_units": units,
+        }
+        return self.draw(name, self.scene.add_line_segments, points=segments.astype(np.float32), **looks)
 
     def arrows(self, name: str, ends: Array, color: Any, shaft: float, head: float, length: float) -> None:
         """Draw arrows from `ends` (k, 2, 3); `shaft` and `head`: radii, `length`: length of the head [m]."""
-        self.draw(
-            name,
-            self.scene.add_arrows,
-            points=ends.astype(np.float32),
-            colors=np.broadcast_to(np.asarray(color, dtype=np.uint8), (len(ends), 3)),
-            shaft_radius=shaft,
-            head_radius=head,
-            head_length=length,
-        )
+        colors = np.broadcast_to(np.asarray(color, dtype=np.uint8), (len(ends), 3))
+        sizes: dict[str, Any] = {"shaft_radius": shaft, "head_radius": head, "head_length": length}
+        self.draw(name, self.scene.add_arrows, points=ends.astype(np.float32), colors=colors, **sizes)
 
     def label(self, name: str, text: str, position: Any, anchor: str = "bottom-center", scale: float = 1.0) -> None:
         """Write a text at a position."""
-        self.draw(
-            name,
-            self.scene.add_label,
-            visible=bool(text),
-            text=text,
-            position=position,
-            anchor=anchor,
-            font_screen_scale=scale,
-        )
+        looks: dict[str, Any] = {"position": position, "anchor": anchor, "font_screen_scale": scale}
+        self.draw(name, self.scene.add_label, visible=bool(text), text=text, **looks)
 
     def body(self, name: str, solid: Solid, color: Any, opacity: float, pose: Pose, position: Any = None) -> None:
         """Draw a solid at a pose, optionally at another position."""
         place = pose.position if position is None else position
         self.draw(name, self.scene.add_frame, show_axes=False, position=place, wxyz=np.roll(pose.quaternion, 1))
-        self.draw(
-            f"{name}/body",
-            self.scene.add_mesh_simple,
-            vertices=solid.vertices.astype(np.float32),
-            faces=solid.faces.astype(np.uint32),
-            color=color,
-            opacity=opacity,
+        self.mesh(f"{name}/body", *solid, color, opacity)
+
+    def mesh(self, name: str, vertices: Array, faces: Indices, color: Any, opacity: Any = None, **looks: Any) -> Any:
+        """Draw a mesh in one color."""
+        points, corners = vertices.astype(np.float32), faces.astype(np.uint32)
+        return self.draw(
+            name, self.scene.add_mesh_simple, vertices=points, faces=corners, color=color, opacity=opacity, **looks
         )
 
     def hide(self, *names: str) -> None:
@@ -146,7 +130,7 @@ class RobotScene:
         self, scene: viser.SceneApi, robot: Robot, home: Pose, *, live: bool = True, pixel: float = 0.0
     ) -> None:
         """Build the scene with the platform at its home pose."""
-        self._scene, self._live, self._pixel = scene, live, pixel
+        self._scene, self._live, self._nodes = scene, live, Nodes(scene, pixel)
         self._build_lights()
         self._low, self._high = shapes.bounds(robot)
         self._size = shapes.size_of(robot)
@@ -154,17 +138,9 @@ class RobotScene:
         self._build_surroundings(robot)
         body = self._body = shapes.platform_solid(robot)
         self._gizmo: Any = self._build_gizmo(robot, body) if live else scene.add_frame("/platform", show_axes=False)
-        self._traces: list[Any] = []
-        self._platform: Any = self._scene.add_mesh_simple("/platform/body", body.vertices, body.faces, color=PLATFORM)
-        self._rest_frame = self._scene.add_frame("/rest", show_axes=False, visible=False)
-        self._scene.add_mesh_simple("/rest/body", body.vertices, body.faces, color=REST, opacity=0.55)
-        self._truth: Any = None  # created when it is first known
+        self._platform = self._nodes.mesh("/platform/body", *body, PLATFORM)
         self._over_pulleys = pulleys_of(robot).radius > 0.0
         self._wheels = self._build_pulleys(robot, home) if self._over_pulleys.any() else None
-        blank = np.zeros((robot.cable_count * (shapes.points_per_cable(robot) - 1), 2, 3))
-        self._cables = self._scene.add_line_segments("/cables", blank, GHOST, **self._wide(CABLE_WIDTH))
-        self._cables.colors = np.zeros(blank.shape, dtype=np.uint8)
-        self._ghost = self._scene.add_line_segments("/chords", blank, GHOST, **self._wide(GHOST_WIDTH), visible=False)
         self._notice = self._scene.add_label(
             "/platform/notice", "", position=(0.0, 0.0, 0.13 * self._size), visible=False, anchor="bottom-center"
         )
@@ -208,8 +184,8 @@ class RobotScene:
         self, snapshot: Configuration, scale: TensionScale, sag_scale: float, error_scale: float, *, ghost: bool
     ) -> None:
         """Draw a configuration; the platform itself follows the gizmo."""
-        self._cables.points = cable_segments(snapshot, sag_scale).astype(np.float32)
-        self._cables.colors = cable_colors(snapshot, scale)
+        nodes, points = self._nodes, cable_segments(snapshot, sag_scale)
+        self._cables = nodes.lines("/cables", points, cable_colors(snapshot, scale), CABLE_WIDTH)
         if self._wheels is not None:
             turns = shapes.pulley_rotations(snapshot.robot, snapshot.pose)[self._over_pulleys]
             self._wheels.batched_wxyzs = turns.astype(np.float32)
@@ -219,18 +195,19 @@ class RobotScene:
             self._notice.text = headline(snapshot)
         elif isinstance(snapshot, InMotion):
             self._notice.text = snapshot.notice
-            self._show_truth(snapshot, error_scale)
-        self._ghost.visible = ghost
+            self._show_other("/truth", TRUTH, snapshot.pose, snapshot.truth, error_scale)
         if ghost:
-            self._ghost.points = chord_segments(snapshot, sag_scale, APART * self._size).astype(np.float32)
-        _move(self._rest_frame, snapshot.pose, snapshot.rest, error_scale)
+            nodes.lines("/chords", chord_segments(snapshot, sag_scale, APART * self._size), GHOST, GHOST_WIDTH)
+        else:
+            nodes.hide("/chords")
+        self._show_other("/rest", REST, snapshot.pose, snapshot.rest, error_scale)
 
-    def _show_truth(self, drawn: InMotion, error_scale: float) -> None:
-        if self._truth is None and drawn.truth is not None:
-            self._truth = self._scene.add_frame("/truth", show_axes=False)
-            self._scene.add_mesh_simple("/truth/body", self._body.vertices, self._body.faces, color=TRUTH, opacity=0.55)
-        if self._truth is not None:
-            _move(self._truth, drawn.pose, drawn.truth, error_scale)
+    def _show_other(self, name: str, color: Any, pose: Pose, other: Pose | None, error_scale: float) -> None:
+        """Draw the platform at another pose, with its distance from `pose` scaled; hide it if this pose is unknown."""
+        if other is None or not np.isfinite(other.position).all():
+            self._nodes.hide(name)
+        else:
+            self._nodes.body(name, self._body, color, 0.55, other, scaled_position(pose, other, error_scale))
 
     def swing(self, rest: Pose, pose: Pose, courses: Array) -> None:
         """Draw the displaced platform and cables (m, P, 3), with the gizmo at the pose of rest."""
@@ -246,19 +223,9 @@ class RobotScene:
 
     def show_traces(self, wanted: Array, actual: Array) -> None:
         """Draw the desired and the actual path (n, 3) instead of the previous paths; NaN is a gap."""
-        while self._traces:
-            self._traces.pop().remove()
         for name, points, color in (("/wanted", wanted, WANTED), ("/actual", actual, ACTUAL)):
             pairs = np.stack((points[:-1], points[1:]), axis=1)
-            known = pairs[np.isfinite(pairs).all(axis=(1, 2))]
-            if len(known):
-                self._traces.append(self._scene.add_line_segments(name, known, color, **self._wide(TRACE_WIDTH)))
-
-    def _wide(self, pixels: float) -> dict[str, Any]:
-        """Arguments for the width of lines."""
-        if self._pixel == 0.0:
-            return {"thickness": pixels, "thickness_units": "screen"}
-        return {"thickness": pixels * self._pixel, "thickness_units": "world"}
+            self._nodes.lines(name, pairs[np.isfinite(pairs).all(axis=(1, 2))], color, TRACE_WIDTH)
 
     def _build_lights(self) -> None:
         """Add light from above and below without shadows and environment map, for computers without a graphics card.
@@ -272,10 +239,10 @@ class RobotScene:
         )
 
     def _build_surroundings(self, robot: Robot) -> None:
-        frame = shapes.frame_solid(robot)
-        self._scene.add_mesh_simple("/frame", frame.vertices, frame.faces, color=STEEL)
+        nodes = self._nodes
+        nodes.mesh("/frame", *shapes.frame_solid(robot), STEEL)
         if len(self._winches.faces):
-            self._scene.add_mesh_simple("/winches", self._winches.vertices, self._winches.faces, color=DRUM)
+            nodes.mesh("/winches", *self._winches, DRUM)
         self._build_dead_cables(robot)
         width, depth = 1.5 * (self._high - self._low)[:2]
         cell = shapes.round_below(self._size / 10.0)
@@ -287,12 +254,8 @@ class RobotScene:
         )  # fmt: skip
         self._build_axes()
         for place, names in _neighbors(robot.frame_anchors, NEAR * self._size) if self._live else ():
-            self._scene.add_label(
-                f"/names/{names[0]}",
-                ", ".join(map(str, names)),
-                position=place + np.array([0.0, 0.0, NEAR * self._size]),
-                anchor="bottom-center",
-            )
+            above = place + np.array([0.0, 0.0, NEAR * self._size])
+            nodes.label(f"/names/{names[0]}", ", ".join(map(str, names)), above)
 
     def _build_pulleys(self, robot: Robot, pose: Pose) -> viser.BatchedMeshHandle:
         """Draw pulleys in their real size; they swivel with the platform."""
@@ -310,19 +273,17 @@ class RobotScene:
             shown = runs[which & (runs[:, 0, 2] != runs[:, 1, 2])]
             if len(shown):
                 pieces = shapes.segments(shapes.straight(shown), dashed=name != "/dead")
-                self._scene.add_line_segments(name, pieces, STEEL, **self._wide(GHOST_WIDTH))
+                self._nodes.lines(name, pieces, STEEL, GHOST_WIDTH)
 
     def _build_axes(self) -> None:
         """Draw world axes at a corner of the floor, with a round length as the scale."""
         arm = shapes.round_below(_ARM * self._size)
         corner = self._low - np.array([0.0, 0.06 * self._size, 0.0])
         arms = np.stack((np.zeros((3, 3)), arm * np.eye(3)), axis=1) + corner
-        self._scene.add_line_segments("/axes", arms, STEEL, **self._wide(ARM_WIDTH))
+        self._nodes.lines("/axes", arms, STEEL, ARM_WIDTH)
         for name, place in zip("xyz", arms[:, 1], strict=True):
-            self._scene.add_label(f"/axes/{name}", name, position=place, anchor="bottom-center", font_screen_scale=0.8)
-        self._scene.add_label(
-            "/axes/length", f"{arm:g} m", position=arms[0].mean(axis=0), anchor="top-center", font_screen_scale=0.8
-        )
+            self._nodes.label(f"/axes/{name}", name, place, scale=0.8)
+        self._nodes.label("/axes/length", f"{arm:g} m", arms[0].mean(axis=0), "top-center", 0.8)
 
     def _build_gizmo(self, robot: Robot, body: shapes.Solid) -> viser.TransformControlsHandle:
         free = np.abs(robot.freedom[:, :3]).max(axis=0) > 0.5  # world axes along which the platform can move
@@ -334,14 +295,6 @@ class RobotScene:
             active_axes=(bool(free[0]), bool(free[1]), bool(free[2])),
             disable_rotations=robot.motion_pattern not in ROTATING,
         )  # fmt: skip
-
-
-def _move(frame: Any, pose: Pose, other: Pose | None, error_scale: float) -> None:
-    """Move a frame to the pose `other`, with its distance from `pose` scaled; hide the frame if `other` is unknown."""
-    frame.visible = other is not None and bool(np.isfinite(other.position).all())
-    if frame.visible and other is not None:
-        frame.position = scaled_position(pose, other, error_scale)
-        frame.wxyz = np.roll(other.quaternion, 1)
 
 
 def _without_rounding(values: Array) -> Array:

@@ -21,11 +21,13 @@ from types import SimpleNamespace
 from typing import Any, Final, NamedTuple, cast
 from urllib.parse import quote
 
+import numpy as np
 import viser
 import websockets
 from viser import infra
 from viser.infra import _infra
 
+from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
 from sagline.viewer.access import CLIENTS, Access, bracketed
 
@@ -236,6 +238,15 @@ def _check(host: str, port: int) -> None:
 def chosen_by(topic: str, value: str | int) -> str:
     """Attributes of an HTML element that sends a value under a topic when it is clicked; see browser/choices.js."""
     return f'data-send="{topic}" data-value="{escape(str(value))}"'
+
+
+def finite_numbers(value: Any, count: int, largest: float) -> Array | None:
+    """Exactly `count` numbers of magnitudes up to `largest`, from the unchecked list of a message; None for others."""
+    if not isinstance(value, list) or len(value) != count:
+        return None
+    if not all(type(each) in (int, float) and abs(each) <= largest for each in value):  # also excludes NaN
+        return None
+    return np.array(value, dtype=np.float64)
 
 
 class Messages:

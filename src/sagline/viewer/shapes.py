@@ -189,7 +189,8 @@ def winch_solid(robot: Robot) -> Solid:
     """Known drums, and a mark at every frame anchor without a visible pulley."""
     radius = _WINCH * size_of(robot)
     marked = robot.frame_anchors[pulleys_of(robot).radius < radius]
-    parts = [drum(place, radius) for place in np.unique(marked, axis=0)]
+    up = np.array([0.0, 0.0, radius])
+    parts = [rod(np.stack((place - up, place + up)), radius) for place in np.unique(marked, axis=0)]
     known = None if robot.winches is None else robot.winches.drum_radius
     if known is not None:
         parts += [rod(ends, thick) for ends, thick in zip(drum_axes(robot), known, strict=True)]
@@ -252,14 +253,6 @@ def platform_solid(robot: Robot) -> Solid:
 def cuboid(middle: Array, edges: Array) -> Solid:
     """A box along the axes."""
     return _hull(middle + _SIGNS * edges)
-
-
-def drum(middle: Array, radius: float) -> Solid:
-    """A vertical cylinder whose height equals its diameter."""
-    angle = np.linspace(0.0, 2.0 * np.pi, _SIDES, endpoint=False)
-    ring = radius * np.stack((np.cos(angle), np.sin(angle), np.zeros(_SIDES)), axis=1)
-    up = np.array([0.0, 0.0, radius])
-    return _hull(middle + np.concatenate((ring - up, ring + up)))
 
 
 def tube(points: Array, radius: float, sides: int = 6) -> Solid:

@@ -49,17 +49,7 @@ class Patch(NamedTuple):
 def draw_patches(nodes: Nodes, name: str, patches: list[Patch], side: str = "double") -> None:
     """Draw `patches` below `name`, instead of the previous patches."""
     for k, patch in enumerate(patches):
-        nodes.draw(
-            f"{name}/{k}",
-            nodes.scene.add_mesh_simple,
-            vertices=patch.vertices.astype(np.float32),
-            faces=patch.faces.astype(np.uint32),
-            color=patch.color,
-            opacity=patch.opacity,
-            side=side,
-            cast_shadow=False,
-            receive_shadow=False,
-        )
+        nodes.mesh(f"{name}/{k}", *patch, side=side, cast_shadow=False, receive_shadow=False)
     nodes.keep_first(name, len(patches))
 
 

@@ -1,5 +1,5 @@
 // Pictures that the server requests stay on this page; the server receives a single pixel instead.
-// A picture for print (offscreen.py) is saved at once, with its dots per inch.
+// A picture for print (features/export.py) is saved at once, with its dots per inch.
 (() => {
   const PIXEL =
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mP8z8BQDwAEhQGAhKmMIQAAAABJRU5ErkJggg==";

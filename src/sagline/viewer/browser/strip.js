@@ -1,4 +1,4 @@
-// Strip below a picture or a film (offscreen.py): title, remark, colors of tensions, and the clock of a film.
+// Strip below a picture or a film (features/export.py): title, remark, colors of tensions, and the clock of a film.
 (() => {
   const INK = "#1f2328", QUIET = "#57606a", LINE = "#d0d5db", BAD = "#b42323";
   const FONT = "system-ui, sans-serif";

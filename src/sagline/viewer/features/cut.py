@@ -15,7 +15,7 @@ from sagline.dynamics.simulation.simulate import losses_after_break, started_run
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.viewer import shapes
-from sagline.viewer.camera import camera_of, nearest_line, screen_point
+from sagline.viewer.camera import OUTSIDE, camera_of, nearest_line
 from sagline.viewer.feature import BackgroundTask, Feature, View
 from sagline.viewer.features.state import FIRST
 from sagline.viewer.page import Page
@@ -23,6 +23,7 @@ from sagline.viewer.playback import PlayedSimulation
 from sagline.viewer.player import PlayerState
 from sagline.viewer.readout import definitions, refused, sentence, verdict_box
 from sagline.viewer.robot_scene import Nodes
+from sagline.viewer.server import finite_numbers
 from sagline.viewer.tension_scale import force_unit
 
 PARTS: Final = (0.03, 0.1, 0.3, 0.7, 1.5, 2.8, 4.2)  # ends of the parts [s]; the first part is short and shown soon
@@ -207,7 +208,7 @@ class CutFeature(Feature):
 
     def _pick(self, value: Any, client: int) -> None:
         """Mark the cable at a point of the picture; `value` is unchecked data of a client."""
-        at, camera, view = screen_point(value), camera_of(self._page.server, client), self._page.view
+        at, camera, view = finite_numbers(value, 2, OUTSIDE), camera_of(self._page.server, client), self._page.view
         if at is None or camera is None or view is None or self._page.state is None:
             return
         cable = nearest_line(camera, at, view.snapshot.courses(view.settings.sag_scale), NEAR)

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
-from math import ceil, log10
-from typing import Any, Final
+from math import atan, ceil, log10, tan
+from typing import Any, Final, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 import viser
+from scipy.spatial.transform import Rotation
 
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError, SaglineError
@@ -18,15 +20,132 @@ from sagline.files.writing import file_stem
 from sagline.robot.batch import pulleys_of
 from sagline.viewer import shapes
 from sagline.viewer.feature import Feature, View
-from sagline.viewer.offscreen import HEIGHT as STRIP
-from sagline.viewer.offscreen import PAPERS, Shot, offscreen_scene, save_picture, strip_of
 from sagline.viewer.page import Page
 from sagline.viewer.player import InMotion, Played
-from sagline.viewer.readout import headline
-from sagline.viewer.robot_scene import DRUM, INFEASIBLE, PLATFORM, STEEL
+from sagline.viewer.readout import css_color, headline, spaced_ticks
+from sagline.viewer.robot_scene import DRUM, INFEASIBLE, PLATFORM, STEEL, TRACE_POINTS, RobotScene
 from sagline.viewer.server import Messages
 from sagline.viewer.snapshot import Snapshot
-from sagline.viewer.tension_scale import TensionScale
+from sagline.viewer.tension_scale import TensionScale, force_unit
+
+STRIP: Final = 4.0  # height of the legend in text sizes
+_STOPS = 16  # number of colors of the bar
+
+
+def strip_of(view: View, *remarks: str) -> dict[str, Any]:
+    """Texts and colors below a picture of a view, as JSON."""
+    settings, scale = view.settings, view.scale
+    unit = force_unit(view.snapshot.robot)
+    drawn = [(settings.sag_scale, "sag"), (settings.error_scale, "errors")]
+    larger = [f"{what} drawn {factor:g} times as large" for factor, what in drawn if factor != 1.0]
+    shares = np.linspace(0.0, 1.0, _STOPS)
+    colors = scale.colors(scale.low * (scale.high / scale.low) ** shares)
+    return {
+        "title": view.snapshot.robot.name,
+        "remark": ", ".join((*remarks, *larger)),
+        "colors": [css_color(color) for color in colors],
+        "ticks": [[f"{tick / unit.newtons:g}", place] for tick, place in spaced_ticks(scale)],
+        "legend": f"Chord tension [{unit.name}]",
+    }
+
+
+PATIENCE: Final = 30.0  # longest wait for a picture [s]
+NAMES: Final = ("/names", "/platform/notice")  # nodes that pictures omit
+STATIC: Final = ("/hull", "/slice")  # nodes that do not change over time
+BORDER: Final = 1.06  # factor on the robot's size, for a margin
+SHAPES: Final = 0.8, 2.4  # smallest and largest ratio of width to height
+DEEPEST: Final = 950.0  # largest depth [m]: viser does not draw objects beyond 1000 m in requested pictures
+_FIRST: Final = 32  # size of the discarded first picture [px]
+
+
+class Shot(NamedTuple):
+    """A picture that is requested from a client's page."""
+
+    height: int  # [px]
+    width: int  # [px]
+    field: float  # vertical field of view [rad]
+    pixel: float  # size of a pixel at the distance of the robot [m]
+    # advance of the client's camera, for robots that extend beyond the largest depth [m]
+    forward: float
+
+    @classmethod
+    def of(cls, camera: viser.CameraHandle, low: Array, high: Array, width: int, height: int = 0) -> Shot:
+        """Picture of the visible part of the box from `low` to `high`, for any proportions of the client's window."""
+        right, up, far, forward = _seen(camera, low, high)
+        rows = height or round(width / float(np.clip(right / up, *SHAPES)))
+        slope = BORDER * max(up, right * rows / width)
+        return cls(rows, width, 2.0 * atan(slope), 2.0 * far * slope / rows, forward)
+
+
+def _seen(camera: viser.CameraHandle, low: Array, high: Array) -> tuple[float, float, float, float]:
+    """Visible extents of a box, horizontal and vertical [slope], its distance, and the advance of the camera [m]."""
+    try:
+        eye = np.array(camera.position, dtype=np.float64).reshape(3)
+        edge = tan(0.5 * float(camera.fov)) * np.array([float(camera.aspect), 1.0])
+        corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
+        place = _turn(camera).inv().apply(corners - eye)
+        if not (np.isfinite(place).all() and np.all((edge > 0.01) & (edge < 100.0))):
+            raise ValueError(edge)
+    except (TypeError, ValueError, ZeroDivisionError):
+        step = "Reload the page."
+        raise InvalidValueError("camera", "not known", "a position, a direction and a field of view", step) from None
+    depth = place[:, 2]
+    far, forward = float(depth.mean()), max(0.0, float(depth.max()) - DEEPEST)
+    if depth.min() <= forward:  # part of the box is behind the camera
+        return float(edge[0]), float(edge[1]), max(far, 0.1 * float(np.linalg.norm(high - low))), 0.0
+    reach, nearer = (np.abs(place[:, :2] / (depth - nearer)[:, None]).max(axis=0) for nearer in (0.0, forward))
+    right, up = (nearer * np.minimum(1.0, edge / reach)).tolist()  # the part within the window
+    return right, up, far - forward, forward
+
+
+def _turn(camera: viser.CameraHandle) -> Rotation:
+    """Rotation from a camera's axes (right, down and forward) to the world axes."""
+    return Rotation.from_quat(np.array(camera.wxyz, dtype=np.float64).reshape(4), scalar_first=True)
+
+
+Show: TypeAlias = Callable[[View], None]  # draws a view
+Take: TypeAlias = Callable[..., None]  # makes the page take a picture, "png" or "jpeg", and waits for it
+
+
+@contextmanager
+def offscreen_scene(
+    client: viser.ClientHandle,
+    server: viser.ViserServer,
+    shot: Shot,
+    view: View,
+    line_width: float,
+    played: Played | None = None,
+) -> Iterator[tuple[Show, Take]]:
+    """Context manager of a scene of one client, for pictures of the played motion or of the view."""
+
+    def show(view: View) -> None:
+        settings = view.settings
+        with client.atomic():
+            scene.place(view.snapshot.pose)
+            scene.show(view.snapshot, view.scale, settings.sag_scale, settings.error_scale, ghost=view.ghost)
+
+    def take(kind: Literal["png", "jpeg"], height: int = shot.height, width: int = shot.width) -> None:
+        camera = client.camera
+        place = camera.position + shot.forward * _turn(camera).apply([0.0, 0.0, 1.0])
+        looks: dict[str, Any] = {"wxyz": camera.wxyz, "position": place, "fov": shot.field}
+        client.get_render(height, width, transport_format=kind, timeout=PATIENCE, **looks)
+
+    snapshot = view.snapshot
+    robot, home = (snapshot.robot, snapshot.pose) if played is None else (played.robot, played.at(0.0).pose)
+    try:
+        scene = RobotScene(client.scene, robot, home, live=False, pixel=line_width * shot.pixel)
+        if played is not None:
+            scene.show_traces(*played.traces(TRACE_POINTS, view.settings.error_scale))
+        drawn = set(client.scene._handle_from_node_name)  # viser has no public list of its nodes
+        for name in sorted(set(server.scene._handle_from_node_name) - drawn):
+            if name.startswith(NAMES) or (played is not None and not name.startswith(STATIC)):
+                client.scene.add_frame(name, show_axes=False, visible=False)
+        show(view)
+        take("jpeg", _FIRST, _FIRST)  # labels appear one picture late
+        yield show, take
+    finally:
+        client.scene.reset()
+
 
 WIDTH, HEIGHT, TEXT = 1920, 1080, 26  # size of a picture [px]
 RATE = 30.0  # pictures of a film per second
@@ -34,7 +153,15 @@ LONGEST = 120.0  # longest film [s]; a longer one would fill the memory of a bro
 LINE_WIDTH = 1.4  # line width relative to that on the screen
 TOPIC: Final = "film"  # topic of the description of the film
 CLOCK: Final = "film clock"  # topic of the texts of its strip, before each picture
-
+PICTURE: Final = "picture"  # topic of the description of a picture
+LETTERS: Final = 8.0  # text size of a picture [pt]
+LINE: Final = 0.3  # points on paper per pixel on a screen; a cable is about 1 pt wide
+# width [in] and dots per inch of printed pictures: widths of IEEE columns; 600 dots per inch for line drawings
+PAPERS: Final = {
+    "Column, 89 mm at 600 dpi": (3.5, 600),
+    "Page, 182 mm at 300 dpi": (7.16, 300),
+    "Page, 182 mm at 600 dpi": (7.16, 600),
+}
 
 _CABLE_RADIUS = 0.0012  # radius of cables, as a share of the robot's size; real cables would be too thin to see
 _DEAD_RADIUS = 0.0006  # radius of dead lengths, as a share of the robot's size
@@ -86,58 +213,6 @@ def _add(scene: Any, name: str, solid: shapes.Solid, color: tuple[int, ...], pla
     scene.add_geometry(mesh, node_name=name, geom_name=name, transform=place)
 
 
-def _filmed(
-    client: viser.ClientHandle,
-    server: viser.ViserServer,
-    messages: Messages,
-    played: Played,
-    view: View,
-    speed: float,
-    name: str,
-    extent: tuple[Array, Array],
-    cancelled: Callable[[], bool],
-) -> None:
-    """Make a client's page record a film of the played motion from its camera; other clients are not affected.
-
-    Args:
-        client: The client.
-        server: The server; its scene is hidden from the client until the film is complete.
-        messages: Messages to the client's page.
-        played: Played motion: a run, a simulation or a log.
-        view: View whose settings are used for all configurations of the motion.
-        speed: Ratio of the time of the played motion to the time of the film.
-        name: Name of the file, without suffix.
-        extent: Lowest and highest corner of everything that is drawn [m].
-        cancelled: Function that returns True if the film was cancelled.
-
-    Raises:
-        InvalidValueError: If the film would be too long.
-        RuntimeError: If the client disconnects or does not send a picture.
-        TimeoutError: If a picture does not arrive in time.
-    """
-    times = moments(played.duration, speed)
-    strip = round(STRIP * TEXT)
-    pace = () if speed == 1.0 else (f"{speed:g} × its speed",)
-    about = {
-        **strip_of(view, played.name, *pace), "name": name, "count": len(times), "rate": RATE,
-        "width": WIDTH, "height": HEIGHT, "text": TEXT, "strip": strip,
-    }  # fmt: skip
-    shot = Shot.of(client.camera, *extent, WIDTH, HEIGHT - strip)
-    messages.send(CLOCK, None)  # pictures without a clock do not belong to the film
-    messages.send(TOPIC, about)
-    try:
-        with offscreen_scene(client, server, shot, view, LINE_WIDTH, played) as scene:
-            for time in times:
-                if cancelled():
-                    return
-                frame = replace(view, snapshot=played.at(float(time)))
-                scene.show(frame)
-                messages.send(CLOCK, _clock(frame, float(time), speed))
-                scene.take("jpeg")
-    finally:
-        messages.send(TOPIC, None)  # a page with all pictures completes the film
-
-
 def moments(duration: float, speed: float) -> Array:
     """Times of a film's pictures [s], from 0 to the end, shape (n,), n >= 2.
 
@@ -178,7 +253,7 @@ class ExportFeature(Feature):
     def __init__(self, page: Page) -> None:
         """Build the panel."""
         server, channel = page.server, page.channel
-        self._page, self._server, self._extent = page, server, page.extent
+        self._page, self._server = page, server
         self._exporters: dict[int, _Exporter] = {}
         gui = server.gui
         with gui.add_folder("Export", expand_by_default=False):
@@ -206,10 +281,24 @@ class ExportFeature(Feature):
         self._film.label = f"Film of the {None if played is None else played.name}"
 
     def _send_picture(self, exporter: _Exporter) -> None:
-        view, paper = self._page.view, PAPERS.get(self._paper.value)
-        if view is not None and paper is not None:
-            messages, strip = exporter.messages, bool(self._strip.value)
-            save_picture(exporter.client, self._server, messages, view, paper, self._name(), self._extent, strip=strip)
+        """Make the client's page save a picture of the view from its camera, without gizmo and labels."""
+        view, paper, client = self._page.view, PAPERS.get(self._paper.value), exporter.client
+        if view is None or paper is None:
+            return
+        width, dots = paper
+        text = LETTERS * dots / 72.0
+        beneath = round(STRIP * text) if self._strip.value else 0
+        shot = Shot.of(client.camera, *self._page.extent, round(width * dots))
+        about = {
+            **strip_of(view), "name": self._name(), "dots": dots, "text": text, "strip": beneath,
+            "width": shot.width, "height": shot.height + beneath,
+        }  # fmt: skip
+        try:
+            with offscreen_scene(client, self._server, shot, view, LINE * dots / 72.0) as (_, take):
+                exporter.messages.send(PICTURE, about)
+                take("png")
+        finally:
+            exporter.messages.send(PICTURE, None)
 
     def _send_scene(self, exporter: _Exporter) -> None:
         view = self._page.view
@@ -218,12 +307,36 @@ class ExportFeature(Feature):
             exporter.client.send_file_download(f"{self._name()}.glb", glb, save_immediately=True)
 
     def _send_film(self, exporter: _Exporter) -> None:
+        """Make the client's page record a film of the played motion from its camera; others are not affected.
+
+        The settings of the view are used for all configurations. The server's scene is hidden from the client until the
+        film is complete.
+        """
         view, played, speed = self._page.view, self._page.player.played, self._page.player.speed
-        if played is not None and view is not None:
-            exporter.cancelled.clear()
-            client, name = exporter.client, f"{self._name()}-{played.name}"
-            messages, cancelled = exporter.messages, exporter.cancelled.is_set
-            _filmed(client, self._server, messages, played, view, speed, name, self._extent, cancelled)
+        if played is None or view is None:
+            return
+        exporter.cancelled.clear()
+        client, send, times = exporter.client, exporter.messages.send, moments(played.duration, speed)
+        strip = round(STRIP * TEXT)
+        pace = () if speed == 1.0 else (f"{speed:g} × its speed",)
+        about = {
+            **strip_of(view, played.name, *pace), "name": f"{self._name()}-{played.name}", "count": len(times),
+            "rate": RATE, "width": WIDTH, "height": HEIGHT, "text": TEXT, "strip": strip,
+        }  # fmt: skip
+        shot = Shot.of(client.camera, *self._page.extent, WIDTH, HEIGHT - strip)
+        send(CLOCK, None)  # pictures without a clock do not belong to the film
+        send(TOPIC, about)
+        try:
+            with offscreen_scene(client, self._server, shot, view, LINE_WIDTH, played) as (show, take):
+                for time in times:
+                    if exporter.cancelled.is_set():
+                        return
+                    frame = replace(view, snapshot=played.at(float(time)))
+                    show(frame)
+                    send(CLOCK, _clock(frame, float(time), speed))
+                    take("jpeg")
+        finally:
+            send(TOPIC, None)  # a page with all pictures completes the film
 
     def _cancel(self, _: Any, client: int) -> None:
         """Cancel the film of a client."""

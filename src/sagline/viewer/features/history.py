@@ -12,7 +12,6 @@ from sagline.core.arrays import Array
 from sagline.core.errors import SaglineError
 from sagline.kinematics.plan import Plan
 from sagline.robot.pose import Pose
-from sagline.viewer.by_hand import ByHand
 from sagline.viewer.feature import Feature, View
 from sagline.viewer.features.cut import Before, CutFeature
 from sagline.viewer.features.push import PushFeature
@@ -21,6 +20,7 @@ from sagline.viewer.page import Page
 from sagline.viewer.player import PlayerState
 from sagline.viewer.readout import html_block
 from sagline.viewer.server import chosen_by
+from sagline.viewer.snapshot import ByHand
 
 PAUSE: Final = 0.4  # time without a change after which the inputs are recorded [s], so that a drag is one step
 MOST: Final = 200  # largest number of steps

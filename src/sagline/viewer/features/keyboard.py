@@ -16,24 +16,20 @@ from sagline.viewer.feature import Feature, View
 from sagline.viewer.page import Page
 from sagline.viewer.player import InMotion
 from sagline.viewer.readout import headline
+from sagline.viewer.server import finite_numbers
 from sagline.viewer.tension_scale import force_unit, number_text
 
 
 def screen_reader_text(view: View) -> dict[str, str]:
     """Verdict, whole text and position of a view for screen readers."""
     snapshot = view.snapshot
-    place = place_of(snapshot.pose)
     if isinstance(snapshot, InMotion):
         head = snapshot.notice or f"As in the {'recording' if view.played is None else view.played.name}"
-        return {"head": head, "text": _with(head, _tensions(snapshot.robot, snapshot.tension)), "place": place}
-    head = headline(snapshot)
-    text = _tensions(snapshot.robot, snapshot.tension) if snapshot.solved else snapshot.reason
-    return {"head": head, "text": _with(head, text), "place": place}
-
-
-def _description(robot: Robot) -> str:
-    """Description of the robot."""
-    return f"{robot.name}: a platform of {number_text(robot.mass, '.4g')} kg on {robot.cable_count} cables"
+        text = _tensions(snapshot.robot, snapshot.tension)
+    else:
+        head = headline(snapshot)
+        text = _tensions(snapshot.robot, snapshot.tension) if snapshot.solved else snapshot.reason
+    return {"head": head, "text": f"{head}, {text}" if text else head, "place": place_of(snapshot.pose)}
 
 
 def place_of(pose: Pose) -> str:
@@ -42,10 +38,6 @@ def place_of(pose: Pose) -> str:
     angles = [number_text(value, ".0f") for value in pose.rotation.as_euler("ZYX", degrees=True)]
     place = f"x {x}, y {y}, z {z} m"
     return place if angles == ["0"] * 3 else f"{place}, turned {', '.join(angles)} degrees about z, y, x"
-
-
-def _with(head: str, text: str) -> str:
-    return f"{head}, {text}" if text else head
 
 
 def _tensions(robot: Robot, tension: Array) -> str:
@@ -69,14 +61,13 @@ class KeyboardFeature(Feature):
     def __init__(self, page: Page) -> None:
         """Send the description of the scene."""
         channel, robot = page.channel, page.robot
-        self._channel, self._go, self._go_home = channel, page.go_near, page.go_home
+        self._channel, self._go = channel, page.go_near
         self._step = shapes.round_below(STEP * shapes.size_of(robot))
         self._pose: Pose | None = None
-        channel.send(
-            "scene", {"what": _description(robot), "step": self._step, "turn": round(float(np.degrees(TURN)), 3)}
-        )
+        what = f"{robot.name}: a platform of {number_text(robot.mass, '.4g')} kg on {robot.cable_count} cables"
+        channel.send("scene", {"what": what, "step": self._step, "turn": round(float(np.degrees(TURN)), 3)})
         channel.on("nudge", self._on_nudge)
-        channel.on("home", lambda *_: self._go_home())
+        channel.on("home", lambda *_: page.go_home())
 
     def follow(self, view: View) -> None:
         """Send the verdict."""
@@ -85,7 +76,7 @@ class KeyboardFeature(Feature):
 
     def _on_nudge(self, value: Any, _: int) -> None:
         """Move by steps along x, y, z, and rotate by steps about z, y, x."""
-        steps = _steps(value)
+        steps = finite_numbers(value, 6, MOST)
         if steps is None or self._pose is None:
             return
         pose = nudged(self._pose, self._step * steps[:3], TURN * steps[:2:-1])
@@ -102,12 +93,3 @@ def nudged(pose: Pose, displacement: Array, turn: Array) -> Pose:
     """`pose`, displaced by `displacement` [m] and rotated about its origin by the rotation vector `turn` [rad]."""
     rotation = Rotation.from_rotvec(turn) * pose.rotation if turn.any() else pose.rotation
     return Pose(pose.position + displacement, rotation)
-
-
-def _steps(value: Any) -> Array | None:
-    """Six numbers of steps from `value`, the data of a message; None for invalid data."""
-    if not isinstance(value, list) or len(value) != 6:
-        return None
-    if not all(isinstance(each, int | float) and abs(each) <= MOST for each in value):  # also excludes NaN
-        return None
-    return np.array(value, dtype=np.float64)

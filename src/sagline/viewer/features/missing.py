@@ -69,7 +69,7 @@ def _missing_rows(snapshot: Snapshot, missing: MissingWrench) -> list[tuple[str,
             ("with moment", f"{_moment(missing)}: {turning} N m about x, y, z through the center of mass"),
         ]
     for lower in (True, False):
-        cables = [str(each.cable) for each in missing.limits if each.lower is lower]
+        cables = [str(cable) for cable, at_lower in missing.limits.items() if at_lower is lower]
         if cables:
             rows.append(
                 (f"At {'lower' if lower else 'upper'} limit", f"cable{'s'[: len(cables) - 1]} {', '.join(cables)}")
@@ -193,18 +193,19 @@ class MissingFeature(Feature):
     def _draw_limits(self, snapshot: Snapshot, missing: MissingWrench | None) -> None:
         """Draw the cables at limits in the colors of these limits, with their names."""
         nodes, scale = self._nodes, self._page.scale
-        limits = () if missing is None else missing.limits
+        limits = {} if missing is None else missing.limits
         nodes.keep_first("/limits_names", len(limits))
         if not limits:
             nodes.hide("/limits")
             return
-        points = snapshot.courses(1.0)[[each.cable for each in limits]]
-        tensions = np.array([scale.low if each.lower else scale.high for each in limits])
+        points = snapshot.courses(1.0)[list(limits)]
+        tensions = np.array([scale.low if lower else scale.high for lower in limits.values()])
         colors = np.repeat(scale.linear_colors(tensions), 2 * (points.shape[1] - 1), axis=0).reshape(-1, 2, 3)
         nodes.lines("/limits", shapes.segments(points, dashed=False), colors, WIDTH)
-        for k, (each, cable) in enumerate(zip(limits, points, strict=True)):
-            place = cable[round(ALONG[each.cable % len(ALONG)] * (len(cable) - 1))]
-            nodes.label(f"/limits_names/{k}", each.name, place, "top-left", SMALL)
+        for k, ((number, lower), cable) in enumerate(zip(limits.items(), points, strict=True)):
+            place = cable[round(ALONG[number % len(ALONG)] * (len(cable) - 1))]
+            name = f"{number} at its {'lower' if lower else 'upper'} limit"
+            nodes.label(f"/limits_names/{k}", name, place, "top-left", SMALL)
 
     def _clear(self) -> None:
         self._key, self._found = (), ((), None)

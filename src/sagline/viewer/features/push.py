@@ -14,13 +14,14 @@ from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.core.numbers import n
 from sagline.robot.equilibrium import Equilibrium
 from sagline.viewer import shapes
-from sagline.viewer.camera import Camera, camera_of, ray_distance, screen_point
+from sagline.viewer.camera import OUTSIDE, Camera, camera_of, ray_distance
 from sagline.viewer.feature import Feature, View
 from sagline.viewer.features.state import FIRST
 from sagline.viewer.page import Page
 from sagline.viewer.push import Push, PushResponse, Reserve, push_response, semi_axes
 from sagline.viewer.readout import definitions, refused, sentence, verdict_box
 from sagline.viewer.robot_scene import Nodes
+from sagline.viewer.server import finite_numbers
 from sagline.viewer.shapes import THINNEST, ball, readable
 from sagline.viewer.tension_scale import ForceUnit, force_unit
 
@@ -214,19 +215,8 @@ class PushFeature(Feature):
             return
         lengths, directions = semi_axes(response.compliance)
         wxyz, scale = _ellipsoid(drawn_for * lengths * directions)
-        nodes.draw(
-            "/gives_way",
-            nodes.scene.add_mesh_simple,
-            vertices=self._ball.vertices.astype(np.float32),
-            faces=self._ball.faces.astype(np.uint32),
-            color=COLOR,
-            opacity=BALL_OPACITY,
-            cast_shadow=False,
-            receive_shadow=False,
-            position=start,
-            wxyz=wxyz,
-            scale=scale,
-        )
+        looks: dict[str, Any] = {"cast_shadow": False, "receive_shadow": False, "position": start}
+        nodes.mesh("/gives_way", *self._ball, COLOR, BALL_OPACITY, wxyz=wxyz, scale=scale, **looks)
 
     def _leave(self, client: int) -> None:
         """Release the force of a client that has disconnected."""
@@ -237,7 +227,7 @@ class PushFeature(Feature):
         """Apply the force of a drag; `value` is unchecked data of a client."""
         if not isinstance(value, dict):
             return
-        phase, at = value.get("phase"), screen_point(value.get("at"))
+        phase, at = value.get("phase"), finite_numbers(value.get("at"), 2, OUTSIDE)
         camera, state = camera_of(self._page.server, client), self._page.state
         if at is None or camera is None:
             return
@@ -253,7 +243,7 @@ class PushFeature(Feature):
         elif phase == "end":
             self._hold = None
 
-    def _grab(self, camera: Camera, at: tuple[float, float], client: int) -> None:
+    def _grab(self, camera: Camera, at: Array, client: int) -> None:
         """Hold the platform point that is visible at a point of the picture, if there is one."""
         state: Equilibrium | None = self._page.state
         if state is None:
@@ -266,13 +256,13 @@ class PushFeature(Feature):
             return
         points = self.body.vertices[self.body.faces].mean(axis=1)  # the ray easily misses a thin platform
         places, depth = camera.project(state.pose.transform(points))
-        away = np.linalg.norm(places - np.asarray(at) * camera.pixels, axis=1)
+        away = np.linalg.norm(places - at * camera.pixels, axis=1)
         away[~(depth > 0.0)] = np.inf  # behind the camera
         if away.min() <= NEAR:
             self._hold = client, points[away.argmin()]
 
 
-def _drag(camera: Camera, at: tuple[float, float], start: Array) -> Array:
+def _drag(camera: Camera, at: Array, start: Array) -> Array:
     """Vector (3,) [m] from `start`, a point in the world, to the picture point `at` at the same depth."""
     depth = float((start - camera.place) @ camera.axes[:, 2])
     return np.asarray(camera.place + depth * camera.ray(at) - start)

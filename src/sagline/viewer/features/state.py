@@ -10,19 +10,17 @@ from typing import Any, Final
 
 import numpy as np
 
-from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.files.pose_text import STRONGEST, pose_of_text
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.tension.methods import QuadraticProgram
 from sagline.viewer import link
-from sagline.viewer.by_hand import ByHand
 from sagline.viewer.feature import Feature, View
 from sagline.viewer.page import Page, Source
 from sagline.viewer.player import InMotion
 from sagline.viewer.readout import html_block
-from sagline.viewer.snapshot import Settings, Snapshot
+from sagline.viewer.snapshot import ByHand, Settings, Snapshot
 from sagline.viewer.tension_scale import number_text
 
 FIRST: Final = -0.9  # order among the controls: above all controls except those of the played motion
@@ -70,9 +68,9 @@ class StateFeature(Feature):
         self._view: View | None = None
         self._time = 0.0
         self._requests: deque[tuple[Any, int]] = deque()  # requests to copy a text, and their clients
-        page.channel.on("pose", self._on_pose)
         page.channel.on("copy", lambda value, client: self._requests.append((value, client)))
-        page.channel.on("link", self._on_link)
+        for topic, reply in (("pose", self._go), ("link", self._open_link)):
+            page.channel.on(topic, partial(self._answer, f"{topic}-reply", reply))
 
     def follow(self, view: View) -> None:
         """Send the pose."""
@@ -82,28 +80,13 @@ class StateFeature(Feature):
     def tick(self) -> None:
         """Answer the requests to copy a text; earlier changes are already shown."""
         while self._requests:
-            value, client = self._requests.popleft()
-            self._answer(client, "copy-reply", value, partial(self._copy, client))
+            self._answer("copy-reply", self._copy, *self._requests.popleft())
 
-    def _on_pose(self, value: Any, client: int) -> None:
+    def _go(self, text: str, _client: int) -> None:
         """Go to a pose that was typed."""
+        self._page.go_near(pose_of_text(text, "the pose", POSE_STEP))
 
-        def go(text: str) -> dict[str, str]:
-            self._page.go_near(pose_of_text(text, "the pose", POSE_STEP))
-            return {}
-
-        self._answer(client, "pose-reply", value, go)
-
-    def _on_link(self, value: Any, client: int) -> None:
-        """Open a link."""
-
-        def follow(text: str) -> dict[str, str]:
-            self._open_link(text, client)
-            return {}
-
-        self._answer(client, "link-reply", value, follow)
-
-    def _answer(self, client: int, topic: str, value: Any, reply: Callable[[str], dict[str, str]]) -> None:
+    def _answer(self, topic: str, reply: Callable[[str, int], str | None], value: Any, client: int) -> None:
         """Handle `value`, a request [name, text] of a page. The answer {"to": name, ...} is sent to this page alone."""
         if not isinstance(value, list) or len(value) != 2 or not all(isinstance(each, str) for each in value):
             return
@@ -111,24 +94,25 @@ class StateFeature(Feature):
         if len(name) > LONGEST_NAME:
             return
         try:
-            answer = reply(text)
+            found = reply(text, client)
+            answer = {} if found is None else {"text": found}
         except SaglineError as error:
             answer = {"refused": str(error)}
         self._channel.send_to(client, topic, {"to": name, **answer})
 
-    def _copy(self, client: int, kind: str) -> dict[str, str]:
+    def _copy(self, kind: str, client: int) -> str:
         """Code or link of the view."""
         view, source = self._view, self._page.source
         if view is None:
             raise InvalidValueError("the view", "not there yet", "a view that is shown", "Wait until it is shown.")
         if kind == "link":
-            return {"text": self._link_to(view, client)}
+            return self._link_to(view, client)
         if kind != "code":
             raise InvalidValueError("what to copy", repr(kind), "code or link", "Press one of the buttons.")
         if view.played is not None and not (self._page.player.is_original and source.played):
             step = "Copy the pose at its start, and simulate from there."
             raise InvalidValueError(f"the {view.played.name}", "in no file", "one that was loaded from a file", step)
-        return {"text": code_of(view, self._robot, source, self._time)}
+        return code_of(view, self._robot, source, self._time)
 
     def _link_to(self, view: View, client: int) -> str:
         """A link to a view with the camera of a client."""
@@ -155,8 +139,10 @@ class StateFeature(Feature):
         parts = link.parts_of(text)
         link.check_robot(parts.pop("robot"), self._robot)
         place, framing = self._place(parts), self._page.framing
-        wrench = _six(parts.pop("wrench", None), "wrench", "N or N m", STRONGEST)
-        camera = _six(parts.pop("camera", None), "camera", "m", framing.farthest)
+        wrench, camera = (
+            link.numbers_of(parts.pop(name), f"the {name} of the link", unit, 6, largest) if name in parts else None
+            for name, unit, largest in (("wrench", "N or N m", STRONGEST), ("camera", "m", framing.farthest))
+        )
         if camera is not None and np.array_equal(camera[:3], camera[3:]):
             raise InvalidValueError("the camera of the link", "at its own target", "two different points", link.STEP)
         hand = parts.pop(HAND, None)
@@ -186,10 +172,6 @@ class StateFeature(Feature):
             raise InvalidValueError("the link", "with a time of a run", "a pose, because nothing is played", step)
         moment = float(link.numbers_of(time or "", "the time of the link", "s", 1, player.duration)[0])
         return lambda: player.scrub_to(max(moment, 0.0))
-
-
-def _six(text: str | None, item: str, unit: str, largest: float) -> Array | None:
-    return None if text is None else link.numbers_of(text, f"the {item} of the link", unit, 6, largest)
 
 
 def code_of(view: View, robot: Robot, source: Source, time: float = 0.0) -> str:

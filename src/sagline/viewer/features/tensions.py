@@ -2,75 +2,143 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
+from dataclasses import dataclass
 from html import escape
-from string import ascii_uppercase
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 
-from sagline.core.arrays import Array
+from sagline.core.arrays import Array, locked
 from sagline.core.errors import InvalidValueError
-from sagline.kinematics.inverse import inverse
-from sagline.kinematics.inverse_solver import InverseSolver
-from sagline.kinematics.plan import Plan
 from sagline.kinematics.polygon import polygon_at, tension_polygon
-from sagline.kinematics.status import PoseStatus
 from sagline.tension.method import kernel_options
 from sagline.tension.methods import MinimumNorm
-from sagline.tension.polygon import TensionPolygon
-from sagline.viewer.by_hand import BY_HAND, WIDTH, ByHand, DotField
+from sagline.tension.polygon import Side, TensionPolygon
 from sagline.viewer.feature import Feature, View
 from sagline.viewer.page import Page
 from sagline.viewer.readout import html_block, sentence
-from sagline.viewer.server import chosen_by
-from sagline.viewer.snapshot import METHODS, Snapshot, method_name
+from sagline.viewer.server import chosen_by, finite_numbers
+from sagline.viewer.snapshot import BY_HAND, METHODS, ByHand, MethodMark, MethodMarks, Snapshot, method_name
 from sagline.viewer.tension_scale import force_unit, number_text
+
+WIDTH, BORDER = 340, 26  # height of the drawing of an interval [px]
+HEIGHTS: Final = (0, 74, 190)  # height of the drawing by the number of redundant cables [px]
+BEYOND: Final = 0.5  # extension of the drawing of an unbounded polygon, relative to the size of its finite part
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DotField:
+    """Drawing of the feasible tensions."""
+
+    polygon: TensionPolygon
+    # corners of the drawing in coordinates of the null space [N], shape (h, r), r = 1 or 2; an unbounded polygon is
+    # clipped
+    corners: Array
+    # limit of each side, from corner k to corner k + 1 (at corner k for an interval)
+    sides: tuple[Side | None, ...]
+    low: Array  # lowest coordinates of the drawing [N], shape (r,)
+    high: Array  # highest coordinates of the drawing [N], shape (r,)
+
+    @classmethod
+    def of(cls, polygon: TensionPolygon, dot: Array, before: DotField | None = None) -> DotField:
+        """Make the drawing of a nonempty polygon, for one or two redundant cables."""
+        corners, sides = polygon.vertices, polygon.sides
+        if before is not None:
+            low, high = before.low, before.high
+        else:
+            low, high = _extent(polygon, dot)
+        if not polygon.bounded:
+            corners, sides = _clipped(corners, sides, low, high)
+        return cls(polygon, locked(np.ascontiguousarray(corners)), sides, low, high)
+
+    @property
+    def redundant(self) -> int:
+        """Number of redundant cables, 1 or 2."""
+        return int(self.corners.shape[1])
+
+    @property
+    def height(self) -> int:
+        """Height of the drawing [px]."""
+        return HEIGHTS[self.redundant]
+
+    @property
+    def middle(self) -> Array:
+        """Coordinates of the middle of the drawing [N], shape (r,)."""
+        return np.asarray(0.5 * (self.low + self.high))
+
+    @property
+    def scale(self) -> float:
+        """Pixels per newton."""
+        inside = np.array([WIDTH, self.height])[: self.redundant] - 2.0 * BORDER
+        return float(np.min(inside / np.maximum(self.high - self.low, 1e-9)))
+
+    def place(self, at: Array) -> tuple[float, float]:
+        """Position of coordinates (r,) in the drawing [px], from its upper left corner."""
+        away = self.scale * (at - self.middle)
+        return 0.5 * WIDTH + float(away[0]), 0.5 * self.height - float(away[1] if self.redundant > 1 else 0.0)
+
+    def nearest(self, at: Array) -> Array:
+        """Nearest feasible point to coordinates (r,)."""
+        if self.redundant == 1:
+            return np.clip(at, self.corners.min(axis=0), self.corners.max(axis=0))
+        starts, ends = self.corners, np.roll(self.corners, -1, axis=0)
+        along, away = ends - starts, at - starts
+        if np.all(along[:, 0] * away[:, 1] - along[:, 1] * away[:, 0] >= 0.0):  # corners are in counter-clockwise order
+            return at
+        length = np.maximum((along**2).sum(axis=1), np.finfo(np.float64).tiny)
+        share = np.clip((along * away).sum(axis=1) / length, 0.0, 1.0)
+        feet = starts + share[:, None] * along
+        return np.asarray(feet[int(np.argmin(np.linalg.norm(feet - at, axis=1)))])
+
+    def tension(self, at: Array) -> Array:
+        """Chord tensions at coordinates (r,) [N], shape (m,)."""
+        return np.maximum(self.polygon.origin + at @ self.polygon.basis, 0.0)
+
+
+def _extent(polygon: TensionPolygon, dot: Array) -> tuple[Array, Array]:
+    """Lowest and highest coordinates to draw (r,)."""
+    if polygon.bounded:
+        return polygon.vertices.min(axis=0), polygon.vertices.max(axis=0)
+    known = np.array([side is not None for side in polygon.sides])
+    if polygon.vertices.shape[1] == 2:
+        known &= np.roll(known, 1)  # a corner of two limits, not of the box
+    points = np.vstack(
+        (polygon.vertices[known], dot[None] if np.isfinite(dot).all() else polygon.vertices[:0], np.zeros_like(dot))
+    )
+    low, high = points.min(axis=0), points.max(axis=0)
+    size = float(np.max(high - low)) or float(np.abs(polygon.origin).max()) or 1.0
+    return low - BEYOND * size, high + BEYOND * size
+
+
+def _clipped(
+    corners: Array, sides: tuple[Side | None, ...], low: Array, high: Array
+) -> tuple[Array, tuple[Side | None, ...]]:
+    """Part of a polygon within the box from `low` to `high`. The sides of the box do not count as limits."""
+    if corners.shape[1] == 1:
+        return np.clip(corners, low, high), sides
+    for axis, sign, end in ((0, 1.0, high[0]), (0, -1.0, -low[0]), (1, 1.0, high[1]), (1, -1.0, -low[1])):
+        inside = sign * corners[:, axis] <= end
+        kept: list[Array] = []
+        named: list[Side | None] = []
+        for k, corner in enumerate(corners):
+            after = (k + 1) % len(corners)
+            if inside[k]:
+                kept.append(corner)
+                named.append(sides[k])
+            if inside[k] != inside[after]:
+                share = (sign * end - corner[axis]) / (corners[after][axis] - corner[axis])
+                kept.append(corner + share * (corners[after] - corner))
+                named.append(None if inside[k] else sides[k])
+        corners, sides = np.array(kept).reshape(-1, 2), tuple(named)
+    return corners, sides
+
 
 NEAR: Final = 10.0  # closer marks are joined [px]
 
 
-class _MethodMark(NamedTuple):
-    """A tension distribution method with its result."""
-
-    name: str
-    letter: str
-    tension: Array  # chord tensions [N], shape (m,); NaN without a solution
-    missing: str = ""  # reason why there is no solution
-
-
-class MethodMarks:
-    """Results of all tension distribution methods at a pose; they remain valid if only the chosen method changes.
-
-    For a moving robot, prepared solvers are about twelve times as fast. Their preparation takes longer than one
-    solution. A robot whose mass follows a slider therefore does not have prepared solvers.
-    """
-
-    def __init__(self) -> None:
-        """Begin without results."""
-        self._key: tuple[object, ...] = ()
-        self._found: tuple[_MethodMark, ...] = ()
-        self._solvers: dict[str, InverseSolver] = {}
-
-    def at(self, plan: Plan) -> tuple[_MethodMark, ...]:
-        """Results at the pose of a plan, at rest under its wrench."""
-        state = plan.state
-        place = (state.pose.position.tobytes(), state.pose.quaternion.tobytes(), state.wrench.tobytes())
-        key = (id(state.robot), type(state.cables.model), *place)
-        if key != self._key:
-            if key[:2] != self._key[:2]:
-                self._solvers = {}
-            elif not self._solvers:
-                self._solvers = _solvers(plan)
-            self._key, self._robot = key, state.robot  # the robot is kept alive, so that its id remains unique
-            ways = zip(METHODS, ascii_uppercase, strict=False)
-            self._found = tuple(_mark(plan, name, letter, self._solvers.get(name)) for name, letter in ways)
-        return self._found
-
-
-def grouped(marks: tuple[_MethodMark, ...], field: DotField) -> list[tuple[tuple[float, float], list[_MethodMark]]]:
+def grouped(marks: tuple[MethodMark, ...], field: DotField) -> list[tuple[tuple[float, float], list[MethodMark]]]:
     """Groups of `marks` at the same position, and these positions [px]. Only methods with a result have a mark."""
-    groups: list[tuple[tuple[float, float], list[_MethodMark]]] = []
+    groups: list[tuple[tuple[float, float], list[MethodMark]]] = []
     for mark in marks:
         if mark.missing:
             continue
@@ -83,37 +151,12 @@ def grouped(marks: tuple[_MethodMark, ...], field: DotField) -> list[tuple[tuple
     return groups
 
 
-def _solvers(plan: Plan) -> dict[str, InverseSolver]:
-    """Prepared solvers of the methods that are applicable to the robot of a plan."""
-    robot, model = plan.state.one_robot, plan.state.cables.model
-    found = {}
-    for name, method in METHODS.items():
-        with suppress(InvalidValueError):  # `inverse` gives the reason
-            found[name] = InverseSolver(robot, model, method.alone)
-    return found
-
-
-def _mark(plan: Plan, name: str, letter: str, solver: InverseSolver | None) -> _MethodMark:
-    state = plan.state
-    robot, pose = state.one_robot, state.pose
-    if solver is not None:
-        step = solver.step(pose.position, pose.quaternion, state.wrench)
-        tension, status = step.chord_tension, step.status
-    else:
-        try:
-            found = inverse(robot, pose, state.cables.model, METHODS[name], state.wrench)
-        except InvalidValueError as error:
-            return _MethodMark(name, letter, np.full(robot.cable_count, np.nan), str(error))
-        tension, status = found.chord_tension, PoseStatus(int(found.status))
-    return _MethodMark(name, letter, tension, "" if status is PoseStatus.SOLVED else status.text)
-
-
 MOST_REDUNDANT: Final = 2  # largest number of redundant cables for which the feasible tensions are drawn
 SHARING: Final = "sharing"  # topic of a chosen tension distribution method
 
 
 def polygon_figure(
-    snapshot: Snapshot, marks: tuple[_MethodMark, ...] = (), field: DotField | None = None, back: str = ""
+    snapshot: Snapshot, marks: tuple[MethodMark, ...] = (), field: DotField | None = None, back: str = ""
 ) -> str:
     """HTML: polygon with the chosen tensions; interval for one redundant cable; otherwise a sentence."""
     if remark := _why_not_drawn(snapshot):
@@ -158,7 +201,7 @@ def _polygon(snapshot: Snapshot) -> TensionPolygon | None:
         return None
 
 
-def _drawing(snapshot: Snapshot, field: DotField, marks: tuple[_MethodMark, ...], *, movable: bool) -> str:
+def _drawing(snapshot: Snapshot, field: DotField, marks: tuple[MethodMark, ...], *, movable: bool) -> str:
     corners, places = field.corners, [field.place(corner) for corner in field.corners]
     outline = " ".join(f"{x:.1f},{y:.1f}" for x, y in places)
     if field.redundant == 2:
@@ -196,7 +239,7 @@ def _dot(snapshot: Snapshot, field: DotField, *, movable: bool) -> str:
     )
 
 
-def _marks(field: DotField, marks: tuple[_MethodMark, ...]) -> str:
+def _marks(field: DotField, marks: tuple[MethodMark, ...]) -> str:
     """A mark with the letter of each tension distribution method; methods with equal results have a common mark."""
     parts = []
     for (x, y), group in grouped(marks, field):
@@ -226,7 +269,7 @@ def _description(snapshot: Snapshot, field: DotField, *, movable: bool) -> str:
     return f"{how} Sides: limits of the cables. Width {unit.written(width)}, height {unit.written(height)}."
 
 
-def _key(snapshot: Snapshot, marks: tuple[_MethodMark, ...], back: str) -> str:
+def _key(snapshot: Snapshot, marks: tuple[MethodMark, ...], back: str) -> str:
     """The methods by their letters, as buttons; and the choice by hand, with a button to return to a method."""
     if not marks:
         return ""
@@ -276,6 +319,7 @@ def _end(field: DotField, k: int, at: tuple[float, float], other: tuple[float, f
 DOT: Final = "dot"  # topic of the dot: {"at": coordinates [N]} or {"by": steps as shares of the drawing}
 OVER: Final = 2e-3  # step beyond a side, as a share of the drawing
 FARTHEST: Final = 1.0  # largest step, as a share of the drawing
+FARTHEST_AIM: Final = 1e12  # largest coordinate of a drag [N]
 
 
 class TensionsFeature(Feature):
@@ -296,9 +340,9 @@ class TensionsFeature(Feature):
         snapshot = view.snapshot
         before, self._field = self._field, None
         if not isinstance(snapshot, Snapshot):
-            self._panel.show_polygon(sentence(snapshot.why_no_choice))
+            figure = sentence(snapshot.why_no_choice)
         elif view.played is not None or snapshot.plan is None or _why_not_drawn(snapshot):
-            self._panel.show_polygon(polygon_figure(snapshot))
+            figure = polygon_figure(snapshot)
         else:
             state = snapshot.plan.state
             place = (state.pose.position.tobytes(), state.pose.quaternion.tobytes(), state.wrench.tobytes())
@@ -310,14 +354,16 @@ class TensionsFeature(Feature):
             if self._field is not None and self._aim is None:
                 self._aim = self._field.polygon.coordinates(snapshot.tension)
             marks = self._marks.at(snapshot.plan) if self._field else ()
-            self._panel.show_polygon(polygon_figure(snapshot, marks, self._field, self._panel.method_name))
+            figure = polygon_figure(snapshot, marks, self._field, self._panel.method_name)
+        self._panel.polygon.content = figure
 
     def _on_dot(self, value: Any, _: int) -> None:
         """Move the dot by a drag or a step. Invalid and late messages are ignored."""
         field = self._field
         if field is None or not isinstance(value, dict):
             return
-        at, by = (_numbers(value.get(name), field.redundant) for name in ("at", "by"))
+        at, by = (finite_numbers(value.get(name), 2, FARTHEST_AIM) for name in ("at", "by"))
+        at, by = (None if place is None else place[: field.redundant] for place in (at, by))
         if at is None:
             if by is None or self._aim is None or not np.isfinite(self._aim).all():
                 return
@@ -334,13 +380,4 @@ class TensionsFeature(Feature):
     def _on_method(self, value: Any, _: int) -> None:
         """Choose the tension distribution method of a clicked mark."""
         if self._field is not None and isinstance(value, str) and value in METHODS:
-            self._panel.choose_method(value)
-
-
-def _numbers(value: Any, count: int) -> Array | None:
-    """`count` finite numbers from `value`, the data of a message; None for invalid data."""
-    if not isinstance(value, list) or len(value) < count:
-        return None
-    if not all(type(part) in (int, float) and abs(part) < 1e12 for part in value):
-        return None
-    return np.array(value[:count], dtype=np.float64)
+            self._panel.method.value = value

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Hashable
-from math import isfinite
 from typing import Any, Final
 
 import numpy as np
@@ -14,6 +13,7 @@ from sagline.viewer.feature import Feature, View
 from sagline.viewer.page import Page
 from sagline.viewer.player import Played
 from sagline.viewer.robot_scene import GHOST, GHOST_WIDTH, NEAR, Nodes, cable_segments
+from sagline.viewer.server import finite_numbers
 from sagline.viewer.tension_scale import linear
 from sagline.viewer.timeline import COLORS, Track, timeline_message
 
@@ -26,6 +26,7 @@ PERIOD: Final = 1.0 / 30.0  # shortest time between messages of the clock [s]
 TURN: Final = 0.5  # shortest time between moves of the window [s]
 NARROWEST: Final = 1e-6  # smallest width of a window, relative to the duration
 _MOST_STEPS: Final = 1_000_000
+LARGEST: Final = 1e300  # largest number in a message
 
 
 class TimelineFeature(Feature):
@@ -157,8 +158,8 @@ class TimelineFeature(Feature):
         duration = self._player.duration
         if value is None:
             self._window = None
-        elif isinstance(value, list) and len(value) == 2 and all(map(_is_number, value)):
-            start, end = max(float(value[0]), 0.0), min(float(value[1]), duration)
+        elif (ends := finite_numbers(value, 2, LARGEST)) is not None:
+            start, end = max(float(ends[0]), 0.0), min(float(ends[1]), duration)
             if end - start >= NARROWEST * duration > 0.0:
                 self._window = None if (start, end) == (0.0, duration) else (start, end)
 
@@ -167,4 +168,4 @@ class TimelineFeature(Feature):
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e300 and isfinite(value)
+    return finite_numbers([value], 1, LARGEST) is not None
