@@ -105,7 +105,7 @@ def test_a_simulation_is_played_like_a_run(tmp_path: FilePath) -> None:
     swing.save(tmp_path / "sim.nc")
     played = played_in(sl.load_robot("cogiro"), tmp_path / "sim.nc")
     assert (played.name, played.duration) == ("simulation", 0.5)
-    np.testing.assert_array_equal(played.home.position, swing.pose.position[0])
+    np.testing.assert_array_equal(played.at(0.0).pose.position, swing.pose.position[0])
     assert np.isnan(played.at(0.5).tension[3])
 
 
