@@ -11,10 +11,10 @@ from sagline.core.arrays import Array, Codes, Flags
 from sagline.kernels import codes, tables
 from sagline.kernels.algebra.functions import angle
 from sagline.kernels.cable import models
-from sagline.kernels.cable.geometry import AZIMUTH_X, AZIMUTH_Y, CHORD, COSINE, SINE, cable_geometry
+from sagline.kernels.cable.geometry import AZIMUTH_X, AZIMUTH_Y, cable_geometry
 from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.cable.states import solve_cable_state
-from sagline.kernels.cable.terms import Chord, Material, Model, Terms, model_of
+from sagline.kernels.cable.terms import Chord, Material, Model, Terms, chord_at, material_at, model_of
 from sagline.kernels.jit import entry, glue, kernel
 
 CHUNK = 256  # cables per chunk; buffers of this length fit into the fastest cache of the processor
@@ -321,8 +321,8 @@ def cable_courses(
     cable_geometry(cables, body, pose, rotation, geometry)
     free = points.shape[1] - wraps - 1
     for i in range(tension.size):
-        pulley, material = pulley_at(cables, i), Material(cables[i, tables.DENSITY], cables[i, tables.STIFFNESS])
-        chord, tau, weight = Chord(geometry[CHORD, i], geometry[SINE, i], geometry[COSINE, i]), tension[i], 0.0
+        pulley, material, chord = pulley_at(cables, i), material_at(cables, i), chord_at(geometry, i)
+        tau, weight = tension[i], 0.0
         sine, cosine = chord.cosine, pulley.entry * chord.sine  # sine and cosine of the wrap angle of a straight cable
         length, horizontal, vertical = 0.0, 0.0, 0.0
         if tau > 0.0:

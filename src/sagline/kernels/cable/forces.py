@@ -21,7 +21,6 @@ from sagline.kernels.algebra import functions
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.models import SMALL_HALLEY_STEP, catenary_end, from_length, from_tension, relative_excess
 from sagline.kernels.cable.pulley import (
-    Behind,
     Wrap,
     behind_cable,
     energy_behind,
@@ -32,7 +31,7 @@ from sagline.kernels.cable.pulley import (
     softness,
     straight_behind,
 )
-from sagline.kernels.cable.terms import Chord, Material, Model, PlaneStiffness
+from sagline.kernels.cable.terms import Material, Model, PlaneStiffness, chord_at, material_at
 from sagline.kernels.jit import formula, glue
 
 LEAST_FREE = 1e-3  # shortest equivalent cable, relative to the cable's length
@@ -40,18 +39,6 @@ TINY = 1e-300  # [N]; avoids a division by zero force
 ORDINARY_END = math.sqrt(
     functions.EXCESS_LIMIT
 )  # largest u = wL/(T_A + T_B) for which the series of P1 is a polynomial
-
-
-@formula
-def material_at(cables: Array, i: int) -> Material:
-    """Material of cable `i` of the cable_table."""
-    return Material(cables[i, tables.DENSITY], cables[i, tables.STIFFNESS])
-
-
-@formula
-def chord_at(rows: Array, i: int) -> Chord:
-    """Chord of cable `i` at a pose."""
-    return Chord(rows[g.CHORD, i], rows[g.SINE, i], rows[g.COSINE, i])
 
 
 @formula
@@ -214,7 +201,7 @@ def _weight_per_length(model: Model, material: Material) -> float:
 
 
 @formula
-def behind_at(model: Model, cables: Array, rows: Array, i: int) -> Behind:
+def behind_at(model: Model, cables: Array, rows: Array, i: int) -> tuple[float, float]:
     """Unstrained cable between P and the drum, after `update_from_equivalent_cables`."""
     return behind_cable(model, material_at(cables, i), pulley_at(cables, i), rows[g.LEAVING, i], _wrap_at(rows, i))
 
@@ -226,12 +213,8 @@ def end_motion_per_length(model: Model, cables: Array, rows: Array, i: int) -> t
     An increase of H stretches the part between P and the drum. The platform end then moves as if cable were paid out.
     The third value is the length of this cable per newton of H.
     """
-    material, pulley, wrap, tension = (
-        material_at(cables, i),
-        pulley_at(cables, i),
-        _wrap_at(rows, i),
-        rows[g.LEAVING, i],
-    )
+    material, pulley = material_at(cables, i), pulley_at(cables, i)
+    wrap, tension = _wrap_at(rows, i), rows[g.LEAVING, i]
     weight = _weight_per_length(model, material)
     strained = 1.0 + tension / material.stiffness
     soft = softness(pulley, weight, material.stiffness, tension, wrap)

@@ -15,7 +15,7 @@ from typing import NamedTuple
 from sagline.core.arrays import Array
 from sagline.kernels import codes, tables
 from sagline.kernels.algebra.functions import angle
-from sagline.kernels.cable.terms import Chord, Force, Material, Model, Pulley
+from sagline.kernels.cable.terms import Chord, Force, Material, Model, PlaneVector, Pulley
 from sagline.kernels.jit import formula, kernel
 
 LEAST_TURNED = -0.8  # smallest derivative in a Newton step; a derivative near -1 would turn the cable too far
@@ -29,13 +29,6 @@ class Wrap(NamedTuple):
     angle: float
 
 
-class Behind(NamedTuple):
-    """Unstrained lengths [m] of the cable between P and the drum: on the pulley, and between drum and pulley."""
-
-    wrapped: float
-    dead: float
-
-
 class Change(NamedTuple):
     """Changes of the parameters of one cable: L [m], w [N/m], EA [N], R [m], dead length [m]."""
 
@@ -46,39 +39,20 @@ class Change(NamedTuple):
     dead: float
 
 
-class EndMotion(NamedTuple):
-    """Motion of the platform end in the cable's plane at a fixed force on it."""
-
-    x: float
-    z: float
-
-
 @formula
 def pulley_at(cables: Array, i: int) -> Pulley:
     """Pulley and dead length of cable `i` of the cable_table."""
-    return Pulley(
-        cables[i, tables.PULLEY_RADIUS],
-        cables[i, tables.ENTRY],
-        cables[i, tables.DEAD_CABLE],
-        cables[i, tables.DEAD_RISE],
-    )
-
-
-@kernel
-def _robot_has_machine(cables: Array) -> bool:
-    """True if any cable in a robot's cable_table (m, CABLE_COLUMNS) has a pulley or dead length."""
-    total = 0.0
-    for i in range(cables.shape[0]):
-        total += cables[i, tables.PULLEY_RADIUS] + cables[i, tables.DEAD_CABLE]
-    return total > 0.0
+    dead, rise = cables[i, tables.DEAD_CABLE], cables[i, tables.DEAD_RISE]
+    return Pulley(cables[i, tables.PULLEY_RADIUS], cables[i, tables.ENTRY], dead, rise)
 
 
 @kernel
 def robots_have_machine(robots: Array) -> bool:
     """True if a cable of any robot (1 or N, m, CABLE_COLUMNS) has a pulley or dead length."""
     for p in range(robots.shape[0]):
-        if _robot_has_machine(robots[p]):
-            return True
+        for i in range(robots.shape[1]):
+            if robots[p, i, tables.PULLEY_RADIUS] + robots[p, i, tables.DEAD_CABLE] > 0.0:
+                return True
     return False
 
 
@@ -141,20 +115,20 @@ def _strains(
 
 
 @formula
-def behind(pulley: Pulley, weight: float, stiffness: float, tension: float, wrap: Wrap) -> Behind:
+def behind(pulley: Pulley, weight: float, stiffness: float, tension: float, wrap: Wrap) -> tuple[float, float]:
     """Unstrained lengths on the pulley and between drum and pulley; `tension` at P [N]; `weight` per length [N/m]."""
     strained, first, last = _strains(pulley, weight, stiffness, tension, wrap.sine)
     beta = weight * pulley.radius / stiffness
     falls = pulley.entry * beta * (1.0 - wrap.cosine - wrap.angle * wrap.sine)
     wrapped = pulley.radius * (wrap.angle - falls / (strained * strained)) / strained
-    return Behind(wrapped, 2.0 * pulley.dead / (first + last))
+    return wrapped, 2.0 * pulley.dead / (first + last)
 
 
 @formula
-def behind_cable(model: Model, material: Material, pulley: Pulley, tension: float, wrap: Wrap) -> Behind:
+def behind_cable(model: Model, material: Material, pulley: Pulley, tension: float, wrap: Wrap) -> tuple[float, float]:
     """`behind` for any model: only the exact cable has weight beyond P, and the straight cable does not stretch."""
     if model.code == codes.STRAIGHT:
-        return Behind(pulley.radius * wrap.angle, pulley.dead)
+        return pulley.radius * wrap.angle, pulley.dead
     weight = material.density * model.gravity if model.code == codes.CATENARY else 0.0
     return behind(pulley, weight, material.stiffness, tension, wrap)
 
@@ -224,8 +198,8 @@ def _length_behind_by(
 
 @kernel
 def end_by(
-    pulley: Pulley, material: Material, weight: float, force: Force, free: float, change: Change, by_weight: EndMotion
-) -> EndMotion:
+    pulley: Pulley, material: Material, weight: float, force: Force, free: float, change: Change, by_weight: PlaneVector
+) -> PlaneVector:
     """Motion of the platform end due to a change of cable data, at a fixed force on the end; docs/model.md, section 10.
 
     by_weight: motion per change of w at a fixed free length [m^2/N].
@@ -243,7 +217,7 @@ def end_by(
     softer = -free * change.stiffness / (material.stiffness * material.stiffness)
     x = softer * force.horizontal + by_weight.x * change.weight
     z = softer * (force.vertical - 0.5 * weight * free) + by_weight.z * change.weight
-    return EndMotion(
+    return PlaneVector(
         x + feed * along_x + change.radius * (1.0 - pulley.entry * along_z),
         z + feed * along_z + change.radius * pulley.entry * along_x,
     )

@@ -13,10 +13,10 @@ import math
 from typing import NamedTuple
 
 from sagline.core.arrays import Array, Codes
-from sagline.kernels import codes, tables
+from sagline.kernels import codes
 from sagline.kernels.algebra.functions import angle
 from sagline.kernels.cable import models
-from sagline.kernels.cable.geometry import CHORD, COSINE, SINE, cable_geometry
+from sagline.kernels.cable.geometry import cable_geometry
 from sagline.kernels.cable.pulley import Wrap, behind_cable, exit_after, free_rise, free_span, pulley_at
 from sagline.kernels.cable.terms import (
     Cables,
@@ -25,8 +25,10 @@ from sagline.kernels.cable.terms import (
     Model,
     Pulley,
     Terms,
+    chord_at,
     chord_of,
     free_chord_of,
+    material_at,
     material_of,
     model_of,
     pulley_of,
@@ -213,17 +215,11 @@ def taut_at_frame_end(
     return before if abs(miss) <= LIMIT_MISS * tension else otherwise
 
 
-class _CableAtTension(NamedTuple):
-    """State of a cable at a pose: length off the drum [m], sag force [N], tension at the frame end [N]."""
-
-    length: float
-    sag_force: float
-    tension: float
-
-
 @kernel
-def hold_cable(model: Model, chord: Chord, material: Material, pulley: Pulley, tau: float) -> _CableAtTension:
-    """State of a cable at the chord tension `tau`. It includes the cable on the pulley and the dead length."""
+def hold_cable(
+    model: Model, chord: Chord, material: Material, pulley: Pulley, tau: float
+) -> tuple[float, float, float]:
+    """Length off the drum [m], sag force [N] and frame-end tension [N] of a cable at the chord tension `tau`."""
     weightless = model.code == codes.STRAIGHT or model.code == codes.ELASTIC
     weight = 0.0 if weightless else material.density * model.gravity
     length, sag_force, _status = solve_cable_state(model, chord, material, pulley, tau)
@@ -235,8 +231,8 @@ def hold_cable(model: Model, chord: Chord, material: Material, pulley: Pulley, t
     if model.code == codes.CATENARY:
         there = tension
         sine, cosine = horizontal / there, pulley.entry * vertical / there
-    rest = behind_cable(model, material, pulley, there, Wrap(sine, cosine, angle(sine, cosine)))
-    return _CableAtTension(length + (rest.wrapped + rest.dead), sag_force, tension)
+    wrapped, dead = behind_cable(model, material, pulley, there, Wrap(sine, cosine, angle(sine, cosine)))
+    return length + (wrapped + dead), sag_force, tension
 
 
 @entry
@@ -268,11 +264,9 @@ def lengths_at_frame_ends(
     model = model_of(terms)
     cable_geometry(cables, body, pose, rotation, geometry)
     for i in range(tension.size):
-        chord = Chord(geometry[CHORD, i], geometry[SINE, i], geometry[COSINE, i])
-        material, pulley = Material(cables[i, tables.DENSITY], cables[i, tables.STIFFNESS]), pulley_at(cables, i)
+        chord, material, pulley = chord_at(geometry, i), material_at(cables, i), pulley_at(cables, i)
         tau = chord_tension_at_frame_end(model, chord, material, pulley, tension[i])
-        held = hold_cable(model, chord, material, pulley, tau)
-        tension_out[i], length_out[i] = held.tension, held.length
+        length_out[i], _sag_force, tension_out[i] = hold_cable(model, chord, material, pulley, tau)
 
 
 LOOSEST = 5.0  # largest X = wD/(2 tau): a cable that is fifteen times as long as its chord and almost without tension

@@ -15,21 +15,11 @@ from sagline.core.arrays import Array
 from sagline.kernels import codes
 from sagline.kernels.algebra.functions import atanhc_excess
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable.forces import across_pulley, energy_over, material_at, stiffness_in_series
+from sagline.kernels.cable.forces import across_pulley, energy_over, stiffness_in_series
 from sagline.kernels.cable.models import sag_of_shallow, shallow_sag_force, slack_series, stretching_tension
-from sagline.kernels.cable.pulley import Change, EndMotion, end_by
-from sagline.kernels.cable.terms import Force, Material, Model, PlaneStiffness, Pulley
+from sagline.kernels.cable.pulley import Change, end_by
+from sagline.kernels.cable.terms import Force, Material, Model, PlaneStiffness, PlaneVector, Pulley, material_at
 from sagline.kernels.jit import formula, kernel
-
-
-class _ShallowSlopes(NamedTuple):
-    """Derivatives of tau of a shallow cable with respect to x_B, z_B [N/m], L [N/m], rho [N m/kg] and EA [1]."""
-
-    by_x: float
-    by_z: float
-    by_length: float
-    by_density: float
-    by_stiffness: float
 
 
 @formula
@@ -105,8 +95,8 @@ def _elastic_stiffness(span: float, rise: float, length: float, tension: float, 
 @kernel
 def shallow_slopes(
     model: Model, span: float, rise: float, material: Material, length: float, tension: float
-) -> _ShallowSlopes:
-    """Derivatives of tau of a shallow cable with respect to chord and cable data.
+) -> tuple[float, float, float, float, float]:
+    """Derivatives of tau of a shallow cable with respect to x_B, z_B [N/m], L [N/m], rho [N m/kg] and EA [1].
 
     The derivatives follow from L (1 + s/EA) = D (1 + S/tau^2) with S = k (rho x_B)^2 and s = |T| (empirical) or tau
     (parabolic).
@@ -133,7 +123,7 @@ def shallow_slopes(
     slope_length = -(1.0 + stretch / stiffness) / by_tension
     slope_density = (2.0 * chord * share - length * by_sag_force * sag_force / stiffness) / (density * by_tension)
     slope_stiffness = length * stretch / (stiffness * stiffness * by_tension)
-    return _ShallowSlopes(slope_x, slope_z, slope_length, slope_density, slope_stiffness)
+    return slope_x, slope_z, slope_length, slope_density, slope_stiffness
 
 
 @formula
@@ -141,17 +131,17 @@ def _shallow_stiffness(
     model: Model, span: float, rise: float, material: Material, length: float, tension: float
 ) -> PlaneStiffness:
     """In-plane stiffness of a shallow cable. It is not symmetric, because the forces are not a gradient."""
-    slopes = shallow_slopes(model, span, rise, material, length, tension)
+    by_x, by_z, _by_length, _by_density, _by_stiffness = shallow_slopes(model, span, rise, material, length, tension)
     chord = math.sqrt(span * span + rise * rise)
     cosine = span / chord
     sine = rise / chord
     across = tension / chord
     unit_sag_force = shallow_sag_force(model, 1.0, material.density)
     return PlaneStiffness(
-        slopes.by_x * cosine + across * sine * sine,
-        slopes.by_z * cosine - across * sine * cosine,
-        slopes.by_x * sine - across * sine * cosine + unit_sag_force * cosine,
-        slopes.by_z * sine + across * cosine * cosine + unit_sag_force * sine,
+        by_x * cosine + across * sine * sine,
+        by_z * cosine - across * sine * cosine,
+        by_x * sine - across * sine * cosine + unit_sag_force * cosine,
+        by_z * sine + across * cosine * cosine + unit_sag_force * sine,
     )
 
 
@@ -171,13 +161,18 @@ def cable_stiffness(
 
 
 @formula
+def _free_span_at(rows: Array, i: int, behind: bool | None) -> tuple[float, float, float]:
+    """Span, rise and unstrained length [m] of the free span of cable `i`."""
+    if behind is None:
+        return rows[g.SPAN, i], rows[g.RISE, i], rows[g.LENGTH, i]
+    return rows[g.FREE_SPAN, i], rows[g.FREE_RISE, i], rows[g.FREE_LENGTH, i]
+
+
+@formula
 def stiffnesses_in_plane(model: Model, cables: Array, rows: Array, behind: bool | None) -> None:
     """Fill the stiffness of every cable of a pose in its plane and normal to it, after `cable_forces`."""
-    x = g.SPAN if behind is None else g.FREE_SPAN
-    z = g.RISE if behind is None else g.FREE_RISE
-    whole = g.LENGTH if behind is None else g.FREE_LENGTH
     for i in range(cables.shape[0]):
-        span, rise, length = rows[x, i], rows[z, i], rows[whole, i]
+        span, rise, length = _free_span_at(rows, i, behind)
         plane = cable_stiffness(model, span, rise, material_at(cables, i), length, force_of(rows, i))
         rows[g.ACROSS, i] = rows[g.TENSION, i] / rows[g.CHORD, i]
         if behind is not None:
@@ -238,13 +233,10 @@ def energy_of_cables(model: Model, cables: Array, rows: Array, behind: bool | No
     after `cable_forces`; behind: `Model.behind` as a separate argument. If no cable has a pulley, it is None, and the
     code for pulleys is not compiled.
     """
-    x = g.SPAN if behind is None else g.FREE_SPAN
-    z = g.RISE if behind is None else g.FREE_RISE
-    whole = g.LENGTH if behind is None else g.FREE_LENGTH
     energy = 0.0
     size = 0.0
     for i in range(cables.shape[0]):
-        span, rise, length = rows[x, i], rows[z, i], rows[whole, i]
+        span, rise, length = _free_span_at(rows, i, behind)
         force = force_of(rows, i)
         energy += _cable_energy(model, span, rise, material_at(cables, i), length, force)
         size += abs(force.horizontal * span) + abs(force.vertical * rise)
@@ -255,26 +247,14 @@ def energy_of_cables(model: Model, cables: Array, rows: Array, behind: bool | No
     return energy, size
 
 
-class PlaneVector(NamedTuple):
-    """Horizontal and vertical part in the cable's plane."""
-
-    x: float
-    z: float
-
-
 class _ForceSlopes(NamedTuple):
-    """Derivatives of the force on the platform end: dT/dL [N/m], dT/d(rho) [N m/kg], dT/d(EA) [1]."""
+    """Derivatives of the force on the platform end, with both ends fixed."""
 
-    by_length: PlaneVector
-    by_density: PlaneVector
-    by_stiffness: PlaneVector
-
-
-class _MachineSlopes(NamedTuple):
-    """Derivatives of the force on the platform end with respect to R and dead length [N/m]."""
-
-    by_radius: PlaneVector
-    by_dead: PlaneVector
+    by_length: PlaneVector  # dT/dL [N/m]
+    by_density: PlaneVector  # dT/d(rho) [N m/kg]
+    by_stiffness: PlaneVector  # dT/d(EA) [1]
+    by_radius: PlaneVector  # dT/dR of the pulley [N/m]
+    by_dead: PlaneVector  # dT/d(dead length) [N/m]
 
 
 @formula
@@ -337,15 +317,17 @@ def _shallow_force_slopes(
     model: Model, span: float, rise: float, material: Material, length: float, tension: float
 ) -> _ForceSlopes:
     """Derivatives of the force of a shallow cable with respect to L, rho and EA."""
-    slopes = shallow_slopes(model, span, rise, material, length, tension)
+    _x, _z, by_length, by_density, by_stiffness = shallow_slopes(model, span, rise, material, length, tension)
     chord = math.hypot(span, rise)
     cosine = span / chord
     sine = rise / chord
-    sag_force = shallow_sag_force(model, chord, 1.0)
+    sag_force, none = shallow_sag_force(model, chord, 1.0), PlaneVector(0.0, 0.0)
     return _ForceSlopes(
-        PlaneVector(slopes.by_length * cosine, slopes.by_length * sine),
-        PlaneVector(slopes.by_density * cosine, slopes.by_density * sine + sag_force),
-        PlaneVector(slopes.by_stiffness * cosine, slopes.by_stiffness * sine),
+        PlaneVector(by_length * cosine, by_length * sine),
+        PlaneVector(by_density * cosine, by_density * sine + sag_force),
+        PlaneVector(by_stiffness * cosine, by_stiffness * sine),
+        none,
+        none,
     )
 
 
@@ -353,55 +335,47 @@ def _shallow_force_slopes(
 def force_slopes(
     model: Model, span: float, rise: float, material: Material, length: float, force: Force, plane: PlaneStiffness
 ) -> _ForceSlopes:
-    """Derivatives of the force with respect to L, rho and EA, for any model except the straight cable."""
+    """Derivatives of the force of a cable without pulley, for any model except the straight cable."""
     horizontal, vertical, tension = force
-    stiffness = material.stiffness
+    stiffness, none = material.stiffness, PlaneVector(0.0, 0.0)
     weight = material.density * model.gravity
     if model.code not in (codes.CATENARY, codes.ELASTIC) and weight > 0.0:
         return _shallow_force_slopes(model, span, rise, material, length, tension)
     by_length = force_by_length(model, span, rise, material, length, force, plane)
     if model.code == codes.CATENARY and weight > 0.0:
         by_weight = force_change(plane, _catenary_by_weight(horizontal, vertical, length, weight, stiffness))
+        by_density = PlaneVector(model.gravity * by_weight.x, model.gravity * by_weight.z)
         soft = -length / (stiffness * stiffness)
         stretched = PlaneVector(soft * horizontal, soft * (vertical - 0.5 * weight * length))
-        return _ForceSlopes(
-            by_length,
-            PlaneVector(model.gravity * by_weight.x, model.gravity * by_weight.z),
-            force_change(plane, stretched),
-        )
+        return _ForceSlopes(by_length, by_density, force_change(plane, stretched), none, none)
     along = tension / (stiffness * math.hypot(span, rise))
-    return _ForceSlopes(by_length, PlaneVector(0.0, 0.0), PlaneVector(along * span, along * rise))
+    return _ForceSlopes(by_length, none, PlaneVector(along * span, along * rise), none, none)
 
 
 @formula
 def slopes_over(
     model: Model, material: Material, pulley: Pulley, free: float, force: Force, plane: PlaneStiffness
-) -> tuple[_ForceSlopes, _MachineSlopes]:
-    """Derivatives of the force with respect to L, rho, EA, R and dead length, for shallow and exact cables.
+) -> _ForceSlopes:
+    """Derivatives of the force of a cable over a pulley, for shallow and exact cables.
 
     free: unstrained length of the free span [m].
     """
     weight = 0.0 if model.code == codes.ELASTIC else material.density * model.gravity
-    by_weight = EndMotion(0.0, 0.0)
+    by_weight = none = PlaneVector(0.0, 0.0)
     if weight > 0.0:
-        x, z = _catenary_by_weight(force.horizontal, force.vertical, free, weight, material.stiffness)
-        by_weight = EndMotion(x, z)
+        by_weight = _catenary_by_weight(force.horizontal, force.vertical, free, weight, material.stiffness)
     if force.horizontal == 0.0 and force.vertical == weight * free:  # there is no force at P
-        none = PlaneVector(0.0, 0.0)
-        return _ForceSlopes(none, none, none), _MachineSlopes(none, none)
+        return _ForceSlopes(none, none, none, none, none)
     heavier = model.gravity if weight > 0.0 else 0.0
     length = end_by(pulley, material, weight, force, free, Change(1.0, 0.0, 0.0, 0.0, 0.0), by_weight)
     density = end_by(pulley, material, weight, force, free, Change(0.0, heavier, 0.0, 0.0, 0.0), by_weight)
     stiffness = end_by(pulley, material, weight, force, free, Change(0.0, 0.0, 1.0, 0.0, 0.0), by_weight)
     radius = end_by(pulley, material, weight, force, free, Change(0.0, 0.0, 0.0, 1.0, 0.0), by_weight)
     dead = end_by(pulley, material, weight, force, free, Change(0.0, 0.0, 0.0, 0.0, 1.0), by_weight)
-    return (
-        _ForceSlopes(
-            force_change(plane, PlaneVector(length.x, length.z)),
-            force_change(plane, PlaneVector(density.x, density.z)),
-            force_change(plane, PlaneVector(stiffness.x, stiffness.z)),
-        ),
-        _MachineSlopes(
-            force_change(plane, PlaneVector(radius.x, radius.z)), force_change(plane, PlaneVector(dead.x, dead.z))
-        ),
+    return _ForceSlopes(
+        force_change(plane, length),
+        force_change(plane, density),
+        force_change(plane, stiffness),
+        force_change(plane, radius),
+        force_change(plane, dead),
     )

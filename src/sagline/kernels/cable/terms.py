@@ -8,7 +8,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sagline.core.arrays import Array
-from sagline.kernels.jit import glue
+from sagline.kernels import tables
+from sagline.kernels.cable import geometry as g
+from sagline.kernels.jit import formula, glue
 from sagline.kernels.memory import Memory, block
 
 # a Model as Python passes it: a plain tuple, whose type numba identifies faster
@@ -53,6 +55,13 @@ class Force(NamedTuple):
     horizontal: float  # T_x [N]
     vertical: float  # T_z [N], up positive
     tension: float  # chord tension tau [N]
+
+
+class PlaneVector(NamedTuple):
+    """Horizontal and vertical part in the cable's plane."""
+
+    x: float
+    z: float
 
 
 class PlaneStiffness(NamedTuple):
@@ -121,6 +130,18 @@ def new_cables(memory: Memory, m: int, machine: bool) -> tuple[Cables, Memory]:
         own[16], own[17],
     )  # fmt: skip
     return cables, memory
+
+
+@formula
+def material_at(cables: Array, i: int) -> Material:
+    """Material of cable `i` of the cable_table."""
+    return Material(cables[i, tables.DENSITY], cables[i, tables.STIFFNESS])
+
+
+@formula
+def chord_at(rows: Array, i: int) -> Chord:
+    """Chord of cable `i` at a pose."""
+    return Chord(rows[g.CHORD, i], rows[g.SINE, i], rows[g.COSINE, i])
 
 
 @glue

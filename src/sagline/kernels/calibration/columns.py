@@ -5,10 +5,9 @@ from __future__ import annotations
 from sagline.core.arrays import Array
 from sagline.kernels.algebra.factors import solve_lower, solve_upper
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable.forces import material_at
 from sagline.kernels.cable.pulley import pulley_at
-from sagline.kernels.cable.stiffness import PlaneVector, force_of, force_slopes, plane_of, slopes_over
-from sagline.kernels.cable.terms import Model
+from sagline.kernels.cable.stiffness import force_of, force_slopes, plane_of, slopes_over
+from sagline.kernels.cable.terms import Model, PlaneVector, material_at
 from sagline.kernels.calibration import kinds
 from sagline.kernels.calibration.tension_slopes import frame_end_slopes, in_world_axes
 from sagline.kernels.calibration.terms import CalibrationArrays, Sensing, Slopes, Unknowns
@@ -251,9 +250,9 @@ def fill_cable(
         own = force_slopes(model, span, rise, material, length, pulled, plane)
     else:
         free = rows[g.FREE_LENGTH, i]
-        own, machine = slopes_over(model, material, pulley_at(cables, i), free, pulled, plane)
-        _add_parameter_change(sought, kinds.RADIUS, i, gain, machine.by_radius, by.by_radius, space, slopes)
-        _add_parameter_change(sought, kinds.DEAD, i, gain, machine.by_dead, by.by_dead, space, slopes)
+        own = slopes_over(model, material, pulley_at(cables, i), free, pulled, plane)
+        _add_parameter_change(sought, kinds.RADIUS, i, gain, own.by_radius, by.by_radius, space, slopes)
+        _add_parameter_change(sought, kinds.DEAD, i, gain, own.by_dead, by.by_dead, space, slopes)
     _add_parameter_change(sought, kinds.DENSITY, i, gain, own.by_density, by.by_density, space, slopes)
     _add_parameter_change(sought, kinds.STIFFNESS, i, gain, own.by_stiffness, by.by_stiffness, space, slopes)
     change = _in_world_axes(rows, i, own.by_length)

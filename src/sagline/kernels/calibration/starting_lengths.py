@@ -11,7 +11,7 @@ from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.geometry import GEOMETRY_ROWS, cable_geometry
 from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.cable.states import chord_tension_at_frame_end, hold_cable
-from sagline.kernels.cable.terms import Chord, Material, Terms, model_of
+from sagline.kernels.cable.terms import Terms, chord_at, material_at, model_of
 from sagline.kernels.jit import entry
 from sagline.kernels.memory import Memory, block, vector
 from sagline.kernels.statics import components_along
@@ -61,8 +61,7 @@ def starting_lengths(
     for p in range(count):
         cable_geometry(cables, body, poses[p], rotation, geometry)
         for i in range(m):
-            chord = Chord(geometry[g.CHORD, i], geometry[g.SINE, i], geometry[g.COSINE, i])
-            material = Material(cables[i, tables.DENSITY], cables[i, tables.STIFFNESS])
+            chord, material = chord_at(geometry, i), material_at(cables, i)
             tau[i] = chord_tension_at_frame_end(model, chord, material, pulley_at(cables, i), tension[p, i])
             least[i] = LEAST * max(tau[i], 0.5 * material.density * model.gravity * chord.length)
             tau[i] = max(tau[i], least[i])
@@ -82,11 +81,8 @@ def starting_lengths(
                 six[k] = 0.0
             six[2] = body[tables.MASS] * model.gravity
             for i in range(m):
-                chord = Chord(geometry[g.CHORD, i], geometry[g.SINE, i], geometry[g.COSINE, i])
-                material = Material(cables[i, tables.DENSITY], cables[i, tables.STIFFNESS])
-                held = hold_cable(model, chord, material, pulley_at(cables, i), tau[i])
-                sag_force[i] = held.sag_force
-                length_out[p, i] = held.length
+                chord, material, pulley = chord_at(geometry, i), material_at(cables, i), pulley_at(cables, i)
+                length_out[p, i], sag_force[i], _tension = hold_cable(model, chord, material, pulley, tau[i])
                 six[2] += sag_force[i]
                 six[3] += geometry[g.LEVER_Y, i] * sag_force[i]
                 six[4] -= geometry[g.LEVER_X, i] * sag_force[i]
@@ -104,8 +100,7 @@ def starting_lengths(
                     change += along[i, j] * part[j]
                 tau[i] = max(tau[i] - change, least[i])
         for i in range(m):
-            chord = Chord(geometry[g.CHORD, i], geometry[g.SINE, i], geometry[g.COSINE, i])
-            material = Material(cables[i, tables.DENSITY], cables[i, tables.STIFFNESS])
-            length_out[p, i] = hold_cable(model, chord, material, pulley_at(cables, i), tau[i]).length
+            chord, material, pulley = chord_at(geometry, i), material_at(cables, i), pulley_at(cables, i)
+            length_out[p, i] = hold_cable(model, chord, material, pulley, tau[i])[0]
             if not length_out[p, i] > 0.0:
                 length_out[p, i] = math.nan

@@ -8,9 +8,8 @@ from typing import NamedTuple
 from sagline.core.arrays import Array
 from sagline.kernels import codes
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable.forces import material_at
 from sagline.kernels.cable.pulley import pulley_at
-from sagline.kernels.cable.terms import Model
+from sagline.kernels.cable.terms import Model, material_at
 from sagline.kernels.jit import formula
 
 

@@ -14,10 +14,10 @@ from sagline.kernels import codes, tables
 from sagline.kernels.algebra.factors import extreme_eigenvalues, factor_positive
 from sagline.kernels.algebra.functions import angle
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable.forces import behind_at, chord_at, material_at
+from sagline.kernels.cable.forces import behind_at
 from sagline.kernels.cable.geometry import cable_geometry
 from sagline.kernels.cable.pulley import Wrap, behind_cable, pulley_at, straight_behind
-from sagline.kernels.cable.terms import Model
+from sagline.kernels.cable.terms import Model, chord_at, material_at
 from sagline.kernels.forward import platform as f
 from sagline.kernels.forward.newton import BALANCED, descend, newton_from, polish, predict, solve_step
 from sagline.kernels.jit import entry, formula, glue, kernel

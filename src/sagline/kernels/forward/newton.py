@@ -12,9 +12,9 @@ from sagline.core.arrays import Array
 from sagline.kernels import codes, tables
 from sagline.kernels.algebra.factors import factor_positive, solve_general, solve_lower, solve_upper
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable.forces import end_motion_per_length, material_at
-from sagline.kernels.cable.stiffness import PlaneVector, force_by_length, force_change, force_of, plane_of
-from sagline.kernels.cable.terms import Model
+from sagline.kernels.cable.forces import end_motion_per_length
+from sagline.kernels.cable.stiffness import force_by_length, force_change, force_of, plane_of
+from sagline.kernels.cable.terms import Model, PlaneVector, material_at
 from sagline.kernels.forward import platform as f
 from sagline.kernels.jit import glue, kernel
 from sagline.kernels.statics import components_along, matrix_along, norm, step_pose, symmetric_part

@@ -8,11 +8,10 @@ from sagline.core.arrays import Array, Codes, Indices
 from sagline.kernels import codes, tables
 from sagline.kernels.algebra.factors import extreme_eigenvalues
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable.forces import material_at
 from sagline.kernels.cable.geometry import CABLE_ROWS, cable_geometry
 from sagline.kernels.cable.pulley import pulley_at
-from sagline.kernels.cable.stiffness import PlaneVector, force_of, force_slopes, plane_of, slopes_over
-from sagline.kernels.cable.terms import Model
+from sagline.kernels.cable.stiffness import force_of, force_slopes, plane_of, slopes_over
+from sagline.kernels.cable.terms import Model, PlaneVector, material_at
 from sagline.kernels.forward import platform as f
 from sagline.kernels.forward.forward import FLAT
 from sagline.kernels.jit import entry, formula, glue
@@ -46,11 +45,10 @@ def _describe_cable(
     span, rise, length = rows[g.SPAN, i], rows[g.RISE, i], rows[g.LENGTH, i]
     material, force, plane = material_at(cables, i), force_of(rows, i), plane_of(rows, i)
     free = length if model.behind is None else rows[g.FREE_LENGTH, i]
-    own, machine = slopes_over(model, material, pulley_at(cables, i), free, force, plane)
-    if model.behind is None:
-        own = force_slopes(model, span, rise, material, length, force, plane)
-    _fill_in_world_axes(machine.by_radius, rows, i, slopes[BY_RADIUS, i])
-    _fill_in_world_axes(machine.by_dead, rows, i, slopes[BY_DEAD, i])
+    over = slopes_over(model, material, pulley_at(cables, i), free, force, plane)
+    own = over if model.behind is not None else force_slopes(model, span, rise, material, length, force, plane)
+    _fill_in_world_axes(over.by_radius, rows, i, slopes[BY_RADIUS, i])
+    _fill_in_world_axes(over.by_dead, rows, i, slopes[BY_DEAD, i])
     _fill_in_world_axes(own.by_length, rows, i, slopes[BY_LENGTH, i])
     _fill_in_world_axes(own.by_density, rows, i, slopes[BY_DENSITY, i])
     _fill_in_world_axes(own.by_stiffness, rows, i, slopes[BY_STIFFNESS, i])
