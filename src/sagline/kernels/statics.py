@@ -40,6 +40,18 @@ def is_rotation(freedom: Array, k: int) -> bool:
     return freedom[k, 3] * freedom[k, 3] + freedom[k, 4] * freedom[k, 4] + freedom[k, 5] * freedom[k, 5] > 0.5
 
 
+@formula
+def squares_along(freedom: Array, part: Array) -> tuple[float, float]:
+    """Sums of squares of the components `part` (n,): along the free translations, and along the free rotations."""
+    translations, rotations = 0.0, 0.0
+    for k in range(freedom.shape[0]):
+        if is_rotation(freedom, k):
+            rotations += part[k] * part[k]
+        else:
+            translations += part[k] * part[k]
+    return translations, rotations
+
+
 @kernel
 def symmetric_part(free: Array, full: Array, matrix: Array) -> None:
     """Fill `matrix` (n, n) with the symmetric part of free K free^T, where K is `full`."""
@@ -83,20 +95,10 @@ def components_along(free: Array, full: Array, part: Array) -> float:
 @formula
 def fill_motion_of_components(free: Array, part: Array, motion: Array) -> None:
     """Fill `motion` (6,) from its components `part` (n,) along the free motions."""
-    for a in range(6):
-        motion[a] = 0.0
+    motion[:] = 0.0
     for j in range(free.shape[0]):
         for a in range(6):
             motion[a] += free[j, a] * part[j]
-
-
-@formula
-def norm(vector: Array) -> float:
-    """Euclidean length of `vector`."""
-    total = 0.0
-    for k in range(vector.shape[0]):
-        total += vector[k] * vector[k]
-    return math.sqrt(total)
 
 
 @formula
@@ -287,13 +289,23 @@ def set_pose(
 
     weight: root weights of the cables in the distribution's variable, (m,).
     """
-    cable_geometry(platform.robot, platform.body, platform.pose, balance.rotation, balance.geometry)
-    if not place_cables(model, limits, platform.robot, balance.geometry, cables):
+    if not place_platform(model, limits, platform, platform.pose, cables, balance):
         return codes.POSE_NO_CHORD
-    fill_structure_matrix(balance.geometry, balance.full)
-    rows_along_freedom(platform.freedom, balance.full, balance.matrix)
     _choose_variable(variable, weight, cables, balance)
     return codes.POSE_SOLVED if factor_balance(balance) else codes.POSE_SINGULAR
+
+
+@glue
+def place_platform(
+    model: Model, limits: TensionLimits, platform: Platform, pose: Array, cables: Cables, balance: Balance
+) -> bool:
+    """Fill cables, geometry and structure matrix at `pose`. False if a cable has no chord."""
+    cable_geometry(platform.robot, platform.body, pose, balance.rotation, balance.geometry)
+    if not place_cables(model, limits, platform.robot, balance.geometry, cables):
+        return False
+    fill_structure_matrix(balance.geometry, balance.full)
+    rows_along_freedom(platform.freedom, balance.full, balance.matrix)
+    return True
 
 
 @glue

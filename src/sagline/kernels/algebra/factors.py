@@ -15,6 +15,28 @@ from sagline.kernels.jit import formula, kernel
 LEAST_PIVOT = 1e-15  # relative to the original diagonal element; a smaller pivot is only a rounding error
 
 
+@formula
+def dot(one: Array, other: Array) -> float:
+    """Scalar product of two vectors."""
+    total = 0.0
+    for k in range(one.shape[0]):
+        total += one[k] * other[k]
+    return total
+
+
+@formula
+def norm(vector: Array) -> float:
+    """Euclidean length of `vector`."""
+    return math.sqrt(dot(vector, vector))
+
+
+@kernel
+def copy(source: Array, target: Array) -> None:
+    """Copy `source` to the first entries of `target`."""
+    for k in range(source.shape[0]):
+        target[k] = source[k]
+
+
 @kernel
 def factor_positive(matrix: Array, shift: float, factor: Array) -> bool:
     """Fill the lower triangle of the factor L of `matrix` + `shift` 1, (n, n). False if not positive definite.
@@ -163,13 +185,11 @@ def factorize(reduced: Array, diagonals: Array) -> bool:
 def orthogonal_factor(reduced: Array, diagonals: Array, q: Array) -> None:
     """Fill Q (m, m) from its reflections. Row m of `q` is a work row."""
     n, m = reduced.shape
+    q[:] = 0.0
     for i in range(m):
-        for j in range(m):
-            q[i, j] = 0.0
         q[i, i] = 1.0
     for k in range(n - 1, -1, -1):
-        for j in range(m):
-            q[m, j] = 0.0
+        q[m] = 0.0
         for i in range(k, m):
             for j in range(m):
                 q[m, j] += reduced[k, i] * q[i, j]
@@ -198,8 +218,7 @@ def pseudo_inverse(reduced: Array, diagonals: Array, q: Array, inverse: Array) -
 def minimum_norm(inverse: Array, right: Array, solution: Array) -> None:
     """Fill the minimum-norm `solution` (m,) of the equations matrix . solution = `right` (n,)."""
     n, m = inverse.shape
-    for i in range(m):
-        solution[i] = 0.0
+    solution[:] = 0.0
     for k in range(n):
         for i in range(m):
             solution[i] += right[k] * inverse[k, i]

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array, Indices
 from sagline.kernels.algebra.bounds import TOLERANCE, box_radius, inward, largest_bound, most_violated_bound, side_of
-from sagline.kernels.algebra.factors import normalize_row, orthogonalize_row
+from sagline.kernels.algebra.factors import copy, normalize_row, orthogonalize_row
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block, counters, vector
 
@@ -83,8 +83,7 @@ def _start_at_box_corner(rows: Array, cost: Array, radius: float, basis: Basis, 
     d = cost.size
     for k in range(d):
         sign = 1.0 if cost[k] >= 0.0 else -1.0
-        for j in range(d):
-            inverse[k, j] = 0.0
+        inverse[k] = 0.0
         inverse[k, k] = sign
         labels[k] = 2 * rows.shape[1] + k
         weights[k] = abs(cost[k])
@@ -138,8 +137,7 @@ def lowest_point(rows: Array, bounds: Array, cost: Array, slack: float, basis: B
     if labels[0] < 0:
         _start_at_box_corner(rows, cost, radius, basis, point)
     else:
-        for k in range(d):
-            point[k] = 0.0
+        point[:] = 0.0
         _move_to_vertex(rows, bounds, cost, radius, basis, point)
     for pivots in range(PIVOTS):
         careful = pivots > CAREFUL
@@ -211,8 +209,7 @@ def _point_on_active_sides(rows: Array, bounds: Array, held: ActiveSet, target: 
     """Fill the point on all active sides that is nearest to `target`. False if this point is not optimal."""
     labels, frame, triangle, pushes = held
     count, d = labels[0], point.size
-    for k in range(d):
-        point[k] = target[k]
+    copy(target, point)
     for c in range(count):  # distance of the active sides from the target, along row c of the frame
         label = labels[1 + c]
         miss = side_of(bounds, label)
@@ -267,8 +264,7 @@ def nearest_point(rows: Array, bounds: Array, target: Array, slack: float, held:
     if labels[0] > 0 and not _point_on_active_sides(rows, bounds, held, target, point):
         labels[0] = 0
     if labels[0] == 0:
-        for k in range(d):
-            point[k] = target[k]
+        copy(target, point)
     for exchange in range(EXCHANGES):
         entering = most_violated_bound(rows, bounds, point, slack, exchange > EXCHANGES // 2)
         if entering < 0:

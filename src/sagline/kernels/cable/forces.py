@@ -19,7 +19,14 @@ from sagline.core.arrays import Array
 from sagline.kernels import codes, tables
 from sagline.kernels.algebra import functions
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable.models import SMALL_HALLEY_STEP, catenary_end, from_length, from_tension, relative_excess
+from sagline.kernels.cable.models import (
+    SMALL_HALLEY_STEP,
+    catenary_end,
+    closure_error,
+    from_length,
+    from_tension,
+    relative_excess,
+)
 from sagline.kernels.cable.pulley import (
     Wrap,
     behind_cable,
@@ -268,21 +275,7 @@ def _halley_step(h: float, xi2: float, zeta2: float, kappa: float, excess: float
     """One Halley step on P2 (docs/model.md, section 2) for h <= 2, without branches."""
     y = h * h
     more = h * y * functions.sinh_excess_polynomial(y)  # sinh h - h
-    s = h + more
-    c = functions.cosh_polynomial(y)
-    total = 1.0 / (h + kappa)
-    lever = 1.0 / (s + kappa * c)
-    a = s * total
-    alpha = (more - kappa) * total
-    alpha1 = (c - a) * total
-    alpha2 = (s - 2.0 * alpha1) * total
-    e = s * lever
-    eta = -kappa * c * lever
-    eta1 = kappa * lever * lever
-    eta2 = -2.0 * eta1 * lever * (c + kappa * s)
-    error = excess + xi2 * alpha * (2.0 + alpha) + zeta2 * eta * (2.0 + eta)
-    slope = 2.0 * (xi2 * a * alpha1 + zeta2 * e * eta1)
-    bend = xi2 * (alpha1 * alpha1 + a * alpha2) + zeta2 * (eta1 * eta1 + e * eta2)
+    error, slope, bend = closure_error(h, (h + more, more, functions.cosh_polynomial(y)), xi2, zeta2, kappa, excess)
     return h - error * slope / (slope * slope - error * bend)
 
 

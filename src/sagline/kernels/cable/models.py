@@ -214,6 +214,28 @@ def _parameter_start(xi: float, zeta: float, kappa: float, excess: float) -> flo
 
 
 @formula
+def closure_error(
+    h: float, functions_of_h: tuple[float, float, float], xi2: float, zeta2: float, kappa: float, excess: float
+) -> tuple[float, float, float]:
+    """Error of P2 at h, and its first and second derivatives; `functions_of_h`: sinh h, sinh h - h, and cosh h."""
+    s, more, c = functions_of_h
+    total = 1.0 / (h + kappa)
+    lever = 1.0 / (s + kappa * c)
+    a = s * total  # 1 + alpha
+    alpha = (more - kappa) * total
+    alpha1 = (c - a) * total
+    alpha2 = (s - 2.0 * alpha1) * total
+    e = s * lever  # 1 + eta
+    eta = -kappa * c * lever
+    eta1 = kappa * lever * lever
+    eta2 = -2.0 * eta1 * lever * (c + kappa * s)
+    error = excess + xi2 * alpha * (2.0 + alpha) + zeta2 * eta * (2.0 + eta)
+    slope = 2.0 * (xi2 * a * alpha1 + zeta2 * e * eta1)
+    bend = xi2 * (alpha1 * alpha1 + a * alpha2) + zeta2 * (eta1 * eta1 + e * eta2)
+    return error, slope, bend
+
+
+@formula
 def _catenary_parameter(xi: float, zeta: float, kappa: float, excess: float) -> tuple[float, int]:
     """P2: h and status of a cable with span/L = xi > 0, rise/L = zeta, kappa = wL/(2EA) and (D^2 - L^2)/L^2."""
     xi2 = xi * xi
@@ -222,21 +244,8 @@ def _catenary_parameter(xi: float, zeta: float, kappa: float, excess: float) -> 
     high = math.inf
     h = _parameter_start(xi, zeta, kappa, excess)
     for _ in range(CATENARY_STEPS):
-        s = h * functions.sinhc(h)
-        c = functions.cosh(h)
-        total = 1.0 / (h + kappa)
-        lever = 1.0 / (s + kappa * c)
-        a = s * total  # 1 + alpha
-        alpha = (functions.sinh_excess(h) - kappa) * total
-        alpha1 = (c - a) * total
-        alpha2 = (s - 2.0 * alpha1) * total
-        e = s * lever  # 1 + eta
-        eta = -kappa * c * lever
-        eta1 = kappa * lever * lever
-        eta2 = -2.0 * eta1 * lever * (c + kappa * s)
-        error = excess + xi2 * alpha * (2.0 + alpha) + zeta2 * eta * (2.0 + eta)
-        slope = 2.0 * (xi2 * a * alpha1 + zeta2 * e * eta1)
-        bend = xi2 * (alpha1 * alpha1 + a * alpha2) + zeta2 * (eta1 * eta1 + e * eta2)
+        s, more, c = h * functions.sinhc(h), functions.sinh_excess(h), functions.cosh(h)
+        error, slope, bend = closure_error(h, (s, more, c), xi2, zeta2, kappa, excess)
         if error > 0.0:
             high = h
         else:

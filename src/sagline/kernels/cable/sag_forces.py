@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array, Codes
 from sagline.kernels import codes
+from sagline.kernels.algebra.factors import copy
 from sagline.kernels.cable.models import shallow_sag_force
 from sagline.kernels.cable.states import CONTACTS, SAME_EXIT, solve_cable_state, solve_cable_states
 from sagline.kernels.cable.terms import Cables, Model, chord_of, material_of, pulley_of
@@ -76,6 +77,18 @@ def sag_forces_at(curves: Curves, tau: Array, sag_force: Array) -> None:
 
 
 @kernel
+def _sag_forces_beside(curves: Curves, tau: Array, above: Array) -> None:
+    """Fill the sag forces slightly above the chord tensions `tau`, and slightly below them in `curves.cables`."""
+    cables = curves.cables
+    for i in range(tau.size):
+        cables.last_sag_force[i] = tau[i] * (1.0 + SLOPE_STEP)
+    sag_forces_at(curves, cables.last_sag_force, above)
+    for i in range(tau.size):
+        cables.last_sag_force[i] = tau[i] * (1.0 - SLOPE_STEP)
+    sag_forces_at(curves, cables.last_sag_force, cables.sag_force)
+
+
+@kernel
 def slopes_at(curves: Curves, tau: Array, slope: Array, bend: Array) -> None:
     """Fill `slope` (m,) and curvature `bend` (m,) [1/N] of the sag forces over `tau`, by central differences."""
     cables = curves.cables
@@ -83,13 +96,8 @@ def slopes_at(curves: Curves, tau: Array, slope: Array, bend: Array) -> None:
         for i in range(tau.size):
             slope[i] = bend[i] = 0.0
         return
-    for i in range(tau.size):
-        cables.last_sag_force[i] = tau[i] * (1.0 + SLOPE_STEP)
-    sag_forces_at(curves, cables.last_sag_force, slope)
     sag_forces_at(curves, tau, bend)
-    for i in range(tau.size):
-        cables.last_sag_force[i] = tau[i] * (1.0 - SLOPE_STEP)
-    sag_forces_at(curves, cables.last_sag_force, cables.sag_force)
+    _sag_forces_beside(curves, tau, slope)
     for i in range(tau.size):
         step = SLOPE_STEP * tau[i]
         above, below, here = slope[i], cables.sag_force[i], bend[i]
@@ -179,15 +187,9 @@ ROWS = 8
 @kernel
 def _growths(curves: Curves, tau: Array, growth: Array) -> None:
     """Fill the growth of the sag forces (m,) [N]: derivatives with respect to the logarithm of the chord tension."""
-    cables = curves.cables
+    _sag_forces_beside(curves, tau, growth)
     for i in range(tau.size):
-        cables.last_sag_force[i] = tau[i] * (1.0 + SLOPE_STEP)
-    sag_forces_at(curves, cables.last_sag_force, growth)
-    for i in range(tau.size):
-        cables.last_sag_force[i] = tau[i] * (1.0 - SLOPE_STEP)
-    sag_forces_at(curves, cables.last_sag_force, cables.sag_force)
-    for i in range(tau.size):
-        growth[i] = (growth[i] - cables.sag_force[i]) / (2.0 * SLOPE_STEP)
+        growth[i] = (growth[i] - curves.cables.sag_force[i]) / (2.0 * SLOPE_STEP)
 
 
 @formula
@@ -307,12 +309,9 @@ def find_extrema(curves: Curves, low: Array, high: Array, memory: Memory) -> Non
     cables, turns = curves.cables, curves.turns
     m = cables.low.size
     work, memory = block(memory, ROWS, m)
-    for i in range(m):
-        turns[LEAST_TENSION, i] = turns[LEAST_SAG_FORCE, i] = turns[MOST_TENSION, i] = turns[MOST_SAG_FORCE, i] = (
-            math.nan
-        )
-        work[A, i] = low[i]
-        work[B, i] = high[i]
+    turns[:] = math.nan
+    copy(low, work[A])
+    copy(high, work[B])
     if curves.model.code != codes.CATENARY:
         return
     _find_rises(curves, work)

@@ -11,7 +11,7 @@ import math
 
 from sagline.core.arrays import Array, Codes, Indices
 from sagline.kernels import codes, tables
-from sagline.kernels.algebra.factors import extreme_eigenvalues, factor_positive
+from sagline.kernels.algebra.factors import copy, extreme_eigenvalues, factor_positive
 from sagline.kernels.algebra.functions import angle
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.forces import behind_at
@@ -22,7 +22,7 @@ from sagline.kernels.forward import platform as f
 from sagline.kernels.forward.newton import BALANCED, descend, newton_from, polish, predict, solve_step
 from sagline.kernels.jit import entry, formula, glue, kernel
 from sagline.kernels.memory import Memory
-from sagline.kernels.statics import components_along, is_rotation, step_pose, symmetric_part
+from sagline.kernels.statics import components_along, squares_along, step_pose, symmetric_part
 
 FLAT = 1e-9  # relative to the largest stiffness; a smaller stiffness counts as zero
 OVERSTRETCHED = 0.1  # strain above which a result is unrealistic
@@ -53,23 +53,6 @@ def _support_status(model: Model, cables: Array, rows: Array, needed: int) -> in
 
 
 @glue
-def _fill_residuals(freedom: Array, gradient: Array, numbers: Array) -> None:
-    """Fill the norms of the unbalanced force [N] and moment [N m] along the free motions."""
-    force = 0.0
-    moment = 0.0
-    for j in range(freedom.shape[0]):
-        total = 0.0
-        for a in range(6):
-            total += freedom[j, a] * gradient[a]
-        if is_rotation(freedom, j):
-            moment += total * total
-        else:
-            force += total * total
-    numbers[f.FORCE_RESIDUAL] = math.sqrt(force)
-    numbers[f.MOMENT_RESIDUAL] = math.sqrt(moment)
-
-
-@glue
 def _find_pose(
     problem: f.PoseProblem,
     exact: Model,
@@ -91,7 +74,7 @@ def _find_pose(
     predicted = predict(problem, lengths, start, chain.last, space, pose)
     for way in range(PREDICTION if predicted else FROM_START, DOWNHILL + 1):
         if way != PREDICTION:
-            f.copy_pose(start, pose)
+            copy(start, pose)
         if way != DOWNHILL:
             steps, size = newton_from(problem, pose, space)
             known = size if steps == 0 and way == FROM_START and model.code == exact.code else 0.0
@@ -129,15 +112,6 @@ def _fill_stability(
     elif status == codes.FORWARD_SOLVED:
         status = _support_status(model, cables, space.rows, arcs.shape[0])
     return status
-
-
-@glue
-def _store_chain(chain: f.LastEquilibrium, pose: Array, wrench: Array) -> None:
-    """Store `pose` and its factored stiffness as the last equilibrium."""
-    if not math.isnan(chain.factor[0, 0]):
-        f.copy_pose(pose, chain.last)
-        for k in range(6):
-            chain.last[f.LAST_WRENCH + k] = wrench[k]
 
 
 @glue
@@ -186,13 +160,13 @@ def forward_poses(
     count, m = batch.lengths.shape
     space, rest = f.new_forward_arrays(Memory(*memory), kept.rows, kept.factor)
     free, arcs, start, pose = f.new_motions(rest, batch.freedom.shape[0])
-    f.copy_pose(batch.starts[0], start)
+    copy(batch.starts[0], start)
     for p in range(count):
         if math.isnan(batch.lengths[p, 0]):
             f.clear_solution(answer, p, codes.FORWARD_NO_LENGTHS, 0)
             continue
         if not chained:  # a result must not depend on the previous sample
-            f.copy_pose(f.row_of(batch.starts, p), start)
+            copy(f.row_of(batch.starts, p), start)
             kept.last[0] = math.nan
             for i in range(m):
                 kept.rows[g.PARAMETER, i] = math.nan
@@ -202,15 +176,19 @@ def forward_poses(
         )
         steps, size = _find_pose(problem, exact, batch.lengths[p], start, kept, space, pose)
         status = _fill_stability(problem, pose, arcs, size, space, answer.numbers[p])
-        _fill_residuals(batch.freedom, space.gradient, answer.numbers[p])
+        components_along(batch.freedom, space.gradient, space.part)
+        force, moment = squares_along(batch.freedom, space.part)
+        answer.numbers[p, f.FORCE_RESIDUAL], answer.numbers[p, f.MOMENT_RESIDUAL] = math.sqrt(force), math.sqrt(moment)
         answer.numbers[p, f.ITERATIONS] = steps
         answer.pose_statuses[p] = status
-        f.copy_pose(pose, answer.poses[p])
+        copy(pose, answer.poses[p])
         _store_sample(problem, kept.rows, p, answer.results, answer.statuses)
         kept.last[0] = math.nan
         if status != codes.FORWARD_NOT_CONVERGED:
-            f.copy_pose(pose, start)
-            _store_chain(kept, pose, problem.wrench)
+            copy(pose, start)
+            if not math.isnan(kept.factor[0, 0]):
+                copy(pose, kept.last)
+                copy(problem.wrench, kept.last[f.LAST_WRENCH :])
 
 
 FIT_STEPS = 200
@@ -242,13 +220,10 @@ def _normal_equations(free: Array, cables: Array, lengths: Array, space: f.Forwa
     rows, matrix, part = space.rows, space.matrix, space.part
     full, row = space.gradient, space.step
     n = part.shape[0]
-    for j in range(n):
-        part[j] = 0.0
-        for k in range(n):
-            matrix[j, k] = 0.0
+    part[:] = 0.0
+    matrix[:] = 0.0
     for i in range(lengths.shape[0]):
-        for j in range(6):
-            full[j] = 0.0
+        full[:] = 0.0
         f.add_force(rows, i, rows[g.COSINE, i], rows[g.SINE, i], full)
         components_along(free, full, row)
         error = _straight_length(cables, rows, i) - lengths[i]
@@ -281,7 +256,7 @@ def _fit_pose(problem: f.PoseProblem, lengths: Array, pose: Array, space: f.Forw
         step_pose(free, body, pose, space.step, space.motion, space.trial)
         new = _half_square_error(cables, body, lengths, space.trial, rotation, rows)
         if new < cost:
-            f.copy_pose(space.trial, pose)
+            copy(space.trial, pose)
             gain = cost - new
             cost = new
             damping = 0.1 * damping if damping > 1e-14 * largest else 0.0
@@ -310,22 +285,22 @@ def fit_poses(
     count, m = batch.lengths.shape
     space, rest = f.new_forward_arrays(Memory(*memory), kept.rows, kept.factor)
     free, arcs, start, pose = f.new_motions(rest, batch.freedom.shape[0])
-    f.copy_pose(batch.starts[0], start)
+    copy(batch.starts[0], start)
     for p in range(count):
         f.clear_solution(answer, p, codes.FORWARD_NO_LENGTHS, codes.CABLE_NO_TENSION)
         if math.isnan(batch.lengths[p, 0]):
             continue
         if not chained:
-            f.copy_pose(f.row_of(batch.starts, p), start)
+            copy(f.row_of(batch.starts, p), start)
         problem = f.problem_at(Model(codes.STRAIGHT, 0.0, 0.0, 0.0, None), batch, p, free, arcs)
-        f.copy_pose(start, pose)
+        copy(start, pose)
         answer.numbers[p, f.ENERGY], answer.numbers[p, f.ITERATIONS], fitted = _fit_pose(
             problem, batch.lengths[p], pose, space
         )
         answer.pose_statuses[p] = codes.FORWARD_FITTED if fitted else codes.FORWARD_NOT_CONVERGED
-        f.copy_pose(pose, answer.poses[p])
+        copy(pose, answer.poses[p])
         if fitted:
-            f.copy_pose(pose, start)
+            copy(pose, start)
         for i in range(m):
             answer.results[tables.SPAN, p, i] = space.rows[g.SPAN, i]
             answer.results[tables.RISE, p, i] = space.rows[g.RISE, i]

@@ -10,14 +10,14 @@ import math
 
 from sagline.core.arrays import Array
 from sagline.kernels import codes, tables
-from sagline.kernels.algebra.factors import factor_positive, solve_general, solve_lower, solve_upper
+from sagline.kernels.algebra.factors import copy, dot, factor_positive, norm, solve_general, solve_lower, solve_upper
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.forces import end_motion_per_length
 from sagline.kernels.cable.stiffness import force_by_length, force_change, force_of, plane_of
 from sagline.kernels.cable.terms import Model, PlaneVector, material_at
 from sagline.kernels.forward import platform as f
 from sagline.kernels.jit import glue, kernel
-from sagline.kernels.statics import components_along, matrix_along, norm, step_pose, symmetric_part
+from sagline.kernels.statics import components_along, matrix_along, step_pose, symmetric_part
 
 
 @kernel
@@ -28,42 +28,28 @@ def trust_step(matrix: Array, gradient: Array, radius: float, factor: Array, wor
     definite and the step is short enough. mu = 0 is an ordinary Newton step.
     """
     n = gradient.shape[0]
-    square = 0.0
-    for i in range(n):
-        square += gradient[i] * gradient[i]
     frobenius = 0.0
     for i in range(n):
         for j in range(n):
             frobenius += matrix[i, j] * matrix[i, j]
     low = 0.0
-    high = math.sqrt(square) / radius + math.sqrt(frobenius)
+    high = norm(gradient) / radius + math.sqrt(frobenius)
     shift = 0.0
     for _ in range(40):
         if not factor_positive(matrix, shift, factor):
             low = max(low, shift)
             shift = max(math.sqrt(low * high), low + 0.001 * (high - low))
             continue
-        for i in range(n):
-            step[i] = -gradient[i]
-        solve_lower(factor, step)
-        solve_upper(factor, step)
-        norm2 = 0.0
-        for i in range(n):
-            norm2 += step[i] * step[i]
-        length = math.sqrt(norm2)
+        length = solve_step(factor, gradient, step)
         if length <= 1.1 * radius and (shift == 0.0 or length >= 0.8 * radius or high - low <= 1e-6 * high):
             break
         if length > radius:
             low = shift
         else:
             high = shift
-        for i in range(n):
-            work[i] = step[i]
+        copy(step, work)
         solve_lower(factor, work)
-        bend = 0.0
-        for i in range(n):
-            bend += work[i] * work[i]
-        new = shift + norm2 / bend * (length - radius) / radius
+        new = shift + dot(step, step) / dot(work, work) * (length - radius) / radius
         shift = new if low < new < high else max(math.sqrt(low * high), low + 0.1 * (high - low))
     return shift
 
@@ -172,7 +158,7 @@ def newton_from(problem: f.PoseProblem, pose: Array, space: f.ForwardArrays) -> 
         before = length
         age += length
         step_pose(free, body, pose, step, space.motion, space.trial)
-        f.copy_pose(space.trial, pose)
+        copy(space.trial, pose)
     return steps, size
 
 
@@ -198,7 +184,7 @@ def _newton_steps(
         for shortening in range(SHORTENINGS + 1):
             last = shortening == SHORTENINGS or (shortening > 0 and best <= good)
             if last:  # no step reduces the unbalance: restore the pose
-                f.copy_pose(pose, trial)
+                copy(pose, trial)
             else:
                 for j in range(step.shape[0]):
                     step[j] *= share
@@ -210,7 +196,7 @@ def _newton_steps(
                 break
             share = 0.25
         length = norm(step)
-        f.copy_pose(trial, pose)
+        copy(trial, pose)
     return (new, length) if better else (best, 0.0)
 
 
@@ -256,7 +242,7 @@ def descend(problem: f.PoseProblem, pose: Array, space: f.ForwardArrays, known: 
     radius = FIRST_RADIUS
     steps, tensions = DESCENT_STEPS, known
     energy, size, promised, shift, length = 0.0, 0.0, 0.0, 0.0, 0.0
-    f.copy_pose(pose, trial)
+    copy(pose, trial)
     for iteration in range(DESCENT_STEPS + 1):
         if iteration > 0 or known == 0.0:
             tensions = f.unbalance(model, cables, body, wrench, trial, rotation, rows, gradient)
@@ -279,7 +265,7 @@ def descend(problem: f.PoseProblem, pose: Array, space: f.ForwardArrays, known: 
                     steps = iteration
                     break
             else:
-                f.copy_pose(trial, pose)
+                copy(trial, pose)
                 if shift == 0.0 and (length <= NEAR or promised <= noise):
                     steps = iteration
                     break

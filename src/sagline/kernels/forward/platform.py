@@ -167,24 +167,14 @@ def fill_arcs(freedom: Array, cables: Array, body: Array, arcs: Array) -> None:
             arcs[j, a] = freedom[j, a] * arc
 
 
-@kernel
-def copy_pose(source: Array, target: Array) -> None:
-    """Copy the pose row `source` to `target`."""
-    for k in range(tables.POSE_COLUMNS):
-        target[k] = source[k]
-
-
 @glue
 def clear_solution(found: Solutions, p: int, status: int, cable_status: int) -> None:
     """Fill the arrays for sample `p` without a result: NaN as values, zero iterations, and the statuses."""
-    for k in range(tables.POSE_COLUMNS):
-        found.poses[p, k] = math.nan
-    for i in range(found.statuses.shape[1]):
-        found.statuses[p, i] = cable_status
-        for row in range(found.results.shape[0]):
-            found.results[row, p, i] = math.nan
-    for k in range(FORWARD_NUMBERS):
-        found.numbers[p, k] = math.nan
+    found.poses[p] = math.nan
+    found.statuses[p] = cable_status
+    for row in range(found.results.shape[0]):
+        found.results[row, p] = math.nan
+    found.numbers[p] = math.nan
     found.numbers[p, ITERATIONS] = 0.0
     found.pose_statuses[p] = status
 
@@ -280,9 +270,7 @@ def platform_stiffness(model: Model, cables: Array, rows: Array, stiffness: Arra
     Its skew part is half the moment of the cable forces. This part is zero in equilibrium without a given moment.
     """
     stiffnesses_in_plane(model, cables, rows, model.behind)
-    for j in range(6):
-        for k in range(6):
-            stiffness[j, k] = 0.0
+    stiffness[:] = 0.0
     for i in range(cables.shape[0]):
         (kxx, kxy, kxz), (kyx, kyy, kyz), (kzx, kzy, kzz) = end_stiffness(rows, i)
         x, y, z = rows[g.LEVER_X, i], rows[g.LEVER_Y, i], rows[g.LEVER_Z, i]

@@ -282,16 +282,12 @@ def inverse_poses(
 def measure_balance(platform: statics.Platform, cables: Cables, balance: statics.Balance, residuals: Array) -> None:
     """Fill the norms of the unbalanced force [N] and moment [N m] along the platform's free motions."""
     statics.fill_needed_wrench(platform, cables, balance)
-    force = 0.0
-    moment = 0.0
+    rest = balance.needed  # work memory, because `balance.right` contains its components
     for k in range(balance.right.size):
-        total = -balance.right[k]
+        rest[k] = -balance.right[k]
         for i in range(cables.tau.size):
-            total += balance.matrix[k, i] * cables.tau[i]
-        if statics.is_rotation(platform.freedom, k):
-            moment += total * total
-        else:
-            force += total * total
+            rest[k] += balance.matrix[k, i] * cables.tau[i]
+    force, moment = statics.squares_along(platform.freedom, rest)
     residuals[FORCE] = math.sqrt(force)
     residuals[MOMENT] = math.sqrt(moment)
 

@@ -13,13 +13,12 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array, Flags, Indices
 from sagline.kernels import codes, statics, tables
-from sagline.kernels.algebra.factors import solve_general
+from sagline.kernels.algebra.factors import copy, dot, solve_general
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable.geometry import cable_geometry
 from sagline.kernels.cable.pulley import robots_have_machine
 from sagline.kernels.cable.sag_forces import Curves, new_curves, sag_forces_at
 from sagline.kernels.cable.states import TensionLimits
-from sagline.kernels.cable.terms import Cables, Model, new_cables
+from sagline.kernels.cable.terms import Cables, new_cables
 from sagline.kernels.inverse import poses as inverse
 from sagline.kernels.jit import entry, glue
 from sagline.kernels.memory import Memory, block, counters, vector
@@ -87,24 +86,6 @@ def new_underconstrained_arrays(memory: Memory, m: int, n: int) -> tuple[Underco
 
 
 @glue
-def _place(
-    model: Model,
-    limits: TensionLimits,
-    platform: statics.Platform,
-    pose: Array,
-    cables: Cables,
-    balance: statics.Balance,
-) -> bool:
-    """Fill cables, geometry and structure matrix at `pose`. False if a cable has no chord."""
-    cable_geometry(platform.robot, platform.body, pose, balance.rotation, balance.geometry)
-    if not statics.place_cables(model, limits, platform.robot, balance.geometry, cables):
-        return False
-    statics.fill_structure_matrix(balance.geometry, balance.full)
-    statics.rows_along_freedom(platform.freedom, balance.full, balance.matrix)
-    return True
-
-
-@glue
 def _mean_lever(geometry: Array) -> float:
     """Root mean square distance of the platform ends from the center of mass. 1 m if all ends are at this center."""
     square = 0.0
@@ -141,10 +122,7 @@ def _fill_tension_level(gram: Array, work: Array, along: Array) -> None:
             for j in range(m):
                 work[i, j] = gram[i, j]
         solve_general(work, along)
-    square = 0.0
-    for i in range(m):
-        square += along[i] * along[i]
-    size = math.nan
+    square, size = dot(along, along), math.nan
     for i in range(m):
         if math.isnan(size) and along[i] * along[i] > 0.1 * square / m:
             size = math.copysign(1.0 / math.sqrt(square), along[i])
@@ -156,14 +134,12 @@ def _fill_tension_level(gram: Array, work: Array, along: Array) -> None:
 def _fill_first_tensions(freedom: Array, lever: float, balance: statics.Balance, gram: Array, tau: Array) -> None:
     """Fill tensions whose wrench is close to the needed wrench. Each tension is at least a small part of the load."""
     m = tau.size
-    square = 0.0
+    square, _moment = statics.squares_along(freedom, balance.right)
     for i in range(m):
         tau[i] = 0.0
         for k in range(balance.right.size):
             unit = 1.0 / (lever * lever) if statics.is_rotation(freedom, k) else 1.0
             tau[i] += unit * balance.matrix[k, i] * balance.right[k]
-    for k in range(balance.right.size):
-        square += 0.0 if statics.is_rotation(freedom, k) else balance.right[k] * balance.right[k]
     solve_general(gram, tau)
     for i in range(m):
         tau[i] = max(tau[i], FLOOR * math.sqrt(square) / m)
@@ -176,9 +152,7 @@ def _fill_stiffness(cables: Cables, geometry: Array, stiffness: Array) -> None:
     The motion is the displacement of the center of mass, then the rotation about it. The sag force is proportional to
     the chord.
     """
-    for a in range(6):
-        for b in range(6):
-            stiffness[a, b] = 0.0
+    stiffness[:] = 0.0
     for i in range(cables.tau.size):
         ux = -geometry[g.COSINE, i] * geometry[g.AZIMUTH_X, i]
         uy = -geometry[g.COSINE, i] * geometry[g.AZIMUTH_Y, i]
@@ -209,19 +183,12 @@ def _fill_system(search: _Search, space: UnderconstrainedArrays) -> None:
     freedom, jacobian, step = platform.freedom, space.jacobian, space.step
     n, m = balance.matrix.shape
     _fill_stiffness(cables, balance.geometry, space.stiffness)
+    statics.matrix_along(freedom, space.stiffness, jacobian)
     for k in range(n):
         step[k] = balance.right[k]
         for i in range(m):
             jacobian[k, n + i] = balance.matrix[k, i]
             step[k] -= balance.matrix[k, i] * cables.tau[i]
-        for j in range(n):
-            if n == 6:  # every motion is free
-                jacobian[k, j] = space.stiffness[k, j]
-                continue
-            jacobian[k, j] = 0.0
-            for a in range(6):
-                for b in range(6):
-                    jacobian[k, j] += freedom[k, a] * space.stiffness[a, b] * freedom[j, b]
     center = statics.turned(
         pose, platform.body[tables.CENTER_X], platform.body[tables.CENTER_Y], platform.body[tables.CENTER_Z]
     )
@@ -230,8 +197,7 @@ def _fill_system(search: _Search, space: UnderconstrainedArrays) -> None:
     for c in range(m):
         for i in range(m):
             jacobian[n + c, n + i] = space.along[i] if given[c] == LEVEL else 0.0
-        for b in range(6):
-            space.motion[b] = 0.0
+        space.motion[:] = 0.0
         if given[c] == LEVEL:
             step[n + c] = level
             for i in range(m):
@@ -253,10 +219,7 @@ def _fill_system(search: _Search, space: UnderconstrainedArrays) -> None:
             else:
                 space.motion[3], space.motion[4] = -center[1], center[0]
             step[n + c] = start[given[c]] - pose[given[c]]
-        for j in range(n):
-            jacobian[n + c, j] = 0.0
-            for b in range(6):
-                jacobian[n + c, j] += space.motion[b] * freedom[j, b]
+        statics.components_along(freedom, space.motion, jacobian[n + c])
 
 
 @glue
@@ -267,21 +230,14 @@ def _take_step(search: _Search, space: UnderconstrainedArrays) -> tuple[float, b
     """
     platform, cables, pose, tau = search.platform, search.curves.cables, search.pose, space.tau
     freedom, step, n = platform.freedom, space.step, platform.freedom.shape[0]
-    turn = 0.0
-    shift = 0.0
-    for k in range(n):
-        if statics.is_rotation(freedom, k):
-            turn += step[k] * step[k]
-        else:
-            shift += step[k] * step[k]
-    turn = math.sqrt(turn)
+    shift, square = statics.squares_along(freedom, step)
+    turn = math.sqrt(square)
     size = max(turn, math.sqrt(shift) / search.lever)
     share = TURN / turn if turn > TURN else 1.0
     for k in range(step.size):
         step[k] *= share
     statics.step_pose(freedom, platform.body, pose, step[:n], space.motion, space.moved)
-    for k in range(pose.size):
-        pose[k] = space.moved[k]
+    copy(space.moved, pose)
     short = False
     for i in range(tau.size):
         size = max(size, abs(step[n + i]) / tau[i])
@@ -303,7 +259,7 @@ def _find_equilibrium(search: _Search, space: UnderconstrainedArrays) -> int:
     status = codes.POSE_NO_EQUILIBRIUM
     waited = 0
     for step in range(STEPS):
-        if not _place(model, search.limits, search.platform, search.pose, cables, search.balance):
+        if not statics.place_platform(model, search.limits, search.platform, search.pose, cables, search.balance):
             break
         sag_forces_at(search.curves, tau, space.sag_force)
         statics.fill_needed_wrench(search.platform, cables, search.balance)
@@ -380,13 +336,12 @@ def underconstrained_poses(
         platform = inverse.platform_at(robot_terms, starts, wrenches, p)
         model = inverse.model_at(model_terms, platform.body)
         pose = poses[p]
-        for k in range(pose.size):
-            pose[k] = starts[p, k]
+        copy(starts[p], pose)
         for i in range(m):
             statuses[p, i] = codes.CABLE_SOLVED
             blocking[p, i] = False
         status = codes.POSE_NO_CHORD
-        if _place(model, limits, platform, pose, cables, balance):
+        if statics.place_platform(model, limits, platform, pose, cables, balance):
             lever = _mean_lever(balance.geometry)
             _fill_gram(freedom, balance.matrix, lever, space.gram)
             if has_yaw or has_level:
@@ -394,8 +349,7 @@ def underconstrained_poses(
             statics.fill_needed_wrench(platform, cables, balance)
             follows = chained and p > 0 and pose_statuses[p - 1] == codes.POSE_SOLVED
             _fill_first_tensions(freedom, lever, balance, space.gram, space.sag_force)
-            for i in range(m):
-                space.tau[i] = results[tables.TENSION, p - 1, i] if follows else space.sag_force[i]
+            copy(results[tables.TENSION, p - 1] if follows else space.sag_force, space.tau)
             for k in range(3 if follows else pose.size, pose.size):
                 pose[k] = poses[p - 1, k]
             curves, _left = new_curves(model, cables, statuses[p], rest)
@@ -411,8 +365,7 @@ def underconstrained_poses(
             inverse.measure_balance(platform, cables, balance, residuals[p])
         else:
             residuals[p, inverse.FORCE] = residuals[p, inverse.MOMENT] = math.nan
-            for k in range(pose.size):
-                pose[k] = starts[p, k]
+            copy(starts[p], pose)
         for k in range(n):
             needed[p, k] = balance.right[k] if solved else math.nan
         pose_statuses[p] = status
