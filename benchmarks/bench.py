@@ -77,7 +77,7 @@ def speed_of_cables() -> Iterator[Row]:
 
     def kernel_of(batch: Callable[..., None], given: Array) -> Callable[[], None]:
         buffers = (room,) if batch is batch_from_tension else ()
-        return lambda: batch(model.terms(9.81), span, rise, rho, ea, given, *work, codes, *buffers)
+        return lambda: batch(model.terms(9.81), (span, rise, rho, ea, given), (*work, codes), *buffers)
 
     to_ns = 1e9 / CABLES
     printed = best_seconds(lambda: as_printed(span, rise, horizontal, 0.067, 44e3, out)) * to_ns

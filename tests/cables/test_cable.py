@@ -12,7 +12,7 @@ import pytest
 
 from sagline import Cable, Catenary, InvalidValueError, Robot, dump_robot, identify_cable, load_robot, without_cables
 from sagline.article.machine import PARAMETERS, Parameter, robot_with_errors
-from sagline.cables.rope import ROPES
+from sagline.cables.cable import ROPES
 from sagline.viewer.snapshot import Settings
 from tests.refusal import refused
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sagline import InvalidValueError
-from sagline.cables.rope import ROPES
+from sagline.cables.cable import ROPES
 from tests.refusal import refused
 
 

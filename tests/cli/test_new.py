@@ -14,7 +14,7 @@ import pytest
 from typer.testing import CliRunner
 
 import sagline as sl
-from sagline.cables.rope import ROPES
+from sagline.cables.cable import ROPES
 from sagline.cli.main import app
 from sagline.cli.new import ROPE_NAMES, grid
 from sagline.robot.catalogue import Design

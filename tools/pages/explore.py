@@ -50,8 +50,8 @@ def calls() -> dict[str, Any]:
     described: dict[str, Call] = {}
     for name, model in (("exact", Catenary()), ("empirical", Empirical())):
         terms = model.terms(GRAVITY)
-        described[name] = "batch_from_tension", (terms, *given.values(), tension, *forces, status, work)
-        state = (terms, *given.values(), *(each[:1] for each in (*forces, tension)))
+        described[name] = "batch_from_tension", (terms, (*given.values(), tension), (*forces, status), work)
+        state = terms, (*given.values(), *(each[:1] for each in (*forces, tension)))
         described[f"{name}Sag"] = "largest_sags", (*state, sag)
         described[f"{name}Points"] = "shape_points", (*state, points)
     return described_calls(described, {**given, **found, "status": status, "sag": sag, "points": points})

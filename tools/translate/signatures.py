@@ -43,7 +43,8 @@ KEPT: Final = plain_tuple(F1, F2, F2, F2, F1, I1, F1)
 BODY: Final = plain_tuple(F2, F1, F1, F2)
 OBSERVED: Final = (GIVEN, plain_tuple(*[F1] * 8), plain_tuple(*[F2] * 4), plain_tuple(I2, F2, F3), MEMORY)
 OBSERVATIONS: Final = plain_tuple(F3, F2, F2, F3, F3, F2)
-STATE: Final = (TERMS, F1, F1, F1, F1, F1, F1, F1, F1)
+STATE: Final = (TERMS, plain_tuple(*[F1] * 8))
+SOLVED: Final = (TERMS, plain_tuple(*[F1] * 5), plain_tuple(F1, F1, F1, CODES1))
 RUN: Final = (plain_tuple(*[INT] * 5), plain_tuple(*[FLOAT] * 4), BODY, F2, COURSES, KEPT, plain_tuple(*[F2] * 5))
 INVERSE: Final = (MODEL, DISTRIBUTION, LIMITS, ROBOTS, F2, F2, F1, MEMORY)
 RULE: Final = plain_tuple(F2, F2, F3, F3)  # spectral elements: nodes, weights, slopes, integrals
@@ -53,8 +54,8 @@ DYNAMIC_MODEL: Final = (INT, FLOAT, FLOAT, FLOAT)
 # argument types of each entry, by the entry's name and the key of the set
 SIGNATURES: Final[dict[str, dict[str, tuple[Type, ...]]]] = {
     "batch_end": {"": (F1,) * 7},
-    "batch_from_length": {"": (TERMS, *[F1] * 8, CODES1)},
-    "batch_from_tension": {"": (TERMS, *[F1] * 8, CODES1, F2)},
+    "batch_from_length": {"": SOLVED},
+    "batch_from_tension": {"": (*SOLVED, F2)},
     "begin_period": {"": (plain_tuple(F1, F1, F1), F1, F1, F2, COURSE, F1, I1, BOOL, BOOL, FLOAT)},
     "cable_courses": {"": (F2, F1, F1, F1, INT, F2, F2, F3)},
     "cable_geometries": {"": (F3, F2, F2, F2, F3)},

@@ -91,15 +91,8 @@ class Creep:
             allowed = f"more than {clock[k - 1]:g} s"
             raise InvalidValueError(f"time[{k}]", f"{clock[k]:g} s", allowed, "Give the samples in order of time.")
         rows = force.reshape(len(clock), -1)
-        found = np.empty(rows.shape)
-        creep_strains(
-            clock,
-            rows,
-            self.axial_stiffness,
-            self.time,
-            locked(np.array([flag(settled, "settled")], dtype=np.bool_)),
-            found,
-        )
+        found, state = np.empty(rows.shape), locked(np.array([flag(settled, "settled")], dtype=np.bool_))
+        creep_strains(clock, rows, self.axial_stiffness, self.time, state, found)
         return locked(found.reshape(force.shape))
 
     def __reduce__(self) -> tuple[Any, tuple[Array, Array]]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
@@ -10,10 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sagline.cables.cable import Cable
-from sagline.cables.problem import Problem
 from sagline.core.arguments import instance, whole_number
-from sagline.core.arrays import Array, Codes, checked, kernel_input, locked, number
-from sagline.core.errors import InvalidValueError
+from sagline.core.arrays import Array, Codes, broadcast_shape, checked, kernel_input, locked, number
+from sagline.core.errors import CableGeometryError, InvalidValueError
 from sagline.core.indices import batch_length, part_of
 from sagline.core.memory import check_memory
 from sagline.core.results import Result
@@ -41,15 +41,7 @@ class CableStatus(Status):
     NOT_CONVERGED = codes.CABLE_NOT_CONVERGED, "the iteration did not converge; please report this cable's data"
 
 
-_ARRAYS = (
-    "span",
-    "rise",
-    "unstrained_length",
-    "horizontal_tension",
-    "vertical_force",
-    "chord_tension",
-    "status",
-)
+_ARRAYS = ["span", "rise", "unstrained_length", "horizontal_tension", "vertical_force", "chord_tension", "status"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,13 +120,9 @@ class CableModel:
         """
         instance(cable, Cable, "cable")
         tension = checked(chord_tension, "chord_tension", "N", low=0.0)
-        problem = Problem.of(cable, span, rise, tension, gravity)
-        length, horizontal, vertical, status = problem.outputs()
-        room = np.empty((batch.BUFFERS, batch.CHUNK))
-        batch.batch_from_tension(
-            self.terms(problem.gravity), *problem.operands, length, horizontal, vertical, status, room
-        )
-        return self._state(cable, problem, length, horizontal, vertical, tension, status)
+        buffer = np.empty((batch.BUFFERS, batch.CHUNK))
+        names = "chord_tension", "unstrained_length"
+        return self._solve(cable, span, rise, gravity, names, tension, batch.batch_from_tension, buffer)
 
     def from_length(
         self, cable: Cable, span: ArrayLike, rise: ArrayLike, unstrained_length: ArrayLike, gravity: float = 9.81
@@ -162,34 +150,38 @@ class CableModel:
         """
         instance(cable, Cable, "cable")
         length = checked(unstrained_length, "unstrained_length", "m", above=0.0)
-        problem = Problem.of(cable, span, rise, length, gravity)
-        tension, horizontal, vertical, status = problem.outputs()
-        batch.batch_from_length(self.terms(problem.gravity), *problem.operands, tension, horizontal, vertical, status)
-        return self._state(cable, problem, length, horizontal, vertical, tension, status)
+        names = "unstrained_length", "chord_tension"
+        return self._solve(cable, span, rise, gravity, names, length, batch.batch_from_length)
 
-    def _state(
+    def _solve(
         self,
         cable: Cable,
-        problem: Problem,
-        length: Array,
-        horizontal: Array,
-        vertical: Array,
-        tension: Array,
-        status: Codes,
+        span: ArrayLike,
+        rise: ArrayLike,
+        gravity: float,
+        names: tuple[str, str],
+        given: Array,
+        kernel: Callable[..., None],
+        *work: Array,
     ) -> CableState:
-        """State of the solved batch; its arrays have the shape of the arguments."""
-        return CableState(
-            model=self,
-            cable=cable,
-            gravity=problem.gravity,
-            span=problem.shaped(problem.span),
-            rise=problem.shaped(problem.rise),
-            unstrained_length=problem.shaped(length),
-            horizontal_tension=problem.shaped(horizontal),
-            vertical_force=problem.shaped(vertical),
-            chord_tension=problem.shaped(tension),
-            status=locked(status.reshape(problem.shape)),
-        )
+        """State of cables; `names`: names of the quantity `given`, and of the quantity that `kernel` computes."""
+        span = _checked_span(span)
+        rise = checked(rise, "rise", "m")
+        gravity = number(gravity, "gravity", "m/s^2", low=0.0)
+        item = "span, rise, tension or length, and cable"
+        shape = broadcast_shape(item, span.shape, rise.shape, given.shape, cable.linear_density.shape)
+        size = math.prod(shape)
+        check_memory(item, 80.0 * size, "Give fewer cables at once.")
+        if (span.size == 0 or span.min() == 0.0) and not np.all((span != 0.0) | (rise != 0.0)):
+            step = "Move one end: a cable between equal points has no chord."
+            raise CableGeometryError("span and rise", "both 0 m", "two different ends", step)
+        fields = (span, rise, cable.linear_density, cable.axial_stiffness, given)
+        found: tuple[NDArray[Any], ...] = (*(np.empty(size) for _ in range(3)), np.empty(size, dtype=np.int8))
+        kernel(self.terms(gravity), tuple(_flat(field, shape) for field in fields), found, *work)
+        known: dict[str, NDArray[Any]] = {names[0]: given, "span": span, "rise": rise}
+        solved = dict(zip((names[1], "horizontal_tension", "vertical_force", "status"), found, strict=True))
+        arrays: dict[str, Any] = {name: _shaped(values, shape) for name, values in (known | solved).items()}
+        return CableState(model=self, cable=cable, gravity=gravity, **arrays)
 
     def profile(self, cable: Cable, state: CableState, points: int = 50) -> Array:
         """Points along a cable of this model, in the vertical plane of the cable.
@@ -207,6 +199,24 @@ class CableModel:
         """
         placed = replace(instance(state, CableState, "state"), model=self, cable=instance(cable, Cable, "cable"))
         return placed.points(whole_number(points, "points", 2))
+
+
+def _checked_span(span: ArrayLike) -> Array:
+    try:
+        return checked(span, "span", "m", low=0.0)
+    except InvalidValueError as error:
+        raise CableGeometryError(*error.args) from None
+
+
+def _flat(field: Array, shape: tuple[int, ...]) -> Array:
+    """Flatten the operand `field` to one axis. It has one value per cable of the batch, or a single value."""
+    return field.reshape(1) if field.size == 1 else kernel_input(field, shape).reshape(-1)
+
+
+def _shaped(field: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
+    """The result or operand `field` in the shape of the batch, (...), write-locked."""
+    whole = field.size == math.prod(shape)
+    return locked(field.reshape(shape) if whole else np.broadcast_to(field, shape))
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -298,16 +308,12 @@ class CableState(Result):
     @property
     def sag(self) -> Array:
         """Largest vertical distance of the cable below its chord [m]. Below its lower end if the chord is vertical."""
-        out = np.empty(self.unstrained_length.size)
-        batch.largest_sags(self.model.terms(self.gravity), *self._columns(), out)
-        return out.reshape(self.shape)
+        return self._evaluate(batch.largest_sags)
 
     @property
     def closure_residual(self) -> Array:
         """Closure error [m]: the error of the state in the equations of its cable model."""
-        out = np.empty(self.unstrained_length.size)
-        batch.closures(self.model.terms(self.gravity), *self._columns(), out)
-        return out.reshape(self.shape)
+        return self._evaluate(batch.closures)
 
     def points(self, count: int) -> Array:
         """Points along the cable in its vertical plane.
@@ -323,23 +329,13 @@ class CableState(Result):
         """
         whole_number(count, "points", 2)
         check_memory("points", 16.0 * self.unstrained_length.size * count, "Choose fewer points.")
-        out = np.empty((self.unstrained_length.size, count, 2))
-        batch.shape_points(self.model.terms(self.gravity), *self._columns(), out)
-        return locked(out.reshape(*self.shape, count, 2))
+        return locked(self._evaluate(batch.shape_points, count, 2))
 
-    def _columns(self) -> tuple[Array, Array, Array, Array, Array, Array, Array, Array]:
-        flat = (kernel_input(field, self.shape).reshape(-1) for field in self._fields())
-        span, rise, density, stiffness, length, horizontal, vertical, tension = flat
-        return span, rise, density, stiffness, length, horizontal, vertical, tension
-
-    def _fields(self) -> tuple[Array, ...]:
-        return (
-            self.span,
-            self.rise,
-            self.cable.linear_density,
-            self.cable.axial_stiffness,
-            self.unstrained_length,
-            self.horizontal_tension,
-            self.vertical_force,
-            self.chord_tension,
-        )
+    def _evaluate(self, kernel: Callable[..., None], *shape: int) -> Array:
+        """Results of `kernel` for all cables, (..., *shape)."""
+        given = (self.span, self.rise, self.cable.linear_density, self.cable.axial_stiffness, self.unstrained_length)
+        forces = (self.horizontal_tension, self.vertical_force, self.chord_tension)
+        columns = tuple(kernel_input(field, self.shape).reshape(-1) for field in (*given, *forces))
+        out = np.empty((self.unstrained_length.size, *shape))
+        kernel(self.model.terms(self.gravity), columns, out)
+        return out.reshape((*self.shape, *shape))

@@ -143,7 +143,7 @@ def _read(key: str, question: str, default: str) -> str:
 
 def _design(name: str, said: dict[str, str]) -> Design:
     """The design from the first answers; valid values replace the answers that are still missing."""
-    from sagline.cables.rope import ROPES
+    from sagline.cables.cable import ROPES
     from sagline.cli.values import quantity
     from sagline.robot.catalogue import COUNTS, LAYOUTS, Design
 
@@ -215,7 +215,7 @@ def _header(said: dict[str, str]) -> str:
 
 def _explained(robot: Robot, design: Design, middle: Plan) -> tuple[list[str], float]:
     """Lines about the robot, with the feasible share of the poses in the middle of its frame."""
-    from sagline.cables.rope import ROPES, SAFETY
+    from sagline.cables.cable import ROPES, SAFETY
     from sagline.robot.catalogue import SLACK_LIMIT
 
     share = float(middle.feasible.mean())

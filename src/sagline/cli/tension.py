@@ -130,7 +130,7 @@ def _plan(robot: Robot, pose: Pose, model: ModelName, method: TensionMethod, wre
 def reason(robot: Robot, pose: Pose, plan: Plan) -> str:
     """Sentence on an infeasible pose: its shortfall and limiting cables, or the motion that no cable resists."""
     from sagline.kinematics.status import PoseStatus
-    from sagline.tension.singular import unresisted_motion
+    from sagline.tension.margin import unresisted_motion
 
     status = PoseStatus(int(plan.status))
     if status is PoseStatus.SINGULAR:

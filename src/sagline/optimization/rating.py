@@ -80,11 +80,9 @@ def _sag(model: CableModel, gravity: float, results: Array, cables: Array) -> Ar
         *(results[tables.SPAN], results[tables.RISE], cables[..., tables.DENSITY], cables[..., tables.STIFFNESS]),
         *(length, results[tables.HORIZONTAL], results[tables.VERTICAL], results[tables.TENSION]),
     )
-    span, rise, density, stiffness, free, horizontal, vertical, tension = (
-        locked(np.ascontiguousarray(row).reshape(-1)) for row in rows
-    )
+    a, b, c, d, e, f, g, h = (locked(np.ascontiguousarray(row).reshape(-1)) for row in rows)
     out = np.empty(length.size)
-    largest_sags(model.terms(gravity), span, rise, density, stiffness, free, horizontal, vertical, tension, out)
+    largest_sags(model.terms(gravity), (a, b, c, d, e, f, g, h), out)
     return out.reshape(length.shape)
 
 

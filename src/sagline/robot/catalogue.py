@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.cables.rope import ROPES, SAFETY
+from sagline.cables.cable import ROPES, SAFETY
 from sagline.core.arguments import brief, choice
 from sagline.core.arrays import Array, checked, number
 from sagline.core.errors import InvalidValueError, nearest

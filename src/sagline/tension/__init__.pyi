@@ -2,6 +2,7 @@
 
 from .margin import capacity_margin as capacity_margin
 from .margin import limit_margin as limit_margin
+from .margin import unresisted_motion as unresisted_motion
 from .method import TensionMethod as TensionMethod
 from .methods import AnalyticCenter as AnalyticCenter
 from .methods import Centroid as Centroid
@@ -17,4 +18,3 @@ from .methods import Puncture as Puncture
 from .methods import QuadraticProgram as QuadraticProgram
 from .polygon import Side as Side
 from .polygon import TensionPolygon as TensionPolygon
-from .singular import unresisted_motion as unresisted_motion

@@ -44,7 +44,7 @@ def solve(
     length, horizontal, vertical = np.full((3, count), np.nan)
     status = np.full(count, -1, dtype=np.int8)
     buffer = np.full((BUFFERS, CHUNK), np.nan)
-    batch_from_tension(terms, span, rise, density, stiffness, tension, length, horizontal, vertical, status, buffer)
+    batch_from_tension(terms, (span, rise, density, stiffness, tension), (length, horizontal, vertical, status), buffer)
     return Answer(length, horizontal, vertical, status)
 
 
@@ -94,7 +94,7 @@ def test_many_at_their_lengths(code: int) -> None:
     length, horizontal, vertical, _ = solve(terms, span, rise, density, stiffness, tension, count=40)
     found, pull_x, pull_z = np.full((3, 40), np.nan)
     status = np.full(40, -1, dtype=np.int8)
-    batch_from_length(terms, span, rise, density, stiffness, length, found, pull_x, pull_z, status)
+    batch_from_length(terms, (span, rise, density, stiffness, length), (found, pull_x, pull_z, status))
     if code == STRAIGHT:
         assert (status == CABLE_NO_TENSION).all()
         return
@@ -105,7 +105,7 @@ def test_many_at_their_lengths(code: int) -> None:
         short = [span, rise, density, stiffness, length]
         short[k] = operand[:1].copy()
         x_s, z_s, rho_s, ea_s, whole_s = short
-        batch_from_length(terms, x_s, z_s, rho_s, ea_s, whole_s, found, pull_x, pull_z, status)
+        batch_from_length(terms, (x_s, z_s, rho_s, ea_s, whole_s), (found, pull_x, pull_z, status))
         for i in (0, 39):
             x, z, rho, ea, whole = (v[min(i, v.size - 1)] for v in short)
             force, verdict = from_length(Model(*terms), x, z, Material(rho, ea), whole)

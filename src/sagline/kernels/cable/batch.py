@@ -20,6 +20,11 @@ from sagline.kernels.jit import entry, glue, kernel
 CHUNK = 256  # cables per chunk; buffers of this length fit into the fastest cache of the processor
 BUFFERS = 11
 
+# span, rise, linear density, axial stiffness, and the given tension or length: as Python passes them
+Operands = tuple[Array, Array, Array, Array, Array]
+# span, rise, linear density, axial stiffness, unstrained length, T_x, T_z and chord tension
+States = tuple[Array, Array, Array, Array, Array, Array, Array, Array]
+
 
 @kernel
 def _copy_chunk(source: Array, start: int, stop: int, target: Array) -> None:
@@ -33,26 +38,18 @@ def _copy_chunk(source: Array, start: int, stop: int, target: Array) -> None:
 
 
 @entry
-def batch_from_tension(
-    terms: Terms,
-    span: Array,
-    rise: Array,
-    density: Array,
-    stiffness: Array,
-    tension: Array,
-    length_out: Array,
-    horizontal_out: Array,
-    vertical_out: Array,
-    status_out: Codes,
-    buffer: Array,
-) -> None:
+def batch_from_tension(terms: Terms, cables: Operands, found: tuple[Array, Array, Array, Codes], buffer: Array) -> None:
     """Length, forces on the platform end and status of every cable at its chord tension.
 
     Loops without branches solve all cables of a chunk as ordinary catenaries. The other cables are then solved again,
     one by one. Each loop computes one result, because the compiler does not vectorize loops with several results.
-    `buffer` is a work array, (BUFFERS, CHUNK).
+
+    cables: span, rise, density, axial stiffness and chord tension; found: filled with length, T_x, T_z and status;
+    buffer: work array, (BUFFERS, CHUNK).
     """
     model = model_of(terms)
+    span, rise, density, stiffness, tension = cables
+    length_out, horizontal_out, vertical_out, status_out = found
     count = length_out.shape[0]
     x, z, rho, ea, tau = buffer[0], buffer[1], buffer[2], buffer[3], buffer[4]
     chord, sine, cosine, half = buffer[5], buffer[6], buffer[7], buffer[8]
@@ -101,20 +98,11 @@ def batch_from_tension(
 
 
 @entry
-def batch_from_length(
-    terms: Terms,
-    span: Array,
-    rise: Array,
-    density: Array,
-    stiffness: Array,
-    length: Array,
-    tension_out: Array,
-    horizontal_out: Array,
-    vertical_out: Array,
-    status_out: Codes,
-) -> None:
-    """Chord tension, forces on the platform end and status of every cable at its unstrained length."""
+def batch_from_length(terms: Terms, cables: Operands, found: tuple[Array, Array, Array, Codes]) -> None:
+    """Chord tension, T_x, T_z and status of every cable at its unstrained length, the last operand."""
     model = model_of(terms)
+    span, rise, density, stiffness, length = cables
+    tension_out, horizontal_out, vertical_out, status_out = found
     x = min(span.shape[0] - 1, 1)
     z = min(rise.shape[0] - 1, 1)
     d = min(density.shape[0] - 1, 1)
@@ -146,20 +134,10 @@ def catenary_point(
 
 
 @entry
-def shape_points(
-    terms: Terms,
-    span: Array,
-    rise: Array,
-    density: Array,
-    stiffness: Array,
-    length: Array,
-    horizontal: Array,
-    vertical: Array,
-    tension: Array,
-    points_out: Array,
-) -> None:
+def shape_points(terms: Terms, cables: States, points_out: Array) -> None:
     """Points (cables, points, 2) at equal steps of unstrained length. Shallow models give parabolas."""
     model = model_of(terms)
+    span, rise, density, stiffness, length, horizontal, vertical, tension = cables
     count = points_out.shape[1]
     for i in range(points_out.shape[0]):
         for k in range(count):
@@ -202,20 +180,10 @@ def _catenary_sag(
 
 
 @entry
-def largest_sags(
-    terms: Terms,
-    span: Array,
-    rise: Array,
-    density: Array,
-    stiffness: Array,
-    length: Array,
-    horizontal: Array,
-    vertical: Array,
-    tension: Array,
-    sag_out: Array,
-) -> None:
+def largest_sags(terms: Terms, cables: States, sag_out: Array) -> None:
     """Largest vertical distance of every cable below its chord."""
     model = model_of(terms)
+    span, rise, density, stiffness, length, horizontal, vertical, tension = cables
     for i in range(sag_out.shape[0]):
         weight = density[i] * model.gravity
         if model.code == codes.CATENARY and weight > 0.0:
@@ -225,24 +193,14 @@ def largest_sags(
 
 
 @entry
-def closures(
-    terms: Terms,
-    span: Array,
-    rise: Array,
-    density: Array,
-    stiffness: Array,
-    length: Array,
-    horizontal: Array,
-    vertical: Array,
-    tension: Array,
-    residual_out: Array,
-) -> None:
+def closures(terms: Terms, cables: States, residual_out: Array) -> None:
     """Error of each cable in the equations of its model [m].
 
     For a catenary, the error is the distance between computed end and platform end; for other models, the error of the
     length.
     """
     model = model_of(terms)
+    span, rise, density, stiffness, length, horizontal, vertical, tension = cables
     for i in range(residual_out.shape[0]):
         chord = math.hypot(span[i], rise[i])
         if model.code == codes.STRAIGHT:

@@ -249,17 +249,9 @@ def lengths_at_frame_ends(
 ) -> None:
     """Unstrained lengths off the drums [m] of cables at a pose; each cable is computed separately.
 
-    Args:
-        terms: Terms of the cable model.
-        cables: Row of the cable_table, (m, CABLE_COLUMNS).
-        body: Row of the body_table.
-        pose: Pose row.
-        tension: Tensions at the frame ends [N], (m,).
-        tension_out: Filled with the frame-end tensions at these lengths [N], (m,). They differ from given tensions that
-            are below the least possible tension.
-        length_out: Filled with the lengths off the drums [m], (m,).
-        rotation: Work array, (3, 3).
-        geometry: Work array, (GEOMETRY_ROWS, m).
+    tension: tensions at the frame ends [N], (m,); tension_out: filled with the frame-end tensions at these lengths [N],
+    (m,). They differ from given tensions that are below the least possible tension. length_out: filled with the lengths
+    [m], (m,); rotation, geometry: work arrays, (3, 3) and (GEOMETRY_ROWS, m).
     """
     model = model_of(terms)
     cable_geometry(cables, body, pose, rotation, geometry)

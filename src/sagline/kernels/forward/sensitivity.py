@@ -66,15 +66,11 @@ def describe_states(
 ) -> None:
     """Stiffness and sensitivities of N samples; NaN for straight cables and if lengths are NaN.
 
-    Args:
-        model: Cable model, the empirical model's constants, and True if cables may have pulleys or dead lengths, else
-            None.
-        given: `ForwardSamples`, whose initial poses are the equilibria.
-        memory: Work arrays from `memory_for`, for the number of cables.
-        matrices: Filled with stiffness of the platform, (N, 6, 6).
-        blocks: Filled with stiffness of every cable's platform end in world axes, (N, m, 3, 3).
-        slopes: Filled with derivatives of the force T of every cable with respect to its data, (N, DATA, m, 3).
-        levers: Filled with vectors from the center of mass to the platform ends, (N, m, 3).
+    The arguments are those of `forward_poses`, whose initial poses are the equilibria, and arrays to be filled:
+
+    matrices: stiffness of the platform, (N, 6, 6); blocks: stiffness of every cable's platform end in world axes, (N,
+    m, 3, 3); slopes: derivatives of the force T of every cable with respect to its data, (N, DATA, m, 3); levers:
+    vectors from the center of mass to the platform ends, (N, m, 3).
     """
     batch = f.ForwardSamples(*given)
     code, k_h, k_p, behind = model
@@ -137,16 +133,9 @@ def stabilities_of_poses(
 ) -> None:
     """Decide whether the equilibria of solved poses are stable.
 
-    Args:
-        terms: Cable model, the empirical model's constants, and True if cables may have pulleys or dead lengths, else
-            None. The stiffness of straight cables is undefined; poses with straight cables therefore count as solved.
-        robots: Same as in `inverse_poses`.
-        poses: Rows (N, POSE_COLUMNS).
-        which: Indices of the poses, (K,).
-        memory: Work arrays from `memory_for`, for the number of cables.
-        results: Same as in `inverse_poses`, (RESULT_ROWS, N, m).
-        pose_statuses: Statuses (N,), filled for these poses: POSE_UNSTABLE if some free motion does not have a positive
-            stiffness, else POSE_SOLVED.
+    The arguments are those of `inverse_poses` and `forward_poses`, and the indices of the poses, `which` (K,). Their
+    statuses become POSE_UNSTABLE if some free motion does not have a positive stiffness, else POSE_SOLVED. The
+    stiffness of straight cables is undefined; poses with straight cables therefore count as solved.
     """
     code, k_h, k_p, behind = terms
     freedom, bodies, tables_of_cables = robots

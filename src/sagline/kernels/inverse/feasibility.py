@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 from sagline.core.arrays import Array, Codes, Flags, Indices
 from sagline.kernels import codes, statics
 from sagline.kernels.algebra.bounds import START, STRIP_ROWS
+from sagline.kernels.algebra.factors import copy
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.pulley import robots_have_machine
 from sagline.kernels.cable.sag_forces import new_curves, sag_forces_at
@@ -45,20 +45,12 @@ def decide_poses(
 
     The tensions of feasible poses are filled.
 
-    Args:
-        model_terms: Same as in `inverse_poses`.
-        limit_terms: Same as in `inverse_poses`.
-        robot_terms: Same as in `inverse_poses`.
-        poses: Rows (N, POSE_COLUMNS).
-        wrenches: External plus inertial wrenches about the center of mass, (1 or N, 6).
-        which: Indices of the poses, (K,).
-        covers: True if the method finds a distribution at every feasible pose. If False, a feasible pose gets
-            POSE_NOT_COVERED.
-        memory: Work arrays from `memory_for`, for the number of cables.
-        answers: Same as in `inverse_poses`; overwritten for these poses.
-        verdicts: Filled for these poses: lower and upper bound of the smallest sufficient change of the force [N],
-            (N, 2); this change along the free motions, (N, n), and Farkas vectors, (N, n), both NaN if not found;
-            True for each cable whose limit opposes the needed wrench, (N, m).
+    The arguments are those of `inverse_poses`, and:
+
+    which: indices of the poses, (K,); covers: True if the method finds a distribution at every feasible pose. If False,
+    a feasible pose gets POSE_NOT_COVERED. verdicts: filled for these poses: lower and upper bound of the smallest
+    sufficient change of the force [N], (N, 2); this change along the free motions, (N, n), and Farkas vectors, (N, n),
+    both NaN if not found; True for each cable whose limit opposes the needed wrench, (N, m).
     """
     limits = TensionLimits(*limit_terms)
     freedom, _bodies, robots = robot_terms
@@ -68,19 +60,18 @@ def decide_poses(
     m = statuses.shape[1]
     cables, rest = new_cables(Memory(*memory), m, robots_have_machine(robots))
     balance, rest = statics.new_balance(rest, m, n)
-    work, rest = new_demand(rest, m, freedom)
-    change = work.change
-    translations = work.demand.soft
+    space, change, weight, rest = new_demand(rest, m, freedom)
+    translations = space.soft
     for p in which:
         platform = inverse.platform_at(robot_terms, poses, wrenches, p)
         model = inverse.model_at(model_terms, platform.body)
-        statics.set_pose(model, limits, codes.CHORD_TENSION, work.weight, platform, cables, balance)
+        statics.set_pose(model, limits, codes.CHORD_TENSION, weight, platform, cables, balance)
         if cable_without_tension(cables) >= 0:
             brackets[p, PROVED], brackets[p, ENOUGH] = math.inf, math.inf
             for i in range(m):
                 blocking[p, i] = not cables.low[i] <= cables.high[i]
             continue
-        demand, lever = demand_of_pose(platform, cables, balance, work)
+        demand, lever = demand_of_pose(platform, cables, balance, space, change)
         curves, left = new_curves(model, cables, statuses[p], rest)
         status, brackets[p, PROVED], brackets[p, ENOUGH], proved = decide_feasibility(
             curves, demand, NODES, change, left
@@ -96,8 +87,7 @@ def decide_poses(
             inverse.measure_balance(platform, cables, balance, residuals[p])
             inverse.write_solution(True, model, cables, balance, results, p)
         else:
-            for i in range(m):
-                statuses[p, i] = codes.CABLE_SOLVED
+            statuses[p] = codes.CABLE_SOLVED
         pose_statuses[p] = status
         for k in range(n):
             supplied = demand.right[k]
@@ -123,49 +113,40 @@ def _pose_status(statuses: Codes) -> int:
     return codes.POSE_NOT_CONVERGED if gravest >= codes.CABLE_TOO_SLACK else codes.POSE_SOLVED
 
 
-class DemandArrays(NamedTuple):
-    """Work arrays for the demand on the cables at a pose."""
-
-    weight: Array  # root weights of the cables in the distribution's variable: ones, (m,)
-    demand: Demand  # the field `size` is not filled
-    change: TensionChange
-
-
 @glue
-def new_demand(memory: Memory, m: int, freedom: Array) -> tuple[DemandArrays, Memory]:
-    """Work arrays for `m` cables and the free motions `freedom` (n, 6), and the remaining memory."""
+def new_demand(memory: Memory, m: int, freedom: Array) -> tuple[Demand, TensionChange, Array, Memory]:
+    """Work arrays for `m` cables and the free motions `freedom` (n, 6), root weights of one, and the remaining memory.
+
+    The field `size` of the demand is not filled.
+    """
     n = freedom.shape[0]
     rows, memory = block(memory, 2 * n + 3, m)
     vectors, memory = block(memory, 3, n)
-    for i in range(m):
-        rows[2 * n, i] = 1.0
+    rows[2 * n] = 1.0
     change = TensionChange(rows[2 * n + 1], rows[2 * n + 2], vectors[0], vectors[1])
     demand = Demand(rows[:n], rows[n : 2 * n], vectors[2], statics.translation_count(freedom), 0.0)
-    return DemandArrays(rows[2 * n], demand, change), memory
+    return demand, change, rows[2 * n], memory
 
 
 @glue
 def demand_of_pose(
-    platform: statics.Platform, cables: Cables, balance: statics.Balance, work: DemandArrays
+    platform: statics.Platform, cables: Cables, balance: statics.Balance, demand: Demand, change: TensionChange
 ) -> tuple[Demand, float]:
     """Fill the demand of a pose on its cables, and the tensions at the start of the search.
 
     Returns the demand, and the lever arm [m] by which its moments are divided.
     """
-    demand = work.demand
     n, m = balance.matrix.shape
     statics.fill_needed_wrench(platform, cables, balance)
     statics.start_from_minimum_norm(balance)
-    for i in range(m):
-        work.change.tau[i] = balance.bounds[START, i]
+    copy(balance.bounds[START], change.tau)
     lever = 0.0
     for i in range(m):
         for k in range(demand.soft, n):
             lever = max(lever, abs(balance.matrix[k, i]))
     column, hanging = balance.needed, demand.right
     for i in range(m):
-        for a in range(6):
-            column[a] = 0.0
+        column[:] = 0.0
         column[2] = 1.0
         column[3] = balance.geometry[g.LEVER_Y, i]
         column[4] = -balance.geometry[g.LEVER_X, i]
@@ -226,19 +207,13 @@ def polygon_of_pose(
 ) -> int:
     """Fill the set of feasible tensions of one pose at fixed sag forces. Returns the number of corners of the set.
 
-    Args:
-        model_terms: Same as in `inverse_poses`.
-        distribution_terms: Same as in `inverse_poses`; only its variable is used.
-        limit_terms: Same as in `inverse_poses`.
-        robot_terms: Same as in `inverse_poses`, of one robot.
-        pose: Row (POSE_COLUMNS,).
-        wrench: External plus inertial wrench about the center of mass, (6,).
-        carried: Chord tensions and sag forces of the cables, (m,) each. If they are NaN, first-order sag forces are
-            used.
-        memory: Work arrays from `memory_for`, for the number of cables.
-        polygon: Filled with scale and offset of the variable, (m,) each; minimum-norm tensions and limits, (3, m); null
-            space (r, m); for r = 2 corners and labels as in `feasible_polygon`; for r = 1 the ends of the interval,
-            corners[0, 0] and corners[1, 0], which may be infinite.
+    The arguments are those of `inverse_poses`, for one robot and one pose. Of the distribution only the variable is
+    used.
+
+    carried: chord tensions and sag forces of the cables, (m,) each. If they are NaN, first-order sag forces are used.
+    polygon: filled with scale and offset of the variable, (m,) each; minimum-norm tensions and limits, (3, m); null
+    space (r, m); for r = 2 corners and labels as in `feasible_polygon`; for r = 1 the ends of the interval, corners[0,
+    0] and corners[1, 0], which may be infinite.
     """
     distribution = Distribution(*distribution_terms)
     freedom, bodies, robots = robot_terms
@@ -253,20 +228,18 @@ def polygon_of_pose(
         model, TensionLimits(*limit_terms), distribution.variable, distribution.weight, platform, cables, balance
     )
     if not math.isnan(tensions[0]):
-        for i in range(m):
-            cables.tau[i] = tensions[i]
-            cables.sag_force[i] = sag_forces[i]
+        copy(tensions, cables.tau)
+        copy(sag_forces, cables.sag_force)
         if distribution.variable == codes.FRAME_END_TENSION:
             inverse.linearize_ends(model, distribution, cables, balance)
     statics.fill_needed_wrench(platform, cables, balance)
     statics.start_from_minimum_norm(balance)
-    for i in range(m):
-        scale[i] = balance.scale[i]
-        offset[i] = balance.offset[i]
-        for row in range(STRIP_ROWS):
-            bounds[row, i] = balance.bounds[row, i]
-        for k in range(r):
-            null[k, i] = balance.null[k, i]
+    copy(balance.scale, scale)
+    copy(balance.offset, offset)
+    for row in range(STRIP_ROWS):
+        copy(balance.bounds[row], bounds[row])
+    for k in range(r):
+        copy(balance.null[k], null[k])
     count = 1
     if r == 1:
         corners[0, 0], corners[1, 0] = feasible_interval(bounds, null)
@@ -295,8 +268,7 @@ def margins_of_poses(
     cables, rest = new_cables(Memory(*memory), m, robots_have_machine(robots))
     balance, rest = statics.new_balance(rest, m, n)
     weight, rest = vector(rest, m)
-    for i in range(m):
-        weight[i] = 1.0
+    weight[:] = 1.0
     translations = statics.translation_count(freedom)
     for p in range(count):
         margins[p] = math.nan
@@ -307,7 +279,6 @@ def margins_of_poses(
             != codes.POSE_NO_CHORD
         )
         if placed and not math.isnan(sag_forces[p, 0]):
-            for i in range(m):
-                cables.sag_force[i] = sag_forces[p, i]
+            copy(sag_forces[p], cables.sag_force)
             statics.fill_needed_wrench(platform, cables, balance)
             margins[p] = zonotope_margin(balance.matrix, balance.right, cables.low, cables.high, translations, rest)

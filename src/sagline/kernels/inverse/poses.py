@@ -254,8 +254,7 @@ def inverse_poses(
     for p in range(first, last):
         platform = platform_at(robot_terms, poses, wrenches, p)
         model = model_at(model_terms, platform.body)
-        for i in range(m):
-            statuses[p, i] = codes.CABLE_SOLVED
+        statuses[p] = codes.CABLE_SOLVED
         status = statics.set_pose(model, limits, distribution.variable, distribution.weight, platform, cables, balance)
         if status == codes.POSE_SOLVED:
             status = distribute_and_solve_cables(

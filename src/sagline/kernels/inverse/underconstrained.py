@@ -302,22 +302,13 @@ def underconstrained_poses(
 ) -> None:
     """Solve part of a batch of platforms with fewer cables than degrees of freedom.
 
-    Args:
-        model_terms: As in `inverse_poses`.
-        limit_terms: As in `inverse_poses`.
-        robot_terms: As in `inverse_poses`, with m < n.
-        starts: Rows with the given coordinates, (N, POSE_COLUMNS); the others are initial values.
-        wrenches: External plus inertial wrenches about the center of mass, (1 or N, 6).
-        given: Codes of the given values, (m,): 0, 1 and 2 for coordinates of the origin, YAW, LEVEL.
-        level: Tension level [N]: component of the chord tensions along the unit vector of tensions whose wrench at the
-            initial pose is smallest.
-        chained: True to start each pose at the rotation and the tensions of the pose before.
-        memory: `memory_for` the number of cables.
-        answers: Filled as in `inverse_poses`.
-        poses: Filled with the poses, (N, POSE_COLUMNS); the given pose without a solution.
-        blocking: Filled: True for cables whose limits the equilibrium violates, (N, m).
-        first: Index of the first pose.
-        last: Index after the last pose.
+    The arguments are those of `inverse_poses` with m < n, and:
+
+    starts: rows with the given coordinates, (N, POSE_COLUMNS); the others are initial values. given: codes of the given
+    values, (m,): 0, 1 and 2 for coordinates of the origin, YAW, LEVEL. level: tension level [N], the component of the
+    chord tensions along the unit vector of tensions whose wrench at the initial pose is smallest. chained: True to
+    start each pose at the rotation and the tensions of the pose before. poses: filled with the poses; the given pose
+    without a solution. blocking: filled: True for cables whose limits the equilibrium violates, (N, m).
     """
     limits = TensionLimits(*limit_terms)
     freedom, _bodies, robots = robot_terms
@@ -337,9 +328,8 @@ def underconstrained_poses(
         model = inverse.model_at(model_terms, platform.body)
         pose = poses[p]
         copy(starts[p], pose)
-        for i in range(m):
-            statuses[p, i] = codes.CABLE_SOLVED
-            blocking[p, i] = False
+        statuses[p] = codes.CABLE_SOLVED
+        blocking[p] = False
         status = codes.POSE_NO_CHORD
         if statics.place_platform(model, limits, platform, pose, cables, balance):
             lever = _mean_lever(balance.geometry)

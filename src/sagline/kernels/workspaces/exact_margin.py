@@ -77,19 +77,19 @@ def settle_margin(
             _write_value(margin, exact, EXACT * size)
             return codes.MARGIN_OPEN
     balance, rest = new_balance(rest, m, n)
-    work, rest = new_demand(rest, m, platform.freedom)
-    set_pose(model, limits, codes.CHORD_TENSION, work.weight, platform, cables, balance)
-    demand, lever = demand_of_pose(platform, cables, balance, work)
+    space, change, weight, rest = new_demand(rest, m, platform.freedom)
+    set_pose(model, limits, codes.CHORD_TENSION, weight, platform, cables, balance)
+    demand, lever = demand_of_pose(platform, cables, balance, space, change)
     for k in range(demand.soft, n):
         load[k] /= lever
-    exact = _largest_multiple(curves, demand, facet.bands, load, margin[ABOVE], work.change.tau, rest)
+    exact = _largest_multiple(curves, demand, facet.bands, load, margin[ABOVE], change.tau, rest)
     if not abs(exact) <= CLOSE * size:
         verdict, _, _, _ = decide_feasibility(
-            curves, demand, SHORT if abs(exact) <= NEAR * size else LONG, work.change, rest
+            curves, demand, SHORT if abs(exact) <= NEAR * size else LONG, change, rest
         )
         feasible, infeasible = verdict == codes.POSE_SOLVED, verdict == codes.POSE_INFEASIBLE
         if not abs(exact) < math.inf or (exact < 0.0 if feasible else infeasible and exact >= 0.0):
-            exact = _largest_multiple(curves, demand, facet.bands, load, margin[ABOVE], work.change.tau, rest)
+            exact = _largest_multiple(curves, demand, facet.bands, load, margin[ABOVE], change.tau, rest)
         if not abs(exact) < math.inf:
             exact = margin[VALUE]
         if feasible:

@@ -12,7 +12,7 @@ from sagline.core.arrays import Array
 from sagline.core.errors import SaglineError
 from sagline.core.numbers import n
 from sagline.kinematics.status import PoseStatus
-from sagline.tension.singular import unresisted_motion
+from sagline.tension.margin import unresisted_motion
 from sagline.viewer import shapes
 from sagline.viewer.feature import BackgroundTask, Feature, View
 from sagline.viewer.features.tensions import SHARING
