@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Final
+from dataclasses import replace
+from typing import Final, TypeAlias
 
 import numpy as np
 
@@ -20,7 +19,6 @@ from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
 from sagline.motion.path import Path
 from sagline.robot.drum import drum_lever
-from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.balance import inertial_wrench, structure_matrix
 
@@ -35,24 +33,7 @@ _GENTLE: Final = 8  # number of initial attempts; each multiplies the time by th
 _ROUNDING: Final = 1e-12
 
 
-@dataclass(frozen=True, slots=True)
-class _TimedSegment:
-    """Segment with its new motion, which is slightly slower than the computed optimum."""
-
-    curve: Curve
-    motion: SpeedProfile | JerkProfile
-    slower: float = 1.0
-
-    @property
-    def duration(self) -> float:
-        """Duration [s]."""
-        return self.motion.duration * self.slower
-
-    def at(self, time: Array) -> tuple[Pose, Array]:
-        """Poses at the times `time`, and the twists with their first and second derivatives (3, N, 6)."""
-        values = self.motion.at(np.clip(time / self.slower, 0.0, self.motion.duration))
-        jet = self.curve.at(np.clip(values[0], 0.0, 1.0))
-        return jet.pose, jet.twists(values / self.slower ** np.arange(4)[:, None])
+_Motion: TypeAlias = tuple[SpeedProfile | JerkProfile, float]  # motion of a segment, and factor of its duration
 
 
 def fastest(
@@ -111,14 +92,15 @@ def fastest(
     )
     callback(progress, "progress")
     segments = segments_of(path)
-    timed: list[_TimedSegment | None] = []
+    motions: list[_Motion | None] = []
     for k, segment in enumerate(segments):
-        timed.append(None if segment.curve is None else _fastest_segment(inner, segment, segment.curve, limits))
+        motions.append(None if segment.curve is None else _fastest_motion(inner, segment, segment.curve, limits))
         if progress is not None:
             progress(k + 1, len(segments))
     bounded = bool(np.isfinite(limits).any())
     for again in range(_TRIES):
-        new = _joined(path, segments, timed, bounded)
+        timed = [_timed(segment, motion) for segment, motion in zip(segments, motions, strict=True)]
+        new = joined_path(path, timed, with_jerk=bounded)
         plan = inverse(inner, new)
         slower = 1.0 if plan.solved.all() else 1.0 + _SLOWER * 4.0**again
         if bounded and _has_speed_limits(robot):
@@ -126,8 +108,22 @@ def fastest(
             slower = max(slower, np.cbrt(ratio) if again < _GENTLE else ratio)
         if slower == 1.0:
             return new
-        timed = [None if one is None else replace(one, slower=one.slower * slower) for one in timed]
+        motions = [None if motion is None else (motion[0], motion[1] * slower) for motion in motions]
     raise _infeasible_error(f"of {len(segments)} moves", plan)
+
+
+def _timed(segment: RestToRestSegment, motion: _Motion | None) -> RestToRestSegment:
+    """The segment with a new motion; None for a segment at rest, which is unchanged."""
+    if motion is None:
+        return segment
+    profile, slower = motion
+
+    def rates(time: Array) -> Array:
+        values = profile.at(np.clip(time / slower, 0.0, profile.duration)) / slower ** np.arange(4)[:, None]
+        values[0] = np.clip(values[0], 0.0, 1.0)
+        return values
+
+    return replace(segment, duration=profile.duration * slower, rates=rates)
 
 
 def _with_margin(robot: Robot, margin: float) -> Robot:
@@ -139,21 +135,20 @@ def _with_margin(robot: Robot, margin: float) -> Robot:
     return robot.replace(tension_min=low, tension_max=high)
 
 
-def _fastest_segment(
-    robot: Robot, segment: RestToRestSegment, curve: Curve, limits: tuple[float, float]
-) -> _TimedSegment:
+def _fastest_motion(robot: Robot, segment: RestToRestSegment, curve: Curve, limits: tuple[float, float]) -> _Motion:
     """Fastest motion along one segment within the robot's limits."""
+    where = f"from {segment.begin:g} s to {segment.begin + segment.duration:g} s"
     place = np.linspace(0.0, 1.0, _PLACES)
     jet = curve.at(place)
     rest = inverse(robot, jet.pose)
     if not rest.solved.all():
-        raise _infeasible_error(f"from {segment.begin:g} s to {segment.end:g} s at rest", rest)
+        raise _infeasible_error(f"{where} at rest", rest)
     balances, speeds = ForceBalance.at(robot, jet, rest), _winch_speed_bounds(robot, curve, place, rest)
     bounds, least = speeds(place), np.inf
     for _ in range(_ITERATIONS):
         profile = fastest_speed_profile(place, balances.half_planes().joined(bounds))
         if profile is None:
-            raise _infeasible_error(f"from {segment.begin:g} s to {segment.end:g} s in motion", rest)
+            raise _infeasible_error(f"{where} in motion", rest)
         before, least = least, profile.duration
         if abs(least - before) <= _CONVERGED * least:
             break
@@ -161,24 +156,33 @@ def _fastest_segment(
     motion: SpeedProfile | JerkProfile | None = profile
     if np.isfinite(limits).any():
         motion = fastest_jerk_profile(curve, robot, speeds, limits, least)
-        if motion is None:
-            raise _infeasible_error(f"from {segment.begin:g} s to {segment.end:g} s in motion", rest)
-    assert motion is not None
-    return _checked(robot, _TimedSegment(curve, motion), limits)
+    if motion is None:
+        raise _infeasible_error(f"{where} in motion", rest)
+    return motion, _factor(robot, segment, curve, motion, limits)
 
 
-def _checked(robot: Robot, timed: _TimedSegment, limits: tuple[float, float]) -> _TimedSegment:
-    """Slow the segment `timed` down slightly if it violates a limit between the positions."""
+def _factor(
+    robot: Robot,
+    segment: RestToRestSegment,
+    curve: Curve,
+    motion: SpeedProfile | JerkProfile,
+    limits: tuple[float, float],
+) -> float:
+    """Factor >= 1 of the duration, with which `motion` violates no limit between the positions."""
+    factor = 1.0
     for again in range(_TRIES):
-        pose, twists = timed.at(np.linspace(0.0, timed.duration, _INSTANTS))
-        plan = inverse(robot, pose, wrench=inertial_wrench(robot, pose, twists[0], twists[1]))
+        timed = _timed(segment, (motion, factor))
+        values = timed.rates(np.linspace(0.0, timed.duration, _INSTANTS))
+        jet = curve.at(values[0])
+        twists = jet.twists(values)
+        plan = inverse(robot, jet.pose, wrench=inertial_wrench(robot, jet.pose, twists[0], twists[1]))
         sizes = (np.linalg.norm(twists[2][:, part], axis=1).max() for part in (slice(0, 3), slice(3, 6)))
         slower = max(1.0, *(np.cbrt(size / limit) for size, limit in zip(sizes, limits, strict=True)))
         if plan.solved.all() and slower <= 1.0 + _ROUNDING:
-            return timed
+            return factor
         if not plan.solved.all():  # the limits hold at rest, and a slower motion changes the tensions less
             slower = max(slower, 1.0 + _SLOWER * 4.0**again)
-        timed = replace(timed, slower=timed.slower * slower)
+        factor *= slower
     raise _infeasible_error("in motion", plan)
 
 
@@ -233,17 +237,3 @@ def _speed_excess(plan: Plan) -> float:
     limits = _fastest_rates(plan.state.one_robot, plan.unstrained_length)
     ratio = float(np.nanmax(np.abs(plan.length_rate) / limits))
     return ratio * (1.0 + _SLOWER) if ratio > 1.0 else 1.0
-
-
-def _joined(
-    path: Path, segments: Sequence[RestToRestSegment], timed: Sequence[_TimedSegment | None], bounded: bool
-) -> Path:
-    """Create the path from `segments`, which move as in `timed`."""
-
-    def motion(k: int, time: Array) -> tuple[Pose, Array]:
-        one = timed[k]
-        assert one is not None
-        return one.at(time)
-
-    durations = [(segment if one is None else one).duration for segment, one in zip(segments, timed, strict=True)]
-    return joined_path(path, segments, durations, motion, with_jerk=bounded)

@@ -194,25 +194,11 @@ class RestToRestSegment:
     """Motion from rest to rest."""
 
     begin: float  # start time [s]
-    end: float  # end time [s]
-    curve: Curve | None  # curve of the motion; None if the platform is at rest all the time
-    progress: Any  # curve parameter over time since the start, a scipy PPoly; None if the curve is None
+    duration: float  # [s]
     sample: int  # index of its first sample
-
-    @property
-    def duration(self) -> float:
-        """Duration [s]."""
-        return self.end - self.begin
-
-    def rates(self, time: Array) -> Array:
-        """Parameter of the curve and its first three derivatives at given times since the start, shape (4, N)."""
-        # Before the start and after the end, the platform is at rest. At a discontinuity, a derivative has the value
-        # after the discontinuity.
-        assert self.progress is not None
-        held = np.clip(time, 0.0, self.duration)
-        values = np.stack([self.progress(held, order) for order in range(4)])
-        values[1:, (time < 0.0) | (time >= self.duration)] = 0.0
-        return values
+    curve: Curve | None = None  # curve of the motion; None if the platform is at rest all the time
+    # curve parameter and its first three time derivatives (4, N) at times since the start (N,) [s]
+    rates: Callable[[Array], Array] = lambda time: np.zeros((4, time.size))
 
 
 def segments_of(path: Path) -> tuple[RestToRestSegment, ...]:
@@ -259,7 +245,7 @@ def _segment(path: Path, begin: float, end: float) -> RestToRestSegment:
     part = slice(int(first), int(last))
     time = path.time[part] - begin
     if not _speed(path.twist[part]).any():
-        return RestToRestSegment(begin, end, None, None, part.start)
+        return RestToRestSegment(begin, end - begin, part.start)
     if time.size < 2:
         value = f"of {time.size} samples"
         raise InvalidValueError(
@@ -280,7 +266,14 @@ def _segment(path: Path, begin: float, end: float) -> RestToRestSegment:
         if not standing and len(values) > 3:
             held[3, 0] = progress(0.0, 3)  # at rest, but its jerk can be nonzero
         progress = piecewise(knots, held, at_end if over else 3)
-    return RestToRestSegment(begin, end, curve, progress, part.start)
+
+    def motion(since: Array) -> Array:
+        """The platform is at rest before and after the segment. At a jump, a derivative has the value after it."""
+        found = np.stack([progress(np.clip(since, 0.0, end - begin), order) for order in range(4)])
+        found[1:, (since < 0.0) | (since >= end - begin)] = 0.0
+        return found
+
+    return RestToRestSegment(begin, end - begin, part.start, curve, motion)
 
 
 def _parametrized(time: Array, pose: Pose, rates: list[Array]) -> tuple[Curve, Array]:
@@ -310,18 +303,9 @@ def sample_time(path: Path) -> float:
     return 1.0 / (round(rate) if abs(rate - round(rate)) <= 1e-6 * rate else rate)
 
 
-def joined_path(
-    path: Path,
-    segments: Sequence[RestToRestSegment],
-    durations: Sequence[float],
-    motion: Callable[[int, Array], tuple[Pose, Array]],
-    *,
-    with_jerk: bool,
-) -> Path:
-    """Path from `segments` with the new `durations` [s], at the sample rate of `path`."""
-    # The arguments of `motion` are the index of a moving segment and times since its start. It returns poses, and
-    # twists with their first two derivatives, (3, N, 6).
-    ends = np.cumsum(durations)
+def joined_path(path: Path, segments: Sequence[RestToRestSegment], *, with_jerk: bool) -> Path:
+    """Path of `segments` with new durations and motions, at the sample rate of `path`."""
+    ends = np.cumsum([segment.duration for segment in segments])
     rests = np.append(0.0, ends)
     time = time_grid(float(ends[-1]), 1.0 / sample_time(path))
     position, quaternion, rates = np.empty((time.size, 3)), np.empty((time.size, 4)), np.zeros((3, time.size, 6))
@@ -329,7 +313,9 @@ def joined_path(
     for k, segment in enumerate(segments):
         part, pose = which == k, path.pose[segment.sample]
         if segment.curve is not None:
-            pose, rates[:, part] = motion(k, time[part] - rests[k])
+            motion = segment.rates(time[part] - rests[k])
+            jet = segment.curve.at(motion[0])
+            pose, rates[:, part] = jet.pose, jet.twists(motion)
         position[part], quaternion[part] = pose.position, pose.quaternion
     jerk, start = locked(rates[2]) if with_jerk else None, path.time[0]
     return Path(time + start, Pose.from_quaternion(position, quaternion), rates[0], rates[1], jerk, rests + start)

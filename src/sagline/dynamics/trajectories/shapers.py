@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 from operator import mul
 from typing import Final
@@ -18,7 +18,6 @@ from sagline.core.memory import check_memory
 from sagline.core.results import Result
 from sagline.dynamics.trajectories.segments import RestToRestSegment, joined_path, sample_time, segments_of
 from sagline.motion.path import Path, checked_time
-from sagline.robot.pose import Pose
 
 MOST_IMPULSES: Final = 10_000  # largest number of impulses; three impulses for each of eight frequencies give 6,561
 _SAME: Final = 1e-12  # impulses with a smaller distance, as a share of a shaper's duration, are merged
@@ -290,23 +289,21 @@ def shaped(path: Path, shaper: Shaper) -> Path:
     if fastest > 0.5 / step:
         limit = f"<= {0.5 / step:g} Hz, half the path's sample rate"
         raise InvalidValueError("the shaper's frequency", f"{fastest:g} Hz", limit, "Sample the path at a higher rate.")
-    segments = segments_of(path)
-    longer = [segment.duration + (0.0 if segment.curve is None else shaper.duration) for segment in segments]
-    check_memory("the shaped path", _BYTES * (sum(longer) / step) * shaper.time.size, "Shape a shorter path.")
-
-    def motion(k: int, time: Array) -> tuple[Pose, Array]:
-        curve = segments[k].curve
-        assert curve is not None
-        parameter = _shaped_parameter(segments[k], shaper, time)
-        jet = curve.at(parameter[0])
-        return jet.pose, jet.twists(parameter)
-
-    return joined_path(path, segments, longer, motion, with_jerk=path.jerk is not None)
+    segments = [_convolved(segment, shaper) for segment in segments_of(path)]
+    samples = sum(segment.duration for segment in segments) / step
+    check_memory("the shaped path", _BYTES * samples * shaper.time.size, "Shape a shorter path.")
+    return joined_path(path, segments, with_jerk=path.jerk is not None)
 
 
-def _shaped_parameter(segment: RestToRestSegment, shaper: Shaper, time: Array) -> Array:
-    """Parameter of the shaped segment and its first three derivatives, (4, N), at `time` since the segment's start."""
-    motion = np.zeros((4, time.size))
-    for delay, share in zip(shaper.time, shaper.amplitude, strict=True):
-        motion += share * segment.rates(time - delay)
-    return motion
+def _convolved(segment: RestToRestSegment, shaper: Shaper) -> RestToRestSegment:
+    """The segment with its motion convolved with the impulses; a segment at rest is unchanged."""
+
+    def motion(time: Array) -> Array:
+        total = np.zeros((4, time.size))
+        for delay, share in zip(shaper.time, shaper.amplitude, strict=True):
+            total += share * segment.rates(time - delay)
+        return total
+
+    if segment.curve is None:
+        return segment
+    return replace(segment, duration=segment.duration + shaper.duration, rates=motion)
