@@ -7,8 +7,12 @@ from scipy.optimize import linprog
 
 import sagline as sl
 from sagline import structure_matrix
-from sagline.dynamics.trajectories.force_balance import ForceBalance, HalfPlanes, fastest_speed_profile
-from sagline.dynamics.trajectories.jerk_bounded import fastest_jerk_profile
+from sagline.dynamics.trajectories.profiles import (
+    ForceBalance,
+    HalfPlanes,
+    fastest_jerk_profile,
+    fastest_speed_profile,
+)
 from sagline.dynamics.trajectories.segments import segments_of
 from tests.refusal import refused
 from tests.tiers import extended, wide

@@ -11,8 +11,15 @@ from sagline.core.arguments import callback, instance
 from sagline.core.arrays import Array, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.progress import Progress
-from sagline.dynamics.trajectories.force_balance import ForceBalance, HalfPlanes, SpeedProfile, fastest_speed_profile
-from sagline.dynamics.trajectories.jerk_bounded import Bounds, JerkProfile, fastest_jerk_profile
+from sagline.dynamics.trajectories.profiles import (
+    Bounds,
+    ForceBalance,
+    HalfPlanes,
+    JerkProfile,
+    SpeedProfile,
+    fastest_jerk_profile,
+    fastest_speed_profile,
+)
 from sagline.dynamics.trajectories.segments import Curve, RestToRestSegment, joined_path, sample_time, segments_of
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan
