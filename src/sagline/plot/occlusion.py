@@ -36,33 +36,20 @@ class FlatLine(NamedTuple):
     gap: float
 
 
+# A flat convex piece that hides lines: its corners (4, 3); the smallest distance behind it at which points are hidden;
+# the index of the line to which it belongs, -1 for surfaces; the index of the line that it hides, -1 for all others.
+_Piece = tuple[Array, float, int, int]
+
+
 class _Covers(NamedTuple):
-    """R flat convex pieces that hide lines behind them; K limits are the sides of a piece.
+    """R flat convex pieces that hide lines behind them, as in `_Piece`; K limits are the sides of a piece."""
 
-    Attributes:
-        normals: Outward normals of the limits in the picture, shape (R, K, 2).
-        offsets: Largest products of each normal and a position in the piece, shape (R, K).
-        planes: Coefficients of the depth, which is planes[:, :2] times position plus planes[:, 2], shape (R, 3).
-        behind: Smallest distance behind the piece at which points are hidden, shape (R,).
-        owners: Index of the line to which the piece belongs, -1 for surfaces, shape (R,).
-        hides: Index of the line that the piece hides, -1 for all lines except its owner, shape (R,).
-    """
-
-    normals: Array
-    offsets: Array
-    planes: Array
-    behind: Array
-    owners: Indices
-    hides: Indices
-
-
-class _Crossing(NamedTuple):
-    """A crossing of a front line and a line behind it: position and unit direction of the front line, shapes (3,)."""
-
-    line: int
-    behind: int
-    place: Array
-    along: Array
+    normals: Array  # outward normals of the limits in the picture, shape (R, K, 2)
+    offsets: Array  # largest products of each normal and a position in the piece, shape (R, K)
+    planes: Array  # coefficients of the depth, which is planes[:, :2] times position plus planes[:, 2], shape (R, 3)
+    behind: Array  # shape (R,)
+    owners: Indices  # shape (R,)
+    hides: Indices  # shape (R,)
 
 
 def view_axes(azimuth: float, elevation: float) -> Array:
@@ -86,7 +73,9 @@ def visible_parts(
     ends = np.concatenate([line.points[1:] for line in lines])
     owners = np.repeat(np.arange(len(lines)), [len(line.points) - 1 for line in lines])
     covers = _covers(lines, [*surfaces, *over], _crossings(lines, starts, ends, owners), size)
-    hidden = _hidden(starts, ends, owners, covers)
+    at_once = max(1, CHUNK // max(covers.offsets.size, 1))
+    blocks = (slice(first, first + at_once) for first in range(0, len(starts), at_once))
+    hidden = [spans for part in blocks for spans in _hidden(starts[part], ends[part], owners[part], covers)]
     found: list[list[Array]] = [[] for _ in lines]
     for start, end, owner, spans in zip(starts, ends, owners, hidden, strict=True):
         for low, high in _rest(spans):
@@ -110,19 +99,10 @@ def _rest(spans: Array) -> list[tuple[float, float]]:
 
 
 def _hidden(starts: Array, ends: Array, owners: Indices, covers: _Covers) -> list[Array]:
-    """Hidden spans (n, 2) of each of S segments, from 0 at the start of a segment to 1 at its end."""
-    if not len(covers.owners):
-        return [np.empty((0, 2)) for _ in starts]
-    at_once = max(1, CHUNK // covers.offsets.size)
-    found: list[Array] = []
-    for first in range(0, len(starts), at_once):
-        part = slice(first, first + at_once)
-        found += _hidden_at_once(starts[part], ends[part], owners[part], covers)
-    return found
+    """Hidden spans (n, 2) of each of S segments, from 0 at the start of a segment to 1 at its end.
 
-
-def _hidden_at_once(starts: Array, ends: Array, owners: Indices, covers: _Covers) -> list[Array]:
-    """Spans of a segment within all limits and behind the plane: all k + 1 linear functions along it are <= 0."""
+    A span is within all limits and behind the plane: all K + 1 linear functions along it are <= 0.
+    """
     steps = ends - starts
     outside = np.einsum("sc,rkc->srk", starts[:, :2], covers.normals) - covers.offsets
     rise = np.einsum("sc,rkc->srk", steps[:, :2], covers.normals)
@@ -139,45 +119,29 @@ def _hidden_at_once(starts: Array, ends: Array, owners: Indices, covers: _Covers
     return [np.column_stack((low[s, there[s]], high[s, there[s]])) for s in range(len(starts))]
 
 
-def _covers(
-    lines: Sequence[FlatLine], surfaces: Sequence[Array], crossings: Sequence[_Crossing], size: float
-) -> _Covers:
+def _covers(lines: Sequence[FlatLine], surfaces: Sequence[Array], crossings: Sequence[_Piece], size: float) -> _Covers:
     """All pieces: the surfaces, strips along the lines, and wider strips at crossings."""
-    corners, behind, owners, hides = [], [], [], []
+    pieces: list[_Piece] = []
     for number, line in enumerate(lines):
         long = np.linalg.norm(np.diff(line.points[:, :2], axis=0), axis=1) > FLAT * size
         if line.half_width > 0.0:
             for start, end in zip(line.points[:-1][long], line.points[1:][long], strict=True):
-                corners.append(_strip(start, end, line.half_width))
-                behind.append(line.half_width + line.gap)
-                owners.append(number)
-    hides += [-1] * len(corners)
-    for crossing in crossings:
-        line = lines[crossing.line]
-        half = line.half_width + line.gap
-        step = ALONG * half * crossing.along
-        corners.append(_strip(crossing.place - step, crossing.place + step, half))
-        behind.append(half)
-        owners.append(crossing.line)
-        hides.append(crossing.behind)
-    wide = [surface for surface in surfaces if abs(_area(surface)) > FLAT * size**2]
-    corners += [surface if _area(surface) > 0.0 else surface[::-1] for surface in wide]
-    behind += [TOUCHING * size] * len(wide)
-    owners += [-1] * len(wide)
-    hides += [-1] * len(wide)
-    most = max(map(len, corners), default=0)
-    padded = np.array([np.concatenate((each, np.repeat(each[-1:], most - len(each), axis=0))) for each in corners])
-    padded = padded.reshape(len(corners), most, 3)
-    along = np.roll(padded[..., :2], -1, axis=1) - padded[..., :2]
+                pieces.append((_strip(start, end, line.half_width), line.half_width + line.gap, number, -1))
+    pieces += crossings
+    for surface in surfaces:
+        if abs(area := _area(surface)) > FLAT * size**2:
+            pieces.append((surface if area > 0.0 else surface[::-1], TOUCHING * size, -1, -1))
+    corners = np.array([piece[0] for piece in pieces]).reshape(-1, 4, 3)
+    behind, owners, hides = (np.array([piece[k] for piece in pieces]) for k in (1, 2, 3))
+    along = np.roll(corners[..., :2], -1, axis=1) - corners[..., :2]
     normals = np.stack((along[..., 1], -along[..., 0]), axis=-1)  # outward if the corners are counter-clockwise
-    offsets = np.einsum("rkc,rkc->rk", normals, padded[..., :2])
+    offsets = np.einsum("rkc,rkc->rk", normals, corners[..., :2])
     planes = np.array([_plane(each) for each in corners]).reshape(-1, 3)
-    numbers = np.array([owners, hides], dtype=np.int64)
-    return _Covers(normals, offsets, planes, np.array(behind), numbers[0], numbers[1])
+    return _Covers(normals, offsets, planes, behind, owners, hides)
 
 
-def _crossings(lines: Sequence[FlatLine], starts: Array, ends: Array, owners: Indices) -> list[_Crossing]:
-    """Crossings at which a line that hides others passes in front of another line."""
+def _crossings(lines: Sequence[FlatLine], starts: Array, ends: Array, owners: Indices) -> list[_Piece]:
+    """Strips at crossings at which a line that hides others passes in front of another line."""
     steps = ends - starts
     hides = np.array([line.half_width + line.gap for line in lines])[owners]
     front = np.flatnonzero(hides > 0.0)
@@ -190,14 +154,12 @@ def _crossings(lines: Sequence[FlatLine], starts: Array, ends: Array, owners: In
     inside = crossing & (np.minimum(here, there) >= 0.0) & (np.maximum(here, there) <= 1.0)
     inside &= owners[:, None] != owners[None, front]
     depth = starts[None, front, 2] + here * steps[None, front, 2] - starts[:, None, 2] - there * steps[:, None, 2]
-    found = []
+    found: list[_Piece] = []
     for back, k in np.argwhere(inside & (depth > hides[None, front])):
-        segment, share = int(front[k]), float(here[back, k])
-        step = steps[segment]
-        place = starts[segment] + share * step
-        found.append(
-            _Crossing(int(owners[segment]), int(owners[back]), place, step / float(np.hypot(step[0], step[1])))
-        )
+        segment, half = int(front[k]), float(hides[front[k]])
+        place = starts[segment] + float(here[back, k]) * steps[segment]
+        step = ALONG * half * steps[segment] / float(np.hypot(*steps[segment, :2]))
+        found.append((_strip(place - step, place + step, half), half, int(owners[segment]), int(owners[back])))
     return found
 
 
