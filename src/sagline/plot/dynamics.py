@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from itertools import pairwise
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
@@ -134,20 +134,12 @@ def _legend_of_shares(ax: Axes) -> None:
     ax.legend(handles=handles, **legend_above(ax, labels))
 
 
-class _MapQuantity(NamedTuple):
-    """A quantity of a map: attribute, label, and True for a logarithmic scale."""
-
-    place: str
-    label: str
-    logarithmic: bool
-
-
-MAP_QUANTITIES: Final = {
-    "frequency": _MapQuantity("frequency", "lowest frequency with cable mass [Hz]", False),
-    "massless_frequency": _MapQuantity("massless_frequency", "lowest frequency, massless [Hz]", False),
-    "platform_share": _MapQuantity("platform_share", "platform's share of the lowest mode with cable mass", False),
-    "peak": _MapQuantity("peak", "largest response with cable mass [m/N]", True),
-    "peak_frequency": _MapQuantity("peak_frequency", "frequency of the largest response, with cable mass [Hz]", False),
+MAP_QUANTITIES: Final = {  # attribute of a map -> label; the scale of "peak" is logarithmic
+    "frequency": "lowest frequency with cable mass [Hz]",
+    "massless_frequency": "lowest frequency, massless [Hz]",
+    "platform_share": "platform's share of the lowest mode with cable mass",
+    "peak": "largest response with cable mass [m/N]",
+    "peak_frequency": "frequency of the largest response, with cable mass [Hz]",
 }
 
 
@@ -173,13 +165,13 @@ def frequency_map(found: FrequencyMap, quantity: str = "frequency") -> Figure:
         >>> found = sl.frequency_map(robot, poses, up_to=8.0)
         >>> figure = sl.plot.frequency_map(found)
     """
-    name, label, logarithmic = MAP_QUANTITIES[choice(quantity, "quantity", MAP_QUANTITIES)]
-    x, y, z, values = _gridded(instance(found, FrequencyMap, "found"), getattr(found, name))
+    label = MAP_QUANTITIES[choice(quantity, "quantity", MAP_QUANTITIES)]
+    x, y, z, values = _gridded(instance(found, FrequencyMap, "found"), getattr(found, quantity))
     shown = max(count for count in PANELS if count <= z.size)
     rows = np.linspace(0, z.size - 1, shown).astype(np.intp)  # the lowest, the highest, and some heights between
     known = values[:, :, rows][np.isfinite(values[:, :, rows])]
     low, high = (float(known.min()), float(known.max())) if known.size else (0.5, 1.0)
-    scale = LogNorm(low, max(high, 1.01 * low)) if logarithmic and low > 0.0 else Normalize(low, high)
+    scale = LogNorm(low, max(high, 1.01 * low)) if quantity == "peak" and low > 0.0 else Normalize(low, high)
     columns = PANELS[shown]
     count, each = shown // columns, current().width / columns
     tall = np.clip(np.ptp(y) / max(float(np.ptp(x)), 1e-9), 0.4, 1.4) * each

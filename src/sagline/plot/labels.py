@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import ceil
 from textwrap import fill
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, Final, TypeGuard, cast
 
 import numpy as np
 from matplotlib.figure import Figure, FigureBase
@@ -47,7 +47,7 @@ LEADER = 8.0  # distance from the end of a line to its name [pt]
 def name_lines(ax: Axes, title: str = "") -> None:
     """Name the lines of axes at their ends, or in a legend above the axes."""
     handles, labels = ax.get_legend_handles_labels()
-    ends = _ends(ax, handles, labels)
+    ends = _ends(ax, handles)
     if ends:
         _write(ax, ends, title)
         rest = [(handle, label) for handle, label in zip(handles, labels, strict=True) if not _is_line(handle)]
@@ -108,34 +108,26 @@ def break_labels(figure: Figure) -> None:
                 ax.yaxis.label.set_text("\n".join(min(whole, key=lambda pair: max(map(len, pair)))))
 
 
-class _End(NamedTuple):
-    """End of a line, with the name of the line; its position in data units, and its height in the axes from 0 to 1."""
-
-    name: str
-    color: Any
-    place: tuple[float, float]
-    height: float
-
-
-def _is_line(handle: Artist) -> bool:
+def _is_line(handle: Artist) -> TypeGuard[Line2D]:
     """True for a line with more than two points. False for a mark across the axes, and for a set of points."""
     if not isinstance(handle, Line2D) or handle.get_linestyle() in ("None", "", " "):
         return False
     return np.size(np.asarray(handle.get_xdata())) > 2
 
 
-def _ends(ax: Axes, handles: Sequence[Artist], labels: Sequence[str]) -> list[_End]:
-    """Ends of the lines. Empty if an end is not at the right side, or if there are too many or too long names."""
+def _ends(ax: Axes, handles: Sequence[Artist]) -> list[tuple[Line2D, Array, float]]:
+    """Lines, their ends in data units, and the heights of the ends in the axes from 0 to 1.
+
+    Empty if an end is not at the right side, or if there are too many or too long names.
+    """
     figure, look = cast(Figure, ax.get_figure(root=True)), current()
-    longest = max((len(label) for handle, label in zip(handles, labels, strict=True) if _is_line(handle)), default=0)
+    lines = [handle for handle in handles if _is_line(handle)]
+    longest = max((len(str(line.get_label())) for line in lines), default=0)
     if longest * WIDE[look.font] * look.tick * POINT > MOST * figure.get_figwidth():
         return []
     figure.draw_without_rendering()  # the layout determines the height of the axes
     found = []
-    for handle, label in zip(handles, labels, strict=True):
-        if not _is_line(handle):
-            continue
-        line = cast(Line2D, handle)
+    for line in lines:
         course = np.asarray(line.get_xydata(), dtype=np.float64)
         known = course[np.isfinite(course).all(axis=1)]
         if not len(known):
@@ -143,7 +135,7 @@ def _ends(ax: Axes, handles: Sequence[Artist], labels: Sequence[str]) -> list[_E
         across, height = ax.transAxes.inverted().transform(line.get_transform().transform(known[-1]))
         if across < 1.0 - END or not 0.0 <= height <= 1.0:
             return []
-        found.append(_End(label, line.get_color(), (float(known[-1, 0]), float(known[-1, 1])), float(height)))
+        found.append((line, known[-1], float(height)))
     return found if len(found) * _spacing(ax) <= 1.0 else []
 
 
@@ -153,19 +145,18 @@ def _spacing(ax: Axes) -> float:
     return SPACING * current().tick * figure.dpi * POINT / ax.bbox.height
 
 
-def _write(ax: Axes, ends: Sequence[_End], title: str) -> None:
+def _write(ax: Axes, ends: Sequence[tuple[Line2D, Array, float]], title: str) -> None:
     """Write names next to the ends of lines, without overlap. A common prefix is written above all names."""
-    look, names = current(), [end.name for end in ends]
+    look, names = current(), [str(line.get_label()) for line, _, _ in ends]
     if not title and len(names) > 1 and len({name.rpartition(" ")[0] for name in names}) == 1:
         title, names = names[0].rpartition(" ")[0], [name.rpartition(" ")[2] for name in names]
-    heights = spread_heights(np.array([end.height for end in ends]), _spacing(ax))
-    for end, name, height in zip(ends, names, heights, strict=True):
+    heights = spread_heights(np.array([height for _, _, height in ends]), _spacing(ax))
+    for (line, (x, y), at), name, height in zip(ends, names, heights, strict=True):
+        leader = {"arrowstyle": "-", "color": line.get_color(), "linewidth": 0.5 * look.line, "relpos": (0.0, 0.5)}
         ax.annotate(
-            name, end.place, xycoords="data", xytext=(LEADER, (height - end.height) * ax.bbox.height * _points(ax)),
-            textcoords="offset points", va="center", ha="left", fontsize=look.tick, color=end.color,
-            annotation_clip=False,
-            arrowprops={"arrowstyle": "-", "color": end.color, "linewidth": 0.5 * look.line, "shrinkA": 1.0,
-                        "shrinkB": 1.0, "relpos": (0.0, 0.5)},
+            name, (float(x), float(y)), xytext=(LEADER, (height - at) * ax.bbox.height * _points(ax)),
+            textcoords="offset points", va="center", ha="left", fontsize=look.tick, color=line.get_color(),
+            annotation_clip=False, arrowprops=leader | {"shrinkA": 1.0, "shrinkB": 1.0},
         )  # fmt: skip
     if title:
         place = (LEADER, (heights.max() - 1.0 + _spacing(ax)) * ax.bbox.height * _points(ax))
