@@ -40,7 +40,7 @@ def test_a_trajectory_in_blocks_is_the_same_trajectory(samples: int, monkeypatch
 
 
 def test_a_block_starts_at_the_last_sample_that_converged(monkeypatch: pytest.MonkeyPatch) -> None:
-    found = forward_rows.ForwardRows.empty(4, 8, behind=False)
+    found = forward_rows.ForwardRows.empty(ROBOT, 4)
     found.poses[:] = np.arange(4.0)[:, None]
     before = np.full((1, 7), -1.0)
     lost, absent, good = sl.ForwardStatus.NOT_CONVERGED, sl.ForwardStatus.NO_LENGTHS, sl.ForwardStatus.UNSTABLE

@@ -39,8 +39,8 @@ from sagline.kernels import codes, tables
 from sagline.kernels.cable.geometry import CABLE_ROWS
 from sagline.kernels.forward.platform import FORWARD_NUMBERS, LAST_COLUMNS
 from sagline.kinematics.forward import DEPTH, centered_positions
+from sagline.kinematics.forward_rows import without_guides
 from sagline.kinematics.status import ForwardStatus, PoseStatus
-from sagline.kinematics.winding import without_guides
 from sagline.plc.blocks import BLOCKS, LAYOUT, Block, Field
 from sagline.robot.batch import has_routing
 from sagline.robot.pattern import ROTATING

@@ -14,10 +14,9 @@ from sagline.core.progress import Progress, blocks
 from sagline.core.results import Result
 from sagline.core.table import Columns, Tabular
 from sagline.kinematics.forward import forward
-from sagline.kinematics.forward_rows import ForwardSolution, solve_forward_rows
+from sagline.kinematics.forward_rows import ForwardSolution, iterate_routing, solve_forward_rows
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import ForwardStatus
-from sagline.kinematics.winding import iterate_routing
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.routing import differs, kernel_length

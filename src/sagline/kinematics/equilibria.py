@@ -18,9 +18,8 @@ from sagline.core.results import Result
 from sagline.core.table import Columns, Tabular
 from sagline.kernels.forward.platform import ENERGY
 from sagline.kinematics.forward import checked_lengths, from_orientations, start_quaternions
-from sagline.kinematics.forward_rows import ForwardRows, ForwardSolution
+from sagline.kinematics.forward_rows import ForwardRows, ForwardSolution, iterate_routing
 from sagline.kinematics.status import STABLE, ForwardStatus
-from sagline.kinematics.winding import iterate_routing
 from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.robot import Robot
 from sagline.robot.routing import differs, with_routing
@@ -104,12 +103,8 @@ def equilibria(
     model = model_of(model)
     lengths = checked_lengths(instance(robot, Robot, "robot"), unstrained_length)
     if lengths.ndim != 1 or np.isnan(lengths).any():
-        raise InvalidValueError(
-            "unstrained_length",
-            f"of shape {lengths.shape}",
-            f"({robot.cable_count},), no NaN",
-            "Give the lengths of one sample.",
-        )
+        allowed, step = f"({robot.cable_count},), no NaN", "Give the lengths of one sample."
+        raise InvalidValueError("unstrained_length", f"of shape {lengths.shape}", allowed, step)
     starts, seed = whole_number(starts, "starts", 1), whole_number(seed, "seed", 0)
     check_memory("starts", START_BYTES * starts * robot.cable_count, "Choose fewer starts.")
     load = external_wrench(wrench, None)
@@ -143,21 +138,15 @@ def _quaternions(robot: Robot, count: int, seed: int) -> Array:
 
 def _distinct(found: ForwardRows, length: float) -> tuple[Indices, Indices]:
     """Index of each different stable equilibrium, in order of energy, and number of starts that ended there."""
-    kept = np.flatnonzero(np.isin(found.pose_status, _KEPT))
-    chosen: list[int] = []
-    counts: list[int] = []
-    for index in kept:
-        same = [
-            k for k, other in enumerate(chosen) if _distance(found.poses[index], found.poses[other], length) < _SAME
-        ]
-        if same:
-            counts[same[0]] += 1
-        else:
-            chosen.append(int(index))
-            counts.append(1)
-    energy = np.nan_to_num(found.numbers[chosen, ENERGY], nan=0.0)
-    order = np.lexsort((-np.array(counts, dtype=np.int64), energy))
-    return np.array(chosen, dtype=np.int64)[order], np.array(counts, dtype=np.int64)[order]
+    counts: dict[int, int] = {}  # by index of a different equilibrium
+    for index in np.flatnonzero(np.isin(found.pose_status, _KEPT)).tolist():
+        same = (k for k in counts if _distance(found.poses[index], found.poses[k], length) < _SAME)
+        chosen = next(same, index)
+        counts[chosen] = counts.get(chosen, 0) + 1
+    different, reached = (np.array([*each], dtype=np.int64) for each in (counts, counts.values()))
+    energy = np.nan_to_num(found.numbers[different, ENERGY], nan=0.0)
+    order = np.lexsort((-reached, energy))
+    return different[order], reached[order]
 
 
 def _distance(row: Array, other: Array, length: float) -> float:

@@ -11,15 +11,21 @@ from numpy.typing import ArrayLike
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary, model_of
 from sagline.core.arguments import callback, optional
-from sagline.core.arrays import LARGEST, SMALLEST, Array, Indices, locked, numbers
+from sagline.core.arrays import LARGEST, SMALLEST, Array, Flags, Indices, locked, numbers
 from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_poses
 from sagline.core.progress import Progress, blocks, rows_of
 from sagline.kernels import codes
 from sagline.kernels.forward.platform import ENERGY
-from sagline.kinematics.forward_rows import BLOCK, ForwardRows, ForwardSolution, solve_forward_rows
+from sagline.kinematics.forward_rows import (
+    BLOCK,
+    ForwardRows,
+    ForwardSolution,
+    checked_winding,
+    iterate_routing,
+    solve_forward_rows,
+)
 from sagline.kinematics.measured import MeasuredTension, fit_measurements
-from sagline.kinematics.winding import checked_winding, iterate_routing
 from sagline.robot.batch import (
     Robots,
     check_count,
@@ -61,7 +67,7 @@ def search(
     progress: called after each block with the number of finished samples and the number of all samples.
     """
     count, m = lengths.shape
-    found = ForwardRows.empty(count, m, has_routing(robot))
+    found = ForwardRows.empty(robot, count)
     for part in blocks(count, max(1, BLOCK // m), progress):
         robots = robots_at(robot, part)
         found.keep(part, _search_block(robots, model, lengths[part], rows_of(wrenches, part)))
@@ -69,7 +75,7 @@ def search(
 
 
 def _search_block(robot: Robots, model: CableModel, lengths: Array, wrenches: Array) -> ForwardRows:
-    found = ForwardRows.empty(len(lengths), lengths.shape[1], has_routing(robot))
+    found = ForwardRows.empty(robot, len(lengths))
     ranks, left = np.full((len(lengths), 3), np.inf), np.arange(len(lengths))
     for quaternion in start_quaternions(first_of(robot)):
         loads = wrenches if len(wrenches) == 1 else locked(wrenches[left])
@@ -260,23 +266,14 @@ def checked_lengths(robot: Robots, lengths: ArrayLike) -> Array:
     shared, dead = first_of(robot), dead_cable(robot)
     m = shared.cable_count
     if array.ndim not in (1, 2) or array.shape[-1] != m:
-        raise InvalidValueError(
-            "unstrained_length",
-            f"of shape {array.shape}",
-            f"shape ({m},) or (N, {m})",
-            f"Give one length for each of the {m} cables of {shared.name}.",
-        )
+        allowed, step = f"shape ({m},) or (N, {m})", f"Give one length for each of the {m} cables of {shared.name}."
+        raise InvalidValueError("unstrained_length", f"of shape {array.shape}", allowed, step)
     absent = np.isnan(array).all(axis=-1, keepdims=True)
     wrong = ~((array >= SMALLEST) & (array < LARGEST)) & ~absent
     if wrong.any():
-        index = tuple(int(i) for i in np.argwhere(wrong)[0])
-        sample = f"sample {index[0]}, " if array.ndim == 2 else ""
-        raise InvalidValueError(
-            f"{sample}cable {index[-1]}: unstrained length",
-            f"{array[index]:g} m",
-            "> 0 m, finite; or NaN for all cables of a sample",
-            "Correct the length of this cable.",
-        )
+        index, item = _first(wrong)
+        allowed = "> 0 m, finite; or NaN for all cables of a sample"
+        raise InvalidValueError(item, f"{array[index]:g} m", allowed, "Correct the length of this cable.")
     fitting = dead.shape[:-1] in ((), array.shape[:-1])  # a wrong number of lengths is refused later
     if fitting and ((array <= dead) & (dead > 0.0)).any():
         raise dead_only(array, np.broadcast_to(dead, array.shape))
@@ -289,14 +286,17 @@ def dead_only(lengths: Array, dead: Array) -> InvalidValueError:
     lengths: unstrained lengths [m], shape (m,) or (N, m); dead: dead length [m], of the same shape; at least one length
     does not exceed it. Returns the error, to be raised. It names the cable and, in a batch, the sample.
     """
-    index = tuple(int(i) for i in np.argwhere((lengths <= dead) & (dead > 0.0))[0])
-    sample = f"sample {index[0]}, " if lengths.ndim == 2 else ""
-    return InvalidValueError(
-        f"{sample}cable {index[-1]}: unstrained length",
-        f"{lengths[index]:.9g} m",
-        f"> {dead[index]:.9g} m, the dead length between drum and pulley",
-        "Give the length of all cable off the drum, or correct dead_cable.",
-    )
+    index, item = _first((lengths <= dead) & (dead > 0.0))
+    allowed = f"> {dead[index]:.9g} m, the dead length between drum and pulley"
+    step = "Give the length of all cable off the drum, or correct dead_cable."
+    return InvalidValueError(item, f"{lengths[index]:.9g} m", allowed, step)
+
+
+def _first(wrong: Flags) -> tuple[tuple[int, ...], str]:
+    """Index of the first wrong length (m,) or (N, m), and its name."""
+    index = tuple(int(i) for i in np.argwhere(wrong)[0])
+    sample = f"sample {index[0]}, " if wrong.ndim == 2 else ""
+    return index, f"{sample}cable {index[-1]}: unstrained length"
 
 
 def start_rows(start: Pose, lengths: Array) -> Array:
@@ -306,7 +306,6 @@ def start_rows(start: Pose, lengths: Array) -> Array:
     """
     if start.shape and start.shape != lengths.shape[:-1]:
         allowed = f"one pose, or {len(lengths)}" if lengths.ndim == 2 else "one pose, for one sample"
-        raise InvalidValueError(
-            "start", f"{len(start)} poses", allowed, "Give one start pose per sample, or a single one."
-        )
+        step = "Give one start pose per sample, or a single one."
+        raise InvalidValueError("start", f"{len(start)} poses", allowed, step)
     return pose_rows(start)

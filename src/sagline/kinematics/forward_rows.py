@@ -1,14 +1,17 @@
-"""Forward kinematics as arrays: arguments and results of the kernels, and the solution of a batch."""
+"""Forward kinematics as arrays: kernel calls for batches, guides and friction, and the result `ForwardSolution`."""
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import ClassVar, Final, Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from sagline.cables.model import CableModel
-from sagline.core.arrays import Array, Codes, Flags, Indices, locked
+from sagline.core.arrays import Array, Codes, Flags, Indices, checked, locked
+from sagline.core.errors import InvalidValueError
 from sagline.core.progress import Progress, blocks, rows_of
 from sagline.core.results import Result
 from sagline.core.table import Columns, Tabular
@@ -18,9 +21,11 @@ from sagline.kernels.forward import platform
 from sagline.kernels.forward.forward import fit_poses, forward_poses
 from sagline.kernels.memory import memory_for
 from sagline.kinematics.status import STABLE, ForwardStatus
-from sagline.robot.batch import Robots, first_of, has_routing
+from sagline.robot.batch import Robots, first_of, has_routing, robots_at
 from sagline.robot.equilibrium import Equilibrium, cables_of_results
 from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.robot.routing import with_routing
 from sagline.statics.tables import body_table, cable_table
 
 
@@ -87,6 +92,7 @@ class ForwardSolution(Result, Tabular):
         return np.asarray(cables.chord_tension <= 0.5 * density * cables.gravity * cables.chord)
 
 
+_OPEN = (codes.FORWARD_NOT_CONVERGED, codes.FORWARD_NO_LENGTHS)  # statuses of samples without a result
 BLOCK = 1 << 13  # cables per block; a block takes at most 130 ms, and interrupts are handled between blocks
 
 
@@ -119,8 +125,7 @@ class ForwardRows(NamedTuple):
 
     def last_pose(self, before: Array) -> Array:
         """Last pose row with a result, (1, POSE_COLUMNS). If no sample has a result: `before`."""
-        found = ~np.isin(self.pose_status, (codes.FORWARD_NOT_CONVERGED, codes.FORWARD_NO_LENGTHS))
-        which = np.flatnonzero(found)[-1:]
+        which = np.flatnonzero(~np.isin(self.pose_status, _OPEN))[-1:]
         return locked(self.poses[which]) if which.size else before
 
     @property
@@ -129,11 +134,12 @@ class ForwardRows(NamedTuple):
         return self.poses, self.results, self.cable_status, self.numbers, self.pose_status
 
     @classmethod
-    def empty(cls, count: int, cables: int, behind: bool | None) -> ForwardRows:
-        """Empty arrays for a batch; `behind`: True if any cable has a pulley or a dead length."""
+    def empty(cls, robot: Robots, count: int) -> ForwardRows:
+        """Empty arrays for `count` samples."""
+        cables = first_of(robot).cable_count
         return cls(
             np.empty((count, tables.POSE_COLUMNS)),
-            np.empty((tables.RESULT_ROWS if behind else tables.BARE_ROWS, count, cables)),
+            np.empty((tables.RESULT_ROWS if has_routing(robot) else tables.BARE_ROWS, count, cables)),
             np.empty((count, cables), dtype=np.int8),
             np.empty((count, platform.FORWARD_NUMBERS)),
             np.empty(count, dtype=np.int8),
@@ -194,9 +200,9 @@ def solve_forward_rows(
     allowed = first_of(robot).freedom if freedom is None else freedom
     bodies, cables, behind = body_table(robot), cable_table(robot), has_routing(robot) or None
     chain, memory = new_chain(m, len(allowed)), memory_for(m)  # the chain continues from block to block
-    found = ForwardRows.empty(count, m, behind)
+    found = ForwardRows.empty(robot, count)
     for part in blocks(count, max(1, BLOCK // m), progress):
-        block = ForwardRows.empty(part.stop - part.start, m, behind)
+        block = ForwardRows.empty(robot, part.stop - part.start)
         per_sample = (rows_of(bodies, part), rows_of(cables, part), lengths[part], rows_of(starts, part))
         given = (allowed, *per_sample, rows_of(wrenches, part))
         if model.code == codes.STRAIGHT:
@@ -215,4 +221,116 @@ def new_chain(cables: int, freedoms: int) -> platform.LastEquilibriumArrays:
         np.full((CABLE_ROWS, cables), np.nan),
         np.full((freedoms, freedoms), np.nan),
         np.full(platform.LAST_COLUMNS, np.nan),
+    )
+
+
+Winding = ArrayLike | Literal["path"]
+# usually about ten are needed, but more for large changes of the routing length or for high friction
+ITERATIONS: Final = 100
+MEMORY: Final = 5  # number of previous iterations that Anderson mixing uses
+_RANK: Final = 1e-6
+TOLERANCE: Final = 1e-13  # convergence tolerance, relative to a length
+
+
+def checked_winding(winding: ArrayLike, shape: tuple[int, ...], cables: int) -> Array:
+    """Winding directions, one per cable.
+
+    winding: directions +1, -1 and 0; shape: () for a single pose, (N,) for N poses. Returns an array of shape (m,) or
+    (N, m).
+    """
+    array = checked(winding, "winding", "")
+    shapes = [(cables,)] + [(*shape, cables)] * bool(shape)
+    if array.shape not in shapes:
+        step = "Give one direction for each cable, or None for no friction."
+        raise InvalidValueError("winding", f"of shape {array.shape}", f"shape {' or '.join(map(str, shapes))}", step)
+    wrong = ~np.isin(array, (-1.0, 0.0, 1.0))
+    if wrong.any():
+        index = tuple(int(i) for i in np.argwhere(wrong)[0])
+        allowed = "1 winding in, -1 paying out, or 0 at rest"
+        item, step = f"winding[{', '.join(map(str, index))}]", "Give the sign of the motion."
+        raise InvalidValueError(item, f"{array[index]:g}", allowed, step)
+    return array
+
+
+def without_guides(robot: Robot, solver: str, instead: str) -> Robot:
+    """Return `robot` unchanged, but refuse a robot with guides.
+
+    solver: name of the function that does not support guides, for the message.
+    """
+    if robot.winches is None or robot.winches.guides is None:
+        return robot
+    step = f"Use {instead}(), or robot.replace(winches=robot.winches.replace(guides=None)) for a straight guided run."
+    raise InvalidValueError("winches: guides", "given", f"None for {solver}", step)
+
+
+def iterate_routing(
+    robot: Robots,
+    model: CableModel,
+    found: ForwardRows,
+    lengths: Array,
+    loads: Array,
+    winding: Array | None,
+    taken: Array | None = None,
+) -> ForwardRows:
+    """Equilibria at lengths that include the actual routing.
+
+    The lengths for the kernels are the given lengths minus the correction for guides and friction. Each iteration
+    computes the correction at the last tensions, until convergence.
+
+    found: equilibria for straight guided cables without friction, at the given lengths minus the initial correction;
+    lengths: unstrained lengths (N, m); loads: external plus inertial wrenches (1 or N, 6); winding: directions of
+    friction, shape (m,) or (N, m), or None; taken: initial correction for guides and friction [m], (N, m); None for
+    zero. Returns the results; NOT_CONVERGED if the iteration does not converge, or a cable is too slack for a catenary
+    between its guides.
+    """
+    more = np.zeros(lengths.shape) if taken is None else taken.copy()
+    past: deque[tuple[Array, Array]] = deque(maxlen=MEMORY)  # input and residual of the last iterations
+    still = np.flatnonzero(~np.isin(found.pose_status, _OPEN))
+    for _ in range(ITERATIONS):
+        if not still.size:
+            return found
+        some = found.part(still)
+        turning = winding if winding is None or winding.ndim == 1 else winding[still]
+        added = _routing_change(robots_at(robot, still), model, some, turning)
+        slack = np.isnan(added)
+        missed = np.where(slack, 0.0, added - more[still])
+        moving = (np.abs(missed) > TOLERANCE * lengths[still]).any(axis=1)
+        whole = np.zeros(lengths.shape)
+        whole[still] = missed
+        mixed = more[still] + _anderson_step(more[still], missed, [(x[still], f[still]) for x, f in past])
+        past.append((more.copy(), whole))
+        given = lengths[still] - mixed
+        lost = np.where(moving, ~(given > 0.0).all(axis=1), slack.any(axis=1))
+        found.pose_status[still[lost]] = codes.FORWARD_NOT_CONVERGED
+        again = moving & ~lost
+        still, starts = still[again], locked(some.poses[again])
+        if still.size:
+            more[still] = mixed[again]
+            load = loads if len(loads) == 1 else locked(loads[still])
+            found.keep(still, solve_forward_rows(robots_at(robot, still), model, locked(given[again]), starts, load))
+            still = still[~np.isin(found.pose_status[still], _OPEN)]
+    found.pose_status[still] = codes.FORWARD_NOT_CONVERGED
+    return found
+
+
+def _anderson_step(taken: Array, missed: Array, past: list[tuple[Array, Array]]) -> Array:
+    """The next iterate by Anderson mixing, from previous inputs and residuals, (N, m)."""
+    if not past:
+        return missed
+    changes = np.stack([missed - before for _, before in past], axis=-1)
+    moves = np.stack([taken - before for before, _ in past], axis=-1)
+    shares = np.linalg.pinv(changes, rcond=_RANK) @ missed[..., None]
+    step: Array = missed - ((moves + changes) @ shares)[..., 0]
+    return step
+
+
+def _routing_change(robot: Robots, model: CableModel, found: ForwardRows, winding: Array | None) -> Array:
+    """Change of the lengths due to guides and friction [m], (N, m); NaN for a cable that is too slack."""
+    shape = (len(found.poses),)
+    plain = found.solution(robot, model, np.zeros(6), shape).state
+    real = with_routing(plain, winding)
+    assert plain.contact is not None
+    assert real.contact is not None
+    return (real.contact.wrapped_length - plain.contact.wrapped_length) + (
+        real.contact.dead_length - plain.contact.dead_length
     )

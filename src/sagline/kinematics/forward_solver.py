@@ -10,17 +10,16 @@ from numpy.typing import ArrayLike
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary, model_of
 from sagline.core.arguments import instance
-from sagline.core.arrays import LARGEST, SMALLEST, Array, Codes, checked, exactly, locked
+from sagline.core.arrays import LARGEST, SMALLEST, Array, checked, exactly, locked
 from sagline.core.errors import InvalidValueError
 from sagline.kernels import codes, tables
 from sagline.kernels.forward.forward import forward_poses
-from sagline.kernels.forward.platform import FORCE_RESIDUAL, FORWARD_NUMBERS, MOMENT_RESIDUAL, STIFFNESS_MIN
+from sagline.kernels.forward.platform import FORCE_RESIDUAL, MOMENT_RESIDUAL, STIFFNESS_MIN
 from sagline.kernels.memory import memory_for
-from sagline.kinematics.caller import copy_in, copy_out
 from sagline.kinematics.forward import dead_only, search
-from sagline.kinematics.forward_rows import new_chain
+from sagline.kinematics.forward_rows import ForwardRows, new_chain, without_guides
+from sagline.kinematics.inverse_solver import copy_in, copy_out
 from sagline.kinematics.status import STABLE, ForwardStatus
-from sagline.kinematics.winding import without_guides
 from sagline.robot.batch import dead_cable, has_routing
 from sagline.robot.pose import PoseLike, single_pose
 from sagline.robot.robot import Robot
@@ -73,20 +72,16 @@ class ForwardSolver:
         self._robot = without_guides(instance(robot, Robot, "robot"), "ForwardSolver", "forward")
         self._model = Catenary() if model is None else model_of(model)
         if self._model.code == codes.STRAIGHT:
-            raise InvalidValueError(
-                "model", "Straight()", "a cable model other than Straight", "Use forward() to fit straight cables."
-            )
-        m, behind = robot.cable_count, has_routing(robot)
+            step = "Use forward() to fit straight cables."
+            raise InvalidValueError("model", "Straight()", "a cable model other than Straight", step)
+        m = robot.cable_count
         self._dead = None if robot.winches is None else dead_cable(robot)
         self._lengths = np.ones((1, m))
         self._start = np.zeros((1, tables.POSE_COLUMNS))
         self._wrench = np.zeros((1, 6))
-        self._pose = np.empty((1, tables.POSE_COLUMNS))
-        self._results = np.empty((tables.RESULT_ROWS if behind else tables.BARE_ROWS, 1, m))
-        self._numbers = np.empty((1, FORWARD_NUMBERS))
-        self._status: Codes = np.empty(1, dtype=np.int8)
+        self._found = ForwardRows.empty(robot, 1)
         self._arguments: tuple[Any, ...] = (
-            (self._model.code, *self._model.parameters, behind or None),
+            (self._model.code, *self._model.parameters, has_routing(robot) or None),
             True,  # arrays that keep the last equilibrium for the next sample
             (
                 robot.freedom,
@@ -96,10 +91,10 @@ class ForwardSolver:
             ),
             new_chain(m, robot.degrees_of_freedom),
             memory_for(m),
-            (self._pose, self._results, np.empty((1, m), dtype=np.int8), self._numbers, self._status),
+            self._found.arrays,
         )
         self._own_lengths, self._load = self._lengths[0].data, self._wrench[0].data
-        self._place, self._turn = self._pose[0, :3], self._pose[0, 3:]
+        self._place, self._turn = self._found.poses[0, :3], self._found.poses[0, 3:]
         self._loaded = False  # True if the last sample had a wrench
         self._start[0, 6] = 1.0
         self._lengths[0] = np.nan  # loads the kernel without solving
@@ -140,11 +135,11 @@ class ForwardSolver:
         load = None if wrench is None else exactly(wrench, "wrench", "N or N m", (6,))
         position, quaternion = np.empty(3), np.empty(4)
         status = self.step_into(lengths, position, quaternion, load)
-        numbers = self._numbers[0]
+        numbers = self._found.numbers[0]
         return ForwardStep(
             position,
             quaternion,
-            self._results[tables.TENSION, 0].copy(),
+            self._found.results[tables.TENSION, 0].copy(),
             status,
             float(numbers[STIFFNESS_MIN]),
             float(numbers[FORCE_RESIDUAL]),
@@ -160,9 +155,8 @@ class ForwardSolver:
                 return given
         lengths = checked(unstrained_length, "unstrained_length", "m", shape=shape, above=0.0)
         if lengths.ndim != 1:
-            raise InvalidValueError(
-                "unstrained_length", f"of shape {lengths.shape}", f"shape {shape}", "Give the lengths of one sample."
-            )
+            step = "Give the lengths of one sample."
+            raise InvalidValueError("unstrained_length", f"of shape {lengths.shape}", f"shape {shape}", step)
         return lengths
 
     def step_into(
@@ -196,9 +190,9 @@ class ForwardSolver:
             found = search(self._robot, self._model, locked(self._lengths.copy()), locked(self._wrench.copy()))
             self._start[:] = found.poses
         forward_poses(*self._arguments)
-        status = ForwardStatus(self._status[0])
+        status = ForwardStatus(self._found.pose_status[0])
         if status in STABLE:
-            self._start[0] = self._pose[0]
+            self._start[0] = self._found.poses[0]
             self._lost = False
         copy_out(self._place, position, "position")
         copy_out(self._turn, quaternion, "quaternion")

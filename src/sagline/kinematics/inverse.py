@@ -18,6 +18,7 @@ from sagline.core.memory import check_poses
 from sagline.core.numbers import n
 from sagline.core.progress import Progress
 from sagline.kernels import codes
+from sagline.kinematics.forward_rows import Winding, checked_winding
 from sagline.kinematics.inverse_rows import (
     Given,
     InverseRows,
@@ -29,7 +30,6 @@ from sagline.kinematics.inverse_rows import (
 )
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
-from sagline.kinematics.winding import Winding, checked_winding
 from sagline.motion.path import Path
 from sagline.robot.batch import first_of, has_routing, one_a_pose
 from sagline.robot.equilibrium import Equilibrium, cables_of_results
@@ -226,12 +226,8 @@ def _reference(robot: Robot, previous: Plan | ArrayLike | None, variable: Variab
         return exactly(previous, "previous", "N", (robot.cable_count,), low=0.0).copy()
     cables = previous.state.cables
     if cables.shape[-1] != robot.cable_count:
-        raise InvalidValueError(
-            "previous",
-            f"a plan of {cables.shape[-1]} cables",
-            f"{robot.cable_count} cables",
-            "Continue a plan of this robot.",
-        )
+        value, step = f"a plan of {cables.shape[-1]} cables", "Continue a plan of this robot."
+        raise InvalidValueError("previous", value, f"{robot.cable_count} cables", step)
     found = last_tensions(previous, variable)
     return np.full(robot.cable_count, np.nan) if found is None else found
 

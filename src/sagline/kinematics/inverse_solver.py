@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import struct
+from array import array
 from math import hypot, isfinite, nan
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary, model_of
-from sagline.core.arguments import flag, instance
+from sagline.core.arguments import brief, flag, instance
 from sagline.core.arrays import Array, exactly, locked
 from sagline.core.errors import InvalidValueError
 from sagline.kernels import codes, tables
@@ -20,22 +21,56 @@ from sagline.kernels.inverse.feasibility import decide_poses
 from sagline.kernels.inverse.poses import inverse_poses
 from sagline.kernels.jit import bound
 from sagline.kernels.memory import memory_for
-from sagline.kinematics.caller import ARRAY, FLOAT, WHOLE, copy_in, copy_out
+from sagline.kinematics.forward_rows import without_guides
 from sagline.kinematics.inverse_rows import UNDECIDED, InverseRows, covers_all
 from sagline.kinematics.status import BALANCED, PoseStatus
-from sagline.kinematics.winding import without_guides
 from sagline.robot.batch import has_routing
 from sagline.robot.robot import Robot
 from sagline.statics.tables import robot_terms
 from sagline.tension.method import TensionMethod, kernel_options, takes_default_kernel
 from sagline.tension.methods import DEFAULT, method_of
 
+ARRAY: Final = np.ndarray  # a module-level name is faster than an attribute of another module
+FLOAT: Final = np.dtype(np.float64)
+WHOLE: Final = slice(None)
 _STATUSES = tuple(sorted(PoseStatus))  # status of each code; this lookup takes a tenth of the time of a conversion
 # A struct accepts exactly this number of real numbers. It is faster than the assignment of a tuple to an array.
 _POSE = struct.Struct(f"{tables.POSE_COLUMNS}d").pack_into
 QUATERNION_TOLERANCE = 1e-6  # largest relative deviation of the length of a quaternion, as in `Pose.from_quaternion`
 _PLAIN = (tuple, list)
 ROUNDING = 1e-15  # relative deviation of the length below which no normalization is needed
+
+
+def copy_in(memory: Any, given: Any, item: str, unit: str) -> None:
+    """Copy a caller's numbers into a work array. The solver checks that the numbers are finite.
+
+    memory: a `memoryview` of float64 numbers, shape (k,). It accepts only an array of equal type and size. This check
+    takes tens of nanoseconds, and is faster than a numpy copy.
+    """
+    try:
+        if given.__class__ is ARRAY:
+            memory[WHOLE] = given
+            return
+        if isinstance(given, list | tuple):
+            memory[WHOLE] = array("d", given)
+            return
+    except (TypeError, ValueError, NotImplementedError, OverflowError):
+        # the numbers have another type or shape: integers and similar types are converted; other values raise an error
+        pass
+    memory[WHOLE] = exactly(given, item, unit, (len(memory),))
+
+
+def copy_out(values: Array, out: Any, item: str) -> None:
+    """Copy the result `values` (k,) into a caller's array."""
+    try:
+        if out.dtype is FLOAT or out.dtype == FLOAT:
+            out[WHOLE] = values
+            return
+    # the target is not an array, has another shape, or is write-locked
+    except (AttributeError, IndexError, TypeError, ValueError):
+        pass
+    allowed = f"a writable array of float64 of shape ({values.size},)"
+    raise InvalidValueError(item, brief(out), allowed, f"Give np.empty({values.size}).")
 
 
 class InverseStep(NamedTuple):
@@ -154,14 +189,19 @@ class InverseSolver:
         lengths = np.empty(self._reference.size)
         status = self.step_into(position, quaternion, lengths, load)
         if status is PoseStatus.NO_POSE:
-            raise self._no_pose()
+            exactly(self._pose[0, :3], "position", "m", (3,))
+            length = float(np.linalg.norm(exactly(self._pose[0, 3:], "quaternion", "", (4,))))
+            hint = "Normalize it; scalar last: (x, y, z, w)."
+            raise InvalidValueError("quaternion", f"of length {length:.12g}", "length 1 to 1e-6", hint)
+        decided = status in (PoseStatus.INFEASIBLE, PoseStatus.BORDERLINE)
+        unknown = 0.0 if status in BALANCED else nan
         return InverseStep(
             lengths,
             self._found.results[tables.TENSION, 0].copy(),
             self._found.results[tables.HORIZONTAL, 0].copy(),
             self._found.results[tables.VERTICAL, 0].copy(),
             status,
-            self._shortfall(status),
+            float(self._found.shortfall[0]) if decided else unknown,
         )
 
     def step_into(
@@ -237,16 +277,3 @@ class InverseSolver:
             return False
         self._pose[0, 3:] /= length
         return True
-
-    def _no_pose(self) -> InvalidValueError:
-        """The error for a position and a quaternion that do not describe a pose."""
-        exactly(self._pose[0, :3], "position", "m", (3,))
-        length = float(np.linalg.norm(exactly(self._pose[0, 3:], "quaternion", "", (4,))))
-        step = "Normalize it; scalar last: (x, y, z, w)."
-        return InvalidValueError("quaternion", f"of length {length:.12g}", "length 1 to 1e-6", step)
-
-    def _shortfall(self, status: PoseStatus) -> float:
-        if status in BALANCED:
-            return 0.0
-        decided = status in (PoseStatus.INFEASIBLE, PoseStatus.BORDERLINE)
-        return float(self._found.shortfall[0]) if decided else nan

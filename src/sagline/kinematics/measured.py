@@ -62,9 +62,8 @@ def fit_measurements(
     rotation vector), (N, 6, 6); they are NaN for a sample without a solution.
     """
     if model.code == codes.STRAIGHT:
-        raise InvalidValueError(
-            "model", "Straight()", "a cable model other than Straight", "Use Catenary() with measured tensions."
-        )
+        step = "Use Catenary() with measured tensions."
+        raise InvalidValueError("model", "Straight()", "a cable model other than Straight", step)
     lengths = found.results[tables.LENGTH]
     readings = _fitting("frame_end_tension", measured.frame_end_tension, lengths.shape)
     deviations = (
@@ -85,9 +84,8 @@ def _fitting(name: str, value: Array, shape: tuple[int, ...]) -> Array:
     try:
         return np.broadcast_to(value, shape)
     except ValueError:
-        raise InvalidValueError(
-            name, f"of shape {value.shape}", f"a shape that broadcasts to {shape}", f"Reshape {name}."
-        ) from None
+        allowed = f"a shape that broadcasts to {shape}"
+        raise InvalidValueError(name, f"of shape {value.shape}", allowed, f"Reshape {name}.") from None
 
 
 def _best_fit(

@@ -182,41 +182,30 @@ class Plan(Result, Saved, Tabular):
     @property
     def warnings(self) -> tuple[str, ...]:
         """Warnings: rotations that are not free, nearly infeasible poses, a cable model outside its validity."""
-        return (*self._turned_away(), *self._at_the_border(), *self._below_validity())
-
-    def _turned_away(self) -> tuple[str, ...]:
-        robot = first_of(self.state.robot)
+        robot, count, cables = first_of(self.state.robot), self.status.size, self.state.cables
+        found = []
         # the rotation is equal at all poses; `inverse` refuses other poses
         turn = forbidden_turn(robot, self.state.pose, LEVEL)[:1]
-        if not np.linalg.norm(turn) > ROUNDING:
-            return ()
-        return (
-            f"the platform is turned by {turn_in_words(turn[0])}, but motion_pattern {robot.motion_pattern} does not "
-            "allow this rotation, and the force balance contains no moment about its axis; correct the pose, or choose "
-            "another motion_pattern",
-        )
-
-    def _at_the_border(self) -> tuple[str, ...]:
-        count = 0 if self.at_border is None else int(np.count_nonzero(self.at_border))
-        if not count:
-            return ()
-        return (
-            f"{count} of {self.status.size} poses are at the border of feasibility: their tensions "
-            f"balance the platform, but {type(self.tension).__name__} did not select them; widen the limits",
-        )
-
-    def _below_validity(self) -> tuple[str, ...]:
-        below = (
-            np.atleast_2d(self.state.cables.status == CableStatus.BELOW_VALIDITY)
-            & np.atleast_1d(self.feasible)[:, None]
-        )
-        return tuple(
-            f"cable {cable}: at {count} of {len(below)} poses its tension is below w D/(2 |sin phi|), where the "
+        if np.linalg.norm(turn) > ROUNDING:
+            found.append(
+                f"the platform is turned by {turn_in_words(turn[0])}, but motion_pattern {robot.motion_pattern} does "
+                "not allow this rotation, and the force balance contains no moment about its axis; correct the pose, "
+                "or choose another motion_pattern"
+            )
+        if self.at_border is not None and (near := np.count_nonzero(self.at_border)):
+            found.append(
+                f"{near} of {count} poses are at the border of feasibility: their tensions "
+                f"balance the platform, but {type(self.tension).__name__} did not select them; widen the limits"
+            )
+        below = np.atleast_2d(cables.status == CableStatus.BELOW_VALIDITY) & np.atleast_1d(self.feasible)[:, None]
+        found += [
+            f"cable {cable}: at {invalid} of {count} poses its tension is below w D/(2 |sin phi|), where the "
             "empirical model's lowest point enters the span; raise tension_min, set lowest_point_margin, or use "
             "Catenary()"
-            for cable, count in enumerate(below.sum(axis=0))
-            if count
-        )
+            for cable, invalid in enumerate(below.sum(axis=0))
+            if invalid
+        ]
+        return tuple(found)
 
     def _gap(self, first: int, last: int) -> Gap:
         part = slice(first, last + 1)

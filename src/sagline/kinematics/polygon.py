@@ -65,9 +65,8 @@ def tension_polygon(
     pose, model = single_pose(pose), model_of(model)
     plan = inverse(robot, pose, model, MinimumNorm(variable), wrench, stability=False)
     if plan.status not in (PoseStatus.SOLVED, PoseStatus.INFEASIBLE):
-        raise InvalidValueError(
-            "pose", "a pose without solution", "a pose that `inverse` can solve", PoseStatus(int(plan.status)).text
-        )
+        why = PoseStatus(int(plan.status)).text
+        raise InvalidValueError("pose", "a pose without solution", "a pose that `inverse` can solve", why)
     options = kernel_options(robot, model, MinimumNorm(variable))
     return polygon_at(robot, pose, options, plan.state.wrench, plan.chord_tension, plan.state.pull, bool(plan.feasible))
 

@@ -133,10 +133,8 @@ def lengths_from_counts(
     else:
         tension = _rows(robot, drum_tension, "drum_tension", "N")
         if tension.shape != rows.shape:
-            shapes = f"of shape {tension.shape}"
-            raise InvalidValueError(
-                "drum_tension", shapes, f"shape {rows.shape}, as counts", "Give one tension per count."
-            )
+            value, allowed = f"of shape {tension.shape}", f"shape {rows.shape}, as counts"
+            raise InvalidValueError("drum_tension", value, allowed, "Give one tension per count.")
         length = _remembered_lengths(drums, robot, path, tension, unstrained=False)
     return locked((length * longer).reshape(rows.shape))
 
@@ -146,19 +144,11 @@ def _remembered_lengths(drums: Drums, robot: Robot, given: Array, tension: Array
     strain = np.atleast_2d(tension / robot.cables.axial_stiffness)
     if (loose := strain <= -1.0).any():
         p, i = (int(index) for index in np.argwhere(loose)[0])
-        shown = f"{np.atleast_2d(tension)[p, i]:g} N"
-        raise InvalidValueError(
-            f"sample {p}, cable {i}: drum_tension", shown, ">= 0 N", "A cable only pulls; correct the tension."
-        )
-    found, paths = np.empty(given.shape), kernel_input(given, given.shape)
-    follow_memory(
-        paths,
-        kernel_input(strain, given.shape),
-        drums.rest_strain,
-        unstrained,
-        found,
-        np.empty((MEMORY_ROWS, len(given))),
-    )
+        item, shown = f"sample {p}, cable {i}: drum_tension", f"{np.atleast_2d(tension)[p, i]:g} N"
+        raise InvalidValueError(item, shown, ">= 0 N", "A cable only pulls; correct the tension.")
+    found, memory = np.empty(given.shape), np.empty((MEMORY_ROWS, len(given)))
+    paths, strains = (kernel_input(each, given.shape) for each in (given, strain))
+    follow_memory(paths, strains, drums.rest_strain, unstrained, found, memory)
     return found
 
 

@@ -52,7 +52,7 @@ def model_data(robot: Robot) -> dict[str, Any]:
     terms, options, memory = robot_terms(robot), kernel_options(robot, model, method), memory_for(m)
     pose, length, tension = np.zeros((1, tables.POSE_COLUMNS)), np.zeros((1, m)), np.zeros(m)
     wrench, first, reference = (locked(each) for each in (np.zeros((1, 6)), np.zeros(1, np.int64), np.full(m, np.nan)))
-    found, rest = InverseRows.empty(robot, 1), ForwardRows.empty(1, m, behind)
+    found, rest = InverseRows.empty(robot, 1), ForwardRows.empty(robot, 1)
     given, decided = (
         (terms, pose, wrench),
         (first, covers_all(method.code, m - n), memory, found.answers, found.proofs),

@@ -18,8 +18,8 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import counted
 from sagline.core.results import Result, set_fields
 from sagline.files.variables import Quantity
+from sagline.kinematics.forward_rows import without_guides
 from sagline.kinematics.status import PoseStatus
-from sagline.kinematics.winding import without_guides
 from sagline.robot.pose import Pose, PoseLike, pose_of
 from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot

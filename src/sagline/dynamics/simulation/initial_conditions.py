@@ -13,9 +13,9 @@ from sagline.core.arrays import Array, checked, exactly, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.kernels import codes
 from sagline.kernels.dynamics.progress import CubicTableArrays
+from sagline.kinematics.forward_rows import without_guides
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
-from sagline.kinematics.winding import without_guides
 from sagline.motion.path import checked_time
 from sagline.robot.batch import dead_cable
 from sagline.robot.drum import drum_tension

@@ -36,7 +36,7 @@ from sagline.kernels.dynamics import rigid_body as body
 from sagline.kernels.dynamics.massless import LOADED
 from sagline.kernels.dynamics.period import begin_period
 from sagline.kernels.jit import bound
-from sagline.kinematics.caller import copy_in
+from sagline.kinematics.inverse_solver import copy_in
 from sagline.robot.batch import dead_cable
 from sagline.robot.equilibrium import Equilibrium, HasState, equilibrium_of
 from sagline.robot.pose import Pose, PoseLike
