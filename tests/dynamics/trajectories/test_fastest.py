@@ -309,7 +309,7 @@ def test_bounds_hold_at_both_ends_of_every_step() -> None:
         assert profile is not None
         for k in range(len(place) - 1):
             for end in (k, k + 1):
-                point = np.array([profile.acceleration[k], profile.square[end]])
+                point = np.array([profile.motion[k, 0], profile.square[end]])
                 assert (planes.rates[end] @ point <= planes.bound[end] + 1e-9).all()
 
 

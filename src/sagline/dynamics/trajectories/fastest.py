@@ -198,12 +198,8 @@ def _infeasible_error(item: str, plan: Plan) -> InvalidValueError:
     where = ", ".join(f"{x:.4g}" for x in plan.state.pose.position[k])
     status = PoseStatus(plan.status[k]).name.lower().replace("_", " ")
     value = f"{status} at ({where}) m" if not plan.solved[k] else "not found"
-    return InvalidValueError(
-        f"the move {item}",
-        value,
-        "tensions within the limits reduced by the margin",
-        "Give a smaller margin, or other poses.",
-    )
+    allowed, step = "tensions within the limits reduced by the margin", "Give a smaller margin, or other poses."
+    return InvalidValueError(f"the move {item}", value, allowed, step)
 
 
 def _has_speed_limits(robot: Robot) -> bool:

@@ -74,8 +74,7 @@ class ForceBalance:
 
     def wrench(self, motion: Array) -> Array:
         """Inertial wrench (K, 6) of `motion` (K, 2): accelerations and squared speeds."""
-        total: Array = np.einsum("ck,cki->ki", motion.T, self.wrenches)
-        return total
+        return np.asarray(np.einsum("ck,cki->ki", motion.T, self.wrenches))
 
     def with_sag_of(self, plan: Plan, motion: Array) -> ForceBalance:
         """Update the sag forces with a plan for the motions (K, 2). Sag forces of infeasible poses are unchanged."""
@@ -140,21 +139,15 @@ class SpeedProfile:
         return float(self.time[-1])
 
     @property
-    def acceleration(self) -> Array:
-        """Acceleration between consecutive positions, shape (K - 1,)."""
-        rate: Array = 0.5 * np.diff(self.square) / np.diff(self.place)
-        return rate
-
-    @property
     def motion(self) -> Array:
         """Acceleration after each position, and squared speed at the position, shape (K, 2)."""
-        rate = self.acceleration
+        rate = 0.5 * np.diff(self.square) / np.diff(self.place)
         return np.stack((np.append(rate, rate[-1]), self.square), axis=1)
 
     def at(self, time: Array) -> Array:
         """Parameter and its first three time derivatives, shape (4, N); the third derivative is 0 within each piece."""
         k = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, len(self.place) - 2)
-        since, rate, speed = time - self.time[k], self.acceleration[k], np.sqrt(self.square[k])
+        since, rate, speed = time - self.time[k], self.motion[k, 0], np.sqrt(self.square[k])
         place = self.place[k] + since * (speed + 0.5 * since * rate)
         return np.stack((place, speed + since * rate, rate, np.zeros_like(place)))
 
@@ -348,8 +341,7 @@ def _jerk_rows(rates: Array, state: Array, course: JerkProfile, limit: float) ->
 
 def _unit(vectors: Array) -> Array:
     size = np.linalg.norm(vectors, axis=1, keepdims=True)
-    unit: Array = np.where(size > _TINY, vectors / np.where(size > _TINY, size, 1.0), 0.0)
-    return unit
+    return np.where(size > _TINY, vectors / np.where(size > _TINY, size, 1.0), 0.0)
 
 
 def _without_redundant(planes: HalfPlanes) -> HalfPlanes:

@@ -49,16 +49,6 @@ class _LineCurve:
 
     ends: Segments  # a single segment
 
-    @classmethod
-    def between(cls, pose: Pose) -> _LineCurve:
-        """Line between the first and the last pose of a batch."""
-        return cls(Segments.between(pose[np.array([0, -1])], QUINTIC))
-
-    @property
-    def moves(self) -> bool:
-        """True if the line has a length or a rotation."""
-        return bool(self.ends.moves[0])
-
     @property
     def direction(self) -> Array:
         """Twist at unit parameter rate, shape (6,)."""
@@ -68,14 +58,12 @@ class _LineCurve:
         """Parameters of poses on the line, shape (N,)."""
         move, turn = self.ends.move[0], self.ends.turn[0]
         if (extent := move @ move) >= (angle := float(np.linalg.norm(turn))) ** 2:
-            along: Array = (pose.position - self.ends.start[0]) @ move / extent
-            return along
+            return np.asarray((pose.position - self.ends.start[0]) @ move / extent)
         # half angles from -45 to 135 degrees, because q and -q are the same rotation
         half = np.arctan2(
             pose.quaternion @ self.ends.side_quaternion[0], pose.quaternion @ self.ends.start_quaternion[0]
         )
-        turned: Array = (np.mod(half + 0.25 * np.pi, np.pi) - 0.25 * np.pi) * 2.0 / angle
-        return turned
+        return np.asarray((np.mod(half + 0.25 * np.pi, np.pi) - 0.25 * np.pi) * 2.0 / angle)
 
     def at(self, parameter: Array) -> Jet:
         """Poses and their derivatives at parameters of shape (N,)."""
@@ -133,12 +121,9 @@ def _arc_lengths(time: Array, twist: Array, twist_rate: Array) -> Array:
     inside = speed[1:-1] <= _STOPPED * speed.max()
     if inside.any():
         k = int(np.argmax(inside)) + 1
-        raise InvalidValueError(
-            f"the path at {time[k]:g} s",
-            "with zero speed inside a curve",
-            "moves along a straight line, or without stops",
-            "Split it into two paths, each from rest to rest.",
-        )
+        value, allowed = "with zero speed inside a curve", "moves along a straight line, or without stops"
+        hint = "Split it into two paths, each from rest to rest."
+        raise InvalidValueError(f"the path at {time[k]:g} s", value, allowed, hint)
     growth = np.sum(twist * twist_rate, axis=1) / np.where(speed > 0.0, speed, 1.0)
     growth[[0, -1]] = np.linalg.norm(twist_rate[[0, -1]], axis=1) * (1.0, -1.0)  # position
     step = np.diff(time)
@@ -148,8 +133,7 @@ def _arc_lengths(time: Array, twist: Array, twist_rate: Array) -> Array:
 
 def _vector(a: Array, b: Array) -> Array:
     """Vector part of the quaternion product a b*, scalars last, shapes (N, 4) -> (N, 3)."""
-    vector: Array = b[:, 3:] * a[:, :3] - a[:, 3:] * b[:, :3] - np.cross(a[:, :3], b[:, :3])
-    return vector
+    return np.asarray(b[:, 3:] * a[:, :3] - a[:, 3:] * b[:, :3] - np.cross(a[:, :3], b[:, :3]))
 
 
 def piecewise(knots: Array, values: Array, at_end: int) -> Any:
@@ -160,16 +144,13 @@ def piecewise(knots: Array, values: Array, at_end: int) -> Any:
     step = np.diff(knots)
     known = len(values)
     # derivatives as Taylor coefficients of a piece, scaled to length 1
-    left, right = (values[:, part] * _powers(step, known) for part in (slice(None, -1), slice(1, None)))
+    scale = np.array([step**k / factorial(k) for k in range(known)])
+    left, right = values[:, :-1] * scale, values[:, 1:] * scale
     pieces = np.concatenate((left, np.zeros_like(left)))
     pieces[:, :-1] = _pieces(left[:, :-1], right[:, :-1])
     last = _pieces(left[:, -1:], right[:at_end, -1:])
     pieces[: len(last), -1:] = last
     return PPoly((pieces / step ** np.arange(2 * known)[:, None])[::-1], knots, extrapolate=True)
-
-
-def _powers(step: Array, count: int) -> Array:
-    return np.array([step**k / factorial(k) for k in range(count)])
 
 
 def _pieces(left: Array, right: Array) -> Array:
@@ -205,37 +186,23 @@ def segments_of(path: Path) -> tuple[RestToRestSegment, ...]:
     """Rest-to-rest segments of a path, in order."""
     # Between two samples of a segment the parameter is a polynomial that matches all known derivatives of the path. Its
     # degree is 7, or 5 for a path without jerk. Paths of `quintic_path` and `septic_path` are represented exactly.
-    _check_ends(path)
-    rests = path.rests if path.rests is not None else _standing(path)
-    return tuple(_segment(path, float(first), float(last)) for first, last in pairwise(rests))
-
-
-def _check_ends(path: Path) -> None:
-    speed = _speed(path.twist)
+    speed, rate = _speed(path.twist), _speed(path.twist_rate)
     for k, which in ((0, "begin"), (len(path) - 1, "end")):
         if speed[k] > RESTING * speed.max():
-            raise InvalidValueError(
-                f"the path at its {which}",
-                f"in motion, at {np.linalg.norm(path.twist[k, :3]):.3g} m/s and "
-                f"{np.linalg.norm(path.twist[k, 3:]):.3g} rad/s",
-                "at rest",
-                "Give a path from rest to rest.",
-            )
+            velocity, turning = (np.linalg.norm(path.twist[k, part]) for part in (slice(0, 3), slice(3, 6)))
+            value = f"in motion, at {velocity:.3g} m/s and {turning:.3g} rad/s"
+            raise InvalidValueError(f"the path at its {which}", value, "at rest", "Give a path from rest to rest.")
+    rests = path.rests
+    if rests is None:  # the times of the samples at rest, including the first and the last
+        still = (speed <= _STANDING * speed.max()) & (rate <= RESTING * rate.max())
+        still[[0, -1]] = True
+        rests = path.time[still]
+    return tuple(_segment(path, float(first), float(last)) for first, last in pairwise(rests))
 
 
 def _speed(twist: Array) -> Array:
     """Speed with 1 rad counted as 1 m, shape (N,)."""
-    speed: Array = np.linalg.norm(twist, axis=-1)
-    return speed
-
-
-def _standing(path: Path) -> Array:
-    """Times of the samples at rest, including the first and the last."""
-    speed, rate = _speed(path.twist), _speed(path.twist_rate)
-    still = (speed <= _STANDING * speed.max()) & (rate <= RESTING * rate.max())
-    still[[0, -1]] = True
-    times: Array = path.time[still]
-    return times
+    return np.asarray(np.linalg.norm(twist, axis=-1))
 
 
 def _segment(path: Path, begin: float, end: float) -> RestToRestSegment:
@@ -247,10 +214,8 @@ def _segment(path: Path, begin: float, end: float) -> RestToRestSegment:
     if not _speed(path.twist[part]).any():
         return RestToRestSegment(begin, end - begin, part.start)
     if time.size < 2:
-        value = f"of {time.size} samples"
-        raise InvalidValueError(
-            f"the move from {begin:g} s to {end:g} s", value, ">= 2", "Sample the path at a higher rate."
-        )
+        item, step = f"the move from {begin:g} s to {end:g} s", "Sample the path at a higher rate."
+        raise InvalidValueError(item, f"of {time.size} samples", ">= 2", step)
     rates = [path.twist[part], path.twist_rate[part], *([] if path.jerk is None else [path.jerk[part]])]
     curve, values = _parametrized(time, path.pose[part], rates)
     standing, over = abs(time[0]) <= near, abs(time[-1] - (end - begin)) <= near
@@ -278,8 +243,8 @@ def _segment(path: Path, begin: float, end: float) -> RestToRestSegment:
 
 def _parametrized(time: Array, pose: Pose, rates: list[Array]) -> tuple[Curve, Array]:
     """Curve through samples, and the parameter at each sample with its derivatives, shape (K, n)."""
-    line = _LineCurve.between(pose)
-    if line.moves:
+    line = _LineCurve(Segments.between(pose[np.array([0, -1])], QUINTIC))
+    if line.ends.moves[0]:
         parameter, square = line.parameter(pose), float(line.direction @ line.direction)
         values = np.stack((parameter, *(rate @ line.direction / square for rate in rates)))
         there = line.at(parameter).pose
