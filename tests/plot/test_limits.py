@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import Delaunay
 
 from sagline.core.arrays import Array, Indices
-from sagline.plot.limits import Find, cut_at_limits
+from sagline.plot.geometry import Find, cut_at_limits
 
 LINE = np.array([1.0, 0.6]), 0.8  # a boundary that meets no grid point
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sagline.core.arrays import Array
-from sagline.plot.occlusion import ALONG, FlatLine, view_axes, visible_parts
+from sagline.plot.geometry import ALONG, FlatLine, view_axes, visible_parts
 from tests.tiers import wide
 
 HALF, GAP = 0.02, 0.05

@@ -90,10 +90,8 @@ def home(
     length, reached = _lengths(robot, given, tension, model)
     if not reached.all():
         i = int(np.argmin(reached))
-        allowed, least = (
-            "a tension that the cable can have at this pose",
-            _least_tension(robot, given, model, i, tension[i]),
-        )
+        allowed = "a tension that the cable can have at this pose"
+        least = _least_tension(robot, given, model, i, tension[i])
         if least is not None:
             least = least * winches.load_cell_gain[i] + winches.load_cell_bias[i]
             allowed = f">= {least:.5g} N at this pose, because of the cable's weight"

@@ -16,7 +16,7 @@ from sagline.core.arguments import choice, instance
 from sagline.core.arrays import locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
-from sagline.plot.labels import figure_legend, set_heading, spread_heights
+from sagline.plot.labels import figure_legend, set_heading, spread_heights, write_beside
 from sagline.plot.sheet import COLORS, GAP_COLOR, MAP_COLORS, VERMILLION, color_bar, draw_map, format_axes, sheet
 from sagline.plot.style import current
 from sagline.robot.pose import Pose
@@ -166,11 +166,9 @@ def _mark_outliers(ax: Axes, found: Calibration, kind: _Kind) -> None:
             cable = "" if outlier.cable is None else f"cable {outlier.cable}, "
             unit = {"length": "m", "load cell": "N", "position": "m"}.get(outlier.quantity, "rad")
             left = outlier.row > found.rows[0] + 0.7 * (found.rows[-1] - found.rows[0])
-            ax.annotate(
-                f"{cable}{n(outlier.size, '.2g', unit)}", (outlier.row, place), xytext=(-7.0 if left else 7.0, 0.0),
-                textcoords="offset points", fontsize=current().tick, va="center", zorder=4.0,
-                ha="right" if left else "left",
-            )  # fmt: skip
+            side, away = ("right", -7.0) if left else ("left", 7.0)
+            size = f"{cable}{n(outlier.size, '.2g', unit)}"
+            write_beside(ax, size, (outlier.row, place), (away, 0.0), ha=side, zorder=4.0, annotation_clip=None)
             named += 1
 
 
@@ -251,7 +249,6 @@ def _slice(found: Calibration, at: float | None) -> tuple[Array, Array, float]:
         low, high = np.minimum(low, box.low), np.maximum(high, box.high)
     z = 0.5 * float(found.poses.position[:, 2].min() + found.poses.position[:, 2].max()) if at is None else at
     if not low[2] <= z <= high[2]:
-        raise InvalidValueError(
-            "height", f"{z:g} m", f"{low[2]:g} to {high[2]:g} m, the range of its poses", "Give another."
-        )
+        allowed = f"{low[2]:g} to {high[2]:g} m, the range of its poses"
+        raise InvalidValueError("height", f"{z:g} m", allowed, "Give another.")
     return np.linspace(low[0], high[0], POINTS), np.linspace(low[1], high[1], POINTS), z

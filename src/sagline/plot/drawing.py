@@ -13,7 +13,8 @@ from sagline.core.arrays import number
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
 from sagline.kinematics.inverse import inverse
-from sagline.plot.occlusion import FlatLine, view_axes, visible_parts
+from sagline.plot.geometry import FlatLine, view_axes, visible_parts
+from sagline.plot.labels import write_beside
 from sagline.plot.robot import FACES, Stroke, drawn_pose, ground, platform_box, strokes, tension_bar
 from sagline.plot.sheet import Sheet, axes_or_new
 from sagline.plot.style import current
@@ -231,12 +232,5 @@ def _draw_axes(ax: Axes, start: Array, ends: Array, length: str, look: Style) ->
         if away < END_ON * longest:
             continue
         ax.annotate("", (end[0], end[1]), (start[0], start[1]), arrowprops=arrow, annotation_clip=False)
-        out = 0.7 * look.tick * (end - start) / away
-        ax.annotate(
-            f"${name}$", (end[0], end[1]), xytext=(out[0], out[1]), textcoords="offset points", fontsize=look.tick,
-            ha="center", va="center", annotation_clip=False,
-        )  # fmt: skip
-    ax.annotate(
-        length, (start[0], start[1]), xytext=(0.0, -0.4 * look.tick), textcoords="offset points", fontsize=look.tick,
-        ha="center", va="top", annotation_clip=False,
-    )  # fmt: skip
+        write_beside(ax, f"${name}$", end, 0.7 * look.tick * (end - start) / away)
+    write_beside(ax, length, start, (0.0, -0.4 * look.tick), va="top")

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from itertools import pairwise
-from typing import TYPE_CHECKING, Final
+from itertools import pairwise, zip_longest
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
@@ -78,8 +78,8 @@ def frequencies(
             raise InvalidValueError("time", "not ascending", "a time a state", "Sort the states by their times.")
     ax = sheet.axes_or_new(ax, height=3.6)
     ax.add_collection(_swinging(states, clock))
-    massless = _filled([each.massless_frequency for each in states])
-    ax.plot(clock, massless, color=sheet.VERMILLION, linewidth=0.9, linestyle=sheet.DASHED, zorder=2.5)
+    rows = zip_longest(*(each.massless_frequency for each in states), fillvalue=np.nan)  # states have different numbers
+    ax.plot(clock, np.array(list(rows)).T, color=sheet.VERMILLION, linewidth=0.9, linestyle=sheet.DASHED, zorder=2.5)
     sheet.format_axes(ax, "state" if time is None else label, "natural frequency [Hz]")
     if time is None:
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
@@ -115,23 +115,13 @@ def _colors(share: Array) -> list[tuple[float, float, float]]:
     return list(zip(red.tolist(), green.tolist(), blue.tolist(), strict=True))
 
 
-def _filled(rows: list[Array]) -> Array:
-    """Rows of different lengths as one table; missing values are NaN."""
-    table = np.full((len(rows), max(row.size for row in rows)), np.nan)
-    for k, row in enumerate(rows):
-        table[k, : row.size] = row
-    return table
-
-
 def _legend_of_shares(ax: Axes) -> None:
-    handles = [
-        Line2D([], [], color=_colors(np.array([share]))[0], linewidth=float(_widths(np.array(share))),
-               label=f"with cable mass, platform share {100.0 * share:.0f} %")
-        for share in SHARES
-    ]  # fmt: skip
+    handles = []
+    for share in SHARES:
+        look: dict[str, Any] = {"color": _colors(np.array([share]))[0], "linewidth": float(_widths(np.array(share)))}
+        handles.append(Line2D([], [], label=f"with cable mass, platform share {100.0 * share:.0f} %", **look))
     handles.append(Line2D([], [], color=sheet.VERMILLION, linewidth=0.9, linestyle=sheet.DASHED, label="massless"))
-    labels = [str(handle.get_label()) for handle in handles]
-    ax.legend(handles=handles, **legend_above(ax, labels))
+    ax.legend(handles=handles, **legend_above(ax, [str(handle.get_label()) for handle in handles]))
 
 
 MAP_QUANTITIES: Final = {  # attribute of a map -> label; the scale of "peak" is logarithmic
@@ -239,9 +229,12 @@ def response(
         curves.frequency, curves.massless, color=sheet.VERMILLION, linewidth=1.1, linestyle=sheet.DASHED,
         label="massless", zorder=2.1,
     )  # fmt: skip
-    sheet.format_axes(ax, "frequency [Hz]", f"{_name(motion or force)} for a {_cause(force)} [{curves.unit}]")
+    motion, cause = _described(motion or force, "rotation", "motion"), _described(force, "moment", "force")
+    sheet.format_axes(ax, "frequency [Hz]", f"{motion} for a {cause} [{curves.unit}]")
     ax.set_xlim(curves.frequency[0], curves.frequency[-1])
-    ax.set_ylim(*_vertical_range(curves.with_mass, curves.massless, curves.static))
+    drawn = np.concatenate((curves.with_mass, curves.massless))
+    low, high = max(float(drawn.min()), LOWEST * curves.static), min(float(drawn.max()), HIGHEST * curves.static)
+    ax.set_ylim(0.7 * low, 1.4 * high)
     ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     ax.xaxis.set_major_formatter("{x:g}")
     ax.xaxis.set_minor_formatter(NullFormatter())
@@ -254,18 +247,8 @@ def response(
     return ax
 
 
-def _vertical_range(with_mass: Array, massless: Array, static: float) -> tuple[float, float]:
-    low = min(with_mass.min(), massless.min())
-    high = max(with_mass.max(), massless.max())
-    return 0.7 * max(float(low), LOWEST * static), 1.4 * min(float(high), HIGHEST * static)
-
-
-def _name(motion: str) -> str:
-    return f"rotation {motion}" if motion.startswith("about") else f"motion along {motion}"
-
-
-def _cause(force: str) -> str:
-    return f"moment {force}" if force.startswith("about") else f"force along {force}"
+def _described(direction: str, about: str, along: str) -> str:
+    return f"{about} {direction}" if direction.startswith("about") else f"{along} along {direction}"
 
 
 def _damping(vibration: Vibration | FrequencyResponse) -> str:

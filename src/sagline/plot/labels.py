@@ -151,17 +151,21 @@ def _write(ax: Axes, ends: Sequence[tuple[Line2D, Array, float]], title: str) ->
     if not title and len(names) > 1 and len({name.rpartition(" ")[0] for name in names}) == 1:
         title, names = names[0].rpartition(" ")[0], [name.rpartition(" ")[2] for name in names]
     heights = spread_heights(np.array([height for _, _, height in ends]), _spacing(ax))
-    for (line, (x, y), at), name, height in zip(ends, names, heights, strict=True):
-        leader = {"arrowstyle": "-", "color": line.get_color(), "linewidth": 0.5 * look.line, "relpos": (0.0, 0.5)}
-        ax.annotate(
-            name, (float(x), float(y)), xytext=(LEADER, (height - at) * ax.bbox.height * _points(ax)),
-            textcoords="offset points", va="center", ha="left", fontsize=look.tick, color=line.get_color(),
-            annotation_clip=False, arrowprops=leader | {"shrinkA": 1.0, "shrinkB": 1.0},
-        )  # fmt: skip
+    for (line, end, at), name, height in zip(ends, names, heights, strict=True):
+        color, up = line.get_color(), (height - at) * ax.bbox.height * _points(ax)
+        leader = {"arrowstyle": "-", "color": color, "linewidth": 0.5 * look.line, "relpos": (0.0, 0.5)}
+        leader |= {"shrinkA": 1.0, "shrinkB": 1.0}
+        write_beside(ax, name, end, (LEADER, up), ha="left", color=color, arrowprops=leader)
     if title:
-        place = (LEADER, (heights.max() - 1.0 + _spacing(ax)) * ax.bbox.height * _points(ax))
-        ax.annotate(title, (1.0, 1.0), xycoords="axes fraction", xytext=place, textcoords="offset points", va="center",
-                    ha="left", fontsize=look.tick)  # fmt: skip
+        up = (heights.max() - 1.0 + _spacing(ax)) * ax.bbox.height * _points(ax)
+        write_beside(ax, title, (1.0, 1.0), (LEADER, up), ha="left", xycoords="axes fraction")
+
+
+def write_beside(ax: Axes, text: str, place: Any, offset: Any, **look: Any) -> None:
+    """Write `text` at `offset` [pt] from `place`, which is in data units without other `xycoords`."""
+    defaults: dict[str, Any] = {"fontsize": current().tick, "ha": "center", "va": "center", "annotation_clip": False}
+    (x, y), (right, up) = place, offset
+    ax.annotate(text, (x, y), xytext=(right, up), textcoords="offset points", **(defaults | look))
 
 
 def _points(ax: Axes) -> float:

@@ -12,7 +12,7 @@ from matplotlib.textpath import TextPath
 
 from sagline.core.arguments import instance
 from sagline.core.errors import InvalidValueError
-from sagline.plot.labels import name_lines
+from sagline.plot.labels import name_lines, write_beside
 from sagline.plot.sheet import COLORS, GAP_COLOR, axes_or_new, format_axes, sheet
 from sagline.plot.style import current
 from sagline.tension.polygon import TensionPolygon
@@ -58,18 +58,14 @@ def polygon(shape: TensionPolygon, points: Mapping[str, ArrayLike] | None = None
         >>> axes = sl.plot.polygon(sl.tension_polygon(robot, pose))
     """
     if instance(shape, TensionPolygon, "shape").vertices.shape[1] != 2 or len(shape.vertices) == 0:
-        raise InvalidValueError(
-            "polygon",
-            f"{len(shape.vertices)} points with {shape.vertices.shape[1]} coordinates",
-            "a polygon of two redundant cables",
-            "Choose a feasible pose of a robot with n + 2 cables.",
-        )
+        value = f"{len(shape.vertices)} points with {shape.vertices.shape[1]} coordinates"
+        step = "Choose a feasible pose of a robot with n + 2 cables."
+        raise InvalidValueError("polygon", value, "a polygon of two redundant cables", step)
     points = instance({} if points is None else points, Mapping, "points")  # type: ignore[type-abstract]
     places = {str(name): shape.coordinates(tensions) for name, tensions in points.items()}
     if wrong := [name for name, place in places.items() if place.ndim != 1]:
-        raise InvalidValueError(
-            f"points[{wrong[0]!r}]", "a batch of tensions", "the tensions of one pose", "Give each pose a name."
-        )
+        item, allowed = f"points[{wrong[0]!r}]", "the tensions of one pose"
+        raise InvalidValueError(item, "a batch of tensions", allowed, "Give each pose a name.")
     corners = np.asarray(shape.vertices)
     extent = float(np.ptp(corners, axis=0).max())
     groups = _equal_places(places, SAME * extent)
@@ -152,17 +148,7 @@ def _name_sides(ax: Axes, shape: TensionPolygon, corners: Array) -> None:
         ax.set(xlim=wanted[:, 0], ylim=wanted[:, 1])
     line = {"arrowstyle": "-", "color": "0.75", "linewidth": 0.6, "shrinkA": 0.0, "shrinkB": 2.0}
     for name in names:
-        ax.annotate(
-            name.text,
-            (name.middle[0], name.middle[1]),
-            xytext=(name.offset[0], name.offset[1]),
-            textcoords="offset points",
-            ha="center",
-            va="center",
-            fontsize=current().tick,
-            color="0.3",
-            arrowprops=line if name.moved else None,
-        )
+        write_beside(ax, name.text, name.middle, name.offset, color="0.3", arrowprops=line if name.moved else None)
 
 
 def _names(shape: TensionPolygon, corners: Array, scale: float) -> list[_Name]:

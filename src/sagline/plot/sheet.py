@@ -23,7 +23,7 @@ from matplotlib.ticker import MaxNLocator
 from sagline.core.arguments import brief, file_path, optional
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.writing import atomic_file
-from sagline.plot.labels import PLACE, TIME, break_labels
+from sagline.plot.labels import PLACE, TIME, break_labels, write_beside
 from sagline.plot.style import PLAIN, SANS, SERIF, Using, current
 
 if TYPE_CHECKING:
@@ -177,10 +177,7 @@ def mark_event(ax: Axes, time: float, name: str, color: str, zorder: float) -> N
     """Draw a vertical line at `time`, with `name` above the axes; no name for ""."""
     ax.axvline(time, color=color, linewidth=1.0, zorder=zorder)
     if name:
-        ax.annotate(
-            name, (time, 1.0), xycoords=("data", "axes fraction"), xytext=(0.0, 2.0), textcoords="offset points",
-            fontsize=current().tick, ha="center", va="bottom", annotation_clip=False,
-        )  # fmt: skip
+        write_beside(ax, name, (time, 1.0), (0.0, 2.0), va="bottom", xycoords=("data", "axes fraction"))
 
 
 def cable_look(cable: int) -> dict[str, Any]:

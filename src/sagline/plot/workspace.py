@@ -16,8 +16,8 @@ from sagline.core.arguments import choice, instance
 from sagline.core.arrays import number
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
+from sagline.plot.geometry import Find, cut_at_limits
 from sagline.plot.labels import PLACE, set_heading
-from sagline.plot.limits import Find, cut_at_limits
 from sagline.plot.robot import draw_robot, format_space_axes
 from sagline.plot.sheet import GAP_COLOR, axes_or_new, format_axes, sheet
 from sagline.plot.style import current
@@ -113,9 +113,8 @@ def _plane(space: Workspace, normal: str, at: float | None) -> Plane:
     flat = flat_axis(space.box)
     if flat is not None and flat[0] != axis:
         own = AXES[flat[0]]
-        raise InvalidValueError(
-            "normal", repr(normal), f"{own!r}, along which the box is flat", f'Give normal="{own}".'
-        )
+        allowed = f"{own!r}, along which the box is flat"
+        raise InvalidValueError("normal", repr(normal), allowed, f'Give normal="{own}".')
     if at is None:
         known = space.surface.vertices[:, axis] if len(space.surface.vertices) else np.array([low, high])
         return Plane(axis, float(np.clip(0.5 * (known.min() + known.max()), low, high)))

@@ -1,4 +1,4 @@
-"""Hidden line removal in parallel projection: parts behind surfaces and behind nearer lines are removed.
+"""Hidden line removal in parallel projection, and division of triangles where the limit of a workspace changes.
 
 Sorting by distance is not sufficient, because each of three cables can pass in front of the next one. In parallel
 projection all quantities are linear along a segment. The ends of hidden parts are therefore exact intersections of
@@ -7,8 +7,8 @@ straight lines.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -185,3 +185,51 @@ def _plane(corners: Array) -> Array:
     middle = corners.mean(axis=0)
     slopes, *_ = np.linalg.lstsq(corners[:, :2] - middle[:2], corners[:, 2] - middle[2], rcond=None)
     return np.array([*slopes, middle[2] - slopes @ middle[:2]])
+
+
+BISECTIONS: Final = 5  # number of bisections that locate a border on an edge
+Find = Callable[[Array], Indices]
+
+
+def cut_at_limits(points: Array, triangles: Indices, limit: Indices, find: Find) -> tuple[Array, Indices]:
+    """Divide triangles so that each part has a single limit.
+
+    `points`: (V, d); `triangles`: (T, 3); `limit`: code of the limit at each point (V,); `find`: function that gives
+    the codes of points (n, d). Returns the corners (U, 3, d) and the codes (U,).
+    """
+    codes = limit[triangles]
+    mixed = (codes != codes[:, :1]).any(axis=1)
+    corners, whole = [points[triangles[~mixed]]], [codes[~mixed, 0]]
+    if mixed.any():
+        triangles = triangles[mixed]
+        edges = np.sort(np.stack((triangles, np.roll(triangles, -1, axis=1)), axis=2), axis=2)  # (T, 3, 2)
+        pairs, place = np.unique(edges.reshape(-1, 2), axis=0, return_inverse=True)
+        borders = _borders(points[pairs], limit[pairs], find)[place.reshape(-1, 3)]
+        for tips, middles, own in _pieces(points[triangles], borders, limit[triangles]):
+            corners.append(np.stack((tips, *middles), axis=1))
+            whole.append(own)
+    return np.concatenate(corners), np.concatenate(whole)
+
+
+def _borders(ends: Array, codes: Indices, find: Find) -> Array:
+    """Points of the edges `ends` (E, 2, d) at which the limit changes, by bisection; middles of all other edges."""
+    ends = ends.copy()
+    change = np.flatnonzero(codes[:, 0] != codes[:, 1])
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (ends[change, 0] + ends[change, 1])
+        there = np.where(find(middle) == codes[change, 0], 0, 1)
+        ends[change, there] = middle
+    return np.asarray(0.5 * (ends[:, 0] + ends[:, 1]))
+
+
+def _pieces(tips: Array, borders: Array, codes: Indices) -> list[tuple[Array, tuple[Array, Array], Indices]]:
+    """Six parts of each triangle, between its corners, the borders on its edges and a common point."""
+    # If a triangle has two limits, the common point is midway between both borders, so that the border is straight.
+    changes = codes != np.roll(codes, -1, axis=1)
+    weight = changes[:, :, None] / changes.sum(axis=1)[:, None, None]
+    common = (weight * borders).sum(axis=1)
+    return [
+        (tips[:, k], pair, codes[:, k])
+        for k in range(3)
+        for pair in ((borders[:, k], common), (common, borders[:, k - 1]))
+    ]
