@@ -26,16 +26,7 @@ from sagline.kinematics.forward_rows import (
     solve_forward_rows,
 )
 from sagline.kinematics.measured import MeasuredTension, fit_measurements
-from sagline.robot.batch import (
-    Robots,
-    check_count,
-    dead_cable,
-    first_of,
-    has_routing,
-    robot_fields,
-    robots_at,
-    together,
-)
+from sagline.robot import batch
 from sagline.robot.equilibrium import cables_of_results, limited_tension
 from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.pose import Pose, PoseLike, pose_of
@@ -53,33 +44,27 @@ _POOR = np.array([0, 1, 2, 3, 4, 5, 6, 0])
 
 
 def search(
-    robot: Robots, model: CableModel, lengths: Array, wrenches: Array, progress: Progress | None = None
+    robot: batch.Robots, model: CableModel, lengths: Array, wrenches: Array, progress: Progress | None = None
 ) -> ForwardRows:
-    """Forward kinematics without initial poses; every sample is searched independently.
-
-    With a fixed orientation the platform has a single equilibrium, because the energy is convex in the position. Any
-    start leads to this equilibrium. The search over all motions then starts there. The first start orientation is
-    level. If no stable equilibrium within the tension limits is found, the search is repeated from tilted starts. The
-    results are compared first by status, then by the number of cables outside their limits, then by energy. The best
-    result is kept.
-
-    lengths: unstrained lengths (N, m), rows of NaN are skipped; wrenches: external plus inertial wrenches (1 or N, 6);
-    progress: called after each block with the number of finished samples and the number of all samples.
-    """
+    """Forward kinematics of lengths (N, m) without initial poses; every sample is searched independently."""
+    # With a fixed orientation the platform has a single equilibrium, because the energy is convex in the position. Any
+    # start leads to this equilibrium. The search over all motions then starts there. The first start orientation is
+    # level. If no stable equilibrium within the tension limits is found, the search is repeated from tilted starts. The
+    # results are compared first by status, then by the number of cables outside their limits, then by energy.
     count, m = lengths.shape
     found = ForwardRows.empty(robot, count)
     for part in blocks(count, max(1, BLOCK // m), progress):
-        robots = robots_at(robot, part)
+        robots = batch.robots_at(robot, part)
         found.keep(part, _search_block(robots, model, lengths[part], rows_of(wrenches, part)))
     return found
 
 
-def _search_block(robot: Robots, model: CableModel, lengths: Array, wrenches: Array) -> ForwardRows:
+def _search_block(robot: batch.Robots, model: CableModel, lengths: Array, wrenches: Array) -> ForwardRows:
     found = ForwardRows.empty(robot, len(lengths))
     ranks, left = np.full((len(lengths), 3), np.inf), np.arange(len(lengths))
-    for quaternion in start_quaternions(first_of(robot)):
+    for quaternion in start_quaternions(batch.first_of(robot)):
         loads = wrenches if len(wrenches) == 1 else locked(wrenches[left])
-        robots = robots_at(robot, left)
+        robots = batch.robots_at(robot, left)
         answer = from_orientations(robots, model, locked(lengths[left]), loads, quaternion)
         outside = outside_limits(robots, model, answer)
         energy = np.nan_to_num(answer.numbers[:, ENERGY], nan=0.0)
@@ -96,14 +81,10 @@ def _search_block(robot: Robots, model: CableModel, lengths: Array, wrenches: Ar
 
 
 def from_orientations(
-    robot: Robots, model: CableModel, lengths: Array, wrenches: Array, quaternion: Array
+    robot: batch.Robots, model: CableModel, lengths: Array, wrenches: Array, quaternion: Array
 ) -> ForwardRows:
-    """Solve from the middle of the frame: first only the position, then all motions.
-
-    lengths: unstrained lengths (N, m); wrenches: external plus inertial wrenches (1 or N, 6); quaternion: initial
-    orientation (x, y, z, w), shape (4,), or one per sample (N, 4).
-    """
-    shared = first_of(robot)
+    """Solve from the middle of the frame, first the position, then all motions; `quaternion`: (4,) or (N, 4)."""
+    shared = batch.first_of(robot)
     freedom = shared.freedom
     starts = pose_rows(Pose.from_quaternion(starting_positions(robot, lengths, quaternion), quaternion))
     if shared.motion_pattern not in ROTATING:
@@ -113,27 +94,18 @@ def from_orientations(
     return solve_forward_rows(robot, model, lengths, locked(placed.poses), wrenches)
 
 
-def starting_positions(robot: Robots, lengths: Array, quaternion: Array) -> Array:
-    """Positions slightly below the center of the frame ends, within the free motions of the platform.
-
-    The center itself is not suitable, because the two ends of a single cable would coincide there.
-
-    lengths: unstrained lengths (N, m); quaternion: orientation of the platform, shape (4,) or (N, 4). Returns positions
-    of the platform origin [m], shape (N, 3).
-    """
-    freedom = first_of(robot).freedom
+def starting_positions(robot: batch.Robots, lengths: Array, quaternion: Array) -> Array:
+    """Positions (N, 3) slightly below the center of the frame ends, within the platform's free motions [m]."""
+    # At the center itself, the two ends of a single cable would coincide.
+    freedom = batch.first_of(robot).freedom
     depth = DEPTH * np.nan_to_num(lengths.mean(axis=1, keepdims=True), nan=1.0)
     position: Array = centered_positions(robot, quaternion) - depth * (freedom[:, 2] @ freedom[:, :3])
     return position
 
 
-def centered_positions(robot: Robots, quaternion: Array) -> Array:
-    """Position of the platform at which the centroid of the platform ends is the centroid of the frame ends.
-
-    quaternion: orientation of the platform, shape (4,) or (N, 4). Returns position of the platform origin [m], shape
-    (3,) or (N, 3).
-    """
-    frame, platform = robot_fields(robot, "frame_anchors", "platform_anchors")
+def centered_positions(robot: batch.Robots, quaternion: Array) -> Array:
+    """Positions (3,) or (N, 3) at which the centroids of the platform ends and of the frame ends coincide [m]."""
+    frame, platform = batch.robot_fields(robot, "frame_anchors", "platform_anchors")
     ends = platform.mean(axis=-2)
     vector, scalar = quaternion[..., :3], quaternion[..., 3:]
     turn = 2.0 * np.cross(vector, ends)
@@ -142,10 +114,7 @@ def centered_positions(robot: Robots, quaternion: Array) -> Array:
 
 
 def start_quaternions(robot: Robot) -> Array:
-    """Start orientations: level, then tilted about each free rotation axis, in both directions.
-
-    Returns quaternions (K, 4), scalar last.
-    """
+    """Start orientations (K, 4), level, then tilted about each free rotation axis in both directions."""
     rows = [np.array([0.0, 0.0, 0.0, 1.0])]
     if robot.motion_pattern in ROTATING:
         axes = robot.freedom[2:, 3:] if robot.motion_pattern in PLANAR else np.eye(3)
@@ -154,12 +123,9 @@ def start_quaternions(robot: Robot) -> Array:
     return np.array(rows)
 
 
-def outside_limits(robot: Robots, model: CableModel, found: ForwardRows) -> Indices:
-    """Number of cables outside the tension limits of the robot, for each sample.
-
-    Returns counts (N,); 0 for straight cables, whose tensions are unknown.
-    """
-    least, most = robot_fields(robot, "tension_min", "tension_max")
+def outside_limits(robot: batch.Robots, model: CableModel, found: ForwardRows) -> Indices:
+    """Number of cables outside the tension limits, (N,); 0 for straight cables, whose tensions are unknown."""
+    least, most = batch.robot_fields(robot, "tension_min", "tension_max")
     cables, contact = cables_of_results(robot, model, found.results, found.cable_status, found.pose_status.shape)
     tension = limited_tension(robot, cables, contact)
     low = (1.0 - _LIMIT_SLACK) * least
@@ -227,7 +193,7 @@ def forward(
         >>> print(found.solved, found.pose.position.round(9))
         True [1. 1. 2.]
     """
-    robots = together(robot)
+    robots = batch.together(robot)
     start = None if start is None else pose_of(start, "start")
     optional(tension_measured, MeasuredTension, "tension_measured")
     model = model_of(model)
@@ -235,15 +201,15 @@ def forward(
     lengths = checked_lengths(robots, unstrained_length)
     shape = lengths.shape[:-1]
     count = shape[0] if shape else None
-    check_count(robots, count)
-    check_poses(count or 1, lengths.shape[-1], has_routing(robots))
+    batch.check_count(robots, count)
+    check_poses(count or 1, lengths.shape[-1], batch.has_routing(robots))
     load = external_wrench(wrench, count)
     direction = None if winding is None else checked_winding(winding, shape, lengths.shape[-1])
     samples, loads = np.atleast_2d(lengths), np.atleast_2d(load)
     if start is None:
         found = search(robots, model, samples, loads, progress)
     else:
-        check_reach(first_of(robots), start, "start")
+        check_reach(batch.first_of(robots), start, "start")
         chained = bool(shape) and not start.shape
         starts = start_rows(start, lengths)
         found = solve_forward_rows(robots, model, samples, starts, loads, chained=chained, progress=progress)
@@ -256,14 +222,10 @@ def forward(
     return replace(solution, state=with_routing(solution.state, direction))
 
 
-def checked_lengths(robot: Robots, lengths: ArrayLike) -> Array:
-    """Lengths of a caller, shape (m,) or (N, m). They are positive and exceed the dead length, or whole rows are NaN.
-
-    robot: the robot of all samples, or one robot per sample; lengths: the caller's lengths [m]. Returns a write-locked
-    array of shape (m,) or (N, m).
-    """
+def checked_lengths(robot: batch.Robots, lengths: ArrayLike) -> Array:
+    """Lengths (m,) or (N, m) of a caller: positive and longer than the dead lengths, or NaN for whole rows."""
     array = numbers(lengths, "unstrained_length", "m")
-    shared, dead = first_of(robot), dead_cable(robot)
+    shared, dead = batch.first_of(robot), batch.dead_cable(robot)
     m = shared.cable_count
     if array.ndim not in (1, 2) or array.shape[-1] != m:
         allowed, step = f"shape ({m},) or (N, {m})", f"Give one length for each of the {m} cables of {shared.name}."
@@ -281,14 +243,10 @@ def checked_lengths(robot: Robots, lengths: ArrayLike) -> Array:
 
 
 def dead_only(lengths: Array, dead: Array) -> InvalidValueError:
-    """Error for a length that does not exceed the dead length.
-
-    lengths: unstrained lengths [m], shape (m,) or (N, m); dead: dead length [m], of the same shape; at least one length
-    does not exceed it. Returns the error, to be raised. It names the cable and, in a batch, the sample.
-    """
+    """Error for a length (m,) or (N, m) that does not exceed its dead length; it names the cable and the sample."""
     index, item = _first((lengths <= dead) & (dead > 0.0))
     allowed = f"> {dead[index]:.9g} m, the dead length between drum and pulley"
-    step = "Give the length of all cable off the drum, or correct dead_cable."
+    step = "Give the length of all cable off the drum, or correct batch.dead_cable."
     return InvalidValueError(item, f"{lengths[index]:.9g} m", allowed, step)
 
 
@@ -300,10 +258,7 @@ def _first(wrong: Flags) -> tuple[tuple[int, ...], str]:
 
 
 def start_rows(start: Pose, lengths: Array) -> Array:
-    """Pose rows of the starts.
-
-    lengths: the samples, shape (m,) or (N, m). Returns array of shape (1 or N, POSE_COLUMNS).
-    """
+    """Pose rows (1 or N, POSE_COLUMNS) of the starts for lengths of shape (m,) or (N, m)."""
     if start.shape and start.shape != lengths.shape[:-1]:
         allowed = f"one pose, or {len(lengths)}" if lengths.ndim == 2 else "one pose, for one sample"
         step = "Give one start pose per sample, or a single one."

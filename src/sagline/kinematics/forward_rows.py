@@ -158,11 +158,7 @@ class ForwardRows(NamedTuple):
         shape: tuple[int, ...],
         covariance: Array | None = None,
     ) -> ForwardSolution:
-        """Result of `forward` in the shape of the arguments, () or (N,).
-
-        load: external plus inertial wrench, shape (6,) or (N, 6); shape: () for a single sample, (N,) for a batch;
-        covariance: covariances of the poses, shape (N, 6, 6), or None.
-        """
+        """Result of `forward` of the shape `shape`, () or (N,); `load` (6,) or (N, 6); `covariance` (N, 6, 6)."""
         pose = Pose._adopt(self.poses[:, :3].reshape(*shape, 3), self.poses[:, 3:].reshape(*shape, 4))
         whole = locked(np.ascontiguousarray(np.broadcast_to(load, (*shape, 6))))
         residuals = self.numbers[:, [platform.FORCE_RESIDUAL, platform.MOMENT_RESIDUAL]]
@@ -189,13 +185,9 @@ def solve_forward_rows(
     freedom: Array | None = None,
     progress: Progress | None = None,
 ) -> ForwardRows:
-    """Run the kernel over samples, in blocks.
-
-    lengths: unstrained lengths (N, m); starts: pose rows (1 or N, POSE_COLUMNS); wrenches: external plus inertial
-    wrenches (1 or N, 6); chained: True if each sample starts at the result of the previous sample; freedom: free
-    motions (n, 6); None for the free motions of the robot; progress: called after each block with the number of
-    finished samples and the number of all samples.
-    """
+    """Run the kernel over samples (N, m) in blocks, from pose rows `starts` and with `wrenches` (1 or N, 6) each."""
+    # chained: True if each sample starts at the result of the previous sample; freedom: free motions (n, 6), by default
+    # those of the robot; progress: called after each block with the number of finished samples and of all samples
     count, m = lengths.shape
     allowed = first_of(robot).freedom if freedom is None else freedom
     bodies, cables, behind = body_table(robot), cable_table(robot), has_routing(robot) or None
@@ -233,11 +225,7 @@ TOLERANCE: Final = 1e-13  # convergence tolerance, relative to a length
 
 
 def checked_winding(winding: ArrayLike, shape: tuple[int, ...], cables: int) -> Array:
-    """Winding directions, one per cable.
-
-    winding: directions +1, -1 and 0; shape: () for a single pose, (N,) for N poses. Returns an array of shape (m,) or
-    (N, m).
-    """
+    """Winding directions +1, -1 and 0 of the cables, (m,) or (N, m), for poses of the shape `shape`, () or (N,)."""
     array = checked(winding, "winding", "")
     shapes = [(cables,)] + [(*shape, cables)] * bool(shape)
     if array.shape not in shapes:
@@ -253,10 +241,7 @@ def checked_winding(winding: ArrayLike, shape: tuple[int, ...], cables: int) -> 
 
 
 def without_guides(robot: Robot, solver: str, instead: str) -> Robot:
-    """Return `robot` unchanged, but refuse a robot with guides.
-
-    solver: name of the function that does not support guides, for the message.
-    """
+    """Return `robot`, but refuse a robot with guides; `solver` is the function that does not support them."""
     if robot.winches is None or robot.winches.guides is None:
         return robot
     step = f"Use {instead}(), or robot.replace(winches=robot.winches.replace(guides=None)) for a straight guided run."
@@ -272,17 +257,11 @@ def iterate_routing(
     winding: Array | None,
     taken: Array | None = None,
 ) -> ForwardRows:
-    """Equilibria at lengths that include the actual routing.
-
-    The lengths for the kernels are the given lengths minus the correction for guides and friction. Each iteration
-    computes the correction at the last tensions, until convergence.
-
-    found: equilibria for straight guided cables without friction, at the given lengths minus the initial correction;
-    lengths: unstrained lengths (N, m); loads: external plus inertial wrenches (1 or N, 6); winding: directions of
-    friction, shape (m,) or (N, m), or None; taken: initial correction for guides and friction [m], (N, m); None for
-    zero. Returns the results; NOT_CONVERGED if the iteration does not converge, or a cable is too slack for a catenary
-    between its guides.
-    """
+    """Equilibria at lengths (N, m) that include the actual routing; `found`: those for straight guided cables."""
+    # The lengths for the kernels are the given lengths minus the correction for guides and friction. Each iteration
+    # computes the correction at the last tensions. `found` is without friction, at the given lengths minus the initial
+    # correction `taken` [m], (N, m), None for zero. The status is NOT_CONVERGED if the iteration does not converge, or
+    # a cable is too slack for a catenary between its guides.
     more = np.zeros(lengths.shape) if taken is None else taken.copy()
     past: deque[tuple[Array, Array]] = deque(maxlen=MEMORY)  # input and residual of the last iterations
     still = np.flatnonzero(~np.isin(found.pose_status, _OPEN))

@@ -18,16 +18,8 @@ from sagline.core.memory import check_poses
 from sagline.core.numbers import n
 from sagline.core.progress import Progress
 from sagline.kernels import codes
+from sagline.kinematics import inverse_rows
 from sagline.kinematics.forward_rows import Winding, checked_winding
-from sagline.kinematics.inverse_rows import (
-    Given,
-    InverseRows,
-    decide_rows,
-    decide_stability,
-    given_codes,
-    solve_inverse_rows,
-    solve_underconstrained_rows,
-)
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
 from sagline.motion.path import Path
@@ -57,7 +49,7 @@ def inverse(
     *,
     winding: Winding | None = None,
     stability: bool = True,
-    given: Sequence[Given] | None = None,
+    given: Sequence[inverse_rows.Given] | None = None,
     level: float = 0.0,
     progress: Progress | None = None,
 ) -> Plan:
@@ -123,7 +115,7 @@ def inverse(
     shared = first_of(robots)
     check_reach(shared, pose, "pose")
     check_plane(shared, pose, "pose")
-    values = given_codes(shared, given)
+    values = inverse_rows.given_codes(shared, given)
     options = kernel_options(robots, model, method) if values is None else None
     rows, path = pose_rows(pose), motion if isinstance(motion, Path) else None
     check_poses(len(rows), shared.cable_count, has_routing(robots))
@@ -133,12 +125,12 @@ def inverse(
     loads = np.atleast_2d(load)
     if options is None:
         asked = values, number(level, "level", "N"), path is not None, stability
-        found, rows = solve_underconstrained_rows(robots, model, rows, loads, *asked, progress)
+        found, rows = inverse_rows.solve_underconstrained_rows(robots, model, rows, loads, *asked, progress)
         pose = Pose.from_quaternion(rows[:, :3].reshape(*pose.shape, 3), rows[:, 3:].reshape(*pose.shape, 4))
     else:
         reference = _reference(shared, previous, tension.variable)
-        found = solve_inverse_rows(robots, method, options, rows, loads, reference, stability, progress)
-        decide_rows(robot_terms(robots), options, rows, loads, found, progress)
+        found = inverse_rows.solve_inverse_rows(robots, method, options, rows, loads, reference, stability, progress)
+        inverse_rows.decide_rows(robot_terms(robots), options, rows, loads, found, progress)
     if (found.pose_status == codes.POSE_NO_CHORD).any():
         refuse_missing_chords(robots, pose)
     whole = locked(np.ascontiguousarray(np.broadcast_to(load, (*pose.shape, 6))))
@@ -152,12 +144,12 @@ def inverse(
     if found.reject_slack(state.unstrained_length):
         state = equilibrium()
     if stability:
-        decide_stability(robots, (model.code, *model.parameters), rows, found)
+        inverse_rows.decide_stability(robots, (model.code, *model.parameters), rows, found)
     plan = _plan_of(state, path, tension, found)
     return plan if winding is None or turning is not None else _with_path_friction(plan)
 
 
-def _plan_of(state: Equilibrium, path: Path | None, tension: TensionMethod, found: InverseRows) -> Plan:
+def _plan_of(state: Equilibrium, path: Path | None, tension: TensionMethod, found: inverse_rows.InverseRows) -> Plan:
     """Plan of solved rows, in the shape of the poses."""
     shared, shape = first_of(state.robot), state.pose.shape
     return Plan(
@@ -228,15 +220,10 @@ def _reference(robot: Robot, previous: Plan | ArrayLike | None, variable: Variab
     if cables.shape[-1] != robot.cable_count:
         value, step = f"a plan of {cables.shape[-1]} cables", "Continue a plan of this robot."
         raise InvalidValueError("previous", value, f"{robot.cable_count} cables", step)
-    found = last_tensions(previous, variable)
-    return np.full(robot.cable_count, np.nan) if found is None else found
-
-
-def last_tensions(plan: Plan, variable: Variable) -> Array | None:
-    """Tensions of the last pose of `plan` that the distribution method solved, (m,) [N]; None without such a pose."""
-    at_border = np.zeros_like(plan.feasible) if plan.at_border is None else plan.at_border
-    feasible = np.flatnonzero(np.atleast_1d(plan.feasible & ~at_border))
-    if not feasible.size:
-        return None
-    state = plan.state
-    return shared_tension(state[int(feasible[-1])] if state.pose.shape else state, variable).copy()
+    solved = np.atleast_1d(previous.feasible)
+    if previous.at_border is not None:
+        solved = solved & ~np.atleast_1d(previous.at_border)
+    if not solved.any():
+        return np.full(robot.cable_count, np.nan)
+    state = previous.state
+    return shared_tension(state[int(np.flatnonzero(solved)[-1])] if state.pose.shape else state, variable).copy()

@@ -106,13 +106,10 @@ def solve_inverse_rows(
     stability: bool = False,
     progress: Progress | None = None,
 ) -> InverseRows:
-    """Run the kernel over poses.
-
-    rows: pose rows (N, POSE_COLUMNS); loads: external plus inertial wrenches (1 or N, 6); reference: initial tensions
-    of `Closest`, in its variable, or NaN: (m,) for the first pose, (N, m) for each pose independently; stability: True
-    to mark solved poses without a proof of stability as UNPROVED_STABILITY; progress: called after each block with
-    the number of finished poses, which does not include undecided poses, and the number of all poses.
-    """
+    """Run the kernel over pose rows (N, POSE_COLUMNS) with external plus inertial wrenches `loads` (1 or N, 6)."""
+    # reference: initial tensions of `Closest`, in its variable, or NaN: (m,) for the first pose, (N, m) for each pose
+    # independently; stability: True to mark solved poses without a proof of stability as UNPROVED_STABILITY; progress:
+    # called after each block with the number of finished poses, without undecided poses, and the number of all poses
     found, last = InverseRows.empty(robot, len(rows)), np.array(np.atleast_2d(reference)[0])
     memory, otherwise = memory_for(last.size), None if takes_default_kernel(method) else True
     given = (*options, robot_terms(robot), rows, loads, last, memory, otherwise, stability, found.answers)
@@ -128,22 +125,16 @@ def solve_inverse_rows(
 
 
 def covers_all(method: int, redundant: int) -> bool:
-    """True if a distribution method solves every feasible pose; closed-form methods do not.
-
-    redundant: number of cables beyond the degrees of freedom.
-    """
+    """True if a method solves every feasible pose with `redundant` spare cables; closed-form methods do not."""
     return redundant == 0 or not codes.CLOSED_FORM <= method <= codes.PUNCTURE
 
 
 def decide_rows(
     terms: RobotTerms, options: Options, rows: Array, loads: Array, found: InverseRows, progress: Progress | None = None
 ) -> None:
-    """Decide the feasibility of poses for which the iterations gave no result. Fill the proofs and the results.
-
-    terms: from `robot_terms`; rows: pose rows (N, POSE_COLUMNS); loads: external plus inertial wrenches (1 or N,
-    6); progress: called after each block with the number of all finished poses, which includes feasible poses, and the
-    number of all poses.
-    """
+    """Decide the feasibility of poses without a result of the iterations. Fill their proofs and results."""
+    # terms: from `robot_terms`; rows: pose rows (N, POSE_COLUMNS); loads: external plus inertial wrenches (1 or N, 6);
+    # progress: called after each block with the number of finished poses, with feasible poses, and of all poses
     count, n = found.needed.shape
     m = found.cable_status.shape[1]
     found.brackets[np.isin(found.pose_status, SOLVED)] = 0.0
@@ -160,10 +151,7 @@ def decide_rows(
 
 
 def decide_stability(robot: Robots, model: ModelTerms, rows: Array, found: InverseRows) -> None:
-    """Decide the stability of solved poses that have no proof of stability. Unstable poses get the status UNSTABLE.
-
-    model: code and constants of the cable model; rows: pose rows (N, POSE_COLUMNS).
-    """
+    """Decide the stability of solved poses without a proof of it. Unstable poses get the status UNSTABLE."""
     which = locked(np.flatnonzero((found.pose_status == codes.UNPROVED_STABILITY) | found.at_border))
     if not which.size:
         return
@@ -214,12 +202,10 @@ def solve_underconstrained_rows(
     stability: bool,
     progress: Progress | None = None,
 ) -> tuple[InverseRows, Array]:
-    """Results, and rows of the found poses (N, POSE_COLUMNS).
-
-    rows: rows of the given poses; loads: external plus inertial wrenches (1 or N, 6); given: codes (m,); level: tension
-    level [N]; chained: True to start each pose at the pose before; stability: True to mark solved poses as
-    UNPROVED_STABILITY.
-    """
+    """Results of underconstrained poses, and rows of the found poses (N, POSE_COLUMNS)."""
+    # rows: rows of the given poses; loads: external plus inertial wrenches (1 or N, 6); given: codes (m,); level:
+    # tension level [N]; chained: True to start each pose at the pose before; stability: True to mark solved poses as
+    # UNPROVED_STABILITY
     assert given is not None  # checked by the caller
     shared = first_of(robot)
     found, poses = InverseRows.empty(robot, len(rows)), np.empty_like(rows)

@@ -52,15 +52,11 @@ class MeasuredTension(Result):
 def fit_measurements(
     robot: Robots, model: CableModel, found: ForwardRows, loads: Array, measured: MeasuredTension
 ) -> Array:
-    """Replace equilibria at measured lengths by best fits to lengths and tensions. Returns covariances of the poses.
-
-    For each sample, Gauss-Newton iterations find the lengths L_true with the smallest sum ((L_true - L)/sigma_L)^2 +
-    sum ((T_A - reading)/sigma_T)^2. The platform is in equilibrium at L_true.
-
-    found: equilibria at the measured lengths (N samples); the search starts at them, and the fits overwrite them;
-    loads: external plus inertial wrenches (1 or N, 6). Returns the covariances of (displacement of the center of mass,
-    rotation vector), (N, 6, 6); they are NaN for a sample without a solution.
-    """
+    """Replace equilibria at measured lengths by best fits to lengths and tensions. Returns covariances (N, 6, 6)."""
+    # For each sample, Gauss-Newton iterations find the lengths L_true with the smallest sum ((L_true - L)/sigma_L)^2 +
+    # sum ((T_A - reading)/sigma_T)^2. The platform is in equilibrium at L_true. The search starts at the equilibria at
+    # the measured lengths. The covariances are those of displacement of the center of mass and rotation vector, NaN
+    # without a solution.
     if model.code == codes.STRAIGHT:
         step = "Use Catenary() with measured tensions."
         raise InvalidValueError("model", "Straight()", "a cable model other than Straight", step)

@@ -81,11 +81,9 @@ def length_rate(state: Equilibrium, path: Path, tension: TensionMethod, feasible
 def _motion_near(
     robot: Robots, path: Path, wrench: Array, longer: float
 ) -> tuple[Callable[[float], tuple[Pose, Array]], float]:
-    """Function that gives poses and wrenches at a time after each sample of `path`, and a time step [s].
-
-    wrench: external plus inertial wrench at the samples (N, 6), whose external part is interpolated by a spline;
-    longer: factor of the step.
-    """
+    """Function that gives poses and wrenches at a time after each sample of `path`, and a time step [s]."""
+    # wrench: external plus inertial wrench at the samples (N, 6), whose external part is interpolated by a spline;
+    # longer: factor of the step
     jerk = path.jerk if path.jerk is not None else _rate(path.time, path.twist_rate)
     external = wrench - inertial_wrench(robot, path.pose, path.twist, path.twist_rate)
     changing = float(np.ptp(external, axis=0).max()) > _CONSTANT * float(np.abs(wrench).max())

@@ -19,10 +19,7 @@ class PoseStatus(Status):
         codes.POSE_SINGULAR,
         "the structure matrix has lost rank: no cable resists some motion of the platform; move the platform",
     )
-    TOO_SLACK = (
-        codes.POSE_TOO_SLACK,
-        "a cable has no catenary between its guides; raise tension_min",
-    )
+    TOO_SLACK = codes.POSE_TOO_SLACK, "a cable has no catenary between its guides; raise tension_min"
     NOT_CONVERGED = codes.POSE_NOT_CONVERGED, "the tensions did not converge; please report this robot and pose"
     NO_CHORD = (
         codes.POSE_NO_CHORD,
@@ -87,10 +84,7 @@ class ForwardStatus(Status):
         codes.FORWARD_NOT_CONVERGED,
         "no equilibrium was found within the allowed number of steps; use a closer start, or omit the start",
     )
-    NO_LENGTHS = (
-        codes.FORWARD_NO_LENGTHS,
-        "all lengths of the sample are NaN, as in a plan at an infeasible pose",
-    )
+    NO_LENGTHS = codes.FORWARD_NO_LENGTHS, "all lengths of the sample are NaN, as in a plan at an infeasible pose"
     FITTED = (
         codes.FORWARD_FITTED,
         "straight cables have no forces: this pose fits the lengths best; see cables.closure_residual",

@@ -127,10 +127,8 @@ def _axes(ax: Axes | None, points: Array, *, bar: bool) -> Axes:
 def _draw_lines(
     ax: Axes, cables: list[Stroke], others: list[Stroke], facing: list[Array], view: Array, flat: Array
 ) -> None:
-    """Draw the visible parts of all lines; widths and gaps are computed for the size on paper.
-
-    facing: visible faces of the platform in the picture (4, 3); flat: points of the ground in the picture (n, 2).
-    """
+    """Draw the visible parts of all lines in front of the faces `facing` (4, 3) and the ground `flat` (n, 2)."""
+    # widths and gaps are computed for the size on paper
     figure: Any = ax.get_figure(root=True)
     figure.draw_without_rendering()
     point = float(np.ptp(ax.get_xlim())) / (ax.bbox.width / figure.dpi * 72.0)  # [m]

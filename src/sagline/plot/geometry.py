@@ -99,10 +99,8 @@ def _rest(spans: Array) -> list[tuple[float, float]]:
 
 
 def _hidden(starts: Array, ends: Array, owners: Indices, covers: _Covers) -> list[Array]:
-    """Hidden spans (n, 2) of each of S segments, from 0 at the start of a segment to 1 at its end.
-
-    A span is within all limits and behind the plane: all K + 1 linear functions along it are <= 0.
-    """
+    """Hidden spans (n, 2) of each of S segments, from 0 at the start of a segment to 1 at its end."""
+    # A span is within all limits and behind the plane: all K + 1 linear functions along it are <= 0.
     steps = ends - starts
     outside = np.einsum("sc,rkc->srk", starts[:, :2], covers.normals) - covers.offsets
     rise = np.einsum("sc,rkc->srk", steps[:, :2], covers.normals)
@@ -192,11 +190,8 @@ Find = Callable[[Array], Indices]
 
 
 def cut_at_limits(points: Array, triangles: Indices, limit: Indices, find: Find) -> tuple[Array, Indices]:
-    """Divide triangles so that each part has a single limit.
-
-    `points`: (V, d); `triangles`: (T, 3); `limit`: code of the limit at each point (V,); `find`: function that gives
-    the codes of points (n, d). Returns the corners (U, 3, d) and the codes (U,).
-    """
+    """Divide triangles (T, 3) of points (V, d) at borders of `limit` (V,): corners (U, 3, d) and codes (U,)."""
+    # each part has a single limit; `find` gives the codes of points (n, d)
     codes = limit[triangles]
     mixed = (codes != codes[:, :1]).any(axis=1)
     corners, whole = [points[triangles[~mixed]]], [codes[~mixed, 0]]

@@ -116,10 +116,8 @@ def _is_line(handle: Artist) -> TypeGuard[Line2D]:
 
 
 def _ends(ax: Axes, handles: Sequence[Artist]) -> list[tuple[Line2D, Array, float]]:
-    """Lines, their ends in data units, and the heights of the ends in the axes from 0 to 1.
-
-    Empty if an end is not at the right side, or if there are too many or too long names.
-    """
+    """Lines, their ends in data units, and heights of the ends in the axes, 0 to 1; empty if there is no space."""
+    # There is no space if an end is not at the right side, or if there are too many or too long names.
     figure, look = cast(Figure, ax.get_figure(root=True)), current()
     lines = [handle for handle in handles if _is_line(handle)]
     longest = max((len(str(line.get_label())) for line in lines), default=0)

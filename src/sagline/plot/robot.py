@@ -68,10 +68,8 @@ class Stroke(NamedTuple):
 
 
 def strokes(robot: Robot, pose: Pose, plan: Plan | None) -> tuple[list[Stroke], list[Stroke]]:
-    """Cables, and pulleys, drums, frame and platform of a robot at `pose`, whose tensions are in `plan`.
-
-    Cables have the colors of their tensions. Cables without tensions are straight, dashed and gray.
-    """
+    """Cables, and pulleys, drums, frame and platform of a robot at `pose`; cables have the colors of their tensions."""
+    # Cables without tensions are straight, dashed and gray.
     state = plan.state if plan is not None and plan.feasible else None
     tension = np.full(robot.cable_count, np.nan) if plan is None else plan.chord_tension
     colors = TensionScale.of(robot).colors(tension) / 255.0

@@ -212,10 +212,7 @@ def _on_lines(margin: Array, levels: Array) -> Flags:
 def _name_region(
     ax: Axes, cut: Slice, within: Flags, free: Flags, name: str, boxes: Sequence[BboxBase]
 ) -> list[BboxBase]:
-    """Write `name` in the middle of each large part of a region, between lines if possible, and over no other text.
-
-    Returns the boxes around the written names.
-    """
+    """Write `name` in the middle of each large part of a region, over no other text; returns the boxes of the names."""
     parts, count = label(within)
     figure: Any = ax.get_figure(root=True)
     points = ax.bbox.width * 72.0 / figure.dpi / cut.across.size

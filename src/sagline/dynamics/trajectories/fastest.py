@@ -11,15 +11,7 @@ from sagline.core.arguments import callback, instance
 from sagline.core.arrays import Array, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.progress import Progress
-from sagline.dynamics.trajectories.profiles import (
-    Bounds,
-    ForceBalance,
-    HalfPlanes,
-    JerkProfile,
-    SpeedProfile,
-    fastest_jerk_profile,
-    fastest_speed_profile,
-)
+from sagline.dynamics.trajectories import profiles
 from sagline.dynamics.trajectories.segments import Curve, RestToRestSegment, joined_path, sample_time, segments_of
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan
@@ -40,7 +32,9 @@ _GENTLE: Final = 8  # number of initial attempts; each multiplies the time by th
 _ROUNDING: Final = 1e-12
 
 
-_Motion: TypeAlias = tuple[SpeedProfile | JerkProfile, float]  # motion of a segment, and factor of its duration
+_Motion: TypeAlias = tuple[
+    profiles.SpeedProfile | profiles.JerkProfile, float
+]  # motion of a segment, and factor of its duration
 
 
 def fastest(
@@ -150,19 +144,19 @@ def _fastest_motion(robot: Robot, segment: RestToRestSegment, curve: Curve, limi
     rest = inverse(robot, jet.pose)
     if not rest.solved.all():
         raise _infeasible_error(f"{where} at rest", rest)
-    balances, speeds = ForceBalance.at(robot, jet, rest), _winch_speed_bounds(robot, curve, place, rest)
+    balances, speeds = profiles.ForceBalance.at(robot, jet, rest), _winch_speed_bounds(robot, curve, place, rest)
     bounds, least = speeds(place), np.inf
     for _ in range(_ITERATIONS):
-        profile = fastest_speed_profile(place, balances.half_planes().joined(bounds))
+        profile = profiles.fastest_speed_profile(place, balances.half_planes().joined(bounds))
         if profile is None:
             raise _infeasible_error(f"{where} in motion", rest)
         before, least = least, profile.duration
         if abs(least - before) <= _CONVERGED * least:
             break
         balances = balances.near_motion(profile.motion)
-    motion: SpeedProfile | JerkProfile | None = profile
+    motion: profiles.SpeedProfile | profiles.JerkProfile | None = profile
     if np.isfinite(limits).any():
-        motion = fastest_jerk_profile(curve, robot, speeds, limits, least)
+        motion = profiles.fastest_jerk_profile(curve, robot, speeds, limits, least)
     if motion is None:
         raise _infeasible_error(f"{where} in motion", rest)
     return motion, _factor(robot, segment, curve, motion, limits)
@@ -172,7 +166,7 @@ def _factor(
     robot: Robot,
     segment: RestToRestSegment,
     curve: Curve,
-    motion: SpeedProfile | JerkProfile,
+    motion: profiles.SpeedProfile | profiles.JerkProfile,
     limits: tuple[float, float],
 ) -> float:
     """Factor >= 1 of the duration, with which `motion` violates no limit between the positions."""
@@ -206,20 +200,22 @@ def _has_speed_limits(robot: Robot) -> bool:
     return robot.winches is not None and robot.winches.speed_limit is not None
 
 
-def _winch_speed_bounds(robot: Robot, curve: Curve, place: Array, rest: Plan) -> Bounds:
+def _winch_speed_bounds(robot: Robot, curve: Curve, place: Array, rest: Plan) -> profiles.Bounds:
     """Bounds on the squared speed of the curve parameter that follow from the speed limits of the winches."""
     if not _has_speed_limits(robot):
-        return lambda parameter: HalfPlanes(np.zeros((parameter.size, 0, 2)), np.zeros((parameter.size, 0)))
+        return lambda parameter: profiles.HalfPlanes(np.zeros((parameter.size, 0, 2)), np.zeros((parameter.size, 0)))
     fastest_cable = _fastest_rates(robot, rest.unstrained_length)
 
-    def bounds(parameter: Array) -> HalfPlanes:
+    def bounds(parameter: Array) -> profiles.HalfPlanes:
         jet = curve.at(parameter)
         lever = jet.pose.matrix @ robot.center_of_mass
         twist = jet.rates[0].copy()
         twist[:, :3] += np.cross(twist[:, 3:], lever)
         change = np.einsum("knm,kn->km", structure_matrix(robot, jet.pose), twist @ robot.freedom.T)
         limit = np.stack([np.interp(parameter, place, column) for column in fastest_cable.T], axis=1)
-        return HalfPlanes(np.stack((np.zeros_like(change), (change / limit) ** 2), axis=-1), np.ones_like(change))
+        return profiles.HalfPlanes(
+            np.stack((np.zeros_like(change), (change / limit) ** 2), axis=-1), np.ones_like(change)
+        )
 
     return bounds
 

@@ -190,10 +190,7 @@ def _rows(planes: HalfPlanes, i: int, step: float, reach: Array) -> tuple[Array,
 
 
 def _range(rates: Array, bound: Array) -> tuple[float, float]:
-    """Smallest and largest value of the second variable for which the first variable has a feasible value.
-
-    If the bounds have no solution, the first result is larger than the second.
-    """
+    """Smallest and largest value of the second variable for which the first has a feasible value; low > high: none."""
     flat = np.abs(rates[:, 0]) <= _FLAT * np.abs(rates[:, 0]).max()
     up, down = ~flat & (rates[:, 0] > 0.0), ~flat & (rates[:, 0] < 0.0)
     slope, level = rates[:, 1] / np.where(flat, 1.0, rates[:, 0]), bound / np.where(flat, 1.0, rates[:, 0])
@@ -242,10 +239,7 @@ class JerkProfile:
 
 
 def _integration_matrices(pieces: int) -> Array:
-    """Matrices that map the jerks of the P pieces to the parameter and its first two derivatives at the knots.
-
-    Returns an array of shape (3, P + 1, P).
-    """
+    """Matrices (3, P + 1, P) from the jerks of P pieces to the parameter and its two derivatives at the knots."""
     h = 1.0 / pieces
     # time since the start of each piece
     since = np.maximum(np.arange(pieces + 1)[:, None] - np.arange(pieces), 0.0) * h
