@@ -10,7 +10,7 @@ import numpy as np
 import sagline as sl
 from benchmarks.measure import Row, best_seconds, print_table
 from sagline.robot.drum import drums_of
-from tests.kernels.cable.test_pulley import there_and_back
+from tests.kernels.cable.test_pulley import lengths_and_recovered_tensions
 from tests.kinematics.test_pulleys import formula_error
 from tests.kinematics.winches import wound
 from tests.tension.reference import random_poses
@@ -41,7 +41,7 @@ def counts() -> Iterator[Row]:
 
 def hard_cables() -> Iterator[Row]:
     """Random cables over pulleys, with dead length: lengths from tensions, and tensions from these lengths."""
-    tension, found, expected, _statuses = there_and_back(38_000, seed=3)
+    tension, found, expected, _statuses = lengths_and_recovered_tensions(38_000, seed=3)
     worst = (np.abs(found - tension) / expected).max()
     yield Row("38,000 random cables, tension to length and back, relative to one rounding", "4", f"{worst:.1f} at most")
 

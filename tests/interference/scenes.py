@@ -1,4 +1,4 @@
-"""Robots at rest, and meshes, for the tests of distances."""
+"""Robots at equilibrium and meshes for tests of distances."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def turned(rng: np.random.Generator) -> Array:
 
 
 def cable_points(state: sl.Equilibrium, cable: int, count: int = 4001) -> Array:
-    """Points of a cable as the state draws it [m], shape (count, 3)."""
+    """Points of a cable from its state [m], shape (count, 3)."""
     start, end = state.exit_point[cable], state.pose.transform(state.one_robot.platform_anchors)[cable]
     along, up = np.moveaxis(state.cables.points(count)[cable], -1, 0)
     level = (end - start)[:2] / np.hypot(*(end - start)[:2])

@@ -9,11 +9,13 @@ from sagline.core.arrays import Array
 from tests.interference.scenes import at_rest, cable_points, from_box, from_segment, turned
 from tests.tiers import wide
 
-SAMPLES = 20_001  # of a cable: 0.6 mm apart, so that the nearest sample is too far by less than 1e-4 mm from 1 m
+SAMPLES = (
+    20_001  # points of a cable, 0.6 mm apart: the nearest one is too far by less than 1e-4 mm at a distance of 1 m
+)
 
 
 def refined(points: Array, distances: Array) -> float:
-    """The least distance between samples, by the parabola through the three best ones."""
+    """Least distance between samples, by the parabola through the three best ones."""
     k = int(np.clip(distances.argmin(), 1, len(distances) - 2))
     a, b, c = distances[k - 1 : k + 2]
     bend = a - 2.0 * b + c
@@ -21,7 +23,7 @@ def refined(points: Array, distances: Array) -> float:
 
 
 @pytest.mark.parametrize("robot", wide(["cogiro", "article-suspended", "expo2015-lucia-pulleys"]))
-def test_cables_against_boxes_rods_and_balls_are_as_sampled(robot: str) -> None:
+def test_distances_to_boxes_rods_and_balls_agree_with_samples(robot: str) -> None:
     rng = np.random.default_rng(7)
     place = (0.3, 0.2, 1.0) if robot == "expo2015-lucia-pulleys" else (1.0, 0.5, 1.5)
     state = at_rest(robot, place)
@@ -49,8 +51,8 @@ def test_cables_against_boxes_rods_and_balls_are_as_sampled(robot: str) -> None:
 
 
 @pytest.mark.parametrize("order", [[0, 1], [1, 0]])
-def test_a_taut_cable_and_one_that_sags_toward_it_are_as_near_as_sampled(order: list[int]) -> None:
-    """The chords are nearest at the platform, the cables often where the heavy one hangs lowest."""
+def test_distance_of_a_taut_and_a_sagging_cable_agrees_with_samples(order: list[int]) -> None:
+    """The chords are nearest at the platform, the cables often at the lowest part of the heavy one."""
     rng, elsewhere = np.random.default_rng(5), 0
     ends = np.array([[0.0, 0.0, 0.0], [0.1, 0.1, 0.2]])[order]
     density = np.array([0.01, 2.0])[order]
@@ -107,8 +109,8 @@ SIDES = np.array([sign * axis for sign in (1.0, -1.0) for axis in np.eye(3)])
 
 
 @pytest.mark.parametrize("small", ["platform", "obstacle"])
-def test_a_box_is_as_near_to_plates_as_its_corners(small: str) -> None:
-    """Plates on all six sides of boxes turned anyhow, either as the platform: each corner is the nearest somewhere."""
+def test_distance_of_box_and_plate_is_that_of_the_corners(small: str) -> None:
+    """Plates on all six sides of rotated boxes, with either as platform: each corner is the nearest somewhere."""
     rng, state, nearest = np.random.default_rng(3), at_rest(), set()
     size, plate = np.array([0.4, 0.3, 0.5]), 200.0
     corners = 0.5 * size * np.array(list(product((-1.0, 1.0), repeat=3)))
@@ -131,7 +133,7 @@ def test_a_box_is_as_near_to_plates_as_its_corners(small: str) -> None:
     assert nearest == set(range(8))
 
 
-def test_cable_diameters_are_taken_off_where_they_are_known() -> None:
+def test_known_cable_diameters_are_subtracted() -> None:
     state = at_rest("expo2015-lucia", (0.3, 0.2, 1.0))
     thin = sl.clearance(state, cable_radius=0.0)
     assert sl.clearance(state).pair_distance == pytest.approx(thin.pair_distance - 0.014, abs=1e-12)
@@ -139,7 +141,7 @@ def test_cable_diameters_are_taken_off_where_they_are_known() -> None:
     assert some.pair_distance[0] == pytest.approx(thin.pair_distance[0] - 1e-3, abs=1e-12)
 
 
-def test_a_batch_is_its_poses_and_those_without_tensions_say_so() -> None:
+def test_a_batch_agrees_with_its_poses_and_marks_those_without_tensions() -> None:
     robot = sl.load_robot("cogiro")
     state = sl.inverse(robot, sl.Pose([[1.0, 0.5, 1.5], [90.0, 0.0, 0.0], [0.0, 0.0, 2.0]], np.eye(3))).state
     lamp = sl.Sphere([0.0, 0.0, 2.0], 0.1, name="lamp")
@@ -156,7 +158,7 @@ def test_a_batch_is_its_poses_and_those_without_tensions_say_so() -> None:
     assert "lamp" in str(found)
 
 
-def test_pairs_that_share_an_anchor_are_left_out_by_name_or_measured_from_some_way_on() -> None:
+def test_pairs_with_a_common_anchor_are_excluded_or_measured_from_a_distance() -> None:
     state = at_rest("article-mixed", (1.0, 0.5, 2.5))
     robot = state.one_robot
     both = robot.replace(
@@ -180,13 +182,13 @@ def test_pairs_that_share_an_anchor_are_left_out_by_name_or_measured_from_some_w
     assert value > 0.01
 
 
-def test_point_platforms_have_nothing_to_measure_and_say_so() -> None:
+def test_point_platforms_have_no_distances() -> None:
     robot = sl.Robot(
         "tripod", [[3, 0, 3], [-2, 2, 3], [-2, -2, 3]], np.zeros((3, 3)), sl.Cable(0.05, 5e4), 10.0, motion_pattern="3T"
     )
     found = sl.clearance(sl.inverse(robot, sl.Pose([0, 0, 1], np.eye(3))).state)
     assert found.distance == np.inf
-    assert isinstance(found.between, str)  # no pair
+    assert isinstance(found.between, str)  # no pairs
     names, reasons = zip(*(one.split(": ") for one in found.left_out), strict=True)
     assert names == tuple(f"cable {i} and cable {k}" for i, k in ((0, 1), (0, 2), (1, 2)))
     assert all("the platform" in reason and reason in str(found) for reason in reasons)

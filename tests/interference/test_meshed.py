@@ -12,7 +12,7 @@ from tests.tiers import wide
 
 
 @pytest.mark.parametrize("robot", wide(["cogiro", "article-suspended"]))
-def test_a_mesh_of_a_box_is_as_near_as_the_box(robot: str) -> None:
+def test_a_mesh_of_a_box_has_the_distances_of_the_box(robot: str) -> None:
     rng = np.random.default_rng(21)
     state = at_rest(robot)
     for _ in range(5):
@@ -28,7 +28,7 @@ def test_a_mesh_of_a_box_is_as_near_as_the_box(robot: str) -> None:
 
 
 @pytest.mark.parametrize("angle", wide([0.4, 0.0]))
-def test_a_mesh_below_cables_that_sag_deeply_is_as_near_as_its_box(angle: float) -> None:
+def test_a_mesh_below_slack_cables_has_the_distances_of_its_box(angle: float) -> None:
     state = at_rest("deep", (1.0, 0.5, 1.5))
     assert state.cables.sag.max() > 1.0
     turn = sl.Pose.from_euler([0, 0, 0], angle, angle, 0.0).matrix
@@ -40,7 +40,7 @@ def test_a_mesh_below_cables_that_sag_deeply_is_as_near_as_its_box(angle: float)
             assert value == pytest.approx(right[pair], abs=1e-9 if right[pair] > 0.0 else 1e-7)
 
 
-def test_what_is_inside_a_mesh_touches_it_and_a_room_is_free_inside() -> None:
+def test_points_inside_a_mesh_touch_it_and_a_hollow_mesh_is_free_inside() -> None:
     state = at_rest()
     block = box_mesh(np.full(3, 100.0), np.zeros(3))
     assert sl.clearance(state, block).distance == 0.0
@@ -52,7 +52,7 @@ def test_what_is_inside_a_mesh_touches_it_and_a_room_is_free_inside() -> None:
     assert found.pair_distance[pairs].min() == pytest.approx(50.0 - np.abs(ends).max(), abs=1e-9)
 
 
-def test_a_mesh_as_platform_is_its_box() -> None:
+def test_a_mesh_as_platform_agrees_with_its_box() -> None:
     state = at_rest()
     ball, rod = sl.Sphere([3.0, 2.0, 2.0], 0.2), sl.Capsule([0, 3, 0], [0, 3, 4], 0.1)
     obstacles: list[Obstacle] = [ball, rod, sl.Box([1, 1, 1], [3, 0, 1])]
@@ -69,7 +69,7 @@ def test_a_mesh_as_platform_is_its_box() -> None:
     assert value == pytest.approx(np.linalg.norm(np.maximum(np.abs(corner - (2.0, 2.0, 0.5)) - 0.1, 0.0)), abs=1e-9)
 
 
-def test_batches_with_meshes_are_their_poses_and_the_least_is_the_same_without_the_rest() -> None:
+def test_batches_with_meshes_agree_with_their_poses() -> None:
     from sagline.interference.clearance import ClearanceRows
 
     robot = sl.load_robot("cogiro")
@@ -84,7 +84,7 @@ def test_batches_with_meshes_are_their_poses_and_the_least_is_the_same_without_t
     assert [rows.pairs.names[k] for k in pair] == list(found.between)
 
 
-def test_meshes_that_are_none_are_refused() -> None:
+def test_invalid_meshes_are_refused() -> None:
     block = box_mesh([1, 1, 1], [0, 0, 0])
     with refused("hall", allowed="a closed surface", kind=sl.InvalidValueError) as caught:
         Mesh(block.vertices, block.faces[1:], "hall")
@@ -99,7 +99,7 @@ def test_meshes_that_are_none_are_refused() -> None:
     assert 'unit="mm"' in caught.value.next_step
 
 
-def test_winding_numbers_tell_inside_from_outside() -> None:
+def test_winding_numbers_distinguish_inside_and_outside() -> None:
     rng = np.random.default_rng(5)
     turn, size = turned(rng), np.array([1.0, 2.0, 0.5])
     block = box_mesh(size, np.array([1.0, 2.0, 3.0]), turn)

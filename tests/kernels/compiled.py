@@ -1,4 +1,4 @@
-"""Inner kernels as Python can call them, compiled by numba, and room for them to work in."""
+"""Inner kernels that Python can call, compiled by numba, and work arrays for them."""
 
 from __future__ import annotations
 
@@ -42,5 +42,5 @@ def from_python(inner: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def memory(numbers: int = 2000, counters: int = 200) -> Memory:
-    """Plenty, filled with what must never be read before it is written."""
+    """Large work arrays with values that must not be read before they are written."""
     return Memory(np.full(numbers, np.nan), np.full(counters, -(10**9), dtype=np.int64))

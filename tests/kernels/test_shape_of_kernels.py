@@ -1,4 +1,4 @@
-"""How many arguments kernels take: a signature between a command and a formula reads like a sentence."""
+"""Numbers of arguments of kernels."""
 
 import ast
 from pathlib import Path
@@ -22,7 +22,7 @@ def inner_kernels() -> dict[str, int]:
     return found
 
 
-def test_no_kernel_takes_more_arguments_than_one_can_read() -> None:
+def test_kernels_have_few_arguments() -> None:
     counts = inner_kernels()
     assert len(counts) > 100
     assert {name: count for name, count in counts.items() if count > MOST} == {}
@@ -33,8 +33,8 @@ def test_no_kernel_takes_more_arguments_than_one_can_read() -> None:
 PULLEY_COLUMNS = {"PULLEY_RADIUS", "ENTRY", "DEAD_CABLE", "DEAD_RISE"}
 
 
-def test_only_the_geometry_and_the_pulley_know_what_a_pulley_is() -> None:
-    """Everything else takes chords, wraps and lengths behind from them."""
+def test_only_geometry_and_pulley_use_pulley_radii() -> None:
+    """All other kernels use chords, wraps and routed lengths."""
     folder = Path(kernels.__file__).parent
     knowing = set()
     for source in folder.rglob("*.py"):

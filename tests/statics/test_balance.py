@@ -1,4 +1,4 @@
-"""Structure matrix, needed wrench and the article's own matrices, against other ways to get them."""
+"""Structure matrix, required wrench and matrices of the article, compared with independent computations."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tests.refusal import refused
 
 @pytest.fixture
 def robot() -> Robot:
-    """Eight cables without any symmetry, the center of mass off the origin."""
+    """Eight cables without symmetry, with the center of mass off the origin."""
     rng = np.random.default_rng(11)
     frame = rng.uniform(-5.0, 5.0, (8, 3)) + np.array([0.0, 0.0, 6.0])
     return Robot(
@@ -57,7 +57,7 @@ def test_structure_matrix_is_minus_the_derivative_of_the_chords(robot: Robot) ->
         np.testing.assert_allclose(structure_matrix(robot, pose)[k], -rate, atol=2e-9)
 
 
-def test_planar_patterns_take_their_rows(robot: Robot) -> None:
+def test_planar_patterns_have_their_rows(robot: Robot) -> None:
     pose = pose_of(2)
     full = structure_matrix(robot, pose)
     planar = robot.replace(motion_pattern="1R2T", plane_normal=(0.0, 1.0, 0.0))
@@ -66,8 +66,8 @@ def test_planar_patterns_take_their_rows(robot: Robot) -> None:
     np.testing.assert_allclose(np.abs(rows), np.abs(full[[0, 2, 4]]), atol=1e-15)
 
 
-def test_the_articles_h_and_b_are_the_same_balance(robot: Robot) -> None:
-    """H t_x + b is the platform's force and moment: written out cable by cable for any tensions."""
+def test_h_and_b_of_the_article_give_the_same_balance(robot: Robot) -> None:
+    """H t_x + b is force and moment on the platform, written out cable by cable for any tensions."""
     pose = pose_of(3)
     h, b = article_balance(robot, pose)
     horizontal = np.random.default_rng(5).uniform(10.0, 100.0, 8)
@@ -80,11 +80,11 @@ def test_the_articles_h_and_b_are_the_same_balance(robot: Robot) -> None:
     total = np.concatenate((force.sum(0), np.cross(lever, force).sum(0)))
     total[2] -= robot.mass * robot.gravity
     np.testing.assert_allclose(h @ horizontal + b, total, rtol=1e-12, atol=1e-10)
-    # and H's columns are those of the structure matrix, divided by cos(phi)
+    # and the columns of H are those of the structure matrix divided by cos(phi)
     np.testing.assert_allclose(h, structure_matrix(robot, pose) / (span / chord), rtol=1e-12, atol=1e-14)
 
 
-def test_a_batch_of_poses_is_each_pose(robot: Robot) -> None:
+def test_a_batch_agrees_with_single_poses(robot: Robot) -> None:
     single = [pose_of(seed) for seed in (1, 2, 3)]
     batch = Pose.from_quaternion([p.position for p in single], [p.quaternion for p in single])
     for k, pose in enumerate(single):
@@ -99,7 +99,7 @@ def test_inertial_wrench_is_minus_the_rate_of_momentum(robot: Robot) -> None:
     start = pose_of(4)
 
     def motion(t: float) -> tuple[Array, Rotation, Array]:
-        """Exact to the order that central differences see."""
+        """Exact to the order of central differences."""
         omega = spin + t * spin_rate
         turn = spin * t + 0.5 * spin_rate * t**2 + np.cross(spin_rate, spin) * t**3 / 12.0
         rotation = Rotation.from_rotvec(turn) * start.rotation
@@ -133,7 +133,7 @@ def test_a_wrench_of_the_wrong_shape_is_named() -> None:
 
 
 @pytest.mark.parametrize("batch", [False, True])
-def test_where_a_cable_has_no_direction_pose_and_cable_are_told(robot: Robot, batch: bool) -> None:
+def test_pose_and_cable_without_a_direction_are_named(robot: Robot, batch: bool) -> None:
     turn = Rotation.from_rotvec([0.1, -0.3, 0.2])
     at_anchor = robot.frame_anchors[5] - turn.as_matrix() @ robot.platform_anchors[5]
     pose = Pose(np.stack((np.zeros(3), at_anchor)), turn) if batch else Pose(at_anchor, turn)
@@ -143,7 +143,7 @@ def test_where_a_cable_has_no_direction_pose_and_cable_are_told(robot: Robot, ba
             matrix(robot, pose)
 
 
-def test_under_an_anchor_the_article_has_no_numbers_and_we_have(robot: Robot) -> None:
+def test_a_vertical_cable_is_finite_unlike_in_the_article(robot: Robot) -> None:
     """Erratum 8, without a warning."""
     above = np.array([0.0, 0.0, 2.0])
     straight = robot.replace(platform_anchors=robot.frame_anchors - above - np.eye(8, 3))

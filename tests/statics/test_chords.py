@@ -1,4 +1,4 @@
-"""Chords that touch pulleys, against the circle itself."""
+"""Chords that touch pulleys, compared with the circle."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def test_chords_touch_their_pulleys(entry: float, seed: int) -> None:
     exits = on_pulleys(touching_angle(robot, pose))
     np.testing.assert_allclose(np.linalg.norm(ends - exits, axis=1), chord, rtol=1e-13)
     np.testing.assert_allclose(np.einsum("ij,ij->i", ends - exits, exits - centers), 0.0, atol=1e-13)
-    # of the two tangents it is the one that goes on as the cable does around the pulley
+    # the tangent that continues in the direction of the cable around the pulley
     forward = on_pulleys(touching_angle(robot, pose) + 1e-3) - exits
     assert (np.einsum("ij,ij->i", forward, ends - exits) > 0.0).all()
 

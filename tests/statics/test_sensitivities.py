@@ -1,4 +1,4 @@
-"""What `stiffness` says of anchors, tensions and lengths, against differences of the forward solution."""
+"""Sensitivities of `stiffness` to anchors, tensions and lengths, compared with differences of forward solutions."""
 
 from collections.abc import Callable
 
@@ -14,14 +14,14 @@ from tests.tiers import wide
 
 
 def step_of(state: sl.Equilibrium) -> float:
-    """Change of anchors and lengths [m] by which no tension changes by more than some percent."""
+    """Change of anchors and lengths [m] for which tensions change by at most a few percent."""
     cables = state.cables
     stiffest = (state.one_robot.cables.axial_stiffness / cables.unstrained_length).max()
     return min(0.03 * float(cables.frame_end_tension.min() / stiffest), 2e-4)
 
 
 def planar() -> sl.Robot:
-    """Four cables around a square platform in an upright plane."""
+    """Four cables around a square platform in a vertical plane."""
     corners = np.array([[1.0, 0.0, 1.0], [-1.0, 0.0, 1.0], [-1.0, 0.0, -1.0], [1.0, 0.0, -1.0]])
     ends = corners[:, [2, 1, 0]]
     return sl.Robot(
@@ -45,7 +45,7 @@ def point() -> sl.Robot:
 
 
 def one_pose(robot: sl.Robot, model: sl.CableModel) -> sl.Equilibrium:
-    """An equilibrium off the middle, under a wrench, tilted where the platform can turn."""
+    """An equilibrium off the middle, with a wrench, tilted if the platform can rotate."""
     if robot.name == "planar":
         pose = sl.Pose((0.4, 0.0, -0.3), Rotation.from_rotvec((0.0, 0.1, 0.0)))
     elif robot.name == "point":
@@ -75,7 +75,7 @@ NAMES = [f"{robot.name}, {type(model).__name__}" for robot, model in CASES]
 
 
 class Moved:
-    """The platform's equilibrium after a change of one datum."""
+    """Equilibrium of the platform after a change of one datum."""
 
     def __init__(self, state: sl.Equilibrium) -> None:
         self.state = state
@@ -167,7 +167,7 @@ def test_cable_stiffness_is_the_slope_of_the_force_on_the_platform_end(model: sl
     agree(sl.stiffness(state).cable_stiffness, np.stack(columns, axis=-1))
 
 
-def test_a_batch_is_its_poses_and_a_pose_without_lengths_is_nan() -> None:
+def test_a_batch_agrees_with_its_poses_and_poses_without_lengths_are_nan() -> None:
     robot = sl.load_robot("article-suspended")
     plan = sl.inverse(robot, sl.Pose([[0.3, 0.2, 1.5], [0, 0, 9.0], [1.0, 0, 2.0]], np.tile(np.eye(3), (3, 1, 1))))
     assert plan.feasible.tolist() == [True, False, True]
@@ -185,11 +185,11 @@ def test_a_batch_is_its_poses_and_a_pose_without_lengths_is_nan() -> None:
         assert np.isnan(values[1]).all()
         assert not np.isnan(values[[0, 2]]).any()
         assert not values.flags.writeable
-        if name != "null_lengths":  # a basis: any other of the same plane serves as well
+        if name != "null_lengths":  # a basis; any other of the same plane is equally valid
             np.testing.assert_allclose(values[2], getattr(alone, name), rtol=1e-9, atol=1e-9 * np.abs(values[2]).max())
 
 
-def test_a_singular_platform_has_no_sensitivities_and_one_without_spare_cables_no_null_lengths() -> None:
+def test_singular_platforms_have_no_sensitivities_and_nonredundant_ones_no_null_lengths() -> None:
     frame = [[3, 3, 3], [-3, 3, 3], [-3, -3, 3], [3, -3, 3]]
     robot = sl.Robot("point", frame, np.zeros((4, 3)), sl.Cable(0.05, 5e4), 10.0, np.eye(3))
     stiff = sl.stiffness(sl.forward(robot, [4.4] * 4).state)

@@ -1,4 +1,4 @@
-"""Stiffness, sensitivities and modes against differences of an independent balance, SciPy and a pendulum."""
+"""Stiffness, sensitivities and modes compared with differences of an independent balance, SciPy and a pendulum."""
 
 import numpy as np
 import pytest
@@ -38,7 +38,7 @@ def test_the_matrix_is_minus_the_slope_of_the_wrench(model: sl.CableModel) -> No
         np.testing.assert_allclose(matrix, np.transpose(columns), rtol=1e-7, atol=1e-7 * np.abs(matrix).max())
 
 
-def test_it_is_symmetric_without_a_given_moment_and_skew_by_half_of_it() -> None:
+def test_stiffness_is_symmetric_except_for_half_of_a_moment() -> None:
     plan = feasible_plan(COGIRO, 2, seed=2)
     free = sl.stiffness(plan.state).matrix
     np.testing.assert_allclose(free, np.swapaxes(free, 1, 2), atol=1e-8)
@@ -85,7 +85,7 @@ def test_sensitivities_are_the_slopes_of_the_forward_solution(model: sl.CableMod
         compare(found.compliance[..., k], by_load)
 
 
-def test_modes_against_scipy() -> None:
+def test_modes_agree_with_scipy() -> None:
     plan = feasible_plan(COGIRO, 3, seed=4)
     modes = sl.modes(plan.state)
     for i in range(3):
@@ -122,7 +122,7 @@ def test_a_pose_without_lengths_has_no_stiffness() -> None:
         assert np.isnan(values[1]).all()
 
 
-def test_a_platform_hung_from_one_point_has_no_compliance() -> None:
+def test_a_platform_suspended_at_one_point_has_no_compliance() -> None:
     frame = [[3, 3, 3], [-3, 3, 3], [-3, -3, 3], [3, -3, 3]]
     robot = sl.Robot("point", frame, np.zeros((4, 3)), sl.Cable(0.05, 5e4), 10.0, np.eye(3))
     found = sl.forward(robot, [4.4] * 4)

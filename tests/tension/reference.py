@@ -1,4 +1,4 @@
-"""The balance and its sharing written out in NumPy and handed to other programs: the tests' independent reference."""
+"""Balance and tension distribution in NumPy and other programs, the independent reference of the tests."""
 
 from functools import cache
 from typing import Any, NamedTuple
@@ -17,7 +17,7 @@ BORDER_ROBOTS = ["article-suspended", "article-mixed", "expo2015-lucia", "ipanem
 
 
 def random_poses(robot: Robot, count: int, rng: np.random.Generator, stretch: float = 1.0) -> Pose:
-    """Poses in the robot's test box, stretched about its center; tilted about any axis."""
+    """Poses in the test box of the robot, enlarged about its center and tilted about any axis."""
     box = robot.test_box
     assert box is not None
     middle, half = (box.high + box.low) / 2, (box.high - box.low) / 2 * stretch
@@ -42,14 +42,14 @@ def presets() -> tuple[Robot, ...]:
 
 
 def ropes(robot: Robot, ends: np.ndarray) -> np.ndarray:
-    """From platform ends (..., m, 3) to where straight cables touch their pulleys, or to the frame anchors."""
+    """Vectors from platform ends (..., m, 3) to the points of tangency of straight cables, or to the frame anchors."""
     anchors = robot.frame_anchors
     if robot.winches is not None:
         radius, entry = robot.winches.pulley_radius, robot.winches.swivel_axis[:, 2]
         span = np.hypot(*np.moveaxis(ends - anchors, -1, 0)[:2])
         outward = (ends - anchors) * [1.0, 1.0, 0.0] / span[..., None]
-        across, drop = span - radius, -entry * (ends - anchors)[..., 2]  # from the middle of the pulley
-        # how far past its top (its bottom, for a cable from above) the cable goes before it leaves
+        across, drop = span - radius, -entry * (ends - anchors)[..., 2]  # from the center of the pulley
+        # angle of the exit beyond the top of the pulley (beyond its bottom, for a cable from above)
         past = np.arctan2(drop, across) + np.arcsin(radius / np.hypot(across, drop))
         up = np.array([0.0, 0.0, 1.0]) * entry[:, None]
         anchors = anchors + radius[:, None] * ((1.0 + np.sin(past))[..., None] * outward + np.cos(past)[..., None] * up)
@@ -57,7 +57,7 @@ def ropes(robot: Robot, ends: np.ndarray) -> np.ndarray:
 
 
 def clear_of_pulleys(robot: Robot, poses: Pose) -> np.ndarray:
-    """Which poses (N,) keep all platform ends away from the swivel axes by more than twice the radius."""
+    """Poses (N,) with all platform ends farther from the swivel axes than twice the radius."""
     radius = np.zeros(robot.cable_count) if robot.winches is None else robot.winches.pulley_radius
     ends = poses.position[:, None] + robot.platform_anchors @ np.swapaxes(poses.rotation.as_matrix(), 1, 2)
     span = np.hypot(*np.moveaxis(ends - robot.frame_anchors, -1, 0)[:2])
@@ -84,12 +84,12 @@ def structures(robot: Robot, poses: Pose) -> np.ndarray:
 
 
 def needed(robot: Robot, wrench: np.ndarray) -> np.ndarray:
-    """What weightless cables must supply (6,)."""
+    """Required wrench of weightless cables (6,)."""
     return np.asarray(np.array([0, 0, robot.mass * robot.gravity, 0, 0, 0]) - wrench)
 
 
 def unbalanced(plan: Plan) -> np.ndarray:
-    """Force and moment left over at every pose (N, 6), from the cables' forces and anchors alone."""
+    """Residual force and moment at each pose (N, 6), from the forces and anchors of the cables only."""
     robot, state = plan.state.one_robot, plan.state.cables
     pose = plan.state.pose
     turn = pose.rotation.as_matrix().reshape(-1, 3, 3)
@@ -105,7 +105,7 @@ def unbalanced(plan: Plan) -> np.ndarray:
 
 
 def is_feasible(matrix: np.ndarray, right: np.ndarray, low: np.ndarray, high: np.ndarray) -> bool:
-    """The verdict of a linear program."""
+    """Verdict of a linear program."""
     bounds = np.column_stack((low, np.where(np.isfinite(high), high, np.inf)))
     scale = np.abs(right).max()
     found = linprog(
@@ -123,7 +123,7 @@ def is_feasible(matrix: np.ndarray, right: np.ndarray, low: np.ndarray, high: np
 def nearest(
     matrix: np.ndarray, right: np.ndarray, low: np.ndarray, high: np.ndarray, target: np.ndarray, weights: np.ndarray
 ) -> np.ndarray:
-    """Tensions of least weighted distance to a target, by DAQP."""
+    """Tensions with the least weighted distance to a target, by DAQP."""
     rows = matrix / np.linalg.norm(matrix, axis=1, keepdims=True)
     sides = right / np.linalg.norm(matrix, axis=1)
     upper = np.concatenate((np.minimum(high, 1e30), sides))
@@ -137,7 +137,7 @@ def nearest(
 
 
 def planar(**changes: Any) -> Robot:
-    """Four cables to one point of a level plane, across which no weight acts; limits 3.8 to 25 N."""
+    """Four cables to one point of a level plane, without weight across it; limits 3.8 to 25 N."""
     side = 0.315
     fields: dict[str, Any] = {
         "name": "planar",
@@ -154,7 +154,7 @@ def planar(**changes: Any) -> Robot:
 
 
 class Border(NamedTuple):
-    """Feasible poses and directions of load (N, 6), and the largest load along each that is found feasible (N,)."""
+    """Feasible poses and directions of load (N, 6), and the largest load along each that is feasible (N,)."""
 
     robot: Robot
     poses: Pose
@@ -163,7 +163,7 @@ class Border(NamedTuple):
 
 
 def found_border(name: str, count: int, seed: int) -> Border:
-    """Grow the load from none, along a force of 1 N and some moment, until it is no longer feasible; then halve."""
+    """Increase the load from zero, along a force of 1 N with some moment, until it is infeasible; then bisect."""
     robot = load_robot(name)
     rng = np.random.default_rng(seed)
     poses = random_poses(robot, 20 * count, rng)
@@ -182,5 +182,5 @@ def found_border(name: str, count: int, seed: int) -> Border:
 
 
 def can_hold(robot: Robot, poses: Pose, wrench: Array) -> np.ndarray:
-    """At which poses the platform can be held with sag under a load (N, 6), by the verdict itself."""
+    """Feasibility of poses with sag under a load (N, 6), by the verdict itself."""
     return inverse(robot, poses, tension=MinimumNorm(), wrench=wrench).feasible

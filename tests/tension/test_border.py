@@ -1,4 +1,4 @@
-"""The load at which the verdict turns, against a nonlinear program in the tensions, and confirmed by forward."""
+"""Largest loads by verdicts compared with a nonlinear program in the tensions, and confirmed by forward."""
 
 import numpy as np
 import pytest
@@ -62,15 +62,15 @@ def check_border(name: str, count: int, seed: int) -> None:
     tau = plan.chord_tension
     assert (tau >= robot.tension_min * (1 - 1e-12)).all()
     assert (tau <= robot.tension_max * (1 + 1e-12)).all()
-    # forward, from these lengths under this load, comes back: what was called feasible is held
+    # forward with these lengths and this load gives the pose: feasible loads are held
     back = forward(robot, plan.unstrained_length, border.poses, wrench=wrench)
     assert np.abs(back.pose.position - border.poses.position).max() < 1e-6 * np.ptp(robot.frame_anchors)
     still = inverse(robot, border.poses, tension=MinimumNorm())
     for i in range(count):
         starts = [np.append(tau[i], loads[i]), np.append(still.chord_tension[i], 0.0)]
         best = max(largest_load(border, i, start) for start in starts)
-        assert best <= loads[i] + PRECISION * weight  # nothing feasible was refused
-    # and what is a millionth of the weight beyond is refused, or said to be at the border: never called feasible
+        assert best <= loads[i] + PRECISION * weight  # no feasible load is refused
+    # a load beyond by a millionth of the weight is refused or at the boundary, never feasible
     beyond = inverse(
         robot, border.poses, tension=MinimumNorm(), wrench=border.ways * (loads + PRECISION * weight)[:, None]
     )
@@ -80,11 +80,11 @@ def check_border(name: str, count: int, seed: int) -> None:
 
 
 @pytest.mark.parametrize("name", wide(BORDER_ROBOTS))
-def test_the_verdict_turns_where_a_nonlinear_program_says(name: str) -> None:
+def test_the_largest_load_agrees_with_a_nonlinear_program(name: str) -> None:
     check_border(name, 12, 41)
 
 
 @pytest.mark.soak
 @pytest.mark.parametrize("name", BORDER_ROBOTS)
-def test_two_hundred_verdicts_turn_where_a_nonlinear_program_says(name: str) -> None:
+def test_two_hundred_largest_loads_agree_with_a_nonlinear_program(name: str) -> None:
     check_border(name, 200, 42)

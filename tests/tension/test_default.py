@@ -1,4 +1,4 @@
-"""One default tension distribution method for all functions and commands; the README gives the numbers of both."""
+"""One default tension distribution method for all functions and commands; README gives the numbers of both."""
 
 from inspect import signature
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""How far tensions are from their limits, by hand."""
+"""Distances of tensions from their limits, by hand."""
 
 from dataclasses import replace
 
@@ -30,7 +30,7 @@ def test_the_distance_to_the_nearer_limit_of_the_tension_that_is_limited(limits_
         for i in range(8):
             horizontal, vertical = float(plan.horizontal_tension[k, i]), float(plan.vertical_force[k, i])
             weight = float(robot.cables.linear_density[i]) * 9.81 * float(plan.unstrained_length[k, i])
-            winch = np.hypot(horizontal, vertical - weight)  # the cable's weight hangs between its two ends
+            winch = np.hypot(horizontal, vertical - weight)  # half of the cable's weight acts at each end
             tension = winch if limits_of == "frame_end" else float(plan.chord_tension[k, i])
             gaps.append(min(tension - 100.0, 2500.0 - tension))
         expected[k] = min(gaps)
@@ -39,7 +39,7 @@ def test_the_distance_to_the_nearer_limit_of_the_tension_that_is_limited(limits_
     np.testing.assert_allclose(limit_margin(plan.state), expected, rtol=1e-9, atol=1e-8)
 
 
-def test_both_limits_count() -> None:
+def test_both_limits_are_considered() -> None:
     plan = inverse(COGIRO, box_poses(COGIRO, 1, seed=3)[0])
     tension = plan.chord_tension
     near_top = COGIRO.replace(tension_min=0.0, tension_max=float(tension.max()) + 3.0)

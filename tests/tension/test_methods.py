@@ -1,4 +1,4 @@
-"""Every way of sharing, on linear (weightless) balances, against independent programs and brute force."""
+"""All tension distribution methods on linear (weightless) balances, compared with other programs and brute force."""
 
 import pickle
 from typing import Any
@@ -53,7 +53,7 @@ ALL = (*ANY_NUMBER, Centroid(), *CLOSED, *WALKS)
 
 
 def many_cables(cables: int, seed: int) -> Robot:
-    """The article's mixed robot with more cables from its walls."""
+    """The mixed robot of the article with additional cables from its walls."""
     mixed, rng = load_robot("article-mixed"), np.random.default_rng(seed)
     more = rng.uniform(-1, 1, (cables - 8, 3)) * [7.5, 5.5, 3.0] + [0, 0, 3]
     side = rng.integers(0, 2, cables - 8)
@@ -72,11 +72,11 @@ MANY = [(many_cables(m, seed), m) for m, seed in ((9, 1), (10, 2), (12, 3), (16,
 
 
 CASES = [(name, method) for name in ("article-mixed", "cogiro") for method in ALL]
-CASES += [(name, method) for name in ("falcon-7", "fast") for method in ALL if method not in WALKS]  # n + 2 cables only
+CASES += [(name, method) for name in ("falcon-7", "fast") for method in ALL if method not in WALKS]  # only n + 2 cables
 
 
 @pytest.mark.parametrize(("name", "method"), CASES)
-def test_balance_and_limits(name: str, method: TensionMethod) -> None:
+def test_balance_and_limits_hold(name: str, method: TensionMethod) -> None:
     robot, rng = load_robot(name), np.random.default_rng(1)
     poses = random_poses(robot, 300, rng, stretch=1.2)
     plan, least = inverse(robot, poses, tension=method), inverse(robot, poses, tension=MinimumNorm())
@@ -147,12 +147,12 @@ def _barrier_slope(robot: Robot, tensions: np.ndarray) -> np.ndarray:
 
 
 def _check_stationary(robot: Robot, matrix: np.ndarray, tensions: np.ndarray, slope: np.ndarray) -> None:
-    """No motion in the null space lowers the objective."""
+    """No motion in the null space decreases the objective."""
     assert np.abs(_null(matrix) @ slope).max() < 1e-7 * np.abs(slope).max()
 
 
 def _check_p_norm(robot: Robot, matrix: np.ndarray, tensions: np.ndarray, p: float) -> None:
-    """Karush-Kuhn-Tucker: the slope is J^T y plus what cables at their limits hold against."""
+    """Karush-Kuhn-Tucker: the slope is J^T y plus multipliers of cables at their limits."""
     slope = (tensions / tensions.max()) ** (p - 1)
     at_low = tensions <= robot.tension_min + 1e-7
     at_high = tensions >= robot.tension_max - 1e-7
@@ -197,7 +197,7 @@ def test_lowest_maximum_breaks_ties_by_norm() -> None:
 
 
 @pytest.mark.parametrize("name", ["article-mixed", "article-suspended", "cogiro", "ipanema-1"])
-def test_walk_and_cut_give_the_same(name: str) -> None:
+def test_polygon_walk_and_cut_agree(name: str) -> None:
     robot = load_robot(name)
     poses = random_poses(robot, 500, np.random.default_rng(10), stretch=1.2)
     same = (LowestSum(), MinimumNorm(), Centroid())
@@ -222,7 +222,7 @@ def test_centroid_by_sampling() -> None:
     assert (np.abs(points[inside].mean(axis=0) - found) < 3 * spread).all()
 
 
-def test_closed_forms_written_out() -> None:
+def test_closed_forms_by_definition() -> None:
     robot = load_robot("article-mixed")
     poses = random_poses(robot, 200, np.random.default_rng(12))
     plans = [inverse(robot, poses, model=Elastic(), tension=method) for method in CLOSED]
@@ -241,7 +241,7 @@ def test_closed_forms_written_out() -> None:
             continue
         held += int(np.abs(improved - simple).max() > 1.0)
         np.testing.assert_allclose(plans[1].chord_tension[i], improved, rtol=1e-8)
-        least = np.linalg.pinv(matrix) @ right  # the puncture lies on the way from here to there
+        least = np.linalg.pinv(matrix) @ right  # the puncture is on the line between the two
         way, there = improved - least, plans[2].chord_tension[i] - least
         share = way @ there / (way @ way)
         np.testing.assert_allclose(there, share * way, atol=1e-7)
@@ -251,7 +251,7 @@ def test_closed_forms_written_out() -> None:
 
 
 def _improved(matrix: np.ndarray, right: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray | None:
-    """Pott's algorithm, as he states it: hold the worst cable, take it out of the problem, solve again."""
+    """Algorithm of Pott: fix the worst cable at its limit, remove it from the problem, solve again."""
     free, tensions = np.ones(len(low), dtype=bool), np.zeros(len(low))
     for _ in range(matrix.shape[1] - matrix.shape[0] + 1):
         middle = ((low + high) / 2)[free]
@@ -270,8 +270,8 @@ def _improved(matrix: np.ndarray, right: np.ndarray, low: np.ndarray, high: np.n
 
 
 @pytest.mark.parametrize("method", [MinimumNorm("frame_end"), PNorm("frame_end", p=4.0), LowestMaximum("frame_end")])
-def test_frame_end_tensions_are_what_is_least(method: TensionMethod) -> None:
-    # SLSQP, on the exact cables: no other tensions of the pose have a smaller objective at the frame end
+def test_the_objective_of_frame_end_tensions_is_minimal(method: TensionMethod) -> None:
+    # SLSQP with exact cables: no other tensions of the pose have a smaller objective at the frame end
     robot = load_robot("cogiro").replace(tension_limits_of="frame_end")
     exponent = {MinimumNorm: 2.0, PNorm: 4.0, LowestMaximum: np.inf}[type(method)]
     for pose in random_poses(robot, 3, np.random.default_rng(13)):
@@ -310,7 +310,7 @@ def test_broken_cable() -> None:
         without_cables(robot, 8)
 
 
-def test_what_is_left_when_cables_break_keeps_its_own_material_and_limits() -> None:
+def test_remaining_cables_keep_their_material_and_limits() -> None:
     whole = load_robot("article-mixed").replace(
         cables=Cable(0.01 * np.arange(1, 9), 1e4 * np.arange(1, 9)),
         tension_min=np.arange(8.0),
@@ -365,14 +365,14 @@ def test_p_norm_between_norm_and_maximum() -> None:
     assert all((plan.feasible == found).all() for plan in plans)
     norms = [2, 4, 8, 16, 32]
     sizes = np.array([[np.linalg.norm(plan.chord_tension[found], q, axis=1) for plan in plans] for q in norms])
-    for k in range(len(norms)):  # in its own norm no other is smaller, up to what the pulls differ
+    for k in range(len(norms)):  # in its own norm no other is smaller, up to differences of sag forces
         assert (sizes[k, k] <= sizes[k].min(axis=0) * (1 + 1e-5)).all()
     least = inverse(robot, poses, tension=LowestMaximum()).chord_tension[found].max(axis=1)
     top = plans[-1].chord_tension[found].max(axis=1)
     assert (top >= least * (1 - 1e-5)).all()
     assert (
         top <= 8 ** (1 / 32) * least * (1 + 1e-5)
-    ).all()  # a p-norm of m numbers is at most m^(1/p) of their largest
+    ).all()  # a p-norm of m numbers is at most m^(1/p) times their maximum
 
 
 def test_slsqp_agrees_with_p_norm() -> None:
@@ -396,8 +396,8 @@ def test_slsqp_agrees_with_p_norm() -> None:
 
 
 @pytest.mark.parametrize("method", METHODS.values())
-def test_a_limit_at_infinity_is_no_feasible_pose(method: type[TensionMethod]) -> None:
-    """The article's (54) asks a level cable for an infinite tension: whatever the way of sharing, that is a verdict."""
+def test_an_infinite_lower_limit_is_infeasible(method: type[TensionMethod]) -> None:
+    """(54) of the article requires an infinite tension of a level cable: a verdict for every method."""
     robot = load_robot("article-suspended").replace(tension_max=1e9)
     anchor, end = robot.frame_anchors[0], robot.platform_anchors[0]
     level = Pose.from_euler([0.0, 0.0, float(anchor[2] - end[2])], 0.0, 0.0, 0.0)
@@ -406,13 +406,13 @@ def test_a_limit_at_infinity_is_no_feasible_pose(method: type[TensionMethod]) ->
 
 
 def point_mass() -> Robot:
-    """Four cables that hang a point mass; the first one hangs plumb where x and y are 0."""
+    """Four cables suspend a point mass; the first one is vertical at x = y = 0."""
     frame = [(0.0, 0.0, 6.0), (4.0, 0.0, 6.0), (-2.0, 3.5, 6.0), (-2.0, -3.5, 6.0)]
     return Robot("point", frame, np.zeros((4, 3)), Cable(np.full(4, 1.0), np.full(4, 1e6)), 50.0, motion_pattern="3T")
 
 
-def test_a_plumb_cable_keeps_the_bound_of_its_neighborhood() -> None:
-    """(54) without a margin: tau > wD/(2 |sin phi|) holds for a plumb cable as for one a nanometer beside it."""
+def test_a_vertical_cable_has_the_bound_of_its_neighborhood() -> None:
+    """(54) without a margin: tau > wD/(2 |sin phi|) holds for a vertical cable as for one beside it."""
     method = MinimumNorm(lowest_point_margin=0.0)
     plumb, beside = (
         inverse(point_mass(), Pose.from_euler([x, 0.0, 2.0], 0.0, 0.0, 0.0), tension=method) for x in (0.0, 1e-9)
@@ -431,7 +431,7 @@ def test_weightless_cables_without_tension_have_a_frame_end_tension() -> None:
     np.testing.assert_array_equal(end.chord_tension, chord.chord_tension)
 
 
-def test_a_batch_of_no_poses_is_answered_by_none() -> None:
+def test_an_empty_batch_has_an_empty_result() -> None:
     plan = inverse(point_mass(), Pose.from_euler(np.zeros((0, 3)), 0.0, 0.0, 0.0))
     assert plan.unstrained_length.shape == (0, 4)
     assert plan.feasible.shape == (0,)
@@ -447,7 +447,7 @@ def test_a_batch_of_no_poses_is_answered_by_none() -> None:
         (["cogiro"], "robot[0]", "'cogiro'"),
     ],
 )
-def test_what_is_no_robot_is_named(robot: Any, item: str, value: str) -> None:
+def test_other_objects_than_robots_are_named(robot: Any, item: str, value: str) -> None:
     allowed = "a Robot, or several in a list" if item == "robot" else "a Robot"
     with refused(item, value, allowed, kind=InvalidValueError):
         inverse(robot, Pose.from_euler([0.0, 0.0, 2.0], 0.0, 0.0, 0.0))

@@ -19,28 +19,28 @@ from tests.refusal import refused
 from tests.tension.reference import planar
 
 
-def spinning(axis_z: tuple[float, float]) -> Robot:
-    """All cables meet one vertical axis of the platform: none resists turning about it."""
+def rotating_about_an_axis(axis_z: tuple[float, float]) -> Robot:
+    """All cables meet one vertical axis of the platform: no cable resists a rotation about it."""
     corners = np.array([[3.0, 3, 3], [-3, 3, 3], [-3, -3, 3], [3, -3, 3]])
     frame = np.concatenate((corners, corners * [1, 1, -1]))
     ends = np.repeat([[0.1, 0, axis_z[0]], [0.1, 0, axis_z[1]]], 4, axis=0)
     return Robot("spinning", frame, ends, Cable(0.01, 1e5), 5.0, np.eye(3), tension_min=1.0, tension_max=1e3)
 
 
-def test_rotation_no_cable_resists() -> None:
-    robot, pose = spinning((0.2, -0.2)), Pose([0.3, 0.0, 0.0], np.eye(3))
+def test_an_unconstrained_rotation() -> None:
+    robot, pose = rotating_about_an_axis((0.2, -0.2)), Pose([0.3, 0.0, 0.0], np.eye(3))
     assert inverse(robot, pose).status == PoseStatus.SINGULAR
     motion = unresisted_motion(robot, pose)
     assert motion.resistance < 1e-15
     np.testing.assert_allclose(np.abs(motion.twist[3:]), [0, 0, 1], atol=1e-12)
-    # the axis runs through (0.4, 0), the center of mass (0.3, 0) turns about it
+    # the axis is at (0.4, 0), the center of mass (0.3, 0) moves around it
     np.testing.assert_allclose(motion.twist[:3], np.cross(motion.twist[3:], [-0.1, 0, 0]), atol=1e-12)
     assert re.match(r"rotation\b.* \(0, 0, -?1\)", motion.text)
     assert "(0.4, 0, 0) m" in motion.text
 
 
-def test_translation_no_cable_resists() -> None:
-    # cables in a line cannot hold a point across it
+def test_an_unconstrained_translation() -> None:
+    # cables on a line cannot support a point across it
     robot = planar(frame_anchors=[[-1, 0, 0], [1, 0, 0], [2, 0, 0], [-2, 0, 0]])
     pose = Pose(np.zeros(3), np.eye(3))
     assert inverse(robot, pose).status == PoseStatus.SINGULAR
@@ -49,8 +49,8 @@ def test_translation_no_cable_resists() -> None:
     assert motion.text in ("translation along (0, 1, 0)", "translation along (0, -1, 0)")
 
 
-def test_the_resistance_is_a_number_without_unit() -> None:
-    """A robot ten times as large resists as well: turning is counted by the platform's own lever."""
+def test_the_resistance_has_no_unit() -> None:
+    """A robot ten times as large resists equally: rotations are scaled with the lever arm of the platform."""
     robot = load_robot("cogiro")
     large = robot.replace(
         frame_anchors=10.0 * robot.frame_anchors,
@@ -61,7 +61,7 @@ def test_the_resistance_is_a_number_without_unit() -> None:
     motion = unresisted_motion(robot, turned)
     same = unresisted_motion(large, Pose.from_quaternion(10.0 * turned.position, turned.quaternion))
     assert same.resistance == pytest.approx(motion.resistance, rel=1e-9)
-    # speeds of the cables, where the platform turns at one lever a second or moves by one meter a second
+    # speeds of the cables for a rotation of one lever arm per second or a translation of one meter per second
     lever = np.linalg.norm(robot.platform_anchors - robot.center_of_mass, axis=1).max()
     weights = np.array([1.0, 1.0, 1.0, lever, lever, lever])
     speeds = structure_matrix(robot, turned).T / weights
@@ -78,7 +78,7 @@ def test_one_pose_at_a_time() -> None:
         unresisted_motion(planar(), Pose(np.zeros((2, 3)), np.broadcast_to(np.eye(3), (2, 3, 3))))
 
 
-def test_many_cables_are_no_matrix_of_cables_squared() -> None:
+def test_many_cables_need_no_square_matrix() -> None:
     generator = np.random.default_rng(4)
     ends = generator.uniform(-1.0, 1.0, (20_000, 3))
     robot = Robot("many", 5.0 * generator.uniform(-1.0, 1.0, ends.shape), ends, Cable(0.1, 1e5), 10.0, np.eye(3))
@@ -87,7 +87,7 @@ def test_many_cables_are_no_matrix_of_cables_squared() -> None:
     motion = unresisted_motion(robot, pose)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert peak < 100e6  # the square takes 3 GB
+    assert peak < 100e6  # the square matrix takes 3 GB
     structure = structure_matrix(robot, pose)
     lever = np.linalg.norm(ends, axis=1).max()
     scaled = structure / np.repeat([1.0, lever], 3)[:, None]

@@ -1,4 +1,4 @@
-"""Every verdict is proved by its own point or its own Farkas vector, in plain arithmetic; a linear program agrees."""
+"""Every verdict is proved by its point or its Farkas vector in plain arithmetic, and agrees with a linear program."""
 
 from typing import Any, NamedTuple
 
@@ -30,7 +30,7 @@ from tests.tiers import extended, wide
 
 FIRST = ("article-suspended", "article-mixed", "cogiro", "falcon-7", "fast", "expo2015-lucia-pulleys")
 NAMES = (*FIRST, *(name for name in robot_names() if name not in FIRST))
-MARGIN = 1e-9  # of the upper limit: what the verdict may be wrong by
+MARGIN = 1e-9  # of the upper limit: the tolerance of a verdict
 
 
 class Sample(NamedTuple):
@@ -40,7 +40,7 @@ class Sample(NamedTuple):
 
 
 def sampled(robot: Robot, count: int, rng: np.random.Generator, model: CableModel) -> Sample:
-    """Random poses in and around the test box, under random wrenches."""
+    """Random poses in and around the test box with random wrenches."""
     poses = random_poses(robot, count, rng, stretch=1.5)
     poses = poses[clear_of_pulleys(robot, poses)]
     count = len(poses)
@@ -51,7 +51,7 @@ def sampled(robot: Robot, count: int, rng: np.random.Generator, model: CableMode
 
 
 def pulls_on_a_grid(sample: Sample, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Tensions between each cable's limits, and the pulls of its exact curve there (points, K, m)."""
+    """Tensions between the limits of each cable, and its exact sag forces there (points, K, m)."""
     robot, cables = sample.robot, sample.plan.state.cables
     tensions = np.geomspace(robot.tension_min, robot.tension_max, 400)[:, None, :]
     span, rise = cables.span[which], cables.rise[which]
@@ -61,7 +61,7 @@ def pulls_on_a_grid(sample: Sample, which: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 def largest_gap(sample: Sample, which: np.ndarray) -> np.ndarray:
-    """y . demand less the most that the cables' curves give along y (K,): above zero it proves infeasibility."""
+    """y . demand minus the largest contribution of the cables along y (K,): a positive value proves infeasibility."""
     assert sample.plan.farkas is not None
     robot, y, matrices = sample.robot, sample.plan.farkas[which], sample.matrices[which]
     tau, pull = pulls_on_a_grid(sample, which)
@@ -76,7 +76,7 @@ def largest_gap(sample: Sample, which: np.ndarray) -> np.ndarray:
 
 
 def unproved(sample: Sample) -> np.ndarray:
-    """Poses whose verdict is not proved, to within the margin, by their own tensions or their own direction."""
+    """Poses whose verdict is not proved, within the margin, by their tensions or their direction."""
     robot, plan = sample.robot, sample.plan
     assert plan.needed is not None
     assert plan.farkas is not None
@@ -92,7 +92,7 @@ def unproved(sample: Sample) -> np.ndarray:
 
 
 def disagreeing(sample: Sample) -> list[int]:
-    """Poses where a linear program says otherwise, and still does with limits moved by the margin."""
+    """Poses with another verdict of a linear program, also with limits changed by the margin."""
     robot, plan = sample.robot, sample.plan
     assert plan.needed is not None
     lost = []
@@ -121,7 +121,7 @@ def check_with_sag(name: str, count: int, seed: int) -> None:
     assert plan.bracket is not None
     statuses = set(np.unique(plan.status))
     assert statuses <= {PoseStatus.SOLVED, PoseStatus.INFEASIBLE, PoseStatus.TOO_SLACK, PoseStatus.BORDERLINE}
-    # where one direction proves nothing the load is next to the border: a hundredth of the weight would do, or a moment
+    # if no single direction is a proof, the load is near the boundary: within a hundredth of the weight, or a moment
     lost = unproved(sample)
     assert len(lost) <= 0.01 * count
     for i in lost:
@@ -151,7 +151,7 @@ def test_a_million_verdicts(name: str) -> None:
         assert not disagreeing(sample)
 
 
-def test_wider_limits_of_blocking_cables_lessen_the_shortfall() -> None:
+def test_wider_limits_of_blocking_cables_reduce_the_shortfall() -> None:
     for robot in presets():
         sample = sampled(robot, 200, np.random.default_rng(23), Elastic())
         plan = sample.plan
@@ -168,7 +168,7 @@ def test_wider_limits_of_blocking_cables_lessen_the_shortfall() -> None:
                     high[cable] += wider
                 else:
                     low[cable] -= wider
-                # the proof's direction says by how much: a newton of limit is worth its component along it
+                # the direction of the proof gives the effect: a newton of limit changes the shortfall by its component
                 least = least_change(sample.matrices[i], needed_by(sample, i), low, high)
                 gained = plan.shortfall[i] - least
                 expected = wider * abs(along[cable]) if plan.blocking[i, cable] else 0.0
@@ -181,7 +181,7 @@ def needed_by(sample: Sample, i: Any) -> np.ndarray:
 
 
 def least_change(matrix: np.ndarray, right: np.ndarray, low: np.ndarray, high: np.ndarray) -> float:
-    """The least force that makes the demand feasible: a quadratic program, by DAQP; infinite where none does.
+    """Least force that makes the demand feasible: a quadratic program by DAQP; infinite if no force does.
 
     In the force alone it is strictly convex; the tensions get a weight of 1e-12, by which the force is off by less
     than 1e-9 of them.
@@ -218,7 +218,7 @@ def test_shortfall_is_that_of_a_quadratic_program() -> None:
 
 
 def check_brackets(count: int, seed: int) -> int:
-    """The proof's gap, worked out anew, comes up to the shortfall: nothing less would do. How many it was done for."""
+    """The gap of the proof, computed again, reaches the shortfall: no smaller force is sufficient. Count them."""
     checked = 0
     for robot in presets():
         sample = sampled(robot, count, np.random.default_rng(seed), Elastic())
@@ -234,17 +234,17 @@ def check_brackets(count: int, seed: int) -> int:
     return checked
 
 
-def test_nothing_less_than_the_shortfall_would_do() -> None:
+def test_no_force_below_the_shortfall_is_sufficient() -> None:
     assert check_brackets(150, 29) > 500
 
 
 @pytest.mark.soak
-def test_nothing_less_than_ten_thousand_shortfalls_would_do() -> None:
+def test_no_force_below_ten_thousand_shortfalls_is_sufficient() -> None:
     assert check_brackets(2500, 30) > 10000
 
 
-def test_the_bracket_holds_the_shortfall_with_sag() -> None:
-    # the force that suffices is shown by forward tensions; the proof's gap is a bound from below on the exact curves
+def test_the_bracket_contains_the_shortfall_with_sag() -> None:
+    # forward tensions show that the force is sufficient; the gap of the proof is a lower bound with exact curves
     for robot in presets():
         sample = sampled(robot, 150, np.random.default_rng(32), Catenary())
         plan = sample.plan
@@ -259,7 +259,7 @@ def test_the_bracket_holds_the_shortfall_with_sag() -> None:
 
 
 def least_force(sample: Sample, i: int, starts: list[np.ndarray]) -> float:
-    """The least force with which some tensions balance the exact cables, by sequential quadratic programs."""
+    """Least force for which some tensions balance the exact cables, by sequential quadratic programs."""
     robot, pose = sample.robot, sample.plan.state.pose[i]
     m, weight = robot.cable_count, robot.mass * robot.gravity
     matrix = robot.freedom @ sample.matrices[i]
@@ -299,7 +299,7 @@ def least_force(sample: Sample, i: int, starts: list[np.ndarray]) -> float:
 
 
 def check_forces(name: str, count: int, most: int, seed: int) -> None:
-    """Nowhere does a nonlinear program find less than the shortfall; and adding the relief makes the pose feasible."""
+    """No nonlinear program finds less than the shortfall, and adding the relief makes the pose feasible."""
     rng = np.random.default_rng(seed)
     sample = sampled(load_robot(name), count, rng, Catenary())
     robot, plan = sample.robot, sample.plan
@@ -310,7 +310,7 @@ def check_forces(name: str, count: int, most: int, seed: int) -> None:
     wrench = plan.state.wrench[known].copy()
     wrench[:, :3] += plan.relief[known]
     relieved = inverse(robot, plan.state.pose[known], tension=MinimumNorm(), wrench=wrench)
-    assert (relieved.feasible | (relieved.shortfall < 1e-6 * weight)).all()  # it brings the load to the border itself
+    assert (relieved.feasible | (relieved.shortfall < 1e-6 * weight)).all()  # it brings the load to the boundary
     middle = np.sqrt(robot.tension_min * robot.tension_max)
     found = 0
     for i in known[:most]:
@@ -318,7 +318,7 @@ def check_forces(name: str, count: int, most: int, seed: int) -> None:
         least = least_force(sample, int(i), starts)
         assert least >= plan.shortfall[i] * (1 - 1e-6) - 1e-8 * weight
         found += least <= plan.shortfall[i] * (1 + 1e-3) + 1e-6 * weight
-    assert found >= 0.3 * len(known[:most])  # nor does it find nothing: from some start it often comes as near
+    assert found >= 0.3 * len(known[:most])  # and it finds a solution: from some start it is often as close
 
 
 SAGGING = ["article-suspended", "article-prototype", "article-mixed", "cogiro", "fast"]
@@ -348,7 +348,7 @@ def test_without_lower_limits_or_gravity_verdicts_are_decided() -> None:
                 assert set(plan.status) <= {PoseStatus.SOLVED, PoseStatus.INFEASIBLE, PoseStatus.TOO_SLACK}
 
 
-def test_limits_below_a_tenth_of_a_cables_weight_are_kept() -> None:
+def test_limits_below_a_tenth_of_the_weight_of_a_cable_are_satisfied() -> None:
     rng = np.random.default_rng(54)
     robot = load_robot("article-suspended").replace(cables=Cable(8.0, 1e6), tension_min=5.0, tension_max=60.0)
     poses = random_poses(robot, 300, rng)
@@ -358,7 +358,7 @@ def test_limits_below_a_tenth_of_a_cables_weight_are_kept() -> None:
     assert (plan.status == PoseStatus.INFEASIBLE).any()
 
 
-def test_poses_far_outside_are_decided_as_soon() -> None:
+def test_distant_poses_are_decided_equally_fast() -> None:
     robot = load_robot("cogiro")
     for height in (50.0, 200.0, 1000.0):
         plan = inverse(robot, Pose([0.0, 0.0, height], np.eye(3)), tension=MinimumNorm())
@@ -368,7 +368,7 @@ def test_poses_far_outside_are_decided_as_soon() -> None:
 
 
 @pytest.mark.parametrize("name", wide(NAMES, first=5))
-def test_capacity_margin_is_the_force_that_still_fits(name: str) -> None:
+def test_capacity_margin_is_the_largest_additional_force(name: str) -> None:
     robot = load_robot(name)
     sample = sampled(robot, 60, np.random.default_rng(26), Elastic())
     plan, rng = sample.plan, np.random.default_rng(27)
@@ -384,10 +384,10 @@ def test_capacity_margin_is_the_force_that_still_fits(name: str) -> None:
 
 @extended
 @pytest.mark.parametrize("name", ["article-mixed", "falcon-7", "fast"])
-def test_capacity_margin_is_no_less(name: str) -> None:
+def test_capacity_margin_is_not_underestimated(name: str) -> None:
     sample = sampled(load_robot(name), 40, np.random.default_rng(28), Elastic())
     margins = capacity_margin(sample.plan.state)
-    ways = _directions(300)  # 12 degrees apart: a face at distance d is met within d / cos 8 degrees
+    ways = _directions(300)  # 12 degrees apart: a face at distance d is hit within d / cos 8 degrees
     for i in np.flatnonzero(sample.plan.feasible)[:2]:
         reach = min(_reach(sample, int(i), way) for way in ways)
         assert margins[i] <= reach * (1 + 1e-6)
@@ -395,14 +395,14 @@ def test_capacity_margin_is_no_less(name: str) -> None:
 
 
 def _directions(count: int) -> np.ndarray:
-    """Evenly spread over the sphere, by the golden angle."""
+    """Uniformly distributed over the sphere by the golden angle."""
     k = np.arange(count)
     z, turn = 1 - (2 * k + 1) / count, np.pi * (1 + 5**0.5) * k
     return np.column_stack((np.sqrt(1 - z * z) * np.cos(turn), np.sqrt(1 - z * z) * np.sin(turn), z))
 
 
 def _reach(sample: Sample, i: int, way: np.ndarray) -> float:
-    """How far the force can grow along a direction: a linear program in the tensions and that length."""
+    """Largest force along a direction: a linear program in the tensions and the force."""
     assert sample.plan.needed is not None
     robot, matrix = sample.robot, sample.matrices[i]
     scale = robot.tension_max.max()

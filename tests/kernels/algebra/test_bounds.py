@@ -1,4 +1,4 @@
-"""Strips and their labels, against plain NumPy."""
+"""Bounds and their labels, compared with plain NumPy."""
 
 import math
 
@@ -28,23 +28,23 @@ def test_largest_number_does_not_count_infinite_limits() -> None:
     assert box_radius(9.0, limits) == 36.0
 
 
-def test_the_box_holds_what_orthonormal_strips_have_in_common() -> None:
+def test_the_box_contains_the_intersection_of_orthonormal_bounds() -> None:
     rng = np.random.default_rng(1)
     for _ in range(50):
         k = 5
         limits = np.array([rng.normal(size=k), -rng.uniform(0, 1, k), rng.uniform(0, 1, k)])
-        # |x| = |x . rows| <= sqrt(k) for orthonormal rows, times the farthest that a side is from START
+        # |x| = |x . rows| <= sqrt(k) for orthonormal rows, times the largest distance of a bound from START
         far = math.sqrt(k) * np.abs(limits[1:] - limits[0]).max()
         assert far <= box_radius(largest_bound(limits), limits)
 
 
-def missed(rows: Array, limits: Array, point: Array) -> Array:
-    """By how much each side is missed, by label."""
+def violations(rows: Array, limits: Array, point: Array) -> Array:
+    """Violation of each bound by label."""
     value = limits[s.START] + point @ rows
     return np.column_stack((limits[s.LOW] - value, value - limits[s.HIGH])).ravel()
 
 
-def test_the_side_missed_most_is_named() -> None:
+def test_the_most_violated_bound_is_named() -> None:
     rng = np.random.default_rng(2)
     names = set()
     for _ in range(300):
@@ -52,7 +52,7 @@ def test_the_side_missed_most_is_named() -> None:
         rows, point = rng.normal(size=(d, k)), rng.normal(size=d)
         limits = np.array([rng.normal(size=k), -rng.uniform(0, 2, k), rng.uniform(0, 2, k)])
         limits[s.HIGH, rng.uniform(size=k) < 0.2] = math.inf
-        gaps = missed(rows, limits, point)
+        gaps = violations(rows, limits, point)
         slack = float(rng.choice([0.0, 0.5]))
         expected = int(np.argmax(gaps)) if gaps.max() > slack else -1
         assert most_violated_bound(rows, limits, point, slack, False) == expected
@@ -62,10 +62,10 @@ def test_the_side_missed_most_is_named() -> None:
     assert names >= {-1, 0, 1, 2, 3}
 
 
-def test_normals_point_inward_and_sides_say_how_far() -> None:
+def test_normals_point_inward_and_sides_are_distances() -> None:
     rng = np.random.default_rng(3)
     rows, point = rng.normal(size=(3, 4)), rng.normal(size=3)
     limits = np.array([rng.normal(size=4), -rng.uniform(0, 2, 4), rng.uniform(0, 2, 4)])
-    for label, gap in enumerate(missed(rows, limits, point)):
+    for label, gap in enumerate(violations(rows, limits, point)):
         reached = inward(label) * rows[:, label // 2] @ point
         np.testing.assert_allclose(side_of(limits, label) - reached, gap, atol=1e-15)

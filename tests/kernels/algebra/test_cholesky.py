@@ -1,4 +1,4 @@
-"""Small positive definite systems against NumPy."""
+"""Small positive definite systems compared with NumPy."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ def test_factor_and_solution(r: int) -> None:
     rng = np.random.default_rng(r)
     half = rng.normal(size=(r, 2 * r))
     matrix, right = half @ half.T, rng.normal(size=r)
-    factor = np.tril(matrix) + np.triu(np.full((r, r), np.nan), 1)  # what is above the diagonal is not read
+    factor = np.tril(matrix) + np.triu(np.full((r, r), np.nan), 1)  # elements above the diagonal are not read
     assert factor_positive(factor, 0.0, factor)
     shifted = np.full((r, r), np.nan)
     assert factor_positive(matrix, 0.5, shifted)
@@ -29,6 +29,6 @@ def test_factor_and_solution(r: int) -> None:
     np.testing.assert_allclose(matrix @ lower, right, atol=1e-11)
 
 
-def test_what_is_not_positive_definite_is_told() -> None:
+def test_a_matrix_that_is_not_positive_definite_is_reported() -> None:
     for matrix in (np.array([[1.0, 0.0], [2.0, 3.0]]), np.zeros((1, 1)), np.array([[np.nan]])):
         assert not factor_positive(matrix, 0.0, np.empty_like(matrix))

@@ -1,4 +1,4 @@
-"""Orthonormal frames row by row, against the factors of NumPy."""
+"""Orthonormal frames row by row, compared with the factors of NumPy."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ take, hold = from_python(orthogonalize_row), from_python(normalize_row)
 
 
 def framed(rows: Array) -> tuple[Array, Array]:
-    """Frame and triangle of given rows."""
+    """Frame and triangular factor of given rows."""
     count, d = rows.shape
     frame, triangle = np.full((count, d), np.nan), np.full((count, count), np.nan)
     for c in range(count):
@@ -21,7 +21,7 @@ def framed(rows: Array) -> tuple[Array, Array]:
 
 
 @pytest.mark.parametrize("d", [1, 2, 3, 6, 15])
-def test_frame_is_orthonormal_and_the_triangle_makes_the_rows_of_it(d: int) -> None:
+def test_frame_is_orthonormal_and_the_factor_gives_the_rows(d: int) -> None:
     rows = np.random.default_rng(1).normal(size=(d, d))
     frame, triangle = framed(rows)
     np.testing.assert_allclose(frame @ frame.T, np.eye(d), atol=4e-16 * d)
@@ -29,15 +29,15 @@ def test_frame_is_orthonormal_and_the_triangle_makes_the_rows_of_it(d: int) -> N
     assert (np.diag(triangle) > 0.0).all()
 
 
-def test_rows_that_nearly_agree_still_end_at_right_angles() -> None:
+def test_nearly_equal_rows_give_an_orthogonal_frame() -> None:
     rng = np.random.default_rng(2)
     for size in (1e-3, 1e-6, 1e-9):
         rows = np.ones((4, 6)) + size * rng.normal(size=(4, 6))
         frame, _ = framed(rows)
-        np.testing.assert_allclose(frame @ frame.T, np.eye(4), atol=1e-15)  # once alone would leave 1e-16/size
+        np.testing.assert_allclose(frame @ frame.T, np.eye(4), atol=1e-15)  # a single pass would leave 1e-16/size
 
 
-def test_what_is_left_of_a_dependent_row_is_rounding() -> None:
+def test_a_dependent_row_leaves_only_rounding() -> None:
     frame, triangle = np.eye(3, 5), np.full((3, 3), np.nan)
     frame[2] = [3.0, -4.0, 0.0, 0.0, 0.0]
     assert take(frame, 2, triangle) == 0.0

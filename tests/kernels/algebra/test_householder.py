@@ -1,4 +1,4 @@
-"""Null space, pseudo-inverse and lost rank, against NumPy."""
+"""Null space, pseudo-inverse and loss of rank compared with NumPy."""
 
 import numpy as np
 import pytest
@@ -41,7 +41,7 @@ def test_rows_along_the_axes_of_either_sign() -> None:
     check(np.array([[-2.0, 0.0, 0.0], [0.0, 0.0, 4.0]]), np.array([1.0, -5.0]))
 
 
-def test_lost_rank_is_seen() -> None:
+def test_loss_of_rank_is_detected() -> None:
     rng = np.random.default_rng(2)
     matrix = rng.normal(size=(6, 8))
     matrix[4] = matrix[1] - 2 * matrix[3]
@@ -51,7 +51,7 @@ def test_lost_rank_is_seen() -> None:
 
 
 @pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
-def test_rank_is_lost_below_a_billionth_of_a_row_whatever_its_unit(size: float) -> None:
+def test_rank_is_lost_below_a_billionth_of_a_row_in_any_unit(size: float) -> None:
     for left, kept in ((0.3e-9, False), (3e-9, True)):
         matrix = np.array([[1.0, 0.0, 0.0], [1.0, left, 0.0]]) * size
         assert factorize(matrix, np.zeros((2, 2))) == kept

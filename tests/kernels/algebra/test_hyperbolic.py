@@ -1,4 +1,4 @@
-"""Hyperbolic functions against 80-bit arithmetic."""
+"""Hyperbolic functions compared with 80-bit arithmetic."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ def test_sinhc_and_cosh_on_both_sides_of_the_switch() -> None:
         (cosh, np.cosh(wide)),
     ):
         found = np.array([function(h) for h in ARGUMENTS])
-        # beyond the polynomials the C library's own rounding counts
+        # outside of the polynomials, the rounding of the C library contributes
         assert float(np.max(np.abs(found / exact - 1))) < 6e-16
 
 
-def test_sinh_excess_keeps_its_digits_where_the_difference_loses_them() -> None:
+def test_sinh_excess_is_accurate_where_the_difference_is_not() -> None:
     for h in (1e-8, 1e-4, 0.03, 0.7, 1.9):
         exact = sum(np.longdouble(h) ** k / np.longdouble(math.factorial(k)) for k in range(3, 41, 2))
         assert abs(float(sinh_excess(h) / exact) - 1.0) < 5e-16

@@ -1,4 +1,4 @@
-"""Linear programs over bounds against SciPy's, from cold and warm starts."""
+"""Linear programs over bounds compared with SciPy, from cold and warm starts."""
 
 import math
 
@@ -35,7 +35,7 @@ def by_scipy(rows: Array, bounds: Array, cost: Array) -> tuple[int, float]:
 
 
 def assert_proof(rows: Array, bounds: Array, cost: Array, basis: lp.Basis, empty: bool) -> None:
-    """The weights of a basis make the cost of its normals, or with the side that contradicts them nothing at all."""
+    """The weights of a basis give the cost from its normals, or zero together with the contradicting bound."""
     d, k = rows.shape
     count = d + 1 if empty else d
     labels, weights = basis.labels[:count], basis.weights[:count]
@@ -80,7 +80,7 @@ def random_program(rng: np.random.Generator, d: int) -> tuple[Array, Array, Arra
 
 
 @pytest.mark.parametrize("d", [1, 2, 3, 7])
-def test_the_sides_of_the_last_answer_are_a_good_start(d: int) -> None:
+def test_the_bounds_of_the_last_solution_are_a_good_start(d: int) -> None:
     rng = np.random.default_rng(40 + d)
     outcomes = []
     for _ in range(60):
@@ -90,7 +90,7 @@ def test_the_sides_of_the_last_answer_are_a_good_start(d: int) -> None:
             continue
         for size in (0.0, 1e-6, 0.1, 3.0):
             moved = bounds + size * rng.uniform(-1, 1, bounds.shape) * [[1], [0], [0]]
-            if size == 3.0:  # infinite limits that become finite; the other way round the side stood on would vanish
+            if size == 3.0:  # infinite limits that become finite; the reverse would remove an active bound
                 moved[2] = np.minimum(moved[2], 4.0)
             verdict, cold, _ = solve(rows, moved, cost)
             assert verdict == by_scipy(rows, moved, cost)[0]
@@ -104,7 +104,7 @@ def test_the_sides_of_the_last_answer_are_a_good_start(d: int) -> None:
     assert outcomes.count(LP_SOLVED) > 30
 
 
-def test_after_an_empty_set_the_caller_starts_anew() -> None:
+def test_after_an_empty_set_the_start_is_discarded() -> None:
     rows, cost = np.array([[1.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), np.array([1.0, 1.0])
     bounds = np.array([[0.0, 0.0, 0.0], [0.0, 1.5, 0.0], [1.0, 2.0, 1.0]])  # x <= 1 and x >= 1.5
     outcome, _, basis = solve(rows, bounds, cost)
@@ -118,7 +118,7 @@ def test_after_an_empty_set_the_caller_starts_anew() -> None:
     np.testing.assert_allclose(point, [1.5, 0.0], atol=1e-15)
 
 
-def test_an_answer_as_far_out_as_the_box_is_infinitely_far() -> None:
+def test_a_solution_at_the_box_is_unbounded() -> None:
     rows, bounds = np.eye(2), np.array([[0.0, 0.0], [1.0, 1.0], [math.inf, 2.0]])
     outcome, _, basis = solve(rows, bounds, np.array([-1.0, -1.0]))
     assert outcome == LP_UNBOUNDED
@@ -127,7 +127,7 @@ def test_an_answer_as_far_out_as_the_box_is_infinitely_far() -> None:
     assert outcome == LP_SOLVED
     np.testing.assert_array_equal(point, [1.0, 2.0])
     assert sorted(basis.labels[:2]) == [0, 3]
-    # any point of one side is as good, and the box names one, whatever the signs of the cost
+    # all points of an edge are equally good; the box determines one for any signs of the cost
     one_strip = np.array([[1.0], [1.0]]), np.array([[0.0], [-2.0], [2.0]])
     for sign in (1.0, -1.0):
         outcome, point, basis = solve(*one_strip, np.array([-sign, -sign]))
@@ -135,7 +135,7 @@ def test_an_answer_as_far_out_as_the_box_is_infinitely_far() -> None:
         np.testing.assert_allclose(sorted(sign * point), [-2.0, 4.0], atol=1e-14)
         outcome, again, basis = solve(*one_strip, np.array([-sign, -sign]), basis)
         np.testing.assert_allclose(again, point, atol=1e-14)
-    # a cost that does not care about a way without end: solved, and tied
+    # a cost that is constant along an unbounded direction: solved, with a tie
     outcome, point, basis = solve(rows[:, :1].copy(), bounds[:, :1].copy(), np.array([1.0, 0.0]))
     assert outcome == LP_SOLVED
     assert point[0] == 1.0
@@ -143,7 +143,7 @@ def test_an_answer_as_far_out_as_the_box_is_infinitely_far() -> None:
 
 
 @pytest.mark.parametrize("d", [2, 3, 5])
-def test_many_sides_through_one_corner(d: int) -> None:
+def test_many_bounds_through_one_corner(d: int) -> None:
     rng = np.random.default_rng(50 + d)
     for _ in range(40):
         rows = rng.integers(-2, 3, (d, 8 * d)).astype(np.float64)
@@ -157,7 +157,7 @@ def test_many_sides_through_one_corner(d: int) -> None:
         if outcome == LP_SOLVED:
             assert cost @ point == pytest.approx(least, abs=1e-10)
             assert_proof(rows, bounds, cost, basis, False)
-    # Klee and Minty's way of making programs long: every corner of a cube on the way
+    # the construction of Klee and Minty for long programs: all corners of a cube are visited
     squeezed = np.eye(d) + np.triu(np.full((d, d), 0.3), 1)
     outcome, point, _ = solve(squeezed, np.array([np.zeros(d), np.zeros(d), np.ones(d)]), -squeezed.sum(axis=1))
     assert outcome == LP_SOLVED

@@ -1,4 +1,4 @@
-"""The nearest point within bounds: optimality, DAQP, and starts from what other problems were left with."""
+"""The nearest point within bounds: optimality, DAQP, and warm starts from other problems."""
 
 import math
 
@@ -22,14 +22,14 @@ def held_for(d: int) -> n.ActiveSet:
 
 
 def point_of(rows: Array, bounds: Array, target: Array, held: n.ActiveSet | None = None) -> Array:
-    """The point, where there is one."""
+    """The point, if it exists."""
     point = solve(rows, bounds, target, held)
     assert point is not None
     return point
 
 
 def solve(rows: Array, bounds: Array, target: Array, held: n.ActiveSet | None = None) -> Array | None:
-    """The point, from a cold start unless held says otherwise; None for none."""
+    """The point, from a cold start unless `held` is given; None if there is none."""
     held = held_for(target.size) if held is None else held
     point = np.full(target.size, np.nan)
     return point if nearest_point(rows, bounds, target, 1e-12, held, point) else None
@@ -41,7 +41,7 @@ def one_sided(rows: Array, sides: Array) -> tuple[Array, Array]:
 
 
 def two_sided(rng: np.random.Generator, d: int) -> tuple[Array, Array, Array]:
-    """Rows, bounds that have something in common, and a target."""
+    """Rows, bounds with a common point, and a target."""
     k = 2 * d + 2
     rows, inside = rng.normal(size=(d, k)), rng.normal(size=d)
     start = rng.normal(size=k)
@@ -62,7 +62,7 @@ def by_daqp(rows: Array, bounds: Array, target: Array) -> Array:
 
 
 @pytest.mark.parametrize("d", [2, 5, 15])
-def test_projection_keeps_the_optimality_conditions(d: int) -> None:
+def test_projection_satisfies_the_optimality_conditions(d: int) -> None:
     rng = np.random.default_rng(5)
     found = 0
     for _ in range(100):
@@ -92,7 +92,7 @@ def test_daqp_agrees(d: int) -> None:
 
 
 @pytest.mark.parametrize("d", [1, 2, 3, 6, 15])
-def test_a_start_from_a_neighbor_gives_the_same_answer(d: int) -> None:
+def test_a_start_from_a_neighbor_gives_the_same_solution(d: int) -> None:
     rng = np.random.default_rng(100 + d)
     stood = 0
     for _ in range(60):
@@ -100,7 +100,7 @@ def test_a_start_from_a_neighbor_gives_the_same_answer(d: int) -> None:
         held = held_for(d)
         assert solve(rows, bounds, target, held) is not None
         before = set(held.labels[1 : 1 + held.labels[0]])
-        for size in (1e-9, 1e-3, 0.3):  # the next limits are the same sides, then partly others
+        for size in (1e-9, 1e-3, 0.3):  # the next limits are on the same sides, then partly on others
             moved = bounds + size * rng.uniform(-1, 1, bounds.shape) * [[1], [0], [0]]
             goal = target + size * rng.normal(size=d)
             cold, warm = solve(rows, moved, goal), solve(rows, moved, goal, held)
@@ -113,11 +113,11 @@ def test_a_start_from_a_neighbor_gives_the_same_answer(d: int) -> None:
 
 
 @pytest.mark.parametrize("d", [1, 2, 3, 6])
-def test_a_start_from_the_wrong_sides_is_forgotten(d: int) -> None:
+def test_a_start_from_wrong_bounds_is_discarded(d: int) -> None:
     rng = np.random.default_rng(200 + d)
     for _ in range(150):
         rows, bounds, target = two_sided(rng, d)
-        rows[:, -1] = rows[:, -2]  # sides that depend on each other
+        rows[:, -1] = rows[:, -2]  # bounds that depend on each other
         bounds[:, -1] = bounds[:, -2]
         held = held_for(d)
         count = int(rng.integers(1, d + 1))
@@ -131,7 +131,7 @@ def test_a_start_from_the_wrong_sides_is_forgotten(d: int) -> None:
         np.testing.assert_allclose(cold, by_daqp(rows, bounds, target), atol=1e-8)
 
 
-def test_held_sides_are_those_the_point_stands_on() -> None:
+def test_held_bounds_are_active_at_the_point() -> None:
     rng = np.random.default_rng(3)
     for _ in range(100):
         rows, bounds, target = two_sided(rng, 3)
@@ -144,10 +144,10 @@ def test_held_sides_are_those_the_point_stands_on() -> None:
             sign = 1.0 if label % 2 == 0 else -1.0
             assert value[label // 2] == pytest.approx(bounds[1 + label % 2, label // 2], abs=1e-12)
             pull = pull + held.pushes[n.PUSH, place] * sign * rows[:, label // 2]
-        np.testing.assert_allclose(pull, 0.0, atol=1e-12)  # the pushes are what keeps the point from its target
+        np.testing.assert_allclose(pull, 0.0, atol=1e-12)  # the multipliers keep the point from its target
 
 
-def test_a_target_inside_is_the_answer_and_stands_on_nothing() -> None:
+def test_a_target_inside_is_the_solution_without_active_bounds() -> None:
     rows, bounds = np.eye(2), np.array([[0.0, 0.0], [-1.0, -1.0], [1.0, math.inf]])
     held = held_for(2)
     np.testing.assert_array_equal(point_of(rows, bounds, np.array([0.5, 9.0]), held), [0.5, 9.0])
@@ -157,7 +157,7 @@ def test_a_target_inside_is_the_answer_and_stands_on_nothing() -> None:
     np.testing.assert_array_equal(point_of(rows, bounds, np.array([0.5, 9.0]), held), [0.5, 9.0])
 
 
-def test_an_empty_set_forgets_what_was_held() -> None:
+def test_an_empty_set_discards_held_bounds() -> None:
     rows = np.array([[1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
     bounds = np.array([[0.0, 0.0, 0.0], [0.0, 1.5, 0.0], [1.0, 2.0, 1.0]])  # x <= 1 and x >= 1.5
     held = held_for(2)
@@ -167,7 +167,7 @@ def test_an_empty_set_forgets_what_was_held() -> None:
     np.testing.assert_allclose(point_of(rows, bounds, np.array([5.0, 5.0]), held), [1.6, 1.0], atol=1e-15)
 
 
-def test_strips_as_thin_as_a_line_and_met_twice() -> None:
+def test_bounds_of_zero_width_given_twice() -> None:
     rows = np.array([[1.0, 2.0, 0.6], [0.0, 0.0, 0.8]])
-    bounds = np.array([[0.0, 0.0, 0.0], [2.0, 4.0, -1.0], [2.0, 4.0, 1.0]])  # x = 2, said twice
+    bounds = np.array([[0.0, 0.0, 0.0], [2.0, 4.0, -1.0], [2.0, 4.0, 1.0]])  # x = 2, given twice
     np.testing.assert_allclose(point_of(rows, bounds, np.array([7.0, 9.0])), [2.0, -0.25], atol=1e-14)

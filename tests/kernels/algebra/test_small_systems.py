@@ -1,4 +1,4 @@
-"""Small dense linear algebra against NumPy."""
+"""Small dense linear algebra compared with NumPy."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def test_extreme_eigenvalues(n: int) -> None:
         np.testing.assert_allclose(found, expected, atol=1e-14 * max(1.0, np.abs(matrix).sum()))
 
 
-def test_the_largest_eigenvalue_is_only_bounded_where_that_is_enough() -> None:
+def test_the_largest_eigenvalue_is_bounded() -> None:
     for _ in range(100):
         matrix = symmetric(6) + 3.0 * np.eye(6)
         expected = np.linalg.eigvalsh(matrix)[[0, -1]]
@@ -42,7 +42,7 @@ def test_the_largest_eigenvalue_is_only_bounded_where_that_is_enough() -> None:
 
 
 @pytest.mark.parametrize("n", range(1, 7))
-def test_cholesky_solves_and_tells_definite_from_indefinite(n: int) -> None:
+def test_cholesky_solves_definite_systems_and_reports_indefinite_ones(n: int) -> None:
     matrix = symmetric(n)
     low = float(np.linalg.eigvalsh(matrix)[0])
     factor, right = np.zeros((n, n)), RNG.normal(size=n)
@@ -58,7 +58,7 @@ def test_cholesky_solves_and_tells_definite_from_indefinite(n: int) -> None:
 
 
 @pytest.mark.parametrize("n", [2, 6])
-def test_cholesky_in_place_reads_the_lower_triangle_alone(n: int) -> None:
+def test_cholesky_in_place_reads_only_the_lower_triangle(n: int) -> None:
     matrix = symmetric(n) + 10.0 * np.eye(n)
     expected = np.linalg.cholesky(matrix)
     given = np.tril(matrix) + np.triu(np.full((n, n), np.nan), 1)
@@ -69,7 +69,7 @@ def test_cholesky_in_place_reads_the_lower_triangle_alone(n: int) -> None:
 @pytest.mark.parametrize("n", range(1, 7))
 def test_gauss_elimination(n: int) -> None:
     matrix, right = RNG.normal(size=(n, n)), RNG.normal(size=n)
-    matrix[0, 0] = 0.0 if n > 1 else 2.0  # needs a pivot
+    matrix[0, 0] = 0.0 if n > 1 else 2.0  # requires a pivot
     solution = right.copy()
     assert solve_general(matrix.copy(), solution)
     np.testing.assert_allclose(matrix @ solution, right, atol=1e-11)

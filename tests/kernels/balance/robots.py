@@ -1,4 +1,4 @@
-"""Random robots and poses in the rows that kernels take, and their balance written out in NumPy."""
+"""Random robots and poses as kernel arguments, and their balance in NumPy."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from sagline.kernels import tables
 
 GRAVITY = 9.81
 EVERY_MOTION = np.eye(6)
-IN_A_PLANE = np.eye(6)[[0, 2, 4]]  # x, z and the turn about y
+IN_A_PLANE = np.eye(6)[[0, 2, 4]]  # x, z and the rotation about y
 A_POINT = np.eye(6)[:3]
 TO_AND_FRO = np.eye(6)[[0]]  # along x
 
 
 class Case(NamedTuple):
-    """One robot at one pose, as kernels take them."""
+    """One robot at one pose, as kernel arguments."""
 
     freedom: Array
     body: Array
@@ -28,7 +28,7 @@ class Case(NamedTuple):
 
     @property
     def structure(self) -> Array:
-        """Columns (u; r x u) along the free motions (n, m), from anchors and pose alone."""
+        """Columns (u; r x u) along the free motions (n, m), from anchors and pose only."""
         turn = Rotation.from_quat(self.pose[3:]).as_matrix()
         frame, platform = self.robot[:, :3], self.robot[:, 3:6]
         rope = frame - (self.pose[:3] + platform @ turn.T)
@@ -44,7 +44,7 @@ class Case(NamedTuple):
 
 
 def random_case(rng: np.random.Generator, m: int, freedom: Array = EVERY_MOTION, flat: bool = False) -> Case:
-    """Frame anchors on a ball of 3 m around a platform of 0.5 m, tilted by some tenths of a radian."""
+    """Frame anchors on a ball of 3 m around a platform of 0.5 m, tilted by a few tenths of a radian."""
     robot = np.zeros((m, tables.CABLE_COLUMNS))
     ways = rng.normal(size=(m, 3))
     robot[:, :3] = 3.0 * ways / np.linalg.norm(ways, axis=1, keepdims=True)

@@ -1,4 +1,4 @@
-"""Between the motions of a body and the free ones of a platform: against NumPy."""
+"""Motions of a body and free motions of a platform, compared with NumPy."""
 
 import numpy as np
 import pytest
@@ -39,7 +39,7 @@ def test_parts_and_motions(pattern: str) -> None:
     np.testing.assert_allclose(matrix, 0.5 * (along + along.T), atol=1e-13)
 
 
-def test_which_motions_turn() -> None:
+def test_rotations_among_the_free_motions() -> None:
     assert [turns(FREEDOMS["3R3T"], k) for k in range(6)] == [False] * 3 + [True] * 3
     assert [turns(FREEDOMS["1R2T"], k) for k in range(3)] == [False, False, True]
     assert not any(turns(FREEDOMS["2T"], k) for k in range(2))

@@ -1,4 +1,4 @@
-"""What is set up at a pose, against NumPy: limits, structure matrix, pseudo-inverse, null space, and failures."""
+"""Setting of a pose compared with NumPy: limits, structure matrix, pseudo-inverse, null space, and failures."""
 
 import math
 from typing import NamedTuple
@@ -92,7 +92,7 @@ def test_balance_of_a_pose(m: int, freedom: Array, variable: int) -> None:
             (cables.density, case.robot[:, tables.DENSITY]),
             (cables.stiffness, case.robot[:, tables.STIFFNESS]),
             (cables.half_weight, half),
-            (cables.sag_force, half),  # the first order
+            (cables.sag_force, half),  # first order
             (cables.low, case.robot[:, tables.TENSION_MIN]),
             (cables.high, case.robot[:, tables.TENSION_MAX]),
         ):
@@ -116,7 +116,7 @@ def test_balance_of_a_pose(m: int, freedom: Array, variable: int) -> None:
         np.testing.assert_allclose(balance.null @ balance.bounds[START], 0.0, atol=1e-11 * large)
 
 
-def test_an_infinite_limit_stays_infinite_in_every_variable() -> None:
+def test_an_infinite_limit_is_infinite_in_every_variable() -> None:
     case = random_case(np.random.default_rng(3), 8)
     case.robot[2, tables.TENSION_MAX] = math.inf
     for variable in VARIABLES:
@@ -137,7 +137,7 @@ def test_limits_of_the_frame_end() -> None:
             )
 
 
-def test_the_bound_of_validity_lifts_the_lower_limit() -> None:
+def test_the_bound_of_validity_raises_the_lower_limit() -> None:
     case = random_case(np.random.default_rng(5), 8)
     cables = setting(case, limits=TensionLimits(LIMITS_OF_CHORD, 2.0), model=Model(EMPIRICAL, 4.9, 4.0, GRAVITY)).cables
     # (54): T_x = tau cos phi > w D cos phi/(2 |sin phi|) + T_adj
@@ -147,14 +147,14 @@ def test_the_bound_of_validity_lifts_the_lower_limit() -> None:
     np.testing.assert_allclose(cables.sag_force, 4.9 * cables.density * cables.chord, rtol=1e-14)
 
 
-def test_lost_rank_is_told() -> None:
+def test_loss_of_rank_is_reported() -> None:
     case = random_case(np.random.default_rng(6), 8)
     case.robot[:, 3:6] = case.body[tables.CENTER_X :]  # all cables through the center of mass
     assert setting(case).status == POSE_SINGULAR
     assert setting(case._replace(freedom=A_POINT)).status == POSE_SOLVED
 
 
-def test_a_cable_whose_ends_coincide_has_no_chord() -> None:
+def test_a_cable_with_coincident_ends_has_no_chord() -> None:
     for short in (0.0, 0.9e-9, 1.1e-9):
         case = random_case(np.random.default_rng(7), 8)
         case.pose[:] = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]

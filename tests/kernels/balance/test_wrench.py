@@ -1,4 +1,4 @@
-"""Structure matrix and needed wrench against cross products in NumPy."""
+"""Structure matrix and required wrench compared with cross products in NumPy."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def test_structure_matrices() -> None:
         np.testing.assert_allclose(matrix, case.structure, atol=1e-15)
 
 
-def test_needed_wrench_balances_weight_load_and_pulls() -> None:
+def test_required_wrench_balances_weight_load_and_sag_forces() -> None:
     case = random_case(np.random.default_rng(1), 8)
     geometry, needed = geometry_of(case), np.full(6, np.nan)
     sag_force = np.random.default_rng(2).uniform(0.0, 5.0, 8)

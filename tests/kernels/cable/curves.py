@@ -1,4 +1,4 @@
-"""Cables of one pose as kernels take them, and their sag forces one by one: the reference of their curves."""
+"""Cables of one pose as kernel arguments, and their sag forces one by one as the reference of their curves."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ def random_curves(rng: np.random.Generator, m: int, model: int = CATENARY) -> Cu
 
 
 def with_turns(curves: Curves) -> Curves:
-    """The same, its turns found."""
+    """The same with extrema of sag forces."""
     find_extrema(curves, curves.cables.low, curves.cables.high, memory())
     return curves
 
 
 def pulls_of(curves: Curves, i: int, tensions: Array) -> Array:
-    """Pulls of cable i, one by one."""
+    """Sag forces of cable i, one by one."""
     cables = curves.cables
     chord = Chord(float(cables.chord[i]), float(cables.sine[i]), float(cables.cosine[i]))
     material = Material(float(cables.density[i]), float(cables.stiffness[i]))

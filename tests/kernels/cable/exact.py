@@ -1,4 +1,4 @@
-"""The elastic catenary in long-digit arithmetic."""
+"""The elastic catenary in multi-precision arithmetic."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def exact_end(t_x: Decimal, t_z: Decimal, length: Decimal, w: Decimal, ea: Decim
 def length_and_pull(
     span: float, rise: float, w: float, ea: float, tension: float, near: tuple[float, float]
 ) -> tuple[Decimal, Decimal]:
-    """Unstrained length and T_z - tau sin phi at a chord tension, by Newton steps from values nearby."""
+    """Unstrained length and T_z - tau sin phi at a chord tension, by Newton steps from close values."""
     with localcontext() as context:
         context.prec = DIGITS
         x, z, weight, stiffness = (Decimal(v) for v in (span, rise, w, ea))

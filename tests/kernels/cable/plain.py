@@ -1,4 +1,4 @@
-"""Cables with nothing behind them, written down as kernels take them: free spans and cables are the same memory."""
+"""Cables without routing as kernel arguments: free spans and cables use the same memory."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SAME = {
 
 
 def plain_cables(m: int, fill: float, **given: Array) -> Cables:
-    """Words for m cables, those given as they are and all others of one value."""
+    """Numbers for m cables: given values, and one value for all others."""
     words = {name: given.get(name, np.full(m, fill)) for name in Cables._fields if name != "machine"}
     words |= {free: words[own] for free, own in SAME.items()}
     return Cables(machine=False, **words)

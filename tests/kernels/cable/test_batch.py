@@ -1,4 +1,4 @@
-"""Loops over many cables, against the same cables one by one."""
+"""Loops over many cables compared with single cables."""
 
 from typing import NamedTuple
 
@@ -21,7 +21,7 @@ COUNT = CHUNK + 37
 
 
 def cables(count: int, largest_strain: float) -> tuple[Array, Array, Array, Array, Array]:
-    """Span, rise, density, stiffness and chord tension of cables from bow strings to deep U's."""
+    """Span, rise, density, stiffness and chord tension of cables from very taut to very slack."""
     rng = np.random.default_rng(1)
     span, rise = rng.uniform(0.5, 20.0, count), rng.uniform(-10.0, 10.0, count)
     tension = np.geomspace(5.0, 500.0, count)
@@ -65,7 +65,7 @@ def test_many_at_their_tensions(code: int) -> None:
 
 
 @pytest.mark.parametrize("largest", [0.0099, 0.0999])
-def test_ordinary_cables_to_the_last_digit(largest: float) -> None:
+def test_ordinary_cables_are_equal_to_the_last_digit(largest: float) -> None:
     span, rise, density, stiffness, tension = cables(60, largest)
     density = density / 3.0  # X up to 2
     length, _, vertical, _ = solve((CATENARY, 0.0, 0.0, GRAVITY), span, rise, density, stiffness, tension, count=60)

@@ -1,4 +1,4 @@
-"""One exact cable in long-digit arithmetic: every path through the kernel, and where one gives way to the next."""
+"""One exact cable in multi-precision arithmetic: all branches of the kernel, and the changes between them."""
 
 import math
 from decimal import Decimal, localcontext
@@ -21,14 +21,14 @@ catenary_from_length = from_python(c.catenary_from_length)
 catenary_end = from_python(c.catenary_end)
 
 SLOPES = (-0.999, -0.6, -0.01, 0.0, 0.3, 0.9)
-LAST_DIGITS = 6e-15  # relative, what rounding in a dozen products and a polynomial leaves
+LAST_DIGITS = 6e-15  # relative, rounding of a dozen products and a polynomial
 
 
 def exact(half_weight: float, sine: float, strain: float, near: tuple[float, float]) -> tuple[float, float, float]:
-    """L/D and (T_z - tau sin phi)/tau of a cable with D = 1 and tau = 1 (in long digits), and cos phi in doubles."""
+    """L/D and (T_z - tau sin phi)/tau of a cable with D = 1 and tau = 1 (multi-precision), and cos phi in doubles."""
     cosine = math.sqrt(1.0 - sine * sine)
     size = math.hypot(cosine, sine)
-    # D = size rather than 1 in the last digit: X and e are those of tau = 1
+    # D = size instead of 1 in the last digit: X and e belong to tau = 1
     length, sag_force = length_and_pull(
         cosine, sine, 2.0 * half_weight / size, 1.0 / strain, 1.0, (near[0] * size, near[1])
     )
@@ -38,13 +38,13 @@ def exact(half_weight: float, sine: float, strain: float, near: tuple[float, flo
 @pytest.mark.parametrize("sine", SLOPES)
 @pytest.mark.parametrize("strain", [1e-7, 1e-4, 0.0099, 0.0101, 0.05, 0.0999, 0.1001, 0.4])
 @pytest.mark.parametrize("half_weight", [1e-6, 1e-3, 0.1, 1.0, 1.999, 2.001, 6.0, 40.0])
-def test_length_and_pull_at_a_chord_tension(half_weight: float, strain: float, sine: float) -> None:
+def test_length_and_sag_force_at_a_chord_tension(half_weight: float, strain: float, sine: float) -> None:
     cosine = math.sqrt(1.0 - sine * sine)
     ratio, status = length_ratio(half_weight, sine, cosine, strain)
     assert status == CABLE_SOLVED
     sag_force = sag_force_ratio(half_weight, sine, strain, ratio)
     length, force, _ = exact(half_weight, sine, strain, (ratio, sag_force))
-    # a U's length grows like exp X: rounding of X grows with it
+    # the length of a very slack cable grows like exp X, and rounding of X with it
     assert ratio == pytest.approx(length, rel=LAST_DIGITS * max(1.0, half_weight))
     assert sag_force == pytest.approx(force, rel=LAST_DIGITS * max(1.0, half_weight), abs=1e-15)
 
@@ -66,9 +66,9 @@ def test_ordinary_cables_without_branches(half_weight: float, sine: float) -> No
 
 @pytest.mark.parametrize("sine", SLOPES)
 @pytest.mark.parametrize("strain", [1e-5, 1e-3, 0.01, 0.05, 0.099])
-def test_one_step_more_from_a_tension_nearby(strain: float, sine: float) -> None:
+def test_one_step_from_a_close_tension(strain: float, sine: float) -> None:
     cosine = math.sqrt(1.0 - sine * sine)
-    # what is left grows like the square of the change, and is the last digit's for a taut cable or a small change
+    # the remainder is quadratic in the change, or rounding for a taut cable or a small change
     for change, half_weight, left in ((1e-3, 5e-3, 0.0), (1e-7, 1.999, 0.0), (1e-3, 0.3, 1e-11), (1e-3, 1.999, 3e-8)):
         there = length_ratio(half_weight, sine, cosine, strain)[0]
         for factor in (1.0 - change, 1.0 + change):
@@ -77,14 +77,14 @@ def test_one_step_more_from_a_tension_nearby(strain: float, sine: float) -> None
             assert again == pytest.approx(there, rel=LAST_DIGITS + left)
 
 
-def test_where_ordinary_cables_end() -> None:
+def test_limit_of_ordinary_cables() -> None:
     assert is_ordinary(2.0, 0.1)
     assert not is_ordinary(2.0001, 0.1)
     assert not is_ordinary(2.0, 0.1001)
     assert not is_ordinary(math.nan, 0.01)
 
 
-def test_a_cable_too_slack_has_no_length() -> None:
+def test_a_cable_that_is_too_slack_has_no_length() -> None:
     assert length_ratio(130.0, 0.2, math.sqrt(0.96), 1e-6)[1] == CABLE_SOLVED
     ratio, status = length_ratio(500.0, 0.2, math.sqrt(0.96), 1e-6)
     assert math.isnan(ratio)
@@ -105,7 +105,7 @@ HANGING = [
 
 
 @pytest.mark.parametrize("case", HANGING)
-def test_forces_at_a_length_put_the_end_where_it_is(case: tuple[float, ...]) -> None:
+def test_forces_at_a_length_give_the_position_of_the_end(case: tuple[float, ...]) -> None:
     span, rise, length, weight, stiffness = case
     force, status = catenary_from_length(*case)
     assert status == CABLE_SOLVED
@@ -114,7 +114,7 @@ def test_forces_at_a_length_put_the_end_where_it_is(case: tuple[float, ...]) -> 
     found, exact_pull = length_and_pull(span, rise, weight, stiffness, force.tension, (length, sag_force))
     assert force.horizontal == pytest.approx(force.tension * span / chord, rel=1e-14)
     assert force.vertical == pytest.approx(float(exact_pull) + force.tension * rise / chord, rel=1e-12)
-    # the tension to its own last digits: a change of it by 1e-13 shows in the length
+    # the tension to its last digits: a change by 1e-13 is visible in the length
     slightly, _ = length_and_pull(span, rise, weight, stiffness, force.tension * (1.0 + 1e-13), (length, sag_force))
     assert abs(found - Decimal(length)) <= max(abs(slightly - found), Decimal(4e-16 * length))
 
@@ -122,7 +122,7 @@ def test_forces_at_a_length_put_the_end_where_it_is(case: tuple[float, ...]) -> 
 def test_a_vertical_cable() -> None:
     force, status = catenary_from_length(0.0, 3.0, 2.99, 0.66, 44e3)
     assert status == CABLE_SOLVED
-    # hangs by its lower end: stretch (height - L)/L = (T_z - wL/2)/EA
+    # suspended at its upper end with a force at its lower end: stretch (height - L)/L = (T_z - wL/2)/EA
     assert force.vertical == pytest.approx(44e3 * 0.01 / 2.99 + 0.5 * 0.66 * 2.99, rel=1e-13)
     assert force.horizontal == 0.0
     force, status = catenary_from_length(0.0, -3.0, 2.99, 0.66, 44e3)

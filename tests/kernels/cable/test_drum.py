@@ -1,4 +1,4 @@
-"""The drum against arc lengths by quadrature, and its memory against a list of pieces of cable."""
+"""The drum compared with arc lengths by quadrature, and remembered winding with a list of pieces of cable."""
 
 import math
 from typing import NamedTuple
@@ -15,7 +15,7 @@ from sagline.kernels.cable.drum import MEMORY_ROWS, follow_memory, lengths_of_tu
 
 
 class Given(NamedTuple):
-    """A drum as a drawing shows it, in meters and whole turns."""
+    """A drum as in a drawing, in meters and whole turns."""
 
     radius: float
     diameter: float
@@ -31,12 +31,12 @@ STUDIED = Given(0.048, 0.004, 0.004, 20.0, 4, 0.8, -0.04, 40.0)
 
 
 def layer_radius(known: Given, layer: int) -> float:
-    """Distance of a layer's middle from the axis: each turn lies on two that touch, in an equilateral triangle."""
+    """Distance of the middle of a layer from the axis: each turn and two turns below form an equilateral triangle."""
     return known.radius + known.diameter / 2 + layer * math.sqrt(known.diameter**2 - (known.diameter / 2) ** 2)
 
 
 def wound(known: Given, turns: float) -> float:
-    """Length of so many turns: the integral of the speed along helix after helix."""
+    """Length of a number of turns: the integral of the speed along the helices."""
     parts, left, layer = [0.0], turns, 0
     while left > 0.0:
         here = min(left, known.turns) if layer < known.layers - 1 else left
@@ -53,7 +53,7 @@ def wound(known: Given, turns: float) -> float:
 
 
 def run(known: Given, turns: float) -> float:
-    """By how much the run to the pulley is longer than where the cable leaves opposite to it."""
+    """Difference of the distance to the pulley and that of the opposite exit."""
     layer = min(int(turns / known.turns), known.layers - 1)
     into = turns - layer * known.turns
     place = known.offset + known.pitch * (into if layer % 2 == 0 else known.turns - into)
@@ -61,7 +61,7 @@ def run(known: Given, turns: float) -> float:
 
 
 def tables(known: Given) -> tuple[Array, Array]:
-    """As kernels take a drum; the starts of the layers by quadrature."""
+    """Kernel arguments of a drum; the beginnings of layers by quadrature."""
     row = np.zeros((1, drum.DRUM_COLUMNS))
     row[0, drum.PITCH_RADIUS] = known.radius + known.diameter / 2
     row[0, drum.LAYER_RISE] = known.diameter * np.sqrt(3.0) / 2
@@ -93,7 +93,7 @@ def test_the_travel_is_the_slope_of_the_length() -> None:
 
 
 @pytest.mark.parametrize("radius", [0.02, 0.3])
-def test_a_meter_of_wander_sixty_millimeters_off_is_that_of_the_triangle(radius: float) -> None:
+def test_the_distance_to_the_exit_agrees_with_a_triangle(radius: float) -> None:
     known = STUDIED._replace(radius=radius, offset=0.0, pitch=0.006, turns=10.0, layers=1)
     row, starts = tables(known)
     length = np.empty((2, 1))
@@ -114,7 +114,7 @@ def test_a_meter_of_wander_sixty_millimeters_off_is_that_of_the_triangle(radius:
     offset=st.floats(-1.0, 1.0),
     shares=st.lists(st.floats(0.0, 1.0), min_size=5, max_size=5),
 )
-def test_turns_come_back_whatever_the_drum(
+def test_turns_are_recovered_for_every_drum(
     radius: float, diameter: float, pitch: float, turns: float, layers: int, distance: float, offset: float,
     shares: list[float],
 ) -> None:  # fmt: skip
@@ -136,7 +136,7 @@ def test_turns_come_back_whatever_the_drum(
 
 
 class Pieces:
-    """A drum as a list of short pieces of cable, the last on top, each with its strain; below them, cable at rest."""
+    """A drum as a list of short strained pieces of cable, the last one outermost; below them, unstrained cable."""
 
     def __init__(self, length: float, rest: float) -> None:
         self.path, self.rest = length * (1.0 + rest), rest
@@ -157,8 +157,8 @@ class Pieces:
             amount -= length
 
 
-def courses(seed: int, samples: int = 60) -> tuple[Array, Array]:
-    """Lengths that go back and forth, and strains."""
+def varied_lengths(seed: int, samples: int = 60) -> tuple[Array, Array]:
+    """Lengths that increase and decrease, and strains."""
     rng = np.random.default_rng(seed)
     length = 5.0 + np.cumsum(rng.normal(scale=0.15, size=(samples, 1)), axis=0)
     return locked(length), locked(rng.uniform(0.002, 0.05, (samples, 1)))
@@ -172,8 +172,8 @@ def followed(length: Array, strain: Array, rest: float, *, unstrained: bool = Tr
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_the_memory_is_that_of_a_list_of_pieces(seed: int) -> None:
-    length, strain = courses(seed)
+def test_remembered_winding_agrees_with_a_list_of_pieces(seed: int) -> None:
+    length, strain = varied_lengths(seed)
     path = followed(length, strain, 0.01)
     slow = Pieces(length[0, 0], 0.01)
     assert path[0, 0] == slow.path
@@ -183,20 +183,20 @@ def test_the_memory_is_that_of_a_list_of_pieces(seed: int) -> None:
             slow.wind_in(-change, strain[k - 1, 0], strain[k, 0])
         else:
             slow.pay_out(change)
-        assert path[k, 0] == pytest.approx(slow.path, abs=2e-8)  # a piece that is cut has its strain's change in it
+        assert path[k, 0] == pytest.approx(slow.path, abs=2e-8)  # a divided piece contains the change of its strain
     assert np.abs(path - 1.01 * length).max() > 1e-3
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_memory_both_ways(seed: int) -> None:
-    length, strain = courses(seed, 400)
+def test_remembered_winding_in_both_directions(seed: int) -> None:
+    length, strain = varied_lengths(seed, 400)
     np.testing.assert_allclose(
         followed(followed(length, strain, 0.01), strain, 0.01, unstrained=False), length, rtol=0.0, atol=3e-14
     )
 
 
-def test_what_is_wound_in_and_paid_out_again_leaves_no_trace() -> None:
-    length, strain = courses(1)
+def test_winding_in_and_out_restores_the_state() -> None:
+    length, strain = varied_lengths(1)
     deepest = length.max()
     there = locked(np.concatenate((length, [[deepest], [deepest - 1.0], [deepest], [deepest + 1.0]])))
     path = followed(there, locked(np.concatenate((strain, np.full((4, 1), 0.03)))), 0.01)
@@ -205,8 +205,8 @@ def test_what_is_wound_in_and_paid_out_again_leaves_no_trace() -> None:
     assert path[-3, 0] == pytest.approx(1.01 * deepest - 1.03, abs=1e-14)
 
 
-def test_samples_without_an_answer_are_left_out() -> None:
-    length, strain = courses(2)
+def test_samples_without_lengths_are_skipped() -> None:
+    length, strain = varied_lengths(2)
     holes = np.insert(length, [3, 10, 10, 60], np.nan, axis=0)
     filled = followed(locked(holes), locked(np.insert(strain, [3, 10, 10, 60], np.nan, axis=0)), 0.01)
     np.testing.assert_array_equal(filled[~np.isnan(holes)], followed(length, strain, 0.01)[:, 0])

@@ -1,4 +1,4 @@
-"""Spans, rises and levers from anchors and poses, against SciPy's rotations."""
+"""Spans, rises and lever arms from anchors and poses, compared with rotations of SciPy."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -12,7 +12,7 @@ def test_geometry_of_poses() -> None:
     robots, bodies = np.array([c.robot for c in cases]), np.array([c.body for c in cases])
     poses = np.array([c.pose for c in cases])
     poses[0, 3:] = Rotation.from_rotvec([2.0, -1.0, 0.5]).as_quat()
-    for count in (1, 5):  # one robot for all poses, or one a pose
+    for count in (1, 5):  # one robot for all poses, or one per pose
         found = np.full((5, g.GEOMETRY_ROWS, 8), np.nan)
         g.cable_geometries(robots[:count], bodies[:count], poses, np.full((3, 3), np.nan), found)
         for p in range(5):

@@ -1,4 +1,4 @@
-"""The switch between cable models: printed formulas, both directions, and what each cannot answer."""
+"""Cable models: printed formulas, both directions, and inputs without a solution."""
 
 import math
 
@@ -35,7 +35,7 @@ CHORD = Chord(5.0, 0.6, 0.8)
 FALLING = Chord(8.0, -0.28, 0.96)
 
 
-def test_pulls_of_first_order() -> None:
+def test_sag_forces_of_first_order() -> None:
     for model, expected in (
         (STRAIGHT_MODEL, 0.0),
         (ELASTIC_MODEL, 0.0),
@@ -48,7 +48,7 @@ def test_pulls_of_first_order() -> None:
 
 @pytest.mark.parametrize("chord", [CHORD, FALLING])
 @pytest.mark.parametrize("tension", [30.0, 400.0])
-def test_lengths_and_pulls_as_printed(tension: float, chord: Chord) -> None:
+def test_lengths_and_sag_forces_as_printed(tension: float, chord: Chord) -> None:
     d, sine, cosine = chord
     assert from_tension(STRAIGHT_MODEL, chord, CABLE, tension) == (d, 0.0, CABLE_SOLVED)
     assert from_tension(ELASTIC_MODEL, chord, CABLE, tension)[0] == pytest.approx(d / (1.0 + tension / 44e3), rel=1e-15)
@@ -75,18 +75,18 @@ def test_lengths_and_pulls_as_printed(tension: float, chord: Chord) -> None:
 
 @pytest.mark.parametrize("chord", [CHORD, FALLING, Chord(12.0, 0.0, 1.0)])
 @pytest.mark.parametrize("model", [ELASTIC_MODEL, EMPIRICAL_MODEL, PARABOLIC_MODEL, EXACT])
-def test_there_and_back(model: Model, chord: Chord) -> None:
+def test_tensions_are_recovered_from_lengths(model: Model, chord: Chord) -> None:
     for tension in (4.0, 60.0, 2000.0):
         length, sag_force, status = from_tension(model, chord, CABLE, tension)
         force, again = from_length(model, chord.length * chord.cosine, chord.length * chord.sine, CABLE, length)
         assert again == status
-        # a last digit of the length is EA times as much tension, where the cable is taut
+        # the last digit of the length changes the tension of a taut cable by EA times as much
         assert force.tension == pytest.approx(tension, rel=1e-11, abs=44e3 * 4e-16)
         assert force.horizontal == pytest.approx(force.tension * chord.cosine, rel=1e-14)
         assert force.vertical - force.tension * chord.sine == pytest.approx(sag_force, rel=1e-11, abs=1e-11)
 
 
-def test_what_models_cannot_answer() -> None:
+def test_inputs_without_a_solution() -> None:
     force, status = from_length(STRAIGHT_MODEL, 4.0, 3.0, CABLE, 5.0)
     assert status == CABLE_NO_TENSION
     assert math.isnan(force.tension)
@@ -100,7 +100,7 @@ def test_what_models_cannot_answer() -> None:
         assert math.isnan(sag_force)
 
 
-def test_the_empirical_model_is_valid_while_its_lowest_point_lies_outside_the_span() -> None:
+def test_the_empirical_model_is_valid_while_its_lowest_point_is_outside_the_span() -> None:
     bound = K_H * 0.067 * 5.0 / 0.6
     for chord in (CHORD, Chord(5.0, -0.6, 0.8)):
         assert from_tension(EMPIRICAL_MODEL, chord, CABLE, bound * 1.001)[2] == CABLE_SOLVED

@@ -1,4 +1,4 @@
-"""What lies on a pulley and behind it, against quadrature; and cables over pulleys there and back."""
+"""The routed part of a cable compared with quadrature, and cables over pulleys in both directions."""
 
 import math
 from collections.abc import Callable
@@ -28,7 +28,7 @@ cable_forces = from_python(forces.forces_from_lengths)
 series = from_python(forces.stiffness_in_series)
 
 GRAVITY = 9.81
-WEIGHT, EA = 8.0, 3e4  # N/m, N: heavy and soft, so that every term shows
+WEIGHT, EA = 8.0, 3e4  # N/m, N: heavy and soft, so that all terms are visible
 
 PULLEYS = [
     Pulley(0.05, 1.0, 0.0, 0.0),
@@ -62,12 +62,14 @@ def along(over: Pulley, tension: float, angle: float, of: Callable[[float, float
 @pytest.mark.parametrize("over", PULLEYS)
 @pytest.mark.parametrize("angle", [0.3, 1.6, 2.9])
 @pytest.mark.parametrize("tension", [60.0, 2500.0])
-def test_length_softness_and_energy_behind_are_integrals(over: Pulley, angle: float, tension: float) -> None:
+def test_length_compliance_and_energy_of_the_routing_are_integrals(over: Pulley, angle: float, tension: float) -> None:
     neglected = 2.0 * over.radius * (WEIGHT * over.radius / EA) ** 2
     lengths = along(over, tension, angle, lambda force, _: 1.0 / (1.0 + force / EA))
     np.testing.assert_allclose(behind(over, WEIGHT, EA, tension, wrap(angle)), lengths, rtol=1e-13, atol=neglected)
     soft = sum(along(over, tension, angle, lambda force, _: 1.0 / (EA * (1.0 + force / EA) ** 3)))
-    first_order = 3.0 * WEIGHT * over.radius / EA * over.radius / EA  # of beta: the pulley's share is taken at P
+    first_order = (
+        3.0 * WEIGHT * over.radius / EA * over.radius / EA
+    )  # in powers of beta: the share of the pulley is evaluated at P
     assert softness(over, WEIGHT, EA, tension, wrap(angle)) == pytest.approx(soft, rel=1e-12, abs=4.0 * first_order)
     strain_and_height = along(
         over, tension, angle, lambda force, z: (0.5 * force**2 / EA + WEIGHT * z) / (1.0 + force / EA)
@@ -78,7 +80,7 @@ def test_length_softness_and_energy_behind_are_integrals(over: Pulley, angle: fl
     assert found == pytest.approx(sum(strain_and_height) + lifted, rel=1e-12, abs=20.0 * EA * neglected + 1e-12)
 
 
-def test_the_chord_touches_the_pulley_where_the_cable_comes_round() -> None:
+def test_the_chord_touches_the_pulley_on_the_side_of_the_cable() -> None:
     rng = np.random.default_rng(1)
     touched = 0
     for _ in range(2000):
@@ -98,7 +100,7 @@ def test_the_chord_touches_the_pulley_where_the_cable_comes_round() -> None:
         foot = end - line
         assert math.hypot(*(foot - center)) == pytest.approx(radius, rel=1e-12)
         assert line @ (foot - center) == pytest.approx(0.0, abs=1e-13)
-        # it comes up (down) at the anchor, the origin, and turns toward the end: the angle alone says where it leaves
+        # the cable comes up (down) at the anchor, the origin, and turns toward the platform end by this angle
         angle = math.atan2(cosine, entry * sine)
         np.testing.assert_allclose(
             foot, radius * np.array([1.0 - math.cos(angle), entry * math.sin(angle)]), atol=1e-13
@@ -106,8 +108,8 @@ def test_the_chord_touches_the_pulley_where_the_cable_comes_round() -> None:
     assert touched > 1000
 
 
-def there_and_back(count: int, seed: int) -> tuple[Array, Array, Array, Array]:
-    """Lengths of random cables over pulleys at chord tensions, and the tensions that those lengths lead to.
+def lengths_and_recovered_tensions(count: int, seed: int) -> tuple[Array, Array, Array, Array]:
+    """Lengths of random cables over pulleys at chord tensions, and the tensions of these lengths.
 
     Returns their chord tensions, those found, what conditioning lets one expect of them, and the statuses.
     """
@@ -134,7 +136,7 @@ def there_and_back(count: int, seed: int) -> tuple[Array, Array, Array, Array]:
         assert status == CABLE_SOLVED
         horizontal, weight = tension[i] * line.cosine, material.density * GRAVITY
         vertical = tension[i] * line.sine + sag_force
-        for _ in range(30):  # until free and wrapped length are those of one angle to the last digit
+        for _ in range(30):  # until free and wrapped length belong to one angle to the last digit
             angle = math.atan2(horizontal, over.entry * (vertical - weight * free))
             span, rise = free_span(over, line, math.cos(angle)), free_rise(over, line, math.sin(angle))
             own = math.hypot(span, rise)
@@ -143,22 +145,22 @@ def there_and_back(count: int, seed: int) -> tuple[Array, Array, Array, Array]:
             vertical = taut * rise / own + sag_force
         leaving = math.hypot(horizontal, vertical - weight * free)
         rows[g.LENGTH, i] = free + sum(behind_cable(model, material, over, leaving, wrap(angle)))
-    for _ in range(8):  # from where the last pose left it, as the platform's own steps do
+    for _ in range(8):  # from the previous pose, like the steps of the platform
         cable_forces(model, cables, rows, True)
-    # one rounding of the length moves the tension by its stiffness along the chord, of the free span in series
+    # rounding of the length changes the tension by the chord stiffness of the free span in series
     stiff = 1.0 / (chord / cables[:, tables.STIFFNESS] + chord * (half_weight * np.cos(slope) / tension) ** 2 / tension)
     expected = np.finfo(float).eps * (stiff * rows[g.LENGTH] + tension)
     return tension, rows[g.TENSION], expected, rows[g.STATUS]
 
 
-def test_lengths_of_cables_over_pulleys_lead_back_to_their_tensions() -> None:
-    tension, found, expected, statuses = there_and_back(2000, seed=2)
+def test_tensions_over_pulleys_are_recovered_from_lengths() -> None:
+    tension, found, expected, statuses = lengths_and_recovered_tensions(2000, seed=2)
     assert (statuses == CABLE_SOLVED).all()
     assert (np.abs(found - tension) / expected).max() < 16.0  # 7
 
 
 @pytest.mark.soak
-def test_lengths_of_many_cables_over_pulleys_lead_back_to_their_tensions() -> None:
-    tension, found, expected, statuses = there_and_back(38_000, seed=3)
+def test_tensions_of_many_cables_over_pulleys_are_recovered_from_lengths() -> None:
+    tension, found, expected, statuses = lengths_and_recovered_tensions(38_000, seed=3)
     assert (statuses == CABLE_SOLVED).all()
     assert (np.abs(found - tension) / expected).max() < 16.0  # 8.9; 99 in 100 are below 4.5

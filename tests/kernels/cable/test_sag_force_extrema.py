@@ -1,4 +1,4 @@
-"""Where sag forces turn, against the sign of their differences on fine grids."""
+"""Extrema of sag forces compared with signs of differences on fine grids."""
 
 import numpy as np
 import pytest
@@ -9,8 +9,8 @@ from tests.kernels.cable.curves import pulls_of, random_curves, sag_force_range,
 GRID = 3000
 
 
-def turns_on_a_grid(curves: Curves, i: int) -> tuple[list[float], list[float]]:
-    """Tensions on a fine grid at which the sag force has a least and a largest value between its neighbors."""
+def extrema_on_a_grid(curves: Curves, i: int) -> tuple[list[float], list[float]]:
+    """Tensions of a fine grid at which the sag force is smaller or larger than at both neighbors."""
     tensions = np.geomspace(curves.cables.low[i], curves.cables.high[i], GRID)
     sag_forces = pulls_of(curves, i, tensions)
     step = np.diff(sag_forces)
@@ -21,37 +21,37 @@ def turns_on_a_grid(curves: Curves, i: int) -> tuple[list[float], list[float]]:
 
 
 def check(curves: Curves) -> tuple[int, int]:
-    """Compare the turns of all cables with those on a grid; how many of each kind there were."""
+    """Compare the extrema of all cables with those on a grid; return the numbers of each kind."""
     found = [0, 0]
     for i in range(curves.cables.low.size):
         width = np.log(curves.cables.high[i] / curves.cables.low[i]) / GRID
         for kind, row in enumerate((LEAST_TENSION, MOST_TENSION)):
-            grid = turns_on_a_grid(curves, i)[kind]
+            grid = extrema_on_a_grid(curves, i)[kind]
             turn = curves.turns[row, i]
             assert len(grid) <= 1
             if grid:
                 found[kind] += 1
                 assert np.log(turn / grid[0]) == pytest.approx(0.0, abs=2 * width + 1e-3)
-            elif np.isfinite(turn):  # flatter than a grid can see: it must be next to an end, or a shallow pair
+            elif np.isfinite(turn):  # too flat for the grid: it must be close to an end, or a shallow pair
                 assert curves.cables.sine[i] < 0
                 assert curves.cables.low[i] <= turn <= curves.cables.high[i]
     return found[0], found[1]
 
 
-def test_pulls_turn_where_a_fine_grid_of_them_does() -> None:
+def test_extrema_agree_with_a_fine_grid() -> None:
     rng = np.random.default_rng(11)
     counts = np.array([check(with_turns(random_curves(rng, 8))) for _ in range(30)]).sum(axis=0)
     assert (counts > 10).all()
 
 
 @pytest.mark.soak
-def test_twenty_thousand_cables_turn_where_they_should() -> None:
+def test_extrema_of_twenty_thousand_cables() -> None:
     rng = np.random.default_rng(12)
     for _ in range(2500):
         check(with_turns(random_curves(rng, 8)))
 
 
-def test_steep_slack_cables_have_no_pull_outside_their_range() -> None:
+def test_sag_forces_of_steep_slack_cables_are_in_their_range() -> None:
     rng = np.random.default_rng(3)
     for _ in range(60):
         curves = random_curves(rng, 8)

@@ -1,4 +1,4 @@
-"""Pulls over ranges of tensions, against fine grids of them."""
+"""Sag forces over ranges of tensions compared with fine grids."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ def section(curves: Curves, i: int, low: float, high: float) -> Section:
     return Section(low, high, float(at_low), float(at_high))
 
 
-def test_a_range_of_pulls_holds_a_fine_grid_of_them_and_no_more() -> None:
+def test_a_range_of_sag_forces_is_that_of_a_fine_grid() -> None:
     rng = np.random.default_rng(1)
     turned = 0
     for _ in range(40):
@@ -32,13 +32,13 @@ def test_a_range_of_pulls_holds_a_fine_grid_of_them_and_no_more() -> None:
             size = float(curves.cables.half_weight[i])
             assert least <= grid.min() + 1e-9 * size
             assert most >= grid.max() - 1e-9 * size
-            # a grid of 400 misses a turn by the curve's bend over half a step at most
+            # a grid of 400 points misses an extremum by at most the curvature over half a step
             assert least == pytest.approx(grid.min(), abs=1e-3 * (grid.max() - grid.min()) + 1e-9 * size)
             assert most == pytest.approx(grid.max(), abs=1e-3 * (grid.max() - grid.min()) + 1e-9 * size)
     assert turned > 60
 
 
-def test_the_most_along_a_direction_is_that_of_a_fine_grid_where_an_end_is_best() -> None:
+def test_the_largest_force_along_a_direction_agrees_with_a_fine_grid() -> None:
     rng = np.random.default_rng(2)
     exact = 0
     for _ in range(40):
@@ -52,7 +52,7 @@ def test_the_most_along_a_direction_is_that_of_a_fine_grid_where_an_end_is_best(
             size = np.abs(values).max() + abs(hanging) * float(curves.cables.half_weight[i])
             assert bound >= values.max() - 1e-9 * size
             end = values[-1] if along > 0 else values[0]
-            # where the tension's share outweighs the steepest sag force, the better end is the answer
+            # if the tension dominates the steepest sag force, the better end is the result
             slope = np.abs(np.diff(values - along * tensions) / np.diff(tensions)).max()
             if abs(along) > 3.0 * slope:
                 exact += 1
@@ -63,7 +63,7 @@ def test_the_most_along_a_direction_is_that_of_a_fine_grid_where_an_end_is_best(
     assert exact > 100
 
 
-def test_an_endless_section_counts_only_against_the_tension() -> None:
+def test_an_unbounded_section_is_used_only_against_the_tension() -> None:
     curves = with_turns(random_curves(np.random.default_rng(3), 1))
     low = float(curves.cables.low[0])
     at_low = float(pulls_of(curves, 0, np.array([low]))[0])
@@ -72,7 +72,7 @@ def test_an_endless_section_counts_only_against_the_tension() -> None:
     assert np.isfinite(most_along(curves, 0, endless, -1.0, 0.5))
 
 
-def test_all_pulls_at_once_are_those_one_by_one() -> None:
+def test_all_sag_forces_agree_with_single_ones() -> None:
     rng = np.random.default_rng(4)
     for _ in range(20):
         curves = random_curves(rng, 8)
@@ -82,17 +82,19 @@ def test_all_pulls_at_once_are_those_one_by_one() -> None:
         expected = np.array([pulls_of(curves, i, tau[i : i + 1])[0] for i in range(8)])
         np.testing.assert_allclose(sag_force, expected, rtol=1e-12, atol=1e-12 * curves.cables.half_weight.max())
         slopes_at(curves, tau, slope, bend)
-        for i in range(8):  # five-point differences of steps twenty times wider
+        for i in range(8):  # five-point differences with steps twenty times larger
             h = 2e-3 * tau[i]
             p = pulls_of(curves, i, tau[i] + h * np.array([-2, -1, 0, 1, 2]))
             assert slope[i] == pytest.approx((p[0] - 8 * p[1] + 8 * p[3] - p[4]) / (12 * h), rel=1e-6, abs=1e-9)
             second = (-p[0] + 16 * p[1] - 30 * p[2] + 16 * p[3] - p[4]) / (12 * h * h)
-            if curves.cables.half_weight[i] > 0.2 * tau[i]:  # of tauter cables it shows the sag force's own rounding
+            if (
+                curves.cables.half_weight[i] > 0.2 * tau[i]
+            ):  # for tauter cables, the rounding of the sag force is visible
                 assert bend[i] == pytest.approx(second, rel=1e-2)
 
 
 @pytest.mark.parametrize("model", [STRAIGHT, EMPIRICAL, PARABOLIC])
-def test_other_models_pull_alike_at_every_tension(model: int) -> None:
+def test_sag_forces_of_other_models_do_not_depend_on_the_tension(model: int) -> None:
     curves = with_turns(random_curves(np.random.default_rng(5), 4, model))
     assert np.isnan(curves.turns).all()
     slope, bend, sag_force, no_tension = np.empty(4), np.empty(4), np.empty(4), np.zeros(4)

@@ -1,4 +1,4 @@
-"""How a cable's force follows its own data: against differences of the public models."""
+"""Slopes of the force of a cable with respect to its data, compared with differences of the public models."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from sagline.kernels.cable.terms import Force, Material, Model
 from tests.kernels.compiled import from_python
 
 MODELS = [sl.Elastic(), sl.Parabolic(), sl.Empirical(), sl.Catenary()]
-ENDS = [(4.0, 3.0, 4.97), (6.0, -2.0, 6.31), (5.0, 0.2, 4.99), (5.0, 1.0, 7.0)]  # the last hangs deep
+ENDS = [(4.0, 3.0, 4.97), (6.0, -2.0, 6.31), (5.0, 0.2, 4.99), (5.0, 1.0, 7.0)]  # the last one is very slack
 DENSITY, AXIAL = 0.067, 44e3
 cable_stiffness = from_python(stiffness.cable_stiffness)
 force_slopes = from_python(stiffness.force_slopes)
@@ -18,7 +18,7 @@ force_by_length = from_python(stiffness.force_by_length)
 
 
 def central(of: object, at: float, share: float) -> Array:
-    """Slope of forces by one datum, extrapolated from two steps."""
+    """Slope of forces with respect to one datum, extrapolated from two steps."""
 
     def slope(h: float) -> Array:
         difference: Array = of(at + h) - of(at - h)  # type: ignore[operator]

@@ -1,4 +1,4 @@
-"""All cables of one pose at once, against the same cables one by one and in long-digit arithmetic."""
+"""All cables of one pose compared with single cables and with multi-precision arithmetic."""
 
 import math
 
@@ -47,7 +47,7 @@ def assert_exact(cables: Cables) -> None:
         length, sag_force = length_and_pull(
             x, z, cables.density[i] * GRAVITY, cables.stiffness[i], tau, (cables.ratio[i] * chord, cables.sag_force[i])
         )
-        heavy = max(1.0, cables.half_weight[i] / tau)  # a U's length grows like exp X
+        heavy = max(1.0, cables.half_weight[i] / tau)  # the length of a very slack cable grows like exp X
         assert cables.ratio[i] * chord == pytest.approx(float(length), rel=LAST_DIGITS * heavy)
         assert cables.sag_force[i] == pytest.approx(float(sag_force), rel=LAST_DIGITS * heavy, abs=1e-15 * tau)
 
@@ -76,7 +76,7 @@ def test_strains_between_one_and_ten_percent() -> None:
 
 
 @pytest.mark.parametrize("place", [0, 3, 7])
-def test_one_stretched_cable_among_taut_ones(place: int) -> None:
+def test_one_cable_with_a_large_strain_among_taut_ones(place: int) -> None:
     strains = np.full(8, 1e-3)
     strains[place] = 0.09
     cables = at_strains(strains)
@@ -84,9 +84,9 @@ def test_one_stretched_cable_among_taut_ones(place: int) -> None:
     assert_exact(cables)
 
 
-def test_ordinary_and_extraordinary_cables_together() -> None:
+def test_ordinary_and_extreme_cables_together() -> None:
     cables = at_strains(np.array([1e-3, 0.02, 0.11, 0.3, 1e-4, 0.05]))
-    cables.density[4] *= 30.0  # a deep U
+    cables.density[4] *= 30.0  # a very slack one
     cables.half_weight[4] *= 30.0
     gravest, statuses = hang(cables)
     assert gravest == CABLE_SOLVED
@@ -94,7 +94,7 @@ def test_ordinary_and_extraordinary_cables_together() -> None:
     assert_exact(cables)
 
 
-def test_the_gravest_status_counts_and_each_cable_has_its_own() -> None:
+def test_the_most_severe_status_is_returned_and_each_cable_has_its_own() -> None:
     cables = at_strains(np.full(4, 1e-3))
     cables.density[1] *= 1e5
     cables.half_weight[1] *= 1e5
@@ -104,7 +104,7 @@ def test_the_gravest_status_counts_and_each_cable_has_its_own() -> None:
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_rounds_that_come_closer_end_in_the_last_digit(sign: float) -> None:
+def test_converging_iterations_end_in_the_last_digit(sign: float) -> None:
     cables = at_strains(np.geomspace(1e-5, 0.099, 24))
     hang(cables)
     for change in (0.99 * h.NEAR, 1e-6, 1e-9):
@@ -113,7 +113,7 @@ def test_rounds_that_come_closer_end_in_the_last_digit(sign: float) -> None:
     assert_exact(cables)
 
 
-def test_near_begins_at_the_last_ratio() -> None:
+def test_iterations_begin_at_the_last_ratio() -> None:
     cables = at_strains(np.full(6, 1e-3))
     hang(cables)
     expected = cables.ratio.copy()
@@ -127,7 +127,7 @@ def test_near_begins_at_the_last_ratio() -> None:
 
 
 @pytest.mark.parametrize("code", [STRAIGHT, ELASTIC, EMPIRICAL, PARABOLIC, CATENARY])
-def test_all_together_are_what_each_is_alone(code: int) -> None:
+def test_all_cables_agree_with_single_cables(code: int) -> None:
     model = Model(code, 4.9, 4.0, GRAVITY)
     cables = at_strains(np.geomspace(1e-5, 0.3, 12))
     _, statuses = hang(cables, model)
@@ -157,11 +157,11 @@ def test_limits_of_the_frame_end_as_chord_tensions(code: int, case: tuple[float,
     for tension in (1.5 * weight * length, 3.0 * weight * length, 300.0 * weight * length):
         tau = chord_tension_at_frame_end(model, chord, material, NO_PULLEY, tension)
         whole, sag_force, _ = from_tension(model, chord, material, tau)
-        end = math.hypot(tau * chord.cosine, tau * sine + sag_force - weight * whole)  # what the frame feels
+        end = math.hypot(tau * chord.cosine, tau * sine + sag_force - weight * whole)  # tension at the frame end
         assert frame_end_tension(model, chord, material, NO_PULLEY, tau) == pytest.approx(end, rel=1e-14)
         assert end == pytest.approx(tension, rel=1e-12)
-        assert tau > 0.5 * weight * length * sine  # the taut side
-    for tension in (0.0, 0.3 * least):  # less than any cable has
+        assert tau > 0.5 * weight * length * sine  # the taut branch
+    for tension in (0.0, 0.3 * least):  # below the tension of any cable
         met = max(0.5 * weight * length * sine, 0.0)
         assert chord_tension_at_frame_end(model, chord, material, NO_PULLEY, tension) == met
         assert taut_at_frame_end(model, chord, material, NO_PULLEY, tension, 7.0) == 7.0
@@ -173,14 +173,16 @@ PULLEYS = [NO_PULLEY, Pulley(0.05, 1.0, 0.0, 0.0), Pulley(0.05, -1.0, 0.0, 0.0)]
 
 @pytest.mark.parametrize("pulley", PULLEYS, ids=["eyelet", "from below", "from above"])
 @pytest.mark.parametrize("case", [*CABLES[:3], (0.2, 40.0, 4.0, -0.97), (0.3, 30.0, 4.0, 0.9)])
-def test_limits_of_the_frame_end_near_the_least_that_a_cable_has(case: tuple[float, ...], pulley: Pulley) -> None:
+def test_frame_end_limits_near_the_least_tension_of_a_cable(case: tuple[float, ...], pulley: Pulley) -> None:
     density, stiffness, length, sine = case
     chord, material = Chord(length, sine, math.sqrt(1.0 - sine * sine)), Material(density, stiffness)
     half = 0.5 * density * GRAVITY * length
     tensions = np.geomspace(0.2, 20.0, 4000) * half
     ends = [frame_end_tension(EXACT, chord, material, pulley, float(tau)) for tau in tensions]
     least, loosest = min(ends), tensions[np.argmin(ends)]
-    digits = 1e-12 if pulley.radius == 0.0 else 1e-9  # where a slack cable leaves its pulley is a matter of passes
+    digits = (
+        1e-12 if pulley.radius == 0.0 else 1e-9
+    )  # the exit point of a slack cable from its pulley requires iterations
     for share in (1.001, 1.01, 1.1, 2.0):
         tau = taut_at_frame_end(EXACT, chord, material, pulley, share * least, 0.0)
         assert frame_end_tension(EXACT, chord, material, pulley, tau) == pytest.approx(share * least, rel=digits)

@@ -1,4 +1,4 @@
-"""One cable's stiffness and energy against long-digit derivatives and integrals, and against its own forces."""
+"""Stiffness and energy of one cable compared with multi-precision derivatives and integrals, and with its forces."""
 
 import math
 from decimal import Decimal, localcontext
@@ -52,13 +52,13 @@ def test_catenary_stiffness_is_the_inverse_of_the_flexibility(case: tuple[float,
         )
         determinant = a * b - c * c
         expected = [float(v / determinant) for v in (b, -c, a)]
-    # each element to its own size, so that a soft direction is not hidden behind a stiff one
+    # each element relative to its size, so that a soft direction is visible beside a stiff one
     found = catenary_stiffness(*case)
     assert found.xz == found.zx
     np.testing.assert_allclose((found.xx, found.xz, found.zz), expected, rtol=3e-13)
 
 
-def test_a_vertical_cable_is_as_stiff_across_the_plane_as_in_it() -> None:
+def test_a_vertical_cable_has_equal_lateral_stiffnesses() -> None:
     (t_x, t_z, tension), _ = catenary_from_length(0.0, 3.0, 2.99, 0.66, 44e3)
     assert t_x == 0.0
     xx, xz, _, _ = catenary_stiffness(t_x, t_z, 2.99, 0.66, 44e3)
@@ -120,6 +120,6 @@ def test_stiffness_of_every_model_is_the_slope_of_its_forces(
     np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-7 * np.abs(expected).max())
 
 
-def test_a_slack_elastic_cable_resists_nothing() -> None:
+def test_a_slack_elastic_cable_has_no_stiffness() -> None:
     slack = Force(0.0, 0.0, 0.0)
     assert cable_stiffness(Model(*sl.Elastic().terms(9.81)), 3.0, 1.0, Material(0.1, 1e4), 5.0, slack) == (0, 0, 0, 0)

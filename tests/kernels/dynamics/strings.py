@@ -1,4 +1,4 @@
-"""Cables as strings, for tests: their rows, what kernels make of them, and another way to it, by chains of springs."""
+"""Cables as vibrating strings: kernel arguments, results of kernels, and a reference of chains of springs."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ GRAVITY = 9.81
 
 
 def string(horizontal: float, vertical: float, length: float, density: float, stiffness: float) -> Array:
-    """A cable that hangs from a held frame end, as a table (1, STRING_COLUMNS)."""
+    """A cable with a fixed frame end, as a table (1, STRING_COLUMNS)."""
     row = np.zeros((1, STRING_COLUMNS))
     row[0, :6] = horizontal, vertical, length, density * GRAVITY, stiffness, density
     return row
@@ -32,7 +32,7 @@ def added(table: Array, frequency: Any, damping: sl.Damping | None = None) -> ND
 
 
 def counted(table: Array, frequency: Any) -> NDArray[np.int64]:
-    """Held frequencies below each of (F,), in the plane and normal to it, shape (F, m, 2)."""
+    """Number of frequencies of the fixed cable below each of (F,), in the plane and normal to it, shape (F, m, 2)."""
     return _both(table, undamped(np.atleast_1d(np.asarray(frequency, dtype=np.float64))[None]), COUNTING)[1]
 
 
@@ -46,7 +46,7 @@ def _both(table: Array, waves: NDArray[Any], phase: float) -> tuple[NDArray[Any]
 
 
 def held(table: Array, number: int, plane: int, digits: float = 1e-13) -> float:
-    """The frequency with that number, from 1 on, in the plane (0) or normal to it (1), by bisection on the count."""
+    """The frequency with a number, from 1 on, in the plane (0) or normal to it (1), by bisection of the count."""
     low, high = 0.0, 1.0
     while counted(table, high)[0, 0, plane] < number:
         low, high = high, 2.0 * high
@@ -60,7 +60,7 @@ def held(table: Array, number: int, plane: int, digits: float = 1e-13) -> float:
 
 
 class Chain(NamedTuple):
-    """A cable as n equal springs between point masses, in its own equilibrium.
+    """A cable as n equal springs between point masses at its own equilibrium.
 
     Attributes:
         plane: Stiffness in the plane, nodes from the first after the frame end, (2 n, 2 n).
@@ -77,7 +77,7 @@ class Chain(NamedTuple):
     density: float
 
     def squares(self, plane: int) -> Array:
-        """Angular frequencies squared with both ends held."""
+        """Squared angular frequencies with both ends fixed."""
         matrix, mass = (
             (self.plane[:-2, :-2], np.repeat(self.mass[:-1], 2))
             if plane == 0
@@ -101,13 +101,13 @@ class Chain(NamedTuple):
 
 
 def chain(table: Array, n: int) -> Chain:
-    """The chain whose springs carry what the given cable does at its platform end.
+    """The chain whose springs have the forces of the given cable at its platform end.
 
     Statics of a chain are known from its end on: each spring carries the force less the masses' weight beyond it.
     """
     horizontal, vertical, length, weight, stiffness, density = table[0, :6]
     step = length / n
-    beyond = vertical - weight * step * (n - np.arange(n) - 0.5)  # half a step's weight hangs at the last node
+    beyond = vertical - weight * step * (n - np.arange(n) - 0.5)  # the weight of half a step acts at the last node
     force = np.hypot(horizontal, beyond)
     tangent = np.stack((np.full(n, horizontal), beyond), axis=1) / force[:, None]
     long = step * (1.0 + force / stiffness)
@@ -125,7 +125,7 @@ def chain(table: Array, n: int) -> Chain:
 def _assembled(springs: Array) -> Array:
     n, d, _ = springs.shape
     matrix = np.zeros((n, d, n, d))
-    for i, spring in enumerate(springs):  # between nodes i - 1 and i, of which the first is the frame's
+    for i, spring in enumerate(springs):  # between nodes i - 1 and i; the first one is that of the frame
         matrix[i, :, i] += spring
         if i:
             matrix[i - 1, :, i - 1] += spring

@@ -1,4 +1,4 @@
-"""A chain's nodes at the frame: what births and merges conserve, and what letting out costs, against sums in numpy."""
+"""Nodes of a chain at the frame: conservation at births and merges, and the energy of released cable, in numpy."""
 
 from typing import NamedTuple
 
@@ -30,7 +30,7 @@ def look(place: Array, speed: Array, count: int, row: Array, pulls: Array, seen:
 
 
 class Chain(NamedTuple):
-    """A chain of five elements in any motion, nodes from the platform to the exit."""
+    """A chain of five elements in any motion, with nodes from the platform to the exit."""
 
     place: Array
     speed: Array
@@ -41,7 +41,7 @@ class Chain(NamedTuple):
 
     @property
     def masses(self) -> Array:
-        """Of its nodes [kg], both ends included."""
+        """Masses of its nodes [kg], both ends included."""
         lengths = np.append(np.full(self.free, self.row[c.ELEMENT]), self.rest)
         halves = 0.5 * self.row[c.DENSITY] * lengths
         masses: Array = np.append(halves, 0.0) + np.append(0.0, halves)
@@ -55,13 +55,13 @@ class Chain(NamedTuple):
         return row
 
     def sum(self, rows: Array) -> Array:
-        """Over the nodes' masses, of rows (3, P)."""
+        """Sum over the masses of the nodes of rows (3, P)."""
         total: Array = rows[:, : self.free + 2] @ self.masses
         return total
 
 
 def a_chain(seed: int, share: float, behind: float = 0.0) -> Chain:
-    """Five elements, the one at the frame so much of an element, strained by 2 % or so."""
+    """Five elements, the one at the frame with a part of its length, strained by about 2 %."""
     rng = np.random.default_rng(seed)
     row = np.zeros(c.CHAIN_COLUMNS)
     row[c.EXIT_X : c.EXIT_Z + 1] = rng.uniform(-5, 5, 3)
@@ -81,7 +81,7 @@ def a_chain(seed: int, share: float, behind: float = 0.0) -> Chain:
 
 
 def tension(chain: Chain) -> float:
-    """Of the element at the frame [N]."""
+    """Tension of the element at the frame [N]."""
     way = np.linalg.norm(chain.place[:, chain.free] - chain.place[:, chain.free + 1]) + chain.row[c.RUN]
     return float(chain.row[c.STIFFNESS] * (way / (chain.rest + chain.row[c.BEHIND]) - 1.0))
 
@@ -95,7 +95,7 @@ def divided(chain: Chain, more: int) -> Chain:
 
 @pytest.mark.parametrize("more", [1, -1])
 @pytest.mark.parametrize("behind", [0.0, 3.0])
-def test_length_mass_and_momentum_stay_where_nodes_are_born_and_merged(more: int, behind: float) -> None:
+def test_births_and_merges_conserve_length_mass_and_momentum(more: int, behind: float) -> None:
     for seed in range(50):
         before = a_chain(seed, 1.6 if more > 0 else 0.4, behind)
         after = divided(before, more)
@@ -109,7 +109,7 @@ def test_length_mass_and_momentum_stay_where_nodes_are_born_and_merged(more: int
 
 
 @pytest.mark.parametrize("behind", [0.0, 3.0])
-def test_a_birth_leaves_the_tension_and_without_dead_cable_the_center_of_mass(behind: float) -> None:
+def test_a_birth_conserves_the_tension_and_without_dead_length_the_center_of_mass(behind: float) -> None:
     for seed in range(50):
         before = a_chain(seed, 1.6, behind)
         after = divided(before, 1)
@@ -121,25 +121,25 @@ def test_a_birth_leaves_the_tension_and_without_dead_cable_the_center_of_mass(be
 
 
 def looked_at(chain: Chain, time: float = 0.0) -> Array:
-    """Power lost, strain energy, that of heights, kinetic, H, a moment later at constant speeds [W, J, J, J, N]."""
+    """Lost power, strain, potential and kinetic energy, and H after a short time at constant speeds [W, J, J, J, N]."""
     place, speed, pulls, seen = chain.place.copy(), chain.speed.copy(), np.zeros(3 * ROOM), np.zeros(5)
     place[:, : chain.free + 1] += time * speed[:, : chain.free + 1]
     look(place, speed, chain.free, chain._replace(rest=chain.rest + time * chain.rate).known, pulls, seen)
     return seen
 
 
-def test_what_is_let_out_takes_from_the_strain_what_h_says() -> None:
-    """With the nodes held, d(energy)/dL is -H: against differences; and the entering length brings its momentum."""
+def test_released_cable_changes_the_strain_energy_by_h() -> None:
+    """With fixed nodes, d(energy)/dL is -H, compared with differences; the released cable adds its momentum."""
     for seed in range(20):
         chain = a_chain(seed, 1.0, behind=2.0)
         still = chain._replace(speed=np.zeros_like(chain.speed))
         step = 1e-6 / chain.rate
         energy = [looked_at(still, time)[1:4].sum() for time in (-step, step)]
-        entering_part = looked_at(still._replace(rate=1e-12))[4]  # H without what moves
+        entering_part = looked_at(still._replace(rate=1e-12))[4]  # H without kinetic terms
         assert (energy[1] - energy[0]) / 2e-6 == pytest.approx(-entering_part, rel=1e-6)
 
 
-def test_elements_lose_what_their_stretching_takes() -> None:
+def test_elements_dissipate_by_their_strain_rates() -> None:
     """Power lost = sum of EA eta l strain_rate^2, the strain rates by differences."""
     for seed in range(20):
         chain = a_chain(seed, 1.0)

@@ -1,4 +1,4 @@
-"""The exact dynamic stiffness of one cable, and its count, against what is known of strings, chains and cables."""
+"""Exact dynamic stiffness of one cable and its count, compared with known results of strings, chains and cables."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sagline.kernels.dynamics.string import BEHIND_X, BEHIND_Y, BEHIND_Z
 from tests.kernels.dynamics.strings import GRAVITY, added, chain, counted, held, string
 from tests.tiers import extended, wide
 
-# taut, sagging, deep, almost folded: T_x, T_z [N], L [m]; 0.1 kg/m
+# taut, sagging, very slack, almost folded: T_x, T_z [N], L [m]; 0.1 kg/m
 CABLES = {
     "taut": string(300.0, 60.0, 10.0, 0.1, 2e5),
     "sagging": string(12.0, -2.0, 10.0, 0.1, 2e5),
@@ -33,7 +33,7 @@ def test_taut_string(number: int, plane: int) -> None:
 
 
 def test_taut_string_s_stiffness() -> None:
-    """Of its end, across: N k/tan(k L) with the chord's stiffness at rest taken away; along: the same of a bar."""
+    """At its end, lateral: N k/tan(k L) minus the chord stiffness at rest; axial: the same for a bar."""
     table = string(50.0, 0.0, 7.0, 0.1, 1e6)
     table[0, 3] = 0.0
     omega = 2.0 * np.pi * np.array([0.5, 3.0, 11.0, 60.0])
@@ -69,7 +69,7 @@ def extrapolated(values: Array) -> Array:
 
 
 def irvine_errors() -> list[float]:
-    """Relative errors of Irvine's formula for the first symmetric frequency at lambda^2 = 1, sag over span halved."""
+    """Errors of Irvine's formula for the first symmetric frequency at lambda^2 = 1, sag over span halved."""
     errors = []
     for ratio in (0.02, 0.01, 0.005, 0.0025):
         span, density = 10.0, 1.0
@@ -95,7 +95,7 @@ def test_irvine_s_first_symmetric_frequency() -> None:
 
 @pytest.mark.parametrize("name", wide(CABLES))
 def test_finite_elements(name: str) -> None:
-    """Chains of springs: order 2, and extrapolated the same stiffness and frequencies."""
+    """Chains of springs: order 2, with the same extrapolated stiffness and frequencies."""
     table = CABLES[name]
     chains = [chain(table, n) for n in (80, 160, 320)]
     limit = 3e-5 if name == "almost folded" else 1e-6
@@ -112,7 +112,7 @@ def test_finite_elements(name: str) -> None:
 
 @extended
 def test_count_against_brute_force() -> None:
-    """Random cables from taut to almost folded, random frequencies: as many as a fine chain has, all up to twenty."""
+    """Random cables from taut to almost folded, random frequencies: the count is that of a fine chain, up to twenty."""
     random = np.random.default_rng(12)
     for _ in range(12):
         weight = 0.1 * GRAVITY * 10.0
@@ -121,12 +121,12 @@ def test_count_against_brute_force() -> None:
         for plane in (0, 1):
             every = np.sqrt(fine.squares(plane)[:21]) / (2.0 * np.pi)
             between = 0.5 * (every[1:] + every[:-1])
-            clear = np.flatnonzero(np.diff(every) > 0.02 * every[1:])  # of what 400 springs err
+            clear = np.flatnonzero(np.diff(every) > 0.02 * every[1:])  # error of 400 springs
             assert counted(table, between[clear])[:, 0, plane].tolist() == (clear + 1).tolist()
 
 
 def test_a_singular_pivot_is_stepped_over() -> None:
-    """At a held frequency itself, and at those of its elements' joints, the count is one of its neighbours'."""
+    """At a frequency of the fixed cable, and at those of its elements, the count is one of its neighbors."""
     table = string(30.0, 40.0, 7.0, 0.1, 1e6)
     table[0, 3] = 0.0
     for number in range(1, 30):
@@ -135,12 +135,12 @@ def test_a_singular_pivot_is_stepped_over() -> None:
         assert np.isfinite(added(table, exact * (1.0 + 1e-9))).all()
 
 
-def test_a_frequency_that_cuts_a_cable_too_fine_is_told() -> None:
+def test_a_frequency_with_too_many_elements_is_reported() -> None:
     assert (counted(CABLES["taut"], 1e12) == collocation.TOO_MANY).all()
 
 
-def test_a_frame_end_that_gives_way() -> None:
-    """A taut string whose frame end sits on a spring, along and across: tan(k L) = -k EA/spring, and the like."""
+def test_a_flexible_frame_end() -> None:
+    """A taut string with a spring at its frame end, lateral and axial: tan(k L) = -k EA/spring, and the like."""
     table = string(50.0, 0.0, 7.0, 0.1, 1e6)
     table[0, 3] = 0.0
     table[0, [BEHIND_X, BEHIND_Z, BEHIND_Y]] = np.sqrt(2e-5), 0.0, 1e-2
@@ -150,7 +150,7 @@ def test_a_frame_end_that_gives_way() -> None:
             k = omega * np.sqrt(0.1 / resistance)
             return float(np.sin(k * 7.0) + give * resistance * k * np.cos(k * 7.0))
 
-        if first is None:  # among many across: where the count of those along rises
+        if first is None:  # among many lateral ones: the step of the count of axial ones
             root = brentq(held_by, 10.0, 1.1 * np.pi / 7.0 * np.sqrt(1e6 / 0.1))
             across = string(50.0, 0.0, 7.0, 0.1, 1e6)
             across[0, 3] = 0.0

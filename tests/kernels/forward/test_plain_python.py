@@ -1,4 +1,4 @@
-"""Forward kernels as plain Python, where an index outside an array raises IndexError: machine code reads on."""
+"""Forward kernels as plain Python, in which an index outside an array raises IndexError, unlike in machine code."""
 
 import os
 import subprocess
@@ -19,7 +19,7 @@ print(*found.pose.position.ravel())
 
 @extended
 @pytest.mark.parametrize("name", ["cogiro"])
-def test_a_forward_solve_from_afar_reads_inside_its_arrays(name: str) -> None:
+def test_a_forward_solution_from_a_distant_start_stays_within_its_arrays(name: str) -> None:
     plain = {**os.environ, "SAGLINE_BACKEND": "python"}
     done = subprocess.run(
         [sys.executable, "-c", SOLVE.format(name=name)], env=plain, capture_output=True, text=True, timeout=300

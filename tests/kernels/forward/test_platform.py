@@ -16,7 +16,7 @@ move, add_force = from_python(statics.moved_pose), from_python(platform.add_forc
 
 
 @pytest.mark.parametrize("size", [1e-12, 0.3, 3.0])
-def test_a_motion_displaces_the_center_of_mass_and_turns_the_platform_about_it(size: float) -> None:
+def test_a_motion_shifts_the_center_of_mass_and_rotates_the_platform_about_it(size: float) -> None:
     rng = np.random.default_rng(7)
     body, motion, moved = rng.normal(size=BODY_COLUMNS), size * rng.normal(size=6), np.full(POSE_COLUMNS, np.nan)
     before = Rotation.random(rng=rng)
@@ -29,7 +29,7 @@ def test_a_motion_displaces_the_center_of_mass_and_turns_the_platform_about_it(s
     np.testing.assert_allclose(displaced, motion[:3], rtol=0.0, atol=2e-15)
 
 
-def test_a_force_in_the_plane_of_a_cable_has_the_moment_of_its_lever() -> None:
+def test_a_force_in_the_plane_of_a_cable_has_the_moment_of_its_lever_arm() -> None:
     rng = np.random.default_rng(8)
     rows, wrench = rng.normal(size=(g.GEOMETRY_ROWS, 3)), rng.normal(size=6)
     horizontal, vertical = 7.0, -3.0

@@ -1,4 +1,4 @@
-"""Cables as they hang, in closed form by the inverse hyperbolic sine: nothing here is taken from the kernels."""
+"""Catenaries in closed form by the inverse hyperbolic sine, independent of the kernels."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from sagline.kernels.interference.catenary_distance import least_distances, work
 
 
 class Hung(NamedTuple):
-    """A cable from `start`, toward an angle about z [rad], by the force at its platform end."""
+    """A cable from `start`, toward an angle about z [rad], with a force at its platform end."""
 
     start: Array
     angle: float
@@ -50,7 +50,7 @@ class Hung(NamedTuple):
 
 
 def random_cable(rng: np.random.Generator, kind: str) -> Hung:
-    """A cable of a kind: taut, sagging, deep, upright, folded, nearly folded, heavy or level."""
+    """A cable of a kind: taut, sagging, very slack, vertical, folded, nearly folded, heavy or level."""
     length = float(rng.uniform(0.5, 15.0))
     weight = float(10.0 ** rng.uniform(-1.0, 1.5))
     load = weight * length
@@ -60,7 +60,7 @@ def random_cable(rng: np.random.Generator, kind: str) -> Hung:
     vertical = load * float(rng.uniform(-1.0, 2.0))
     if kind == "upright":
         vertical = load * float(rng.choice([rng.uniform(1.1, 9.0), -rng.uniform(0.1, 9.0)]))
-    if kind in ("folded", "nearly folded", "level"):  # it turns inside, perhaps at its very end
+    if kind in ("folded", "nearly folded", "level"):  # the curvature has an extremum inside, perhaps at its very end
         vertical = load * float(rng.choice([0.5, rng.uniform(0.0, 1.0), 1e-14, 1.0 - 1e-14]))
     return Hung(
         rng.uniform(-3.0, 3.0, 3), float(rng.uniform(-4.0, 4.0)), horizontal, vertical, length, weight, stiffness
@@ -71,16 +71,16 @@ KINDS = ("taut", "sagging", "deep", "upright", "folded", "nearly folded", "level
 
 
 def random_pair(rng: np.random.Generator) -> tuple[Hung, Hung, bool]:
-    """Two cables, and whether they run side by side; others cross, all but cross, share an end, or are anywhere."""
+    """Two cables, and True if they are side by side; others cross, nearly cross, have a common end, or neither."""
     one, other = (random_cable(rng, str(rng.choice(KINDS))) for _ in range(2))
     match kind := int(rng.integers(6)):
         case 0:  # they cross
             meet = one.points(rng.random()) - other.points(rng.random())
             other = other._replace(start=other.start + meet)
-        case 1:  # they all but cross
+        case 1:  # they nearly cross
             meet = one.points(rng.random()) - other.points(rng.random())
             other = other._replace(start=other.start + meet + 10.0 ** rng.uniform(-9, -1) * rng.normal(size=3))
-        case 2:  # they share an end
+        case 2:  # they have a common end
             other = other._replace(start=one.points(1.0) - other.points(1.0) + other.start)
         case 3:  # side by side
             aside = 10.0 ** rng.uniform(-6, 0) if rng.random() < 0.9 else 0.0
@@ -91,7 +91,7 @@ def random_pair(rng: np.random.Generator) -> tuple[Hung, Hung, bool]:
 
 
 def sampled_distance(one: Hung, other: Hung, count: int = 1501) -> float:
-    """Least distance of count x count points [m], made better by simplex search from the three best ones."""
+    """Least distance of count x count points [m], improved by a simplex search from the three best ones."""
     share = np.linspace(0.0, 1.0, count)
     a, b = one.points(share), other.points(share)
     squares = (a**2).sum(1)[:, None] + (b**2).sum(1) - 2.0 * a @ b.T
@@ -116,7 +116,7 @@ def sampled_distance(one: Hung, other: Hung, count: int = 1501) -> float:
 
 
 def all_pairs(count: int) -> Indices:
-    """Numbers of all pairs of so many."""
+    """Indices of all pairs of a number of cables."""
     return np.array(list(combinations(range(count), 2)), dtype=np.int64)
 
 
@@ -138,7 +138,7 @@ def measured(
 
 
 def nearest_cable_pairs() -> list[tuple[Array, Array]]:
-    """The sixty nearest pairs of cables of four robots at random feasible poses, as rows; shared anchors left out."""
+    """The sixty nearest pairs of cables of four robots at random feasible poses, as rows, without common anchors."""
     rng = np.random.default_rng(60)
     found: list[tuple[float, Array, Array]] = []
     for name in ("article-suspended", "cogiro", "ipanema-1", "expo2015-lucia-pulleys"):

@@ -18,7 +18,7 @@ from tests.tiers import wide
 
 
 @pytest.mark.parametrize("cases", wide([10, 80, pytest.param(6000, marks=pytest.mark.soak)]))
-def test_no_lower_bound_is_above_what_dense_samples_find(cases: int) -> None:
+def test_lower_bounds_are_below_distances_of_dense_samples(cases: int) -> None:
     rng = np.random.default_rng(14)
     for case in range(cases):
         one, other, side_by_side = random_pair(rng)
@@ -28,7 +28,7 @@ def test_no_lower_bound_is_above_what_dense_samples_find(cases: int) -> None:
         size = 1e-12 * (1.0 + np.abs(nearest).max())
         assert low <= sampled + size, case
         assert low <= found, case
-        assert found <= low + precision or side_by_side, case  # which takes more pieces than there is memory for
+        assert found <= low + precision or side_by_side, case  # requires more pieces than the memory holds
         assert found <= sampled + precision, case
         assert np.linalg.norm(nearest[0] - nearest[1]) == pytest.approx(found, abs=size), case
         for cable, place in zip((one, other), nearest, strict=True):  # the points are on the cables
@@ -46,7 +46,7 @@ def test_six_of_the_nearest_cable_pairs_agree_with_brute_force_to_1e_12() -> Non
     assert agreement(nearest_cable_pairs()[::10]) <= 1e-12
 
 
-def test_the_least_of_all_pairs_is_the_same_whether_the_others_are_measured_or_not() -> None:
+def test_the_least_distance_is_the_same_without_the_other_pairs() -> None:
     rng = np.random.default_rng(3)
     rows = np.array([[random_cable(rng, kind).row for kind in ("taut", "sagging", "deep", "upright", "level")]] * 1)
     rows = np.concatenate([rows + 0.0] * 20)
@@ -57,7 +57,7 @@ def test_the_least_of_all_pairs_is_the_same_whether_the_others_are_measured_or_n
     assert (low.min(axis=1) <= each.min(axis=1)).all()
 
 
-def test_radii_are_taken_off_and_missing_tensions_are_nan() -> None:
+def test_radii_are_subtracted_and_missing_tensions_give_nan() -> None:
     rng = np.random.default_rng(4)
     rows = np.array([[random_cable(rng, "sagging").row, random_cable(rng, "taut").row]] * 2)
     rows[1, 0] = np.nan
@@ -72,7 +72,7 @@ def test_radii_are_taken_off_and_missing_tensions_are_nan() -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_pieces_lie_within_their_bulge_of_their_chord_and_not_much_nearer(kind: str) -> None:
+def test_pieces_are_within_a_tight_bound_of_their_chord(kind: str) -> None:
     rng = np.random.default_rng(8)
     for _ in range(60):
         cable = random_cable(rng, kind)
@@ -85,12 +85,12 @@ def test_pieces_lie_within_their_bulge_of_their_chord_and_not_much_nearer(kind: 
         assert piece[0, 3:6] == pytest.approx(points[-1], abs=size)
         beyond = float(from_segment(points, piece[0, :3], piece[0, 3:6]).max())
         assert beyond <= piece[0, BULGE] + size
-        if kind == "taut":  # where the curvature hardly changes, the bound is nearly reached
+        if kind == "taut":  # with nearly constant curvature the bound is nearly reached
             give = cable.weight / cable.stiffness * ((end - begin) * cable.length) ** 2 / 8.0
             assert piece[0, BULGE] <= 1.2 * beyond + give + size
 
 
-def test_a_parabola_s_pieces_touch_their_bulge() -> None:
+def test_pieces_of_a_parabola_reach_the_bound() -> None:
     row = np.zeros(shapes.COLUMNS)
     row[shapes.KIND], row[shapes.LAST], row[shapes.LEVEL] = shapes.PARABOLA, 1.0, 1.0
     row[shapes.SPAN], row[shapes.RISE], row[shapes.DROP] = 10.0, 0.0, 2.0

@@ -1,4 +1,4 @@
-"""What distribution iterations and hanging hand on to each other."""
+"""Data that tension distribution and sag forces exchange in iterations."""
 
 import numpy as np
 
@@ -17,7 +17,7 @@ room_for_cables = from_python(new_cables)
 room_for_balance = from_python(new_balance)
 
 
-def test_cables_take_the_tensions_shared_and_remember_their_pulls() -> None:
+def test_cables_have_the_distributed_tensions_and_keep_their_sag_forces() -> None:
     cables, _ = room_for_cables(memory(), 3, False)
     balance, _ = room_for_balance(memory(), 3, 1)
     balance.tension[:], balance.scale[:] = [10.0, 24.0, 6.0], [1.0, 2.0, 0.5]
@@ -31,7 +31,7 @@ def test_cables_take_the_tensions_shared_and_remember_their_pulls() -> None:
     assert sag_force_change(cables) == 0.5
 
 
-def test_where_a_choice_is_held_and_that_sides_named_before_are_forgotten() -> None:
+def test_held_bounds_are_stored_and_old_ones_discarded() -> None:
     balance, _ = room_for_balance(memory(), 5, 3)
     rng = np.random.default_rng(1)
     balance.null[:] = np.linalg.qr(rng.normal(size=(5, 2)))[0].T
@@ -43,7 +43,7 @@ def test_where_a_choice_is_held_and_that_sides_named_before_are_forgotten() -> N
     assert near.held.labels[0] == 0
 
 
-def test_a_new_pose_knows_nothing_of_the_one_before() -> None:
+def test_a_new_pose_keeps_no_data_of_the_previous_one() -> None:
     kept = room_of(8, 2)
     kept.known[0], kept.basis.labels[0] = 4, 7
     reset_work_arrays(kept)

@@ -1,4 +1,4 @@
-"""Inverse of poses through its entry: balance, limits, every method, no state left from pose to pose."""
+"""Inverse of poses through its entry: balance, limits, all methods, and no state between poses."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ OTHERWISE = range(codes.LOWEST_SUM, codes.POLYGON_WALK + 1)
 
 
 def fixed(array: Array) -> Array:
-    """Read-only, as inputs come from Python: kernels are compiled once for these."""
+    """Read-only, like inputs from Python: kernels are compiled once for these."""
     return locked(array.copy())
 
 
@@ -95,8 +95,8 @@ def solve(
     return answer
 
 
-def left_over(case: Case, pose: Array, results: Array) -> Array:
-    """What the cables' forces at the platform, its weight and the load leave unbalanced, along the free motions."""
+def residual_of(case: Case, pose: Array, results: Array) -> Array:
+    """Residual of cable forces, weight and load along the free motions."""
     case = case._replace(pose=pose)
     chords = case.chords
     level = np.hypot(chords[:, 0], chords[:, 1])
@@ -122,7 +122,7 @@ def left_over(case: Case, pose: Array, results: Array) -> Array:
 
 
 def course(case: Case, count: int, reach: float = 0.3) -> Array:
-    """Poses along a line, the last ones far out."""
+    """Poses on a line, with distant ones at the end."""
     poses = np.tile(case.pose, (count, 1))
     poses[:, 0] += np.linspace(0.0, reach, count)
     poses[:, 2] -= np.linspace(0.0, 0.5 * reach, count)
@@ -130,7 +130,7 @@ def course(case: Case, count: int, reach: float = 0.3) -> Array:
 
 
 def feasible_case(m: int, freedom: Array = EVERY_MOTION, seed: int = 0) -> Case:
-    """The first random robot that can hold its platform."""
+    """The first random robot with a feasible pose."""
     for trial in range(400):
         case = random_case(np.random.default_rng(1000 * seed + trial), m, freedom, flat=freedom is IN_A_PLANE)
         if solve(case).poses[0] == POSE_SOLVED:
@@ -148,7 +148,7 @@ def test_the_platform_is_in_balance(m: int, freedom: Array, otherwise: bool | No
     poses = course(case, 4, 0.02)
     answer = solve(case, poses, otherwise=otherwise)
     for p in np.flatnonzero(answer.poses == POSE_SOLVED):
-        assert np.abs(left_over(case, poses[p], answer.results[:, p])).max() < 1e-9
+        assert np.abs(residual_of(case, poses[p], answer.results[:, p])).max() < 1e-9
         assert np.abs(answer.residuals[p]).max() < 1e-9
         tau = answer.results[tables.TENSION, p]
         assert (tau >= case.robot[:, tables.TENSION_MIN] - 1e-9).all()
@@ -158,7 +158,7 @@ def test_the_platform_is_in_balance(m: int, freedom: Array, otherwise: bool | No
         np.testing.assert_allclose(answer.results[tables.RISE, p], chords[:, 2], rtol=1e-12)
         assert (answer.statuses[p] == codes.CABLE_SOLVED).all()
         length = np.linalg.norm(chords, axis=1)
-        for i in range(m):  # and each cable is as long as one that is hung at its tension from scratch
+        for i in range(m):  # the length of each cable agrees with a single catenary at its tension
             chord = Chord(length[i], chords[i, 2] / length[i], np.hypot(chords[i, 0], chords[i, 1]) / length[i])
             material = Material(case.robot[i, tables.DENSITY], case.robot[i, tables.STIFFNESS])
             expected = from_tension(Model(CATENARY, 0.0, 0.0, GRAVITY), chord, material, tau[i])[0]
@@ -167,14 +167,14 @@ def test_the_platform_is_in_balance(m: int, freedom: Array, otherwise: bool | No
 
 
 @pytest.mark.parametrize("method", [MINIMUM_NORM, codes.QUADRATIC_PROGRAM, *OTHERWISE])
-def test_a_batch_is_its_poses_one_by_one(method: int) -> None:
+def test_a_batch_agrees_with_single_poses(method: int) -> None:
     case = feasible_case(8)
     poses = course(case, 12, 2.0)
     poses[5] = poses[0]
     otherwise = None if method <= codes.QUADRATIC_PROGRAM else True
     together = solve(case, poses, method, goal=90.0, otherwise=otherwise)
     assert together.poses[0] == together.poses[5]
-    assert len(set(together.poses)) > 1  # something went wrong in between, and left nothing behind
+    assert len(set(together.poses)) > 1  # an error in between, without later effects
     for p in range(12):
         alone = solve(case, poses[p : p + 1].copy(), method, goal=90.0, otherwise=otherwise)
         np.testing.assert_array_equal(together.results[:, p], alone.results[:, 0])
@@ -184,7 +184,7 @@ def test_a_batch_is_its_poses_one_by_one(method: int) -> None:
         assert together.poses[p] == alone.poses[0]
 
 
-def test_only_the_poses_asked_for_are_written() -> None:
+def test_only_the_requested_poses_are_written() -> None:
     case = feasible_case(8)
     answer = solve(case, course(case, 5), span=(1, 3))
     assert (answer.poses[[0, 3, 4]] == -7).all()
@@ -195,7 +195,7 @@ def test_only_the_poses_asked_for_are_written() -> None:
 @pytest.mark.parametrize(
     ("variable", "otherwise"), [(CHORD_TENSION, None), (HORIZONTAL_TENSION, None), (FRAME_END_TENSION, True)]
 )
-def test_closest_starts_where_the_pose_before_ended(variable: int, otherwise: bool | None) -> None:
+def test_closest_starts_at_the_tensions_of_the_previous_pose(variable: int, otherwise: bool | None) -> None:
     case = feasible_case(8)
     poses = course(case, 6, 0.05)
     previous = np.full(8, math.nan)
@@ -221,7 +221,7 @@ def shared_tensions(case: Case, variable: int, results: Array) -> Array:
     return np.asarray(np.hypot(results[tables.HORIZONTAL], results[tables.VERTICAL] - weight * results[tables.LENGTH]))
 
 
-def test_an_infeasible_pose_leaves_the_tensions_before_it() -> None:
+def test_an_infeasible_pose_keeps_the_previous_tensions() -> None:
     case = feasible_case(8)
     poses = course(case, 3, 0.0)
     poses[1, 2] += 50.0
@@ -237,7 +237,7 @@ def test_an_infeasible_pose_leaves_the_tensions_before_it() -> None:
 
 
 def in_variable(case: Case, variable: int, tensions: Array) -> Array:
-    """Chord tensions in the distribution's variable."""
+    """Chord tensions in the variable of the distribution."""
     chords = case.chords
     length = np.linalg.norm(chords, axis=1)
     sine, cosine = chords[:, 2] / length, np.hypot(chords[:, 0], chords[:, 1]) / length
@@ -259,11 +259,11 @@ def in_variable(case: Case, variable: int, tensions: Array) -> Array:
 
 
 @pytest.mark.parametrize("variable", [CHORD_TENSION, HORIZONTAL_TENSION, FRAME_END_TENSION])
-def test_the_least_norm_is_that_of_the_variable(variable: int) -> None:
+def test_the_least_norm_is_in_the_variable_of_the_distribution(variable: int) -> None:
     found = 0
     for seed in range(40):
         case = random_case(np.random.default_rng(seed), 14)
-        case.robot[:, tables.TENSION_MIN], case.robot[:, tables.TENSION_MAX] = 0.5, 1e5  # none is met
+        case.robot[:, tables.TENSION_MIN], case.robot[:, tables.TENSION_MAX] = 0.5, 1e5  # no limit is active
         answer = solve(case, method=codes.QUADRATIC_PROGRAM, variable=variable, goal=150.0, otherwise=True)
         tau = answer.results[tables.TENSION, 0]
         if answer.poses[0] != POSE_SOLVED or tau.min() < 1.0:
@@ -272,11 +272,11 @@ def test_the_least_norm_is_that_of_the_variable(variable: int) -> None:
         null = np.linalg.svd(case.structure)[2][6:]
         above, below, here = (in_variable(case, variable, tau * factor) for factor in (1.001, 0.999, 1.0))
         slope, miss = (above - below) / (0.002 * tau), here - 150.0
-        np.testing.assert_allclose(null @ (slope * miss), 0.0, atol=1e-4)  # no way along the null space is better
+        np.testing.assert_allclose(null @ (slope * miss), 0.0, atol=1e-4)  # no direction of the null space is better
     assert found > 3
 
 
-def test_why_there_is_no_answer() -> None:
+def test_reasons_of_failure() -> None:
     case = feasible_case(8)
     broken = case._replace(robot=case.robot.copy())
     broken.robot[:, 3:6] = broken.body[tables.CENTER_X :]
@@ -296,7 +296,7 @@ def robots_of_every_size() -> list[Case]:
     return cases + [random_case(np.random.default_rng(m), m, TO_AND_FRO) for m in (2, 3, 9, 24)]
 
 
-def test_memory_is_enough_for_every_robot_and_way_of_sharing() -> None:
+def test_memory_is_sufficient_for_every_robot_and_method() -> None:
     for case in robots_of_every_size():
         m, n = len(case.robot), len(case.freedom)
         r = m - n
@@ -310,14 +310,14 @@ def test_memory_is_enough_for_every_robot_and_way_of_sharing() -> None:
             enough = room[0].size > 30
             for call in (decided, margined, polygoned):
                 if enough:
-                    if call is not margined or m < 14:  # a margin looks at all choices of columns
+                    if call is not margined or m < 14:  # a margin examines all choices of columns
                         call(case, room)
                 else:
                     with pytest.raises(ValueError, match="total size"):
                         call(case, room)
 
 
-def test_too_little_memory_is_told() -> None:
+def test_too_little_memory_is_reported() -> None:
     case = feasible_case(8)
     numbers, counters = memory_for(8)
     for room in ((numbers[:500].copy(), counters), (numbers, counters[:3].copy()), (numbers[:0], counters[:0])):

@@ -1,4 +1,4 @@
-"""Weightless cables and what is asked of them, written down as kernels take it."""
+"""Weightless cables and their demands as kernel arguments."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ def weightless(low: Array, high: Array) -> Curves:
 
 
 def demand_of(matrix: Array, right: Array, soft: int) -> Demand:
-    """What is asked of weightless cables with a structure matrix (n, m), of which the first rows are forces."""
+    """Demand of weightless cables with a structure matrix (n, m), whose first rows are forces."""
     return Demand(matrix.copy(), np.zeros_like(matrix), right.copy(), soft, float(np.abs(right).max()))
 
 
 def change_from(tau: Array, n: int) -> TensionChange:
-    """A search that begins at tensions (m,); the rest must be written before it is read."""
+    """A search that begins at tensions (m,); other memory must be written before it is read."""
     return TensionChange(tau.copy(), np.full(len(tau), np.nan), np.full(n, np.nan), np.full(n, np.nan))

@@ -23,12 +23,12 @@ class Problem(NamedTuple):
 
     @property
     def is_feasible(self) -> bool:
-        """The verdict of a linear program."""
+        """Verdict of a linear program."""
         return bool(self.program(np.zeros(len(self.null))).status == 0)
 
     @property
     def is_endless(self) -> bool:
-        """Whether the set, if there is one, goes on for ever: some way never leaves a bound with two finite limits.
+        """True for an unbounded set: a direction never leaves a bound with two finite limits.
 
         Of such ways up to a length, the linear program finds one along which tensions without upper limits grow most.
         """
@@ -48,7 +48,7 @@ class Problem(NamedTuple):
         return bool(found.fun < -1e-9)
 
     def program(self, cost: Array) -> linprog:
-        """Least cost over the set, by SciPy."""
+        """Least cost over the set by SciPy."""
         finite = np.isfinite(self.bounds[HIGH])
         rows = np.concatenate((-self.null.T, self.null.T[finite]))
         start = self.bounds[START]
@@ -67,7 +67,7 @@ class Problem(NamedTuple):
 
 
 def random_problem(rng: np.random.Generator, m: int, r: int, feasible: bool = True, open_share: float = 0.0) -> Problem:
-    """Tensions of some hundred newtons; START is perpendicular to the null space, as the minimum norm is."""
+    """Tensions of some hundred newtons; START is perpendicular to the null space, like the minimum norm."""
     null = np.linalg.qr(rng.normal(size=(m, r)))[0].T.copy()
     bounds = np.zeros((3, m))
     start = rng.uniform(20.0, 200.0, m)
@@ -80,7 +80,7 @@ def random_problem(rng: np.random.Generator, m: int, r: int, feasible: bool = Tr
 
 
 def nearness(r: int, reference: Array | None = None, previous: Array | None = None) -> ReferencePoint:
-    """Work arrays for the point of r redundant cables, near to a reference or to 0."""
+    """Work arrays for the point of r redundant cables, nearest to a reference or to 0."""
     held = ActiveSet(
         np.zeros(r + 2, dtype=np.int64),
         np.full((r + 1, r), np.nan),
@@ -92,7 +92,7 @@ def nearness(r: int, reference: Array | None = None, previous: Array | None = No
 
 
 def room_of(m: int, r: int) -> WorkArrays:
-    """What the tension distribution methods work in, with nothing known."""
+    """Work arrays of the tension distribution methods in their initial state."""
     labels = np.full(2 * m + SPARE_CORNERS, -1, dtype=np.int64)
     corners = np.full((2 * m + SPARE_CORNERS, 2), np.nan)
     return WorkArrays(corners, labels, np.zeros(1, dtype=np.int64), basis_of(r + 1), memory())
@@ -108,7 +108,7 @@ def corner_room(m: int) -> tuple[Array, Indices]:
 
 
 def brute_corners(problem: Problem, slack: float = 1e-9) -> Array:
-    """Every crossing of two limits that keeps all others (K, 2)."""
+    """All intersections of two limits that satisfy all others (K, 2)."""
     bounds, null = problem
     sides = [(null[:, i], bounds[row, i] - bounds[START, i]) for i in range(null.shape[1]) for row in (LOW, HIGH)]
     found: list[Array] = []

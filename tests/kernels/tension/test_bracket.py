@@ -1,4 +1,4 @@
-"""Verdicts on curves: by hand for weightless cables, and against a fine grid for two that sag."""
+"""Verdicts on curves: by hand for weightless cables, and compared with a fine grid for two sagging ones."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def test_weightless_cables_by_hand() -> None:
     for right, expected, shortfall in (
         ([1.5, 1.2], POSE_SOLVED, 0.0),
         ([5.0, 0.5], POSE_INFEASIBLE, np.hypot(3.0, 0.5)),
-        ([2.0, 1.0], POSE_SOLVED, 0.0),  # on the border itself
+        ([2.0, 1.0], POSE_SOLVED, 0.0),  # on the boundary itself
         ([2.0 + 1e-6, 1.0], POSE_INFEASIBLE, 1e-6),
     ):
         demand = demand_of(np.eye(2), np.array(right), 2)
@@ -33,7 +33,7 @@ def test_weightless_cables_by_hand() -> None:
         assert by_one == (expected == POSE_INFEASIBLE)
 
 
-def test_no_force_helps_where_moments_are_out_of_reach() -> None:
+def test_no_force_is_sufficient_if_moments_are_infeasible() -> None:
     matrix = np.array([[1.0, 1.0], [1.0, -1.0]])  # two cables up at x = -1 and x = 1
     change = change_from(np.ones(2), 2)
     demand = demand_of(matrix, np.array([2.0, 5.0]), 1)
@@ -46,7 +46,7 @@ def test_no_force_helps_where_moments_are_out_of_reach() -> None:
 
 
 def test_one_sagging_cable_reaches_the_range_of_its_curve() -> None:
-    # one row: tau - sag_force(tau), which need not grow with tau; what it reaches is known from a fine grid
+    # one row: tau - sag_force(tau), which is not monotonic; its range is known from a fine grid
     rng = np.random.default_rng(7)
     verdicts: list[bool] = []
     nearest: list[bool] = []
@@ -59,7 +59,7 @@ def test_one_sagging_cable_reaches_the_range_of_its_curve() -> None:
         bend = np.abs(np.diff(reached)).max()
         right = rng.uniform(reached.min() - 0.2 * np.ptp(reached), reached.max() + 0.2 * np.ptp(reached))
         if min(abs(right - reached.min()), abs(right - reached.max())) < bend:
-            continue  # too near for the grid
+            continue  # too close for the grid
         demand = Demand(np.ones((1, 1)), np.full((1, 1), hanging), np.array([right]), 1, abs(right))
         change = change_from(np.array([low]), 1)
         status, proved, enough, _ = decide(curves, demand, NODES, change, memory(5000))
@@ -71,7 +71,7 @@ def test_one_sagging_cable_reaches_the_range_of_its_curve() -> None:
             assert tau - hanging * pulls_of(curves, 0, change.tau)[0] == pytest.approx(right, rel=1e-8)
         else:
             distance = max(reached.min() - right, right - reached.max())
-            # deep curves have places where no step helps, so that what suffices there is not the least
+            # slack curves have tensions without an improving step, so the sufficient force is not the least one
             assert proved - bend <= distance <= enough + bend
             nearest.append(bool(enough <= distance + bend))
     assert np.mean(nearest) > 0.9

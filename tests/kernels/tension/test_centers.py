@@ -1,4 +1,4 @@
-"""The analytic center against its own condition, and where it starts."""
+"""The analytic center compared with its condition, and its initial points."""
 
 import math
 
@@ -26,7 +26,7 @@ def push(problem: Problem, point: Array) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize(("m", "r"), wide([(8, 2), (7, 1), (9, 3), (14, 8)]))
-def test_the_center_and_those_of_the_rounds_that_follow(m: int, r: int) -> None:
+def test_the_center_in_several_iterations(m: int, r: int) -> None:
     rng = np.random.default_rng(m)
     lost = 0
     for trial in range(25):
@@ -46,7 +46,7 @@ def test_the_center_and_those_of_the_rounds_that_follow(m: int, r: int) -> None:
 
 
 @pytest.mark.parametrize("r", [1, 2, 3])
-def test_infinite_limits_do_not_count_but_an_end_there_must_be(r: int) -> None:
+def test_infinite_limits_are_ignored_and_the_set_must_be_bounded(r: int) -> None:
     rng = np.random.default_rng(1)
     ends = set()
     for trial in range(60):
@@ -55,7 +55,7 @@ def test_infinite_limits_do_not_count_but_an_end_there_must_be(r: int) -> None:
         status = share_at_center(*problem, point, room_of(r + 3, r))
         if problem.is_endless:
             ends.add(False)
-            # beyond a polygon the deepest point of such a set may be found, and Newton's steps then have no end
+            # for polyhedra the search can find the deepest point of such a set, from which Newton's steps have no end
             assert status == POSE_UNBOUNDED or (r > 2 and status == POSE_NOT_CONVERGED)
         elif status == POSE_SOLVED:
             ends.add(True)
@@ -72,12 +72,12 @@ def test_the_deepest_point_by_a_linear_program() -> None:
         assert deepest_point(*problem, room_of(9, 3), point) == POSE_SOLVED
         tensions = problem.tensions(point)
         depth = np.minimum(tensions - problem.bounds[LOW], problem.bounds[HIGH] - tensions).min()
-        for size, there in ((-1e-4, True), (1e-4, False)):  # limits as much narrower leave just one point
+        for size, there in ((-1e-4, True), (1e-4, False)):  # narrower limits leave just one point
             shrunk = problem.bounds + np.array([[0.0], [depth + size], [-depth - size]])
             assert problem._replace(bounds=shrunk).is_feasible == there
 
 
-def test_a_center_from_before_that_no_limit_allows_is_forgotten() -> None:
+def test_an_infeasible_previous_center_is_discarded() -> None:
     problem = random_problem(np.random.default_rng(3), 8, 2)
     room, point = room_of(8, 2), np.full(2, np.nan)
     assert share_at_center(*problem, point, room) == POSE_SOLVED
@@ -88,7 +88,7 @@ def test_a_center_from_before_that_no_limit_allows_is_forgotten() -> None:
     np.testing.assert_allclose(point, expected, atol=1e-6)
 
 
-def test_a_set_too_thin_to_have_an_inside_keeps_the_point() -> None:
+def test_a_set_without_interior_keeps_the_point() -> None:
     null = np.array([[1.0, 0.0], [0.0, 1.0]])
     bounds = np.array([[0.0, 0.0], [2.0, -1.0], [2.0, 1.0]])
     point = np.full(2, np.nan)

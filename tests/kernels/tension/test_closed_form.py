@@ -1,4 +1,4 @@
-"""Closed forms of distribution, step by step in NumPy."""
+"""Closed forms of tension distribution, step by step in NumPy."""
 
 import numpy as np
 import pytest
@@ -15,14 +15,14 @@ share = from_python(share_near_middle)
 
 
 def closed_form(problem: Problem) -> Array:
-    """The tensions nearest to the middle of the limits."""
+    """Tensions nearest to the middle of the limits."""
     bounds, null = problem
     middle = 0.5 * (bounds[LOW] + bounds[HIGH])
     return np.asarray(bounds[START] + null.T @ (null @ (middle - bounds[START])))
 
 
 def improved(problem: Problem) -> Array | None:
-    """The worst cable to its limit, the others nearest to where they were, until all keep theirs."""
+    """Move the worst cable to its limit and the others to the nearest tensions, until all limits are satisfied."""
     bounds, null = problem
     tensions = closed_form(problem)
     held: list[int] = []
@@ -48,7 +48,7 @@ def test_closed_and_improved_closed_form(m: int, r: int) -> None:
     for trial in range(120):
         problem = random_problem(rng, m, r)
         if trial % 2:
-            shift = rng.normal(size=m) * 20.0  # within the row space, as START must stay
+            shift = rng.normal(size=m) * 20.0  # within the row space, in which START must remain
             problem.bounds[START] += shift - problem.null.T @ (problem.null @ shift)
         tension = np.full(m, np.nan)
         first = closed_form(problem)
@@ -64,7 +64,7 @@ def test_closed_and_improved_closed_form(m: int, r: int) -> None:
 
 
 @extended
-def test_puncture_goes_back_towards_the_minimum_norm_as_far_as_limits_let_it() -> None:
+def test_puncture_moves_towards_the_minimum_norm_up_to_the_limits() -> None:
     rng = np.random.default_rng(3)
     for _ in range(80):
         problem = random_problem(rng, 8, 2)
@@ -82,7 +82,7 @@ def test_puncture_goes_back_towards_the_minimum_norm_as_far_as_limits_let_it() -
         assert problem.keeps_limits(tension, 1e-9)
 
 
-def test_puncture_stays_at_a_minimum_norm_that_keeps_all_limits() -> None:
+def test_puncture_is_the_minimum_norm_if_it_is_feasible() -> None:
     problem = random_problem(np.random.default_rng(4), 8, 2)
     problem.bounds[LOW], problem.bounds[HIGH] = problem.bounds[START] - 1.0, problem.bounds[START] + 9.0
     tension = np.full(8, np.nan)

@@ -1,4 +1,4 @@
-"""The least change of a wrench, by hand and against SciPy."""
+"""The least change of a wrench, by hand and compared with SciPy."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def search(matrix: Array, right: Array, low: Array, high: Array, soft: int) -> t
 
 
 def test_by_hand() -> None:
-    # two cables along x and y that sag force with 1 to 2 N; needed: (5, 0.5) N, three too much and half too little
+    # two cables along x and y with forces of 1 to 2 N; required: (5, 0.5) N, three too much and half too little
     left, change = search(np.eye(2), np.array([5.0, 0.5]), np.ones(2), np.full(2, 2.0), 2)
     assert left == pytest.approx(np.hypot(3.0, 0.5), rel=1e-12)
     np.testing.assert_allclose(change.tau, [2.0, 1.0], rtol=1e-12)
@@ -32,18 +32,18 @@ def test_by_hand() -> None:
     assert search(np.eye(2), np.array([1.5, 9.0]), np.ones(2), np.full(2, 2.0), 1)[0] == np.inf
 
 
-def test_the_moment_is_supplied_while_the_force_gives_way() -> None:
-    # two cables up at x = -1 and x = 1: force t1 + t2, moment t1 - t2; needed 10 N and 1 N m, each at most 2 N
+def test_the_moment_is_supplied_and_the_force_is_reduced() -> None:
+    # two cables up at x = -1 and x = 1: force t1 + t2, moment t1 - t2; required 10 N and 1 N m, each at most 2 N
     matrix = np.array([[1.0, 1.0], [1.0, -1.0]])
     left, change = search(matrix, np.array([10.0, 1.0]), np.zeros(2), np.full(2, 2.0), 1)
     assert left == pytest.approx(7.0, rel=1e-12)
     np.testing.assert_allclose(change.tau, [2.0, 1.0], rtol=1e-12)
-    # along (1, y): the second cable, between its limits, gives nothing, so y = 1; the first one is held at its limit
+    # along (1, y): the second cable, between its limits, contributes zero, so y = 1; the first one is at its limit
     np.testing.assert_allclose(change.direction, [1.0, 1.0], rtol=1e-9)
     assert search(matrix, np.array([3.0, 1.0]), np.zeros(2), np.full(2, 2.0), 1)[0] == pytest.approx(0.0, abs=1e-12)
 
 
-def test_forces_alone_against_least_squares() -> None:
+def test_forces_agree_with_least_squares() -> None:
     rng = np.random.default_rng(1)
     for _ in range(60):
         matrix, right = rng.normal(size=(3, 5)), rng.normal(size=3) * 30.0
@@ -51,13 +51,13 @@ def test_forces_alone_against_least_squares() -> None:
         found = lsq_linear(matrix, right, (low, high), method="bvls", tol=1e-14)
         left, change = search(matrix, right, low, high, 3)
         assert left == pytest.approx(float(np.linalg.norm(found.fun)), abs=1e-8)
-        if left > 1e-6:  # what it points at is a proof: the cables give no more along it than is already used
+        if left > 1e-6:  # the direction is a proof: the cables supply no more along it than already used
             along = change.direction @ matrix
             gap = change.direction @ right - np.maximum(along * low, along * high).sum()
             assert gap == pytest.approx(left, rel=1e-7)
 
 
-def test_dependent_moments_are_told() -> None:
+def test_dependent_moments_are_reported() -> None:
     matrix = np.array([[1.0, 1.0, 1.0], [1.0, 2.0, 3.0], [2.0, 4.0, 6.0]])
     left, _ = search(matrix, np.array([1.0, 2.0, 4.0]), np.zeros(3), np.ones(3), 1)
     assert np.isnan(left)

@@ -1,4 +1,4 @@
-"""Capacity margins against linear programs along many directions."""
+"""Capacity margins compared with linear programs along many directions."""
 
 import itertools
 import math
@@ -28,13 +28,13 @@ def test_all_choices_in_order(count: int, m: int) -> None:
         changed = next_choice(chosen, m)
         if changed < 0:
             break
-        assert changed == int((before != chosen).argmax())  # the columns ahead of it are still in the frame
+        assert changed == int((before != chosen).argmax())  # the previous columns are still in the frame
         found.append(tuple(chosen))
     assert found == list(itertools.combinations(range(m), count))
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 6])
-def test_frames_follow_the_choice_and_are_completed_by_the_normal(n: int) -> None:
+def test_frames_of_a_choice_are_completed_by_the_normal(n: int) -> None:
     rng = np.random.default_rng(n)
     matrix = rng.normal(size=(n, 8))
     frame, triangle = np.full((n, n), np.nan), np.full((n, n), np.nan)
@@ -59,7 +59,7 @@ def test_dependent_columns_span_no_face() -> None:
     assert extend(matrix, np.array([0, 2, 3]), 1, frame, triangle) == 3
 
 
-def test_the_most_that_tensions_supply_along_a_normal() -> None:
+def test_the_largest_force_along_a_normal() -> None:
     rng = np.random.default_rng(2)
     for _ in range(30):
         matrix, normal = rng.normal(size=(3, 6)), rng.normal(size=3)
@@ -71,7 +71,7 @@ def test_the_most_that_tensions_supply_along_a_normal() -> None:
     forward, backward = support(matrix, low, high, normal)
     assert (forward if normal @ matrix[:, 2] > 0.0 else backward) == math.inf
     assert math.isfinite(backward if normal @ matrix[:, 2] > 0.0 else forward)
-    matrix[:, 2] -= normal * (normal @ matrix[:, 2]) / (normal @ normal)  # in the face: its limits do not count
+    matrix[:, 2] -= normal * (normal @ matrix[:, 2]) / (normal @ normal)  # in the face, its limits have no effect
     assert np.isfinite(support(matrix, low, high, normal)).all()
 
 

@@ -1,4 +1,4 @@
-"""Distribution nearest to a reference, against DAQP and by hand."""
+"""Tension distribution nearest to a reference, compared with DAQP and by hand."""
 
 import math
 
@@ -32,13 +32,13 @@ def by_daqp(problem: Problem, reference: Array) -> Array:
 
 
 @pytest.mark.parametrize(("m", "r"), wide([(8, 2), (7, 1), (9, 3), (21, 15)]))
-def test_daqp_agrees_and_the_next_round_starts_where_this_one_ended(m: int, r: int) -> None:
+def test_iterations_agree_with_daqp(m: int, r: int) -> None:
     rng = np.random.default_rng(m)
     met = 0
     for _ in range(40):
         problem = random_problem(rng, m, r, open_share=0.2)
         near = nearness(r, rng.normal(size=r) * 100.0)
-        for size in (0.0, 1e-6, 1.0, 20.0):  # rounds: START moves with the sag forces
+        for size in (0.0, 1e-6, 1.0, 20.0):  # iterations: START moves with the sag forces
             moved = problem._replace(bounds=problem.bounds + size * rng.uniform(-1, 1, m) * [[1.0], [0.0], [0.0]])
             tension = np.full(m, np.nan)
             status = share_nearest(*moved, near, tension)
@@ -53,7 +53,7 @@ def test_daqp_agrees_and_the_next_round_starts_where_this_one_ended(m: int, r: i
     assert met > 40
 
 
-def test_a_reference_within_limits_is_the_answer_and_nothing_is_held() -> None:
+def test_a_feasible_reference_is_the_solution_without_active_limits() -> None:
     problem = random_problem(np.random.default_rng(1), 8, 2)
     near = nearness(2, np.array([1e4, 1e4]))
     tension = np.full(8, np.nan)
@@ -92,7 +92,7 @@ def test_the_reference_in_coordinates_of_the_null_space(method: int) -> None:
     np.testing.assert_allclose(near.reference, problem.null @ (weight * (goal - offset)), atol=1e-14)
 
 
-def test_limits_are_kept_on_both_sides() -> None:
+def test_limits_are_satisfied_on_both_sides() -> None:
     bounds = np.array([[0.0, 0.0], [1.0, 1.0], [2.0, math.inf]])
     for tension, slack, kept in (
         ([1.0, 9e9], 0.0, True),

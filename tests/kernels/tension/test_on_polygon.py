@@ -1,4 +1,4 @@
-"""Centroid, interval and the polygon walk's optima, against brute force."""
+"""Centroid, interval and optima by the polygon walk, compared with brute force."""
 
 import math
 
@@ -43,20 +43,20 @@ def test_the_interval_of_one_redundant_cable() -> None:
     assert empty > 10
 
 
-def test_an_interval_without_end_and_one_of_a_point() -> None:
+def test_an_unbounded_interval_and_one_of_a_point() -> None:
     null = np.array([[0.6, 0.8, 0.0]])
     bounds = np.array([[0.0, 0.0, 0.0], [1.2, 0.8, -1.0], [math.inf, math.inf, 1.0]])
     np.testing.assert_allclose(feasible_interval(bounds, null), (2.0, math.inf))
-    bounds[HIGH, 0] = 1.2 * (1.0 - 4e-13)  # passed by rounding only
+    bounds[HIGH, 0] = 1.2 * (1.0 - 4e-13)  # crossed by rounding only
     first, last = feasible_interval(bounds, null)
     assert first == last == pytest.approx(2.0)
-    bounds[HIGH, 0], bounds[START, 2] = 3.0, 1.1  # a cable that nothing moves
+    bounds[HIGH, 0], bounds[START, 2] = 3.0, 1.1  # a cable that the null space does not move
     first, last = feasible_interval(bounds, null)
     assert first > last
 
 
 def expected_point(problem: Problem, method: int, parameter: float, reference: np.ndarray) -> np.ndarray:
-    """The chosen point by brute force: of all corners, of many points on the border, or of many triangles."""
+    """The chosen point by brute force: of all corners, of many points of the boundary, or of many triangles."""
     corners = brute_corners(problem)
     middle = corners.mean(axis=0)
     corners = corners[np.argsort(np.arctan2(*(corners - middle).T[::-1]))]
@@ -76,7 +76,7 @@ def expected_point(problem: Problem, method: int, parameter: float, reference: n
 
 
 @pytest.mark.parametrize(("method", "parameter"), wide([(CENTROID, 0.0), *((POLYGON_WALK, walk) for walk in WALKS)]))
-def test_the_chosen_point_and_the_same_in_rounds_that_follow(method: int, parameter: float) -> None:
+def test_the_chosen_point_in_several_iterations(method: int, parameter: float) -> None:
     rng = np.random.default_rng(2)
     for _ in range(25):
         problem = random_problem(rng, 8, 2)
@@ -114,7 +114,7 @@ def test_one_redundant_cable(method: int, parameter: float) -> None:
         assert near.point[0] == pytest.approx(expected, abs=1e-7)
 
 
-def test_the_centroid_of_a_set_without_end() -> None:
+def test_the_centroid_of_an_unbounded_set() -> None:
     for r in (1, 2):
         problem = random_problem(np.random.default_rng(4), 4, r)
         null = np.array([[0.5, 0.5, 0.5, 0.5], [0.5, -0.5, 0.5, -0.5]])[:r].copy()
@@ -126,8 +126,8 @@ def test_the_centroid_of_a_set_without_end() -> None:
         assert distribute_on_polygon(CENTROID, 0.0, bounds, null, nearness(r), room_of(4, r)) == POSE_SOLVED
 
 
-def test_tied_sums_go_to_the_point_of_the_side_nearest_to_the_goal() -> None:
-    # tensions x, y and 1 - x - y among others: the sum of the first three does not depend on the point
+def test_tied_sums_choose_the_point_of_the_edge_nearest_to_the_reference() -> None:
+    # tensions x, y and 1 - x - y among others: the sum of the first three is constant
     null = np.array([[1.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
     bounds = np.array([[0.0, 0.0, 0.0], [-1.0, -1.0, -5.0], [1.0, 1.0, 5.0]])
     square = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])

@@ -1,4 +1,4 @@
-"""Least p-norms against SciPy and the conditions of optimality."""
+"""Least p-norms compared with SciPy and with the conditions of optimality."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ def size_at(problem: Problem, offset: Array, p: float, point: Array) -> float:
 
 
 def assert_least(problem: Problem, offset: Array, p: float, point: Array) -> None:
-    """The slope of the norm is made of inward normals of limits met (Karush, Kuhn, Tucker)."""
+    """The slope of the norm is a combination of inward normals of active limits (Karush, Kuhn, Tucker)."""
     bounds, null = problem
     tensions = problem.tensions(point)
     assert problem.keeps_limits(tensions, 1e-8)
@@ -44,7 +44,7 @@ def nonnegative(matrix: Array, right: Array) -> tuple[Array, float]:
 
 @pytest.mark.parametrize("p", [2.0, 4.0, 7.0, 50.0])
 @pytest.mark.parametrize(("m", "r"), wide([(8, 2), (7, 1), (9, 3)]))
-def test_the_least_norm_and_those_of_the_rounds_that_follow(m: int, r: int, p: float) -> None:
+def test_the_least_norm_in_several_iterations(m: int, r: int, p: float) -> None:
     rng = np.random.default_rng(m)
     lost = 0
     for trial in range(15):
@@ -82,10 +82,10 @@ def test_scipy_finds_nothing_smaller() -> None:
             assert size_at(problem, offset, p, near.point) <= found.fun * (1 + 1e-9)
 
 
-def test_the_first_exponent_may_be_the_last() -> None:
+def test_a_single_exponent() -> None:
     problem = random_problem(np.random.default_rng(2), 8, 2)
     near = nearness(2)
     status = share_by_norm(2.0, problem.bounds, np.zeros(8), problem.null, near, np.zeros(1, dtype=np.int64), memory())
     assert status == POSE_SOLVED
-    near.reference[:] = problem.null @ -problem.bounds[0]  # of the least 2-norm: START itself, or its projection
+    near.reference[:] = problem.null @ -problem.bounds[0]  # of the least 2-norm: START, or its projection
     assert_least(problem, np.zeros(8), 2.0, near.point)

@@ -1,4 +1,4 @@
-"""The feasible polygon against linear programs, the walk around it, and its corners by brute force."""
+"""The feasible polygon compared with linear programs, the polygon walk, and its corners by brute force."""
 
 import math
 
@@ -29,7 +29,7 @@ def polygon_of(problem: Problem) -> tuple[Array, Indices]:
 
 
 def scattered(rng: np.random.Generator, scale: float = 1.0) -> Problem:
-    """Eight cables whose bounds often have nothing in common."""
+    """Eight cables whose bounds often have no common point."""
     null = np.linalg.qr(rng.normal(size=(8, 2)))[0].T.copy()
     start = rng.normal(size=8) * 3 * scale
     return Problem(np.array([start, -rng.uniform(0, 5, 8) * scale, rng.uniform(0, 5, 8) * scale]), null)
@@ -68,7 +68,7 @@ def test_nearest_point_of_a_square() -> None:
 
 
 def assert_polygon(problem: Problem, corners: Array, labels: Indices) -> None:
-    """Counter-clockwise; each corner on the side before it and the side that leaves it, and within all limits."""
+    """Counter-clockwise; each corner is on the edges before and after it, and within all limits."""
     bounds, null = problem
     m, count = null.shape[1], len(corners)
     assert area_of(corners) >= -1e-9
@@ -97,12 +97,12 @@ def test_corners_by_brute_force(m: int) -> None:
             for corner in expected:
                 assert np.abs(corners - corner).max(axis=1).min() < 1e-7
             assert_polygon(problem, corners, labels)
-    assert signs == {True, False}  # the first four corners come in either sense
+    assert signs == {True, False}  # the first four corners in either orientation
     assert max(sizes) >= min(m, 5)
 
 
 @extended
-def test_infinite_limits_end_at_a_box_that_is_labeled_so() -> None:
+def test_infinite_limits_end_at_a_labeled_box() -> None:
     rng = np.random.default_rng(7)
     ended = set()
     for trial in range(200):
@@ -116,13 +116,13 @@ def test_infinite_limits_end_at_a_box_that_is_labeled_so() -> None:
         closed = all(problem.program(way).status == 0 for way in (*far, np.array([1.0, 1.0]), np.array([-1.0, -1.0])))
         ended.add(bool((labels < 12).all()))
         assert (labels < 12).all() == closed
-        near = brute_corners(problem)  # the finite corners are all there
+        near = brute_corners(problem)  # all finite corners are included
         for corner in near:
             assert np.abs(corners - corner).max(axis=1).min() < 1e-6
     assert ended == {True, False}
 
 
-def test_a_set_as_thin_as_a_segment_or_a_point() -> None:
+def test_sets_that_are_a_segment_or_a_point() -> None:
     null = np.array([[1.0, 0.0, 0.6], [0.0, 1.0, 0.8]])
     bounds = np.array([[0.0, 0.0, 0.0], [2.0, -1.0, -9.0], [2.0, 1.0, 9.0]])
     corners, _ = polygon_of(Problem(bounds, null))
@@ -133,11 +133,11 @@ def test_a_set_as_thin_as_a_segment_or_a_point() -> None:
     corners, _ = polygon_of(Problem(bounds, null))
     assert len(corners) > 0
     np.testing.assert_allclose(corners, [[2.0, 0.0]] * len(corners), atol=1e-10)
-    bounds[LOW, 2] = bounds[HIGH, 2] = 2.1  # y = 1.125: beyond
+    bounds[LOW, 2] = bounds[HIGH, 2] = 2.1  # y = 1.125: infeasible
     assert len(polygon_of(Problem(bounds, null))[0]) == 0
 
 
-def test_limits_the_wrong_way_round_leave_nothing() -> None:
+def test_reversed_limits_give_an_empty_set() -> None:
     rng = np.random.default_rng(8)
     for i in range(6):  # the widest two among them
         problem = random_problem(rng, 6, 2)
@@ -157,7 +157,7 @@ def test_a_cable_that_the_null_space_does_not_move() -> None:
 
 
 @pytest.mark.parametrize("m", [4, 8, 12])
-def test_the_same_sides_again_or_false(m: int) -> None:
+def test_the_same_edges_again_or_false(m: int) -> None:
     rng = np.random.default_rng(20 + m)
     kept, changed = 0, 0
     for _ in range(150):
@@ -175,7 +175,7 @@ def test_the_same_sides_again_or_false(m: int) -> None:
             else:
                 changed += 1
                 assert size > 1e-9
-                # not the same sides: cut off, gone, or the set is empty
+                # other edges: cut off, absent, or the set is empty
                 assert sorted(names) != sorted(labels[:count])
                 again = feasible_polygon(*moved, found, sides)
                 np.testing.assert_array_equal(found[:again], expected)
@@ -184,13 +184,13 @@ def test_the_same_sides_again_or_false(m: int) -> None:
 
 
 def sorted_like(corners: Array, names: Indices, labels: Indices) -> Array:
-    """Corners in the order in which their sides are named elsewhere."""
+    """Corners in the order of the edges of another list."""
     assert sorted(names) == sorted(labels)
     return np.asarray(corners[[list(names).index(label) for label in labels]])
 
 
-def test_an_open_polygon_is_never_the_same_again() -> None:
-    null = np.array([[0.5, 0.5, 0.5, 0.5], [0.5, -0.5, 0.5, -0.5]])  # along the first axis all tensions grow
+def test_an_unbounded_polygon_is_never_reused() -> None:
+    null = np.array([[0.5, 0.5, 0.5, 0.5], [0.5, -0.5, 0.5, -0.5]])  # all tensions grow along the first axis
     problem = Problem(np.array([[0.0] * 4, [1.0, 2.0, 3.0, 4.0], [math.inf] * 4]), null)
     corners, labels = corner_room(4)
     count = feasible_polygon(*problem, corners, labels)

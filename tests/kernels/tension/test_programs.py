@@ -1,4 +1,4 @@
-"""Lowest sum and lowest maximum against SciPy's linear programs, their ties against DAQP."""
+"""Lowest sum and lowest maximum compared with linear programs of SciPy, and ties with DAQP."""
 
 import math
 
@@ -22,14 +22,14 @@ share_lowest_maximum = from_python(p.share_lowest_maximum)
 
 
 def moved_by(problem: Problem, size: float, rng: np.random.Generator) -> Problem:
-    """The same rows with other limits, as the next round has them."""
+    """The same rows with other limits, as in the next iteration."""
     bounds = problem.bounds.copy()
     bounds[START] += size * rng.uniform(-1, 1, bounds.shape[1])
     return problem._replace(bounds=bounds)
 
 
 @pytest.mark.parametrize(("m", "r"), wide([(8, 2), (5, 1), (12, 6)]))
-def test_lowest_sum_and_the_rounds_that_follow(m: int, r: int) -> None:
+def test_lowest_sum_in_several_iterations(m: int, r: int) -> None:
     rng = np.random.default_rng(m)
     outcomes = []
     for _ in range(40):
@@ -51,7 +51,7 @@ def test_lowest_sum_and_the_rounds_that_follow(m: int, r: int) -> None:
 
 
 @pytest.mark.parametrize(("m", "r"), wide([(8, 2), (5, 1), (12, 6)]))
-def test_lowest_maximum_and_the_rounds_that_follow(m: int, r: int) -> None:
+def test_lowest_maximum_in_several_iterations(m: int, r: int) -> None:
     rng = np.random.default_rng(m)
     outcomes = []
     for _ in range(40):
@@ -99,13 +99,13 @@ def nearest_of(problem: Problem, rows: Array, sides: Array, reference: Array) ->
 
 
 def tied_sum(rng: np.random.Generator) -> Problem:
-    """The sum does not feel one of the two directions: a side of the polygon is the answer."""
+    """The sum is constant along one direction: an edge of the polygon is optimal."""
     null = np.array([[0.5, 0.5, 0.5, 0.5, 0.0, 0.0], [0.5, -0.5, 0.5, -0.5, 0.0, 0.0]])
     start = np.append(np.zeros(4), [3.0, 4.0])
     return Problem(np.array([start, np.append(rng.uniform(1, 2, 4), [0.0, 0.0]), np.full(6, 50.0)]), null)
 
 
-def test_a_tied_sum_goes_to_the_reference_in_every_round() -> None:
+def test_a_tied_sum_is_nearest_to_the_reference() -> None:
     rng = np.random.default_rng(1)
     for _ in range(30):
         problem, near, basis = tied_sum(rng), nearness(2, rng.normal(size=2) * 5.0), basis_of(2)
@@ -119,11 +119,11 @@ def test_a_tied_sum_goes_to_the_reference_in_every_round() -> None:
             np.testing.assert_allclose(near.point, expected, atol=1e-6)
 
 
-def test_a_tied_maximum_goes_to_the_reference_in_every_round() -> None:
+def test_a_tied_maximum_is_nearest_to_the_reference() -> None:
     rng = np.random.default_rng(2)
     null = np.array([[1.0, 0.0, 0.0, 0.6], [0.0, 1.0, 0.0, 0.8]])
     for _ in range(30):
-        # the third cable has the largest tension, whatever the point
+        # the third cable has the largest tension at every point
         bounds = np.array([[0.0, 0.0, 40.0, 5.0], rng.uniform(1, 3, 4), [20.0, 25.0, 60.0, 70.0]])
         problem, near, basis = Problem(bounds, null), nearness(2, rng.normal(size=2) * 15.0), basis_of(3)
         offset = np.array([1.0, -1.0, 2.0, 3.0])
@@ -137,7 +137,7 @@ def test_a_tied_maximum_goes_to_the_reference_in_every_round() -> None:
             np.testing.assert_allclose(near.point, expected, atol=1e-6)
 
 
-def test_what_outcomes_mean() -> None:
+def test_meanings_of_outcomes() -> None:
     meanings = {LP_SOLVED: POSE_SOLVED, LP_EMPTY: POSE_INFEASIBLE, LP_UNBOUNDED: POSE_UNBOUNDED}
     for outcome, status in {**meanings, LP_GAVE_UP: POSE_NOT_CONVERGED}.items():
         assert status_of(outcome) == status

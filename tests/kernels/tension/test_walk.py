@@ -1,4 +1,4 @@
-"""The walk around the feasible polygon against its corners by brute force."""
+"""The polygon walk compared with corners by brute force."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Sag forces off their secants, against fine grids of exact sag forces."""
+"""Differences of sag forces from their secants, compared with fine grids of exact sag forces."""
 
 from typing import Any
 
@@ -37,7 +37,7 @@ def cables_and_pulls(rng: np.random.Generator, count: int) -> tuple[Any, Array, 
 
 
 def check(rng: np.random.Generator, count: int) -> Array:
-    """Compare; width of the bounds over the true one, at the cables with a visible one."""
+    """Compare; return the ratio of the width of the bounds to the true one, for cables with a visible width."""
     cables, limits, off, rounding = cables_and_pulls(rng, count)
     found = np.array([off_secant(cables, i, *limits[:, i]) for i in range(count)])
     assert (found[:, 0] <= off.min(axis=1) + rounding).all()
@@ -47,7 +47,7 @@ def check(rng: np.random.Generator, count: int) -> Array:
     return np.asarray((found[seen, 1] - found[seen, 0]) / np.ptp(off[seen], axis=1))
 
 
-def test_no_pull_is_outside_its_bounds_and_most_bounds_are_tight() -> None:
+def test_sag_forces_are_within_tight_bounds() -> None:
     wider = check(np.random.default_rng(31), 6000)
     assert np.median(wider) < 1.3
     assert np.quantile(wider, 0.9) < 8.0

@@ -1,4 +1,4 @@
-"""Centered tensions against scipy's minimum of the same sum, and where a demand is out of reach."""
+"""Centered tensions compared with the minimum by scipy, and infeasible demands."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def _cost(matrix: Array, right: Array, low: Array, high: Array, tau: Array) -> f
     return float(0.5 * np.sum((right - matrix @ tau) ** 2) + SMOOTHING * barrier)
 
 
-def test_against_another_minimizer() -> None:
+def test_centered_tensions_agree_with_another_minimizer() -> None:
     rng = np.random.default_rng(3)
     for m, n in ((8, 6), (4, 3), (7, 2)):
         matrix = rng.normal(size=(n, m))
@@ -46,7 +46,7 @@ def test_against_another_minimizer() -> None:
         assert cost(search.tau) < best.fun + 0.05 * SMOOTHING * m
 
 
-def test_what_is_out_of_reach_leaves_the_distance() -> None:
+def test_an_infeasible_demand_gives_the_distance() -> None:
     # a box of forces 1 to 2 along two axes; the point (5, 0.5) is nearest to its corner (2, 1)
     search = _search(np.ones(2), np.full(2, 2.0), np.array([5.0, 0.5]))
     square = find_center(np.eye(2), 1e-8, search)

@@ -1,4 +1,4 @@
-"""Support functions of sets of loads, and the loads that lie farthest against a direction."""
+"""Support functions of sets of loads, and the extreme loads along a direction."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def support(loads: Loads, along: Array) -> float:
 
 
 @pytest.mark.parametrize("kind", ["segments", "ellipsoids", "polytopes", "all"])
-def test_the_farthest_load_reaches_as_far_as_the_support_function(kind: str) -> None:
+def test_the_extreme_load_agrees_with_the_support_function(kind: str) -> None:
     rng = np.random.default_rng(31)
     for _ in range(20):
         loads, against, wrench = loads_of(kind, rng), rng.normal(size=6), np.full(6, np.nan)
@@ -45,5 +45,5 @@ def test_the_farthest_load_reaches_as_far_as_the_support_function(kind: str) -> 
         assert reach(loads, against) == pytest.approx(most, rel=1e-13)
         farthest(loads, against, wrench)
         assert -against @ (wrench - loads.center) == pytest.approx(most, rel=1e-13)
-        other = rng.normal(size=6)  # it is a load of the set: it reaches no farther than the set in any direction
+        other = rng.normal(size=6)  # it belongs to the set: it is within the support function of every direction
         assert other @ (wrench - loads.center) <= support(loads, other) + 1e-12

@@ -1,4 +1,4 @@
-"""How far cables get in a box of poses, against random poses in it; and the slopes against differences."""
+"""Bounds of cables over a box of poses compared with random poses; slopes compared with differences."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ M = 8
 
 
 class Given(NamedTuple):
-    """A robot at a pose, as kernels take it."""
+    """A robot at a pose, as kernel arguments."""
 
     cables: Array
     body: Array

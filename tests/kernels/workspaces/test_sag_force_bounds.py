@@ -1,4 +1,4 @@
-"""What bounds the change of a sag force, against the sag forces of random cables, one by one."""
+"""Bounds of changes of sag forces compared with sag forces of random cables."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_tensions(soft: bool) -> None:
             change = (sag_forces[0] - sag_forces[2]) / (1e-4 * low)
             assert -rise_rate(curves, i, low) - 1e-8 <= change <= fall_rate(curves, i, low) + 1e-8
             tightest = max(tightest, (sag_forces[0] - sag_forces[1]) / fall(curves, i, low, high))
-    assert soft or tightest > 0.99  # and not larger than need be
+    assert soft or tightest > 0.99  # and the bounds are not much larger than necessary
 
 
 def test_positions() -> None:
@@ -75,7 +75,7 @@ def test_positions() -> None:
     assert tightest > 0.95
 
 
-def test_limits_of_the_frame_end_move_no_faster() -> None:
+def test_frame_end_limits_have_the_same_bounds() -> None:
     rng = np.random.default_rng(3)
     tightest = 0.0
     for _ in range(100):
