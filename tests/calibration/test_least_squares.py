@@ -9,16 +9,7 @@ from sagline.calibration.calibrate import active_sensors
 from sagline.calibration.least_squares import evaluate_step, predict_state, solve
 from sagline.calibration.log import load_cells_of
 from sagline.calibration.parameters import external, parameters_of, with_values
-from sagline.calibration.problem import (
-    Fit,
-    FitProblem,
-    ReadingsTable,
-    SearchState,
-    machine_at,
-    readings_table,
-    reported_lengths,
-    start_of,
-)
+from sagline.calibration.problem import Fit, FitProblem, ReadingsTable, SearchState, readings_table, start_of
 from sagline.core.arrays import Array
 from tests.calibration import reference
 from tests.calibration.machines import robots, standing
@@ -162,10 +153,10 @@ def missed_after(name: str, share: float) -> tuple[float, float]:
         parameters_of(robot, ALL, given, counted=False),
         ReadingsTable(None, lengths, cells, *silent),
     )
-    before = SearchState(problem.prior, machine_at(problem, problem.prior), lengths, reference.pose_rows(pose))
+    before = SearchState(problem.prior, problem.machine_at(problem.prior), lengths, reference.pose_rows(pose))
     step = share * 0.02 * problem.scale * np.cos(np.arange(len(problem.prior)))
-    after, part = machine_at(problem, problem.prior + step), slice(0, len(lengths))
-    found, starts = predict_state(problem, before, None, step, after, reported_lengths(problem, after, part), part)
+    after, part = problem.machine_at(problem.prior + step), slice(0, len(lengths))
+    found, starts = predict_state(problem, before, None, step, after, problem.reported_lengths(after, part), part)
     rest = sl.forward(after.robot, found, sl.Pose.from_quaternion(starts[:, :3], starts[:, 3:]), model)
     assert rest.stable.all()
     ended = reference.pose_rows(rest.pose)

@@ -9,14 +9,7 @@ import numpy as np
 
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary, model_of
-from sagline.calibration.diagnostics import (
-    GOOD,
-    STRANGE,
-    diagnose_log,
-    fits_without_measured_poses,
-    measured_pose_mistakes,
-    wrong_units,
-)
+from sagline.calibration import diagnostics
 from sagline.calibration.evaluation import calibration_of
 from sagline.calibration.findings import Omission
 from sagline.calibration.least_squares import misfit
@@ -110,7 +103,7 @@ def calibrate(
     if (folds := whole_number(folds, "folds", 0, MOST_FOLDS)) == 1:
         raise InvalidValueError("folds", "1", "0 for none, or >= 2", "Give 5, say.")
     checked = None if unknowns is None else checked_unknowns(unknowns)  # before any other work
-    _refuse(wrong_units(robot, log))
+    _refuse(diagnostics.wrong_units(robot, log))
     fit_log, rows, left_out = screen(robot, log)
     sensors = active_sensors(fit_log)
     asked = checked_unknowns(default_unknowns(sensors)) if checked is None else checked
@@ -123,11 +116,11 @@ def calibrate(
         _refuse_mistakes(robot, log, fit_log, parameters, model)
         raise
     departure = float(np.abs(problem.missed(fit.state.numbers)).max())
-    if not fit.converged or misfit(fit.normal) > GOOD or departure > STRANGE:
+    if not fit.converged or misfit(fit.normal) > diagnostics.GOOD or departure > diagnostics.STRANGE:
         _refuse_mistakes(robot, log, fit_log, parameters, model)
     elif Omission.OTHER_EQUILIBRIUM in lost:
         elsewhere = lost[Omission.OTHER_EQUILIBRIUM]
-        _refuse(measured_pose_mistakes(robot, fit_log, elsewhere, parameters.names, model))
+        _refuse(diagnostics.measured_pose_mistakes(robot, fit_log, elsewhere, parameters.names, model))
     validation = cross_validate(problem, fit, kept, folds, robust=robust, progress=progress) if folds else None
     omitted = {**left_out, **{reason: locked(rows[which]) for reason, which in lost.items()}}
     return calibration_of(problem, asked, fit, kept, rows, omitted, log.source, validation)
@@ -160,9 +153,9 @@ def _refuse_mistakes(robot: Robot, log: WinchLog, fit_log: WinchLog, parameters:
     """Reject a log with a likely mistake. Reject measured poses that do not fit, if all other readings fit."""
     if not {"measuring_frame", "target"}.isdisjoint(parameters.names):
         log = log.replace(position=None, rotation=None)  # the axes of the measuring system are not known yet
-    _refuse(diagnose_log(robot, log, model))
-    if fits_without_measured_poses(robot, fit_log, model):
-        _refuse(measured_pose_mistakes(robot, fit_log, np.arange(len(fit_log)), parameters.names, model))
+    _refuse(diagnostics.diagnose_log(robot, log, model))
+    if diagnostics.fits_without_measured_poses(robot, fit_log, model):
+        _refuse(diagnostics.measured_pose_mistakes(robot, fit_log, np.arange(len(fit_log)), parameters.names, model))
 
 
 def _refuse(sentences: Iterable[str]) -> None:

@@ -16,7 +16,7 @@ from sagline.calibration.least_squares import QUANTILE, exceeded_with, whitened_
 from sagline.calibration.observations import BLOCK, with_parameters
 from sagline.calibration.outliers import misfitting, outliers_in
 from sagline.calibration.parameters import KINDS, OF_CELLS, Parameters, Unknown, external, parameters_of, quantities_of
-from sagline.calibration.problem import Fit, FitProblem, reported_lengths
+from sagline.calibration.problem import Fit, FitProblem
 from sagline.calibration.result import Calibration
 from sagline.calibration.weak_identifiability import weak_directions
 from sagline.core.arrays import Array, Flags, Indices, locked
@@ -179,7 +179,7 @@ def _last_readings(problem: FitProblem, wider: FitProblem, fit: Fit) -> tuple[Ar
     state, residuals = fitted._replace(numbers=numbers, machine=machine), []
     triangle = np.zeros((0, numbers.size + 1))
     for part in blocks(len(state.poses), BLOCK):
-        reported = reported_lengths(problem, machine, part)
+        reported = problem.reported_lengths(machine, part)
         rows = whitened_at(wider, state, reported, part, free_of_noise=True)
         residuals.append(np.hstack((reported - state.lengths[part], rows.residual)))
         columns = np.concatenate((rows.matrix, rows.misfit[..., None]), axis=-1)

@@ -12,15 +12,7 @@ from sagline.cables.model import CableModel
 from sagline.calibration.least_squares import best_step, evaluate_step, solve
 from sagline.calibration.log import WinchLog
 from sagline.calibration.parameters import Unknown, parameters_of
-from sagline.calibration.problem import (
-    Evaluated,
-    FitProblem,
-    SearchState,
-    machine_at,
-    readings_table,
-    reported_lengths,
-    start_of,
-)
+from sagline.calibration.problem import Evaluated, FitProblem, SearchState, readings_table, start_of
 from sagline.core.arrays import Array, Indices
 from sagline.core.indices import evenly_spaced
 from sagline.robot.drum import drums_of
@@ -217,7 +209,7 @@ def _fitted(problem: FitProblem, state: SearchState) -> Evaluated:
 
 def _offsets(problem: FitProblem, poses: Pose | None) -> tuple[Array, Array]:
     state = start_of(problem, poses)
-    off = reported_lengths(problem, machine_at(problem, problem.prior), slice(None)) - state.lengths
+    off = problem.reported_lengths(problem.machine_at(problem.prior)) - state.lengths
     middle = np.median(off, axis=0)
     return middle, np.median(np.abs(off - middle), axis=0)
 

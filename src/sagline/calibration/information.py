@@ -79,22 +79,11 @@ def prior_information(rows: Array, root: Array) -> Array:
     return np.asarray(root.T @ root * max(1.0, CONDITION * float((rows**2).sum())))
 
 
-class Choice(NamedTuple):
-    """The most informative candidates, in the order of a greedy choice among them.
-
-    Attributes:
-        order: Their indices, shape (count,).
-        gain: Increase of the log det of the information by the first k candidates, shape (count,).
-        deviation: Standard deviations of the parameters from the priors and the first k candidates, shape (count, P).
-    """
-
-    order: Indices
-    gain: Array
-    deviation: Array
-
-
-def choose_informative(rows: Array, known: Array, count: int) -> Choice:
+def choose_informative(rows: Array, known: Array, count: int) -> tuple[Indices, Array, Array]:
     """D-optimal choice of `count` candidates: a greedy choice, and for few candidates an improvement by exchanges.
+
+    Returns the indices of the candidates in the order of a greedy choice among them; and, for the first k of them, the
+    increase of the log det of the information, (count,), and the standard deviations of the parameters, (count, P).
 
     The increase of log det by the greedy choice is at least 1 - 1/e of the largest possible increase, because log det
     is submodular (Nemhauser, Wolsey & Fisher 1978). The exchanges follow Fedorov 1972.
@@ -111,7 +100,7 @@ def choose_informative(rows: Array, known: Array, count: int) -> Choice:
         candidate, gains[k] = again.best()
         again.take(candidate)
         deviations[k] = np.sqrt(np.diag(again.covariance))
-    return Choice(among[again.chosen], np.cumsum(gains), deviations)
+    return among[again.chosen], np.cumsum(gains), deviations
 
 
 def _exchange(found: Information) -> None:

@@ -15,25 +15,9 @@ from scipy.spatial.transform import Rotation
 from scipy.special import chdtri
 
 from sagline.calibration.log import Sensors, reading_deviations
-from sagline.calibration.observations import (
-    BLOCK,
-    NO_LOAD,
-    MachineTerms,
-    WhitenedRows,
-    counts_at,
-    whitened_rows,
-    winch_slopes,
-)
+from sagline.calibration.observations import BLOCK, NO_LOAD, MachineTerms, WhitenedRows, whitened_rows, winch_slopes
 from sagline.calibration.parameters import left_jacobian
-from sagline.calibration.problem import (
-    Evaluated,
-    Fit,
-    FitProblem,
-    Normal,
-    SearchState,
-    machine_at,
-    reported_lengths,
-)
+from sagline.calibration.problem import Evaluated, Fit, FitProblem, Normal, SearchState
 from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.progress import Progress, blocks
@@ -69,11 +53,10 @@ def whitened_at(
     the noise.
     """
     log, machine = problem.log, state.machine
-    counts, along = (None if log.counts is None else log.counts[part]), reported
-    if free_of_noise and machine.drums is not None:
-        along = state.lengths[part]
-        counts = counts_at(machine.drums, along)
-    slopes = winch_slopes(machine.robot, problem.parameters, counts, along)
+    if free_of_noise:
+        slopes = winch_slopes(machine, state.lengths[part])
+    else:
+        slopes = winch_slopes(machine, reported, None if log.counts is None else log.counts[part])
     readings = PoseReadings(reported, log.cells[part], log.positions[part], log.rotations[part])
     turning = problem.parameters.where[kinds.TURN : kinds.TURN + 3, 0]
     turn = left_jacobian(state.numbers[turning]) if turning[0] >= 0 else None
@@ -136,7 +119,7 @@ def predict_state(
     if known is not None:
         off = np.einsum("nij,nj->ni", known.back, known.misfit - known.matrix @ step)
         return reported + off, before.poses[part]
-    was = reported_lengths(problem, before.machine, part)
+    was = problem.reported_lengths(before.machine, part)
     rows = whitened_at(problem, before, was, part, step)
     off = np.einsum("nij,nj->ni", rows.back, rows.misfit - rows.matrix[..., 0])
     more = off - (before.lengths[part] - was)
@@ -159,14 +142,14 @@ def evaluate_step(
     have less weight. Raises an error if the parameters are invalid for the robot.
     """
     numbers = before.numbers if step is None else np.maximum(before.numbers + step, problem.least)
-    machine = before.machine if step is None else machine_at(problem, numbers)
+    machine = before.machine if step is None else problem.machine_at(numbers)
     count, width = len(before.poses), len(numbers)
     lengths = before.lengths if step is None else np.empty(before.lengths.shape)
     after = SearchState(numbers, machine, lengths, before.poses.copy())
     matrix, gradient = np.zeros((width, width)), np.zeros(width)
     squares, readings, weights = np.full(count, np.inf), np.zeros(count, dtype=np.int64), np.zeros(count)
     for part in blocks(count, BLOCK, progress):
-        reported, starts = reported_lengths(problem, machine, part), before.poses[part]
+        reported, starts = problem.reported_lengths(machine, part), before.poses[part]
         if step is not None:
             after.lengths[part], starts = predict_state(problem, before, known, step, machine, reported, part)
         lengths = after.lengths[part]

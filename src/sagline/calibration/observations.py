@@ -45,34 +45,6 @@ def has_drum_data(robot: Robot) -> bool:
     return robot.winches is not None and all(getattr(robot.winches, name) is not None for name in names)
 
 
-def winch_slopes(robot: Robot, parameters: Parameters, counts: Array | None, lengths: Array) -> Array:
-    """Derivatives of reported lengths (N, m) [m] by length_zero, drum_radius and axial_stiffness [m/N], (3, N, m)."""
-    slopes = np.zeros((SLOPES, *lengths.shape))
-    if counts is None or robot.winches is None:
-        slopes[0] = 1.0
-        return slopes
-    with_radius = bool((parameters.where[kinds.DRUM] >= 0).any())
-    winches, stiffness = robot.winches, robot.cables.axial_stiffness
-    strain = winches.winding_tension / stiffness
-    slopes[2] = lengths * strain / (stiffness * (1.0 + strain))
-    if winches.drum_distance is None and (winches.layers == 1.0).all():  # all turns have the same length
-        slopes[0] = 1.0 / (1.0 + strain)
-        if with_radius:
-            radius, pitch = _known_field(winches, "drum_radius"), _known_field(winches, "groove_pitch")
-            circle = 2.0 * np.pi * (radius + 0.5 * _known_field(robot.cables, "diameter"))
-            turn_slope = 2.0 * np.pi * circle / np.hypot(circle, pitch)  # derivative of a helix length by the radius
-            turns = (counts - winches.count_zero) / (winches.gear * _known_field(winches, "counts_per_turn"))
-            slopes[1] = turns * turn_slope / (1.0 + strain)
-        return slopes
-    for row, name in ((0, "length_zero"), (1, "drum_radius"))[: 1 + with_radius]:
-        value = _known_field(winches, name)
-        step = STEP * value
-        ends = (robot.replace(winches=winches.replace(**{name: value + sign * step})) for sign in (-1.0, 1.0))
-        low, high = (lengths_at_counts(drums_of(end), counts) for end in ends)
-        slopes[row] = (high - low) / (2.0 * step)
-    return slopes
-
-
 def _known_field(of: Winch | Cable, name: str) -> Array:
     """Value of a field, without None, because `drums_of` has checked it."""
     return np.asarray(getattr(of, name))
@@ -182,6 +154,39 @@ def with_parameters(machine: MachineTerms, parameters: Parameters) -> MachineTer
     return machine._replace(parameters=parameters, terms=terms, slopes=slopes_of_values(machine.robot, parameters))
 
 
+def winch_slopes(machine: MachineTerms, lengths: Array, counts: Array | None = None) -> Array:
+    """Derivatives of reported lengths (N, m) [m] by length_zero, drum_radius and axial_stiffness [m/N], (3, N, m).
+
+    counts: the readings (N, m); None for the counts at these lengths.
+    """
+    slopes = np.zeros((SLOPES, *lengths.shape))
+    if machine.drums is None:
+        slopes[0] = 1.0
+        return slopes
+    counts = counts_at(machine.drums, lengths) if counts is None else counts
+    with_radius = bool((machine.parameters.where[kinds.DRUM] >= 0).any())
+    robot, winches = machine.robot, machine.drums.winches
+    stiffness = robot.cables.axial_stiffness
+    strain = winches.winding_tension / stiffness
+    slopes[2] = lengths * strain / (stiffness * (1.0 + strain))
+    if winches.drum_distance is None and (winches.layers == 1.0).all():  # all turns have the same length
+        slopes[0] = 1.0 / (1.0 + strain)
+        if with_radius:
+            radius, pitch = _known_field(winches, "drum_radius"), _known_field(winches, "groove_pitch")
+            circle = 2.0 * np.pi * (radius + 0.5 * _known_field(robot.cables, "diameter"))
+            turn_slope = 2.0 * np.pi * circle / np.hypot(circle, pitch)  # derivative of a helix length by the radius
+            turns = (counts - winches.count_zero) / (winches.gear * _known_field(winches, "counts_per_turn"))
+            slopes[1] = turns * turn_slope / (1.0 + strain)
+        return slopes
+    for row, name in ((0, "length_zero"), (1, "drum_radius"))[: 1 + with_radius]:
+        value = _known_field(winches, name)
+        step = STEP * value
+        ends = (robot.replace(winches=winches.replace(**{name: value + sign * step})) for sign in (-1.0, 1.0))
+        low, high = (lengths_at_counts(drums_of(end), counts) for end in ends)
+        slopes[row] = (high - low) / (2.0 * step)
+    return slopes
+
+
 def whitened_rows(
     machine: MachineTerms,
     readings: PoseReadings,
@@ -227,8 +232,7 @@ def predicted_rows(
 ) -> WhitenedRows:
     """Slopes of readings at equilibria, given by pose rows and unstrained lengths (N, m) [m]; the misfit is zero."""
     machine = machine_of(robot, model, parameters, sensors, np.zeros(robot.cable_count))
-    counts = None if machine.drums is None else counts_at(machine.drums, lengths)
-    slopes, count = winch_slopes(robot, parameters, counts, lengths), len(lengths)
+    slopes, count = winch_slopes(machine, lengths), len(lengths)
     aligned = np.tile([0.0, 0.0, 0.0, 1.0], (count, 1))
     readings = PoseReadings(lengths, np.zeros(lengths.shape), np.zeros((count, 3)), aligned)
     rows = whitened_rows(machine, readings, slopes, poses, lengths)

@@ -22,7 +22,7 @@ from sagline.calibration.observations import (
     whitened_rows,
 )
 from sagline.calibration.parameters import Unknown, parameters_of
-from sagline.calibration.problem import FitProblem, SearchState, reported_lengths
+from sagline.calibration.problem import FitProblem, SearchState
 from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.kernels.calibration.terms import PoseReadings
 from sagline.kinematics.forward_rows import solve_forward_rows
@@ -171,7 +171,7 @@ def outliers_in(
     several cables or no cable can explain the misfit, the whole pose is the outlier.
     """
     log, machine, m = problem.log, state.machine, state.lengths.shape[1]
-    reported = reported_lengths(problem, machine, slice(None))
+    reported = problem.reported_lengths(machine)
     deviation = reading_deviations(machine.sensors, m)
     read = ~np.isnan(np.hstack((log.cells, log.positions, log.rotations[:, :3]))) & np.isfinite(deviation[m:])
     exact = unit_sensors(machine.sensors)

@@ -10,18 +10,8 @@ from typing import Final
 import numpy as np
 
 from sagline.cables.models import Catenary
+from sagline.calibration import information
 from sagline.calibration.candidates import CandidatePoses, candidates_of, shortest_tour, tour_length
-from sagline.calibration.information import (
-    Choice,
-    Situation,
-    choose_informative,
-    deviations_of,
-    error_text,
-    information_of,
-    most_helpful,
-    prior_information,
-    typical_load_cell_deviation,
-)
 from sagline.calibration.log import Sensors
 from sagline.calibration.observations import has_drum_data, predicted_rows
 from sagline.calibration.parameters import (
@@ -159,7 +149,7 @@ def _sensors(plan: CalibrationPoses) -> Iterator[str]:
         ("rotations", read.rotation_deviation, "rad"),
     ):
         if deviation is not None:
-            yield f"{words} ({error_text(float(np.max(deviation)), unit)})"
+            yield f"{words} ({information.error_text(float(np.max(deviation)), unit)})"
 
 
 def _errors(plan: CalibrationPoses, width: int) -> Iterator[str]:
@@ -173,7 +163,9 @@ def _errors(plan: CalibrationPoses, width: int) -> Iterator[str]:
         for unit in dict.fromkeys(np.array(plan.parameters.units)[names == name]):
             mine = (names == name) & (np.array(plan.parameters.units) == unit)
             errors = (plan.parameters.prior_deviation, plan.expected_error, plan.random_error)
-            before, after, usual = (error_text(float(np.sqrt(np.mean(one[mine] ** 2))), str(unit)) for one in errors)
+            before, after, usual = (
+                information.error_text(float(np.sqrt(np.mean(one[mine] ** 2))), str(unit)) for one in errors
+            )
             cells = zip((mine.sum(), before, after, usual), others, strict=True)
             yield f"  {name:<{first}}" + "".join(f"{cell:>{own}}" for cell, own in cells)
 
@@ -272,9 +264,9 @@ def calibration_poses(
     standing, rows = standing.part(stable), _read(rows[stable])
     _refuse(robot, parameters, size, tried, rows)
     root, unit = prior_root(parameters), scale * np.abs(slopes)
-    known = prior_information(rows, root)
-    choice = choose_informative(rows, known, size)
-    order = choice.order[_driving_order(standing.part(choice.order))]
+    known = information.prior_information(rows, root)
+    chosen, gain, deviation = information.choose_informative(rows, known, size)
+    order = chosen[_driving_order(standing.part(chosen))]
     poses, own, random = standing.part(order), rows[order], _random(rows, standing.usual, size, drawn)
     return CalibrationPoses(
         robot=robot,
@@ -283,12 +275,16 @@ def calibration_poses(
         poses=Pose.from_quaternion(poses.poses[:, :3], poses.poses[:, 3:]),
         frame_end_tension=poses.tensions,
         unstrained_length=poses.lengths,
-        expected_error=locked(deviations_of(own, held, root) * unit),
-        random_error=locked(np.median([deviations_of(other, held, root) for other in random], axis=0) * unit),
+        expected_error=locked(information.deviations_of(own, held, root) * unit),
+        random_error=locked(
+            np.median([information.deviations_of(other, held, root) for other in random], axis=0) * unit
+        ),
         share_of_random=_share(known, own, random),
-        gain=locked(choice.gain),
-        enough=_sufficient_count(choice),
-        most_helpful=most_helpful(Situation(robot, _CATENARY, parameters, read, scale, slopes, known, poses, own)),
+        gain=locked(gain),
+        enough=_sufficient_count(deviation),
+        most_helpful=information.most_helpful(
+            information.Situation(robot, _CATENARY, parameters, read, scale, slopes, known, poses, own)
+        ),
     )
 
 
@@ -309,7 +305,7 @@ def _default_sensors(robot: Robot, tensions: Array) -> Sensors:
     winches = robot.winches
     if winches is not None and (winches.load_cell_deviation > 0.0).all():
         return Sensors(tension_deviation=winches.load_cell_deviation)
-    return Sensors(tension_deviation=typical_load_cell_deviation(tensions))
+    return Sensors(tension_deviation=information.typical_load_cell_deviation(tensions))
 
 
 def _scale(parameters: Parameters, slopes: Array) -> tuple[Array, Array]:
@@ -357,7 +353,7 @@ def _random(rows: Array, usual: Flags, count: int, seed: int) -> list[Array]:
 
 def _share(known: Array, rows: Array, random: list[Array]) -> float:
     """Ratio of errors to errors from random poses, in directions with prior errors that random poses at least halve."""
-    own, *others = (information_of(each) for each in (rows, *random))
+    own, *others = (information.information_of(each) for each in (rows, *random))
     size, vectors = np.linalg.eigh(np.mean(others, axis=0))
     seen = vectors[:, size > SEEN]
     if not seen.size:
@@ -366,8 +362,8 @@ def _share(known: Array, rows: Array, random: list[Array]) -> float:
     return float(np.exp(0.5 * np.log(variance[0] / np.median(variance[1:], axis=0)).mean()))
 
 
-def _sufficient_count(choice: Choice) -> int:
-    """Smallest number of poses at which an additional pose reduces no error by more than 1 %."""
-    lowered = (1.0 - choice.deviation[1:] / choice.deviation[:-1]).max(axis=1)
+def _sufficient_count(deviation: Array) -> int:
+    """Smallest number of poses at which an additional pose reduces no error by more than 1 %; deviation: (N, P)."""
+    lowered = (1.0 - deviation[1:] / deviation[:-1]).max(axis=1)
     still = np.flatnonzero(lowered > ENOUGH)
     return int(still[-1]) + 2 if still.size else 1

@@ -111,6 +111,20 @@ class FitProblem(NamedTuple):
         """Lower bounds of the internal parameters, (P,)."""
         return np.array([0.0 if name in _NONNEGATIVE else -np.inf for name in self.parameters.names])
 
+    def machine_at(self, numbers: Array) -> MachineTerms:
+        """Robot and sensors with internal parameters (P,); an error if they are invalid for the robot."""
+        values, parameters = external(self.parameters, numbers), self.parameters
+        robot = with_values(self.robot, parameters, values)
+        sensors, offset = sensors_with(self.sensors, parameters, values), offset_with(self.robot, parameters, values)
+        return machine_of(robot, self.model, parameters, sensors, offset)
+
+    def reported_lengths(self, machine: MachineTerms, part: slice = slice(None)) -> Array:
+        """Lengths reported by the winches [m], (n, m), for some of the poses."""
+        if self.log.counts is not None and machine.drums is not None:
+            return lengths_at_counts(machine.drums, self.log.counts[part])
+        assert self.log.lengths is not None
+        return np.asarray(self.log.lengths[part] + machine.offset)
+
 
 class SearchState(NamedTuple):
     """A state of the search.
@@ -168,24 +182,6 @@ class Fit(NamedTuple):
 Evaluated = tuple[SearchState, Normal]
 
 
-def machine_at(problem: FitProblem, numbers: Array) -> MachineTerms:
-    """Robot and sensors with internal parameters (P,); an error if they are invalid for the robot."""
-    values, parameters = external(problem.parameters, numbers), problem.parameters
-    robot = with_values(problem.robot, parameters, values)
-    sensors = sensors_with(problem.sensors, parameters, values)
-    offset = offset_with(problem.robot, parameters, values)
-    return machine_of(robot, problem.model, parameters, sensors, offset)
-
-
-def reported_lengths(problem: FitProblem, machine: MachineTerms, part: slice) -> Array:
-    """Lengths reported by the winches [m], (n, m), for some of the poses."""
-    log = problem.log
-    if log.counts is not None and machine.drums is not None:
-        return lengths_at_counts(machine.drums, log.counts[part])
-    assert log.lengths is not None
-    return np.asarray(log.lengths[part] + machine.offset)
-
-
 def start_of(problem: FitProblem, commanded: Pose | None) -> SearchState:
     """Initial state: the priors, with the platform at commanded poses or at poses from the reported lengths.
 
@@ -195,11 +191,11 @@ def start_of(problem: FitProblem, commanded: Pose | None) -> SearchState:
     numbers = problem.prior
     offset = offset_with(problem.robot, problem.parameters, problem.parameters.prior)
     machine = machine_of(problem.robot, problem.model, problem.parameters, problem.sensors, offset)
-    reported = reported_lengths(problem, machine, slice(None))
+    reported = problem.reported_lengths(machine)
     poses = _poses(problem, machine, reported, commanded)
     lengths = held_lengths(problem, machine, poses, reported)
     aligned = _aligned(problem, numbers, poses)
-    return SearchState(aligned, machine if aligned is numbers else machine_at(problem, aligned), lengths, poses)
+    return SearchState(aligned, machine if aligned is numbers else problem.machine_at(aligned), lengths, poses)
 
 
 def held_lengths(problem: FitProblem, machine: MachineTerms, poses: Array, reported: Array) -> Array:

@@ -12,16 +12,7 @@ from sagline.calibration.least_squares import evaluate_step, exceeded_with, solv
 from sagline.calibration.log import load_cells_of
 from sagline.calibration.observations import BLOCK, NO_LOAD, MachineTerms
 from sagline.calibration.outliers import EXAMINED, outliers_in
-from sagline.calibration.problem import (
-    Evaluated,
-    Fit,
-    FitProblem,
-    SearchState,
-    held_lengths,
-    machine_at,
-    reported_lengths,
-    start_of,
-)
+from sagline.calibration.problem import Evaluated, Fit, FitProblem, SearchState, held_lengths, start_of
 from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.progress import Progress, blocks
@@ -88,7 +79,7 @@ def _improbable(fit: Fit, kept: Flags) -> Flags:
 def _restart(problem: FitProblem, state: SearchState, which: Flags) -> SearchState:
     """State with some poses restarted by forward kinematics of the reported lengths."""
     machine = state.machine
-    reported = reported_lengths(problem, machine, slice(None))
+    reported = problem.reported_lengths(machine)
     found = search(machine.robot, problem.model, locked(reported[which].copy()), NO_LOAD, None)
     poses, lengths = state.poses.copy(), state.lengths.copy()
     poses[which] = np.where(found.stable[:, None], found.poses, poses[which])
@@ -107,7 +98,7 @@ def _single_cable_outliers(problem: FitProblem, state: SearchState, which: Flags
 
 def _other_equilibrium(problem: FitProblem, state: SearchState, which: Flags) -> Flags:
     """Flags (N,) of the poses of `which` that are far from the forward kinematics of the reported lengths."""
-    reported = reported_lengths(problem, state.machine, slice(None))[which]
+    reported = problem.reported_lengths(state.machine)[which]
     found = search(state.machine.robot, problem.model, locked(reported), NO_LOAD, None)
     far = which.copy()
     far[which] = np.linalg.norm(found.poses[:, :3] - state.poses[which, :3], axis=1) > FAR
@@ -127,7 +118,7 @@ def cross_validate(
     if folds < 2:
         return None
     now, before = np.zeros((2, 4))
-    nominal = machine_at(problem, problem.prior)
+    nominal = problem.machine_at(problem.prior)
     for part in np.array_split(places, folds):
         left = np.zeros(len(kept), dtype=np.bool_)
         left[part] = True
@@ -157,7 +148,7 @@ def _prediction_errors(problem: FitProblem, machine: MachineTerms, starts: Array
     for own in blocks(whole.stop - whole.start, BLOCK):
         part = slice(whole.start + own.start, whole.start + own.stop)
         try:
-            reported = reported_lengths(problem, machine, part)
+            reported = problem.reported_lengths(machine, part)
         except InvalidValueError:  # large errors in the drum data give invalid lengths
             continue
         there = which[part] & np.isfinite(reported).all(axis=1) & (reported > 0.0).all(axis=1)
