@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from attrs import field, frozen
 from numpy.typing import ArrayLike
 
 from sagline.core.arrays import Array, checked
 from sagline.core.errors import InvalidValueError
-from sagline.core.results import Shown
+from sagline.core.fields import given, if_known, reduced
+from sagline.core.results import Shown, set_fields
 from sagline.core.table import Columns, Tabular
 from sagline.robot.pose import Pose, PoseLike, pose_of
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@frozen(eq=False, repr=False, weakref_slot=False)
 class Path(Shown, Tabular):
     """Motion of the platform frame over time, in N samples.
 
@@ -27,7 +28,10 @@ class Path(Shown, Tabular):
             shape (N, 6).
         jerk: d(twist_rate)/dt [m/s^3, rad/s^3], shape (N, 6); None if unknown, for example for sampled poses.
         rests: Times at which the platform rests between two segments, including the first and last time [s], shape
-            (R,). They can be between samples. None if unknown, for example for sampled poses.
+            (R,), strictly increasing. They can be between samples. None if unknown, for example for sampled poses.
+
+    Raises:
+        InvalidValueError: If the times do not increase, a number is not finite, or the lengths differ.
     """
 
     _columns: ClassVar[Columns] = (
@@ -36,49 +40,31 @@ class Path(Shown, Tabular):
         *(f"{name}=twist.{k}" for k, name in enumerate(("vx", "vy", "vz", "wx", "wy", "wz"))),
     )
 
-    time: Array
-    pose: Pose
-    twist: Array
-    twist_rate: Array
-    jerk: Array | None
-    rests: Array | None
+    time: Array = field(converter=given)
+    pose: Pose = field(converter=pose_of)
+    twist: Array = field(converter=given)
+    twist_rate: Array = field(converter=given)
+    jerk: Array | None = field(default=None, converter=if_known)
+    rests: Array | None = field(default=None, converter=if_known)
 
-    def __init__(
-        self,
-        time: ArrayLike,
-        pose: PoseLike,
-        twist: ArrayLike,
-        twist_rate: ArrayLike,
-        jerk: ArrayLike | None = None,
-        rests: ArrayLike | None = None,
-    ) -> None:
-        """Create a path from its fields.
-
-        Args:
-            time: Time of each sample [s], shape (N,), strictly increasing.
-            pose: A batch of N poses.
-            twist: Velocity [m/s] and angular velocity [rad/s], shape (N, 6).
-            twist_rate: First time derivatives of the twist [m/s^2, rad/s^2], shape (N, 6).
-            jerk: Second time derivatives of the twist [m/s^3, rad/s^3], shape (N, 6), or None.
-            rests: Times of rest between segments [s], strictly increasing, from first to last sample time; or None.
-
-        Raises:
-            InvalidValueError: If the times do not increase, a number is not finite, or the lengths differ.
-        """
-        clock, pose = checked_time(time), pose_of(pose)
-        samples = clock.size
-        if pose.shape != (samples,):
-            raise _length_error("pose", pose.shape, samples)
-        object.__setattr__(self, "time", clock)
-        object.__setattr__(self, "pose", pose)
-        object.__setattr__(self, "jerk", None)
-        object.__setattr__(self, "rests", None if rests is None else _checked_rests(rests, clock))
-        rates = [("twist", twist, "m/s or rad/s"), ("twist_rate", twist_rate, "m/s^2 or rad/s^2")]
-        for name, value, unit in [*rates, *([] if jerk is None else [("jerk", jerk, "m/s^3 or rad/s^3")])]:
-            array = checked(value, name, unit, shape=(None, 6))
-            if array.shape != (samples, 6):
-                raise _length_error(name, array.shape, samples)
-            object.__setattr__(self, name, array)
+    def __attrs_post_init__(self) -> None:
+        """Check every field."""
+        clock = checked_time(self.time)
+        if self.pose.shape != clock.shape:
+            raise _length_error("pose", self.pose.shape, clock.size)
+        rests = None if self.rests is None else _checked_rests(self.rests, clock)
+        set_fields(self, time=clock, rests=rests)
+        for name, unit in (
+            ("twist", "m/s or rad/s"),
+            ("twist_rate", "m/s^2 or rad/s^2"),
+            ("jerk", "m/s^3 or rad/s^3"),
+        ):
+            if name == "jerk" and self.jerk is None:
+                continue
+            array = checked(getattr(self, name), name, unit, shape=(None, 6))
+            if array.shape != (clock.size, 6):
+                raise _length_error(name, array.shape, clock.size)
+            set_fields(self, **{name: array})
 
     def __len__(self) -> int:
         """Number of samples."""
@@ -89,9 +75,7 @@ class Path(Shown, Tabular):
         """Time between the first and the last sample [s]."""
         return float(self.time[-1] - self.time[0])
 
-    def __reduce__(self) -> tuple[type[Path], tuple[Array, Pose, Array, Array, Array | None, Array | None]]:
-        """Pickle through the constructor, so that a loaded path is checked and write-locked."""
-        return Path, (self.time, self.pose, self.twist, self.twist_rate, self.jerk, self.rests)
+    __reduce__ = reduced
 
 
 def checked_time(time: ArrayLike, item: str = "time") -> Array:

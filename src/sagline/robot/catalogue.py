@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from importlib.resources import files
 from math import pi
 from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike
+from attrs import field, frozen
 
 from sagline.cables.cable import ROPES, SAFETY
 from sagline.core.arguments import brief, choice
-from sagline.core.arrays import Array, checked, number
+from sagline.core.arrays import Array, checked, number, refuse_first
 from sagline.core.errors import InvalidValueError, nearest
+from sagline.core.fields import given
+from sagline.core.results import set_fields
 from sagline.robot.pose import PoseBox
 from sagline.robot.robot import Robot, box_inertia
 from sagline.robot.winch import Winch
@@ -44,9 +46,8 @@ def preset_text(name: str) -> str:
     if name not in names:
         near = nearest(name, names)
         hint = f"Did you mean {near}? " if near else ""
-        raise InvalidValueError(
-            "robot", repr(name), ", ".join(names), f"{hint}To use a robot file, give its path, such as robot.yaml."
-        )
+        step = f"{hint}To use a robot file, give its path, such as robot.yaml."
+        raise InvalidValueError("robot", repr(name), ", ".join(names), step)
     return (_PRESETS / f"{name}.yaml").read_text(encoding="utf-8")
 
 
@@ -59,85 +60,50 @@ _CORNERS = np.array([[0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.5, -0.5]])
 _POSTS = np.array([[0.5, -0.5], [-0.5, -0.5], [0.0, 0.5]])  # posts at the corners of a triangle in the same rectangle
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@frozen(eq=False)
 class Design:
     """Data of an initial robot design.
 
     Attributes:
         name: Name of the robot.
         frame: Edges of the frame [m], shape (3,); it is on the floor, centered at the origin.
-        platform: Edges of the platform [m], shape (3,).
+        platform: Edges of the platform [m], shape (3,), smaller than the edges of the frame.
         mass: Mass of the platform with its payload [kg].
         rope: Name in the catalogue of ropes.
-        diameter: Diameter of the rope [m].
+        diameter: Diameter of the rope [m], 0.3 mm to 80 mm.
         cables: Number of cables, 6 to 8.
         layout: "top" (all cables from above) or "mixed" (from above and from below).
+
+    Raises:
+        InvalidValueError: If a size is not positive, the platform does not fit, the layout cannot support a load, or
+            the rope is unknown.
     """
 
     name: str
-    frame: Array
-    platform: Array
-    mass: float
-    rope: str
-    diameter: float
-    cables: int
-    layout: str
+    frame: Array = field(converter=given)
+    platform: Array = field(converter=given)
+    mass: float = field(converter=float)
+    rope: str = "dyneema-sk78"
+    diameter: float = 0.006
+    cables: int = 8
+    layout: str = "top"
 
-    def __init__(
-        self,
-        name: str,
-        frame: ArrayLike,
-        platform: ArrayLike,
-        mass: float,
-        rope: str = "dyneema-sk78",
-        diameter: float = 0.006,
-        cables: int = 8,
-        layout: str = "top",
-    ) -> None:
-        """Check the data that `Robot` does not check, or that the messages of `Robot` describe in other terms.
-
-        Args:
-            name: Name of the robot.
-            frame: Edges of the frame [m], shape (3,).
-            platform: Edges of the platform [m], shape (3,), smaller than the edges of the frame.
-            mass: Mass of the platform with its payload [kg].
-            rope: Name in the catalogue of ropes.
-            diameter: Diameter of the rope [m], 0.3 mm to 80 mm.
-            cables: Number of cables, 6 to 8.
-            layout: "top" or "mixed".
-
-        Raises:
-            InvalidValueError: If a size is not positive, the platform does not fit, the layout cannot support a load,
-                or the rope is unknown.
-        """
-        outer = checked(frame, "frame", "m", shape=(3,), above=0.0)
-        inner = checked(platform, "platform", "m", shape=(3,), above=0.0)
-        if (inner >= outer).any():
-            axis = int(np.argmax(inner >= outer))
-            raise InvalidValueError(
-                f"platform[{axis}]",
-                f"{inner[axis]:g} m",
-                f"< frame[{axis}], {outer[axis]:g} m",
-                "Take a smaller platform.",
-            )
-        if choice(layout, "layout", LAYOUTS) == "bottom":
-            raise InvalidValueError(
-                "layout", "'bottom'", "top, mixed", "Cables from below only pull down; add cables from above."
-            )
-        if cables not in COUNTS[layout]:
-            allowed = " or ".join(map(str, COUNTS[layout]))
-            raise InvalidValueError(f"cables of layout {layout}", cables, allowed, "Choose another number or layout.")
-        choice(rope, "rope", tuple(ROPES))
-        if not THINNEST <= diameter <= THICKEST:
-            raise InvalidValueError(
-                "diameter",
-                f"{diameter:g} m",
-                f"{1e3 * THINNEST:g} mm to {1e3 * THICKEST:g} mm",
-                "Give it with its unit.",
-            )
-        values = (name, outer, inner, float(mass), rope, float(diameter), int(cables), layout)
-        for field, value in zip(fields(self), values, strict=True):
-            object.__setattr__(self, field.name, value)
+    def __attrs_post_init__(self) -> None:
+        """Check the data that `Robot` does not check, or that the messages of `Robot` describe in other terms."""
+        outer, inner = (checked(getattr(self, k), k, "m", shape=(3,), above=0.0) for k in ("frame", "platform"))
+        set_fields(self, frame=outer, platform=inner)
+        step = "Take a smaller platform."
+        refuse_first(inner >= outer, "platform", inner, "m", "< frame[{i}], {limit:g} m", step, outer)
+        if choice(self.layout, "layout", LAYOUTS) == "bottom":
+            step = "Cables from below only pull down; add cables from above."
+            raise InvalidValueError("layout", "'bottom'", "top, mixed", step)
+        if self.cables not in COUNTS[self.layout]:
+            item, allowed = f"cables of layout {self.layout}", " or ".join(map(str, COUNTS[self.layout]))
+            raise InvalidValueError(item, self.cables, allowed, "Choose another number or layout.")
+        choice(self.rope, "rope", tuple(ROPES))
+        if not THINNEST <= self.diameter <= THICKEST:
+            allowed = f"{1e3 * THINNEST:g} mm to {1e3 * THICKEST:g} mm"
+            raise InvalidValueError("diameter", f"{self.diameter:g} m", allowed, "Give it with its unit.")
 
     def robot(self) -> Robot:
         """Robot of this design. Its tension limits follow from platform weight and rope strength.
@@ -153,9 +119,8 @@ class Design:
         weakest = SLACK_LIMIT * self.mass * 9.81
         strongest = rope.breaking_force(self.diameter) / SAFETY
         if strongest <= weakest:
-            raise InvalidValueError(
-                "diameter", f"{1e3 * self.diameter:g} mm", "a rope that can carry the load", "Take a thicker rope."
-            )
+            value, allowed = f"{1e3 * self.diameter:g} mm", "a rope that can carry the load"
+            raise InvalidValueError("diameter", value, allowed, "Take a thicker rope.")
         frame, platform = self._anchors()
         return Robot(
             name=self.name,
@@ -283,11 +248,11 @@ class WinchDrive:
             "torque_limit": self.torque_limit,
             "speed_limit": self.speed_limit,
         }
-        for field in fields:
-            if field in given or field not in Winch.__slots__:
+        for name in fields:
+            if name in given or name not in Winch.__slots__:
                 allowed = f"a field of Winch other than {', '.join(given)}"
                 step = "For another drive, use Winch(...)."
-                raise InvalidValueError("field", brief(field), allowed, step)
+                raise InvalidValueError("field", brief(name), allowed, step)
         radius = number(drum_radius, "drum_radius", "m", above=0.0)
         return Winch(drum_radius=radius, **given, **fields)
 
