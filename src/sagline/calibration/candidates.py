@@ -28,21 +28,13 @@ SAME: Final = 1e-6  # smallest distance of two sets of tensions, as a share of t
 
 
 class CandidatePoses(NamedTuple):
-    """N equilibria.
+    """N equilibria."""
 
-    Attributes:
-        poses: Pose rows, shape (N, POSE_COLUMNS).
-        lengths: All cable off the drums [m], shape (N, m).
-        tensions: Tensions at the frame ends [N], shape (N, m).
-        place: Index of the pose, shape (N,); all sets of tensions at one pose have the same index.
-        usual: True if the pose belongs to the uniform distribution over the box, shape (N,).
-    """
-
-    poses: Array
-    lengths: Array
-    tensions: Array
-    place: Indices
-    usual: Flags
+    poses: Array  # pose rows, shape (N, POSE_COLUMNS)
+    lengths: Array  # all cable off the drums [m], shape (N, m)
+    tensions: Array  # tensions at the frame ends [N], shape (N, m)
+    place: Indices  # index of the pose, shape (N,); all sets of tensions at one pose have the same index
+    usual: Flags  # True if the pose belongs to the uniform distribution over the box, shape (N,)
 
     def part(self, which: Flags | Indices | slice) -> CandidatePoses:
         """Subset of the candidates."""

@@ -42,42 +42,26 @@ LENGTH_UNITS: Final = {"": 1.0, "ft": 0.3048, "in": 0.0254}  # [m]
 
 
 class Hypothesis(NamedTuple):
-    """A change of the readings.
+    """A change of the readings."""
 
-    Attributes:
-        lengths: Two cables with exchanged lengths or counts, or None.
-        cells: Two cables with exchanged load cells, or None.
-        flipped: A cable with an encoder that counts backward, or None.
-        moved: Cables with zeros that are computed from the commanded poses.
-        late: Number of rows by which the load cells lag behind the encoders.
-        behind: Number of rows by which the encoders lag behind the load cells and the commanded poses.
-        cell_unit: Unit of the load cells in `CELL_UNITS`; "" for newtons.
-        length_unit: Unit of the lengths in `LENGTH_UNITS`; "" for meters.
-    """
-
-    lengths: tuple[int, int] | None = None
-    cells: tuple[int, int] | None = None
-    flipped: int | None = None
-    moved: tuple[int, ...] = ()
-    late: int = 0
-    behind: int = 0
-    cell_unit: str = ""
-    length_unit: str = ""
+    lengths: tuple[int, int] | None = None  # two cables with exchanged lengths or counts, or None
+    cells: tuple[int, int] | None = None  # two cables with exchanged load cells, or None
+    flipped: int | None = None  # a cable with an encoder that counts backward, or None
+    moved: tuple[int, ...] = ()  # cables with zeros that are computed from the commanded poses
+    late: int = 0  # number of rows by which the load cells lag behind the encoders
+    behind: int = 0  # number of rows by which the encoders lag behind the load cells and the commanded poses
+    cell_unit: str = ""  # unit of the load cells in `CELL_UNITS`; "" for newtons
+    length_unit: str = ""  # unit of the lengths in `LENGTH_UNITS`; "" for meters
 
 
 class _TrialResult(NamedTuple):
-    """Fit of the readings after a change.
+    """Fit of the readings after a change."""
 
-    Attributes:
-        quality: Median over the rows of the sum of squares per reading: 1 if a robot fits within the deviations of the
-            sensors, infinite if none fits.
-        departure: Mean square of the distance of the parameters from their priors, in prior deviations.
-        zeros: Errors of the zeros of the lengths [m], (m,).
-    """
-
+    # median over the rows of the sum of squares per reading: 1 if a robot fits within the deviations of the sensors,
+    # infinite if none fits
     quality: float
-    departure: float
-    zeros: Array
+    departure: float  # mean square of the distance of the parameters from their priors, in prior deviations
+    zeros: Array  # errors of the zeros of the lengths [m], (m,)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

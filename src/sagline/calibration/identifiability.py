@@ -230,36 +230,22 @@ _FORCE: Final = "weigh the platform, or check a load cell with a known weight"
 
 
 class Generator(NamedTuple):
-    """A change of the parameters that changes no reading, if all parameters are unknowns.
+    """A change of the parameters that changes no reading, if all parameters are unknowns."""
 
-    Attributes:
-        name: Name of the quantity.
-        step: Measurement that fixes the quantity.
-        change: Change of every row of `kernels.calibration.kinds`, (KIND_ROWS, m); relative where the logarithm is
-            estimated.
-        lengths: Relative change of the lengths off the drums.
-    """
-
-    name: str
-    step: str
+    name: str  # name of the quantity
+    step: str  # measurement that fixes the quantity
+    # change of every row of `kernels.calibration.kinds`, (KIND_ROWS, m); relative where the logarithm is estimated
     change: Array
-    lengths: float = 0.0
+    lengths: float = 0.0  # relative change of the lengths off the drums
 
 
 class Symmetries(NamedTuple):
-    """The g symmetries of a robot, including changes of the zeros and radii of its drums.
+    """The g symmetries of a robot, including changes of the zeros and radii of its drums."""
 
-    Attributes:
-        each: Symmetries with a name; the columns of the drums follow after these.
-        table: Change of every row of `kinds`, (KIND_ROWS, m, g).
-        lengths: Lengths that the drums pay out minus required lengths, (2 m, g); a combination must make them zero.
-        matters: True for parameters that a symmetry must not change if they are known, (KIND_ROWS, m).
-    """
-
-    each: tuple[Generator, ...]
-    table: Array
-    lengths: Array
-    matters: Flags
+    each: tuple[Generator, ...]  # symmetries with a name; the columns of the drums follow after these
+    table: Array  # change of every row of `kinds`, (KIND_ROWS, m, g)
+    lengths: Array  # lengths that the drums pay out minus required lengths, (2 m, g); a combination must make them zero
+    matters: Flags  # True for parameters that a symmetry must not change if they are known, (KIND_ROWS, m)
 
 
 def _generators(robot: Robot, sensors: Sensors, turn: Array) -> Iterator[Generator]:

@@ -153,29 +153,17 @@ Option = tuple[str, Array]  # text of a measurement, and the information with it
 
 
 class Situation(NamedTuple):
-    """Information about the parameters after the measurements at the chosen poses.
-
-    Attributes:
-        robot: The robot.
-        model: Cable model.
-        parameters: The unknowns.
-        sensors: The sensors.
-        scale: Unit of each internal parameter for the information, shape (P,).
-        slopes: Derivatives of the values with respect to the internal parameters, shape (P,).
-        known: Prior information, with a small value where there is no prior, shape (P, P).
-        standing: The chosen poses.
-        rows: Whitened rows of their readings, in units of `scale`, shape (N, k, P).
-    """
+    """Information about the parameters after the measurements at the chosen poses."""
 
     robot: Robot
     model: CableModel
     parameters: Parameters
     sensors: Sensors
-    scale: Array
-    slopes: Array
-    known: Array
-    standing: CandidatePoses
-    rows: Array
+    scale: Array  # unit of each internal parameter for the information, shape (P,)
+    slopes: Array  # derivatives of the values with respect to the internal parameters, shape (P,)
+    known: Array  # prior information, with a small value where there is no prior, shape (P, P)
+    standing: CandidatePoses  # the chosen poses
+    rows: Array  # whitened rows of their readings, in units of `scale`, shape (N, k, P)
 
     @property
     def information(self) -> Array:

@@ -54,22 +54,16 @@ class WhitenedRows(NamedTuple):
     """Whitened observations at N equilibria: the rows are independent, each with a standard deviation of 1.
 
     The number of rows R of a pose is m + 6, or m if neither positions nor rotations are measured.
-
-    Attributes:
-        matrix: Derivatives by the internal parameters, with adapted true lengths, (N, R, P); rows without a reading are
-            zero. The internal parameter is the logarithm where `logarithmic` is True.
-        misfit: Readings minus predictions, (N, R).
-        residual: Residuals in physical units [N, m, rad] at the given lengths, (N, m + 6); NaN if missing.
-        back: Change of the true lengths [m] per unit of misfit, (N, m, R).
-        motion: Motion of the platform about its center of mass [m, rad], world axes, (N, m + 1, 6). The first m rows
-            are per true length. The last row is for a step along a direction, with adapted lengths. There are no rows
-            without a direction.
     """
 
+    # derivatives by the internal parameters, with adapted true lengths, (N, R, P); rows without a reading are zero. The
+    # internal parameter is the logarithm where `logarithmic` is True
     matrix: Array
-    misfit: Array
-    residual: Array
-    back: Array
+    misfit: Array  # readings minus predictions, (N, R)
+    residual: Array  # residuals in physical units [N, m, rad] at the given lengths, (N, m + 6); NaN if missing
+    back: Array  # change of the true lengths [m] per unit of misfit, (N, m, R)
+    # motion of the platform about its center of mass [m, rad], world axes, (N, m + 1, 6). The first m rows are per true
+    # length. The last row is for a step along a direction, with adapted lengths. There are no rows without a direction
     motion: Array
 
 
@@ -98,33 +92,19 @@ def _sensor_arrays(robot: Robot, sensors: Sensors) -> SensingArrays:
 
 
 class MachineTerms(NamedTuple):
-    """A robot with parameter values and its sensors, in the form of the kernel.
-
-    Attributes:
-        model: Cable model.
-        parameters: The parameters.
-        robot: The robot with the parameter values.
-        sensors: The sensors.
-        offset: Offset of reported lengths [m], (m,).
-        drums: Drums if counts are read; else None.
-        terms: Cable model in the form of the kernel.
-        body: body_table.
-        cables: cable_table.
-        sensing: Sensors in the form of the kernel.
-        slopes: Derivatives of the values by the internal parameters, (P,).
-    """
+    """A robot with parameter values and its sensors, in the form of the kernel."""
 
     model: CableModel
     parameters: Parameters
-    robot: Robot
+    robot: Robot  # the robot with the parameter values
     sensors: Sensors
-    offset: Array
-    drums: Drums | None
-    terms: ForwardTerms
-    body: Array
-    cables: Array
-    sensing: SensingArrays
-    slopes: Array
+    offset: Array  # offset of reported lengths [m], (m,)
+    drums: Drums | None  # drums if counts are read; else None
+    terms: ForwardTerms  # cable model in the form of the kernel
+    body: Array  # body_table
+    cables: Array  # cable_table
+    sensing: SensingArrays  # sensors in the form of the kernel
+    slopes: Array  # derivatives of the values by the internal parameters, (P,)
 
 
 def machine_of(

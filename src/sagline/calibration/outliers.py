@@ -41,51 +41,30 @@ _HALVINGS: Final = 6
 
 
 class _Suspect(NamedTuple):
-    """A possible error at a pose.
+    """A possible error at a pose."""
 
-    Attributes:
-        quantity: Quantity of the `Outlier`.
-        cable: Index of the cable, or None.
-        which: Indices of the changed lengths and readings among all 2 m + 6.
-    """
-
-    quantity: str
-    cable: int | None
-    which: Indices
+    quantity: str  # quantity of the `Outlier`
+    cable: int | None  # index of the cable, or None
+    which: Indices  # indices of the changed lengths and readings among all 2 m + 6
 
 
 class _SuspectFit(NamedTuple):
-    """Best fit of a pose if the suspects may have any errors.
+    """Best fit of a pose if the suspects may have any errors."""
 
-    Attributes:
-        squares: Remaining sum of squares.
-        sizes: Error of each suspect.
-        deviations: Errors in standard deviations.
-    """
-
-    squares: float
-    sizes: list[float]
-    deviations: list[float]
+    squares: float  # remaining sum of squares
+    sizes: list[float]  # error of each suspect
+    deviations: list[float]  # errors in standard deviations
 
 
 class _Case(NamedTuple):
-    """One pose of the log.
+    """One pose of the log."""
 
-    Attributes:
-        machine: The robot with sensors in SI units.
-        deviation: Standard deviations of lengths and readings, (2 m + 6,).
-        readings: Readings at the pose, one row.
-        pose: Pose row, (1, POSE_COLUMNS).
-        lengths: True lengths [m], (1, m).
-        read: Flags of the available readings, (m + 6,).
-    """
-
-    machine: MachineTerms
-    deviation: Array
-    readings: PoseReadings
-    pose: Array
-    lengths: Array
-    read: Flags
+    machine: MachineTerms  # the robot with sensors in SI units
+    deviation: Array  # standard deviations of lengths and readings, (2 m + 6,)
+    readings: PoseReadings  # readings at the pose, one row
+    pose: Array  # pose row, (1, POSE_COLUMNS)
+    lengths: Array  # true lengths [m], (1, m)
+    read: Flags  # flags of the available readings, (m + 6,)
 
     def misses(self) -> tuple[Array, Array]:
         """Reported minus true lengths, and readings minus predictions, (2 m + 6,); slopes by length, (m + 6, m)."""

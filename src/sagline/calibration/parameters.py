@@ -22,33 +22,19 @@ from sagline.robot.winch import Winch
 
 
 class Kind(NamedTuple):
-    """A kind of unknown.
+    """A kind of unknown."""
 
-    Attributes:
-        owner: Object that has the field: "robot", its "cables" or "winches", or the measuring "system".
-        unit: Its unit in SI.
-        first: First row of the kind in `kernels.calibration.kinds`.
-        axes: Names of its components, ("",) for a single number.
-        each: True if every cable has its own value.
-        shared: True if all cables share one value by default.
-        logarithmic: True if the logarithm is estimated, because the value is positive and its deviation is relative.
-        deviation: Standard deviation of a value from a drawing or data sheet, relative if logarithmic.
-        assumed: Standard deviation of a value that is missing in the robot's source.
-        needs: The readings that observe the kind: "counts", "load cells", "positions"; "" for any readings.
-        common: Share of the prior variance that the values of all cables have in common, 0 to 1.
-    """
-
-    owner: str
-    unit: str
-    first: int
-    axes: tuple[str, ...]
-    each: bool
-    shared: bool
-    logarithmic: bool
-    deviation: float
-    assumed: float
-    needs: str = ""
-    common: float = 0.0
+    owner: str  # object that has the field: "robot", its "cables" or "winches", or the measuring "system"
+    unit: str  # its unit in SI
+    first: int  # first row of the kind in `kernels.calibration.kinds`
+    axes: tuple[str, ...]  # names of its components, ("",) for a single number
+    each: bool  # True if every cable has its own value
+    shared: bool  # True if all cables share one value by default
+    logarithmic: bool  # True if the logarithm is estimated, because the value is positive and its deviation is relative
+    deviation: float  # standard deviation of a value from a drawing or data sheet, relative if logarithmic
+    assumed: float  # standard deviation of a value that is missing in the robot's source
+    needs: str = ""  # the readings that observe the kind: "counts", "load cells", "positions"; "" for any readings
+    common: float = 0.0  # share of the prior variance that the values of all cables have in common, 0 to 1
 
 
 _XYZ: Final = ("x", "y", "z")
@@ -362,17 +348,11 @@ _WIDE: Final = 1e3  # largest prior deviation, relative to the usual deviation o
 
 
 class PriorUnits(NamedTuple):
-    """Unknowns in standard deviations of their priors.
+    """Unknowns in standard deviations of their priors."""
 
-    Attributes:
-        scale: One standard deviation in the internal parameters, (P,).
-        units: One standard deviation in the units of the parameters, (P,).
-        free: Indices of the parameters that do not count as known.
-    """
-
-    scale: Array
-    units: Array
-    free: Indices
+    scale: Array  # one standard deviation in the internal parameters, (P,)
+    units: Array  # one standard deviation in the units of the parameters, (P,)
+    free: Indices  # indices of the parameters that do not count as known
 
 
 def prior_units(parameters: Parameters) -> PriorUnits:

@@ -35,21 +35,13 @@ _NONNEGATIVE: Final = ("pulley_radius", "dead_cable")  # kinds with a typical va
 
 
 class ReadingsTable(NamedTuple):
-    """Readings at N poses, NaN if missing.
+    """Readings at N poses, NaN if missing."""
 
-    Attributes:
-        counts: Encoder counts, (N, m), or None.
-        lengths: Reported lengths [m], (N, m), or None; exactly one of counts and lengths is given.
-        cells: Load cell readings [N], (N, m).
-        positions: Measured positions [m], (N, 3).
-        rotations: Measured rotations as unit quaternions, (N, 4).
-    """
-
-    counts: Array | None
-    lengths: Array | None
-    cells: Array
-    positions: Array
-    rotations: Array
+    counts: Array | None  # encoder counts, (N, m), or None
+    lengths: Array | None  # reported lengths [m], (N, m), or None; exactly one of counts and lengths is given
+    cells: Array  # load cell readings [N], (N, m)
+    positions: Array  # measured positions [m], (N, 3)
+    rotations: Array  # measured rotations as unit quaternions, (N, 4)
 
 
 def readings_table(log: WinchLog) -> ReadingsTable:
@@ -61,17 +53,9 @@ def readings_table(log: WinchLog) -> ReadingsTable:
 
 
 class FitProblem(NamedTuple):
-    """The estimation problem.
+    """The estimation problem."""
 
-    Attributes:
-        robot: The robot before the calibration.
-        model: Cable model.
-        sensors: The sensors.
-        parameters: The unknowns.
-        log: The readings.
-    """
-
-    robot: Robot
+    robot: Robot  # the robot before the calibration
     model: CableModel
     sensors: Sensors
     parameters: Parameters
@@ -127,56 +111,33 @@ class FitProblem(NamedTuple):
 
 
 class SearchState(NamedTuple):
-    """A state of the search.
+    """A state of the search."""
 
-    Attributes:
-        numbers: Internal parameters, (P,).
-        machine: The robot with these parameters.
-        lengths: True lengths [m], (N, m).
-        poses: Pose rows, (N, POSE_COLUMNS).
-    """
-
-    numbers: Array
-    machine: MachineTerms
-    lengths: Array
-    poses: Array
+    numbers: Array  # internal parameters, (P,)
+    machine: MachineTerms  # the robot with these parameters
+    lengths: Array  # true lengths [m], (N, m)
+    poses: Array  # pose rows, (N, POSE_COLUMNS)
 
 
 class Normal(NamedTuple):
-    """Normal equations of all poses at a state.
+    """Normal equations of all poses at a state."""
 
-    Attributes:
-        matrix: J^T W J of all poses, without the prior, (P, P).
-        gradient: J^T W y, (P,).
-        squares: Sum of squares of each pose, (N,); infinite for a pose without an equilibrium.
-        readings: Number of readings at each pose, (N,).
-        weights: Weights of the poses, (N,).
-        rows: Whitened readings if the log has one block; None for a longer log, because storing them takes too much
-            memory.
-    """
-
-    matrix: Array
-    gradient: Array
-    squares: Array
-    readings: Indices
-    weights: Array
+    matrix: Array  # J^T W J of all poses, without the prior, (P, P)
+    gradient: Array  # J^T W y, (P,)
+    squares: Array  # sum of squares of each pose, (N,); infinite for a pose without an equilibrium
+    readings: Indices  # number of readings at each pose, (N,)
+    weights: Array  # weights of the poses, (N,)
+    # whitened readings if the log has one block; None for a longer log, because storing them takes too much memory
     rows: WhitenedRows | None
 
 
 class Fit(NamedTuple):
-    """Result of the least squares.
+    """Result of the least squares."""
 
-    Attributes:
-        state: Last state.
-        normal: Normal equations at this state.
-        converged: True if the tolerance is met.
-        iterations: Number of steps.
-    """
-
-    state: SearchState
-    normal: Normal
-    converged: bool
-    iterations: int
+    state: SearchState  # last state
+    normal: Normal  # normal equations at this state
+    converged: bool  # True if the tolerance is met
+    iterations: int  # number of steps
 
 
 Evaluated = tuple[SearchState, Normal]

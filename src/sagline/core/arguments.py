@@ -83,10 +83,7 @@ class _Brief(Repr):
 
 
 def brief(value: object) -> str:
-    """Short text of a value for a message: one line, for any object.
-
-    Returns the type of the object if its text is too long or raises an error.
-    """
+    """Short text of a value for a message, in one line; its type if the text is too long or raises an error."""
     if isinstance(value, type):
         return f"the class {value.__name__}"
     try:
@@ -150,10 +147,7 @@ def label(value: Any, item: str) -> str:
 
 
 def integer(value: Any) -> int | None:
-    """The integer `value`. Booleans and arrays are not accepted, even if an array has one element.
-
-    Returns the integer, or None if the value is not an integer.
-    """
+    """The integer `value`, or None if it is none, such as a Boolean or an array with one element."""
     if isinstance(value, bool | np.bool_) or (isinstance(value, np.ndarray) and value.ndim):
         return None
     try:
@@ -163,10 +157,7 @@ def integer(value: Any) -> int | None:
 
 
 def whole_number(value: Any, item: str, low: int, high: int = sys.maxsize) -> int:
-    """Check that `value` is a whole number from `low` to `high`.
-
-    value: integer of Python or numpy, not a Boolean; high: by default the largest size of a Python container.
-    """
+    """Check that `value` is a whole number from `low` to `high`; an integer of Python or numpy, not a Boolean."""
     number = integer(value)
     if number is not None and low <= number <= high:
         return number
@@ -186,10 +177,7 @@ def flag(value: Any, item: str) -> bool:
 def elements(
     value: Any, single: Any, item: str, step: str, allowed: str = "one or several in a list"
 ) -> tuple[Any, ...]:
-    """Elements of the iterable `value`. One object of the type `single` counts as one element.
-
-    A text, a mapping or an array without axes is one object, although Python can iterate over a text and a mapping.
-    """
+    """Elements of the iterable `value`; a `single` is one element; texts, mappings and numbers are refused."""
     if isinstance(value, single):
         return (value,)
     if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable) or getattr(value, "ndim", 1) == 0:
@@ -216,10 +204,7 @@ def callback(value: Any, item: str) -> Any:
 
 
 def file_path(file: Any, item: str = "file", *, folder: bool = False) -> Path:
-    """Check the path of a file or folder.
-
-    file: the path, as a text or a path object.
-    """
+    """Check the path of a file or folder, a text or a path object."""
     given = os.fspath(file) if isinstance(file, os.PathLike) and not isinstance(file, type) else file
     if not isinstance(given, str):
         raise InvalidValueError(item, brief(file), "the path of a file, a text or a Path", f"Give {item} as a text.")

@@ -45,12 +45,11 @@ def checked(
     infinite: bool = False,
     missing: bool = False,
 ) -> Array:
-    """Locked float64 copy of `value`. If `value` is not allowed, the error names the problem.
+    """Locked float64 copy of `value`, C-contiguous. If `value` is not allowed, the error names the problem.
 
-    unit: unit of the value, for the message; "" if dimensionless; shape: required trailing axes, with None for any
-    length; leading axes are arbitrary; None (default) accepts every shape; above: limit that every value must exceed;
-    missing: True if NaN is allowed. Returns a float64 array, C-contiguous, write-locked, that owns its memory. An array
-    with all these properties, such as a result of sagline, is returned without a copy.
+    unit: unit of the value, for the message; shape: required trailing axes, with None for any length; None (default)
+    accepts every shape; above: limit that every value must exceed; missing: True if NaN is allowed. An array that
+    already has all these properties and owns its memory, such as a result of sagline, is returned without a copy.
     """
     array = value if _is_immutable(value) else numbers(value, item, unit)
     if shape is not None:
@@ -61,10 +60,7 @@ def checked(
 
 
 def numbers(value: ArrayLike, item: str, unit: str) -> Array:
-    """Float64 copy of a caller's numbers in C order, of any shape and range; NaN is allowed.
-
-    value: real number or array of real numbers, neither masked nor with a unit object; unit: its unit, for the message.
-    """
+    """Float64 copy of a caller's real numbers in C order, of any shape and range, also NaN; no mask, no unit."""
     if type(value) in (float, np.float64):
         return np.array(value)
     _refuse_masked_or_with_unit(value, item, unit)
@@ -86,10 +82,7 @@ def numbers(value: ArrayLike, item: str, unit: str) -> Array:
 
 
 def number(value: Any, item: str, unit: str, *, low: float = -np.inf, above: float = -np.inf) -> float:
-    """The single finite number `value`.
-
-    above: limit that the value must exceed.
-    """
+    """The single finite number `value`; above: limit that the value must exceed."""
     return float(exactly(value, item, unit, (), low=low, above=above))
 
 
@@ -127,10 +120,7 @@ def spread(array: Array, shape: tuple[int, ...]) -> Array:
 
 
 def broadcast_shape(item: str, *shapes: tuple[int, ...]) -> tuple[int, ...]:
-    """The shape to which several arrays broadcast.
-
-    item: name of the arrays, for the message.
-    """
+    """The shape to which several arrays broadcast; item: name of the arrays, for the message."""
     try:
         return np.broadcast_shapes(*shapes)
     except ValueError:

@@ -134,10 +134,7 @@ def printable(text: str, kept: str = "") -> str:
 
 
 def is_seen(character: str) -> bool:
-    """True for a visible character, and for a space of any width.
-
-    Invisible formatting marks, such as U+200E and U+200B, give False.
-    """
+    """True for a visible character and for a space; False for formatting marks, such as U+200E and U+200B."""
     return character.isprintable() or unicodedata.category(character) == "Zs"
 
 

@@ -12,11 +12,9 @@ from sagline.core.errors import NoBatchError, NoSuchEntryError
 
 
 def part_of(index: Any, shape: tuple[int, ...], single: str) -> Any:
-    """Checked index along the first axis of a batch.
+    """Checked index along the first axis of a batch: an integer, a slice, or an array of integers or booleans.
 
-    index: a number (negative: from the end), a slice, or a list or array of numbers or booleans; shape: shape of the
-    batch; () for a single entry; single: name of a single entry, "single pose" for instance. Returns an integer, a
-    slice, or an array of integers or booleans.
+    index: as given by a caller; shape: shape of the batch, () for a single entry; single: name of a single entry.
     """
     if not shape:
         raise NoBatchError("index", brief(index), "none", f"A {single} cannot be indexed; use it directly.")
@@ -34,10 +32,7 @@ def part_of(index: Any, shape: tuple[int, ...], single: str) -> Any:
 
 
 def batch_length(shape: tuple[int, ...], single: str) -> int:
-    """Number of entries along the first axis of a batch.
-
-    shape: shape of the batch; () for a single entry; single: name of a single entry, "single pose" for instance.
-    """
+    """Number of entries along the first axis of a batch of shape `shape`; single: name of a single entry."""
     if not shape:
         raise NoBatchError("this", f"a {single}", "a batch", f"A {single} has no length; use it directly.")
     return shape[0]

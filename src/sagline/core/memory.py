@@ -19,11 +19,7 @@ _GROUPS: Final = (  # files with the memory limit and the used memory of a conta
 
 
 def check_memory(item: str, size: float, next_step: str) -> None:
-    """Refuse an allocation of `size` bytes that does not fit into memory.
-
-    item: purpose of the memory, for the message, such as "a path of 2e+08 samples"; size: peak memory. A size below 64
-        MB is not checked.
-    """
+    """Refuse an allocation of `size` bytes that does not fit into memory; item: its purpose. 64 MB are not checked."""
     if size > UNASKED and size > (free := free_memory()):
         # the two numbers must differ in the message
         digits = next((k for k in range(3, 17) if f"{size:.{k}g}" != f"{free:.{k}g}"), 17)
@@ -32,10 +28,7 @@ def check_memory(item: str, size: float, next_step: str) -> None:
 
 
 def check_poses(count: int, cable_count: int, behind: bool) -> None:
-    """Refuse forward or inverse kinematics of `count` poses that do not fit into memory.
-
-    cable_count: number of cables m of the robot; behind: True with pulleys or dead lengths.
-    """
+    """Refuse kinematics of `count` poses that do not fit into memory; behind: True with pulleys or dead lengths."""
     cable = _CABLE_BYTES + (_BEHIND_BYTES if behind else 0.0)
     check_memory(
         f"a batch of {count:,} poses", count * (_POSE_BYTES + cable * cable_count), "Solve the batch in parts."
@@ -43,10 +36,7 @@ def check_poses(count: int, cable_count: int, behind: bool) -> None:
 
 
 def free_memory() -> float:
-    """Memory that is still available to this process [bytes]. Infinite if the system does not report it.
-
-    Returns the smallest of three free memories: of the computer, of its container, and of this process.
-    """
+    """Smallest free memory of computer, container and process [bytes]; infinite if the system does not report it."""
     free = [float("inf")]
     with contextlib.suppress(OSError, ValueError, AttributeError):  # AttributeError: Windows has no sysconf
         free.append(float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE"))

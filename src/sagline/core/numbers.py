@@ -63,8 +63,7 @@ def n(
 def plus_minus(value: SupportsFloat, error: SupportsFloat, unit: str = "", *, prefixed: bool = True) -> str:
     """Number with its standard error, both rounded to two significant digits of the error: "512 ± 12 kN".
 
-    error: standard error of the value, in the unit; infinite or NaN if unknown; prefixed: True to write the unit with
-    its most readable prefix; False in a column of a table.
+    error: in the unit; infinite or NaN if unknown; prefixed: False to write no unit, in a column of a table.
     """
     number, own = float(value), float(error)
     if not (isfinite(number) and isfinite(own) and own > 0.0):
@@ -78,10 +77,7 @@ def plus_minus(value: SupportsFloat, error: SupportsFloat, unit: str = "", *, pr
 
 
 def counted(count: int, noun: str) -> str:
-    """The number `count` with its noun, "1 pose" or "1,200 poses".
-
-    noun: noun in the singular; its plural is formed with s or es.
-    """
+    """The number `count` with its noun, "1 pose" or "1,200 poses"; noun: in the singular."""
     return f"{count:,} {noun}{'' if count == 1 else 'es' if noun.endswith(('ch', 'x')) else 's'}"
 
 

@@ -20,14 +20,11 @@ from sagline.robot.pose import Pose, PoseLike, pose_of
 class RestProfile:
     """Polynomial that increases from 0 to 1 for s from 0 to 1. Its first k derivatives vanish at both ends.
 
-    The derivative of the polynomial is c u^k with u = s (1 - s). The degree of the polynomial is 2 k + 1.
+    Its derivative is c u^k with u = s (1 - s), integrated by the binomial theorem; docs/model.md, section 7.
 
     Attributes:
         order: k, >= 2. It is 2 for the quintic (no acceleration at the ends) and 3 for the septic (also no jerk).
         tail: Coefficients of the polynomial divided by s^(k + 1), constant first.
-
-    Source:
-        c u^k integrated by the binomial theorem; docs/model.md, section 7.
     """
 
     order: int

@@ -23,13 +23,7 @@ _ALIKE = {"cable_count": "", "motion_pattern": "", "tension_limits_of": "", "gra
 
 
 def together(robot: Robot | Sequence[Robot]) -> Robots:
-    """Check a robot, or check that several robots form a batch; several robots are returned as a tuple.
-
-    Several robots must have the same number of cables, motion pattern, plane normal, type of tension limits, and
-    gravity. All other properties may differ.
-
-    robot: a robot, or a sequence of robots.
-    """
+    """Check `robot`: a robot, or several with common properties (`_ALIKE`, plane normal), as a tuple."""
     if isinstance(robot, Robot):
         return robot
     robots = listed(robot, Robot, "robot")
@@ -151,11 +145,10 @@ def outward(robot: Robots, pose: Pose) -> Array:
 
 
 def points_on_pulleys(robot: Robots, pose: Pose, angle: Array) -> Array:
-    """Points on the pulleys at given angles from the entry points of the cables.
+    """Points on the pulleys in the world [m], (..., m, 3); frame anchors for cables without a pulley.
 
     pose: one pose, or a batch of N, which defines the swivel angles of the pulleys; angle: angle along the pulley
-    [rad], 0 at the frame anchor and the wrap angle at the exit point, shape (..., m). Returns points in the world [m],
-    shape (..., m, 3); frame anchors for cables without a pulley.
+    [rad], (..., m): 0 at the frame anchor, the wrap angle at the exit point.
     """
     radius, entry = pulleys_of(robot)
     away = outward(robot, pose) * (radius * (1.0 - np.cos(angle)))[..., None]

@@ -73,10 +73,6 @@ class Design:
         diameter: Diameter of the rope [m], 0.3 mm to 80 mm.
         cables: Number of cables, 6 to 8.
         layout: "top" (all cables from above) or "mixed" (from above and from below).
-
-    Raises:
-        InvalidValueError: If a size is not positive, the platform does not fit, the layout cannot support a load, or
-            the rope is unknown.
     """
 
     name: str
@@ -106,14 +102,7 @@ class Design:
             raise InvalidValueError("diameter", f"{self.diameter:g} m", allowed, "Give it with its unit.")
 
     def robot(self) -> Robot:
-        """Robot of this design. Its tension limits follow from platform weight and rope strength.
-
-        Returns:
-            Robot; assumed values are marked in its field `assumed`.
-
-        Raises:
-            InvalidValueError: If the ropes are too weak for the load, or a value is wrong.
-        """
+        """Robot of this design. Its tension limits follow from platform weight and rope strength."""
         rope = ROPES[self.rope]
         cable = rope.cable(self.diameter)
         weakest = SLACK_LIMIT * self.mass * 9.81
@@ -143,10 +132,7 @@ class Design:
         )
 
     def placed(self, share: float) -> PoseBox:
-        """Box of platform positions around the center of the frame.
-
-        share: edges of the box, divided by the difference of frame edges and platform edges, 0 to 1.
-        """
+        """Box of platform positions around the center of the frame; share: its edges by the free edges, 0 to 1."""
         middle = np.array([0.0, 0.0, 0.5 * self.frame[2]])
         half = 0.5 * share * (self.frame - self.platform)
         return PoseBox(middle - half, middle + half)

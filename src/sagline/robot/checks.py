@@ -65,14 +65,11 @@ def winch_of_each_cable(given: Winch | None, frame: Array) -> Winch | None:
 
 
 def inertia(given: ArrayLike | None, pattern: str, normal: Array | None) -> Array:
-    """Inertia about the center of mass: symmetric, without negative moments, positive about each axis of free rotation.
+    """Inertia about the center of mass [kg m^2], (3, 3): symmetric, without negative moments, or None for zeros.
 
-    A body with three free rotations must also satisfy the triangle inequality: each principal moment is at most the sum
-    of the other two. For a planar platform, the moments about the axes in its plane may be zero, because other tools
-    write zeros. Without rotations all moments may be zero.
-
-    given: inertia [kg m^2], or None; pattern: the motion pattern, which defines the free rotations; normal: unit normal
-    of the plane of a planar pattern, shape (3,); None for the other patterns. Returns a matrix of shape (3, 3).
+    It is positive about each axis of free rotation. A body with three free rotations must also satisfy the triangle
+    inequality: each principal moment is at most the sum of the other two. For a planar platform, the moments about the
+    axes in its plane may be zero, because other tools write zeros. Without rotations all moments may be zero.
     """
     if given is None and pattern in ROTATING:
         step = f"The motion pattern {pattern} has a rotation; give the inertia."

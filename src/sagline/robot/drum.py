@@ -47,11 +47,7 @@ class Drums:
     most: Array
 
     def turns(self, length: Array) -> tuple[Array, Array]:
-        """Turns on the drums, and change of cable length per turn.
-
-        length: lengths off the drums [m], shape (N, m); NaN gives NaN. Returns turns, and change of length per turn
-        [m], both of shape (N, m).
-        """
+        """Turns on the drums, and change of length per turn [m], at lengths off the drums [m], (N, m); NaN for NaN."""
         turns, travel = self._turns(length)
         if (wrong := self._off(turns)) is not None:
             sample, i = wrong
@@ -92,10 +88,7 @@ class Drums:
         return lengths
 
     def zero_and_rate(self) -> tuple[Array, Array]:
-        """Turns on the drums at count_zero, which belong to length_zero, and counts per turn paid out.
-
-        Returns both of shape (m,).
-        """
+        """Turns on the drums at count_zero, which belong to length_zero, and counts per turn paid out, both (m,)."""
         per_turn, length = _given(self.winches, "counts_per_turn"), _given(self.winches, "length_zero", _ZERO_STEP)
         turns, _ = self._turns(length[None])
         if (wrong := self._off(turns)) is not None:
@@ -135,10 +128,10 @@ class Drums:
 
 
 def drums_of(robot: Robot) -> Drums:
-    """The drums of a robot.
+    """Drums of a robot. Its winches need drum_radius and groove_pitch. Its cables need a diameter.
 
-    robot: the robot. Its winches need drum_radius and groove_pitch. Its cables need a diameter. Several layers also
-    need drum_width and cable_length. If the cable exit moves along the drum, cable_length is also needed.
+    Several layers also need drum_width and cable_length. A cable exit that moves along the drum also needs
+    cable_length.
     """
     winches, diameter = robot.winches, robot.cables.diameter
     names = ["drum_radius", "groove_pitch"]
@@ -156,10 +149,7 @@ def drums_of(robot: Robot) -> Drums:
 
 
 def not_given(names: Sequence[str]) -> tuple[str, str]:
-    """Item and value of a message about missing fields.
-
-    names: missing fields, such as "winches: drum_radius", grouped by type. The item names each type only once.
-    """
+    """Item and value of a message about the missing fields `names`; the item names each type only once."""
     if len(names) == 1:
         return names[0], "not given"
     kinds = groupby((name.split(": ", 1) for name in names), key=lambda words: words[0])
@@ -183,10 +173,10 @@ def _tables(winches: Winch, diameter: Array) -> tuple[Array, Array]:
 
 
 def _layer_starts(winches: Winch, table: Array) -> Array:
-    """Lengths off the drum at which the layers begin.
+    """Lengths off the drum at which the layers begin [m].
 
-    Such a length is the cable length, minus the length on the layers below, minus the extra length that the cable
-    between drum and pulley has because it is slanted.
+    Such a length is the cable length minus two lengths: the length on the layers below, and the extra length that the
+    cable between drum and pulley has because it is slanted.
     """
     count = np.arange(int(winches.layers.max()) + 1)
     known = winches.cable_length if winches.cable_length is not None else winches.length_zero
@@ -212,16 +202,12 @@ def _limits(winches: Winch, robot: Robot) -> tuple[Array, Array, Array]:
 
 
 def drum_tension(state: Equilibrium) -> Array:
-    """Tension of the cables at the drum; friction is included if the state has winding directions.
+    """Tension of the cables at the drum [N], (m,) or (N, m); with friction if the state has winding directions.
 
     Along an exact cable without friction, T + T^2/(2 EA) - w z is constant (z is the height). With the other models,
-    the cable between pulley and drum has no weight, and its tension is the chord tension.
-
-    Returns tensions [N], shape (m,) or (N, m). The tension of a slack cable that leaves a drum downward is negative.
-    The tension is NaN if it would compress the cable to a negative length.
-
-    Source:
-        docs/model.md, section 10.
+    the cable between pulley and drum has no weight, and its tension is the chord tension. The tension of a slack cable
+    that leaves a drum downward is negative; NaN if it would compress the cable to a negative length. docs/model.md,
+    section 10.
     """
     robot, cables = state.one_robot, state.cables
     if state.contact is not None and differs(robot, state.contact.winding) and state.contact.winding is not None:
@@ -240,11 +226,7 @@ def drum_tension(state: Equilibrium) -> Array:
 
 
 def warmth(robot: Robot, temperature: Any) -> Array | float:
-    """Factor of thermal expansion of the cables.
-
-    temperature: difference from the reference temperature [K], one number or one per cable. Returns 1 + expansion *
-    temperature, shape (m,) or a number.
-    """
+    """Factor of thermal expansion 1 + expansion * `temperature`, (m,) or a number; temperature difference [K]."""
     difference = checked(temperature, "temperature", "K")
     if difference.shape not in ((), (robot.cable_count,)):
         allowed, step = f"shape () or ({robot.cable_count},)", "Give one value, or one value per cable."
@@ -282,10 +264,9 @@ def _at(item: str, sample: int, cable: int, samples: int) -> str:
 
 
 def drum_lever(robot: Robot, length: Array) -> Array:
-    """Cable length per radian of drum rotation [m], at given lengths off the drums.
+    """Cable length per radian of drum rotation [m], at lengths off the drums (m,) or (N, m) [m].
 
-    length: unstrained lengths off the drums [m], (m,) or (N, m). Returns the levers of the layers in use, with the
-    shape of the lengths. If drum data are unknown, the lever is drum_radius plus half the cable diameter.
+    These are the levers of the layers in use; drum_radius plus half the cable diameter if drum data are unknown.
     """
     winch = robot.winches
     if winch is None or winch.drum_radius is None:

@@ -221,11 +221,7 @@ def of_equilibrium(function: Callable[Concatenate[Equilibrium, _P], _R_co]) -> O
 
 
 def limited_tension(robot: Robots, cables: CableState, contact: Contact | None = None) -> Array:
-    """Tension to which the limits of a robot apply: chord tension or frame-end tension.
-
-    robot: the robot, or several with common properties; cables: state of their cables, fields of shape (m,) or (N, m);
-    contact: their contact with pulleys, or None. Returns tensions [N] with the shape of the cable fields.
-    """
+    """Tension to which the limits of the robot or robots apply [N]: chord tension or frame-end tension."""
     if first_of(robot).tension_limits_of == "frame_end":
         return cables.frame_end_tension
     return cables.chord_tension if contact is None else contact.chord_tension
@@ -237,7 +233,7 @@ def cables_of_results(
     """States of the free spans of solved poses, and their contact, or None if no cable has a pulley or a dead length.
 
     results: rows as in `sagline.kernels.tables`, (RESULT_ROWS, N, m); status: status of each cable, (N, m); shape: ()
-    for a single pose, (N,) for a batch.
+    or (N,), of the poses.
     """
     m = results.shape[2]
 

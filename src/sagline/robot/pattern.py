@@ -16,12 +16,10 @@ _SPATIAL: Final = {"3R3T": locked(np.eye(6)), "3T": locked(np.eye(3, 6))}
 
 
 def freedom_matrix(pattern: MotionPattern, plane_normal: Array | None) -> Array:
-    """Matrix that selects the free components of (force, moment) or (velocity, angular velocity), world axes.
+    """Orthonormal rows (n, 6) that select the free components of a wrench or twist in world axes.
 
-    pattern: "3R3T" (all six), "3T" (a point mass), "1R2T" (a plane), "2T" (a plane without rotation); plane_normal:
-    unit normal of the plane, shape (3,); None for the spatial patterns. Returns array of shape (n, 6) with orthonormal
-    rows. The translations of a planar pattern are e1 and e2 with e1 x e2 = plane_normal; e1 is horizontal and e2 points
-    upward as steeply as the plane allows. The rotation about the normal is the last row.
+    plane_normal: unit normal of the plane of a planar pattern, (3,). Its translations are e1 and e2 with e1 x e2 =
+    plane_normal; e1 is horizontal, and e2 points upward as steeply as the plane allows. The rotation is the last row.
     """
     if plane_normal is None:
         return _SPATIAL[pattern]

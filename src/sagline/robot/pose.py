@@ -26,12 +26,10 @@ _ROUNDING = 4.0 * np.finfo(np.float64).eps
 
 
 def unit(vectors: Array) -> Array:
-    """Normalize vectors along the last axis.
+    """Normalize vectors along the last axis; zero vectors give NaN.
 
-    If the length of a vector differs from 1 only by rounding errors, the vector is returned unchanged. Loading and
-    copying repeat the normalization, which must not change values. Zero vectors give NaN; check lengths first.
-
-    vectors: shape (..., k). Returns array of the same shape; the given array itself if all lengths are 1.
+    A vector whose length differs from 1 only by rounding errors is unchanged, because loading and copying repeat the
+    normalization, which must not change values. The given array itself is returned if all lengths are 1.
     """
     length = np.sqrt(np.einsum("...i,...i->...", vectors, vectors))[..., np.newaxis]
     if (np.abs(length - 1.0) <= _ROUNDING).all():

@@ -33,13 +33,10 @@ def check_cable_count(robot: Robot, name: str | None = None, step: str = _FEWER_
 
 
 def check_reach(robot: Robot, pose: Pose, item: str) -> None:
-    """Refuse poses with differences that the motion pattern of the robot does not allow.
+    """Refuse a batch of poses with differences that the motion pattern of the robot does not allow.
 
     The orientation of a platform without rotations is arbitrary but constant. A planar platform rotates only about the
-    normal of its plane, and its distance from this plane is constant.
-
-    robot: the robot, or the first of several robots with the same pattern; pose: a batch, or one pose. A single pose
-    and NaN are always accepted.
+    normal of its plane, and its distance from this plane is constant. NaN is accepted.
     """
     pattern, normal = robot.motion_pattern, robot.plane_normal
     if pattern == "3R3T" or len(pose.shape) == 0 or len(pose) == 0:
@@ -72,10 +69,9 @@ def check_plane(robot: Robot, pose: Pose, item: str) -> None:
 
 
 def forbidden_turn(robot: Robot, pose: Pose, other: Array) -> Array:
-    """Forbidden part of the rotation from a given orientation to each pose, according to the motion pattern.
+    """Forbidden part of the rotation from the quaternion `other` (4,) to each pose, by the motion pattern.
 
-    pose: one pose or a batch of N; other: the orientation, a unit quaternion, shape (4,). Returns sin(angle/2) times
-    the axis, shape (N, 3); zeros if all motions are free.
+    Returns sin(angle/2) times the axis, (N, 3); zeros if all motions are free.
     """
     own = np.atleast_2d(pose.quaternion)
     if robot.motion_pattern == "3R3T":
@@ -87,20 +83,16 @@ def forbidden_turn(robot: Robot, pose: Pose, other: Array) -> Array:
 
 
 def turn_in_words(turn: Array) -> str:
-    """Description of a rotation for a message.
-
-    turn: sin(angle/2) times the axis, shape (3,), not zero.
-    """
+    """Description of a rotation for a message; turn: sin(angle/2) times the axis, (3,), not zero."""
     sine = float(np.linalg.norm(turn))
     axis = ", ".join(f"{x:.3g}" for x in np.round(turn / sine, 9) + 0.0)
     return f"{degrees(2.0 * asin(min(sine, 1.0))):.3g} deg about ({axis})"
 
 
 def out_of_plane(robot: Robot, pose: Pose) -> Array:
-    """Distance between the platform ends of a planar robot and the plane of its frame ends.
+    """Signed distances (N,) [m] between the platform ends of a planar robot and the plane of its frame ends.
 
-    pose: one pose or a batch of N. Returns the signed distance [m], shape (N,); the distances are zero if the robot is
-    not planar, or if its frame ends or its platform ends are not in one plane.
+    They are zero if the robot is not planar, or if its frame ends or its platform ends are not in one plane.
     """
     away = np.zeros(len(np.atleast_2d(pose.position)))
     if robot.plane_normal is None:
@@ -116,12 +108,10 @@ _FLAT: Final = 0.05  # anchors with a smaller height difference, relative to the
 
 
 def bounds(robot: Robot) -> tuple[Array, Array]:
-    """Lowest and highest corner [m] of the box around the robot: its frame, or the range of its anchors.
+    """Lowest and highest corner [m], (3,) each, of the box around the robot: its frame, or the range of its anchors.
 
     The top of the frame is at the height of the highest anchors. If all anchors are at the top and the frame is not
     given, the box extends down to the floor, or to the lowest pose of the test box.
-
-    Returns the two corners, shape (3,) each.
     """
     low, high = robot.frame_anchors.min(axis=0), robot.frame_anchors.max(axis=0)
     if robot.frame_size is not None:

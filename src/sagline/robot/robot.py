@@ -222,29 +222,18 @@ class Robot(Shown):
 
 
 def box_inertia(mass: float, x: float, y: float, z: float) -> Array:
-    """Inertia of a solid box whose edges are along the platform axes.
-
-    mass: mass [kg]; x, y, z: edges along the axes [m]. Returns the inertia about the center of mass [kg m^2], shape (3,
-    3).
-    """
+    """Inertia of a solid box about its center of mass [kg m^2], (3, 3); x, y, z: edges along the platform axes [m]."""
     return np.diag([y * y + z * z, x * x + z * z, x * x + y * y]) * (mass / 12.0)
 
 
 def cylinder_inertia(mass: float, radius: float, height: float) -> Array:
-    """Inertia of a solid cylinder whose axis is along the z axis of the platform.
-
-    mass: mass [kg]; radius: radius [m]; height: height [m]. Returns the inertia about the center of mass [kg m^2],
-    shape (3, 3).
-    """
+    """Inertia of a solid cylinder along z about its center of mass [kg m^2], (3, 3); mass [kg], radius, height [m]."""
     across = (3.0 * radius * radius + height * height) / 12.0
     return np.diag([across, across, 0.5 * radius * radius]) * mass
 
 
 def with_mass(robot: Robot, mass: float) -> Robot:
-    """Copy of a robot with another mass; the inertia is scaled in proportion.
-
-    mass: mass of the platform with its payload [kg], > 0.
-    """
+    """Copy of a robot with another mass [kg], payload included; the inertia is scaled in proportion."""
     return robot.replace(mass=mass, inertia=robot.inertia * (mass / robot.mass))
 
 

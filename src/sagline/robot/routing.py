@@ -65,10 +65,7 @@ class _ExitState(NamedTuple):
 
 
 def differs(robot: Robot | tuple[Robot, ...], winding: Array | None) -> bool:
-    """True if the routing differs from a straight guided cable without friction.
-
-    winding: +1, -1 and 0, or None.
-    """
+    """True if the routing differs from a straight guided cable without friction; winding: +1, -1 and 0, or None."""
     winches = [one.winches for one in ((robot,) if isinstance(robot, Robot) else robot) if one.winches is not None]
     rubs = winding is not None and bool(winding.any())
     return any(
@@ -80,10 +77,8 @@ def differs(robot: Robot | tuple[Robot, ...], winding: Array | None) -> bool:
 def with_routing(state: Equilibrium, winding: Array | None) -> Equilibrium:
     """Equilibrium with the lengths of the actual routing between exit points and drums.
 
-    state: equilibrium with the routing of the kernels; winding: +1 winding in, -1 paying out, 0 at rest, shape (m,) or
-    (N, m); None: no friction. Returns the equilibrium with corrected wrapped and dead lengths; they are NaN for a cable
-    that is too slack for a catenary between its guides. Returns the given equilibrium if there are no guides and no
-    friction.
+    winding: +1 winding in, -1 paying out, 0 at rest, (m,) or (N, m); None: no friction. The lengths are NaN for a cable
+    that is too slack for a catenary between its guides. Without guides and friction, `state` is returned.
     """
     if state.contact is None or (winding is None and not differs(state.robot, None)):
         return state
@@ -106,10 +101,7 @@ def kernel_length(state: Equilibrium) -> Array:
 
 
 def actual_routing(state: Equilibrium) -> _Routing:
-    """The actual routing with guides, and with friction if the contact of the state has winding directions.
-
-    state: an equilibrium with pulleys or dead lengths. The arrays of the result have the shape of its cables.
-    """
+    """The actual routing with guides, and with friction if the contact of `state` has winding directions."""
     return _routing(state, guided=False)
 
 

@@ -53,11 +53,10 @@ UNCERTAIN: Final[Mapping[str, _Uncertain]] = MappingProxyType(
 def deviations(
     given: Any, item: str, cables: int, *, low: float = -np.inf, above: float = -np.inf
 ) -> Mapping[str, Array]:
-    """Standard deviations of the quantities of a robot, each in the shape of its field.
+    """Standard deviations of quantities of `UNCERTAIN`, each in the shape of its field, in the given order.
 
-    given: deviations for some names of `UNCERTAIN`: one number for the whole field, three numbers (x, y, z) for a
-    quantity with three components, or an array of the shape of the field; infinite if unknown; low: the smallest
-    allowed deviation. Returns the same names in the same order.
+    given: one number for the whole field, three numbers (x, y, z) for a quantity with three components, or an array of
+    the shape of the field; infinite if unknown; low, above: limits of the deviations.
     """
     if not isinstance(given, Mapping):
         allowed = "names of fields and standard deviations"
@@ -77,10 +76,7 @@ def deviations(
 
 
 def value_of(robot: object, name: str) -> Array | None:
-    """Value of the robot's quantity to which a tolerance applies.
-
-    Returns the value in SI units, with the shape of the field or (); None if the robot does not have this value.
-    """
+    """Value of the robot's quantity `name` in SI units, in the shape of its field; None if the robot has none."""
     found: Any = robot
     for part in UNCERTAIN[name].place.split("."):
         found = None if found is None else getattr(found, part)
@@ -88,11 +84,7 @@ def value_of(robot: object, name: str) -> Array | None:
 
 
 def of_share(share: ArrayLike, value: Array | None, item: str) -> Array:
-    """Standard deviation of a quantity from a relative deviation.
-
-    share: the relative deviation, one number or an array with the shape of the quantity; value: value of the quantity,
-    or None if unknown. Returns the deviation in the unit and the shape of the quantity.
-    """
+    """Standard deviation, in the unit and the shape of the quantity, from the relative deviation `share`."""
     if value is None:
         raise InvalidValueError(item, "in percent", "a field that is given", f"Give {item} in its unit, or the field.")
     array = checked(share, item, "%")

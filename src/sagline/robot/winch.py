@@ -179,10 +179,7 @@ class Winch:
         )
 
     def _long(self) -> str:
-        """Names of the fields that differ among the cables, for a message.
-
-        Fields with one value for all cables count as equal, because all fields are already expanded to one shape.
-        """
+        """Names of the fields that differ among the cables, for a message; all fields have one shape."""
         differ = [name for name, field in self.known().items() if (field != field[0]).any()]
         if not differ:
             return "winches"
@@ -217,18 +214,7 @@ class Winch:
         return evolve(self, **changes)
 
     def _run_to(self, frame_anchors: Array) -> Winch:
-        """Copy of these winches whose dead lengths are computed from the guides.
-
-        Args:
-            frame_anchors: Points where the cables end after their last guides, world axes [m], shape (m, 3).
-
-        Returns:
-            Winch with fields of shape (m,). If these winches have no guides, the result is the same object.
-
-        Raises:
-            InvalidValueError: If the last guide is at the frame anchor, or if a given dead length or rise (not 0)
-                differs from the value that follows from the guides by more than a relative error of 1e-9.
-        """
+        """Copy whose dead lengths are computed from the guides and the frame anchors (m, 3) [m] after them."""
         if self.guides is None:
             return self
         points = np.concatenate((self.guides, frame_anchors[:, None]), axis=1)
