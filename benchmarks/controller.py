@@ -9,7 +9,7 @@ import numpy as np
 
 import sagline as sl
 from benchmarks.measure import Row, print_table
-from sagline.article.table2 import table2
+from sagline.article.ten_poses import table2
 from sagline.control.link import Command, Missing, Sample
 from tests.control.rigs import HOME, Spy, imperfect, rig
 from tests.control.tours import OFF, tour

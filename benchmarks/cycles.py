@@ -16,7 +16,7 @@ from rich.console import Console
 
 import sagline as sl
 from benchmarks.measure import Row, show
-from sagline.article.table2 import table2
+from sagline.article.ten_poses import table2
 from sagline.control.real_time import set_priority
 from sagline.core.arrays import Array
 from sagline.twin.server import machine_in_process

@@ -24,7 +24,7 @@ from sagline.article.experiment import (
     points,
     with_cells,
 )
-from sagline.article.machine import ANCHORS, DRUM, LOAD, MODULUS, ZERO, Errors
+from sagline.article.explanations import ANCHORS, DRUM, LOAD, MODULUS, ZERO, Errors
 from sagline.article.ten_poses import HOME
 from sagline.control import Controller, EventKind, RefusedError, TensionSettings
 from tests.refusal import refused

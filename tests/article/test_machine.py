@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.article.explanations import Explanation, corrected_aic, explanations
-from sagline.article.machine import (
+from sagline.article.explanations import (
     ANCHORS,
     DENSITY,
     DRUM,
@@ -21,12 +20,14 @@ from sagline.article.machine import (
     WIDTH,
     ZERO,
     Errors,
+    Explanation,
+    corrected_aic,
+    explanations,
     rest_positions,
     robot_with_errors,
     wound_lengths,
 )
-from sagline.article.table2 import table2
-from sagline.article.ten_poses import HOME, METHOD, tour
+from sagline.article.ten_poses import HOME, METHOD, table2, tour
 from sagline.core.arrays import Array
 from tests.refusal import refused
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.article import texts
+from sagline.article import drawing
 from sagline.article.report import PARTS, ArticleReport, selection, write_article
 from sagline.present.page import Verdict
 from tests.article.conftest import Written
@@ -327,7 +327,7 @@ def test_a_folder_that_cannot_be_written_is_refused_before_the_work(tmp_path: Pa
 
 
 def test_every_text_belongs_to_a_finding_or_a_chapter() -> None:
-    folder = Path(texts.__file__).parent
+    folder = Path(drawing.__file__).parent
     source = "".join(file.read_text(encoding="utf-8") for file in folder.glob("*.py"))
     entries = tomllib.loads((folder / "data" / "report.toml").read_text(encoding="utf-8"))
     for kind, call in (("findings", "finding"), ("chapters", "chapter")):
@@ -338,5 +338,5 @@ def test_every_text_belongs_to_a_finding_or_a_chapter() -> None:
 def test_numbers_of_texts_have_factors_parts_and_units() -> None:
     known = {"share": 0.25, "errors": [1.0, 2.0], "fit": {"k": 4.385}, "count": 12, "word": "slack"}
     template = "{100*share:.1f %} {1000*errors[1]:.0f mm} {fit[k]:.2f} {count} {word}"
-    text = texts._Numbers().format(template, **known)
+    text = drawing._Numbers().format(template, **known)
     assert text.replace("\N{NO-BREAK SPACE}", " ") == "25.0 % 2 m 4.38 12 slack"

@@ -5,8 +5,8 @@ import re
 import numpy as np
 import pytest
 
+from sagline.article.constants import sag_chapter
 from sagline.article.regressions import published_sampling
-from sagline.article.sag import sag_chapter
 from sagline.core.arrays import Array
 from sagline.present.page import Finding
 from tests.article.hanging import GRAVITY, length_and_force

@@ -7,8 +7,7 @@ import pytest
 from scipy.optimize import least_squares
 
 import sagline as sl
-from sagline.article.explanations import explanations
-from sagline.article.machine import (
+from sagline.article.explanations import (
     ANCHORS,
     DEAD,
     DENSITY,
@@ -20,6 +19,7 @@ from sagline.article.machine import (
     PULLEY,
     WIDTH,
     ZERO,
+    explanations,
     rest_positions,
 )
 from sagline.article.ten_poses import METHOD, TenPoses, ten_poses
@@ -77,13 +77,11 @@ def test_the_platform_is_too_high_at_low_positions(study: TenPoses) -> None:
     ],
 )
 def test_one_parameter_off_at_a_time(study: TenPoses, name: str, slope: float) -> None:
-    trend = next(t for t in study.trends if t.parameter.name == name)
-    assert trend.height_slope == pytest.approx(slope, rel=0.02)
+    assert study.height_slope(study.trends[name]) == pytest.approx(slope, rel=0.02)
 
 
 def test_raised_anchors_lift_the_platform_equally(study: TenPoses) -> None:
-    trend = next(t for t in study.trends if t.parameter.name == ANCHORS)
-    np.testing.assert_allclose(trend.error - study.model_error, [[0.0, 0.0, 0.02]] * 10, atol=1e-7)
+    np.testing.assert_allclose(study.trends[ANCHORS] - study.model_error, [[0.0, 0.0, 0.02]] * 10, atol=1e-7)
 
 
 def test_errors_after_homing_vanish_at_the_home_pose(study: TenPoses) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from sagline import Cable, Catenary, InvalidValueError, Robot, dump_robot, identify_cable, load_robot, without_cables
-from sagline.article.machine import PARAMETERS, Parameter, robot_with_errors
+from sagline.article.explanations import PARAMETERS, Parameter, robot_with_errors
 from sagline.cables.cable import ROPES
 from sagline.viewer.snapshot import Settings
 from tests.refusal import refused

@@ -7,8 +7,7 @@ from functools import cache
 import numpy as np
 
 import sagline as sl
-from sagline.article.table2 import table2
-from sagline.article.ten_poses import HOME
+from sagline.article.ten_poses import HOME, table2
 
 TEN_POSES = table2().desired  # m, shape (10, 3)
 PROTOTYPE = sl.load_robot("article-prototype")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.article.machine import DEAD, LOAD, MODULUS, PULLEY, rest_positions, robot_with_errors
+from sagline.article.explanations import DEAD, LOAD, MODULUS, PULLEY, rest_positions, robot_with_errors
 from sagline.control import Command, Mode, Sample
 from tests.control.protocol import PERIOD, GroupFault, GroupStatus
 from tests.dynamics.machines import prototype

@@ -1,34 +1,45 @@
-"""Chapters about figures 6 and 7, and about the dependence of the constants on the sampled tensions."""
+"""Chapters about figures 6 to 15, and about the dependence of the constants on the sampled tensions."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sagline.article.drawing import Drawings, axes, legend_above, shades
+from sagline.article.drawing import Courses, Drawings, axes, chapter, finding, legend_above, shades, with_fit
 from sagline.article.regressions import (
+    ANGLE,
     PUBLISHED_K_H,
     PUBLISHED_K_P,
     SHALLOW_K_H,
     SHALLOW_K_P,
     Constants,
-    ConstantsStudy,
+    End,
     InterceptStudy,
-    constants_study,
+    SagStudy,
+    StretchStudy,
+    angle_shape,
+    chord_shape,
+    constants,
+    density_shape,
     intercept_studies,
+    length_shape,
+    published_range,
     published_sampling,
+    sag_study,
+    simulated_cable,
+    stretch_study,
 )
-from sagline.article.texts import chapter, finding
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
-from sagline.plot.sheet import BLUE, PURPLE, VERMILLION
+from sagline.plot.sheet import BLUE, GREEN, PURPLE, VERMILLION
 from sagline.present.page import Chapter, Finding, table_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-MIDDLE = 2  # index of the article's angle of 0.754 rad among the samples
+MIDDLE, DENSE = 2, -1  # indices of the article's angle of 0.754 rad and of the largest density among the samples
 LOWEST = np.geomspace(40.0, 800.0, 12)  # lowest sampled tensions [N]
 HIGHEST = np.geomspace(300.0, 40_000.0, 12)  # highest sampled tensions [N]
 FACTORS = np.array([1.0, 2.0, 4.0, 8.0, 16.0, 32.0])
@@ -48,9 +59,12 @@ def intercept_chapter() -> Chapter:
 
 def constants_chapter() -> Chapter:
     """Chapter about the dependence of k_h and k_p on the sampled tensions."""
-    study = constants_study(published_sampling(), LOWEST, HIGHEST, FACTORS)
-    draw = Drawings("constants")
-    return chapter("constants", (_range(study, draw), _limit(study, draw)))
+    sampling, draw = published_sampling(), Drawings("constants")
+    found = published_range(sampling)
+    over_lowest = [constants(sampling.between(low, found.highest)) for low in LOWEST]
+    over_highest = [constants(sampling.between(found.lowest, high)) for high in HIGHEST]
+    scaled = [constants(sampling.between(f * found.lowest, f * found.highest)) for f in FACTORS]
+    return chapter("constants", (_range(found, over_lowest, over_highest, draw), _limit(scaled, draw)))
 
 
 def _over_chord(platform: InterceptStudy, frame: InterceptStudy, draw: Drawings) -> Finding:
@@ -101,28 +115,29 @@ def _over_density(platform: InterceptStudy, frame: InterceptStudy, draw: Drawing
     )
 
 
-def _range(study: ConstantsStudy, draw: Drawings) -> Finding:
-    found = study.published
+def _range(
+    found: Constants, over_lowest: Sequence[Constants], over_highest: Sequence[Constants], draw: Drawings
+) -> Finding:
     figure, ax = axes("lowest sampled $T_x$ [N]", "$k_p$ [m²/s⁴]")
-    _course(ax, study.over_lowest, "lowest", "k_p", BLUE, "regression")
+    _course(ax, over_lowest, "lowest", "k_p", BLUE, "regression")
     ax.axhline(PUBLISHED_K_P, color=VERMILLION, linewidth=0.9, linestyle="--", label="published")
     ax.axhline(SHALLOW_K_P, color="0.4", linewidth=0.9, linestyle=":", label="$g^2/24$")
     _logarithmic(ax, (50, 100, 200, 500))
     legend_above(ax)
     second, bx = axes("highest sampled $T_x$ [N]", "$|k_h|$ [m/s²]")
-    _course(bx, study.over_highest, "highest", "k_h_frame", BLUE, "frame end")
-    _course(bx, study.over_highest, "highest", "k_h_platform", PURPLE, "platform end")
+    _course(bx, over_highest, "highest", "k_h_frame", BLUE, "frame end")
+    _course(bx, over_highest, "highest", "k_h_platform", PURPLE, "platform end")
     bx.axhline(PUBLISHED_K_H, color=VERMILLION, linewidth=0.9, linestyle="--", label="published")
     bx.axhline(SHALLOW_K_H, color="0.4", linewidth=0.9, linestyle=":", label="$g/2$")
     _logarithmic(bx, (500, 2000, 10_000, 40_000))
     legend_above(bx)
-    all_k_p = [c.k_p for c in study.over_lowest]
+    all_k_p = [c.k_p for c in over_lowest]
     return finding(
         "published-range",
         numbers={
             "published_range": found._asdict(),
-            "over_lowest": [c._asdict() for c in study.over_lowest],
-            "over_highest": [c._asdict() for c in study.over_highest],
+            "over_lowest": [c._asdict() for c in over_lowest],
+            "over_highest": [c._asdict() for c in over_highest],
         },
         panels=(
             draw.panel(figure, f"k_p over the lowest tension; the highest is {n(found.highest, '.3g', 'N')}."),
@@ -134,37 +149,36 @@ def _range(study: ConstantsStudy, draw: Drawings) -> Finding:
     )
 
 
-def _limit(study: ConstantsStudy, draw: Drawings) -> Finding:
-    last = study.scaled[-1]
+def _limit(scaled: Sequence[Constants], draw: Drawings) -> Finding:
     figure, ax = axes("factor of both ends of the range", "deviation from the limit [%]")
     limits = {"k_p": SHALLOW_K_P, "k_h_frame": SHALLOW_K_H, "k_h_platform": SHALLOW_K_H}
     labels = {"k_p": "$k_p$ from $g^2/24$", "k_h_frame": "$|k_h|$, frame end", "k_h_platform": "$|k_h|$, platform end"}
     for (name, limit), color in zip(limits.items(), (BLUE, VERMILLION, PURPLE), strict=True):
-        away = [100.0 * abs(abs(getattr(c, name)) / limit - 1.0) for c in study.scaled]
+        away = [100.0 * abs(abs(getattr(c, name)) / limit - 1.0) for c in scaled]
         ax.semilogy(FACTORS, away, color=color, marker="o", markersize=3.0, linewidth=1.1, label=labels[name])
     _logarithmic(ax, tuple(FACTORS.astype(int)))
     legend_above(ax)
     return finding(
         "taut-limit",
-        numbers={"scaled": [c._asdict() for c in study.scaled], "factors": FACTORS, "g_squared_over_24": SHALLOW_K_P},
+        numbers={"scaled": [c._asdict() for c in scaled], "factors": FACTORS, "g_squared_over_24": SHALLOW_K_P},
         panels=(draw.panel(figure, "Deviation of |k_h| from g/2, and of k_p from g²/24."),),
         data=(
             table_of(
                 "The constants by the article's regressions",
                 ("factor", [*(f"{factor:g}" for factor in FACTORS), "limit"], ""),
-                ("lowest T_x [N]", [*(c.lowest for c in study.scaled), "∞"], ",.0f"),
-                ("highest T_x [N]", [*(c.highest for c in study.scaled), "∞"], ",.0f"),
-                ("k_h platform end [m/s²]", [*(c.k_h_platform for c in study.scaled), SHALLOW_K_H], "+.5f"),
-                ("k_h frame end [m/s²]", [*(c.k_h_frame for c in study.scaled), -SHALLOW_K_H], ".5f"),
-                ("k_p [m²/s⁴]", [*(c.k_p for c in study.scaled), SHALLOW_K_P], ".5f"),
+                ("lowest T_x [N]", [*(c.lowest for c in scaled), "∞"], ",.0f"),
+                ("highest T_x [N]", [*(c.highest for c in scaled), "∞"], ",.0f"),
+                ("k_h platform end [m/s²]", [*(c.k_h_platform for c in scaled), SHALLOW_K_H], "+.5f"),
+                ("k_h frame end [m/s²]", [*(c.k_h_frame for c in scaled), -SHALLOW_K_H], ".5f"),
+                ("k_p [m²/s⁴]", [*(c.k_p for c in scaled), SHALLOW_K_P], ".5f"),
             ),
         ),
         factor=FACTORS[-1],
-        last=last,
+        last=scaled[-1],
     )
 
 
-def _course(ax: Axes, course: tuple[Constants, ...], x: str, y: str, color: str, label: str) -> None:
+def _course(ax: Axes, course: Sequence[Constants], x: str, y: str, color: str, label: str) -> None:
     values = [abs(getattr(c, y)) for c in course]
     ax.plot(
         [getattr(c, x) for c in course], values, color=color, marker="o", markersize=3.0, linewidth=1.1, label=label
@@ -179,3 +193,159 @@ def _logarithmic(ax: Axes, ticks: tuple[int, ...]) -> None:
 
 def _bend(chords: Array, intercept: Array, h_b: Array) -> float:
     return float(np.abs(intercept - h_b * chords).max() / np.abs(intercept).max())
+
+
+CHORD = 10.0  # [m]
+TENSIONS = np.linspace(10.0, 500.0, 150)  # [N]
+PICKED = (1, 3, 5, 7)  # indices of drawn chords
+DRAWN = (1, 3, 5, 7, 9)  # indices of drawn densities
+
+
+def sag_chapter() -> Chapter:
+    """Chapter about the regressions that lead from the adjusting length to k_p."""
+    end = End.at_angle(CHORD)
+    stretch, sag = stretch_study(simulated_cable(), end, TENSIONS), sag_study(published_sampling())
+    draw = Drawings("sag")
+    return chapter(
+        "sag",
+        (
+            _with_stretch(stretch, draw),
+            _relieved(stretch, draw),
+            _tension(sag, draw),
+            _chord(sag, draw),
+            _angle(sag, draw),
+            _density(sag, draw),
+        ),
+        chord=CHORD,
+    )
+
+
+def _with_stretch(study: StretchStudy, draw: Drawings) -> Finding:
+    figure, ax = axes("$T_x$ [N]", "$d$ [mm]")
+    ax.plot(study.tensions, 1e3 * study.unstretchable, color=BLUE, linewidth=1.3, label="does not stretch")
+    ax.plot(study.tensions, 1e3 * study.stretchable, color=VERMILLION, linewidth=1.3, label="stretches")
+    ax.axhline(0.0, color="0.6", linewidth=0.6)
+    legend_above(ax)
+    hooke = study.magnitude[-1] * CHORD / float(simulated_cable().axial_stiffness)
+    numbers = {
+        "least_unstretchable_m": study.unstretchable.min(),
+        "last_stretchable_m": study.stretchable[-1],
+        "share_of_hooke": -study.stretchable[-1] / hooke,
+    }
+    return finding(
+        "d-over-tension", numbers=numbers, panels=(draw.panel(figure, "Adjusting length as a function of T_x."),)
+    )
+
+
+def _relieved(study: StretchStudy, draw: Drawings) -> Finding:
+    printed = 1e3 * (study.relieved - study.unstretchable)
+    mended = 1e3 * (study.relieved_exactly - study.unstretchable)
+    numbers = {"error_of_36_mm": np.abs(printed).max(), "error_with_mean_tension_mm": np.abs(mended).max()}
+    figure, ax = axes("$|T|$ [N]", "$d$ [mm]")
+    ax.plot(study.magnitude, 1e3 * study.unstretchable, color=BLUE, linewidth=2.4, alpha=0.5, label="does not stretch")
+    ax.plot(study.magnitude, 1e3 * study.relieved, color=VERMILLION, linewidth=1.1, label="without stretch by (38)")
+    ax.set_yscale("log")
+    legend_above(ax)
+    second, bx = axes("$|T|$ [N]", "error of $d$ [mm]")
+    bx.plot(study.magnitude, printed, color=VERMILLION, linewidth=1.3, label="(36), (38)")
+    bx.plot(study.magnitude, mended, color=GREEN, linewidth=1.3, label="without stretch by the mean tension")
+    legend_above(bx)
+    return finding(
+        "stretch-removed",
+        numbers=numbers,
+        panels=(
+            draw.panel(figure, "d over |T|: of the cable that does not stretch, and of the elastic cable with (38)."),
+            draw.panel(second, "The difference between both."),
+        ),
+    )
+
+
+def _tension(study: SagStudy, draw: Drawings) -> Finding:
+    tensions = study.sampling.tensions
+    figure, ax = axes("$T_x$ [N]", "$d$ [m]")
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    d, a_d = (values[MIDDLE, PICKED, DENSE] for values in (study.adjusting_length, study.a_d))
+    fits = a_d[:, None] * length_shape(tensions)
+    Courses(tensions, d, tensions, fits, _named(study.sampling.chords[[*PICKED]], "g")).draw(ax, "$D$ [m]")
+    share = study.adjusting_length / study.fitted_length
+    numbers = {"exact_over_fit_min": share.min(), "exact_over_fit_max": share.max()}
+    return finding(
+        "d-model", numbers=numbers, panels=(draw.panel(figure, f"d {_middle_and_dense(study)}, with fits."),)
+    )
+
+
+def _chord(study: SagStudy, draw: Drawings) -> Finding:
+    sampling = study.sampling
+    fine = np.linspace(0.0, sampling.chords[-1], 80)
+    fits = study.q_a[:, DENSE, None] * chord_shape(fine)
+    courses = Courses(sampling.chords, study.a_d[..., DENSE], fine, fits, _named(sampling.angles, "g"))
+    captions = (
+        f"a_d {_middle_and_dense(study)} with its cubic (figure 11).",
+        "The same at five angles (figure 12).",
+    )
+    away = _away(study.fitted_a_d, study.a_d)
+    return finding(
+        "a-over-chord",
+        numbers={"cubic_away_share": away},
+        panels=courses.panels(("$D$ [m]", "$a_d$ [m N²]", r"$\varphi$ [rad]"), MIDDLE, captions, draw),
+    )
+
+
+def _angle(study: SagStudy, draw: Drawings) -> Finding:
+    sampling = study.sampling
+    fine = np.linspace(0.0, 0.5 * np.pi, 100)
+    fits = study.p_q[[*DRAWN], None] * angle_shape(fine)
+    labels = _named(sampling.densities[[*DRAWN]], ".1f")
+    courses = Courses(sampling.angles, study.q_a[:, DRAWN].T, fine, fits, labels)
+    captions = (
+        f"q_a at ρ = {n(sampling.densities[DENSE], unit='kg/m')} (figure 13).",
+        "The same at five densities (figure 14).",
+    )
+    away = _away(study.fitted_q_a, study.q_a)
+    return finding(
+        "q-over-angle",
+        numbers={"cos4_away_share": away},
+        panels=courses.panels((r"$\varphi$ [rad]", "$q_a$ [N²/m²]", r"$\rho$ [kg/m]"), DENSE, captions, draw),
+    )
+
+
+def _density(study: SagStudy, draw: Drawings) -> Finding:
+    densities = study.sampling.densities
+    fine = np.linspace(0.0, densities[-1], 80)
+    figure, ax = axes(r"$\rho$ [kg/m]", "$p_q$ [N²/m²]")
+    with_fit(ax, densities, study.p_q, fine, study.k_p * density_shape(fine))
+    each = study.p_q / density_shape(densities)
+    second, bx = axes(r"$\rho$ [kg/m]", r"$p_q/\rho^2$ [m²/s⁴]")
+    bx.plot(densities, each, "o-", color=BLUE, markersize=3.0, linewidth=1.1, label="density by density")
+    bx.axhline(PUBLISHED_K_P, color=VERMILLION, linewidth=0.9, linestyle="--", label="published")
+    bx.axhline(SHALLOW_K_P, color="0.4", linewidth=0.9, linestyle=":", label="$g^2/24$")
+    legend_above(bx)
+    return finding(
+        "p-over-density",
+        numbers={
+            "k_p": study.k_p,
+            "shallow_k_p": SHALLOW_K_P,
+            "k_p_of_density": each,
+            "densities_kg_per_m": densities,
+        },
+        panels=(
+            draw.panel(figure, "p_q with the fitted parabola."),
+            draw.panel(second, "p_q/ρ²; by (45) it would not depend on ρ."),
+        ),
+        heaviest=each[-1],
+    )
+
+
+def _named(values: Iterable[float], form: str) -> list[str]:
+    return [format(value, form) for value in values]
+
+
+def _middle_and_dense(study: SagStudy) -> str:
+    """Text of the angle and density of the drawn cables, for a caption."""
+    return f"at φ = {n(ANGLE, unit='rad')}, ρ = {n(study.sampling.densities[DENSE], unit='kg/m')}"
+
+
+def _away(fit: Array, values: Array) -> float:
+    """Largest distance from a fit, divided by the largest value, along the axis of the fit (the second to last one)."""
+    return float((np.abs(fit - values).max(axis=-2) / values.max(axis=-2)).max())

@@ -8,12 +8,20 @@ from typing import TypeAlias
 import numpy as np
 
 import sagline as sl
-from sagline.article.feasible_sets import End
-from sagline.article.regressions import PUBLISHED_K_P, SHALLOW_K_P, sag_study, stretch_study
-from sagline.article.sampling import ANGLE, GRAVITY, article_sampling, simulated_cable
+from sagline.article.drawing import chapter, finding
+from sagline.article.regressions import (
+    ANGLE,
+    GRAVITY,
+    PUBLISHED_K_P,
+    SHALLOW_K_P,
+    End,
+    article_sampling,
+    sag_study,
+    simulated_cable,
+    stretch_study,
+)
 from sagline.article.simulation import METHOD, ROBOTS
-from sagline.article.table2 import table2
-from sagline.article.texts import chapter, finding
+from sagline.article.ten_poses import table2
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.present.page import Chapter, Finding, Table

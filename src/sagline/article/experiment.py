@@ -18,9 +18,8 @@ from numpy.typing import ArrayLike
 
 import sagline as sl
 from sagline import control
-from sagline.article.machine import DRUM, ZERO, Errors, robot_with_errors
-from sagline.article.table2 import Table2, table2
-from sagline.article.ten_poses import HOME
+from sagline.article.explanations import DRUM, ZERO, Errors, robot_with_errors
+from sagline.article.ten_poses import HOME, Table2, table2
 from sagline.control.link import PERIOD
 from sagline.core.arrays import Array, locked
 from sagline.core.status import Status

@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from sagline import control
-from sagline.article.drawing import Drawings, cables_over_time, error_panels, legend_above
+from sagline.article.drawing import Drawings, cables_over_time, chapter, error_panels, finding, legend_above
 from sagline.article.experiment import SPEED, STOP, Experiment
-from sagline.article.texts import chapter, finding
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.files.writing import plain

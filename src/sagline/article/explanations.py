@@ -1,16 +1,109 @@
-"""Least-squares fits of parameter errors to measured positions, with an information criterion for each fit."""
+"""Errors of the prototype's parameters: robots with errors, and fits of errors to measured positions."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import combinations
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
 import sagline as sl
-from sagline.article.machine import Errors, Parameter
 from sagline.core.arrays import Array, Flags
+from sagline.robot.batch import has_routing
+
+MODULUS, DENSITY, LOAD = "Young's modulus E", "linear density ρ", "load"
+ANCHORS, DRUM, ZERO = "anchor height", "drum radius", "zero of the lengths"
+PULLEY, DEAD = "pulley radius", "dead cable"
+WIDTH, HEIGHT = "platform anchors, outward", "platform anchors, up and down"
+Errors: TypeAlias = Mapping[str, float]  # error of each parameter in its unit, by name; missing errors are zero
+
+
+class Parameter(NamedTuple):
+    """Parameter of the prototype that may differ from Table 1; the error is the same for all cables."""
+
+    name: str
+    unit: str  # unit of the error
+    typical: float  # typical error, in this unit
+    plausible: float  # largest plausible error, in this unit; assumed, because the article does not give it
+    positive: bool = False  # True if the error can only be positive
+
+
+PARAMETERS = (
+    Parameter(MODULUS, "%", 20.0, 50.0),
+    Parameter(DENSITY, "%", 20.0, 30.0),
+    Parameter(LOAD, "kg", -2.0, 5.0),
+    Parameter(ANCHORS, "mm", 20.0, 50.0),
+    Parameter(DRUM, "%", -1.0, 3.0),
+    Parameter(ZERO, "mm", -10.0, 50.0),
+    Parameter(PULLEY, "mm", 30.0, 60.0, positive=True),
+    Parameter(DEAD, "m", 0.2, 4.0, positive=True),
+    Parameter(WIDTH, "mm", 10.0, 20.0),
+    Parameter(HEIGHT, "mm", 10.0, 20.0),
+)
+
+
+def robot_with_errors(robot: sl.Robot, errors: Errors) -> sl.Robot:
+    """Robot with errors of some parameters: anchors, cables, routing and load."""
+    off = {parameter.name: 0.0 for parameter in PARAMETERS} | dict(errors)
+    cables, winches, outward = robot.cables, robot.winches, np.sign(robot.platform_anchors)
+    changes: dict[str, Any] = {}  # parts without errors are not copied, because a fit needs a thousand robots
+    if off[MODULUS] or off[DENSITY]:
+        changes["cables"] = cables.replace(
+            axial_stiffness=cables.axial_stiffness * (1.0 + 0.01 * off[MODULUS]),
+            linear_density=cables.linear_density * (1.0 + 0.01 * off[DENSITY]),
+        )
+    if off[PULLEY] or off[DEAD]:
+        winches = sl.Winch() if winches is None else winches
+        changes["winches"] = winches.replace(
+            pulley_radius=winches.pulley_radius + 1e-3 * off[PULLEY], dead_cable=winches.dead_cable + off[DEAD]
+        )
+    return robot.replace(
+        mass=robot.mass + off[LOAD],
+        frame_anchors=robot.frame_anchors + np.array([0.0, 0.0, 1e-3 * off[ANCHORS]]),
+        platform_anchors=robot.platform_anchors + 1e-3 * outward * [off[WIDTH], off[WIDTH], off[HEIGHT]],
+        **changes,
+    )
+
+
+def wound_lengths(plan: sl.Plan, home: sl.Plan, errors: Errors) -> Array:
+    """Actual lengths that the winches give for commanded lengths."""
+    from_home = plan.unstrained_length - home.unstrained_length
+    return plan.unstrained_length + 0.01 * errors.get(DRUM, 0.0) * from_home + 1e-3 * errors.get(ZERO, 0.0)
+
+
+def rest_positions(robot: sl.Robot, plan: sl.Plan, home: sl.Plan, errors: Sequence[Errors]) -> Array:
+    """Equilibria of robots with errors; their lengths are planned for the robot without errors."""
+    # In the home pose, the encoders are set to the planned lengths. Therefore, the lengths on pulleys and the dead
+    # lengths at home have no effect.
+    robots = [robot_with_errors(robot, one) for one in errors]
+    off_drum = np.stack([wound_lengths(plan, home, one) for one in errors]) + _not_counted(robots, home)[:, None]
+    count, poses, m = off_drum.shape
+    repeated = [one for one in robots for _ in range(poses)]
+    found = sl.forward(repeated, off_drum.reshape(-1, m), start=plan.state.pose[np.tile(np.arange(poses), count)])
+    if not found.solved.all():
+        index = int(np.argmin(found.solved))
+        raise sl.InvalidValueError(
+            "the changed robot",
+            f"without a stable equilibrium at pose {index % poses}",
+            "smaller changes",
+            "Reduce the change of the robot.",
+        )
+    return found.pose.position.reshape(count, poses, 3)
+
+
+def _not_counted(robots: Sequence[sl.Robot], home: sl.Plan) -> Array:
+    """Cable lengths on pulleys and behind them, at the home pose [m], shape (K, m)."""
+    added = np.zeros((len(robots), home.unstrained_length.shape[-1]))
+    behind = [index for index, robot in enumerate(robots) if has_routing(robot)]
+    if behind:
+        pose = home.state.pose[np.zeros(len(behind), dtype=int)]
+        there = [robots[index] for index in behind]
+        bare = [robot.replace(winches=None) for robot in there]
+        with_them, without = (sl.inverse(some, pose, tension=home.tension).unstrained_length for some in (there, bare))
+        added[behind] = with_them - without
+    return added
+
 
 STEP = 0.01  # step of the difference quotients, relative to the typical error of the parameter
 ITERATIONS = 20
@@ -43,12 +136,9 @@ class Explanation(NamedTuple):
         """Names of the parameters."""
         return frozenset(parameter.name for parameter in self.parameters)
 
-
-class _Tangent(NamedTuple):
-    """First-order model of the positions, about given errors of the parameters."""
-
-    error: Array  # actual minus desired position, shape (3 N,) [m]
-    slopes: Array  # derivatives with respect to each parameter, shape (3 N, k) [m per unit of the parameter]
+    def place(self, name: str) -> int:
+        """Index of the parameter with a name."""
+        return [parameter.name for parameter in self.parameters].index(name)
 
 
 def explanations(error_of: ErrorOf, measured: Array, models: Sequence[Model]) -> tuple[Explanation, ...]:
@@ -59,13 +149,13 @@ def explanations(error_of: ErrorOf, measured: Array, models: Sequence[Model]) ->
     for _ in range(ITERATIONS):
         near = tangents(error_of, [models[i] for i in moving], [values[i] for i in moving])
         far = []
-        for i, one in zip(moving, near, strict=True):
-            right = measured.ravel() - one.error + one.slopes @ values[i]
-            step = _bounded_least_squares(models[i], one.slopes, right) - values[i]
+        for i, (error, slope) in zip(moving, near, strict=True):
+            right = measured.ravel() - error + slope @ values[i]
+            step = _bounded_least_squares(models[i], slope, right) - values[i]
             if step @ steps[i] < 0.0:  # opposite to the previous step: the steps oscillate about the solution
                 step *= 0.5
-            values[i], steps[i], slopes[i] = values[i] + step, step, one.slopes
-            if np.abs(one.slopes @ step).max() > CONVERGED:
+            values[i], steps[i], slopes[i] = values[i] + step, step, slope
+            if np.abs(slope @ step).max() > CONVERGED:
                 far.append(i)
         moving = far
         if not moving:
@@ -87,8 +177,9 @@ def subsets(parameters: Sequence[Parameter], most: int) -> list[Model]:
     return [model for count in range(1, most + 1) for model in combinations(parameters, count)]
 
 
-def tangents(error_of: ErrorOf, models: Sequence[Model], values: Sequence[Array]) -> list[_Tangent]:
-    """First-order model of each fit at its values; the steps of finite differences are away from upper limits."""
+def tangents(error_of: ErrorOf, models: Sequence[Model], values: Sequence[Array]) -> list[tuple[Array, Array]]:
+    """Position errors (3 N,) [m] and their derivatives (3 N, k) [m per unit of the parameter], for each fit."""
+    # the steps of finite differences are away from upper limits
     points, steps = [], []
     for model, x in zip(models, values, strict=True):
         high = limits(model)[1]
@@ -98,9 +189,7 @@ def tangents(error_of: ErrorOf, models: Sequence[Model], values: Sequence[Array]
     rows = [_errors(model, row) for model, some in zip(models, points, strict=True) for row in some]
     found = error_of(rows).reshape(len(rows), -1)
     parts = np.split(found, np.cumsum([len(some) for some in points])[:-1])
-    return [
-        _Tangent(part[0], ((part[1:] - part[0]) / step[:, None]).T) for part, step in zip(parts, steps, strict=True)
-    ]
+    return [(part[0], ((part[1:] - part[0]) / step[:, None]).T) for part, step in zip(parts, steps, strict=True)]
 
 
 def limits(model: Model) -> tuple[Array, Array]:
@@ -134,13 +223,11 @@ def _errors(model: Model, values: Array) -> Errors:
 def _start(error_of: ErrorOf, measured: Array, models: Sequence[Model]) -> tuple[list[Array], list[Array]]:
     """Initial values and first-order model of every fit, from common derivatives at zero errors."""
     alone: list[Model] = [(parameter,) for parameter in dict.fromkeys(p for model in models for p in model)]
-    near = {
-        model[0]: one for model, one in zip(alone, tangents(error_of, alone, [np.zeros(1)] * len(alone)), strict=True)
-    }
-    slopes = [np.hstack([near[parameter].slopes for parameter in model]) for model in models]
+    near = dict(zip(alone, tangents(error_of, alone, [np.zeros(1)] * len(alone)), strict=True))
+    slopes = [np.hstack([near[(parameter,)][1] for parameter in model]) for model in models]
     values = [
-        _bounded_least_squares(model, one, measured.ravel() - near[model[0]].error)
-        for model, one in zip(models, slopes, strict=True)
+        _bounded_least_squares(model, slope, measured.ravel() - near[model[:1]][0])
+        for model, slope in zip(models, slopes, strict=True)
     ]
     return values, slopes
 

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 import sagline as sl
-from sagline.article.drawing import Drawings, axes, legend_above, shades
-from sagline.article.sampling import ANGLE, GRAVITY, FittedLine, fit_line, simulated_cable
-from sagline.article.texts import chapter, finding
+from sagline.article.drawing import Drawings, axes, chapter, finding, legend_above, shades
+from sagline.article.regressions import ANGLE, GRAVITY, End, FittedLine, fit_line, simulated_cable
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.plot.sheet import BLUE, VERMILLION
@@ -23,23 +21,6 @@ TENSIONS = np.linspace(10.0, 500.0, 200)  # [N]
 PSI_TENSIONS = np.array([30.0, 60.0, 120.0, 200.0, 300.0, 400.0])  # [N]
 SHOWN = 2  # index of the length whose set psi has a drawing of its own
 LOW_PART = 50.0  # lowest tension of the curve [N], as in the article
-
-
-class End(NamedTuple):
-    """Desired position of the platform end of a cable."""
-
-    span: float  # horizontal distance from the frame end [m]
-    rise: float  # height above the frame end [m]
-
-    @classmethod
-    def at_angle(cls, chord: float) -> End:
-        """End of a chord, from its length [m], at the article's angle."""
-        return cls(chord * float(np.cos(ANGLE)), chord * float(np.sin(ANGLE)))
-
-    @property
-    def chord(self) -> float:
-        """Length D of the chord [m]."""
-        return float(np.hypot(self.span, self.rise))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

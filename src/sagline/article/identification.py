@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 import sagline as sl
-from sagline.article.drawing import Drawings, axes, draw_errors, legend_above, map_axes, shades
+from sagline.article.drawing import Drawings, axes, chapter, draw_errors, finding, legend_above, map_axes, shades
 from sagline.article.identify import EmpiricalFit, identify_empirical
 from sagline.article.identify_cable import CableFit, identify_cable
-from sagline.article.sampling import simulated_cable
-from sagline.article.texts import chapter, finding
+from sagline.article.regressions import simulated_cable
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.present.page import Chapter, Finding, Table, table_of

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.article.sampling import fit_factor
+from sagline.article.regressions import fit_factor
 from sagline.cables.cable import Cable
 from sagline.cables.model import CableState
 from sagline.cables.models import Catenary, Empirical

@@ -1,19 +1,31 @@
-"""Chapter about Table 2 and figures 25 to 27."""
+"""Chapter about Table 2 and figures 25 to 27, and about possible causes of the errors of Table 2."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from sagline.article.causes import best_explanations, limits_of_ten_points, single_causes
-from sagline.article.drawing import Drawings, axes, cables_over_time, error_panels, legend_above
-from sagline.article.machine import Parameter
-from sagline.article.sampling import fit_line
+from sagline.article.drawing import Drawings, axes, cables_over_time, chapter, error_panels, finding, legend_above
+from sagline.article.explanations import (
+    ANCHORS,
+    DEAD,
+    DENSITY,
+    LOAD,
+    MODULUS,
+    PARAMETERS,
+    PULLEY,
+    ZERO,
+    Explanation,
+    Parameter,
+    corrected_aic,
+)
+from sagline.article.regressions import fit_line
 from sagline.article.ten_poses import TenPoses, ten_poses, tour
-from sagline.article.texts import chapter, finding
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
-from sagline.plot.sheet import BLUE, COLORS, LINE_STYLES
-from sagline.present.page import Chapter, Finding, Table, table_of
+from sagline.plot.sheet import BLUE, COLORS, LINE_STYLES, VERMILLION
+from sagline.present.page import Chapter, Finding, Panel, Table, table_of
 
 AREA = 2e4  # area of a circle per meter of error [pt^2/m]
 
@@ -121,32 +133,33 @@ def _space(study: TenPoses, draw: Drawings) -> Finding:
 
 def _trends(study: TenPoses, draw: Drawings) -> Finding:
     height = study.table.desired[:, 2]
-    figure, ax = axes("$z$ desired [m]", "vertical error [mm]")
-    ax.plot(height, 1e3 * study.table.error[:, 2], "ko", markersize=4.0, label="measured")
-    second, bx = axes("$z$ desired [m]", "vertical error [mm]")
-    bx.plot(height, 1e3 * study.table.error[:, 2], "ko", markersize=4.0, label="measured")
+    pairs = [axes("$z$ desired [m]", "vertical error [mm]") for _ in range(2)]
+    for _, ax in pairs:
+        ax.plot(height, 1e3 * study.table.error[:, 2], "ko", markersize=4.0, label="measured")
     fine = np.array([height.min(), height.max()])
-    for k, trend in enumerate(study.trends):
-        axis = ax if k < 5 else bx
-        line = fit_line(height, 1e3 * trend.error[:, 2])
+    slopes = {name: study.height_slope(error) for name, error in study.trends.items()}
+    listed = []
+    for k, parameter in enumerate(PARAMETERS):
+        ax, label, error = pairs[k // 5][1], _typical(parameter), study.trends[parameter.name]
+        line = fit_line(height, 1e3 * error[:, 2])
         course = line.slope * fine + line.intercept
         look = {"color": COLORS[k % 5], "linestyle": LINE_STYLES[k % 5]}
-        axis.plot(fine, course, **look, linewidth=1.2, label=_typical(trend.parameter))
-    for axis in (ax, bx):
-        axis.set_ylim(-25.0, 85.0)
-        legend_above(axis)
-    listed = [(_typical(trend.parameter), trend.error, trend.height_slope) for trend in study.trends]
+        ax.plot(fine, course, **look, linewidth=1.2, label=label)
+        listed.append((label, error, slopes[parameter.name]))
+    for _, ax in pairs:
+        ax.set_ylim(-25.0, 85.0)
+        legend_above(ax)
     listed.append(("measured", study.table.error, float(1e3 * study.height_line.slope)))
     rows = [(name, *(n(1e3 * z, ".1f") for z in error[:, 2]), n(slope, "+.1f")) for name, error, slope in listed]
-    slopes = {trend.parameter.name: trend.height_slope for trend in study.trends}
     falling = [name for name, slope in slopes.items() if slope * study.height_line.slope > 1e-6 * abs(slope)]
+    captions = (
+        "Measured vertical errors over height, and trends that single parameters predict.",
+        "Trends of the other parameters.",
+    )
     return finding(
         "one-parameter-off",
         numbers={"height_slope_mm_per_m": slopes, "measured_slope_mm_per_m": 1e3 * study.height_line.slope},
-        panels=(
-            draw.panel(figure, "Measured vertical errors over height, and trends that single parameters predict."),
-            draw.panel(second, "Trends of the other parameters."),
-        ),
+        panels=[draw.panel(figure, caption) for (figure, _), caption in zip(pairs, captions, strict=True)],
         data=(
             Table(
                 "Predicted vertical error [mm] at the ten poses, and its slope over height [mm/m]",
@@ -154,7 +167,7 @@ def _trends(study: TenPoses, draw: Drawings) -> Finding:
                 rows,
             ),
         ),
-        stiffer=slopes[study.trends[0].parameter.name],
+        stiffer=slopes[MODULUS],
         falling=", ".join(falling),
     )
 
@@ -166,3 +179,222 @@ def _typical(parameter: Parameter) -> str:
 
 def _span(values: Array, form: str) -> str:
     return f"{n(values.min(), form)} to {n(values.max(), form)}"
+
+
+COUNTS = ("one parameter", "two parameters", "three parameters")
+SHOWN = 8  # number of rows with two parameters, and with three, in the table of explanations
+FEW = 6e-3  # an explanation is good if its remaining error is at most this [m]
+PRINTING = 1e-3 / np.sqrt(12.0)  # standard deviation of the rounding of positions to whole millimeters [m]
+NOTHING = 0.95  # a model explains nothing if its remaining error exceeds this share of the measured error
+ALIKE = 0.2  # a slope over height counts as zero below this share of the measured slope
+AS_MEASURED = 0.15  # a slope counts as equal to the measured slope below this relative difference
+LOWEST, HIGHEST = "P8", "P7"
+
+
+def best_explanations(study: TenPoses, draw: Drawings) -> Finding:
+    """Finding: the best explanations, and the benefit of more parameters."""
+    one, two, three = (study.best(count) for count in (1, 2, 3))
+    second = study.explanations[1][1]
+    alone = {found.parameters[0].name: found for found in study.explanations[0]}
+    beside = {name: study.explanation(ZERO, PULLEY, name) for name in (DEAD, MODULUS, LOAD)}
+    places = [(beside[name], beside[name].place(name)) for name in (MODULUS, LOAD)]
+    ratios = [abs(found.values[k]) / found.deviation[k] for found, k in places]  # distances from nominal values
+    far = float(np.ceil(10.0 * max(ratios))) / 10.0
+    inside = min(found.aicc for found in study.explanations[2] if not found.at_limit.any())
+    count = sum(len(group) for group in study.explanations)
+    return finding(
+        "explanations",
+        numbers={
+            "models": count,
+            "measured_rms_mm": 1e3 * study.measured_rms,
+            "explanations": [[_numbers(found) for found in group] for group in study.explanations],
+            "three_inside_aicc_above_best_two": inside - two.aicc,
+            "second_two_aicc_above_best_two": second.aicc - two.aicc,
+            "modulus_and_load_within_deviations": far,
+        },
+        panels=tuple(_panel(study, study.best(k + 1), name, draw) for k, name in enumerate(COUNTS)),
+        data=(_table_of_explanations(study),),
+        one=one,
+        two=two,
+        three=three,
+        second=second,
+        one_values=_values(one),
+        two_values=_values(two),
+        three_values=_values(three),
+        dead_cable=_told(beside[DEAD], DEAD),
+        modulus=_told(beside[MODULUS], MODULUS),
+        load=_told(beside[LOAD], LOAD),
+        modulus_alone=alone[MODULUS],
+        density_alone=alone[DENSITY],
+        second_values=_values(second),
+    )
+
+
+def limits_of_ten_points(study: TenPoses) -> Finding:
+    """Finding: limits of ten points, and the parameters that ten points cannot separate."""
+    few = [found for found in study.explanations[1] if found.rms < FEW]
+    named = all(found.names & {PULLEY, ANCHORS} for found in few)
+    zeros = 1e3 * study.single_zero
+    return finding(
+        "ten-points",
+        numbers={
+            "printing_rms_mm": 1e3 * PRINTING,
+            "pulley_imitated_by_zero_and_anchor_height": study.imitated,
+            "single_zero_deviation_mm": zeros,
+            "few_mm": 1e3 * FEW,
+            "pairs_that_leave_few": len(few),
+            "pairs": len(study.explanations[1]),
+            "best_two_over_printing": study.best(2).rms / PRINTING,
+            "pulley_or_anchor_height_in_all_of_them": named,
+        },
+        data=(
+            Table(
+                "Standard deviation of the zero offset of each cable, if it is estimated from ten points",
+                ("", *(f"cable {i}" for i in range(zeros.size))),
+                [("zero offset of its length [mm]", *(n(x, ".0f") for x in zeros))],
+            ),
+        ),
+        every="Every" if named else "Not every",
+        least_zero=zeros.min(),
+        largest_zero=zeros.max(),
+    )
+
+
+def _table_of_explanations(study: TenPoses) -> Table:
+    shown = [group if k == 0 else group[:SHOWN] for k, group in enumerate(study.explanations)]
+    rest = study.table.error - study.model_error
+    rms, worst = float(np.sqrt(np.mean(rest**2))), float(np.linalg.norm(rest, axis=1).max())
+    found = [("nothing off", rms, worst, rms, corrected_aic(rms, rest.size, 0))]
+    found += [(_values(one), one.rms, one.worst, one.left_out, one.aicc) for group in shown for one in group]
+    return Table(
+        f"No parameter, one parameter, and the best {SHOWN} with two and with three; in parentheses: uncertainty",
+        ("off by", "remaining, rms [mm]", "remaining, worst pose [mm]", "left-out pose, rms [mm]", "AICc"),
+        [
+            (text, n(1e3 * left, ".2f"), n(1e3 * far, ".1f"), n(1e3 * out, ".2f"), n(aicc, ".1f"))
+            for text, left, far, out, aicc in found
+        ],
+    )
+
+
+def _panel(study: TenPoses, found: Explanation, count: str, draw: Drawings) -> Panel:
+    figure, ax = axes("$z$ desired [m]", "error [mm]")
+    height = study.table.desired[:, 2]
+    for axis, name, color, marker in ((2, "z", VERMILLION, "o"), (1, "y", BLUE, "s")):
+        ax.plot(height, 1e3 * study.table.error[:, axis], marker, color=color, markersize=4.5, label=f"{name} measured")
+        ax.plot(
+            height,
+            1e3 * found.predicted[:, axis],
+            marker,
+            color=color,
+            markersize=7.0,
+            markerfacecolor="none",
+            label=f"{name} explained",
+        )
+    legend_above(ax)
+    return draw.panel(figure, f"Best explanation by {count}: {_values(found)}.")
+
+
+def _numbers(found: Explanation) -> dict[str, Any]:
+    names = [parameter.name for parameter in found.parameters]
+    return {
+        "values": dict(zip(names, found.values, strict=True)),
+        "deviations": dict(zip(names, found.deviation, strict=True)),
+        "at_limit": [name for name, limit in zip(names, found.at_limit, strict=True) if limit],
+        "rms_mm": 1e3 * found.rms,
+        "worst_mm": 1e3 * found.worst,
+        "left_out_rms_mm": 1e3 * found.left_out,
+        "aicc": found.aicc,
+    }
+
+
+def _values(found: Explanation) -> str:
+    return ", ".join(f"{parameter.name} {_told(found, parameter.name)}" for parameter in found.parameters)
+
+
+def _told(found: Explanation, name: str) -> str:
+    """Text of a value with its standard uncertainty, or with a mark if the value is at a limit."""
+    k = found.place(name)
+    value, unit = found.values[k], found.parameters[k].unit
+    if found.at_limit[k]:
+        return f"{n(value, '+.3g', unit)} (limit)"
+    return n(value, unit=unit, uncertainty=found.deviation[k])
+
+
+def single_causes(study: TenPoses) -> Finding:
+    """Finding: each class of parameters alone, with an example, the best value, the remaining error and its reason."""
+    ranked = study.explanations[0]
+    alone = {found.parameters[0].name: found for found in ranked}
+    slopes = {name: study.height_slope(found.predicted) for name, found in alone.items()}
+    measured = 1e3 * float(study.height_line.slope)
+    falling = [name for name in slopes if abs(slopes[name] - measured) <= AS_MEASURED * abs(measured)]
+    none = [one.parameters[0].name for one in ranked if one.rms > NOTHING * study.measured_rms]
+    pair, low, high = study.best(2), study.table.points.index(LOWEST), study.table.points.index(HIGHEST)
+    dead, error = 1e3 * study.dead_meter[:, 2], 1e3 * study.table.error[:, 2]
+    names = " and ".join(sorted(parameter.name for parameter in pair.parameters))
+    return finding(
+        "classes",
+        numbers={
+            "measured_rms_mm": 1e3 * study.measured_rms,
+            "measured_slope_mm_per_m": measured,
+            "left_mm": {name: 1e3 * found.rms for name, found in alone.items()},
+            "slope_of_best_mm_per_m": slopes,
+            "two_left_mm": 1e3 * pair.rms,
+            "dead_meter_mm": {LOWEST: dead[low], HIGHEST: dead[high]},
+            "measured_mm": {LOWEST: error[low], HIGHEST: error[high]},
+            "explain_nothing": none,
+            "fall_as_measured": falling,
+        },
+        data=(_table_of_classes(study, alone, slopes),),
+        fall=-measured,
+        falling=_listed(falling),
+        pulley=alone[PULLEY],
+        anchors_name=ANCHORS,
+        anchors=alone[ANCHORS],
+        names=names,
+        no_cause=_listed(none),
+    )
+
+
+def _table_of_classes(study: TenPoses, alone: dict[str, Explanation], slopes: dict[str, float]) -> Table:
+    head = ["off", "for example", "mean displacement [mm]", "best value", "slope [mm/m]"]
+    measured = (1e3 * study.height_line.slope, "+.1f"), (1e3 * study.measured_rms, ".1f")
+    return Table(
+        "Single imperfections; the best value is the plausible value that agrees best with Table 2",
+        [*head, "remaining error, rms [mm]", "remark"],
+        [_row(study, found, slopes[name]) for name, found in alone.items()]
+        + [("as measured", "", "", "", *(n(value, form) for value, form in measured), "")],
+    )
+
+
+def _row(study: TenPoses, found: Explanation, slope: float) -> tuple[str, ...]:
+    parameter, limit = found.parameters[0], " (limit)" if found.at_limit[0] else ""
+    return (
+        parameter.name,
+        n(parameter.typical, "+g", parameter.unit),
+        n(1e3 * np.linalg.norm(study.trends[parameter.name], axis=1).mean(), ".1f"),
+        f"{n(found.values[0], '+.3g', parameter.unit)}{limit}",
+        n(slope, "+.1f"),
+        n(1e3 * found.rms, ".1f"),
+        _remark(study, found, slope),
+    )
+
+
+def _remark(study: TenPoses, found: Explanation, slope: float) -> str:
+    measured = 1e3 * float(study.height_line.slope)
+    if found.rms > NOTHING * study.measured_rms:
+        return "explains nothing"
+    if abs(slope - measured) <= AS_MEASURED * abs(measured):
+        return "decreases with height as measured"
+    if found.at_limit[0]:
+        return "too small, even at the limit"
+    if abs(slope) <= ALIKE * abs(measured):
+        return "raises all poses equally"
+    return (
+        "increases with height, which is opposite to the measurement"
+        if slope * measured < 0.0
+        else "decreases with height, with another slope"
+    )
+
+
+def _listed(names: list[str]) -> str:
+    return " and ".join(names) if len(names) < 3 else f"{', '.join(names[:-1])} and {names[-1]}"

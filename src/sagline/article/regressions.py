@@ -1,4 +1,4 @@
-"""Figures 6 to 15: the article's regressions for its two constants k_h and k_p."""
+"""Figures 6 to 15: sampled cables, and the article's regressions for its two constants k_h and k_p."""
 
 from __future__ import annotations
 
@@ -9,9 +9,96 @@ from typing import NamedTuple
 import numpy as np
 
 import sagline as sl
-from sagline.article.feasible_sets import End
-from sagline.article.sampling import GRAVITY, UNSTRETCHABLE, Sampling, article_sampling, fit_factor, fit_line
 from sagline.core.arrays import Array
+
+GRAVITY = 9.81  # [m/s^2], the same in all studies of the article
+ANGLE = 0.754  # angle of the article's figure 10 [rad]
+UNSTRETCHABLE = 1e20  # stiffness [N] for which the strain is below the rounding error
+
+
+class FittedLine(NamedTuple):
+    """Lines y = slope x + intercept, fitted to samples along the last axis."""
+
+    slope: Array  # slope, shape (...)
+    intercept: Array  # intercept, shape (...)
+    r_squared: Array  # coefficient of determination: share of the variance of y that the line explains, shape (...)
+    deviation: Array  # largest distance of a sample from the line, in the unit of y, shape (...)
+
+
+def fit_line(x: Array, y: Array) -> FittedLine:
+    """Fit a least-squares line to samples along the last axis."""
+    x, y = np.broadcast_arrays(x, y)
+    away_x = x - x.mean(axis=-1, keepdims=True)
+    away_y = y - y.mean(axis=-1, keepdims=True)
+    slope = np.sum(away_x * away_y, axis=-1) / np.sum(away_x**2, axis=-1)
+    rest = away_y - slope[..., None] * away_x
+    explained = 1.0 - np.sum(rest**2, axis=-1) / np.sum(away_y**2, axis=-1)
+    intercept = y.mean(axis=-1) - slope * x.mean(axis=-1)
+    return FittedLine(slope, intercept, explained, np.abs(rest).max(axis=-1))
+
+
+def fit_factor(shape: Array, y: Array, axis: int = -1) -> Array:
+    """Least-squares factor a of y = a * shape, along one axis."""
+    # all other regressions of the article have this form; the shape is 1/T_x^2, D^3, cos^4(phi), rho^2, D or rho
+    shape, y = np.broadcast_arrays(shape, y)
+    factor: Array = np.sum(shape * y, axis=axis) / np.sum(shape**2, axis=axis)
+    return factor
+
+
+class End(NamedTuple):
+    """Desired position of the platform end of a cable."""
+
+    span: float  # horizontal distance from the frame end [m]
+    rise: float  # height above the frame end [m]
+
+    @classmethod
+    def at_angle(cls, chord: float) -> End:
+        """End of a chord, from its length [m], at the article's angle."""
+        return cls(chord * float(np.cos(ANGLE)), chord * float(np.sin(ANGLE)))
+
+    @property
+    def chord(self) -> float:
+        """Length D of the chord [m]."""
+        return float(np.hypot(self.span, self.rise))
+
+
+class Sampling(NamedTuple):
+    """Every combination of four quantities of cables without stretch; the platform end is above the frame end."""
+
+    angles: Array  # angle phi of the chord (the article's beta), between 0 and pi/2 [rad]
+    chords: Array  # D [m]
+    densities: Array  # rho [kg/m]
+    tensions: Array  # T_x [N]
+
+    def hang(self) -> sl.CableState:
+        """States of the sampled cables, by the exact model."""
+        angle, chord, density, tension = np.meshgrid(*self, indexing="ij")
+        cosine = np.cos(angle)
+        cable, chord_tension = sl.Cable(density, UNSTRETCHABLE), tension / cosine
+        return sl.Catenary().from_tension(cable, chord * cosine, chord * np.sin(angle), chord_tension, GRAVITY)
+
+    def between(self, lowest: float, highest: float) -> Sampling:
+        """The same sampling, with its tensions evenly spaced between two limits."""
+        return self._replace(tensions=np.linspace(lowest, highest, self.tensions.size))
+
+
+def article_sampling() -> Sampling:
+    """Assumed samples; the article gives only phi = 0.754 rad and rho in (0, 2)."""
+    # Chords from 2 to 16 m, as in the frames of the article's Table 1; five angles around 0.754 rad; ten densities;
+    # sixty tensions from 100 N to 10 kN, evenly spaced. Source: Gia Luan & Truong Thinh 2020, figures 6 to 15
+    return Sampling(
+        angles=np.array([0.25, 0.5, ANGLE, 1.0, 1.25]),
+        chords=np.linspace(2.0, 16.0, 8),
+        densities=np.linspace(0.2, 2.0, 10),
+        tensions=np.linspace(100.0, 10_000.0, 60),
+    )
+
+
+def simulated_cable() -> sl.Cable:
+    """The cable of the article's simulated robots."""
+    cables = sl.load_robot("article-suspended").cables
+    return cables._part(0, cables.linear_density.shape)
+
 
 PUBLISHED_K_H = 4.845  # [m/s^2], magnitude; Gia Luan & Truong Thinh 2020, section 4.2.2
 PUBLISHED_K_P = 4.385  # [m^2/s^4], section 5.2.4
@@ -27,7 +114,6 @@ class InterceptStudy:
     sampling: Sampling  # the cables, a angles, c chords, r densities
     slope: Array  # slopes a_pi of the fitted lines, shape (a, c, r)
     intercept: Array  # intercepts b_pi of the fitted lines [N], shape (a, c, r)
-    r_squared: Array  # deviations of the samples from the lines, shape (a, c, r)
     h_b: Array  # h_b in b_pi = h_b D [N/m], shape (a, r)
     k_h_of_angle: Array  # k_h in h_b = k_h rho, for each angle [m/s^2], shape (a,)
     k_h: float  # k_h in h_b = k_h rho, for all angles together [m/s^2]
@@ -51,7 +137,6 @@ def _study(sampling: Sampling, vertical: Array) -> InterceptStudy:
         sampling=sampling,
         slope=line.slope,
         intercept=line.intercept,
-        r_squared=line.r_squared,
         h_b=h_b,
         k_h_of_angle=fit_factor(sampling.densities, h_b),
         k_h=float(fit_factor(everywhere.ravel(), h_b.ravel())),
@@ -62,8 +147,6 @@ def _study(sampling: Sampling, vertical: Array) -> InterceptStudy:
 class StretchStudy:
     """Adjusting length d = L - D of a cable, as a function of the tension."""
 
-    cable: sl.Cable  # material
-    end: End  # desired position of the platform end
     tensions: Array  # T_x [N], shape (t,)
     magnitude: Array  # |T| at the platform end of the cable without stretch [N], shape (t,)
     unstretchable: Array  # adjusting length d of a cable that does not stretch [m], shape (t,)
@@ -131,8 +214,6 @@ def stretch_study(cable: sl.Cable, end: End, tensions: Array) -> StretchStudy:
     mean_force = np.hypot(soft.horizontal_tension, soft.vertical_force - 0.5 * soft.cable_weight)
     stretch = soft.unstrained_length / cable.axial_stiffness
     return StretchStudy(
-        cable=cable,
-        end=end,
         tensions=stiff.horizontal_tension,
         magnitude=stiff.platform_end_tension,
         unstretchable=stiff.adjusting_length,
@@ -169,35 +250,11 @@ class Constants(NamedTuple):
     k_p: float  # k_p [m^2/s^4]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ConstantsStudy:
-    """The constants k_h and k_p for different ranges of tensions."""
-
-    sampling: Sampling  # the cables, which are the same for all ranges of tensions
-    over_lowest: tuple[Constants, ...]  # ranges from each lowest tension to the highest tension of the article
-    over_highest: tuple[Constants, ...]  # ranges from the lowest tension of the article to each highest tension
-    # the article's range times 1, 2, 4, and so on, up to the limit of taut cables
-    scaled: tuple[Constants, ...]
-    published: Constants  # the range that gives the published |k_h| (at the frame end) and k_p
-
-
 def constants(sampling: Sampling) -> Constants:
     """Both constants from the article's regressions, for sampled cables."""
     platform, frame = intercept_studies(sampling)
     tensions = sampling.tensions
     return Constants(float(tensions.min()), float(tensions.max()), platform.k_h, frame.k_h, sag_study(sampling).k_p)
-
-
-def constants_study(sampling: Sampling, lowest: Array, highest: Array, factors: Array) -> ConstantsStudy:
-    """The constants for many ranges of tensions, and the range of tensions that gives the published constants."""
-    found = published_range(sampling)
-    return ConstantsStudy(
-        sampling=sampling,
-        over_lowest=tuple(constants(sampling.between(low, found.highest)) for low in lowest),
-        over_highest=tuple(constants(sampling.between(found.lowest, high)) for high in highest),
-        scaled=tuple(constants(sampling.between(f * found.lowest, f * found.highest)) for f in factors),
-        published=found,
-    )
 
 
 @cache

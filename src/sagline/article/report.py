@@ -86,11 +86,11 @@ class ReportPart(NamedTuple):
 PARTS = (
     ReportPart("feasible-sets", (3, 4, 5), (), "feasible_sets", "feasible_chapter"),
     ReportPart("intercept", (6, 7), (), "constants", "intercept_chapter"),
-    ReportPart("sag", tuple(range(8, 16)), (), "sag", "sag_chapter"),
+    ReportPart("sag", tuple(range(8, 16)), (), "constants", "sag_chapter"),
     ReportPart("constants", (), (), "constants", "constants_chapter"),
     ReportPart("identify", (), (), "identification", "identify_chapter"),
     ReportPart("models", (), (), "models", "models_chapter"),
-    ReportPart("simulation", tuple(range(17, 23)), (), "simulation_page", "simulation_chapter"),
+    ReportPart("simulation", tuple(range(17, 23)), (), "simulation", "simulation_chapter"),
     ReportPart("poses", (25, 26, 27), (2,), "poses", "poses_chapter"),
     ReportPart("workspace", (), (), "workspace", "workspace_chapter"),
     ReportPart("errata", (), (), "errata", "errata_chapter"),

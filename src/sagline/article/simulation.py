@@ -1,4 +1,4 @@
-"""Study of figures 17 to 22: both robots along the planar path, with each of the five cable models."""
+"""Chapter about figures 17 to 22: both robots along the planar path, with each of the five cable models."""
 
 from __future__ import annotations
 
@@ -9,8 +9,24 @@ from typing import NamedTuple
 import numpy as np
 
 import sagline as sl
+from sagline.article.drawing import (
+    WIDTH,
+    Drawings,
+    axes,
+    cables_over_time,
+    chapter,
+    finding,
+    legend_above,
+    logarithmic_with_floor,
+    thinning,
+)
 from sagline.article.models import MODELS
 from sagline.core.arrays import Array
+from sagline.core.numbers import n
+from sagline.plot.plan import path as draw_path
+from sagline.plot.robot import robot as draw_robot
+from sagline.plot.sheet import BLUE, COLORS, LINE_STYLES, VERMILLION, Sheet, draw_components
+from sagline.present.page import Chapter, Finding, Panel, Table, Verdict
 
 ROBOTS = ("article-suspended", "article-mixed")  # the article's first and second configuration
 # The article's (55) selects the tensions closest to the previous ones. In its figures, however, cables that are not
@@ -43,19 +59,12 @@ class Figures(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PathStudy:
-    """Both robots along the same path.
-
-    Attributes:
-        path: The path, N samples.
-        models: The cable models, shape (k,).
-        suspended: Plan and exact equilibria of the first configuration, one per model.
-        mixed: Plan and exact equilibria of the second configuration, one per model.
-    """
+    """Both robots along the same path."""
 
     path: sl.Path
     models: tuple[sl.CableModel, ...]
-    suspended: tuple[sl.Confirmation, ...]
-    mixed: tuple[sl.Confirmation, ...]
+    suspended: tuple[sl.Confirmation, ...]  # plan and exact equilibria of the first configuration, one per model
+    mixed: tuple[sl.Confirmation, ...]  # plan and exact equilibria of the second configuration, one per model
 
     def of(self, kind: type[sl.CableModel]) -> tuple[sl.Confirmation, sl.Confirmation]:
         """Runs of both robots with one model."""
@@ -67,17 +76,6 @@ class PathStudy:
         """Highest T_x of the mixed robot, divided by that of the suspended robot, with the empirical model."""
         suspended, mixed = (figures(run) for run in self.of(sl.Empirical))
         return mixed.tension_max / suspended.tension_max
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class LowTension:
-    """Position error of the empirical model as a function of the lower tension limit."""
-
-    tension_min: Array  # lower limit of the chord tension [N], shape (k,)
-    suspended: Array  # largest error along one axis of the first configuration [m], shape (k,)
-    mixed: Array  # largest error along one axis of the second configuration [m], shape (k,)
-    suspended_bound: Figures  # first configuration; the lower limit is the bound (54) with T_adj = 0
-    mixed_bound: Figures  # second configuration with the same lower limit
 
 
 def path_study(rate: float = 100.0, models: Sequence[sl.CableModel] = MODELS) -> PathStudy:
@@ -95,16 +93,18 @@ def path_study(rate: float = 100.0, models: Sequence[sl.CableModel] = MODELS) ->
     return PathStudy(path, tuple(models), suspended, mixed)
 
 
-def low_tension_study(limits: Array, rate: float = 10.0) -> LowTension:
-    """Study of the empirical model at low tensions, at which cables may become slack."""
+def low_tension_study(limits: Array, rate: float = 10.0) -> tuple[Array, list[Figures]]:
+    """Largest errors along one axis [m], (2, k), at lower tension limits [N], and numbers for the bound (54)."""
+    # study of the empirical model with both robots; cables may become slack; T_adj of the bound is 0
     path, robots = sl.article_path(rate), [sl.load_robot(name) for name in ROBOTS]
-    suspended, mixed = (
+    errors = [
         [figures(_run(robot.replace(tension_min=low), path, sl.Empirical(), METHOD)).axis_error_max for low in limits]
         for robot in robots
-    )
+    ]
     bound = sl.MinimumNorm("horizontal", lowest_point_margin=0.0)
-    bounds = [figures(_run(robot.replace(tension_min=0.0), path, sl.Empirical(), bound)) for robot in robots]
-    return LowTension(np.asarray(limits), np.array(suspended), np.array(mixed), *bounds)
+    return np.array(errors), [
+        figures(_run(robot.replace(tension_min=0.0), path, sl.Empirical(), bound)) for robot in robots
+    ]
 
 
 def figures(run: sl.Confirmation) -> Figures:
@@ -146,3 +146,230 @@ def _smoothness(run: sl.Confirmation) -> dict[str, float]:
         "slope_max": float(np.nanmax(np.abs(slope))),
         "slope_jump": float(np.nanmax(np.abs(np.diff(slope, axis=0)))),
     }
+
+
+LIMITS = np.array(
+    [15.0, 17.0, 18.0, 18.5, 19.0, 19.5, 20.0, 22.5, 25.0, 30.0, 40.0, 50.0]
+)  # lower limits of the chord tension in the study [N]
+CORNER = (5.0, 3.5, 1.5)  # corner of the path, from which distances are measured [m]
+FLOOR = 1e-9  # smallest drawn distance [m]
+NEAR = 1.05  # a tension is near its minimum if it is below this multiple of the lower limit
+
+
+def simulation_chapter() -> Chapter:
+    """Chapter about both robots along the path."""
+    study = path_study()
+    draw = Drawings("simulation")
+    return chapter(
+        "simulation",
+        (
+            _robots(study, draw),
+            _path(study.path, draw),
+            _courses(study, draw),
+            _error(study, draw),
+            _comparison(study),
+            _models(study, draw),
+            _low_tension(draw),
+        ),
+    )
+
+
+def _robots(study: PathStudy, draw: Drawings) -> Finding:
+    panels = []
+    for run, caption in zip(study.of(sl.Catenary), ("First configuration: suspended.", "Second: mixed."), strict=True):
+        figure = Sheet(figsize=(WIDTH, 3.4))
+        figure.subplots_adjust(left=0.13, right=0.97, bottom=0.0, top=1.0)
+        ax = figure.add_subplot(projection="3d")
+        draw_robot(run.plan.state.one_robot, sl.Pose.from_euler(CORNER, 0.0, 0.0, 0.0), ax)
+        ax.set_title("")
+        panels.append(draw.panel(figure, caption))
+    return finding("robots", panels=panels)
+
+
+def _path(path: sl.Path, draw: Drawings) -> Finding:
+    figure, ax = axes("", "")
+    draw_path(path, ax)
+    figure.subplots_adjust(bottom=0.16, top=0.92)
+    second, bx = axes("time [s]", "velocity [m/s]")
+    part = thinning(len(path))
+    draw_components(bx, path.time[part], path.twist[part, :2], "v_{}")
+    legend_above(bx)
+    speed = np.linalg.norm(path.twist[:, :3], axis=1)
+    acceleration = np.linalg.norm(path.twist_rate[:, :3], axis=1)
+    return finding(
+        "path",
+        numbers={
+            "duration_s": path.duration,
+            "samples": len(path),
+            "speed_max": speed.max(),
+            "acceleration_max": acceleration.max(),
+        },
+        panels=(draw.panel(figure, "The path from above (figure 18)."), draw.panel(second, "Velocities (figure 19).")),
+    )
+
+
+def _courses(study: PathStudy, draw: Drawings) -> Finding:
+    panels, numbers, texts = [], {}, []
+    for run, robot, figure in zip(study.of(sl.Empirical), ("suspended", "mixed"), (20, 21), strict=True):
+        cables, numbers[robot] = run.plan.state.cables, figures(run)._asdict()
+        for values, label, what in (
+            (cables.unstrained_length, "$L$ [m]", "unstrained length"),
+            (1e3 * cables.adjusting_length, "$d$ [mm]", "adjusting length"),
+            (cables.horizontal_tension, "$T_x$ [N]", "T_x"),
+            (cables.vertical_force, "$T_z$ [N]", "T_z"),
+        ):
+            panels.append(_cables(run.plan, values, label, f"Figure {figure}, {robot}: {what}.", draw))
+        found = figures(run)
+        texts.append(
+            f"{robot.capitalize()}: L {n(found.length_min, '.2f')} to {n(found.length_max, '.2f', 'm')}, d "
+            f"{n(1e3 * found.adjusting_min, '.3g')} to {n(1e3 * found.adjusting_max, '.3g', 'mm')}, T_x "
+            f"{n(found.tension_min, '.3g')} to {n(found.tension_max, '.3g', 'N')}. Between two samples T_x changes "
+            f"by at most {n(found.step_max, '.2g', 'N')}. Its slope is at most {n(found.slope_max, '.2g', 'N/s')}. "
+            f"Between two samples the slope changes by at most {n(found.slope_jump, '.2g', 'N/s')}"
+        )
+    return finding("courses", numbers=numbers, panels=panels, courses=".\n\n".join(texts))
+
+
+def _cables(plan: sl.Plan, values: Array, label: str, caption: str, draw: Drawings) -> Panel:
+    path = plan.path
+    assert path is not None
+    figure, ax = cables_over_time(path.time, values, label, 1.0, "{}")
+    ax.set_xlim(path.time[0], path.time[-1])
+    legend_above(ax, "cable")
+    return draw.panel(figure, caption)
+
+
+def _error(study: PathStudy, draw: Drawings) -> Finding:
+    panels, found = [], {}
+    for run, robot in zip(study.of(sl.Empirical), ("suspended", "mixed"), strict=True):
+        found[robot] = figures(run)
+        panels.append(_error_panel(run, study.path, f"{robot.capitalize()}: empirical model.", draw))
+    inside = all(f.axis_error_max <= ERROR_BAND for f in found.values())
+    return finding(
+        "position-error",
+        numbers={
+            robot: {"axis_mm": 1e3 * f.axis_error_max, "max_mm": 1e3 * f.error_max, "mean_mm": 1e3 * f.error_mean}
+            for robot, f in found.items()
+        },
+        verdict=Verdict.HOLDS if inside else Verdict.FAILS,
+        panels=panels,
+        axis_errors=", ".join(f"{n(1e3 * f.axis_error_max, '.2f', 'mm')} ({robot})" for robot, f in found.items()),
+        distances=", ".join(
+            f"{n(1000.0 * f.error_max, '.2f', 'mm')} at most and {n(1000.0 * f.error_mean, '.2f', 'mm')} in the mean"
+            for f in found.values()
+        ),
+    )
+
+
+def _error_panel(run: sl.Confirmation, path: sl.Path, caption: str, draw: Drawings) -> Panel:
+    part = thinning(len(path))
+    figure, ax = axes("time [s]", "position error [mm]", height=2.7)
+    draw_components(ax, path.time[part], 1e3 * run.position_error[part])
+    ax.set_xlim(path.time[0], path.time[-1])
+    legend_above(ax)
+    return draw.panel(figure, caption)
+
+
+def _comparison(study: PathStudy) -> Finding:
+    suspended, mixed = study.of(sl.Empirical)
+    robot = mixed.plan.state.one_robot
+    lower = robot.frame_anchors[:, 2] < robot.frame_anchors[:, 2].mean()
+    near = float(np.mean(mixed.plan.chord_tension[:, lower] <= NEAR * robot.tension_min[lower]))
+    rows = [
+        (label, *(n(scale * getattr(figures(run), field), form) for run in (suspended, mixed)))
+        for label, field, scale, form in (
+            ("highest T_x [N]", "tension_max", 1.0, ".1f"),
+            ("lowest T_x [N]", "tension_min", 1.0, ".1f"),
+            ("highest |T_z| [N]", "vertical_max", 1.0, ".1f"),
+            ("shortest L [m]", "length_min", 1.0, ".2f"),
+            ("longest L [m]", "length_max", 1.0, ".2f"),
+            ("largest position error [mm]", "error_max", 1e3, ".2f"),
+            ("feasible poses [%]", "feasible", 100.0, ".4g"),
+        )
+    ]
+    return finding(
+        "configurations",
+        numbers={
+            "tension_ratio": study.tension_ratio,
+            "near_limit_share": NEAR - 1.0,
+            "share_of_lower_cables_at_limit": near,
+        },
+        data=(Table("Empirical model", ("", "suspended", "mixed"), rows),),
+    )
+
+
+def _models(study: PathStudy, draw: Drawings) -> Finding:
+    rows, numbers = [], {}
+    for model, first, second in zip(study.models, study.suspended, study.mixed, strict=True):
+        pair, name = (figures(first), figures(second)), type(model).__name__
+        rows.append(
+            (
+                name,
+                *(
+                    n(1e3 * value, ".3g", size=1e3 * f.length_max)
+                    for f in pair
+                    for value in (f.error_max, f.error_mean)
+                ),
+                *(n(f.tension_max, ".1f") for f in pair),
+                *(n(100 * f.held, ".4g") for f in pair),
+            )
+        )
+        numbers[name] = {"suspended_mm": 1e3 * pair[0].error_max, "mixed_mm": 1e3 * pair[1].error_max}
+    head = ["model", "max, suspended", "mean", "max, mixed", "mean", "T_x suspended", "T_x mixed"]
+    panels = []
+    for robot, runs in (("suspended", study.suspended), ("mixed", study.mixed)):
+        figure, ax = axes("time [s]", "distance from the plan [mm]")
+        part = thinning(len(study.path))
+        ax.set_prop_cycle(linestyle=LINE_STYLES)
+        for model, run, color in zip(study.models[:-1], runs, COLORS, strict=False):
+            distance = 1e3 * np.linalg.norm(run.position_error[part], axis=1)
+            ax.plot(study.path.time[part], distance, color=color, linewidth=1.1, label=type(model).__name__)
+        logarithmic_with_floor(ax, 1e3 * FLOOR, f"below {n(FLOOR, '.3g', 'm')}")
+        legend_above(ax)
+        panels.append(draw.panel(figure, f"Position errors of four models, {robot}; the exact model is the reference."))
+    shallow = [figures(run).error_max for run in study.of(sl.Parabolic)]
+    return finding(
+        "five-models",
+        numbers={
+            "largest_error": numbers,
+            "exact_largest_error_pm": 1e12 * _worst(study.of(sl.Catenary)),
+            "longest_length_m": max(figures(run).length_max for run in study.of(sl.Catenary)),
+        },
+        panels=panels,
+        data=(
+            Table(
+                "Distance from the plan [mm], highest T_x [N], and poses held in a stable equilibrium [%]",
+                [*head, "held, susp.", "mixed"],
+                rows,
+            ),
+        ),
+        exact=_worst(study.of(sl.Catenary)),
+        parabolic=max(shallow),
+    )
+
+
+def _low_tension(draw: Drawings) -> Finding:
+    errors, bounds = low_tension_study(LIMITS)
+    figure, ax = axes("lower limit of the chord tension [N]", "largest error along an axis [mm]")
+    for error, color, label in zip(errors, (BLUE, VERMILLION), ("suspended", "mixed"), strict=True):
+        ax.plot(LIMITS, 1e3 * error, color=color, marker="o", markersize=3.0, label=label)
+    ax.axhline(1e3 * ERROR_BAND, color="0.5", linewidth=0.8, linestyle=":", label="6 mm, as in the article")
+    ax.set_yscale("log")
+    legend_above(ax)
+    return finding(
+        "low-tension",
+        numbers={
+            "band_mm": 1e3 * ERROR_BAND,
+            "limits_N": LIMITS,
+            "suspended_mm": 1e3 * errors[0],
+            "mixed_mm": 1e3 * errors[1],
+            "bound_54_mm": [1e3 * f.axis_error_max for f in bounds],
+            "bound_54_lowest_N": [f.tension_min for f in bounds],
+        },
+        panels=(draw.panel(figure, "Largest position error of the empirical model over the lower tension limit."),),
+        good_from=LIMITS[errors.max(axis=0) <= ERROR_BAND].min(),
+    )
+
+
+def _worst(runs: tuple[sl.Confirmation, sl.Confirmation]) -> float:
+    return max(figures(run).error_max for run in runs)

@@ -2,42 +2,71 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from importlib.resources import files
 
 import numpy as np
 
 import sagline as sl
-from sagline.article.explanations import ErrorOf, Explanation, explanations, subsets, tangents
-from sagline.article.machine import (
+from sagline.article.explanations import (
     ANCHORS,
     DEAD,
     PARAMETERS,
     PULLEY,
     ZERO,
+    ErrorOf,
     Errors,
-    Parameter,
+    Explanation,
+    explanations,
     rest_positions,
     robot_with_errors,
+    subsets,
+    tangents,
 )
-from sagline.article.sampling import FittedLine, fit_line
-from sagline.article.table2 import Table2, table2
+from sagline.article.regressions import FittedLine, fit_line
 from sagline.core.arrays import Array, locked
 from sagline.motion.rest_to_rest import QUINTIC
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Table2:
+    """The article's Table 2, as printed."""
+
+    points: tuple[str, ...]  # names of the poses, shape (10,)
+    desired: Array  # desired positions [m], shape (10, 3)
+    actual: Array  # measured positions [m], shape (10, 3)
+    printed_error: Array  # positioning errors as printed [m], shape (10,)
+
+    @property
+    def error(self) -> Array:
+        """Actual minus desired position [m], shape (10, 3)."""
+        return self.actual - self.desired
+
+    @property
+    def distance(self) -> Array:
+        """Euclidean distance of actual and desired position [m], shape (10,)."""
+        return np.asarray(np.linalg.norm(self.error, axis=1))
+
+
+def table2() -> Table2:
+    """Read the table from the package."""
+    # source: Gia Luan & Truong Thinh 2020, Table 2
+    text = files("sagline.article").joinpath("data/table2.csv").read_text(encoding="utf-8")
+    rows = list(csv.reader(line for line in text.splitlines() if not line.startswith("#")))[1:]
+    numbers = np.array([row[1:] for row in rows], dtype=np.float64)
+    return Table2(
+        points=tuple(row[0] for row in rows),
+        desired=locked(numbers[:, 0:3].copy()),
+        actual=locked(numbers[:, 3:6].copy()),
+        printed_error=locked(1e-3 * numbers[:, 6]),
+    )
+
 
 HOME = (0.0, 0.0, 1.5)  # home position of the prototype [m]
 METHOD = sl.MinimumNorm("horizontal")
 TOUR_SPEED = 0.2  # assumed speed [m/s]; the article states "low speed"
-
-
-class Trend(NamedTuple):
-    """Effect that a typical error of one parameter has on the positions."""
-
-    parameter: Parameter
-    error: Array  # predicted actual minus desired position [m], shape (10, 3)
-    # change of the vertical error per height of the pose [mm/m]; the measured change is negative
-    height_slope: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,7 +78,8 @@ class TenPoses:
     home: sl.Plan  # the plan of the prototype's home pose
     model_error: Array  # error of the empirical model at the ten poses [m], shape (10, 3)
     height_line: FittedLine  # least-squares line of the measured vertical error over the height of the pose
-    trends: tuple[Trend, ...]  # effects of single parameters
+    # actual minus desired positions for a typical error of one parameter [m], (10, 3), by the parameter's name
+    trends: dict[str, Array]
     # all explanations by one, two and three parameters; each group is sorted by the remaining error
     explanations: tuple[tuple[Explanation, ...], ...]
     # effect of a pulley radius: share that a length offset and an anchor height reproduce together, as a
@@ -58,6 +88,10 @@ class TenPoses:
     single_zero: Array  # standard deviations of the length offsets of all cables [m], shape (m,)
     dead_meter: Array  # actual minus desired position that 1 m of dead length would cause [m], shape (10, 3)
     measured_rms: float  # root mean square of the measured errors, over all coordinates [m]
+
+    def height_slope(self, error: Array) -> float:
+        """Change of the vertical error with the height of the pose [mm/m], from errors (10, 3) [m]."""
+        return float(fit_line(self.table.desired[:, 2], 1e3 * error[:, 2]).slope)
 
     def best(self, count: int) -> Explanation:
         """Explanation with the smallest remaining error for a number of parameters."""
@@ -88,7 +122,7 @@ def ten_poses(most: int = 3) -> TenPoses:
         home=home,
         model_error=nominal,
         height_line=fit_line(table.desired[:, 2], table.error[:, 2]),
-        trends=tuple(_trend(parameter, error, table) for parameter, error in zip(PARAMETERS, off, strict=True)),
+        trends={parameter.name: error for parameter, error in zip(PARAMETERS, off, strict=True)},
         explanations=ranked,
         imitated=imitated,
         single_zero=single_zero,
@@ -110,17 +144,11 @@ def _planned(robot: sl.Robot, positions: Array) -> sl.Plan:
     return sl.inverse(robot, sl.Pose.from_euler(positions, 0.0, 0.0, 0.0), sl.Empirical(), METHOD)
 
 
-def _trend(parameter: Parameter, error: Array, table: Table2) -> Trend:
-    height = table.desired[:, 2]
-    line = fit_line(height, 1e3 * error[:, 2])
-    return Trend(parameter, error, float(line.slope))
-
-
 def _limits(robot: sl.Robot, error_of: ErrorOf, plan: sl.Plan, found: Explanation) -> tuple[float, Array]:
     """Limits of ten poses, computed near the best explanation by two parameters: `imitated` and `single_zero`."""
     at = dict(zip((p.name for p in found.parameters), found.values, strict=True))
     three = tuple(p for p in PARAMETERS if p.name in (PULLEY, ZERO, ANCHORS))
-    slopes = tangents(error_of, [three], [np.array([at.get(p.name, 0.0) for p in three])])[0].slopes
+    ((_, slopes),) = tangents(error_of, [three], [np.array([at.get(p.name, 0.0) for p in three])])
     is_pulley = np.array([p.name == PULLEY for p in three])
     whole, others = slopes[:, is_pulley], slopes[:, ~is_pulley]
     imitation = others @ np.linalg.lstsq(others, whole)[0]

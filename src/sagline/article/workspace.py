@@ -7,9 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 import sagline as sl
-from sagline.article.drawing import Drawings, axes, legend_above
+from sagline.article.drawing import Drawings, axes, chapter, finding, legend_above
 from sagline.article.simulation import ROBOTS
-from sagline.article.texts import chapter, finding
 from sagline.core.numbers import n
 from sagline.plot.labels import PLACE
 from sagline.plot.sheet import BLUE, VERMILLION
