@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sagline.control.extrema import extrema, finite, largest
+from sagline.control.null_space import extrema, finite, largest
 
 ODD = (np.nan, np.inf, -np.inf)
 

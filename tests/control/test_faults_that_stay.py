@@ -10,9 +10,9 @@ import pytest
 import sagline as sl
 from sagline.control.controller import Controller
 from sagline.control.link import Command, Missing, Sample
+from sagline.control.null_space import TensionSettings
 from sagline.control.real_time import Pace
 from sagline.control.states import RefusedError, State
-from sagline.control.tension_loop import TensionSettings
 from sagline.twin.machine import Machine
 from tests.control.lockstep import one
 from tests.control.rigs import HOME, Watcher, at, imperfect, prototype, state_of

@@ -11,7 +11,7 @@ import pytest
 
 import sagline as sl
 from sagline.control.controller import Controller
-from sagline.control.known_lengths import _zeros, length_tolerance
+from sagline.control.homing import _zeros, length_tolerance
 from sagline.control.states import RefusedError, State
 from sagline.core.arrays import Array
 from tests.control.rigs import HOME, at, imperfect, prototype, rest, rig, state_of

@@ -10,8 +10,7 @@ from scipy.linalg import expm
 
 import sagline as sl
 from sagline.control.link import PERIOD
-from sagline.control.null_space import null_space
-from sagline.control.tension_loop import TensionLoop, TensionSettings
+from sagline.control.null_space import TensionLoop, TensionSettings, null_space
 from sagline.core.arrays import Array
 from tests.control.margins import FREQUENCY, Margins, axis, closed_loops, closed_poles, inner_loops, margins
 from tests.control.stops import PROTOTYPE, stops

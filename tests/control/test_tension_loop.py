@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.control.null_space import NullSpace, null_space
-from sagline.control.tension_loop import TensionLoop, TensionSettings
+from sagline.control.null_space import NullSpace, TensionLoop, TensionSettings, null_space
 from sagline.core.arrays import Array
 from tests.control.stops import stops
 from tests.refusal import refused

@@ -9,7 +9,7 @@ import numpy as np
 import sagline as sl
 from sagline.control.checks import Motion
 from sagline.control.controller import Controller
-from sagline.control.tension_loop import TensionSettings
+from sagline.control.null_space import TensionSettings
 from sagline.core.arrays import Array
 from sagline.twin.machine import Machine
 from tests.control.rigs import HOME, rig

@@ -21,6 +21,8 @@ from .link import Mode as Mode
 from .link import Sample as Sample
 from .null_space import Gains as Gains
 from .null_space import NullSpace as NullSpace
+from .null_space import TensionLoop as TensionLoop
+from .null_space import TensionSettings as TensionSettings
 from .null_space import gains_along as gains_along
 from .null_space import null_space as null_space
 from .null_space import parity as parity
@@ -32,5 +34,3 @@ from .recording import Recorded as Recorded
 from .recording import Recorder as Recorder
 from .states import RefusedError as RefusedError
 from .states import State as State
-from .tension_loop import TensionLoop as TensionLoop
-from .tension_loop import TensionSettings as TensionSettings

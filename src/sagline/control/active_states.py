@@ -11,10 +11,9 @@ from sagline.control.commands import FRESH, Claim
 from sagline.control.context import Context
 from sagline.control.execution import ExecutionStatus
 from sagline.control.homing import Homing, HomingJog, jog_tension_limits
-from sagline.control.jogging import PlatformJog
 from sagline.control.link import CHECK, Missing, Mode, Sample
 from sagline.control.recording import EventKind
-from sagline.control.set_points import Along, Ramp, SetPoint, SetPointSource, Standing
+from sagline.control.set_points import Along, PlatformJog, Ramp, SetPoint, SetPointSource, Standing
 from sagline.control.states import RefusedError, State
 from sagline.core.arrays import Array
 from sagline.kinematics.status import ForwardStatus

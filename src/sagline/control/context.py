@@ -16,11 +16,11 @@ from sagline.control.evidence import Cycle, Fault, Reaction
 from sagline.control.execution import Execution, ExecutionStatus, execution_of
 from sagline.control.faults import faults_of
 from sagline.control.link import PERIOD, Link, Sample
+from sagline.control.null_space import TensionLoop, TensionSettings
 from sagline.control.real_time import Garbage, Pace
 from sagline.control.recording import CycleTable, Event, EventKind, Journal, Recorded, Recorder
 from sagline.control.set_points import Along, Standing, standing_at
 from sagline.control.states import MOTION, RefusedError, State, check_transition
-from sagline.control.tension_loop import TensionLoop, TensionSettings
 from sagline.core.arguments import brief, flag, instance, optional, whole_number
 from sagline.core.arrays import Array, number
 from sagline.core.errors import InvalidValueError

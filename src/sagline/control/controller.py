@@ -13,14 +13,22 @@ from sagline.control.active_states import Following, HomingState
 from sagline.control.checks import Motion, check_lead, check_motion, check_start, plan_motion
 from sagline.control.context import Context
 from sagline.control.execution import Execution
-from sagline.control.jogging import PlatformJog, checked_displacement, checked_winch, winch_jog
 from sagline.control.link import Link
+from sagline.control.null_space import TensionSettings
 from sagline.control.preparation import Preparation
 from sagline.control.real_time import Pace, load_kernels
 from sagline.control.recording import Recorder
-from sagline.control.set_points import Along, SetPoint, SetPointSource, Standing
+from sagline.control.set_points import (
+    Along,
+    PlatformJog,
+    SetPoint,
+    SetPointSource,
+    Standing,
+    checked_displacement,
+    checked_winch,
+    winch_jog,
+)
 from sagline.control.states import RefusedError, State, check_transition
-from sagline.control.tension_loop import TensionSettings
 from sagline.core.arguments import instance
 from sagline.core.arrays import number
 from sagline.motion.path import Path

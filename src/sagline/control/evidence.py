@@ -9,9 +9,8 @@ from typing import ClassVar, Final, NamedTuple
 
 import numpy as np
 
-from sagline.control.extrema import extrema, finite, largest
 from sagline.control.link import RAMP, Command, Mode, Sample, WinchState, groups_of
-from sagline.control.null_space import SIGMAS, NullSpace
+from sagline.control.null_space import SIGMAS, NullSpace, extrema, finite, largest
 from sagline.core.arrays import Array, Flags
 from sagline.robot.robot import Robot
 

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Final
 import numpy as np
 
 from sagline.control.link import Sample
-from sagline.control.null_space import gains_along
+from sagline.control.null_space import TensionSettings, gains_along
 from sagline.control.recording import (
     ASKED,
     PLACE,
@@ -21,7 +21,6 @@ from sagline.control.recording import (
     Event,
 )
 from sagline.control.states import State
-from sagline.control.tension_loop import TensionSettings
 from sagline.core.arguments import instance, whole_number
 from sagline.core.arrays import Array, Codes, Flags, Indices, locked, number
 from sagline.core.results import Result, Saved

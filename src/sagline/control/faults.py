@@ -1,30 +1,253 @@
-"""Table of all faults, and creation of the fault rules for a robot."""
+"""Faults of the exchange between controller and machine, table of all faults, and creation of the rules."""
 
 from __future__ import annotations
 
+from collections import deque
 from typing import Final, NamedTuple
 
-from sagline.control.evidence import Evidence, Fault
+import numpy as np
+
+from sagline.control.evidence import Cycle, Evidence, Fault, Reaction
 from sagline.control.faults_cables import CableBroken, CellDead, CellLost, CellOff, CellStuck, OverTension, Slack
 from sagline.control.faults_drives import CorrectionAtLimit, EncoderJump, FollowingError, NotFollowing, ServoSaturated
-from sagline.control.faults_link import (
-    BlockDiscarded,
-    CycleLate,
-    CycleLost,
-    EmergencyStop,
-    GroupActs,
-    GroupSilent,
-    GroupStale,
-    OwnerLost,
-    RecordingStopped,
-)
-from sagline.control.link import PERIOD
-from sagline.control.null_space import cell_errors
-from sagline.control.tension_loop import TensionSettings
+from sagline.control.link import CHECK, PERIOD, GroupFault, GroupStatus, Mode, WinchState, fault_text
+from sagline.control.null_space import TensionSettings, cell_errors
 from sagline.core.arguments import brief, instance
-from sagline.core.arrays import number
+from sagline.core.arrays import Flags, number
 from sagline.core.errors import InvalidValueError
 from sagline.robot.robot import Robot
+
+STALE, SILENT = 3, 10  # largest age of a sample [cycles]
+WINDOW: Final = 100  # length of the window in which late cycles are counted [cycles]
+LATE, LATE_OFTEN, LOST = 0.02, 0.005, 0.1  # delay of a late cycle [s]
+OFTEN: Final = 3  # largest number of late cycles per window
+ROUNDING: Final = 1e-6  # tolerance of an age, as a share of it
+
+# plain integers, because array operations with members of an enumeration are four times slower
+_LOCKED, _EMERGENCY, _PRESSED = int(GroupStatus.LOCKED), int(GroupStatus.EMERGENCY), int(GroupFault.EMERGENCY_STOP)
+_TRIPPED, _LEAVE = int(WinchState.FAULT), int(Mode.LEAVE)
+
+_FREE: Final = "Stop other programs on this computer."
+
+
+class _Old(Fault):
+    """Group whose newest sample is too many cycles old."""
+
+    cycles: int
+    step: str
+
+    def found(self, cycle: Cycle) -> str | None:
+        """Message for the group with the oldest sample."""
+        worst, limit = self.seen.oldest, self.cycles * self.seen.period
+        if worst < limit * (1.0 - ROUNDING):
+            return None
+        group = int(np.argmax(cycle.sample.age))
+        what = f"its newest sample is {1e3 * worst:.0f} ms old; allowed: below {1e3 * limit:.0f} ms"
+        return f"group {group}: {what}. {self.step}"
+
+
+class GroupStale(_Old):
+    """Late group: the tension loop is off until the group answers again."""
+
+    name = "group stale"
+    rule = f"the newest sample of a group is {STALE} cycles old, as blocks are missing, repeated, late or invalid"
+    reaction = Reaction.DEGRADED
+    within = "30 ms"
+    quiet = 1.0
+    cycles = STALE
+    step = "The tension loop is off until the group answers."
+
+
+class GroupSilent(_Old):
+    """Group that does not answer."""
+
+    name = "group silent"
+    rule = f"the newest sample of a group is {SILENT} cycles old"
+    reaction = Reaction.STOPPING
+    within = "100 ms"
+    cycles = SILENT
+    step = f"{CHECK}, then acknowledge."
+
+
+class BlockDiscarded(Fault):
+    """Group that sends invalid blocks. If it sends no valid block, it becomes late and then silent."""
+
+    name = "block discarded"
+    rule = "incomplete or foreign (by its counters, magic, version or size), repeated, or older than an earlier block"
+    reaction = Reaction.EVENT
+    within = "1 cycle"
+
+    def __init__(self, seen: Evidence) -> None:
+        """Create the rule without findings."""
+        super().__init__(seen)
+        self._quiet, self._line = WINDOW, ""
+
+    def found(self, cycle: Cycle) -> str | None:
+        """Message for the first group with discarded blocks. The fault ends after one second without such blocks."""
+        sample, before = cycle.sample, cycle.before
+        self._quiet += 1
+        if before is not None and sample.discarded.tolist() != before.discarded.tolist():
+            group = int(np.argmax(sample.discarded - before.discarded))
+            count = int(sample.discarded[group])
+            self._quiet = 0
+            reason = sample.reasons[group] if sample.reasons else None
+            why, step = reason or ("the link gives no reason", CHECK)
+            self._line = f"group {group}: a block was discarded, {count} so far: {why}. {step}."
+        return self._line if self._quiet < WINDOW else None
+
+
+class OwnerLost(Fault):
+    """Group that the controller no longer owns."""
+
+    name = "owner lost"
+    rule = "the owner of a group changes after the controller owned all groups"
+    reaction = Reaction.STOPPING
+    within = "1 cycle"
+
+    def found(self, cycle: Cycle) -> str | None:
+        """Message for the first group that another controller or no controller owns."""
+        command = cycle.command
+        if command is None or command.mode == _LEAVE:
+            return None
+        owners = cycle.sample.owner.tolist()
+        if owners.count(command.owner) == len(owners):
+            return None
+        group, owner = next((g, owner) for g, owner in enumerate(owners) if owner != command.owner)
+        who = f"controller {owner} owns it" if owner else "no controller owns it"
+        return f"group {group}: {who}; expected: {command.owner}. Stop the other controller, then connect again."
+
+
+class GroupActs(Fault):
+    """Group that its PLC or a drive has stopped."""
+
+    name = "group acts by itself"
+    rule = "a PLC reports a fault or locked drums, or a drive reports a fault"
+    reaction = Reaction.STOPPING
+    within = "1 cycle"
+    lasting = True
+
+    def __init__(self, seen: Evidence) -> None:
+        """Create the rule without findings."""
+        super().__init__(seen)
+        self._reported: Flags = np.zeros(int(seen.group_of.max()) + 1, dtype=bool)
+
+    def found(self, cycle: Cycle) -> str | None:
+        """Message for the groups that have newly stopped, with the reason of the first group."""
+        seen, sample = self.seen, cycle.sample
+        if not (seen.faulted or seen.tripped or seen.bits & _LOCKED):
+            return None
+        if cycle.command is not None and cycle.command.mode in (Mode.LOCK, Mode.LEAVE):
+            return None
+        tripped = (sample.winch_fault != 0) | (sample.state == _TRIPPED)
+        acting = (sample.fault != 0) | ((sample.status & _LOCKED) != 0)
+        acting[seen.group_of[tripped]] = True
+        acting &= (sample.status & _EMERGENCY) == 0  # the groups are locked as required
+        acting &= sample.fault != _PRESSED
+        new = acting & ~self._reported
+        if not new.any():
+            return None
+        self._reported |= new
+        groups = np.flatnonzero(new)
+        names = ", ".join(str(g) for g in groups)
+        return f"group {names} has stopped: {self._why(cycle, int(groups[0]), tripped)}. Repair it, then acknowledge."
+
+    def _why(self, cycle: Cycle, group: int, tripped: Flags) -> str:
+        mine = np.flatnonzero(tripped & (self.seen.group_of == group))
+        if mine.size:
+            return f"drive {mine[0]} tripped with code {cycle.sample.winch_fault[mine[0]]}"
+        code, locked = int(cycle.sample.fault[group]), cycle.sample.status[group] & _LOCKED
+        return ", and ".join(filter(None, (fault_text(code) if code else "", "drums are locked" if locked else "")))
+
+
+class EmergencyStop(Fault):
+    """Emergency stop of the hardware, reported by the PLC."""
+
+    name = "emergency stop"
+    rule = "a PLC reports that the emergency stop is pressed"
+    reaction = Reaction.EMERGENCY
+    within = "a scan of the PLC, 1 cycle"
+    homing = True
+
+    def found(self, cycle: Cycle) -> str | None:
+        """Message for the groups that report an emergency stop."""
+        if not (self.seen.faulted or self.seen.bits & _EMERGENCY):
+            return None
+        sample = cycle.sample
+        pressed = ((sample.status & _EMERGENCY) != 0) | (sample.fault == _PRESSED)
+        if not pressed.any():
+            return None
+        groups = ", ".join(str(g) for g in np.flatnonzero(pressed))
+        return f"emergency stop, reported by group {groups}. Make the machine safe, release it, then connect and home."
+
+
+class CycleLate(Fault):
+    """Cycles that are late because the computer is too busy."""
+
+    name = "cycle late"
+    rule = f"> {1e3 * LATE:g} ms late, or {OFTEN} of {WINDOW} cycles > {1e3 * LATE_OFTEN:g} ms late"
+    reaction = Reaction.EVENT
+    within = "1 cycle"
+
+    def __init__(self, seen: Evidence) -> None:
+        """Create the rule without late cycles."""
+        super().__init__(seen)
+        self._cycle = 0
+        self._late: deque[tuple[int, float]] = deque()  # times and delays in the window
+
+    def found(self, cycle: Cycle) -> str | None:
+        """Message for the longest delay of the last second, or for the number of late cycles."""
+        self._cycle += 1
+        late = self._late
+        if LATE_OFTEN < cycle.late <= LOST:
+            late.append((self._cycle, cycle.late))
+        if late and late[0][0] <= self._cycle - WINDOW:
+            late.popleft()
+        if not late:
+            return None
+        worst = max(by for _, by in late)
+        if worst > LATE:
+            return f"a cycle was {1e3 * worst:.0f} ms late; allowed: {1e3 * LATE:g} ms. {_FREE}"
+        if len(late) < OFTEN:
+            return None
+        return (
+            f"{len(late)} of the last {WINDOW} cycles were more than {1e3 * LATE_OFTEN:g} ms late, by up to "
+            f"{1e3 * worst:.0f} ms; allowed: {OFTEN - 1}. {_FREE}"
+        )
+
+
+class CycleLost(Fault):
+    """Cycle that is so late that the PLCs have stopped the winches."""
+
+    name = "cycle lost"
+    rule = f"> {1e3 * LOST:g} ms late"
+    reaction = Reaction.STOPPING
+    within = "1 cycle"
+
+    def found(self, cycle: Cycle) -> str | None:
+        """Message for the delay of the cycle."""
+        if cycle.late <= LOST:
+            return None
+        return (
+            f"a cycle began {1e3 * cycle.late:.0f} ms late; allowed: {1e3 * LOST:g} ms. The PLCs have stopped the "
+            f"winches. {_FREE} Then acknowledge."
+        )
+
+
+class RecordingStopped(Fault):
+    """Recording that has stopped; the motion continues."""
+
+    name = "recording stopped"
+    rule = "a write fails, for instance because the disk is full, or the queue to the writer is full"
+    reaction = Reaction.EVENT
+    within = "1 s"
+
+    def found(self, cycle: Cycle) -> str | None:
+        """Message with the reason why recording stopped."""
+        if not cycle.recording:
+            return None
+        why = cycle.recording if len(cycle.recording) <= 120 else cycle.recording[:117] + "..."
+        return f"recording has stopped: {why}. The motion continues; written data are kept. Free some disk space."
+
 
 LARGEST_CORRECTION: Final = TensionSettings().largest  # largest correction of the tension loop [m]
 

@@ -8,9 +8,8 @@ from typing import Final
 import numpy as np
 
 from sagline.control.evidence import PLANNED_SHARE, SLACK_SHARE, Cycle, Evidence, Fault, Reaction
-from sagline.control.extrema import largest
 from sagline.control.link import Mode
-from sagline.control.null_space import SIGMAS
+from sagline.control.null_space import SIGMAS, largest
 from sagline.core.arrays import Array
 
 NEAR: Final = 0.9  # share of the upper limit; the motion stops if the tension is above it for some samples

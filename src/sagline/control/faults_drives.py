@@ -9,8 +9,8 @@ import numpy as np
 
 from sagline.control.commands import BEHIND
 from sagline.control.evidence import Cycle, Evidence, Fault, Reaction
-from sagline.control.extrema import finite, largest
 from sagline.control.link import CHECK, COUNTERS, Command, GroupStatus, Mode, Sample, WinchState, newer
+from sagline.control.null_space import finite, largest
 from sagline.core.arrays import Array
 
 JUMP: Final = 1e-3  # largest jump [m per cycle]

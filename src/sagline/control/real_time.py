@@ -19,9 +19,8 @@ import numpy as np
 from sagline.cables.model import CableModel
 from sagline.control.checks import plan_motion
 from sagline.control.homing import Homing
-from sagline.control.jogging import PlatformJog, winch_jog
 from sagline.control.link import PERIOD
-from sagline.control.set_points import SetPoint, standing_at
+from sagline.control.set_points import PlatformJog, SetPoint, standing_at, winch_jog
 from sagline.core.arguments import whole_number
 from sagline.core.arrays import Array, Indices, locked, number
 from sagline.core.errors import InvalidValueError, SaglineError

@@ -49,8 +49,8 @@ from sagline.robot.robot import Robot
 from sagline.statics.tables import body_table, cable_table
 from sagline.tension.method import Options, TensionMethod, kernel_options, takes_default_kernel
 from sagline.tension.methods import DEFAULT, method_of
+from sagline.twin.hardware import plc_limits
 from sagline.twin.plc_program import FOLLOWING, TINY
-from sagline.twin.start import plc_limits
 
 KERNELS: Final = "c/kernels.json"
 BAD_INPUT: Final = 9

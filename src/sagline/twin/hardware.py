@@ -1,17 +1,199 @@
-"""Hardware of a machine: drives, brakes, encoders and load cells, and the true robot."""
+"""Hardware of a machine: initial state, drives, brakes, encoders and load cells, and the true robot."""
 
 from __future__ import annotations
 
-from typing import Final
+import math
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from sagline.control.link import HEARTBEAT
 from sagline.core.arrays import Array
+from sagline.core.errors import InvalidValueError
 from sagline.dynamics.simulation.simulator import Reading, Simulator
+from sagline.dynamics.simulation.steps import frequency_with_winches, platform_frequency
+from sagline.dynamics.simulation.winches import drive_data
 from sagline.dynamics.vibration.dynamic_stiffness import Damping
-from sagline.robot.drum import drum_lever
+from sagline.kernels.cable.drum import lengths_of_turns, turns_of_lengths
+from sagline.kernels.dynamics import drives as d
+from sagline.kinematics.forward import forward
+from sagline.kinematics.inverse import inverse
+from sagline.robot.batch import dead_cable
+from sagline.robot.drum import drum_lever, drums_of
+from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.pose import Pose, single_pose
 from sagline.robot.robot import Robot
-from sagline.twin.start import Start
+from sagline.twin.plc_program import LEFT, PlcLimits
+
+
+class _EncoderScale:
+    """Conversion between lengths and encoder counts. Known drums: by their turns. Otherwise: with a constant radius.
+
+    Attributes:
+        per_meter: Counts per meter of unstrained paid-out cable, at the reference lengths, (m,).
+    """
+
+    def __init__(self, robot: Robot, length: Array, counts: Array) -> None:
+        """Reference lengths [m] (m,) and counts (m,) of a robot's encoders."""
+        winch = robot.winches
+        if winch is None or winch.counts_per_turn is None:
+            step = "Give counts_per_turn in the robot file, or with robot.replace(winches=Winch(counts_per_turn=...))."
+            raise InvalidValueError("winches: counts_per_turn", "not given", "known if encoder counts are used", step)
+        stretch = 1.0 + winch.winding_tension / robot.cables.axial_stiffness
+        each = winch.gear * winch.counts_per_turn
+        self.per_meter = each * stretch / (2.0 * np.pi * drum_lever(robot, length))
+        self._drums = None
+        if winch.groove_pitch is not None and robot.cables.diameter is not None:
+            drums = drums_of(robot)
+            self._drums = (drums.table, drums.starts)
+            self._stretch, self._each, self._work = stretch, each, np.empty((3, 1, robot.cable_count))
+            self._at_no_turns = counts + each * drums.turns((length * stretch)[None])[0][0]
+        else:
+            self._at_no_length = counts - length * self.per_meter
+
+    def counts(self, length: Array) -> Array:
+        """Convert unstrained lengths off the drums [m] to counts of the encoders, not rounded."""
+        if self._drums is None:
+            found: Array = length * self.per_meter + self._at_no_length
+            return found
+        path, turns, travel = self._work
+        np.multiply(length, self._stretch, out=path[0])
+        turns_of_lengths(*self._drums, path, turns, travel)
+        found = self._at_no_turns - turns[0] * self._each
+        return found
+
+    def lengths(self, counts: Array) -> Array:
+        """Convert counts of the encoders to unstrained lengths off the drums [m]."""
+        if self._drums is None:
+            found: Array = (counts - self._at_no_length) / self.per_meter
+            return found
+        path, turns, _ = self._work
+        np.divide(self._at_no_turns - counts, self._each, out=turns[0])
+        lengths_of_turns(*self._drums, turns, path)
+        found = path[0] / self._stretch
+        return found
+
+
+SHARE: Final = 0.2  # largest phase of the highest mode in a step [rad]
+NEAR: Final = 1e-6  # largest deviation from a whole number of steps, in periods
+REACH: Final = 2.0  # cable length if cable_length is unknown, divided by the largest distance of two frame anchors
+
+
+class Start(NamedTuple):
+    """State of a machine before it is switched on."""
+
+    state: Equilibrium  # equilibrium of the true robot
+    nominal: _EncoderScale  # conversion of the encoders in the PLCs
+    true: _EncoderScale  # conversion of the encoders by the true drums
+
+
+def initial_state(true: Robot, nominal: Robot, start: Any, surveyed: bool) -> Start:
+    """Compute the true equilibrium at the start and the conversions of the encoders."""
+    pose = _start_pose(nominal, start)
+    plan = inverse(nominal, pose)
+    planned = _feasible_lengths(plan.unstrained_length, nominal, "start")
+    counts = np.zeros(nominal.cable_count)
+    scale = _EncoderScale(nominal, planned, counts)
+    if (winch := nominal.winches) is not None and winch.length_zero is not None:
+        stretch = 1.0 + winch.winding_tension / nominal.cables.axial_stiffness
+        counts = np.rint(winch.count_zero - scale.counts(winch.length_zero / stretch))
+        scale = _EncoderScale(nominal, planned, counts)
+    if surveyed:
+        state = inverse(true, pose).state
+        _feasible_lengths(state.unstrained_length, true, "start")
+    else:
+        routed = _routed_length(true, pose) - _routed_length(nominal, pose)  # without wrapped and dead lengths
+        state = _rest_at(true, planned + routed + _zero_errors(true, nominal), pose)
+    return Start(state, scale, _EncoderScale(true, state.unstrained_length, counts))
+
+
+def _start_pose(robot: Robot, start: Any) -> Pose:
+    """Pose at which the encoders are set; by default the middle of the robot's test_box, without a rotation."""
+    if start is not None:
+        return single_pose(start, "start")
+    if robot.test_box is None:
+        allowed = f"a pose, because {robot.name} has no test_box"
+        step = "Give the pose at which encoders are set: start=Pose.from_euler([0, 0, 1.5], 0, 0, 0)."
+        raise InvalidValueError("start", "not given", allowed, step)
+    return Pose.from_euler(0.5 * (robot.test_box.low + robot.test_box.high), 0.0, 0.0, 0.0)
+
+
+def winch_limits(robot: Robot, scale: _EncoderScale) -> PlcLimits:
+    """Limits of a robot's winches in the PLCs; each limit is a list over all winches."""
+    winch, anchors = robot.winches, robot.frame_anchors
+    assert winch is not None
+    apart = np.linalg.norm(anchors[:, None] - anchors, axis=-1).max()
+    dead = dead_cable(robot) + np.zeros(robot.cable_count)
+    most = dead + REACH * apart if winch.cable_length is None else winch.cable_length
+    speed = np.full(robot.cable_count, np.inf)
+    if winch.speed_limit is not None and winch.counts_per_turn is not None:
+        speed = winch.speed_limit * winch.counts_per_turn / (2.0 * math.pi * np.abs(scale.per_meter))
+    tension = robot.tension_max + np.zeros(robot.cable_count)
+    return PlcLimits(*(column.tolist() for column in (dead + LEFT, most, speed, tension)))
+
+
+def check_step(robot: Robot, state: Equilibrium, step: float, period: float) -> None:
+    """Refuse a `step` [s] that is too long for the robot's modes, and a `period` [s] out of range.
+
+    The period must be a whole multiple of the step, and at most the heartbeat.
+    """
+    if not (parts := period / step) >= 0.5 or abs(parts - round(parts)) > NEAR * parts:
+        raise InvalidValueError("period", f"{period:g} s", f"a whole multiple of {step:g} s, the step", "Correct it.")
+    if period > HEARTBEAT:
+        step_to = "Give 0.01, as in the article."
+        raise InvalidValueError("period", f"{period:g} s", f"<= {HEARTBEAT:g} s, the heartbeat", step_to)
+    length = state.unstrained_length
+    pose = Pose.from_quaternion(state.pose.position[None], state.pose.quaternion[None])
+    data = drive_data(robot, "robot", length, False)
+    platform = platform_frequency(robot, pose, length[None])
+    highest = frequency_with_winches(platform, d.DRUMS, data, length[None], robot.cables.axial_stiffness)
+    if step * highest > SHARE:
+        limit, frequency = SHARE / highest, highest / (2.0 * math.pi)
+        finer = 1e-3 / 2 ** math.ceil(math.log2(1e-3 / limit))
+        allowed = f"<= {limit:.3g} s, {SHARE:g} rad of the highest mode, {frequency:.3g} Hz, cables taut"
+        raise InvalidValueError("step", f"{step:g} s", allowed, f"Give step={finer:.6g}.")
+
+
+def _feasible_lengths(length: Array, robot: Robot, item: str) -> Array:
+    if np.isnan(length).any():
+        allowed = f"a pose that {robot.name} can hold within its tension limits"
+        raise InvalidValueError(item, "a pose that is not feasible", allowed, "Give another pose as start.")
+    return length
+
+
+def _rest_at(robot: Robot, length: Array, pose: Pose) -> Equilibrium:
+    """Equilibrium of the true robot at given lengths, near a pose."""
+    dead = dead_cable(robot) + np.zeros(robot.cable_count)
+    found = forward(robot, length, start=pose) if (length > dead).all() else None
+    if found is None or not found.stable:
+        allowed, step = "a robot with an equilibrium near the start", "Change the robot by less, or give surveyed=True."
+        raise InvalidValueError("robot", "without equilibrium at the nominal lengths", allowed, step)
+    return found.state
+
+
+def _zero_errors(true: Robot, nominal: Robot) -> Array:
+    """Zero errors of the encoders: true minus indicated length off the drums [m], shape (m,)."""
+    error = np.zeros(true.cable_count)
+    if true.winches is not None and nominal.winches is not None:
+        there, thought = true.winches.length_zero, nominal.winches.length_zero
+        if there is not None and thought is not None:
+            error = there - thought
+    return error
+
+
+def _routed_length(robot: Robot, pose: Pose) -> Array:
+    """Sum of the length on the pulley and the dead length of each cable [m], (m,)."""
+    if robot.winches is None or not robot.winches.anything_behind:
+        return np.zeros(robot.cable_count)
+    whole, bare = (inverse(some, pose).unstrained_length for some in (robot, robot.replace(winches=None)))
+    return _feasible_lengths(whole - bare, robot, "start")
+
+
+def plc_limits(robot: Robot) -> PlcLimits:
+    """Limits of a robot's winches in the PLCs; each limit is a list over all winches."""
+    planned = _feasible_lengths(inverse(robot, _start_pose(robot, None)).unstrained_length, robot, "test_box")
+    return winch_limits(robot, _EncoderScale(robot, planned, np.zeros(robot.cable_count)))
+
 
 FILTER: Final = 0.05  # time constant of the PLCs' filters of load cells [s]
 LENGTH, RATE, TORQUE, CELL, FILTERED = range(5)  # indices of the rows of the readings

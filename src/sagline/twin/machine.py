@@ -15,7 +15,7 @@ from sagline.dynamics.simulation.simulator import Reading
 from sagline.dynamics.vibration.dynamic_stiffness import Damping
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.twin.hardware import CELL, LENGTH, Hardware
+from sagline.twin.hardware import CELL, LENGTH, Hardware, check_step, initial_state, winch_limits
 from sagline.twin.injected import KINDS, Injected, Schedule, fault
 from sagline.twin.link import (
     COUNTER,
@@ -32,7 +32,6 @@ from sagline.twin.link import (
     Report,
 )
 from sagline.twin.plc_program import Order, PlcLimits, Program
-from sagline.twin.start import check_step, initial_state, winch_limits
 
 LOSSES: Final = Damping(loss_time=1e-3, air_damping=0.2)  # assumed; about 2 N s/m of air damping on the prototype
 MOST_SEED: Final = 2**63 - 1
