@@ -24,16 +24,12 @@ POSE_LOST: Final = "the pose of the platform is not known; home again"
 
 
 class ActiveState(ABC):
-    """Base class of the states of a controller; `context.state` is the name of the state.
-
-    Attributes:
-        context: Data and services that all states share.
-        point: Last set point that was sent; None if the drives rest.
-        source: Source of the set points; None in a state without set points.
-    """
+    """Base class of the states of a controller; `context.state` is the name of the state."""
 
     def __init__(self, context: Context, point: SetPoint | None = None, source: SetPointSource | None = None) -> None:
         """Enter the state with the set point of the previous state."""
+        # point: last set point that was sent; None if the drives rest
+        # source: source of the set points; None in a state without set points
         self.context, self.point, self.source = context, point, source
 
     @abstractmethod
@@ -103,11 +99,7 @@ class Off(ActiveState):
 
 
 class Connecting(ActiveState):
-    """CONNECTING: the controller claims the groups.
-
-    Attributes:
-        claim: Claim of all groups.
-    """
+    """CONNECTING: the controller claims the groups."""
 
     def __init__(self, context: Context) -> None:
         """Begin to claim."""
@@ -176,17 +168,13 @@ class Emergency(ActiveState):
 
 
 class HomingState(ActiveState):
-    """HOMING: the operator jogs single winches until the tensions agree with the plan.
-
-    Attributes:
-        homing: Plan at the pose that the operator named, and comparison of samples with this plan.
-    """
+    """HOMING: the operator jogs single winches until the tensions agree with the plan."""
 
     def __init__(self, context: Context, homing: Homing) -> None:
         """Enter the state at rest."""
         context.enter(State.HOMING, "the operator named the pose")
         super().__init__(context)
-        self.homing = homing
+        self.homing = homing  # plan at the pose that the operator named, and comparison of samples with this plan
         self._largest_tension = np.full(len(context.zero), np.inf)  # upper limits of the tensions during a jog [N]
 
     def jog(self, winch: int, by: float) -> None:
@@ -290,11 +278,7 @@ class Following(ActiveState):
 
 
 class Stopping(ActiveState):
-    """STOPPING: a ramp begins at the last set point that was sent. All rates reach zero at the same time.
-
-    Attributes:
-        after: State at the end of the ramp.
-    """
+    """STOPPING: a ramp begins at the last set point that was sent. All rates reach zero at the same time."""
 
     def __init__(self, before: ActiveState, after: State, status: ExecutionStatus, reason: str) -> None:
         """Begin the ramp. The record of the motion receives `status` and `reason`."""

@@ -28,21 +28,15 @@ MOST_OWNER: Final = 2**31
 
 
 class Sender:
-    """Sender of the next command.
-
-    Attributes:
-        owner: Id of the controller.
-        counter: Counter of the last command.
-        command: Next command; None if nothing is sent.
-        length: Measured lengths at rest [m], shape (m,).
-        tension: Tensions at rest, at the drums [N], shape (m,).
-    """
+    """Sender of the next command."""
 
     def __init__(self, cable_count: int, random: np.random.Generator) -> None:
         """Create the sender; nothing is sent yet."""
         self.owner = int(random.integers(1, MOST_OWNER))
-        self.counter = int(random.integers(1, MOST_OWNER))
-        self.command: Command | None = None
+        self.counter = int(random.integers(1, MOST_OWNER))  # counter of the last command
+        self.command: Command | None = None  # next command; None if nothing is sent
+        # length: measured lengths at rest [m], shape (m,)
+        # tension: tensions at rest, at the drums [N], shape (m,)
         self.length, self.tension = np.full(cable_count, np.nan), np.zeros(cable_count)
         self._enabled: Flags = np.ones(cable_count, dtype=np.bool_)
         self._disabled: Flags = ~self._enabled
@@ -85,17 +79,11 @@ _AGAIN: Final = "Try again; if this continues, check the program of the PLC."
 
 
 class Disagreement(NamedTuple):
-    """Reason why groups do not agree.
+    """Reason why groups do not agree."""
 
-    Attributes:
-        reason: The groups and the cause as text.
-        next_step: Next step for the reader.
-        lasting: True if the operator must act.
-    """
-
-    reason: str
+    reason: str  # the groups and the cause as text
     next_step: str
-    lasting: bool = False
+    lasting: bool = False  # True if the operator must act
 
     def refusal(self, what: str) -> RefusedError:
         """Convert the reason to an error for the rejected request `what`."""
@@ -141,13 +129,7 @@ def disagreement(
 
 
 class Claim:
-    """Claim of the ownership of all groups.
-
-    Attributes:
-        mode: Mode of the next command; None if nothing is sent.
-        ready: True if all groups agree.
-        refused: Reason of the failure; None before a failure.
-    """
+    """Claim of the ownership of all groups."""
 
     def __init__(
         self, owner: int, groups: tuple[tuple[int, ...], ...], period: float, random: np.random.Generator
@@ -157,9 +139,9 @@ class Claim:
         self._silent = self._cycles = self._agreed = 0
         self._waiting = 0
         self._tries = 1
-        self.mode: Mode | None = Mode.HOLD
-        self.ready = False
-        self.refused: Disagreement | None = None
+        self.mode: Mode | None = Mode.HOLD  # mode of the next command; None if nothing is sent
+        self.ready = False  # True if all groups agree
+        self.refused: Disagreement | None = None  # reason of the failure; None before a failure
 
     def look(self, answer: Sample | Missing, counter: int) -> None:
         """Evaluate an answer of the machine, and choose the mode of the next command."""

@@ -76,26 +76,19 @@ class Estimator:
 
 
 class _Run:
-    """The present or the last motion, and its record.
-
-    Attributes:
-        motion: Planned motion; None for a platform jog, or before the first motion.
-        paused: Path that can be resumed.
-        status: Final status; RUNNING before its end.
-        reason: Reason of the status in one line.
-        first_event: Index of the first event of the motion.
-        table: Table of the cycles.
-        recording: True if cycles are added to the table.
-        announced: True if the recorder has received the plan, and has not received its end.
-    """
+    """The present or the last motion, and its record."""
 
     def __init__(self) -> None:
         """Begin without a motion."""
-        self.motion: Motion | None = None
+        self.motion: Motion | None = None  # planned motion; None for a platform jog, or before the first motion
         self.paused: Along | None = None
+        # status: final status; RUNNING before its end
+        # reason: reason of the status in one line
         self.status, self.reason = ExecutionStatus.RUNNING, ""
         self.first_event = 0
         self.table: CycleTable | None = None
+        # recording: True if cycles are added to the table
+        # announced: True if the recorder has received the plan, and has not received its end
         self.recording = self.announced = False
 
 
@@ -103,15 +96,7 @@ class Context:
     """Data and services that the states of a controller share.
 
     Attributes:
-        state: State of the controller.
-        sample: Newest sample; None before the first.
-        zero: Offset from homing, added to lengths of samples [m], shape (m,).
-        homed: True if the pose of the platform is known.
-        run: Present or last motion.
-        previous_plan: Plan that the next plan continues, because the platform rests at its end; None otherwise.
         correction: Correction of the tension loop, added to the lengths of the plan [m], shape (m,).
-        number: Index of the cycle, from 0.
-        time: Time on the link's clock [s].
     """
 
     def __init__(
@@ -147,11 +132,16 @@ class Context:
         self.journal = Journal(record)
         self.garbage = Garbage()
         self.state = State.OFF
-        self.sample: Sample | None = None
+        self.sample: Sample | None = None  # newest sample; None before the first
+        # zero: offset from homing, added to lengths of samples [m], shape (m,)
+        # homed: True if the pose of the platform is known
         self.zero, self.homed = np.zeros(m), False
         self.unknown = np.full(m, nan)
+        # number: index of the cycle, from 0
+        # time: time on the link's clock [s]
         self.number, self.time = 0, 0.0
         self.run = _Run()
+        # previous_plan: plan that the next plan continues, because the platform rests at its end; None otherwise
         self.previous_plan: Plan | None = None
         self.clear_faults()
         self.reset_tension_loop()

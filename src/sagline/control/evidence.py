@@ -57,37 +57,7 @@ _TRIPPED: Final = int(WinchState.FAULT)
 
 
 class Evidence:
-    """Tensions of this cycle and data of the machine, used by all rules of a set.
-
-    Attributes:
-        group_of: Index of the group of each winch, shape (m,).
-        period: Period of a cycle [s].
-        largest: Largest correction of a length without a fault [m].
-        noise: Standard deviation of a reading [N].
-        sigma: Standard deviation of a reading, increased by the bias of a good cell [N].
-        limit: Upper limits of T_A [N], shape (m,).
-        full_scale: Full scale of the cells [N], infinite if unknown, shape (m,).
-        believed: True for cells whose readings are used, shape (m,).
-        tension: T_A [N], shape (m,): the reading if it is finite and the cell is not ignored, otherwise the planned
-            tension. If there is no plan either, a value between the limits for slack and tight cables.
-        plain: True if no cell is ignored and all readings are finite.
-        stopped: True while a reported fault stops the motion and the winches still move.
-        broken: True for broken cables, shape (m,).
-        jumped: True for encoders that have jumped, shape (m,).
-        least: Smallest tension [N].
-        most: Largest tension [N].
-        oldest: Age of the oldest group's sample [s].
-        bits: Status bits set in at least one group.
-        common: Status bits set in every group.
-        faulted: True if a PLC reports a fault.
-        tripped: True if a drive reports a fault.
-        states: Codes of the winches' states, as plain numbers.
-        low: Number of consecutive new readings at which the cable is slack, but taut in the plan, shape (m,).
-        before_low: Last reading before the readings of a slack cable [N], shape (m,).
-        steady: T_A minus the plan after the slow filter [N], shape (m,); constant while a cable is slack.
-        quick: T_A minus the plan after the quick filter [N], shape (m,).
-        compared: True if tensions can be compared with a plan.
-    """
+    """Tensions of this cycle and data of the machine, used by all rules of a set."""
 
     def __init__(
         self,
@@ -99,36 +69,56 @@ class Evidence:
     ) -> None:
         """Begin without evidence; `period` [s]; `cell`: deviation, bias [N]; `largest`: limit of a correction [m]."""
         m, winch = robot.cable_count, robot.winches
-        self.group_of = np.zeros(m, dtype=np.int64)
+        self.group_of = np.zeros(m, dtype=np.int64)  # index of the group of each winch, shape (m,)
         for g, members in enumerate(groups_of(m) if groups is None else groups):
             self.group_of[list(members)] = g
+        # period: period of a cycle [s]
+        # largest: largest correction of a length without a fault [m]
         self.period, self.largest = period, largest
+        # noise: standard deviation of a reading [N]
+        # sigma: standard deviation of a reading, increased by the bias of a good cell [N]
         self.noise, self.sigma = cell[0], math.hypot(*cell)
-        self.limit = robot.tension_max
+        self.limit = robot.tension_max  # upper limits of T_A [N], shape (m,)
         least = robot.tension_min
         self._slack = np.where(least > 0.0, SLACK_SHARE * least, SIGMAS * self.sigma)
         self._taut = np.where(least > 0.0, PLANNED_SHARE * least, 2.0 * SIGMAS * self.sigma)
         self._most_slack, self._neither = float(self._slack.max()), np.maximum(self._slack, self._taut)
         known = winch is not None and winch.load_cell_range is not None
+        # full_scale: full scale of the cells [N], infinite if unknown, shape (m,)
         self.full_scale = np.broadcast_to(winch.load_cell_range if known else np.inf, (m,))  # type: ignore[union-attr, arg-type]
         self._set_up_motors(robot)
-        self.believed: Flags = np.ones(m, dtype=bool)
-        self.broken: Flags = np.zeros(m, dtype=bool)
-        self.jumped: Flags = np.zeros(m, dtype=bool)
+        self.believed: Flags = np.ones(m, dtype=bool)  # True for cells whose readings are used, shape (m,)
+        self.broken: Flags = np.zeros(m, dtype=bool)  # True for broken cables, shape (m,)
+        self.jumped: Flags = np.zeros(m, dtype=bool)  # True for encoders that have jumped, shape (m,)
+        # low: number of consecutive new readings at which the cable is slack, but taut in the plan, shape (m,)
         self.low = np.zeros(m, dtype=np.int64)
-        self.before_low = np.full(m, np.nan)
+        self.before_low = np.full(m, np.nan)  # last reading before the readings of a slack cable [N], shape (m,)
         self._filtered, self._change = np.zeros((2, m)), np.empty((2, m))
+        # steady: T_A minus the plan after the slow filter [N], shape (m,); constant while a cable is slack
+        # quick: T_A minus the plan after the quick filter [N], shape (m,)
         self.steady, self.quick = self._filtered
+        # stopped: True while a reported fault stops the motion and the winches still move
+        # compared: True if tensions can be compared with a plan
         self.compared = self.any_low = self.stopped = False
+        # plain: True if no cell is ignored and all readings are finite
         self.plain, self._all_believed = True, True
         self._still, self._settled = 0, round(RAMP / period)
         # full-size arrays, because numpy is three times slower with scalars or columns
         self._shares = np.array([[period / (time + period)] * m for time in (STEADY_TIME, QUICK_TIME)])
         self.cycle: Cycle | None = None
+        # tension: T_A [N], shape (m,): the reading if it is finite and the cell is not ignored, otherwise the planned
+        # tension. If there is no plan either, a value between the limits for slack and tight cables.
         self.tension = np.full(m, math.nan)
+        # least: smallest tension [N]
+        # most: largest tension [N]
+        # oldest: age of the oldest group's sample [s]
         self.least = self.most = self.oldest = math.nan
+        # bits: status bits set in at least one group
+        # common: status bits set in every group
         self.bits = self.common = 0
-        self.states = list[int]()
+        self.states = list[int]()  # codes of the winches' states, as plain numbers
+        # faulted: True if a PLC reports a fault
+        # tripped: True if a drive reports a fault
         self.faulted = self.tripped = False
 
     def _set_up_motors(self, robot: Robot) -> None:

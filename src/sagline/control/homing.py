@@ -115,28 +115,13 @@ MOST: Final = 1.2  # a jog ends if a tension exceeds the planned tension times t
 
 
 class Homing:
-    """Plan at the stated pose, and comparison of tensions and lengths with the plan.
-
-    Attributes:
-        plan: Plan of the robot at the stated pose.
-        state: Equilibrium of the plan.
-        standing: Constant set point at the pose.
-        tension: Planned T_A at the pose [N], shape (m,).
-        sigma: Standard deviation of the load cells [N], shape (m,).
-        off: Mean of the measured minus the planned tensions [N], shape (m,).
-        tolerance: Largest difference of a length that the operator need not confirm [m], shape (m,); infinite if the
-            machine has no valid lengths.
-        apart: Lengths of the machine minus lengths of the plan [m], shape (m,).
-        zero: Offset added to the lengths of samples after homing [m], shape (m,).
-        agrees: True if every tension is within 5 sigma.
-        confirmed: True if the operator has confirmed the pose although lengths of the machine differ from the plan.
-    """
+    """Plan at the stated pose, and comparison of tensions and lengths with the plan."""
 
     def __init__(
         self, robot: Robot, pose: Pose, model: CableModel, method: TensionMethod, zero: Array | float = 0.0
     ) -> None:
         """Plan the stated pose `pose`; `zero`: offset from an earlier homing, added to lengths [m], (m,)."""
-        self.plan = inverse(robot, pose, model, method)
+        self.plan = inverse(robot, pose, model, method)  # plan of the robot at the stated pose
         if not self.plan.solved:
             gap = self.plan.gaps[0]
             step = "State another pose, at which every cable is under tension."
@@ -144,16 +129,23 @@ class Homing:
             raise RefusedError("homing", f"the pose {reason}, {gap.status.name}", step)
         self.state = self.plan.state
         self.standing = Standing.at(self.state)
-        self.tension = self.state.cables.frame_end_tension
-        self.sigma = cell_sigma(robot)
+        self.tension = self.state.cables.frame_end_tension  # planned T_A at the pose [N], shape (m,)
+        self.sigma = cell_sigma(robot)  # standard deviation of the load cells [N], shape (m,)
         self._pose, self._robot, self._model = pose, robot, model
         m, winches = robot.cable_count, robot.winches
         self._present = zero + np.zeros(m)
         known = self._present.any() or (winches is not None and winches.length_zero is not None)
+        # tolerance: largest difference of a length that the operator need not confirm [m], shape (m,); infinite if the
+        # machine has no valid lengths
         self.tolerance = length_tolerance(robot, self.state, model) if known else np.full(m, np.inf)
         self._lengths, self._tensions = np.zeros(m), np.zeros(m)
         self._count, self._counter = 0, np.zeros(0, dtype=np.int64)
+        # off: mean of the measured minus the planned tensions [N], shape (m,)
+        # apart: lengths of the machine minus lengths of the plan [m], shape (m,)
+        # zero: offset added to the lengths of samples after homing [m], shape (m,)
         self.off, self.apart, self.zero = np.full(m, np.nan), np.full(m, np.nan), np.zeros(m)
+        # agrees: True if every tension is within 5 sigma
+        # confirmed: True if the operator has confirmed the pose although lengths of the machine differ from the plan
         self.agrees = self.confirmed = False
 
     @property

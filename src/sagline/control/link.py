@@ -100,12 +100,7 @@ class Command(NamedTuple):
 
 
 class Refusal(NamedTuple):
-    """Reason why a block, or a PLC, cannot be used.
-
-    Attributes:
-        reason: Reason as text.
-        next_step: Next step for the reader.
-    """
+    """Reason why a block, or a PLC, cannot be used."""
 
     reason: str
     next_step: str

@@ -19,16 +19,11 @@ UNWATCHED = frozenset({State.OFF, State.CONNECTING})
 
 
 class Loop:
-    """Control loop of a controller, cycle by cycle.
-
-    Attributes:
-        context: Data and services that all states share.
-        active: Active state.
-        stop_requested: True if the next cycle begins to stop the motion.
-    """
+    """Control loop of a controller, cycle by cycle."""
 
     def __init__(self, context: Context) -> None:
         """Begin in the state OFF."""
+        # stop_requested: True if the next cycle begins to stop the motion
         self.context, self.stop_requested = context, False
         self.active: ActiveState = Off(context)
 

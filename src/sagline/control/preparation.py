@@ -22,7 +22,6 @@ from sagline.core.arrays import Array
 from sagline.robot.pose import Pose, PoseLike, pose_of
 from sagline.robot.robot import Robot
 
-
 T = TypeVar("T")
 SETTLING: Final = 3.0  # longest time for the comparison of tensions during homing [s]
 

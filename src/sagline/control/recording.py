@@ -201,11 +201,7 @@ def _width(columns: dict[str, slice]) -> int:
 
 
 class Journal:
-    """List of events, and the recorder.
-
-    Attributes:
-        events: Events up to now.
-    """
+    """List of events, and the recorder."""
 
     def __init__(self, record: Recorder | None) -> None:
         """Begin without events."""

@@ -30,31 +30,19 @@ WHOLE: Final = 1e-9  # tolerance of the time, in rows
 
 
 class SetPoint(NamedTuple):
-    """Set point for the end of a cycle.
+    """Set point for the end of a cycle."""
 
-    Attributes:
-        length: Unstrained lengths off the drums in the model [m], shape (m,).
-        rate: Rates of these lengths [m/s], shape (m,).
-        tension: T_A planned for the set point [N], shape (m,); NaN if unknown.
-        drum_tension: Expected tension at the drums [N], shape (m,).
-        wrench: External plus inertial wrench on the platform [N, N m], shape (6,); None for zero.
-        row: Matrices of the tension loop at the set point; None without matrices.
-        clock: Time since the start of the plan [s]; NaN outside a plan.
-        done: True if the source ends here.
-        enable: Drives that may move, shape (m,); None for all.
-        leading: True during the transition from the lengths at rest to the lengths of a plan. The tensions then differ
-            from the planned tensions.
-    """
-
-    length: Array
-    rate: Array
-    tension: Array
-    drum_tension: Array
-    wrench: Array | None
-    row: NullSpace | None
-    clock: float
-    done: bool
-    enable: Flags | None = None
+    length: Array  # unstrained lengths off the drums in the model [m], shape (m,)
+    rate: Array  # rates of these lengths [m/s], shape (m,)
+    tension: Array  # T_A planned for the set point [N], shape (m,); NaN if unknown
+    drum_tension: Array  # expected tension at the drums [N], shape (m,)
+    wrench: Array | None  # external plus inertial wrench on the platform [N, N m], shape (6,); None for zero
+    row: NullSpace | None  # matrices of the tension loop at the set point; None without matrices
+    clock: float  # time since the start of the plan [s]; NaN outside a plan
+    done: bool  # True if the source ends here
+    enable: Flags | None = None  # drives that may move, shape (m,); None for all
+    # True during the transition from the lengths at rest to the lengths of a plan. The tensions then differ from the
+    # planned tensions.
     leading: bool = False
 
 

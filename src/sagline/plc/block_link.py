@@ -33,54 +33,33 @@ RETRY: Final = 0.2  # time between attempts to connect [s]
 
 
 class _Newest(NamedTuple):
-    """Newest valid block of a group.
+    """Newest valid block of a group."""
 
-    Attributes:
-        values: Values of the rows, by name.
-        arrived: Time of arrival on the link's clock [s].
-        round_trip: Time from the request or the command to the arrival [s].
-    """
-
-    values: dict[str, Any]
-    arrived: float
-    round_trip: float
+    values: dict[str, Any]  # values of the rows, by name
+    arrived: float  # time of arrival on the link's clock [s]
+    round_trip: float  # time from the request or the command to the arrival [s]
 
 
 class _Outgoing(NamedTuple):
-    """Next block to write.
-
-    Attributes:
-        block: Block to write.
-        data: Bytes of the block.
-        since: Time at which it was queued [s].
-    """
+    """Next block to write."""
 
     block: Block
     data: bytes
-    since: float
+    since: float  # time at which it was queued [s]
 
 
 class GroupThread(Thread):
-    """Thread that exchanges data with one PLC.
-
-    Attributes:
-        number: Index of the group, from 0.
-        newest: Newest valid block of the group; None before the first.
-        discarded: Number of invalid blocks.
-        reason: Reason of the last invalid block; None before the first.
-        trouble: Last error of the connection; None without an error.
-        settled: Event that is set after the first answer of the PLC, valid or not.
-    """
+    """Thread that exchanges data with one PLC."""
 
     def __init__(self, number: int, winches: int, wire: Wire, clock: Callable[[], float]) -> None:
         """Prepare the thread; `clock`: clock of the link [s]."""
         super().__init__(name=f"sagline group {number}", daemon=True)
-        self.number = number
-        self.newest: _Newest | None = None
+        self.number = number  # index of the group, from 0
+        self.newest: _Newest | None = None  # newest valid block of the group; None before the first
         self.discarded = 0
-        self.reason: Refusal | None = None
-        self.trouble: Refusal | None = None
-        self.settled = Event()
+        self.reason: Refusal | None = None  # reason of the last invalid block; None before the first
+        self.trouble: Refusal | None = None  # last error of the connection; None without an error
+        self.settled = Event()  # event that is set after the first answer of the PLC, valid or not
         self._winches = winches
         self._wire = wire
         self._clock = clock

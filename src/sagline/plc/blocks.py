@@ -26,40 +26,25 @@ TYPES: Final = {  # types of SCL as `struct` formats; the PLC uses big-endian or
 
 
 class Field(NamedTuple):
-    """One row of a block.
+    """One row of a block."""
 
-    Attributes:
-        name: Name in packing and SCL.
-        type: One of `TYPES`, or the rows of a structure. With a structure, the value is an array of structures, one per
-            winch, with indices from 1.
-        offset: Offset from the start of the block, or of the structure [bytes].
-        meaning: Meaning and unit.
-    """
-
-    name: str
+    name: str  # name in packing and SCL
+    # one of `TYPES`, or the rows of a structure. With a structure, the value is an array of structures, one per winch,
+    # with indices from 1.
     type: str | tuple[Field, ...]
-    offset: int
+    offset: int  # offset from the start of the block, or of the structure [bytes]
     meaning: str
 
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Data block with standard (not optimized) access; the table defines the offset of every byte.
+    """Data block with standard (not optimized) access; the table defines the offset of every byte."""
 
-    Attributes:
-        number: Number of the data block in the PLC.
-        name: Name of the block in SCL.
-        magic: Value of its row `magic`.
-        register: First Modbus holding register of the block.
-        size: Size of the whole block [bytes].
-        fields: Rows of the block.
-    """
-
-    number: int
-    name: str
-    magic: int
-    register: int
-    size: int
+    number: int  # number of the data block in the PLC
+    name: str  # name of the block in SCL
+    magic: int  # value of its row `magic`
+    register: int  # first Modbus holding register of the block
+    size: int  # size of the whole block [bytes]
     fields: tuple[Field, ...]
 
     @cached_property

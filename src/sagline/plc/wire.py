@@ -19,15 +19,10 @@ MOST_ADDRESSES: Final = 10_000  # largest number of addresses, and largest numbe
 
 
 class Address(NamedTuple):
-    """Address of a PLC.
+    """Address of a PLC."""
 
-    Attributes:
-        host: Name, IPv4 address, or IPv6 address without brackets.
-        port: TCP port.
-    """
-
-    host: str
-    port: int
+    host: str  # name, IPv4 address, or IPv6 address without brackets
+    port: int  # TCP port
 
     def __str__(self) -> str:
         """Address as host:port, or as [host]:port for IPv6."""
@@ -129,16 +124,12 @@ class LinkError(SaglineError):
 
 
 class WireError(Exception):
-    """Error of a failed connection.
-
-    Attributes:
-        refusal: Reason and next step.
-    """
+    """Error of a failed connection."""
 
     def __init__(self, refusal: Refusal) -> None:
         """Store the refusal."""
         super().__init__(refusal)
-        self.refusal = refusal
+        self.refusal = refusal  # reason and next step
 
 
 class Wire(Protocol):

@@ -16,15 +16,12 @@ LOOPBACK: Final = "127.0.0.1"
 
 
 class BlockServers(ABC):
-    """Servers of the data blocks of all PLCs. Any client may read and write the blocks.
-
-    Attributes:
-        addresses: "host:port" of each group.
-    """
+    """Servers of the data blocks of all PLCs. Any client may read and write the blocks."""
 
     def __init__(self, blocks: Sequence[bytes], host: str = LOOPBACK, port: int = 0) -> None:
         """Start one server for each group."""
         self._memory = [{kind: bytearray(kind.size) for kind in BLOCKS} for _ in blocks]
+        # addresses: "host:port" of each group
         self.addresses: tuple[str, ...] = ()
         try:
             for i, block in enumerate(blocks):

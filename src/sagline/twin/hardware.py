@@ -27,11 +27,7 @@ from sagline.twin.plc_program import LEFT, PlcLimits
 
 
 class _EncoderScale:
-    """Conversion between lengths and encoder counts. Known drums: by their turns. Otherwise: with a constant radius.
-
-    Attributes:
-        per_meter: Counts per meter of unstrained paid-out cable, at the reference lengths, (m,).
-    """
+    """Conversion between lengths and encoder counts. Known drums: by their turns. Otherwise: with a constant radius."""
 
     def __init__(self, robot: Robot, length: Array, counts: Array) -> None:
         """Reference lengths [m] (m,) and counts (m,) of a robot's encoders."""
@@ -41,6 +37,7 @@ class _EncoderScale:
             raise InvalidValueError("winches: counts_per_turn", "not given", "known if encoder counts are used", step)
         stretch = 1.0 + winch.winding_tension / robot.cables.axial_stiffness
         each = winch.gear * winch.counts_per_turn
+        # per_meter: counts per meter of unstrained paid-out cable, at the reference lengths, (m,)
         self.per_meter = each * stretch / (2.0 * np.pi * drum_lever(robot, length))
         self._drums = None
         if winch.groove_pitch is not None and robot.cables.diameter is not None:
@@ -203,10 +200,6 @@ class Hardware:
     """Drives, sensors and plant.
 
     Attributes:
-        read: Readings at the end of a period, shape (5, m). The rows are LENGTH: unstrained lengths off the drums, from
-            the encoder counts and the nominal drums [m]; RATE: mean rates of the lengths over the period [m/s]; TORQUE:
-            torques of the motors at their shafts, positive torque pays out cable [N m]; CELL: readings
-            of the load cells [N]; FILTERED: filtered readings [N].
         counts: Encoder counts, whole numbers as floats, shape (m,).
     """
 
@@ -224,6 +217,10 @@ class Hardware:
         self._powered, self._torque_of_force = [False] * m, np.zeros(m)
         self._periods, self._shares = np.full(m, period), np.full(m, period / (FILTER + period))
         self._load_changed = True  # True until the simulator has the new load
+        # read: readings at the end of a period, shape (5, m). The rows are LENGTH: unstrained lengths off the drums,
+        # from the encoder counts and the nominal drums [m]; RATE: mean rates of the lengths over the period [m/s];
+        # TORQUE: torques of the motors at their shafts, positive torque pays out cable [N m]; CELL: readings of the
+        # load cells [N]; FILTERED: filtered readings [N].
         self.read = np.zeros((5, m))
         self._rows = tuple(self.read)
         self.read[FILTERED] = reading.load_cell

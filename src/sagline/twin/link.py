@@ -18,11 +18,7 @@ TINY: Final = 1e-9  # tolerance for rounding errors of times [s]
 
 
 class Network:
-    """Delay, jitter and losses of messages.
-
-    Attributes:
-        ideal: True if each message arrives without delay.
-    """
+    """Delay, jitter and losses of messages."""
 
     def __init__(self, delay: float, jitter: float, loss: float, seed: int) -> None:
         """Check the arguments `delay` [s], `jitter` [s] and `loss` (a share)."""
@@ -31,7 +27,7 @@ class Network:
         self._loss = number(loss, "loss", "", low=0.0)
         if self._loss >= 1.0:
             raise InvalidValueError("loss", f"{loss:g}", ">= 0, < 1", "Give the share, 0.01 for 1 %.")
-        self.ideal = not (self._delay or self._jitter or self._loss)
+        self.ideal = not (self._delay or self._jitter or self._loss)  # True if each message arrives without delay
         self._generator = np.random.default_rng((seed, 1))
 
     def arrival(self, now: float) -> float | None:
@@ -72,19 +68,16 @@ COUNTER, OWNER, ECHO, STATUS, FAULT = range(5)  # rows of the third array
 
 
 class PlcBlocks:
-    """Blocks of all groups, in arrays.
-
-    Attributes:
-        arrays: Length, rate, torque, tension, filtered (5, m); counts, state, winch fault (3, m); counter, owner,
-            echo, status, fault (5, G); the PLCs' clocks [s] (G,).
-        owners: Ids of the controllers that own the groups, as plain numbers.
-    """
+    """Blocks of all groups, in arrays."""
 
     __slots__ = ("arrays", "owners")
 
     def __init__(self, arrays: tuple[Array, Whole, Whole, Array]) -> None:
         """Store the arrays."""
+        # arrays: length, rate, torque, tension, filtered (5, m); counts, state, winch fault (3, m); counter, owner,
+        # echo, status, fault (5, G); the PLCs' clocks [s] (G,)
         self.arrays = arrays
+        # owners: ids of the controllers that own the groups, as plain numbers
         self.owners: list[int] = arrays[FIRST][OWNER].tolist()
 
     def counter(self, group: int) -> int:

@@ -59,20 +59,6 @@ class Program:
     """Program of one group.
 
     The inputs of the program are the command, the encoders and the load cells. The outputs are the attributes.
-
-    Attributes:
-        owner: Id of the controller that owns the group, 0 for none.
-        echo: Counter of the last accepted command, 0 before the first.
-        fault: Reason of an automatic stop. A command to hold acknowledges the fault, if the ramp has ended and at least
-            100 ms have passed.
-        powered: True for each drive that has power and a released brake.
-        length: Set points at the end of the scan's period [m].
-        tension: Expected tensions at the drums [N].
-        drive_fault: Fault codes of the drives, 0 for none.
-        contact: State of the normally closed contact of the emergency stop: False if the stop is pressed, or if the
-            wire is broken.
-        emergency: True from the opening of the contact until a reset with a closed contact.
-        locked: True if the drums are locked until the operator releases them.
     """
 
     def __init__(self, limits: PlcLimits, period: float) -> None:
@@ -80,11 +66,21 @@ class Program:
         self.limits, self.period = limits, period
         count = len(limits.least)
         self.winches = range(count)
+        # owner: id of the controller that owns the group, 0 for none
+        # echo: counter of the last accepted command, 0 before the first
+        # fault: reason of an automatic stop. A command to hold acknowledges the fault, if the ramp has ended and at
+        # least 100 ms have passed.
         self.owner, self.echo, self.fault = 0, 0, GroupFault.NONE
-        self.powered = [False] * count
+        self.powered = [False] * count  # True for each drive that has power and a released brake
         self._loaded = [False] * count  # True for each drive that produces the expected tension
+        # length: set points at the end of the scan's period [m]
+        # tension: expected tensions at the drums [N]
         self.length, self.tension = [0.0] * count, [0.0] * count
-        self.drive_fault = [0] * count
+        self.drive_fault = [0] * count  # fault codes of the drives, 0 for none
+        # contact: state of the normally closed contact of the emergency stop: False if the stop is pressed, or if the
+        # wire is broken
+        # emergency: True from the opening of the contact until a reset with a closed contact
+        # locked: True if the drums are locked until the operator releases them
         self.contact, self.emergency, self.locked = True, False, False
         self._order: Order | None = None
         self._fresh = False
