@@ -32,9 +32,9 @@ def written_with_figures(folder: Path, parts: tuple[str, ...] = ()) -> Written:
     figures: list[tuple[str, Figure]] = []
     panel = Drawings.panel
 
-    def report_kept_for_all_tests(self: Drawings, figure: Any, caption: str) -> Panel:
+    def report_kept_for_all_tests(self: Drawings, figure: Any, caption: str, legend: str = "") -> Panel:
         figures.append((caption, figure))
-        return panel(self, figure, caption)
+        return panel(self, figure, caption, legend)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Drawings, "panel", report_kept_for_all_tests)

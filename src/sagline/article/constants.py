@@ -7,7 +7,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sagline.article.drawing import Courses, Drawings, axes, chapter, finding, legend_above, shades, with_fit
+from sagline.article.drawing import (
+    Drawings,
+    axes,
+    chapter,
+    course_panels,
+    draw_courses,
+    finding,
+    shades,
+    with_fit,
+)
 from sagline.article.regressions import (
     ANGLE,
     PUBLISHED_K_H,
@@ -76,13 +85,16 @@ def _over_chord(platform: InterceptStudy, frame: InterceptStudy, draw: Drawings)
         ax.plot(sampling.chords, platform.intercept[MIDDLE, :, k], color=color, marker="o", markersize=3.0, label=label)
         ax.plot(sampling.chords, frame.intercept[MIDDLE, :, k], color=color, marker="s", markersize=3.0, linestyle="--")
     ax.axhline(0.0, color="0.6", linewidth=0.6)
-    legend_above(ax, r"$\rho$ [kg/m]")
     bent = [_bend(sampling.chords[:, None], study.intercept, study.h_b[:, None, :]) for study in (platform, frame)]
     return finding(
         "b-over-chord",
         numbers={"nonproportional_share_platform": bent[0], "nonproportional_share_frame": bent[1]},
         panels=(
-            draw.panel(figure, "b_π at φ = 0.754 rad: platform end (circles, solid), frame end (squares, dashed)."),
+            draw.panel(
+                figure,
+                "b_π at φ = 0.754 rad: platform end (circles, solid), frame end (squares, dashed).",
+                r"$\rho$ [kg/m]",
+            ),
         ),
     )
 
@@ -99,7 +111,7 @@ def _over_density(platform: InterceptStudy, frame: InterceptStudy, draw: Drawing
             sampling.densities, frame.h_b[k], color=color, marker="s", markersize=2.6, linewidth=0.9, linestyle="--"
         )
     ax.axhline(0.0, color="0.6", linewidth=0.6)
-    legend_above(ax, r"$\varphi$ [rad]")
+    caption = "h_b at five angles: platform end (circles), frame end (squares, dashed)."
     spread = np.ptp(frame.k_h_of_angle) / abs(frame.k_h)
     return finding(
         "h-over-density",
@@ -111,7 +123,7 @@ def _over_density(platform: InterceptStudy, frame: InterceptStudy, draw: Drawing
             "half_gravity": SHALLOW_K_H,
             "k_h_spread_over_angles": spread,
         },
-        panels=(draw.panel(figure, "h_b at five angles: platform end (circles), frame end (squares, dashed)."),),
+        panels=(draw.panel(figure, caption, r"$\varphi$ [rad]"),),
     )
 
 
@@ -123,14 +135,12 @@ def _range(
     ax.axhline(PUBLISHED_K_P, color=VERMILLION, linewidth=0.9, linestyle="--", label="published")
     ax.axhline(SHALLOW_K_P, color="0.4", linewidth=0.9, linestyle=":", label="$g^2/24$")
     _logarithmic(ax, (50, 100, 200, 500))
-    legend_above(ax)
     second, bx = axes("highest sampled $T_x$ [N]", "$|k_h|$ [m/s²]")
     _course(bx, over_highest, "highest", "k_h_frame", BLUE, "frame end")
     _course(bx, over_highest, "highest", "k_h_platform", PURPLE, "platform end")
     bx.axhline(PUBLISHED_K_H, color=VERMILLION, linewidth=0.9, linestyle="--", label="published")
     bx.axhline(SHALLOW_K_H, color="0.4", linewidth=0.9, linestyle=":", label="$g/2$")
     _logarithmic(bx, (500, 2000, 10_000, 40_000))
-    legend_above(bx)
     all_k_p = [c.k_p for c in over_lowest]
     return finding(
         "published-range",
@@ -157,7 +167,6 @@ def _limit(scaled: Sequence[Constants], draw: Drawings) -> Finding:
         away = [100.0 * abs(abs(getattr(c, name)) / limit - 1.0) for c in scaled]
         ax.semilogy(FACTORS, away, color=color, marker="o", markersize=3.0, linewidth=1.1, label=labels[name])
     _logarithmic(ax, tuple(FACTORS.astype(int)))
-    legend_above(ax)
     return finding(
         "taut-limit",
         numbers={"scaled": [c._asdict() for c in scaled], "factors": FACTORS, "g_squared_over_24": SHALLOW_K_P},
@@ -225,7 +234,6 @@ def _with_stretch(study: StretchStudy, draw: Drawings) -> Finding:
     ax.plot(study.tensions, 1e3 * study.unstretchable, color=BLUE, linewidth=1.3, label="does not stretch")
     ax.plot(study.tensions, 1e3 * study.stretchable, color=VERMILLION, linewidth=1.3, label="stretches")
     ax.axhline(0.0, color="0.6", linewidth=0.6)
-    legend_above(ax)
     hooke = study.magnitude[-1] * CHORD / float(simulated_cable().axial_stiffness)
     numbers = {
         "least_unstretchable_m": study.unstretchable.min(),
@@ -245,11 +253,9 @@ def _relieved(study: StretchStudy, draw: Drawings) -> Finding:
     ax.plot(study.magnitude, 1e3 * study.unstretchable, color=BLUE, linewidth=2.4, alpha=0.5, label="does not stretch")
     ax.plot(study.magnitude, 1e3 * study.relieved, color=VERMILLION, linewidth=1.1, label="without stretch by (38)")
     ax.set_yscale("log")
-    legend_above(ax)
     second, bx = axes("$|T|$ [N]", "error of $d$ [mm]")
     bx.plot(study.magnitude, printed, color=VERMILLION, linewidth=1.3, label="(36), (38)")
     bx.plot(study.magnitude, mended, color=GREEN, linewidth=1.3, label="without stretch by the mean tension")
-    legend_above(bx)
     return finding(
         "stretch-removed",
         numbers=numbers,
@@ -267,11 +273,13 @@ def _tension(study: SagStudy, draw: Drawings) -> Finding:
     ax.set_yscale("log")
     d, a_d = (values[MIDDLE, PICKED, DENSE] for values in (study.adjusting_length, study.a_d))
     fits = a_d[:, None] * length_shape(tensions)
-    Courses(tensions, d, tensions, fits, _named(study.sampling.chords[[*PICKED]], "g")).draw(ax, "$D$ [m]")
+    draw_courses(ax, (tensions, d, tensions, fits, _named(study.sampling.chords[[*PICKED]], "g")))
     share = study.adjusting_length / study.fitted_length
     numbers = {"exact_over_fit_min": share.min(), "exact_over_fit_max": share.max()}
     return finding(
-        "d-model", numbers=numbers, panels=(draw.panel(figure, f"d {_middle_and_dense(study)}, with fits."),)
+        "d-model",
+        numbers=numbers,
+        panels=(draw.panel(figure, f"d {_middle_and_dense(study)}, with fits.", "$D$ [m]"),),
     )
 
 
@@ -279,7 +287,7 @@ def _chord(study: SagStudy, draw: Drawings) -> Finding:
     sampling = study.sampling
     fine = np.linspace(0.0, sampling.chords[-1], 80)
     fits = study.q_a[:, DENSE, None] * chord_shape(fine)
-    courses = Courses(sampling.chords, study.a_d[..., DENSE], fine, fits, _named(sampling.angles, "g"))
+    courses = sampling.chords, study.a_d[..., DENSE], fine, fits, _named(sampling.angles, "g")
     captions = (
         f"a_d {_middle_and_dense(study)} with its cubic (figure 11).",
         "The same at five angles (figure 12).",
@@ -288,7 +296,7 @@ def _chord(study: SagStudy, draw: Drawings) -> Finding:
     return finding(
         "a-over-chord",
         numbers={"cubic_away_share": away},
-        panels=courses.panels(("$D$ [m]", "$a_d$ [m N²]", r"$\varphi$ [rad]"), MIDDLE, captions, draw),
+        panels=course_panels(courses, ("$D$ [m]", "$a_d$ [m N²]", r"$\varphi$ [rad]"), MIDDLE, captions, draw),
     )
 
 
@@ -297,7 +305,7 @@ def _angle(study: SagStudy, draw: Drawings) -> Finding:
     fine = np.linspace(0.0, 0.5 * np.pi, 100)
     fits = study.p_q[[*DRAWN], None] * angle_shape(fine)
     labels = _named(sampling.densities[[*DRAWN]], ".1f")
-    courses = Courses(sampling.angles, study.q_a[:, DRAWN].T, fine, fits, labels)
+    courses = sampling.angles, study.q_a[:, DRAWN].T, fine, fits, labels
     captions = (
         f"q_a at ρ = {n(sampling.densities[DENSE], unit='kg/m')} (figure 13).",
         "The same at five densities (figure 14).",
@@ -306,7 +314,7 @@ def _angle(study: SagStudy, draw: Drawings) -> Finding:
     return finding(
         "q-over-angle",
         numbers={"cos4_away_share": away},
-        panels=courses.panels((r"$\varphi$ [rad]", "$q_a$ [N²/m²]", r"$\rho$ [kg/m]"), DENSE, captions, draw),
+        panels=course_panels(courses, (r"$\varphi$ [rad]", "$q_a$ [N²/m²]", r"$\rho$ [kg/m]"), DENSE, captions, draw),
     )
 
 
@@ -320,7 +328,6 @@ def _density(study: SagStudy, draw: Drawings) -> Finding:
     bx.plot(densities, each, "o-", color=BLUE, markersize=3.0, linewidth=1.1, label="density by density")
     bx.axhline(PUBLISHED_K_P, color=VERMILLION, linewidth=0.9, linestyle="--", label="published")
     bx.axhline(SHALLOW_K_P, color="0.4", linewidth=0.9, linestyle=":", label="$g^2/24$")
-    legend_above(bx)
     return finding(
         "p-over-density",
         numbers={

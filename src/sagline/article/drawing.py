@@ -11,7 +11,7 @@ from importlib.resources import files
 from itertools import count
 from math import ceil
 from string import Formatter
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 import matplotlib
 import numpy as np
@@ -110,8 +110,10 @@ class Drawings:
         """Prepare drawings; their identifiers begin with the name of this part of the page."""
         self._names = (f"{page}-{k}-" for k in count(1))
 
-    def panel(self, figure: Sheet, caption: str) -> Panel:
-        """Convert a figure to a drawing of the page; screen readers read the caption."""
+    def panel(self, figure: Sheet, caption: str, legend: str = "") -> Panel:
+        """Convert a figure to a drawing with a legend, its title is `legend`; screen readers read the caption."""
+        if figure.axes[0].get_legend_handles_labels()[1]:
+            legend_above(figure.axes[0], legend)
         svg = svg_text(figure, 200, **{"svg.hashsalt": "sagline", "svg.fonttype": "path"})
         svg = _size.sub("", _remarks.sub("", svg).strip(), count=2)  # the page determines the size
         svg = svg.replace("<svg ", f'<svg role="img" aria-label="{escape(caption)}" ', 1)
@@ -202,7 +204,7 @@ def thinning(number: int) -> slice:
 
 def cables_over_time(
     time: Array, values: Array, label: str, width: float, name: str = "", stops: Iterable[float] = ()
-) -> tuple[Sheet, Axes]:
+) -> Sheet:
     """Draw one line per cable over time, from values (N, m), and a vertical line at each stop."""
     figure, ax = axes("time without stops [s]" if stops else "time [s]", label, height=2.7)
     part = thinning(len(time))
@@ -210,14 +212,13 @@ def cables_over_time(
         ax.plot(time[part], course, **cable_look(i), linewidth=width, label=name.format(i))
     for stop in stops:
         ax.axvline(stop, color="0.75", linewidth=0.6, linestyle="--")
-    return figure, ax
+    return figure
 
 
 def with_fit(ax: Axes, x: Array, y: Array, fine: Array, fit: Array) -> None:
     """Draw one curve, sampled at x, with its fit."""
     ax.plot(x, y, "o", color=BLUE, markersize=3.5, label="exact")
     ax.plot(fine, fit, color="black", linewidth=0.9, label="fit")
-    legend_above(ax)
 
 
 def error_panels(
@@ -233,37 +234,32 @@ def error_panels(
         for point, at in zip(names, place, strict=True):
             ax.annotate(point, at, fontsize=TICK, ha="center", va="center")
         ax.margins(0.16)
-        if len(series) > 1:
-            legend_above(ax)
         panels.append(draw.panel(figure, caption.format(name)))
     return panels
 
 
-class Courses(NamedTuple):
-    """Several curves with their fits."""
+# curves with their fits: abscissae (n,) and samples (k, n), abscissae (l,) and values (k, l) of the fits, names (k,)
+Courses: TypeAlias = tuple[Array, Array, Array, Array, list[str]]
 
-    x: Array  # abscissae of the samples, shape (n,)
-    rows: Array  # the samples, shape (k, n)
-    fine: Array  # abscissae of the drawn fits, shape (l,)
-    fits: Array  # the fits, shape (k, l)
-    names: list[str]  # names of the curves in the legend
 
-    def draw(self, ax: Axes, title: str) -> None:
-        """Draw all curves, from dark to light."""
-        for row, fit, name, color in zip(self.rows, self.fits, self.names, shades(len(self.names)), strict=True):
-            ax.plot(self.x, row, "o", color=color, markersize=2.6, label=name)
-            ax.plot(self.fine, fit, color=color, linewidth=0.9)
-        legend_above(ax, title)
+def draw_courses(ax: Axes, courses: Courses) -> None:
+    """Draw all curves with their fits, from dark to light."""
+    x, rows, fine, fits, names = courses
+    for row, fit, name, color in zip(rows, fits, names, shades(len(names)), strict=True):
+        ax.plot(x, row, "o", color=color, markersize=2.6, label=name)
+        ax.plot(fine, fit, color=color, linewidth=0.9)
 
-    def panels(
-        self, labels: tuple[str, str, str], one: int, captions: tuple[str, str], draw: Drawings
-    ) -> tuple[Panel, Panel]:
-        """Draw a single curve and all curves, with labels of both axes and of the legend."""
-        figure, ax = axes(*labels[:2])
-        with_fit(ax, self.x, self.rows[one], self.fine, self.fits[one])
-        second, bx = axes(*labels[:2])
-        self.draw(bx, labels[2])
-        return draw.panel(figure, captions[0]), draw.panel(second, captions[1])
+
+def course_panels(
+    courses: Courses, labels: tuple[str, str, str], one: int, captions: tuple[str, str], draw: Drawings
+) -> tuple[Panel, Panel]:
+    """Draw a single curve and all curves, with labels of both axes and of the legend."""
+    x, rows, fine, fits, _ = courses
+    figure, ax = axes(*labels[:2])
+    with_fit(ax, x, rows[one], fine, fits[one])
+    second, bx = axes(*labels[:2])
+    draw_courses(bx, courses)
+    return draw.panel(figure, captions[0]), draw.panel(second, captions[1], labels[2])
 
 
 def map_axes(x: str, y: str) -> tuple[Sheet, Axes]:

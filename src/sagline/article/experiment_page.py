@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from sagline import control
-from sagline.article.drawing import Drawings, cables_over_time, chapter, error_panels, finding, legend_above
+from sagline.article.drawing import Drawings, cables_over_time, chapter, error_panels, finding
 from sagline.article.experiment import SPEED, STOP, Experiment
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
@@ -111,9 +111,7 @@ def _lengths(result: Experiment, draw: Drawings) -> Finding:
 
 
 def _courses(result: Experiment, values: Array, label: str, caption: str, draw: Drawings) -> Panel:
-    figure, ax = cables_over_time(result.time, values, label, 0.9, "cable {}", result.stops.tolist())
-    legend_above(ax)
-    return draw.panel(figure, caption)
+    return draw.panel(cables_over_time(result.time, values, label, 0.9, "cable {}", result.stops.tolist()), caption)
 
 
 def _space(result: Experiment, draw: Drawings) -> Finding:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import sagline as sl
-from sagline.article.drawing import Drawings, axes, chapter, finding, legend_above, shades
+from sagline.article.drawing import Drawings, axes, chapter, finding, shades
 from sagline.article.regressions import ANGLE, GRAVITY, End, FittedLine, fit_line, simulated_cable
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
@@ -102,7 +102,6 @@ def _psi(studies: list[_FeasibleSets], draw: Drawings) -> Finding:
     for study, color in zip(studies, shades(len(studies)), strict=True):
         outline = study.psi[SHOWN]
         ax.plot(outline[:, 0], outline[:, 1], color=color, linewidth=1.3, label=n(1e3 * study.tolerance, unit="mm"))
-    legend_above(ax, r"tolerance $\epsilon_{max}$")
     along = np.array(studies[0].end) / CHORD
     second, bx = axes("along the chord [N]", "across it [N]")
     middle = studies[-1].psi[SHOWN].mean(axis=0)
@@ -110,7 +109,8 @@ def _psi(studies: list[_FeasibleSets], draw: Drawings) -> Finding:
         away, label = study.psi[SHOWN] - middle, n(1e3 * study.tolerance, unit="mm")
         bx.plot(away @ along, away @ (-along[1], along[0]), color=color, linewidth=1.3, label=label)
     bx.set_ylim(-0.2, 0.3)
-    legend_above(bx, r"tolerance $\epsilon_{max}$")
+    legend = r"tolerance $\epsilon_{max}$"
+    caption = "The same sets relative to their middle, along and across the chord; the scales differ."
     ratio = extents[:-1] / extents[1:]
     return finding(
         "psi",
@@ -121,10 +121,8 @@ def _psi(studies: list[_FeasibleSets], draw: Drawings) -> Finding:
             "times_smaller": ratio,
         },
         panels=(
-            draw.panel(figure, f"The set ψ for L = {n(length, '.5g', 'm')} and three tolerances."),
-            draw.panel(
-                second, "The same sets relative to their middle, along and across the chord; the scales differ."
-            ),
+            draw.panel(figure, f"The set ψ for L = {n(length, '.5g', 'm')} and three tolerances.", legend),
+            draw.panel(second, caption, legend),
         ),
         extents=", ".join(
             (f"{n(x, '.3g', 'N')} at {n(1000.0 * e, unit='mm')}" for x, e in zip(extents, TOLERANCES, strict=True))
@@ -140,7 +138,6 @@ def _curve(study: _FeasibleSets, draw: Drawings) -> Finding:
         label = rf"$\psi$, $\epsilon_{{max}}$ = {n(1e3 * study.tolerance, unit='mm')}" if k == 0 else "_"
         ax.plot([outline[:, 0].min(), outline[:, 0].max()], height, color=VERMILLION, linewidth=2.2, label=label)
     ax.set_xlim(0.0, TENSIONS[-1])
-    legend_above(ax)
     return finding(
         "psi-curve",
         numbers={
@@ -164,12 +161,10 @@ def _line(study: _FeasibleSets, draw: Drawings) -> Finding:
     ax.plot(
         study.tensions, line.slope * study.tensions + line.intercept, color="black", linewidth=0.9, label=r"line $\pi$"
     )
-    legend_above(ax)
     second, bx = axes("$T_x$ [N]", "away from the line [N]")
     bx.plot(study.tensions, rest, color=BLUE, linewidth=1.3, label=r"fitted line")
     bx.plot(study.tensions, from_article, color=VERMILLION, linewidth=1.3, label=r"$\tan\varphi\, T_x + wD/2$")
     bx.axhline(0.0, color="0.6", linewidth=0.6)
-    legend_above(bx)
     return finding(
         "line-pi",
         numbers={

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import sagline as sl
-from sagline.article.drawing import Drawings, axes, chapter, draw_errors, finding, legend_above, map_axes, shades
+from sagline.article.drawing import Drawings, axes, chapter, draw_errors, finding, map_axes, shades
 from sagline.article.identify import EmpiricalFit, identify_empirical
 from sagline.article.identify_cable import CableFit, identify_cable
 from sagline.article.regressions import simulated_cable
@@ -74,7 +74,7 @@ def _limits(fit: EmpiricalFit, draw: Drawings) -> Finding:
     for tolerance, color in zip(TOLERANCES, shades(len(TOLERANCES)), strict=True):
         frontier[tolerance] = np.array([fit.weight_max(tolerance, tension) for tension in fit.tensions])
         ax.plot(fit.tensions, frontier[tolerance], color=color, linewidth=1.3, label=n(1e3 * tolerance, unit="mm"))
-    legend_above(ax, "position error")
+    caption = "Weight of the heaviest cable over the lowest tension, for four tolerances."
     limits = [
         {"tolerance_m": each, "tension_min_N": fit.tension_min(each), "weight_max_N": fit.weight_max(each)}
         for each in TOLERANCES
@@ -82,7 +82,7 @@ def _limits(fit: EmpiricalFit, draw: Drawings) -> Finding:
     return finding(
         "validity-limits",
         numbers={"limits": limits},
-        panels=(draw.panel(figure, "Weight of the heaviest cable over the lowest tension, for four tolerances."),),
+        panels=(draw.panel(figure, caption, "position error"),),
         data=(
             table_of(
                 "Limits that keep the position error (20) below a tolerance",

@@ -17,7 +17,6 @@ from sagline.article.drawing import (
     chapter,
     draw_errors,
     finding,
-    legend_above,
     logarithmic_with_floor,
     map_axes,
 )
@@ -164,7 +163,6 @@ def _slices(draw: Drawings) -> Finding:
         logarithmic_with_floor(ax, 1e3 * FLOOR, f"below {n(FLOOR, '.3g', 'm')}")
         if quantity != "angle":
             ax.set_xscale("log")
-        legend_above(ax)
         panels.append(draw.panel(figure, f"Over the {label.split(' [')[0]}."))
         worst[quantity] = {name: float(row.max()) for name, row in zip(NAMES[:-1], error, strict=False)}
     return finding(

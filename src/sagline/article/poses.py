@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from sagline.article.drawing import Drawings, axes, cables_over_time, chapter, error_panels, finding, legend_above
+from sagline.article.drawing import Drawings, axes, cables_over_time, chapter, error_panels, finding
 from sagline.article.explanations import (
     ANCHORS,
     DEAD,
@@ -90,7 +90,7 @@ def _tour(draw: Drawings) -> Finding:
             "Planned lengths minus the lengths at home, to be compared with figure 26.",
         ),
     ):
-        figure, _ = cables_over_time(path.time, values, label, 0.9, stops=stops.tolist())
+        figure = cables_over_time(path.time, values, label, 0.9, stops=stops.tolist())
         panels.append(draw.panel(figure, caption))
     tension = cables.frame_end_tension
     return finding(
@@ -114,7 +114,6 @@ def _space(study: TenPoses, draw: Drawings) -> Finding:
     ax.plot(height, 1e3 * table.error[:, 2], "o", color=BLUE, markersize=4.0, label="measured")
     ends = np.array([height.min(), height.max()])
     ax.plot(ends, 1e3 * (line.slope * ends + line.intercept), color="black", linewidth=0.9, label="line")
-    legend_above(ax)
     panels.append(draw.panel(figure, "Actual minus desired height of the platform."))
     tension = study.plan.horizontal_tension.mean(axis=1)
     against = float(np.corrcoef(tension, table.distance)[0, 1])
@@ -148,7 +147,6 @@ def _trends(study: TenPoses, draw: Drawings) -> Finding:
         listed.append((label, error, slopes[parameter.name]))
     for _, ax in pairs:
         ax.set_ylim(-25.0, 85.0)
-        legend_above(ax)
     listed.append(("measured", study.table.error, float(1e3 * study.height_line.slope)))
     rows = [(name, *(n(1e3 * z, ".1f") for z in error[:, 2]), n(slope, "+.1f")) for name, error, slope in listed]
     falling = [name for name, slope in slopes.items() if slope * study.height_line.slope > 1e-6 * abs(slope)]
@@ -290,7 +288,6 @@ def _panel(study: TenPoses, found: Explanation, count: str, draw: Drawings) -> P
             markerfacecolor="none",
             label=f"{name} explained",
         )
-    legend_above(ax)
     return draw.panel(figure, f"Best explanation by {count}: {_values(found)}.")
 
 

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from matplotlib.ticker import FixedLocator, NullLocator
 
 import sagline as sl
-from sagline.article.drawing import NAME_SIZE, Drawings, axes, legend_above
+from sagline.article.drawing import NAME_SIZE, Drawings, axes
 from sagline.article.simulation import ERROR_BAND
 from sagline.core.numbers import n
 from sagline.files.writing import check_files, plain
@@ -182,7 +182,6 @@ def _picture(chapters: Sequence[Chapter]) -> Panel | None:
     ax.xaxis.set_minor_locator(NullLocator())
     ax.set_yticks(range(len(models)), labels=list(models))
     ax.set_ylim(len(models) - 0.5, -0.5)
-    legend_above(ax)
     return Drawings("result").panel(
         figure, "Position errors of exact cables along the article's path, with lengths that each cable model plans."
     )

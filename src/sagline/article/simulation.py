@@ -16,7 +16,6 @@ from sagline.article.drawing import (
     cables_over_time,
     chapter,
     finding,
-    legend_above,
     logarithmic_with_floor,
     thinning,
 )
@@ -193,7 +192,6 @@ def _path(path: sl.Path, draw: Drawings) -> Finding:
     second, bx = axes("time [s]", "velocity [m/s]")
     part = thinning(len(path))
     draw_components(bx, path.time[part], path.twist[part, :2], "v_{}")
-    legend_above(bx)
     speed = np.linalg.norm(path.twist[:, :3], axis=1)
     acceleration = np.linalg.norm(path.twist_rate[:, :3], axis=1)
     return finding(
@@ -233,10 +231,9 @@ def _courses(study: PathStudy, draw: Drawings) -> Finding:
 def _cables(plan: sl.Plan, values: Array, label: str, caption: str, draw: Drawings) -> Panel:
     path = plan.path
     assert path is not None
-    figure, ax = cables_over_time(path.time, values, label, 1.0, "{}")
-    ax.set_xlim(path.time[0], path.time[-1])
-    legend_above(ax, "cable")
-    return draw.panel(figure, caption)
+    figure = cables_over_time(path.time, values, label, 1.0, "{}")
+    figure.axes[0].set_xlim(path.time[0], path.time[-1])
+    return draw.panel(figure, caption, "cable")
 
 
 def _error(study: PathStudy, draw: Drawings) -> Finding:
@@ -266,7 +263,6 @@ def _error_panel(run: sl.Confirmation, path: sl.Path, caption: str, draw: Drawin
     figure, ax = axes("time [s]", "position error [mm]", height=2.7)
     draw_components(ax, path.time[part], 1e3 * run.position_error[part])
     ax.set_xlim(path.time[0], path.time[-1])
-    legend_above(ax)
     return draw.panel(figure, caption)
 
 
@@ -325,7 +321,6 @@ def _models(study: PathStudy, draw: Drawings) -> Finding:
             distance = 1e3 * np.linalg.norm(run.position_error[part], axis=1)
             ax.plot(study.path.time[part], distance, color=color, linewidth=1.1, label=type(model).__name__)
         logarithmic_with_floor(ax, 1e3 * FLOOR, f"below {n(FLOOR, '.3g', 'm')}")
-        legend_above(ax)
         panels.append(draw.panel(figure, f"Position errors of four models, {robot}; the exact model is the reference."))
     shallow = [figures(run).error_max for run in study.of(sl.Parabolic)]
     return finding(
@@ -355,7 +350,6 @@ def _low_tension(draw: Drawings) -> Finding:
         ax.plot(LIMITS, 1e3 * error, color=color, marker="o", markersize=3.0, label=label)
     ax.axhline(1e3 * ERROR_BAND, color="0.5", linewidth=0.8, linestyle=":", label="6 mm, as in the article")
     ax.set_yscale("log")
-    legend_above(ax)
     return finding(
         "low-tension",
         numbers={

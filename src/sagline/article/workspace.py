@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TypeAlias
 
 import numpy as np
 
 import sagline as sl
-from sagline.article.drawing import Drawings, axes, chapter, finding, legend_above
+from sagline.article.drawing import Drawings, axes, chapter, finding
 from sagline.article.simulation import ROBOTS
 from sagline.core.numbers import n
 from sagline.plot.labels import PLACE
@@ -20,11 +20,7 @@ HEIGHT = 3.0  # half the height of the frame [m]
 POINTS = 121  # number of points along each side of a slice
 
 
-class _Workspaces(NamedTuple):
-    """Workspaces of a robot with sag and without sag."""
-
-    exact: sl.Workspace  # workspace with exact catenaries
-    straight: sl.Workspace  # workspace with straight cables without weight
+Pair: TypeAlias = tuple[sl.Workspace, sl.Workspace]  # workspaces with exact catenaries, and with weightless cables
 
 
 def workspace_chapter() -> Chapter:
@@ -34,37 +30,38 @@ def workspace_chapter() -> Chapter:
     return chapter("workspace", (_volumes(pairs), _boundaries(pairs, draw)))
 
 
-def _pair(name: str) -> _Workspaces:
+def _pair(name: str) -> Pair:
     robot = sl.load_robot(name)
-    return _Workspaces(*(sl.workspace(robot, model=model, cells=CELLS) for model in (sl.Catenary(), sl.Straight())))
+    exact, straight = (sl.workspace(robot, model=model, cells=CELLS) for model in (sl.Catenary(), sl.Straight()))
+    return exact, straight
 
 
-def _volumes(pairs: dict[str, _Workspaces]) -> Finding:
-    change = {name: pair.exact.volume / pair.straight.volume - 1.0 for name, pair in pairs.items()}
+def _volumes(pairs: dict[str, Pair]) -> Finding:
+    change = {name: exact.volume / straight.volume - 1.0 for name, (exact, straight) in pairs.items()}
     volumes = "; ".join(
-        f"{name}: {n(pair.exact.volume, '.1f')} m³ with sag, {n(pair.straight.volume, '.1f')} m³ on straight cables, "
+        f"{name}: {n(exact.volume, '.1f')} m³ with sag, {n(straight.volume, '.1f')} m³ on straight cables, "
         f"{n(100.0 * change[name], '+.2f', '%')}"
-        for name, pair in pairs.items()
+        for name, (exact, straight) in pairs.items()
     )
     return finding(
         "volume",
         numbers={
             name: {
-                "volume_m3": pair.exact.volume,
-                "volume_error_m3": pair.exact.volume_error,
-                "straight_volume_m3": pair.straight.volume,
-                "straight_volume_error_m3": pair.straight.volume_error,
+                "volume_m3": exact.volume,
+                "volume_error_m3": exact.volume_error,
+                "straight_volume_m3": straight.volume,
+                "straight_volume_error_m3": straight.volume_error,
                 "change_percent": 100.0 * change[name],
             }
-            for name, pair in pairs.items()
+            for name, (exact, straight) in pairs.items()
         },
         data=(
             table_of(
                 "Volumes of the workspaces within the frame.",
                 ("robot", pairs, ""),
-                ("with sag [m³]", [pair.exact.volume for pair in pairs.values()], ".1f"),
-                ("error [m³]", [pair.exact.volume_error for pair in pairs.values()], ".1f"),
-                ("straight [m³]", [pair.straight.volume for pair in pairs.values()], ".1f"),
+                ("with sag [m³]", [exact.volume for exact, _ in pairs.values()], ".1f"),
+                ("error [m³]", [exact.volume_error for exact, _ in pairs.values()], ".1f"),
+                ("straight [m³]", [straight.volume for _, straight in pairs.values()], ".1f"),
                 ("change [%]", [100.0 * each for each in change.values()], "+.2f"),
             ),
         ),
@@ -72,7 +69,7 @@ def _volumes(pairs: dict[str, _Workspaces]) -> Finding:
     )
 
 
-def _boundaries(pairs: dict[str, _Workspaces], draw: Drawings) -> Finding:
+def _boundaries(pairs: dict[str, Pair], draw: Drawings) -> Finding:
     apart = {name: _farthest(pair) for name, pair in pairs.items()}
     panels = tuple(
         _panel(pair, normal, at, draw)
@@ -85,26 +82,27 @@ def _boundaries(pairs: dict[str, _Workspaces], draw: Drawings) -> Finding:
     )
 
 
-def _panel(pair: _Workspaces, normal: int, at: float, draw: Drawings) -> Panel:
+def _panel(pair: Pair, normal: int, at: float, draw: Drawings) -> Panel:
     """Drawing of both boundaries in a plane."""
-    plane, box = Plane(normal, at), pair.exact.box
+    exact, straight = pair
+    plane, box = Plane(normal, at), exact.box
     first, second = plane.axes
     figure, ax = axes(PLACE[first], PLACE[second])
-    for space, color, label in ((pair.exact, BLUE, "with sag"), (pair.straight, VERMILLION, "straight")):
+    for space, color, label in ((exact, BLUE, "with sag"), (straight, VERMILLION, "straight")):
         cut = slice_of(space.levels().details, plane, box.low, box.high, (POINTS, POINTS))
-        style = "-" if space is pair.exact else "--"
+        style = "-" if space is exact else "--"
         ax.contour(cut.across, cut.up, cut.level, levels=[0.0], colors=color, linestyles=style, linewidths=1.3)
         ax.plot([], [], color=color, linestyle=style, label=label)
     ax.set(xlim=(box.low[first], box.high[first]), ylim=(box.low[second], box.high[second]))
-    legend_above(ax)
-    return draw.panel(figure, f"{pair.exact.robot.name}: boundaries in the plane {plane}; the frame is the border.")
+    return draw.panel(figure, f"{exact.robot.name}: boundaries in the plane {plane}; the frame is the border.")
 
 
-def _farthest(pair: _Workspaces) -> float:
+def _farthest(pair: Pair) -> float:
     """Largest distance between both boundaries along rays from the middle of the frame [m]."""
     middle = np.array([0.0, 0.0, HEIGHT])
     ways = np.vstack((np.eye(3), -np.eye(3)))
-    reach = np.linspace(0.0, float(np.max(pair.exact.box.high - pair.exact.box.low)), 2001)
+    box = pair[0].box
+    reach = np.linspace(0.0, float(np.max(box.high - box.low)), 2001)
     places = middle + reach[:, None, None] * ways
     ends = []
     for space in pair:
