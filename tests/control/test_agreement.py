@@ -52,12 +52,12 @@ BAD: dict[str, tuple[str, int, float, int]] = {
 @pytest.mark.parametrize("name", BAD)
 def test_each_disagreement_is_refused_with_its_group_cause_and_next_step(name: str, snapshot: Any) -> None:
     field, index, value, group = BAD[name]
-    assert disagreement(agreeing(), OWN, COUNTER, GROUPS) is None
+    assert disagreement(agreeing(), OWN, COUNTER, GROUPS)[0] is None
     wrong = getattr(agreeing(), field).copy()
     wrong[index] = value
-    found = disagreement(agreeing()._replace(**{field: wrong}), OWN, COUNTER, GROUPS)
+    found, _ = disagreement(agreeing()._replace(**{field: wrong}), OWN, COUNTER, GROUPS)
     assert found is not None
-    error = found.refusal("it")
+    error = RefusedError("it", *found)
     assert (error.item, error.reason.partition(":")[0]) == ("it", f"group {group}")
     assert str(error) == snapshot
     assert len(str(error)) < 300
@@ -65,8 +65,8 @@ def test_each_disagreement_is_refused_with_its_group_cause_and_next_step(name: s
 
 def test_an_echo_may_be_ten_commands_old_across_the_end_of_the_counters() -> None:
     sample = agreeing()._replace(echo=np.full(4, COUNTERS - 4))
-    assert disagreement(sample, OWN, 6, GROUPS) is None
-    assert disagreement(sample, OWN, 7, GROUPS) is not None
+    assert disagreement(sample, OWN, 6, GROUPS)[0] is None
+    assert disagreement(sample, OWN, 7, GROUPS)[0] is not None
 
 
 MISHAPS = [

@@ -9,7 +9,7 @@ import pytest
 
 import sagline as sl
 from sagline.control import Mode, Sample
-from sagline.twin.injected import KINDS, Injected, Schedule, fault
+from sagline.twin.injected import KINDS, Injected, TimedQueue, fault
 from tests.control.protocol import PERIOD, GroupFault, GroupStatus, WinchState
 from tests.refusal import refused
 from tests.tiers import wide
@@ -107,13 +107,23 @@ def test_mutilated_texts_are_read_or_refused_in_one_line() -> None:
     assert all(len(line) < 300 and line.isprintable() for line in lines)
 
 
-def test_a_schedule_begins_and_ends_in_order() -> None:
-    schedule = Schedule()
-    for text in ("cell 1 sticks at 2 s for 1 s", "cell 2 sticks at 1 s", "cell 3 sticks at 1 s for 5 s"):
-        schedule.plan(fault(text))
-    assert [(begins, what.which) for begins, what in schedule.due(2.0)] == [(True, 2), (True, 3), (True, 1)]
-    assert [(begins, what.which) for begins, what in schedule.due(9.0)] == [(False, 1), (False, 3)]
-    assert schedule.due(99.0) == []
+def test_items_of_a_queue_are_due_in_order_of_time_and_then_of_addition() -> None:
+    queue = TimedQueue()
+    for time, item in ((2.0, "c"), (1.0, "b"), (1.0, "a"), (3.0, "d")):
+        queue.add(time, item)
+    assert queue.due(2.0 - 1e-10) == [(1.0, "b"), (1.0, "a"), (2.0, "c")]
+    assert queue.waiting
+    assert queue.due(9.0) == [(3.0, "d")]
+    assert not queue.waiting
+
+
+def test_faults_of_a_machine_begin_and_end_at_their_times() -> None:
+    rig = sl.twin.Machine(ROBOT, seed=2, faults=["load grows by 2 kg at 0.02 s for 0.03 s"])
+    weights = []
+    for _ in range(7):
+        rig.advance()
+        weights.append(float(rig._hardware._weight[2]))
+    assert [weight < 0.0 for weight in weights] == [False, False, True, True, True, False, False]
 
 
 def run(text: str, seconds: float = 0.6, *, moving: bool = True) -> tuple[sl.twin.Machine, list[Sample], list[Sample]]:

@@ -9,7 +9,8 @@ import pytest
 
 import sagline as sl
 from sagline.control import Command, Missing, Mode, Sample
-from sagline.twin.link import DelayLine, Network
+from sagline.twin.injected import TimedQueue
+from sagline.twin.link import Network
 from tests.control.protocol import PERIOD
 from tests.twin.pilot import HOME, Pilot
 
@@ -64,17 +65,20 @@ def test_with_jitter_and_losses_nothing_older_comes_after_something_newer() -> N
 
 def test_the_network_is_what_it_says() -> None:
     network, sent = Network(0.01, 0.02, 0.25, 4), 20_000
-    late = [arrival for _ in range(sent) if (arrival := network.arrival(0.0)) is not None]
+    way = TimedQueue()
+    for k in range(sent):
+        network.send(way, 0.0, k)
+    late = [arrival for arrival, _ in way.due(1.0)]
     assert len(late) / sent == pytest.approx(0.75, abs=4.0 * np.sqrt(0.25 * 0.75 / sent))
     assert (min(late), max(late)) == pytest.approx((0.01, 0.03), abs=1e-5)
     assert np.mean(late) == pytest.approx(0.02, abs=4.0 * 0.02 / np.sqrt(12 * sent))
 
 
 def test_messages_arrive_in_the_order_of_their_times() -> None:
-    way = DelayLine(Network(0.0, 0.5, 0.0, 1))
+    network, way = Network(0.0, 0.5, 0.0, 1), TimedQueue()
     for k in range(50):
-        way.send(0.01 * k, k)
-    early, late = way.arrived(0.4), way.arrived(10.0)
+        network.send(way, 0.01 * k, k)
+    early, late = way.due(0.4), way.due(10.0)
     times = [time for time, _ in early + late]
     assert times == sorted(times)
     assert len(times) == 50

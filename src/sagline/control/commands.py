@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -16,11 +16,11 @@ from sagline.control.link import (
     GroupStatus,
     Missing,
     Mode,
+    Refusal,
     Sample,
     WinchState,
     fault_text,
 )
-from sagline.control.states import RefusedError
 from sagline.core.arrays import Array, Flags
 
 VALID_FOR: Final = HEARTBEAT  # time for which a PLC may use a command [s]
@@ -75,28 +75,17 @@ AGREEING: Final = 5  # consecutive cycles in which all groups must agree
 SURE: Final = 20  # [cycles], a cause that lasts longer did not arise before the claim
 BEHIND: Final = 10  # largest number of commands by which an echo may lag
 _LOCKED, _PRESSED, _READY = int(GroupStatus.LOCKED), int(GroupStatus.EMERGENCY), int(GroupStatus.READY)
+_RELEASE: Final = "Make the machine safe and release the stop."
 _AGAIN: Final = "Try again; if this continues, check the program of the PLC."
-
-
-class Disagreement(NamedTuple):
-    """Reason why groups do not agree."""
-
-    reason: str  # the groups and the cause as text
-    next_step: str
-    lasting: bool = False  # True if the operator must act
-
-    def refusal(self, what: str) -> RefusedError:
-        """Convert the reason to an error for the rejected request `what`."""
-        return RefusedError(what, self.reason, self.next_step)
 
 
 def disagreement(
     sample: Sample, owner: int, counter: int, groups: tuple[tuple[int, ...], ...], period: float = PERIOD
-) -> Disagreement | None:
-    """First reason why a group does not agree; None if all agree. General reasons are checked before special reasons.
+) -> tuple[Refusal | None, bool]:
+    """First reason why a group does not agree, and True if the operator must act; None if all groups agree.
 
     A group agrees if its sample is fresh, this controller owns it, its drives are ready, without fault and not locked,
-    and it has accepted one of the last commands.
+    and it has accepted one of the last commands. General reasons are checked before special reasons.
     """
     status, other = sample.status, sample.owner
     faulty = (sample.winch_fault != 0) | (sample.state == int(WinchState.FAULT))
@@ -124,8 +113,8 @@ def disagreement(
     for there, reason, step, lasting in causes:
         if there.any():
             names = ", ".join(map(str, np.flatnonzero(there)))
-            return Disagreement(f"group {names}: {reason}", step, lasting)
-    return None
+            return Refusal(f"group {names}: {reason}", step), lasting
+    return None, False
 
 
 class Claim:
@@ -141,7 +130,7 @@ class Claim:
         self._tries = 1
         self.mode: Mode | None = Mode.HOLD  # mode of the next command; None if nothing is sent
         self.ready = False  # True if all groups agree
-        self.refused: Disagreement | None = None  # reason of the failure; None before a failure
+        self.refused: Refusal | None = None  # reason of the failure; None before a failure
 
     def look(self, answer: Sample | Missing, counter: int) -> None:
         """Evaluate an answer of the machine, and choose the mode of the next command."""
@@ -149,17 +138,17 @@ class Claim:
             self._silent += 1
             if self._silent * self._period >= SILENT:
                 reason = "; ".join(f"group {g}: {why}" for g, why in zip(*answer[1:], strict=True))
-                self._refuse(Disagreement(reason, f"{CHECK}, then try again."))
+                self._refuse(Refusal(reason, f"{CHECK}, then try again."))
             return
         self._cycles += 1
         if self._waiting:
             self._wait()
             return
-        why = disagreement(answer, self._owner, counter, self._groups, self._period)
+        why, lasting = disagreement(answer, self._owner, counter, self._groups, self._period)
         self._agreed = self._agreed + 1 if why is None else 0
         if why is None:
             self.ready = self._agreed >= AGREEING
-        elif (why.lasting and self._cycles >= SURE) or (self._late and self._tries == TRIES):
+        elif (lasting and self._cycles >= SURE) or (self._late and self._tries == TRIES):
             self._refuse(why)
         elif self._late:
             self._give_back()
@@ -183,5 +172,5 @@ class Claim:
         if not self._waiting:
             self.mode, self._cycles = Mode.HOLD, 0
 
-    def _refuse(self, why: Disagreement) -> None:
+    def _refuse(self, why: Refusal) -> None:
         self.refused, self.mode = why, Mode.LEAVE

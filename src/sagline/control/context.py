@@ -175,9 +175,9 @@ class Context:
         """Return the newest sample; raise an error if a group does not agree to the request `what`."""
         if self.sample is None:
             raise RefusedError(what, "no group has answered", "Connect first.")
-        why = disagreement(self.sample, self.owner, self.sender.counter, self.link.groups, self.period)
+        why, _ = disagreement(self.sample, self.owner, self.sender.counter, self.link.groups, self.period)
         if why is not None:
-            raise why.refusal(what)
+            raise RefusedError(what, *why)
         return self.sample
 
     def locate(self, sample: Sample, wrench: Array | None) -> str:

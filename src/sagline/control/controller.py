@@ -131,12 +131,8 @@ class Controller(Preparation):
         check_start(self.robot, self.estimate, motion.state.pose[0])
         lead = self._set_point("the path").length - motion.length[0]
         check_lead("the path", lead)
-        self._begin(
-            State.MOVING,
-            Along(motion, self.period, lead),
-            motion,
-            f"a path of {self.period * (len(motion) - 1):.2f} s",
-        )
+        text = f"a path of {self.period * (len(motion) - 1):.2f} s"
+        self._begin(State.MOVING, Along(motion, self.period, lead), motion, text)
 
     def execute(self, path: Path | Motion) -> Execution:
         """Follow a path to its end.

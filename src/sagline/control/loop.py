@@ -55,24 +55,9 @@ class Loop:
         self.active = self.active.next(answer)
         if c.run.recording or c.journal.watched:
             clock, planned = (float("nan"), c.unknown) if point is None else (point.clock, point.tension)
-            estimator = c.estimator
-            c.keep(
-                Recorded(
-                    c.number,
-                    c.state,
-                    c.degraded,
-                    late,
-                    clock,
-                    command,
-                    answer,
-                    estimator.position,
-                    estimator.quaternion,
-                    estimator.status,
-                    c.zero,
-                    planned,
-                    correction,
-                )
-            )
+            about, pose = (c.number, c.state, c.degraded, late, clock), c.estimator
+            estimate = pose.position, pose.quaternion, pose.status
+            c.keep(Recorded(*about, command, answer, *estimate, c.zero, planned, correction))
         c.number += 1
 
     def _judge(

@@ -7,7 +7,6 @@ from functools import partial
 from typing import Final, TypeVar
 
 from sagline.control.active_states import Connecting, Holding, HomingState, Off, idle_at
-from sagline.control.commands import Disagreement
 from sagline.control.context import Context
 from sagline.control.execution import Execution
 from sagline.control.homing import Homing
@@ -156,7 +155,7 @@ class Preparation:
         if self.state is not State.READY:
             step = "Check the machine, and if another controller owns it; then try again."
             refused = connecting.claim.refused if isinstance(connecting, Connecting) else None
-            raise (refused or Disagreement(self._context.run.reason, step)).refusal("connecting")
+            raise RefusedError("connecting", *(refused or (self._context.run.reason, step)))
 
     def begin_homing(self, pose: PoseLike) -> None:
         """State the pose of the platform at rest, and begin to compare tensions.

@@ -66,21 +66,9 @@ class Standing:
         """Constant set point for a single equilibrium."""
         robot = state.one_robot
         redundant = robot.cable_count > robot.degrees_of_freedom
-        length = state.unstrained_length
         row = null_space(state) if redundant else None
-        return cls(
-            SetPoint(
-                length,
-                np.zeros(len(length)),
-                state.cables.frame_end_tension,
-                drum_tension(state),
-                None,
-                row,
-                np.nan,
-                True,
-            ),
-            state.pose,
-        )
+        length, tension, drum = state.unstrained_length, state.cables.frame_end_tension, drum_tension(state)
+        return cls(SetPoint(length, np.zeros(len(length)), tension, drum, None, row, np.nan, True), state.pose)
 
     def step(self) -> SetPoint:
         """Return the constant set point."""

@@ -40,14 +40,6 @@ class _Newest(NamedTuple):
     round_trip: float  # time from the request or the command to the arrival [s]
 
 
-class _Outgoing(NamedTuple):
-    """Next block to write."""
-
-    block: Block
-    data: bytes
-    since: float  # time at which it was queued [s]
-
-
 class GroupThread(Thread):
     """Thread that exchanges data with one PLC."""
 
@@ -64,12 +56,13 @@ class GroupThread(Thread):
         self._wire = wire
         self._clock = clock
         self._kick = Event()
-        self._outgoing: deque[_Outgoing] = deque(maxlen=1)  # a new block replaces a queued block
+        # block to write, its bytes, and the time at which it was queued [s]; a new block replaces a queued block
+        self._outgoing: deque[tuple[Block, bytes, float]] = deque(maxlen=1)
         self._ending = Event()
 
     def hand_over(self, block: Block, data: bytes) -> None:
         """Queue `block` for writing, and read the PLC's block afterwards. It replaces a block in the queue."""
-        self._outgoing.append(_Outgoing(block, data, self._clock()))
+        self._outgoing.append((block, data, self._clock()))
         self._kick.set()
 
     def ask(self) -> None:
@@ -110,10 +103,10 @@ class GroupThread(Thread):
         while True:
             asked = self._clock()
             if self._outgoing:
-                outgoing = self._outgoing.popleft()
-                if asked - outgoing.since < HEARTBEAT:  # after a new connection, older commands are obsolete
-                    asked = outgoing.since
-                    self._wire.write(outgoing.block, outgoing.data)
+                block, data, since = self._outgoing.popleft()
+                if asked - since < HEARTBEAT:  # after a new connection, older commands are obsolete
+                    asked = since
+                    self._wire.write(block, data)
             if self._ending.is_set():
                 return
             self._take(self._wire.read(FROM_PLC), asked, connected)

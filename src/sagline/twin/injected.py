@@ -172,33 +172,28 @@ def _number(text: str, word: str | None, otherwise: float, unit: str) -> float:
     return number
 
 
-class Schedule:
-    """Queue of the starts and ends of faults."""
+class TimedQueue:
+    """Queue of items with their times; items of equal time remain in the order in which they were added."""
 
     def __init__(self) -> None:
         """Make an empty queue."""
-        self._due: list[tuple[float, int, bool, Injected]] = []
-        self._planned = 0
+        self._items: list[tuple[float, int, Any]] = []
+        self._added = 0
 
     @property
     def waiting(self) -> bool:
         """True if the queue is not empty."""
-        return bool(self._due)
+        return bool(self._items)
 
-    def plan(self, what: Injected) -> None:
-        """Add the start and the end of a fault."""
-        self._push(what.time, True, what)
-        if what.duration < math.inf:
-            self._push(what.time + what.duration, False, what)
+    def add(self, time: float, item: Any) -> None:
+        """Add an item; `time`: time from which it is due [s]."""
+        self._added += 1
+        heappush(self._items, (time, self._added, item))
 
-    def _push(self, time: float, begins: bool, what: Injected) -> None:
-        self._planned += 1
-        heappush(self._due, (time, self._planned, begins, what))
-
-    def due(self, now: float) -> list[tuple[bool, Injected]]:
-        """Faults that start (True) or end (False) up to the time `now` [s], in order of time."""
+    def due(self, now: float) -> list[tuple[float, Any]]:
+        """Remove the items that are due up to the time `now` [s], each with its time, the earliest first."""
         found = []
-        while self._due and self._due[0][0] <= now + TINY:
-            _, _, begins, what = heappop(self._due)
-            found.append((begins, what))
+        while self._items and self._items[0][0] <= now + TINY:
+            time, _, item = heappop(self._items)
+            found.append((time, item))
         return found

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import deque
-from heapq import heappop, heappush
 from typing import Any, Final, NamedTuple, Protocol
 
 import numpy as np
@@ -12,9 +11,8 @@ from sagline.control.link import Command, Missing, Refusal, Sample, Sent, Whole,
 from sagline.core.arrays import Array, number
 from sagline.core.errors import InvalidValueError
 from sagline.plc.blocks import LOAD, TORN
+from sagline.twin.injected import TimedQueue
 from sagline.twin.plc_program import Order
-
-TINY: Final = 1e-9  # tolerance for rounding errors of times [s]
 
 
 class Network:
@@ -30,35 +28,11 @@ class Network:
         self.ideal = not (self._delay or self._jitter or self._loss)  # True if each message arrives without delay
         self._generator = np.random.default_rng((seed, 1))
 
-    def arrival(self, now: float) -> float | None:
-        """Arrival time of a message that is sent now [s]; None if the message is lost."""
-        if self.ideal:
-            return now
-        lost, late = self._generator.random(2)
-        return None if lost < self._loss else now + self._delay + late * self._jitter
-
-
-class DelayLine:
-    """Queue of the messages in one direction that have been sent, but have not arrived."""
-
-    def __init__(self, network: Network) -> None:
-        """Begin without messages."""
-        self._network, self._sent = network, 0
-        self._messages: list[tuple[float, int, Any]] = []
-
-    def send(self, now: float, message: Any) -> None:
-        """Send a message; `now`: time [s]."""
-        if (arrival := self._network.arrival(now)) is not None:
-            self._sent += 1
-            heappush(self._messages, (arrival, self._sent, message))
-
-    def arrived(self, now: float) -> list[tuple[float, Any]]:
-        """Messages that have arrived up to now, each with its arrival time [s], the earliest first."""
-        found = []
-        while self._messages and self._messages[0][0] <= now + TINY:
-            arrival, _, message = heappop(self._messages)
-            found.append((arrival, message))
-        return found
+    def send(self, way: TimedQueue, now: float, message: Any) -> None:
+        """Add a message that is sent now [s] to a queue with its arrival time, unless the message is lost."""
+        lost, late = (1.0, 0.0) if self.ideal else self._generator.random(2)
+        if lost >= self._loss:
+            way.add(now + self._delay + late * self._jitter, message)
 
 
 FIRST: Final = 2  # index of the first array of `PlcBlocks` with one column per group, not per winch
@@ -169,8 +143,8 @@ class MachineLink:
         self._machine, self._network, self._moves = machine, network, moves
         self._groups = machine.groups
         count = len(self._groups)
-        self._outbound = [DelayLine(network) for _ in range(count)]
-        self._inbound = [DelayLine(network) for _ in range(count)]
+        self._outbound = [TimedQueue() for _ in range(count)]  # messages that have been sent, but have not arrived
+        self._inbound = [TimedQueue() for _ in range(count)]
         self._newest: list[PlcBlocks | None] = [None] * count
         self._arrival = np.zeros(count)
         self._parts = [slice(winches[0], winches[-1] + 1) for winches in self._groups]
@@ -221,13 +195,13 @@ class MachineLink:
             if ideal:
                 deliver(group, message)
             else:
-                self._outbound[group].send(now, message)
+                self._network.send(self._outbound[group], now, message)
 
     def before(self, now: float) -> None:
         """Deliver the messages that have arrived by `now`, the time of the beginning of a scan [s]."""
         if not self._network.ideal:
             for group, way in enumerate(self._outbound):
-                for _, message in way.arrived(now):
+                for _, message in way.due(now):
                     self._machine.deliver(group, message)
 
     def after(self, now: float, snapshot: PlcBlocks, spoiled: dict[int, str]) -> None:
@@ -238,8 +212,8 @@ class MachineLink:
         else:
             for group, back in enumerate(self._inbound):
                 for block in self._blocks(group, snapshot, spoiled.get(group)):
-                    back.send(now, block)
-                for arrival, block in back.arrived(now):
+                    self._network.send(back, now, block)
+                for arrival, block in back.due(now):
                     self._take(group, arrival, block)
         self._past.append(snapshot)
 

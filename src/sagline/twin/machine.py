@@ -16,7 +16,7 @@ from sagline.dynamics.vibration.dynamic_stiffness import Damping
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.twin.hardware import CELL, LENGTH, Hardware, check_step, initial_state, winch_limits
-from sagline.twin.injected import KINDS, Injected, Schedule, fault
+from sagline.twin.injected import KINDS, Injected, TimedQueue, fault
 from sagline.twin.link import (
     COUNTER,
     COUNTS,
@@ -130,7 +130,7 @@ class Machine:
         self._reported: Any = None  # last reported blocks, without counters
         self._cycles = self._counter = 0
         self._links: list[MachineLink] = []
-        self._schedule, self._commands = Schedule(), ""
+        self._schedule, self._commands = TimedQueue(), ""  # starts (True) and ends of faults; fault of all commands
         self._spoiled: dict[int, str] = {}
         self._stopped: set[int] = set()
         self._taken: set[int] = set()
@@ -310,11 +310,13 @@ class Machine:
         parts = len(self.groups) if kind.item == "group" else self.robot.cable_count
         if kind.numbered and not 0 <= found.which < parts:
             raise InvalidValueError("fault", brief(str(found)), f"{kind.item} 0 to {parts - 1}", "Numbers begin at 0.")
-        self._schedule.plan(found)
+        self._schedule.add(found.time, (True, found))
+        if found.duration < np.inf:
+            self._schedule.add(found.time + found.duration, (False, found))
 
     def _apply_due_faults(self) -> None:
         """Begin and end the due faults."""
-        for begins, what in self._schedule.due(self.time):
+        for _, (begins, what) in self._schedule.due(self.time):
             self._apply_fault(what, begins)
 
     def _apply_fault(self, what: Injected, begins: bool) -> None:

@@ -17,7 +17,7 @@ from sagline.control.real_time import Pace
 from sagline.core.arguments import flag, instance, whole_number
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError, SaglineError
-from sagline.plc.blocks import AGAIN, CLAIM, FROM_PLC, TO_PLC, winch_row, winch_rows
+from sagline.plc.blocks import CLAIM, FROM_PLC, TO_PLC, winch_row, winch_rows
 from sagline.plc.wire import LAST_PORT, plc_packages
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
@@ -120,17 +120,9 @@ class Server:
         length, rate, tension, enable = (
             np.array([values[winch_row(i, name)] for i in winches]) for name in ("length", "rate", "tension", "enable")
         )
-        mode = values["mode"]
-        return Command(
-            values["counter"],
-            values["owner"],
-            Mode(mode) if mode in MODES else Mode.HOLD,
-            1e-3 * values["valid_for"],
-            length,
-            rate,
-            tension,
-            enable != 0,
-        )
+        mode = Mode(values["mode"]) if values["mode"] in MODES else Mode.HOLD
+        head = values["counter"], values["owner"], mode, 1e-3 * values["valid_for"]
+        return Command(*head, length, rate, tension, enable != 0)
 
     def _block(self, group: int) -> bytes | None:
         """Block of the PLC of a group; None if a fault keeps the previous block."""
@@ -149,22 +141,12 @@ def check_first_port(port: int, robot: Robot) -> None:
 
 def block_of(group: int, report: Report) -> bytes:
     """Create the block of the report of a PLC; the group index begins at 0."""
-    head = {
-        "counter": report.counter,
-        AGAIN: report.counter_again,
-        "group": group + 1,
-        "time": 1e6 * report.plc_time,
-        "owner": report.owner,
-        "echo": report.echo,
-        "status": report.status,
-        "fault": report.fault,
-        "winches": len(report.length),
-    }
+    head = {"group": group + 1, "time": 1e6 * report.plc_time, "winches": len(report.length)}
     if report.foreign:
         head["magic"] = 0
     counts = [(count + HALF) % (2 * HALF) - HALF for count in report.counts]  # as in a PLC, counters overflow
     columns: list[list[Any]] = [*report[8:13], counts, report.state, report.winch_fault]
-    return FROM_PLC.pack(head | winch_rows(ROWS, columns))
+    return FROM_PLC.pack(report._asdict() | head | winch_rows(ROWS, columns))
 
 
 def _block_servers(blocks: list[bytes], host: str, port: int, modbus: bool) -> BlockServers:
