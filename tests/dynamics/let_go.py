@@ -1,4 +1,4 @@
-"""Robots that swing: let go beside their place, and an integration in time that shares nothing with the kernels."""
+"""Swinging robots: released beside their equilibrium, with an integration in time independent of the kernels."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LIFT = sl.MinimumNorm()
 def beside(
     robot: sl.Robot, place: tuple[float, float, float], by: Array, model: sl.CableModel | None = None
 ) -> tuple[sl.Equilibrium, Array]:
-    """A state beside a place, and the lengths with which the robot rests at the place itself."""
+    """A state beside a pose, and the lengths for which the robot is at equilibrium at the pose."""
     model = model or sl.Catenary()
     at, away = (sl.Pose.from_euler(np.asarray(place) + shift, 0.0, 0.0, 0.0) for shift in (np.zeros(3), by))
     lengths = sl.inverse(robot, at, model=model, tension=LIFT).unstrained_length
@@ -24,7 +24,7 @@ def beside(
 
 
 def lopsided(name: str) -> sl.Robot:
-    """A preset whose center of mass is off the platform's origin, with an inertia along none of its axes."""
+    """A preset with its center of mass off the platform origin and an inertia that is not diagonal."""
     robot = sl.load_robot(name)
     turn = Rotation.from_euler("xyz", [0.3, -0.5, 0.8]).as_matrix()
     moments = np.linalg.eigvalsh(robot.inertia) * [0.9, 1.1, 1.3]
@@ -32,7 +32,7 @@ def lopsided(name: str) -> sl.Robot:
 
 
 def integrated(robot: sl.Robot, model: sl.CableModel, pose: sl.Pose, lengths: Array, times: Array) -> Array:
-    """Position of the platform's origin and its quaternion, (N, 7), released at rest, by DOP853 and Euler's equations.
+    """Position of the platform origin and its quaternion, (N, 7), released at rest, by DOP853 and Euler's equations.
 
     In the platform's own axes, with forces from the public cable model: another formulation, another method.
     """

@@ -1,4 +1,4 @@
-"""The prototype with all that its drives and sensors need."""
+"""The prototype with all data of its drives and sensors."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ SENSORS = {
 
 
 def prototype(**changes: Any) -> sl.Robot:
-    """The preset with winches of the twin's values; changes are fields of `Winch`."""
+    """The preset with winches of the twin; changes are fields of `Winch`."""
     robot = sl.load_robot("article-prototype")
     rope = robot.cables.replace(diameter=0.003)
     return robot.replace(winches=sl.Winch(**{**DRIVE, **SENSORS, **changes}), cables=rope)

@@ -1,4 +1,4 @@
-"""What vibration each way of moving leaves, by simulation: for a test, the benchmark, and the page with the table."""
+"""Residual vibration after motions of all kinds by simulation, for a test, the benchmark and the table of the page."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ import sagline as sl
 
 WAYPOINTS = [(0.0, 0.0, 1.5), (3.0, 0.0, 1.5)]
 SECONDS, RATE = 2.0, 1000.0
-AFTER = 3.0  # s of vibration that are looked at
+AFTER = 3.0  # s of recorded vibration
 HEAVY = 1.2
 
 
 class Scene(NamedTuple):
-    """A robot, a motion of it, and the frequencies that this excites most: massless, and with cable mass."""
+    """A robot, a motion, and the frequencies with the largest excitation: massless, and with cable mass."""
 
     robot: sl.Robot
     path: sl.Path
@@ -26,7 +26,7 @@ class Scene(NamedTuple):
 
 
 class Way(NamedTuple):
-    """A way of moving: its path, and whether the lengths are those of a platform at rest everywhere."""
+    """A kind of motion: its path, and True if the lengths are quasi-static."""
 
     path: Callable[[Scene], sl.Path]
     static: bool
@@ -66,7 +66,7 @@ WAYS = {
 
 @cache
 def planned(name: str) -> tuple[sl.Path, np.ndarray]:
-    """Path and lengths of a way of moving."""
+    """Path and lengths of a kind of motion."""
     way, given = WAYS[name], scene()
     path = way.path(given)
     plan = sl.inverse(given.robot, path.pose if way.static else path, tension=sl.MinimumNorm())
@@ -75,7 +75,7 @@ def planned(name: str) -> tuple[sl.Path, np.ndarray]:
 
 
 def residual(name: str, mass: float = 1.0, **options: Any) -> float:
-    """Largest distance from where the platform comes to rest, after the end of the motion [mm].
+    """Largest distance from the rest position after the end of the motion [mm].
 
     Args:
         name: One of `WAYS`.
@@ -91,6 +91,6 @@ def residual(name: str, mass: float = 1.0, **options: Any) -> float:
     run = sl.simulate(start, unstrained_length=table, duration=path.duration + AFTER, record=0.002, **options)
     after = run.pose.position[run.time >= path.duration]
     goal = sl.forward(moved, lengths[-1], start=path.pose[-1]).pose.position
-    if options:  # cables with mass hang a little otherwise: about the middle of what is left
+    if options:  # cables with mass have a slightly different shape: relative to the middle of the vibration
         goal = 0.5 * (after.min(axis=0) + after.max(axis=0))
     return float(1e3 * np.linalg.norm(after - goal, axis=1).max())

@@ -1,4 +1,4 @@
-"""States of robots to vibrate about."""
+"""Equilibria of robots for vibrations."""
 
 from __future__ import annotations
 
@@ -19,5 +19,5 @@ def middle(name: str) -> sl.Equilibrium:
 
 @cache
 def at(name: str, position: tuple[float, float, float]) -> sl.Equilibrium:
-    """A robot of the catalogue at a position, its tensions of least norm."""
+    """A robot of the catalogue at a position, with tensions of minimum norm."""
     return sl.inverse(sl.load_robot(name), sl.Pose(position, np.eye(3)), tension=sl.MinimumNorm()).state

@@ -1,4 +1,4 @@
-"""Numbers that docs/model.md tells of cables with mass in time, each as it stands there."""
+"""Numbers of docs/model.md on cables with mass in time, computed again."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ PAGE = Path(__file__).parents[2] / "docs" / "model.md"
 
 @cache
 def page() -> str:
-    """In one line."""
+    """The page in one line."""
     return " ".join(PAGE.read_text(encoding="utf-8").split())
 
 
-def test_how_far_off_a_chain_of_twenty_elements_rests() -> None:
+def test_rest_position_error_of_a_chain_of_twenty_elements() -> None:
     off = chains_at_rest(cogiro(), 20).pose.position - cogiro().pose.position
     assert f"For CoGiRo with 20 elements the difference is {1e6 * np.linalg.norm(off):.1f} µm." in page()
 
 
-def test_how_well_the_energy_closes_along_a_path() -> None:
+def test_error_of_the_energy_balance_along_a_path() -> None:
     energy = moved().energy
     turned_over, error = np.ptp(energy.supplied), np.abs(energy.error).max()
     told = f"the winches supply and take back {turned_over:,.0f} J. The residual of the energy balance is"
     assert f"{told} ${1e6 * error:.0f} \\cdot 10^{{-6}}$ J" in page()
 
 
-def test_how_well_steps_agree_after_a_break() -> None:
+def test_agreement_of_steps_after_a_break() -> None:
     """At 0.45, 0.2 and 0.1 of l sqrt(rho/EA), of which the default is 0.4, 5e-5 s."""
     after = []
     for share in (1.125, 0.5, 0.25):

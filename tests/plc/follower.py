@@ -1,4 +1,4 @@
-"""A process that lets cable out, 5 mm a second, until somebody kills it: `python -m tests.plc.follower ADDRESSES`."""
+"""A process that winds out cable at 5 mm/s until it is killed: `python -m tests.plc.follower ADDRESSES`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The blocks of a PLC and the link over them, for tests of other folders; `sagline.plc` itself does not offer them."""
+"""The blocks of a PLC and the link over them, for tests of other folders."""
 
 from sagline.plc.block_link import BlockLink
 from sagline.plc.blocks import CLAIM, FROM_PLC, TO_PLC, Block

@@ -1,4 +1,4 @@
-"""Samples and commands to be sent about."""
+"""Samples and commands for transmission."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sagline.core.arrays import Array
 
 
 def a_sample(winches: int, seed: int = 0, **values: Any) -> Sample:
-    """A sample of random values that single precision holds."""
+    """A sample of random values that are exact in single precision."""
     random = np.random.default_rng(seed)
     groups = -(-winches // 2)
 
@@ -47,7 +47,7 @@ def a_sample(winches: int, seed: int = 0, **values: Any) -> Sample:
 
 
 def sample_blocks(sample: Sample) -> list[bytes]:
-    """The blocks of the groups, packed by hand: an independent opinion of where everything is."""
+    """Blocks of the groups packed by hand, an independent reference of the layout."""
     blocks = []
     for g, (counter, owner, echo) in enumerate(zip(sample.counter, sample.owner, sample.echo, strict=True)):
         winches = range(2 * g, min(2 * g + 2, len(sample.length)))
@@ -62,7 +62,7 @@ def sample_blocks(sample: Sample) -> list[bytes]:
 
 
 def a_command(winches: int, seed: int = 0, **values: Any) -> Command:
-    """A command of random set points."""
+    """A command with random set points."""
     random = np.random.default_rng(seed)
     rate, tension = (np.float32(random.normal(size=winches)).astype(float) for _ in range(2))
     enable = random.random(winches) < 0.5
@@ -75,7 +75,7 @@ def status(counter: int, owner: int = 0) -> Sample:
 
 
 def bad(counter: int, spoil: Callable[[bytearray], None]) -> list[bytes]:
-    """Good blocks, but for that of the third group."""
+    """Valid blocks, except that of the third group."""
     blocks = sample_blocks(status(counter))
     content = bytearray(blocks[2])
     spoil(content)

@@ -1,4 +1,4 @@
-"""PLCs of all kinds at the other end of a socket: good ones, strangers, and those that say nothing."""
+"""PLCs behind sockets: valid ones, foreign ones, and silent ones."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from tests.plc.samples import a_sample, sample_blocks
 from tests.twin.blocks import BlockServers, ModbusServers, S7Servers
 
 OWNER = 4711
-PATIENCE = 20.0  # s: for a machine that has much else to do; nothing waits so long where all is well
+PATIENCE = 20.0  # s, for a busy machine; no wait is this long otherwise
 
 
 def until(condition: Callable[[], Any], patience: float = PATIENCE) -> None:
-    """Wait until it holds."""
+    """Wait for a condition."""
     end = time.monotonic() + patience
     while not condition():
         assert time.monotonic() < end, "it never came about"
@@ -30,7 +30,7 @@ def until(condition: Callable[[], Any], patience: float = PATIENCE) -> None:
 
 
 class Kind(NamedTuple):
-    """What carries the blocks."""
+    """Protocol of the blocks."""
 
     servers: Callable[[list[bytes]], BlockServers]
     link: Callable[..., BlockLink]
@@ -43,7 +43,7 @@ BOTH = [pytest.param(S7, id="S7"), pytest.param(MODBUS, id="Modbus")]
 
 @contextmanager
 def plcs(kind: Kind = S7, sample: Sample | None = None) -> Iterator[Any]:
-    """As many good groups as a sample has."""
+    """As many valid groups as in a sample."""
     servers = kind.servers(sample_blocks(a_sample(8) if sample is None else sample))
     try:
         yield servers
@@ -65,7 +65,7 @@ def taken(link: BlockLink) -> Sample:
 
 @contextmanager
 def stranger(answer: bytes | None = None) -> Iterator[str]:
-    """Somebody who accepts whoever comes, and says the same to each, or nothing."""
+    """A server that accepts all connections and sends the same bytes to each, or none."""
     kept: list[socket.socket] = []
     with socket.create_server(("127.0.0.1", 0)) as listening:
 
@@ -88,7 +88,7 @@ def stranger(answer: bytes | None = None) -> Iterator[str]:
                 client.close()
 
 
-def nobody() -> str:
-    """An address where nothing listens."""
+def unused_address() -> str:
+    """An address without a server."""
     with socket.create_server(("127.0.0.1", 0)) as listening:
         return f"127.0.0.1:{listening.getsockname()[1]}"

@@ -29,7 +29,7 @@ def test_every_ipv6_address_is_read_with_and_without_brackets_and_port() -> None
                 given = f"[{host}]:{port}"
                 assert addresses_of(given, PORT) == (Address(host, port),)
                 continue
-            with pytest.raises(sl.InvalidValueError, match="group 1"):  # the same as that of group 0
+            with pytest.raises(sl.InvalidValueError, match="group 1"):  # equal to that of group 0
                 addresses_of(given, PORT)
             assert addresses_of(host, PORT) == addresses_of(f"[{host}]", PORT) == (Address(host, PORT),)
             (found,) = addresses_of(f"[{host}]:{port}", PORT)
@@ -42,7 +42,7 @@ def test_every_ipv6_address_is_read_with_and_without_brackets_and_port() -> None
     ["[::1", "::1]", "[]", "[]:5", "[::1]5", "[::1]:", "[::1]:0", "[::1]:65536", "[::1]:x", "[[::1]]", "[plc]:5", ":::",
      "1:2:3", "::1:x", "[127.0.0.1]:5", "::g", "[::1]]", "[::1] :5", "a:5:6"],
 )  # fmt: skip
-def test_what_is_no_address_is_refused(text: str) -> None:
+def test_invalid_addresses_are_refused(text: str) -> None:
     with pytest.raises(sl.InvalidValueError, match="group 0"):
         addresses_of(text, PORT)
 

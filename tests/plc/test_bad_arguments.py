@@ -1,4 +1,4 @@
-"""Links and servers, given what they cannot take: one line, before anything is connected."""
+"""Links and servers with bad arguments: one line, before any connection."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 
 import sagline as sl
 from tests.abuse.bad_values import REFUSED, Bad, bad_values
-from tests.plc.servers import nobody
+from tests.plc.servers import unused_address
 from tests.refusal import refused as expected
 from tests.tiers import extended
 
@@ -27,7 +27,7 @@ VALID: dict[str, tuple[str, Any, bool]] = {
 
 
 def refused(call: Callable[..., Any], name: str, expected: type[Exception] | None, **others: Any) -> Iterator[str]:
-    """What is wrong with how bad values of an argument are answered."""
+    """Errors in the refusals of bad values of an argument."""
     kind, valid, optional = VALID[name]
     for bad in bad_values(kind, valid, optional):
         if problem := _problem(call, {**others, name: bad.value}, bad, expected):
@@ -46,15 +46,15 @@ def _problem(call: Callable[..., Any], arguments: dict[str, Any], bad: Bad, expe
 
 
 @pytest.mark.parametrize("kind", [sl.plc.S7Link, sl.plc.ModbusLink])
-def test_links_refuse_in_a_line_before_they_connect(kind: Callable[..., Any]) -> None:
-    given: dict[str, Any] = {"addresses": [nobody() for _ in range(4)], "robot": ROBOT}
+def test_links_refuse_bad_arguments_in_one_line_first(kind: Callable[..., Any]) -> None:
+    given: dict[str, Any] = {"addresses": [unused_address() for _ in range(4)], "robot": ROBOT}
     names = ("robot", "timeout", *(("device",) if kind is sl.plc.ModbusLink else ()))
     for name in names:
         others = {key: value for key, value in given.items() if key != name}
         assert list(refused(kind, name, sl.plc.LinkError, **others)) == []
 
 
-def test_a_server_refuses_in_a_line() -> None:
+def test_a_server_refuses_bad_arguments_in_one_line() -> None:
     machine = sl.twin.Machine(ROBOT)
 
     def served(**arguments: Any) -> None:

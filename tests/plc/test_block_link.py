@@ -1,4 +1,4 @@
-"""What a link sends and takes, over real sockets, whatever carries the blocks."""
+"""Data that a link sends and receives over real sockets, for all protocols."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from tests.tiers import extended, wide
 
 
 @pytest.mark.parametrize("kind", BOTH)
-def test_a_sample_comes_over_the_wire(kind: Kind) -> None:
+def test_a_sample_is_received(kind: Kind) -> None:
     sample = status(7)
     with plcs(kind, sample) as servers, linked(kind, servers) as link:
         got = taken(link)
@@ -48,7 +48,7 @@ def test_a_sample_comes_over_the_wire(kind: Kind) -> None:
 
 @extended
 @pytest.mark.parametrize("kind", BOTH)
-def test_a_group_whose_grant_is_not_ours_gets_the_claim_and_nothing_else(kind: Kind) -> None:
+def test_a_group_without_our_grant_gets_only_the_claim(kind: Kind) -> None:
     with plcs(kind, status(1, owner=99)) as servers, linked(kind, servers) as link:
         link.exchange(a_command(8, owner=OWNER))
         written: list[tuple[bytes, bytes]] = [(b"", b"")] * 4
@@ -66,7 +66,7 @@ def test_a_group_whose_grant_is_not_ours_gets_the_claim_and_nothing_else(kind: K
 
 
 @pytest.mark.parametrize("kind", wide(reversed(BOTH)))
-def test_a_group_whose_grant_is_ours_gets_the_command(kind: Kind) -> None:
+def test_a_group_with_our_grant_gets_the_command(kind: Kind) -> None:
     command = a_command(8, owner=OWNER)
     with plcs(kind, status(1, owner=OWNER)) as servers, linked(kind, servers) as link:
         link.exchange(command)
@@ -81,7 +81,7 @@ def test_a_group_whose_grant_is_ours_gets_the_command(kind: Kind) -> None:
 
 @extended
 @pytest.mark.parametrize("kind", BOTH)
-def test_who_leaves_claims_nothing_back_and_his_last_command_is_written_before_the_link_closes(kind: Kind) -> None:
+def test_the_last_command_is_written_before_the_link_closes(kind: Kind) -> None:
     owners = np.array([OWNER, 0, 99, OWNER])
     with plcs(kind, a_sample(8, owner=owners)) as servers:
         with linked(kind, servers) as link:
@@ -93,7 +93,7 @@ def test_who_leaves_claims_nothing_back_and_his_last_command_is_written_before_t
 
 @extended
 @pytest.mark.parametrize("kind", BOTH)
-def test_who_only_reads_writes_nothing(kind: Kind) -> None:
+def test_a_reading_link_writes_nothing(kind: Kind) -> None:
     with plcs(kind, status(1, owner=OWNER)) as servers, linked(kind, servers) as link:
         for counter in (2, 3):
             servers.publish(sample_blocks(status(counter)))
@@ -102,7 +102,7 @@ def test_who_only_reads_writes_nothing(kind: Kind) -> None:
 
 
 def next_discarded(link: BlockLink, group: int) -> Sample:
-    """The sample after one more block of a group was discarded."""
+    """The next sample with one more discarded block of a group."""
     before = taken(link).discarded[group]
     until(lambda: taken(link).discarded[group] > before)
     return taken(link)
@@ -119,9 +119,7 @@ NO_NEWS: list[tuple[Callable[[bytearray], None], str]] = [
 
 
 @pytest.mark.parametrize(("spoil", "reason"), wide(NO_NEWS))
-def test_a_block_that_is_no_news_is_counted_with_its_reason_and_the_age_goes_on(
-    spoil: Callable[[bytearray], None], reason: str
-) -> None:
+def test_a_repeated_block_is_counted_with_its_reason_and_ages(spoil: Callable[[bytearray], None], reason: str) -> None:
     with plcs(S7, status(10)) as servers, linked(S7, servers) as link:
         servers.publish(bad(11, spoil))
         sample = next_discarded(link, 2)
@@ -137,14 +135,14 @@ def test_a_block_that_is_no_news_is_counted_with_its_reason_and_the_age_goes_on(
 
 
 @extended
-def test_counters_begin_again_after_the_largest() -> None:
+def test_counters_wrap_around() -> None:
     with plcs(S7, status(2**31 - 1)) as servers, linked(S7, servers) as link:
         servers.publish(sample_blocks(status(1)))
         until(lambda: np.all(taken(link).counter == 1))
 
 
 @extended
-def test_a_plc_that_begins_anew_is_believed_after_a_while_of_silence_and_one_that_stands_never() -> None:
+def test_a_restarted_plc_is_accepted_after_a_silence_and_a_stopped_one_never() -> None:
     with plcs(S7, status(1000)) as servers, linked(S7, servers) as link:
         servers.publish([*sample_blocks(status(1))[:3], sample_blocks(status(1000))[3]])
         until(lambda: np.all(taken(link).counter[:3] == 1))
@@ -154,7 +152,7 @@ def test_a_plc_that_begins_anew_is_believed_after_a_while_of_silence_and_one_tha
 
 
 @pytest.mark.parametrize(("late", "written"), [(0.05, [b"command"]), (0.15, [])])
-def test_what_waited_too_long_for_a_connection_is_never_written(late: float, written: list[bytes]) -> None:
+def test_commands_that_wait_too_long_are_discarded(late: float, written: list[bytes]) -> None:
     class Wire:
         def __init__(self) -> None:
             self.written: list[bytes] = []
@@ -187,7 +185,7 @@ def test_what_waited_too_long_for_a_connection_is_never_written(late: float, wri
 
 
 class Scripted:
-    """A wire that answers with what it is given, or raises it, and what its group made of that; in one thread."""
+    """A connection that returns given answers or raises given errors, and the state of its group; in one thread."""
 
     def __init__(self, *answers: bytes | Exception, step: float = 0.01) -> None:
         self.answers, self.time, self.step = list(answers), 0.0, step
@@ -226,8 +224,8 @@ class Scripted:
         return True
 
 
-def heard(*answers: bytes | Exception) -> tuple[list[int | None], list[str]]:
-    """Counters of the newest block of group 0 after each answer, and what is wrong then."""
+def counters_and_reasons(*answers: bytes | Exception) -> tuple[list[int | None], list[str]]:
+    """Counters of the newest block of group 0 after each answer, with the reasons of discarded blocks."""
     wire = Scripted(*answers)
     wire.group.run()
     return wire.counters[1:], wire.troubles[1:]
@@ -238,24 +236,24 @@ def block(counter: int) -> bytes:
 
 
 @pytest.mark.parametrize("error", [struct.error("short"), AttributeError("recv"), AssertionError(), OSError("gone")])
-def test_whatever_a_wire_raises_a_group_goes_on_and_says_why(error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_group_continues_after_any_error_with_the_reason(error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(block_link, "RETRY", 0.0)
-    counters, troubles = heard(block(7), error, block(8))
+    counters, troubles = counters_and_reasons(block(7), error, block(8))
     assert counters == [7, 7, 8]
     assert (troubles[0], troubles[2]) == ("", "")
     assert f"{type(error).__name__} ({error})" in troubles[1]
 
 
-def test_a_plc_that_begins_anew_with_a_connection_is_believed_at_once_and_on_the_same_one_it_is_not(
+def test_a_restarted_plc_is_accepted_at_once_with_a_new_connection(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(block_link, "RETRY", 0.0)
     gone = WireError(Refusal("the PLC closes the connection at once", "Check it"))
-    assert heard(block(1000), gone, block(1), block(2))[0] == [1000, 1000, 1, 2]
-    assert heard(block(1000), block(1), block(2))[0] == [1000, 1000, 1000]
+    assert counters_and_reasons(block(1000), gone, block(1), block(2))[0] == [1000, 1000, 1, 2]
+    assert counters_and_reasons(block(1000), block(1), block(2))[0] == [1000, 1000, 1000]
 
 
-def test_after_silence_a_lower_counter_is_believed_and_an_equal_one_never() -> None:
+def test_a_lower_counter_is_accepted_after_silence_and_an_equal_one_never() -> None:
     wire = Scripted(block(1000), block(1000), block(1), step=OWNER_TIMEOUT)
     wire.group.run()
     assert wire.counters[1:] == [1000, 1000, 1]
@@ -263,7 +261,7 @@ def test_after_silence_a_lower_counter_is_believed_and_an_equal_one_never() -> N
 
 
 class Broken:
-    """A client of a library that raises what no library should."""
+    """A client of a library that raises an unexpected exception."""
 
     def __init__(self, error: Exception) -> None:
         self._error = error
@@ -276,7 +274,7 @@ class Broken:
 
 
 @pytest.mark.parametrize("error", [struct.error("short"), AttributeError("recv"), AssertionError()])
-def test_whatever_a_library_raises_is_told_as_the_connections(error: Exception) -> None:
+def test_errors_of_a_library_are_reported_as_connection_errors(error: Exception) -> None:
     for wire in (S7Wire("127.0.0.1", 102), ModbusWire("127.0.0.1", 502, 1)):
         vars(wire)["_client"] = Broken(error)
         with pytest.raises(WireError, match=r"(S7|Modbus)"):
@@ -286,6 +284,6 @@ def test_whatever_a_library_raises_is_told_as_the_connections(error: Exception) 
         wire.close()
 
 
-def test_who_has_no_connection_is_told_so() -> None:
+def test_a_missing_connection_is_reported() -> None:
     with pytest.raises(WireError, match=r"connection .*closed"):
         S7Wire("127.0.0.1", 102).read(FROM_PLC)

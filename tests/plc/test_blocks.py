@@ -1,4 +1,4 @@
-"""The blocks: offsets, bytes, and what is said of bytes that are not sagline's."""
+"""Blocks: offsets, bytes, and errors of foreign bytes."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ def test_sizes_are_those_of_the_protocol() -> None:
 
 
 @pytest.mark.parametrize("block", BLOCKS, ids=lambda block: block.name)
-def test_rows_follow_each_other_without_gap_or_overlap(block: Block) -> None:
+def test_rows_have_no_gap_and_no_overlap(block: Block) -> None:
     at = 0
     for name, kind, offset in block.rows:
         assert offset == at, name
-        assert offset % 2 == 0, name  # a PLC begins every value of a standard block at a word
+        assert offset % 2 == 0, name  # every value of a standard block begins at a word
         at += struct.calcsize(f">{TYPES[kind]}")
     assert at == block.size
 
 
-def test_bytes_of_a_command_and_a_claim_are_where_a_plc_looks_for_them() -> None:
+def test_bytes_of_a_command_and_a_claim_are_at_their_offsets() -> None:
     command = a_command(8)
     data = command_blocks(command)[3]
     assert data[4:8] == b"SAGT"
@@ -53,23 +53,23 @@ def test_bytes_of_a_command_and_a_claim_are_where_a_plc_looks_for_them() -> None
 
 
 @pytest.mark.parametrize("winches", [1, 2, 7, 8])
-def test_a_sample_comes_back_as_it_was(winches: int) -> None:
+def test_a_sample_is_unpacked_exactly(winches: int) -> None:
     sample = a_sample(winches, seed=winches)
     groups = [read for block in sample_blocks(sample) if not isinstance(read := FROM_PLC.read(block), Refusal)]
     assert groups[-1]["winches"] == 2 - winches % 2
     back = sample_of(groups, winches=winches, time=1.5, age=sample.age, discarded=sample.discarded)
     for name, value in sample._asdict().items():
         assert np.asarray(getattr(back, name)).dtype == np.asarray(value).dtype, name
-        # microseconds are not seconds: one rounding each way
+        # microseconds and seconds: one rounding in each direction
         np.testing.assert_allclose(getattr(back, name), value, rtol=1e-15 if name == "plc_time" else 0.0, err_msg=name)
 
 
-def test_the_place_of_a_winch_that_is_not_there_is_zero() -> None:
+def test_bytes_of_missing_winches_are_zero() -> None:
     assert command_blocks(a_command(7))[3][40:60] == bytes(20)
 
 
 def spoiled(block: Block, seed: int) -> tuple[bytes, str]:
-    """A block with one thing wrong, and a word of what is to be said of it."""
+    """A block with one error, and a word of the message."""
     random = np.random.default_rng(seed)
     data = bytearray(block.pack({"counter": 5, "owner": 9}))
     kind = ["size", "magic", "version", "torn"][seed % 4 if block is not CLAIM else seed % 2]
@@ -83,7 +83,7 @@ def spoiled(block: Block, seed: int) -> tuple[bytes, str]:
 
 
 @pytest.mark.parametrize("block", BLOCKS, ids=lambda block: block.name)
-def test_what_is_wrong_is_told_in_one_line_with_a_next_step(block: Block) -> None:
+def test_errors_are_reported_in_one_line_with_a_next_step(block: Block) -> None:
     for seed in range(40):
         data, said = spoiled(block, seed)
         refusal = block.read(data)

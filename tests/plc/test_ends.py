@@ -1,4 +1,4 @@
-"""SIGTERM and SIGHUP of `sagline control` and `sagline twin`: the machine rests, the log is whole, exit 143 and 129."""
+"""SIGTERM and SIGHUP of `sagline control` and `sagline twin`: the machine stops, the log is whole, exit 143 and 129."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from tests.tiers import extended
 pytestmark = extended  # real time, processes and sockets
 COMMAND = [sys.executable, "-m", "sagline.cli", "control", "article-prototype"]
 TRIES = 8
-MAGIC = b"\x89MCAP0\r\n"  # also the end of a file that was closed
+MAGIC = b"\x89MCAP0\r\n"  # also the end of a closed file
 UNBUFFERED = {**os.environ, "PYTHONUNBUFFERED": "1"}
-LINES = "home 0,0,1.5; goto 0.3,0,1.5\n"  # the way takes longer than the test
+LINES = "home 0,0,1.5; goto 0.3,0,1.5\n"  # the motion takes longer than the test
 
 
 def moving(twin: Twin, log: Path) -> subprocess.Popen[str]:
@@ -51,9 +51,7 @@ def one_that_moves(twin: Twin, log: Path) -> subprocess.Popen[str] | None:
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129)])
-def test_a_controller_stops_its_machine_and_closes_its_log_and_so_does_a_twin(
-    number: int, code: int, tmp_path: Path
-) -> None:
+def test_controller_and_twin_stop_the_machine_and_close_their_logs(number: int, code: int, tmp_path: Path) -> None:
     log, truth = tmp_path / "run.mcap", tmp_path / "twin.mcap"
     with a_twin("--log", str(truth)) as twin:
         controller = moving(twin, log)

@@ -1,4 +1,4 @@
-"""Modbus alone: what it says of PLCs that are none, and registers."""
+"""Modbus: errors of foreign servers, and registers."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from pymodbus.server import ModbusTcpServer
 
 import sagline as sl
 from tests.plc.samples import a_sample, sample_blocks
-from tests.plc.servers import MODBUS, PATIENCE, S7, nobody, plcs, stranger
+from tests.plc.servers import MODBUS, PATIENCE, S7, plcs, stranger, unused_address
 from tests.refusal import refused
 from tests.tiers import extended
 from tests.twin.blocks import ModbusServers
@@ -31,14 +31,14 @@ def test_registers_are_the_bytes_of_the_blocks() -> None:
             assert client.read_holding_registers(18, count=4, device_id=1).registers == registers[18:22]
             client.write_registers(200, [1, 2, 3, 4], device_id=1)
             assert servers.written()[1][1] == struct.pack(">4H", 1, 2, 3, 4)
-            assert not any(servers.written()[1][1])  # who looked took it out
+            assert not any(servers.written()[1][1])  # a reader has removed it
             assert client.read_holding_registers(52, count=1, device_id=1).isError()
 
 
 @extended
-def test_the_error_names_the_group_that_is_no_plc_and_why(snapshot: Any) -> None:
+def test_the_error_names_the_invalid_group_and_the_reason(snapshot: Any) -> None:
     with plcs(MODBUS) as servers, plcs(S7) as others, stranger() as mute:
-        good, gone = list(servers.addresses), nobody()
+        good, gone = list(servers.addresses), unused_address()
         errors = {
             "nobody": error_of([*good[:3], gone], 3, PATIENCE),
             "S7": error_of([*good[:3], others.addresses[3]], 3, PATIENCE),
@@ -51,21 +51,21 @@ def test_the_error_names_the_group_that_is_no_plc_and_why(snapshot: Any) -> None
 
 
 def error_of(addresses: list[str], group: int, timeout: float) -> str:
-    """Error of a link, about one group."""
+    """Error of a link about one group."""
     with refused(f"group {group} at {addresses[group]}", kind=sl.plc.LinkError) as caught:
         sl.plc.ModbusLink(addresses, 8, timeout=timeout)
     assert len(str(caught.value)) < 300
     line = str(caught.value).replace(addresses[group], "ADDRESS")
-    return re.sub(r" \(groups? .* either\)", "", line)  # on a busy computer others may be late, too
+    return re.sub(r" \(groups? .* either\)", "", line)  # on a busy computer others can be late as well
 
 
-def test_a_device_id_that_is_none_is_refused() -> None:
+def test_an_invalid_device_id_is_refused() -> None:
     with refused("device", "256", kind=sl.InvalidValueError):
         sl.plc.ModbusLink(["a", "b", "c", "d"], 8, device=256)
 
 
 @extended
-def test_a_twin_that_cannot_listen_at_all_its_ports_listens_at_none(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_twin_listens_at_all_ports_or_none(monkeypatch: pytest.MonkeyPatch) -> None:
     begun: list[ModbusTcpServer] = []
 
     async def begin(server: ModbusTcpServer, *, background: bool) -> None:

@@ -1,4 +1,4 @@
-"""The link over real sockets: what it sends, what it takes, and what it says of PLCs that are none."""
+"""The S7 link over real sockets: sent and received data, and errors of foreign servers."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from snap7.type import SrvArea
 import sagline as sl
 from sagline.plc.blocks import BLOCKS, FROM_PLC
 from tests.plc.samples import a_command, a_sample, bad, of_another_version, sample_blocks, status
-from tests.plc.servers import PATIENCE, S7, linked, nobody, plcs, stranger, taken, until
+from tests.plc.servers import PATIENCE, S7, linked, plcs, stranger, taken, until, unused_address
 from tests.refusal import refused
 from tests.tiers import extended
 
 
 @extended
-def test_an_exchange_waits_for_nobody_and_a_silent_group_is_connected_anew() -> None:
+def test_an_exchange_does_not_wait_and_a_silent_group_is_reconnected() -> None:
     with plcs(S7, status(1)) as servers, linked(S7, servers) as link:
         server = servers._servers[1]
-        server.lock_area(SrvArea.DB, FROM_PLC.number)  # it answers no more
+        server.lock_area(SrvArea.DB, FROM_PLC.number)  # it no longer answers
         times = []
 
         def age() -> float:
@@ -45,7 +45,7 @@ def test_an_exchange_waits_for_nobody_and_a_silent_group_is_connected_anew() -> 
 
 
 @extended
-def test_the_slowest_group_sets_the_time_not_the_sum() -> None:
+def test_groups_are_read_in_parallel() -> None:
     wait = 0.03
     with plcs(S7, status(1)) as servers:
         for server in servers._servers:
@@ -55,15 +55,15 @@ def test_the_slowest_group_sets_the_time_not_the_sum() -> None:
             link.exchange(a_command(8))
             until(lambda: np.all(taken(link).counter == 2))
             assert wait <= link.round_trip.min()
-            assert link.round_trip.max() < 3 * wait  # in turn it would be at least 4
+            assert link.round_trip.max() < 3 * wait  # in sequence it would be at least 4
 
 
 @extended
-def test_it_asks_for_the_pdu_of_an_s7_1200_and_the_twin_grants_no_other() -> None:
+def test_the_pdu_has_the_size_of_an_s7_1200() -> None:
     with plcs() as servers:
         client = Client()
         client.connect("127.0.0.1", 0, 1, tcp_port=int(servers.addresses[0].rpartition(":")[2]))
-        assert client.get_pdu_length() == 240  # it asked for 480
+        assert client.get_pdu_length() == 240  # the client requested 480
         client.disconnect()
     asked: list[int] = []
 
@@ -104,9 +104,7 @@ def test_it_asks_for_the_pdu_of_an_s7_1200_and_the_twin_grants_no_other() -> Non
         ([1, 2, 3, 4], 0, "1"),
     ],
 )
-def test_addresses_that_are_none_are_refused_before_anything_is_connected(
-    addresses: Any, group: int | None, value: str
-) -> None:
+def test_invalid_addresses_are_refused_before_connecting(addresses: Any, group: int | None, value: str) -> None:
     item = "number of PLC addresses" if group is None else f"address of group {group}"
     with refused(item, value, kind=sl.InvalidValueError) as caught:
         sl.plc.S7Link(addresses, 8)
@@ -125,7 +123,7 @@ def test_addresses_of_another_kind_are_refused(addresses: Any) -> None:
 
 
 def error_of(addresses: list[str], group: int, winches: int = 8, timeout: float = PATIENCE) -> str:
-    """Error of a link, about one group."""
+    """Error of a link about one group."""
     with refused(f"group {group} at {addresses[group]}", kind=sl.plc.LinkError) as caught:
         sl.plc.S7Link(addresses, winches, timeout=timeout)
     assert len(str(caught.value)) < 300
@@ -134,9 +132,9 @@ def error_of(addresses: list[str], group: int, winches: int = 8, timeout: float 
 
 
 @extended
-def test_the_error_names_a_port_where_nothing_listens(snapshot: Any) -> None:
+def test_the_error_names_a_port_without_a_server(snapshot: Any) -> None:
     with plcs() as servers:
-        assert error_of([*servers.addresses[:2], nobody(), servers.addresses[3]], 2) == snapshot
+        assert error_of([*servers.addresses[:2], unused_address(), servers.addresses[3]], 2) == snapshot
 
 
 @extended
@@ -186,9 +184,7 @@ def test_the_error_names_the_number_of_winches_of_plc_and_robot(snapshot: Any) -
 
 
 @pytest.mark.parametrize(("package", "link"), [("snap7", sl.plc.S7Link), ("pymodbus", sl.plc.ModbusLink)])
-def test_a_package_that_is_missing_is_named_with_the_extra(
-    package: str, link: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_missing_package_is_named_with_the_extra(package: str, link: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     for name in [*sys.modules]:
         if name.startswith((package, "sagline.plc.s7_link", "sagline.plc.modbus_link")):
             monkeypatch.delitem(sys.modules, name)

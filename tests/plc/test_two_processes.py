@@ -1,4 +1,4 @@
-"""A controller and a twin, each in a process of its own, over four real sockets, in real time."""
+"""A controller and a twin in two processes, over four real sockets, in real time."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ TRIES = 8
 
 def test_drive_stop_freeze_and_kill() -> None:
     with a_twin() as twin:
-        the_plcs_stop_by_themselves_where_the_controller_is_killed(twin)
+        the_plcs_stop_after_the_controller_is_killed(twin)
         robot = sl.load_robot("article-prototype")
         with closing(sl.plc.S7Link(twin.addresses, robot, timeout=PATIENCE)) as link:
             control = sl.control.Controller(robot, link, pace=Pace(), seed=1)
@@ -47,7 +47,7 @@ def test_drive_stop_freeze_and_kill() -> None:
             a_killed_machine_is_a_fault(control, twin)
 
 
-def the_plcs_stop_by_themselves_where_the_controller_is_killed(twin: Twin) -> None:
+def the_plcs_stop_after_the_controller_is_killed(twin: Twin) -> None:
     with closing(sl.plc.S7Link(twin.addresses, 8, timeout=PATIENCE)) as link:
         command = [sys.executable, "-m", "tests.plc.follower", twin.addresses]
         with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as process:
@@ -67,7 +67,7 @@ def the_plcs_stop_by_themselves_where_the_controller_is_killed(twin: Twin) -> No
     assert (last.owner == OWNER).all()
     for group in range(4):
         times = np.array([sample.plc_time[group] for sample in seen])
-        gap = np.diff(times).max()  # between two looks
+        gap = np.diff(times).max()  # between two samples
         began = times[np.argmax([sample.echo[group] == last.echo[group] for sample in seen])]
         assert times[-1] - began <= HEARTBEAT + RAMP + 3 * SCAN + gap
     # as far as it goes in 100 ms, and then in the ramp; when a command comes its set point is still a cycle away
@@ -77,7 +77,7 @@ def the_plcs_stop_by_themselves_where_the_controller_is_killed(twin: Twin) -> No
 
 
 def at_last(control: sl.control.Controller, ask: Callable[[], object], state: State) -> None:
-    """Ask until it comes about: on a machine that has much else to do a cycle may be so late that the robot stops."""
+    """Repeat a request until it succeeds: on a busy machine a late cycle can stop the robot."""
     for _ in range(TRIES):
         try:
             ask()
@@ -106,7 +106,7 @@ def it_goes_there(control: sl.control.Controller, place: Array) -> None:
 def a_second_controller_gets_no_grant(first: sl.control.Controller, twin: Twin) -> None:
     claim = a_command(8, owner=first.owner % 1000 + 1, mode=Mode.HOLD)
     with closing(sl.plc.S7Link(twin.addresses, 8, timeout=PATIENCE)) as link:
-        for _ in range(60):  # longer than a grant outlives its owner's last command
+        for _ in range(60):  # longer than a grant lasts after the last command of its owner
             first.cycle()
             link.exchange(claim)
         assert (taken(link).owner == first.owner).all()
@@ -137,7 +137,7 @@ def a_frozen_machine_is_a_fault_that_can_be_acknowledged(control: sl.control.Con
 
     def is_back() -> bool:
         control.cycle()
-        with suppress(sl.control.RefusedError):  # until all groups take commands again
+        with suppress(sl.control.RefusedError):  # until all groups accept commands again
             control.acknowledge()
         return control.state is State.IDLE
 

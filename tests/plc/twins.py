@@ -1,4 +1,4 @@
-"""`sagline twin` in a process of its own."""
+"""`sagline twin` in another process."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ START = 300.0  # s: a first run compiles
 
 
 class Twin:
-    """The process, and what it says."""
+    """The process and its outputs."""
 
     def __init__(self, *words: str) -> None:
         command = [sys.executable, "-m", "sagline.cli", "twin", "article-prototype", "--port", "0", *words]
@@ -35,7 +35,7 @@ class Twin:
         self._lines.put("")
 
     def line(self, pattern: str, patience: float = PATIENCE) -> re.Match[str]:
-        """The next line in which a pattern is found."""
+        """The next line with a match of a pattern."""
         while True:
             line = self._lines.get(timeout=patience)
             if found := re.search(pattern, line):
@@ -43,7 +43,7 @@ class Twin:
             assert line, f"the twin ended: {self.process.communicate()[1]}"
 
     def end(self) -> None:
-        """Whatever it does, it is over."""
+        """End the process in any state."""
         self.process.kill()
         self._listener.join()
         self.process.communicate()

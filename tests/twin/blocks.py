@@ -1,4 +1,4 @@
-"""Servers of the blocks of a twin, for tests of other folders, and the memory behind them."""
+"""Servers of the blocks of a twin and their memory, for tests of other folders."""
 
 from sagline.twin import Server
 from sagline.twin.block_servers import BlockServers
@@ -10,5 +10,5 @@ __all__ = ["BlockServers", "ModbusServers", "S7Servers", "memory"]
 
 
 def memory(server: Server) -> list[dict[Block, bytearray]]:
-    """Blocks of each group, as they are stored."""
+    """Stored blocks of each group."""
     return server._servers._memory

@@ -1,4 +1,4 @@
-"""A controller that does what a test says, and nothing by itself."""
+"""A controller that executes the calls of a test only."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ HOME = sl.Pose.from_euler([0.0, 0.0, 1.5], 0.0, 0.0, 0.0)
 
 
 class Pilot:
-    """Sends commands over a link, one a cycle."""
+    """Sends commands over a link, one per cycle."""
 
     def __init__(self, link: Link, plan: Plan, owner: int = 77) -> None:
         """Take a plan, a single pose or along a path."""
@@ -28,7 +28,7 @@ class Pilot:
         self.at = 0
 
     def send(self, mode: Mode, length: Array | None = None, rate: Array | None = None) -> Sample:
-        """Send one command, for where the plan is unless told otherwise; the sample that comes back."""
+        """Send one command, by default for the present point of the plan; return the following sample."""
         self.counter += 1
         length = self.length[self.at] if length is None else length
         rate = np.zeros_like(length) if rate is None else rate
@@ -38,19 +38,19 @@ class Pilot:
         return self._sample(self.link.exchange(command))
 
     def look(self) -> Sample:
-        """Let a cycle pass without a command; the sample."""
+        """Let a cycle pass without a command; return the sample."""
         return self._sample(self.link.exchange(None))
 
     def wait(self, seconds: float) -> list[Sample]:
-        """Send nothing for a while; the samples."""
+        """Send nothing for a duration; return the samples."""
         return [self.look() for _ in range(round(seconds / 0.01))]
 
     def hold(self, seconds: float) -> list[Sample]:
-        """Hold for a while; the samples."""
+        """Hold for a duration; return the samples."""
         return [self.send(Mode.HOLD) for _ in range(round(seconds / 0.01))]
 
     def go(self, seconds: float) -> list[Sample]:
-        """Follow the plan for a while; the samples."""
+        """Follow the plan for a duration; return the samples."""
         samples = []
         for _ in range(round(seconds / 0.01)):
             self.at = min(self.at + 1, len(self.length) - 1)
@@ -68,6 +68,6 @@ P2 = (-0.13, 1.42, 0.68)  # m, of Table 2
 
 @cache
 def leg(robot: sl.Robot, speed: float) -> Plan:
-    """A plan straight from home to the second of the ten poses, whose middle is passed at a speed [m/s]."""
+    """A straight plan from home to the second of the ten poses, with a given speed in the middle [m/s]."""
     waypoints = [HOME, sl.Pose.from_euler(list(P2), 0.0, 0.0, 0.0)]
     return sl.inverse(robot, sl.quintic_path(waypoints, speed=speed))

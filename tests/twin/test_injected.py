@@ -1,4 +1,4 @@
-"""Faults as texts, and what a controller sees of them."""
+"""Faults as texts, and their effects in a controller."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_a_fault_is_its_text(name: str) -> None:
         assert "no duration" in caught.value.allowed
 
 
-def test_what_a_text_leaves_out() -> None:
+def test_defaults_of_omitted_parts() -> None:
     assert fault("  Cell 3   STICKS ") == Injected("cell sticks", 3)
     later, negative = fault("cable 4 breaks at 1e1 s"), fault("encoder 5 jumps by -2 mm at 40 s")
     assert (later.time, negative.value) == (10.0, -0.002)
@@ -46,7 +46,7 @@ def test_what_a_text_leaves_out() -> None:
 ITEMS = ("cable", "cell", "commands", "emergency stop", "encoder", "group", "load", "servo")
 CELL = ("cell NUMBER", "sticks", "reads # N", "saturates", "fails", "is wrong by # N")
 SECONDS = ("number", " s")
-WRONG: dict[str, tuple[str, ...]] = {  # what the allowed values name
+WRONG: dict[str, tuple[str, ...]] = {  # in the allowed values of the message
     "cel 3 sticks": ITEMS,
     "": ITEMS,
     "cell 3": CELL,
@@ -71,7 +71,7 @@ WRONG: dict[str, tuple[str, ...]] = {  # what the allowed values name
 
 
 @pytest.mark.parametrize("text", WRONG)
-def test_a_text_that_is_no_fault_is_refused_with_what_is_allowed(text: str) -> None:
+def test_an_invalid_text_is_refused_with_the_allowed_values(text: str) -> None:
     with refused("fault", kind=sl.InvalidValueError) as caught:
         fault(text)
     assert [part for part in WRONG[text] if part not in caught.value.allowed] == []
@@ -86,7 +86,7 @@ def test_the_nearest_item_is_proposed() -> None:
 
 
 @pytest.mark.parametrize("given", [None, 3, b"cell 3 sticks", ["cell 3 sticks"]])
-def test_no_text_at_all(given: object) -> None:
+def test_an_empty_text(given: object) -> None:
     with refused("fault", allowed="a text", kind=sl.InvalidValueError):
         fault(given)  # type: ignore[arg-type]
     with refused("fault", kind=sl.InvalidValueError):
@@ -137,7 +137,7 @@ def run(text: str, seconds: float = 0.6, *, moving: bool = True) -> tuple[sl.twi
     return rig, go(0.2), go(seconds)
 
 
-def test_a_cell_that_sticks() -> None:
+def test_a_constant_load_cell() -> None:
     _, before, after = run("cell 3 sticks")
     assert {sample.tension[3] for sample in after} == {before[-1].tension[3]}
     assert len({sample.tension[2] for sample in after}) == len(after)
@@ -146,7 +146,7 @@ def test_a_cell_that_sticks() -> None:
 @pytest.mark.parametrize(
     ("words", "reads"), wide([("reads -12.5 N", -12.5), ("saturates", 2500.0), ("reads 0 N", 0.0)], first=2)
 )
-def test_a_cell_that_reads_something_else(words: str, reads: float) -> None:
+def test_a_wrong_reading_of_a_load_cell(words: str, reads: float) -> None:
     _, before, after = run(f"cell 6 {words} at 0.3 s for 0.1 s")
     assert [sample.tension[6] for sample in after[:10]] == [reads] * 10
     assert abs(after[10].tension[6] - before[-1].tension[6]) < 30.0
@@ -154,7 +154,7 @@ def test_a_cell_that_reads_something_else(words: str, reads: float) -> None:
     assert after[0].filtered[6] == pytest.approx(filtered)
 
 
-def test_a_cell_that_fails_and_comes_back() -> None:
+def test_a_load_cell_that_fails_and_recovers() -> None:
     _, before, after = run("cell 6 fails at 0.3 s for 0.1 s", moving=False)
     read = np.array([(sample.tension[6], sample.filtered[6]) for sample in after])
     assert np.isnan(read[:10]).all()
@@ -162,13 +162,13 @@ def test_a_cell_that_fails_and_comes_back() -> None:
     assert np.isfinite([np.delete(sample.tension, 6) for sample in after]).all()
 
 
-def test_a_cell_that_is_wrong_by_so_much() -> None:
+def test_an_offset_of_a_load_cell() -> None:
     right = run("cell 1 is wrong by 0 N", moving=False)[2]
     wrong = run("cell 0 is wrong by 50 N", moving=False)[2]
     np.testing.assert_allclose([a.tension[0] - b.tension[0] for a, b in zip(wrong, right, strict=True)], 50.0)
 
 
-def test_a_cable_that_breaks() -> None:
+def test_a_broken_cable() -> None:
     rig, before, after = run("cable 4 breaks", 1.0, moving=False)
     assert before[-1].tension[4] > 100.0
     assert np.abs([sample.tension[4] for sample in after]).max() < 6.0  # noise
@@ -177,7 +177,7 @@ def test_a_cable_that_breaks() -> None:
     assert others.max() > 1.3 * before[-1].tension.max()
 
 
-def test_an_encoder_that_jumps_moves_its_cable() -> None:
+def test_a_jump_of_an_encoder_moves_its_cable() -> None:
     rig, before, after = run("encoder 5 jumps by 2 mm", 2.0, moving=False)
     first = after[0].length - before[-1].length
     np.testing.assert_allclose(first[5], 0.002, atol=6e-4)  # its drive, of 20 /s, is on its way back already
@@ -203,7 +203,7 @@ def test_a_servo_at_its_limit() -> None:
     assert np.ptp(np.flatnonzero(faults[:, 1])) >= 9  # 100 ms, so that nobody misses it
 
 
-def test_a_servo_that_trips() -> None:
+def test_a_tripped_servo() -> None:
     rig, _, after = run("servo 3 trips")
     last = after[-1]
     assert (last.state[3], last.winch_fault[3], last.fault[1]) == (WinchState.FAULT, 1, GroupFault.DRIVE)
@@ -213,7 +213,7 @@ def test_a_servo_that_trips() -> None:
     assert Pilot(rig.link(), PLAN).look().winch_fault.tolist() == [0] * 8
 
 
-def test_a_load_that_grows_is_carried() -> None:
+def test_a_growing_load_is_carried() -> None:
     damped = sl.Damping(loss_time=0.05)
     rig = sl.twin.Machine(ROBOT, damping=damped, faults=["load grows by 10 kg at 0.5 s for 3 s"])
     pilot = Pilot(rig.link(), PLAN)
@@ -241,7 +241,7 @@ def test_an_emergency_stop() -> None:
 @pytest.mark.parametrize(
     "words", wide(["repeats", "is silent", "goes back", "is torn", "is foreign", "stops"], first=2)
 )
-def test_a_group_of_which_nothing_new_comes(words: str) -> None:
+def test_a_group_without_new_data(words: str) -> None:
     _, before, after = run(f"group 2 {words} at 0.3 s for 0.12 s")
     ages = np.array([sample.age for sample in after])
     np.testing.assert_allclose(ages[:12, 2], PERIOD * np.arange(1, 13), atol=1e-9)
@@ -256,7 +256,7 @@ def test_a_group_of_which_nothing_new_comes(words: str) -> None:
     assert after[-1].counter[2] > before[-1].counter[2]
 
 
-def test_a_plc_that_stops_begins_anew_with_its_brakes_on() -> None:
+def test_a_stopped_plc_restarts_with_its_brakes_on() -> None:
     rig, before, after = run("group 2 stops at 0.3 s for 0.2 s")
     assert before[-1].owner[2] == 77
     assert np.linalg.norm(before[-1].rate[4:6]) > 0.1
@@ -267,7 +267,7 @@ def test_a_plc_that_stops_begins_anew_with_its_brakes_on() -> None:
     assert rig.time == pytest.approx(0.9)
 
 
-def test_blocks_that_come_twice_or_change_places_do_no_harm() -> None:
+def test_repeated_and_reordered_blocks_have_no_effect() -> None:
     _, _, twice = run("group 2 doubles")
     assert np.abs([sample.age for sample in twice]).max() < 1e-9
     assert twice[-1].discarded.tolist() == [0, 0, 60, 0]
@@ -280,7 +280,7 @@ def test_blocks_that_come_twice_or_change_places_do_no_harm() -> None:
 
 
 @pytest.mark.parametrize("words", wide(["are foreign", "stop", "repeat", "are torn"], first=2))
-def test_commands_that_do_not_come_are_a_dead_controller(words: str) -> None:
+def test_missing_commands_are_treated_as_a_dead_controller(words: str) -> None:
     _, before, after = run(f"commands {words}")
     assert {int(sample.echo[0]) for sample in after} == {int(before[-1].echo[0])}
     holds = [bool((sample.status & GroupStatus.HOLDING).all()) for sample in after]
@@ -288,7 +288,7 @@ def test_commands_that_do_not_come_are_a_dead_controller(words: str) -> None:
     assert (after[-1].fault == GroupFault.HEARTBEAT).all()
 
 
-def test_a_grant_that_somebody_takes() -> None:
+def test_a_grant_taken_by_another_controller() -> None:
     _, before, after = run("group 1 is taken at 0.3 s for 0.4 s", 1.0)
     assert before[-1].owner.tolist() == [77] * 4
     assert after[0].owner[1] not in (0, 77)
@@ -298,7 +298,7 @@ def test_a_grant_that_somebody_takes() -> None:
     assert after[-1].owner.tolist() == [77] * 4  # it left, and the pilot claims in every cycle
 
 
-def test_what_a_machine_does_not_have() -> None:
+def test_faults_of_missing_parts_are_refused() -> None:
     rig = sl.twin.Machine(ROBOT)
     for text, says in (
         ("cell 8 sticks", "cell 0 to 7"),
@@ -320,7 +320,7 @@ def test_a_fault_from_the_past_happens_at_once() -> None:
 @pytest.mark.parametrize(
     ("text", "again", "foreign"), [("group 0 is torn", True, False), ("group 0 is foreign", False, True)]
 )
-def test_a_server_shows_blocks_that_are_no_good(text: str, again: bool, foreign: bool) -> None:
+def test_a_server_shows_invalid_blocks(text: str, again: bool, foreign: bool) -> None:
     rig = sl.twin.Machine(ROBOT, faults=[text])
     rig.advance()
     report, good = rig.report(0), rig.report(1)
@@ -331,7 +331,7 @@ def test_a_server_shows_blocks_that_are_no_good(text: str, again: bool, foreign:
 
 
 @pytest.mark.parametrize("words", ["is silent", "repeats", "goes back", "stops"])
-def test_a_server_leaves_a_block_as_it_was(words: str) -> None:
+def test_a_server_keeps_an_old_block(words: str) -> None:
     rig = sl.twin.Machine(ROBOT, faults=[f"group 1 {words}"])
     rig.advance()
     assert [rig.report(group) is None for group in range(4)] == [False, True, False, False]

@@ -1,4 +1,4 @@
-"""The machine behind the link: where it begins, how it stops, that it is the same in every run."""
+"""The machine behind the link: initial state, stops, and reproducible runs."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PLAN = sl.inverse(ROBOT, HOME)
 OWN = 77
 
 
-def test_it_stands_still_on_its_drives() -> None:
+def test_the_machine_stands_still_on_its_drives() -> None:
     rig = sl.twin.Machine(ROBOT, seed=1)
     pilot, place = Pilot(rig.link(), PLAN), rig.reading.position.copy()
     assert np.abs(place - HOME.position).max() < 1e-12
@@ -33,7 +33,7 @@ def test_it_stands_still_on_its_drives() -> None:
     assert np.abs(sample.filtered - PLAN.state.cables.frame_end_tension).max() < 1.0
 
 
-STOPS = [  # model.md, section 12: how, m/s, N, mm
+STOPS = [  # model.md, section 12: kind of stop, m/s, N, mm
     (Mode.LOCK, 0.3, 63.0, 11.7),
     (Mode.HOLD, 0.3, 39.0, 26.7),
     (Mode.LOCK, 0.06, 13.0, 2.3),
@@ -49,7 +49,7 @@ def studied() -> sl.Robot:
 
 @pytest.mark.parametrize(("mode", "speed", "peak", "travel"), wide(STOPS, first=2))
 def test_stops_of_the_study(mode: Mode, speed: float, peak: float, travel: float) -> None:
-    """Whose drives had an integral gain of 80 kN/m."""
+    """The integral gain of its drives was 80 kN/m."""
     robot = studied()
     plan = leg(robot, speed)
     assert plan.path is not None
@@ -95,7 +95,7 @@ def test_a_dead_controller_costs_speed_times_heartbeat_and_half_the_ramp(speed: 
 
 
 def test_an_ideal_link_changes_no_bit() -> None:
-    """Driven over the link, and as a server does it: claims and commands by hand, blocks as reports."""
+    """Driven over the link, and as by a server: claims and commands by hand, blocks as reports."""
     plan = leg(ROBOT, 0.3)
     linked, served = (sl.twin.Machine(ROBOT, seed=5, faults=["cell 3 sticks at 0.4 s"]) for _ in range(2))
     pilot = Pilot(linked.link(), plan)
@@ -123,11 +123,11 @@ def test_an_ideal_link_changes_no_bit() -> None:
     assert np.linalg.norm(linked.reading.position - HOME.position) > 0.005
 
 
-def test_a_seed_is_a_run() -> None:
+def test_a_seed_determines_a_run() -> None:
     def run(seed: int) -> list[float]:
         rig = sl.twin.Machine(ROBOT, seed=seed, jitter=0.03, loss=0.1)
         pilot = Pilot(rig.link(), PLAN)
-        rig.link(moves=False)  # a second listener does not change the first one's way
+        rig.link(moves=False)  # a second listener does not change the motion for the first one
         found: list[float] = []
         for _ in range(50):
             pilot.counter += 1
@@ -165,7 +165,7 @@ def test_counts_and_lengths_of_a_drum_are_those_of_encoder_counts(drum: dict[str
     assert np.abs(sample.length - plan.unstrained_length).max() < 76e-9
 
 
-def test_zeros_of_the_encoders_are_off_by_what_length_zero_is() -> None:
+def test_encoder_zeros_have_the_errors_of_length_zero() -> None:
     error = np.linspace(-0.002, 0.003, 8)
     assert ROBOT.winches is not None
     true = ROBOT.replace(winches=ROBOT.winches.replace(length_zero=3.0 + error))
@@ -199,8 +199,8 @@ def test_a_smaller_drum_lets_out_less() -> None:
 @pytest.mark.parametrize(
     "error", [{PULLEY: 33.0}, {DEAD: 0.5}, {MODULUS: 20.0}, {LOAD: 2.0}, {DEAD: 1.0, PULLEY: 20.0}]
 )
-def test_it_begins_where_the_article_s_machine_rests(error: dict[str, float]) -> None:
-    """What pulleys and dead cable add to the lengths at home was not counted when the encoders were set."""
+def test_it_begins_at_the_equilibrium_of_the_machine_of_the_article(error: dict[str, float]) -> None:
+    """The contribution of pulleys and dead length to lengths at home was not counted when the encoders were set."""
     home = sl.inverse(ROBOT, sl.Pose.from_quaternion(HOME.position[None], [[0.0, 0.0, 0.0, 1.0]]))
     rig = sl.twin.Machine(robot_with_errors(ROBOT, error), nominal=ROBOT)
     np.testing.assert_allclose(rig.reading.position, rest_positions(ROBOT, home, home, [error])[0, 0], atol=1e-9)
@@ -218,7 +218,7 @@ def test_the_start_is_the_middle_of_the_test_box() -> None:
 
 
 def test_a_step_that_is_too_coarse_for_the_modes() -> None:
-    """sqrt(k/J_e) of the stiffest drum on its cable counts too."""
+    """sqrt(k/J_e) of the stiffest drum on its cable is included."""
     stiff = ROBOT.replace(cables=ROBOT.cables.replace(axial_stiffness=3e6))
     with refused("step", "0.001 s", kind=sl.InvalidValueError) as caught:
         sl.twin.Machine(stiff)
@@ -233,7 +233,7 @@ def test_a_step_that_is_too_coarse_for_the_modes() -> None:
     assert float(caught.value.allowed.split("<= ")[1].split(" s")[0]) == pytest.approx(limit, rel=0.03)
 
 
-def test_what_cannot_be_a_machine() -> None:
+def test_impossible_machines_are_refused() -> None:
     assert ROBOT.winches is not None
     blind = ROBOT.replace(winches=sl.Winch(drum_radius=0.03, inertia=1e-5))
     without_inertia = blind.replace(winches=sl.Winch(drum_radius=0.03, counts_per_turn=4096))
@@ -290,10 +290,10 @@ def test_two_controllers_on_one_machine() -> None:
 
 
 @pytest.mark.parametrize(("expected", "fault", "most"), [(1e6, GroupFault.SET_POINT, 1e-4), (1999.0, None, 0.02)])
-def test_motors_that_are_told_to_expect_too_much_let_no_cable_run(
+def test_motors_with_excessive_feedforward_hold_the_cables(
     expected: float, fault: GroupFault | None, most: float
 ) -> None:
-    """Beyond the limit it is refused; below, drives that lag hold what their cells read: 17 mm, then they stand."""
+    """Beyond the limit it is refused; below, lagging drives hold with the readings of their cells after 17 mm."""
     pilot = Pilot(sl.twin.Machine(ROBOT, seed=1).link(), PLAN)
     pilot.hold(0.2)
     begin = pilot.go(0.05)[-1]

@@ -1,4 +1,4 @@
-"""Late, uneven and lost messages on the lockstep clock."""
+"""Delayed, irregular and lost messages on the lockstep clock."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def samples(count: int, **network: Any) -> list[Sample | Missing]:
 
 
 @pytest.mark.parametrize("cycles", [0, 1, 2, 3, 5])
-def test_a_delay_is_so_many_cycles_each_way(cycles: int) -> None:
+def test_a_delay_is_a_number_of_cycles_in_each_direction(cycles: int) -> None:
     found = samples(40, delay=cycles * PERIOD)
     assert [isinstance(sample, Missing) for sample in found] == [True] * cycles + [False] * (40 - cycles)
     last = found[-1]
@@ -49,7 +49,7 @@ def test_part_of_a_period_counts_as_one() -> None:
     np.testing.assert_allclose(last.age, 0.7 * PERIOD, atol=1e-9)
 
 
-def test_with_jitter_and_losses_nothing_older_comes_after_something_newer() -> None:
+def test_with_jitter_and_losses_blocks_arrive_in_order() -> None:
     found = [sample for sample in samples(600, jitter=0.05, loss=0.2) if isinstance(sample, Sample)]
     counters = np.array([sample.counter for sample in found])
     assert (np.diff(counters, axis=0) >= 0).all()
@@ -63,7 +63,7 @@ def test_with_jitter_and_losses_nothing_older_comes_after_something_newer() -> N
     np.testing.assert_allclose((np.diff(ages, axis=0))[stood], PERIOD, atol=1e-9)
 
 
-def test_the_network_is_what_it_says() -> None:
+def test_the_network_has_the_stated_properties() -> None:
     network, sent = Network(0.01, 0.02, 0.25, 4), 20_000
     way = TimedQueue()
     for k in range(sent):

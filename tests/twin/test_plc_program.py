@@ -1,4 +1,4 @@
-"""What a PLC does by itself, scan by scan."""
+"""Behavior of a PLC, scan by scan."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ LIMITS = PlcLimits([0.5, 0.5], [8.0, 9.0], [0.4, 0.5], [1000.0, 2000.0])
 
 
 class Group:
-    """A program, whose drives are where their set points were, unless told otherwise."""
+    """A program whose drives are at their set points by default."""
 
     def __init__(self) -> None:
         self.program, self.now, self.counter = Program(LIMITS, PERIOD), 100.0, 0
@@ -61,7 +61,7 @@ class Group:
         return self.program
 
 
-def test_a_grant_is_for_one() -> None:
+def test_a_grant_has_one_owner() -> None:
     group = Group()
     program = group.scan()
     assert program.status == GroupStatus.READY | GroupStatus.BRAKED
@@ -82,7 +82,7 @@ def test_a_grant_is_for_one() -> None:
     assert (program.owner, program.echo) == (8, 0)
 
 
-def test_who_leaves_gives_it_back_and_the_brakes_fall() -> None:
+def test_a_released_grant_applies_the_brakes() -> None:
     group = Group()
     program = group.ready()
     assert program.powered == [True, True]
@@ -94,7 +94,7 @@ def test_who_leaves_gives_it_back_and_the_brakes_fall() -> None:
 
 
 @pytest.mark.parametrize("first", [1, COUNTERS - 2])
-def test_commands_are_taken_once_and_in_order(first: int) -> None:
+def test_commands_are_executed_once_and_in_order(first: int) -> None:
     group = Group()
     group.program.claim(7, group.now)
     taken = []
@@ -105,7 +105,7 @@ def test_commands_are_taken_once_and_in_order(first: int) -> None:
     assert taken == [0, 1, 1, 4, 4, 4, 5]
 
 
-def test_drives_take_up_their_tension_before_the_brakes_go() -> None:
+def test_drives_reach_their_tension_before_the_brakes_open() -> None:
     group = Group()
     group.program.claim(7, group.now)
     program = group.do(Mode.HOLD)
@@ -120,13 +120,13 @@ def test_drives_take_up_their_tension_before_the_brakes_go() -> None:
     assert program.powered == [False, False]
 
 
-def test_a_counter_that_stands_goes_on_then_ramps_then_holds() -> None:
+def test_without_new_commands_the_motion_continues_then_stops_and_holds() -> None:
     group = Group()
     program = group.moving()
     begin, rate = np.array(program.length), np.array([0.2, -0.1])
     path = np.array([begin, *(group.scan().length for _ in range(40))])
     speed = np.diff(path, axis=0) / PERIOD
-    waits = round(HEARTBEAT / PERIOD) - 1  # the command's own period has passed
+    waits = round(HEARTBEAT / PERIOD) - 1  # the period of the command itself has passed
     np.testing.assert_allclose(speed[:waits], np.tile(rate, (waits, 1)), atol=1e-12)
     times = PERIOD * (np.arange(round(RAMP / PERIOD)) + 0.5)
     np.testing.assert_allclose(speed[waits : waits + 20], np.outer(1.0 - times / RAMP, rate), atol=1e-12)
@@ -144,7 +144,7 @@ def test_a_counter_that_stands_goes_on_then_ramps_then_holds() -> None:
 
 
 @pytest.mark.parametrize(("valid_for", "scans"), [(0.03, 3), (0.0, 1), (5.0, 10), (math.nan, 10), (-1.0, 1)])
-def test_a_command_is_valid_for_so_long_and_no_longer_than_the_heartbeat(valid_for: float, scans: int) -> None:
+def test_a_command_is_valid_for_its_time_and_at_most_the_heartbeat(valid_for: float, scans: int) -> None:
     group = Group()
     program = group.moving()
     group.do(Mode.FOLLOW, program.length, [0.2, -0.1], valid_for=valid_for)
@@ -152,7 +152,7 @@ def test_a_command_is_valid_for_so_long_and_no_longer_than_the_heartbeat(valid_f
     assert found.index(True) == scans - 1
 
 
-def test_a_lost_command_is_no_stop() -> None:
+def test_a_lost_command_does_not_stop_the_motion() -> None:
     group = Group()
     program = group.moving()
     begin = list(program.length)
@@ -164,8 +164,8 @@ def test_a_lost_command_is_no_stop() -> None:
 
 
 @pytest.mark.parametrize("scan", [0.001, 0.004, 0.005, 0.01])
-def test_a_fast_scan_is_on_a_straight_way_between_set_points(scan: float) -> None:
-    """Whatever the scan, the set points are those of a command a cycle after it came, and between them even."""
+def test_fast_scans_interpolate_set_points_linearly(scan: float) -> None:
+    """For every scan time, set points follow those of a command within one cycle after its arrival, linearly."""
     group = Group()
     group.program = Program(LIMITS, scan)
     program, begin, commands = group.ready(), group.now, 0
@@ -182,7 +182,7 @@ def test_a_fast_scan_is_on_a_straight_way_between_set_points(scan: float) -> Non
     assert np.abs(np.array(found) - 0.2 * np.array(times)).max() <= late + 1e-12
 
 
-def test_a_command_to_hold_ramps_too() -> None:
+def test_a_command_to_hold_uses_the_ramp() -> None:
     group = Group()
     program = group.moving()
     begin = program.length[0]
@@ -194,7 +194,7 @@ def test_a_command_to_hold_ramps_too() -> None:
 
 
 @pytest.mark.parametrize("broken", ["nan", "inf", "fast", "rate", "no tension", "pushed", "beyond its limit"])
-def test_set_points_that_are_refused(broken: str) -> None:
+def test_refused_set_points(broken: str) -> None:
     group = Group()
     program = group.moving()
     length, rate, tension = list(program.length), [0.2, -0.1], [150.0, 160.0]
@@ -227,7 +227,7 @@ def test_set_points_at_the_ends_of_their_range(start: float, step: float) -> Non
 
 
 @pytest.mark.parametrize("reading", [2001.0, math.nan])
-def test_too_much_tension_takes_in_no_more_cable(reading: float) -> None:
+def test_a_high_tension_stops_winding_in(reading: float) -> None:
     group = Group()
     program = group.moving()
     group.cell = [900.0, reading]
@@ -239,14 +239,14 @@ def test_too_much_tension_takes_in_no_more_cable(reading: float) -> None:
     assert program.length[0] - before[0] == pytest.approx(0.2 * RAMP / 2)
     group.do(Mode.HOLD)
     at = list(program.length)
-    for cycle in range(1, 20):  # to let it out is allowed, so that somebody can
+    for cycle in range(1, 20):  # winding out is allowed, to reduce the tension
         group.do(Mode.FOLLOW, [at[0], at[1] + 0.001 * cycle], [0.0, 0.1])
     assert program.length[1] == pytest.approx(at[1] + 0.019)
     assert not program.fault
 
 
 @pytest.mark.parametrize("reading", [2001.0, math.nan])
-def test_nor_while_it_slows_down(reading: float) -> None:
+def test_a_high_tension_stops_winding_in_during_the_ramp(reading: float) -> None:
     group = Group()
     program = group.moving()
     group.cell = [900.0, reading]
@@ -259,9 +259,7 @@ def test_nor_while_it_slows_down(reading: float) -> None:
 
 
 @pytest.mark.parametrize(("reading", "held"), [(120.0, 120.0), (-3.0, 0.0), (math.nan, 150.0), (1000.1, 150.0)])
-def test_a_drive_that_does_not_follow_stands_where_it_is_and_holds_what_its_cell_reads(
-    reading: float, held: float
-) -> None:
+def test_a_lagging_drive_stands_and_holds_the_measured_tension(reading: float, held: float) -> None:
     group = Group()
     program = group.moving()
     group.encoder[0] = program.length[0] + 0.0101
@@ -270,13 +268,13 @@ def test_a_drive_that_does_not_follow_stands_where_it_is_and_holds_what_its_cell
     assert program.fault == GroupFault.FOLLOWING_ERROR
     assert program.length[0] == group.encoder[0]
     assert program.tension == [held, 160.0]
-    for _ in range(30):  # what is expected of it may be what was wrong: a command to hold leaves it
+    for _ in range(30):  # its expected tension may be wrong: a command to hold does not set it
         group.do(Mode.HOLD, tension=[700.0, 160.0])
     assert (program.fault, program.powered, program.tension) == (GroupFault.NONE, [True, True], [held, 160.0])
 
 
-def test_a_drive_that_lags_again_gets_its_brake_until_the_operator_lets_it_go() -> None:
-    """Whatever stopped its group before."""
+def test_a_drive_that_lags_again_is_braked_until_acknowledged() -> None:
+    """For any earlier reason of a stop of its group."""
     group = Group()
     program = group.moving()
     while not program.fault:
@@ -294,7 +292,7 @@ def test_a_drive_that_lags_again_gets_its_brake_until_the_operator_lets_it_go() 
     assert group.do(Mode.HOLD).powered == [True, True]
 
 
-def test_a_command_to_hold_ends_no_ramp_that_a_fault_began() -> None:
+def test_a_command_to_hold_does_not_end_the_ramp_of_a_fault() -> None:
     group = Group()
     program = group.moving()
     before, since = list(program.length), group.now
@@ -305,7 +303,7 @@ def test_a_command_to_hold_ends_no_ramp_that_a_fault_began() -> None:
     assert np.subtract(program.length, before) == pytest.approx(np.array([0.2, -0.1]) * RAMP / 2)
 
 
-def test_locked_drums_are_the_operator_s() -> None:
+def test_locked_drums_are_released_by_the_operator() -> None:
     group = Group()
     program = group.moving()
     group.do(Mode.LOCK)
@@ -359,21 +357,21 @@ def test_a_late_command_moves_no_faster_than_the_winch() -> None:
     np.testing.assert_allclose(np.abs(np.diff(path, axis=0)).max(axis=0) / PERIOD, LIMITS.speed, atol=1e-6)
 
 
-def test_a_broken_wire_of_the_emergency_stop_is_an_emergency_stop() -> None:
+def test_an_open_emergency_stop_circuit_is_an_emergency_stop() -> None:
     group = Group()
     program = group.moving()
     program.contact = False
     group.do(Mode.FOLLOW)
     assert (program.powered, program.fault) == ([False, False], GroupFault.EMERGENCY_STOP)
     program.reset()
-    assert group.scan().status & GroupStatus.EMERGENCY  # a reset does not help while it is open
+    assert group.scan().status & GroupStatus.EMERGENCY  # a reset has no effect while it is open
     program.contact = True
     assert group.scan().status & GroupStatus.EMERGENCY
     program.reset()
     assert group.scan().status == GroupStatus.READY | GroupStatus.BRAKED
 
 
-def test_an_emergency_stop_is_mirrored_and_the_grant_can_still_be_given_back() -> None:
+def test_an_emergency_stop_is_reported_and_the_grant_can_be_released() -> None:
     group = Group()
     program = group.moving()
     program.contact = False
@@ -389,7 +387,7 @@ def test_an_emergency_stop_is_mirrored_and_the_grant_can_still_be_given_back() -
     assert group.scan().fault == GroupFault.NONE
 
 
-def test_a_drive_that_trips_stops_its_group() -> None:
+def test_a_tripped_drive_stops_its_group() -> None:
     group = Group()
     program = group.moving()
     program.trip(1, 9)
@@ -406,7 +404,7 @@ def test_a_drive_that_trips_stops_its_group() -> None:
     assert group.do(Mode.HOLD).powered == [True, True]
 
 
-def test_a_grant_that_is_taken_in_motion_is_a_stop() -> None:
+def test_a_change_of_the_grant_in_motion_is_a_stop() -> None:
     group = Group()
     program = group.moving()
     program.seize(8, group.now)
@@ -417,14 +415,14 @@ def test_a_grant_that_is_taken_in_motion_is_a_stop() -> None:
 
 
 def anything(generator: np.random.Generator, group: Group) -> None:
-    """One scan of a group to which anything may happen, most of it now and then."""
+    """One scan of a group with random events, most of them rare."""
     program = group.program
 
-    def seldom(share: float, strange: Any, usual: Any) -> Any:
+    def rarely(share: float, strange: Any, usual: Any) -> Any:
         return strange if generator.random() < share else usual
 
     def spoiled(share: float, usual: float) -> float:
-        return float(seldom(share, generator.choice([math.nan, math.inf, -math.inf, -1.0, 0.0, 1e300]), usual))
+        return float(rarely(share, generator.choice([math.nan, math.inf, -math.inf, -1.0, 0.0, 1e300]), usual))
 
     if (pick := generator.random()) < 0.1:
         program.claim(int(generator.choice([0, 7, 8])), group.now)
@@ -435,18 +433,18 @@ def anything(generator: np.random.Generator, group: Group) -> None:
     elif pick < 0.15:
         program.contact = True
         program.reset()
-    group.cell = [seldom(0.01, 1e4, 150.0) for _ in range(2)]
-    group.encoder = [at + seldom(0.02, 0.02, 0.0) for at in group.encoder]
+    group.cell = [rarely(0.01, 1e4, 150.0) for _ in range(2)]
+    group.encoder = [at + rarely(0.02, 0.02, 0.0) for at in group.encoder]
     if generator.random() < 0.9:
         rate = generator.uniform(-0.4, 0.4, 2)
         order = group.order(
-            seldom(0.2, int(generator.choice([*Mode, 9])), Mode.FOLLOW),
+            rarely(0.2, int(generator.choice([*Mode, 9])), Mode.FOLLOW),
             [spoiled(0.01, at + r * PERIOD) for at, r in zip(program.length, rate, strict=True)],
             [spoiled(0.01, r) for r in rate],
-            owner=seldom(0.02, 8, 7),
+            owner=rarely(0.02, 8, 7),
             valid_for=spoiled(0.05, 0.1),
             tension=[spoiled(0.05, 150.0) for _ in range(2)],
-            enable=seldom(0.1, [bool(generator.integers(2)), True], [True, True]),
+            enable=rarely(0.1, [bool(generator.integers(2)), True], [True, True]),
         )
         program.take(order)
     program.scan(group.now, list(group.encoder), list(group.cell))
@@ -454,7 +452,7 @@ def anything(generator: np.random.Generator, group: Group) -> None:
 
 
 @pytest.mark.parametrize("seeds", [8, pytest.param(30, marks=extended), pytest.param(1000, marks=pytest.mark.soak)])
-def test_whatever_comes_drives_do_what_they_may(seeds: int) -> None:
+def test_drives_stay_within_their_limits_for_any_input(seeds: int) -> None:
     followed = 0
     for seed in range(seeds):
         generator, group = np.random.default_rng(seed), Group()

@@ -1,4 +1,4 @@
-"""The servers of a twin, on the lockstep clock: over the sockets comes what the machine says, to the last bit."""
+"""Servers of a twin on the lockstep clock: sockets transmit the state of the machine exactly."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def served(kind: Kind, *faults: str) -> Iterator[tuple[sl.twin.Server, BlockLink
         yield server, link
 
 
-def gone_on(server: sl.twin.Server, link: BlockLink) -> Sample:
+def next_sample(server: sl.twin.Server, link: BlockLink) -> Sample:
     """The sample after a scan."""
     before = taken(link).counter
     server.scan()
@@ -48,7 +48,7 @@ def gone_on(server: sl.twin.Server, link: BlockLink) -> Sample:
 
 
 def send(server: sl.twin.Server, link: BlockLink, command: Command) -> None:
-    """Send a command, or the claim where there is no grant, and wait until it has arrived."""
+    """Send a command, or the claim without a grant, and wait for its arrival."""
     link.exchange(command)
     told = struct.pack(">I", command.counter)
     until(lambda: all(bytes(each[TO_PLC][:4]) == told or any(each[CLAIM]) for each in memory(server)))
@@ -61,7 +61,7 @@ def command_of(counter: int, mode: Mode, length: Array) -> Command:
 
 
 @pytest.mark.parametrize("kind", wide(BOTH))
-def test_a_machine_behind_sockets_does_what_it_does_in_process(kind: Kind) -> None:
+def test_a_machine_behind_sockets_agrees_with_one_in_process(kind: Kind) -> None:
     alone = machine()
     with served(kind) as (server, link):
         begin = taken(link).length
@@ -74,7 +74,7 @@ def test_a_machine_behind_sockets_does_what_it_does_in_process(kind: Kind) -> No
                 else:
                     alone.take(group, command_of(counter, mode, length[list(winches)]))
             alone.advance()
-            sample = gone_on(server, link)
+            sample = next_sample(server, link)
             for group, winches in enumerate(alone.groups):
                 report = alone.report(group)
                 assert report is not None
@@ -88,7 +88,7 @@ def test_a_machine_behind_sockets_does_what_it_does_in_process(kind: Kind) -> No
         assert (sample.length - begin > 2e-4).all()
 
 
-def test_a_report_is_packed_as_a_plc_has_it() -> None:
+def test_a_report_is_packed_as_in_a_plc() -> None:
     sample = a_sample(8, counts=np.arange(8) * 2**20)
     heads = [int(column[1]) for column in (sample.owner, sample.echo, sample.status, sample.fault)]
     floats = [column[2:4].tolist() for column in sample[8:13]]
@@ -107,7 +107,7 @@ def test_a_report_is_packed_as_a_plc_has_it() -> None:
     assert [values["winch[1].counts"], values["winch[2].counts"]] == [-(2**31), 2**31 - 1]
 
 
-def test_what_is_written_but_no_command_moves_nothing() -> None:
+def test_foreign_bytes_do_not_move_the_machine() -> None:
     random = np.random.default_rng(0)
     with closing(sl.twin.Server(machine())) as server:
         good = bytearray(TO_PLC.pack({"counter": 1, "owner": OWNER, "mode": 2, "valid_for": 100}))
@@ -149,7 +149,7 @@ def test_a_command_is_valid_for_the_milliseconds_in_its_block(valid_for: int, sc
 @extended
 def test_a_silent_group_keeps_its_block() -> None:
     with served(S7, "group 1 is silent at 0.01 s") as (server, link):
-        before = gone_on(server, link)
+        before = next_sample(server, link)
         server.scan()
         until(lambda: np.all(taken(link).counter == before.counter + np.array([1, 0, 1, 1])))
 
@@ -161,7 +161,7 @@ def test_each_group_needs_a_port() -> None:
 
 
 @extended
-def test_a_port_in_use_is_told() -> None:
+def test_a_port_in_use_is_reported() -> None:
     with closing(sl.twin.Server(machine())) as server:
         port = int(server.addresses[2].rpartition(":")[2])
         with refused("address of the twin", kind=sl.InvalidValueError) as caught:
@@ -170,12 +170,12 @@ def test_a_port_in_use_is_told() -> None:
 
 
 @extended
-def test_the_last_command_of_before_a_grant_is_history() -> None:
+def test_commands_from_before_a_grant_are_ignored() -> None:
     with served(S7) as (server, link):
         length = taken(link).length
         owners = []
         for counter, mode in enumerate((Mode.HOLD, Mode.HOLD, Mode.LEAVE, Mode.HOLD), 1):
             send(server, link, command_of(counter, mode, length))
-            owners.append(int(gone_on(server, link).owner[0]))
-        owners.append(int(gone_on(server, link).owner[0]))
+            owners.append(int(next_sample(server, link).owner[0]))
+        owners.append(int(next_sample(server, link).owner[0]))
         assert owners == [OWNER, OWNER, 0, OWNER, OWNER]

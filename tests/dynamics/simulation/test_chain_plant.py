@@ -1,4 +1,4 @@
-"""A platform with masses at its cables' ends against sums over the parts."""
+"""A platform with masses at its cable ends compared with sums over the parts."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from sagline.kernels.dynamics import rigid_body as body
 
 
 def parts(seed: int) -> tuple[Array, Array, Array, tuple[Array, Array, Array, Array]]:
-    """Inertia of a platform, masses and their places on it, and a motion."""
+    """Inertia of a platform, masses with their places on it, and a motion."""
     rng = np.random.default_rng(seed)
     inertia = np.array([rng.uniform(1, 100), *np.sort(rng.uniform(2, 3, 3))])
     place, velocity, spin = rng.normal(size=(3, 3))
@@ -19,7 +19,7 @@ def parts(seed: int) -> tuple[Array, Array, Array, tuple[Array, Array, Array, Ar
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_energy_momentum_and_its_moment_are_those_of_the_parts(seed: int) -> None:
+def test_energy_and_momenta_are_sums_over_the_parts(seed: int) -> None:
     inertia, masses, ends, motion = parts(seed)
     place, turning, velocity, spin = motion
     carrier = LoadedPlatform.of(inertia, masses, ends)
@@ -47,7 +47,7 @@ def test_energy_momentum_and_its_moment_are_those_of_the_parts(seed: int) -> Non
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_what_is_seen_is_the_platforms_own_motion(seed: int) -> None:
+def test_the_recorded_motion_is_that_of_the_platform(seed: int) -> None:
     inertia, masses, ends, motion = parts(seed)
     carrier = LoadedPlatform.of(inertia, masses, ends)
     recorded = np.concatenate((carrier.state(*motion)[: body.MOMENTUM], motion[3]))
@@ -59,7 +59,7 @@ def test_what_is_seen_is_the_platforms_own_motion(seed: int) -> None:
 
 
 @pytest.mark.parametrize("moments", [[np.inf, np.inf, 2.0], [np.inf] * 3])
-def test_what_cannot_turn_does_not(moments: list[float]) -> None:
+def test_a_point_mass_does_not_rotate(moments: list[float]) -> None:
     _, masses, ends, motion = parts(0)
     carrier = LoadedPlatform.of(np.array([10.0, *moments]), masses, ends)
     assert np.isinf(carrier.inertia[1:]).tolist() == np.isinf(moments).tolist()

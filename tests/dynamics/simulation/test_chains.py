@@ -1,4 +1,4 @@
-"""Robots on cables with mass in time, lumped: against exact modes, other steps, the same robot without cable mass."""
+"""Robots on lumped cables with mass in time, compared with exact modes, other steps and massless cables."""
 
 from __future__ import annotations
 
@@ -17,32 +17,32 @@ from tests.tiers import extended, wide
 
 
 @cache
-def hung(name: str, x: float, y: float, z: float) -> sl.Equilibrium:
-    """A preset at rest."""
+def preset_at_rest(name: str, x: float, y: float, z: float) -> sl.Equilibrium:
+    """A preset at equilibrium."""
     return sl.inverse(sl.load_robot(name), sl.Pose([x, y, z], np.eye(3))).state
 
 
 def cogiro() -> sl.Equilibrium:
-    return hung("cogiro", 0.5, 0.3, 2.0)
+    return preset_at_rest("cogiro", 0.5, 0.3, 2.0)
 
 
 def over_pulleys() -> sl.Equilibrium:
-    return hung("ipanema-3-pulleys", -0.3, -0.05, 1.1)
+    return preset_at_rest("ipanema-3-pulleys", -0.3, -0.05, 1.1)
 
 
 def winched(state: sl.Equilibrium, cable: int, way: float) -> tuple[list[float], list[Array]]:
-    """Let out some of a cable and wind it in again."""
+    """Wind a cable out and in again."""
     there, back = state.unstrained_length.copy(), state.unstrained_length
     there[cable] += way
     return [0.0, 0.2, 0.3, 0.5], [back, there, there, back]
 
 
 @pytest.mark.parametrize("name", ["cogiro", "ipanema-3-pulleys", "expo2015-lucia"])
-def test_chains_reach_the_exact_equilibrium_with_the_square_of_their_nodes(name: str) -> None:
-    """Pose, and tension at the platform ends, against the exact catenary: errors fall four times as nodes double."""
+def test_chains_converge_to_the_exact_equilibrium_with_second_order(name: str) -> None:
+    """Pose and platform-end tensions compared with the exact catenary: errors fall to a quarter as the nodes double."""
     box = sl.load_robot(name).test_box
     assert box is not None
-    state = hung(name, *np.mean([box.low, box.high], axis=0) + 0.1)
+    state = preset_at_rest(name, *np.mean([box.low, box.high], axis=0) + 0.1)
     off = []
     for nodes in (10, 20, 40):
         found = chains_at_rest(state, nodes)
@@ -67,8 +67,8 @@ def test_a_robot_at_rest_stays_at_rest(state: object) -> None:
     assert (run.cable_mass, run.events, run.nodes.shape[2]) == ("lumped", (), 11)
 
 
-def test_nodes_lie_on_the_exact_catenary_with_the_square_of_their_number() -> None:
-    """A deep one: of 2 % longer cables, which sag by some 0.8 m."""
+def test_nodes_converge_to_the_exact_catenary_with_second_order() -> None:
+    """A slack one: cables that are 2 % longer sag by about 0.8 m."""
     robot = sl.Robot(
         "slack",
         frame_anchors=[[-5, 0, 5], [5, 0, 5]],
@@ -90,7 +90,7 @@ def test_nodes_lie_on_the_exact_catenary_with_the_square_of_their_number() -> No
 
 
 def spectrum_peaks(time: Array, motion: Array, low: float, high: float) -> Array:
-    """Frequencies of the peaks of a record between two frequencies [Hz], those above 5 % of the largest."""
+    """Frequencies of the peaks of a record in a range [Hz], above 5 % of the largest peak."""
     from scipy.signal import find_peaks
 
     windowed = (motion - motion.mean()) * np.hanning(len(motion))
@@ -104,17 +104,21 @@ def spectrum_peaks(time: Array, motion: Array, low: float, high: float) -> Array
 
 @cache
 def pushed(duration: float, nodes: int) -> sl.Simulation:
-    """expo2015-lucia after a small push, free of damping."""
+    """expo2015-lucia after a small impulse, without damping."""
     gust = ([0, 0.02, 0.1, 0.2, 0.21], np.outer([0, 1, 1, 1, 0], [0.3, 0.2, -0.3, 0.1, 0.08, 0.05]))
     return sl.simulate(
-        hung("expo2015-lucia", -0.6, 0.0, 3.5), cable_mass="lumped", nodes=nodes, duration=duration, wrench=gust
+        preset_at_rest("expo2015-lucia", -0.6, 0.0, 3.5),
+        cable_mass="lumped",
+        nodes=nodes,
+        duration=duration,
+        wrench=gust,
     )
 
 
 def check_peaks(run: sl.Simulation, duration: float) -> None:
     free = run.time > 0.3
     peaks = spectrum_peaks(run.time[free], run.pose.position[free, 0], 1.9, 3.2)
-    state = hung("expo2015-lucia", -0.6, 0.0, 3.5)
+    state = preset_at_rest("expo2015-lucia", -0.6, 0.0, 3.5)
     exact = sl.vibration(state, up_to=3.2).frequency
     assert exact == pytest.approx([2.011, 2.586, 3.028], abs=5e-4)
     assert peaks == pytest.approx(exact, abs=1.0 / duration)
@@ -141,8 +145,8 @@ def test_the_spectrum_of_a_minute_shows_the_modes_of_cables_with_mass(nodes: int
 
 
 @extended
-def test_light_cables_let_the_platform_move_as_on_massless_ones() -> None:
-    """A tenth of the mass, a tenth of the difference: the platform, what it carries, its weight and its turning."""
+def test_the_motion_on_light_cables_is_that_on_massless_ones() -> None:
+    """With a tenth of the cable mass, a tenth of the difference, for several platforms and loads."""
     off = []
     for density in (1e-3, 1e-4):
         robot = sl.load_robot("article-prototype")
@@ -162,7 +166,7 @@ def test_light_cables_let_the_platform_move_as_on_massless_ones() -> None:
 
 
 def moved(step: float | None = None) -> sl.Simulation:
-    """CoGiRo along a path on which its cables get nodes and lose them."""
+    """CoGiRo along a path on which its cables gain and lose nodes."""
     path = sl.quintic_path([(0, 0, 1.5), (2.5, 1.5, 3.0), (0, 0, 1.5)], durations=(2.0, 2.0), rate=500.0)
     return sl.simulate(sl.inverse(sl.load_robot("cogiro"), path), cable_mass="lumped", nodes=10, step=step)
 
@@ -171,17 +175,17 @@ def moved(step: float | None = None) -> sl.Simulation:
 def test_moving_winches_close_the_balance_of_energy() -> None:
     run = moved()
     cable = np.abs(run.length - run.length[0]).max(axis=0) / (run.length[0] / 10)
-    assert (cable > 2.0).sum() >= 4  # nodes were born and merged
+    assert (cable > 2.0).sum() >= 4  # nodes were created and merged
     turned_over = np.ptp(run.energy.supplied)
     assert turned_over > 1000.0
     assert np.abs(run.energy.error).max() < 1e-8 * turned_over
-    assert np.abs(run.energy.lost).max() < 1e-4 * turned_over  # what births and merges take
+    assert np.abs(run.energy.lost).max() < 1e-4 * turned_over  # energy of births and merges
     assert np.abs(moved(0.5 * run.step).energy.error).max() < 0.7 * np.abs(run.energy.error).max()
 
 
 @extended
 def test_a_broken_cable_gives_the_same_tensions_at_half_the_step() -> None:
-    """0.4 of l sqrt(rho/EA) against 0.2, 20 nodes: the largest tension of any cable after it."""
+    """0.4 of l sqrt(rho/EA) compared with 0.2, 20 nodes: the largest tension of any cable after the break."""
     after = []
     for share in (1.0, 0.5):
         run = sl.simulate(cogiro(), cable_mass="lumped", duration=0.5, step=share * 5e-5, events=sl.Break(0, 0.0))
@@ -195,7 +199,7 @@ def test_a_broken_cable_gives_the_same_tensions_at_half_the_step() -> None:
 
 
 @extended
-def test_a_step_that_shakes_a_broken_robot_apart_is_told_with_time_and_cable() -> None:
+def test_an_unstable_step_after_a_break_is_reported_with_time_and_cable() -> None:
     element = cogiro().free_length.min() / 20
     longest = 0.85 * element * float(np.sqrt(0.065 / 700e3))
     with refused("step", kind=sl.InvalidValueError) as caught:
@@ -205,8 +209,8 @@ def test_a_step_that_shakes_a_broken_robot_apart_is_told_with_time_and_cable() -
 
 @extended
 @pytest.mark.parametrize("event", [sl.Drop(20.0, 0.1), sl.PickUp(20.0, 0.1)])
-def test_loads_move_the_platform_as_they_do_without_cable_mass(event: sl.Drop | sl.PickUp) -> None:
-    """So soon that its waves have not come back: it falls or rises, and no energy is invented."""
+def test_the_effect_of_loads_agrees_with_massless_cables(event: sl.Drop | sl.PickUp) -> None:
+    """Before the reflected waves return: the platform falls or rises, and no energy is generated."""
     run = sl.simulate(cogiro(), cable_mass="lumped", duration=0.12, events=event)
     massless = sl.simulate(cogiro(), duration=0.12, events=event)
     way = massless.pose.position[-1, 2] - 2.0
@@ -218,8 +222,8 @@ def test_loads_move_the_platform_as_they_do_without_cable_mass(event: sl.Drop | 
 
 
 @extended
-def test_a_load_that_is_picked_up_in_motion_shares_the_momentum_and_one_that_falls_takes_its_own() -> None:
-    """The velocity of the platform's center of mass a step before and after, of a platform that moves and turns."""
+def test_changes_of_payload_in_motion_conserve_momentum() -> None:
+    """Velocity of the center of mass a step before and after, for a translating and rotating platform."""
     robot = cogiro().one_robot
     step, carried = 5e-5, 0.5 * 0.065 * float(cogiro().free_length.sum()) / 20.0
     given = {"cable_mass": "lumped", "duration": 0.101, "step": step, "record": step}
@@ -249,7 +253,7 @@ def test_a_brake_stops_the_lengths_of_chains() -> None:
 
 @extended
 def test_winches_with_inertia_close_the_balance_of_energy_on_chains() -> None:
-    """Over pulleys and dead cable, with drums that are let go at other tensions than they were wound at."""
+    """With pulleys and dead length, and drums released at other tensions than those of winding."""
     robot = sl.load_robot("article-prototype")
     assert robot.winches is not None
     loops = {"inertia": 0.035, "position_gain": 20.0, "speed_gain": 4e3, "integral_gain": 8e4}
@@ -270,7 +274,7 @@ def test_winches_with_inertia_close_the_balance_of_energy_on_chains() -> None:
 
 @extended
 def test_damping_and_wind_close_the_balance_too() -> None:
-    state = hung("expo2015-lucia", -0.6, 0.0, 3.5)
+    state = preset_at_rest("expo2015-lucia", -0.6, 0.0, 3.5)
     run = sl.simulate(
         state,
         cable_mass="lumped",
@@ -285,9 +289,9 @@ def test_damping_and_wind_close_the_balance_too() -> None:
 
 
 @extended
-def test_a_steady_wind_moves_the_platform_as_half_its_force_on_every_cable_does() -> None:
-    """Damped to rest; what wind adds to the weight of inclined cables is a tenth of that."""
-    state = hung("expo2015-lucia", -0.6, 0.0, 3.5)
+def test_a_steady_wind_acts_with_half_of_its_force_at_the_platform_ends() -> None:
+    """Damped to rest; the effect of wind on inclined cables is a tenth of that of their weight."""
+    state = preset_at_rest("expo2015-lucia", -0.6, 0.0, 3.5)
     given = {"duration": 2.5, "damping": sl.Damping(loss_time=0.02, air_damping=20.0), "wind": [1.0, 0.0, 0.0]}
     run = sl.simulate(state, cable_mass="lumped", nodes=4, **given)  # type: ignore[arg-type]
     massless = sl.simulate(state, **given)  # type: ignore[arg-type]
@@ -311,13 +315,13 @@ def test_a_steady_wind_moves_the_platform_as_half_its_force_on_every_cable_does(
         first=4,
     ),
 )
-def test_options_that_do_not_suit_chains_are_refused(given: dict[str, Any], parts: tuple[str, ...]) -> None:
+def test_unsupported_options_of_chains_are_refused(given: dict[str, Any], parts: tuple[str, ...]) -> None:
     with refused(*parts) as caught:
         sl.simulate(cogiro(), **{"cable_mass": "lumped", "duration": 0.1, **given})
     assert len(str(caught.value)) < 300
 
 
-def test_cables_without_weight_or_mass_are_no_chains() -> None:
+def test_cables_without_weight_or_mass_are_refused() -> None:
     robot = sl.load_robot("cogiro")
     pose = sl.Pose([0.5, 0.3, 2.0], np.eye(3))
     with refused("start: model", "Elastic()", 'Catenary() where cable_mass="lumped"'):
@@ -325,7 +329,7 @@ def test_cables_without_weight_or_mass_are_no_chains() -> None:
 
 
 def on_a_point(*frame: tuple[float, float, float], lengths: list[float], lever: float = 0.0) -> sl.Equilibrium:
-    """A load on cables that meet in a point of it, so high above its center of mass: nothing keeps it from turning."""
+    """A load on cables that meet in a point high above its center of mass: its rotation about the point is free."""
     robot = sl.Robot(
         "load",
         frame_anchors=frame,
@@ -339,8 +343,8 @@ def on_a_point(*frame: tuple[float, float, float], lengths: list[float], lever: 
 
 @extended
 @pytest.mark.parametrize("lever", [0.0, 1e-6, 0.5])
-def test_a_pendulum_of_chains_hangs_as_far_as_they_stretch_and_stays_there(lever: float) -> None:
-    """Tension rises linearly along a plumb cable, for which the midpoint rule is exact."""
+def test_a_pendulum_of_chains_rests_at_its_exact_stretch(lever: float) -> None:
+    """The tension of a vertical cable is linear, for which the midpoint rule is exact."""
     state = on_a_point((0, 0, 12.0), lengths=[10.0], lever=lever)
     gravity = state.one_robot.gravity
     run = sl.simulate(state, duration=0.2, cable_mass="lumped", nodes=7)
@@ -351,7 +355,7 @@ def test_a_pendulum_of_chains_hangs_as_far_as_they_stretch_and_stays_there(lever
 
 @extended
 @pytest.mark.parametrize("frame", [[(-4, 0, 7.0), (4, 0, 8.0)], [(-4, 0, 7.0), (4, 0, 8.0), (0, 4, 8.0)]])
-def test_chains_that_meet_in_a_point_reach_the_exact_equilibrium_too(frame: Any) -> None:
+def test_chains_to_a_common_point_reach_the_exact_equilibrium(frame: Any) -> None:
     state = on_a_point(*frame, lengths=[6.0, 8.0, 7.0][: len(frame)])
     off = [np.linalg.norm(chains_at_rest(state, nodes).pose.position - state.pose.position) for nodes in (10, 20, 40)]
     assert np.divide(off[:-1], off[1:]) == pytest.approx(4.0, abs=0.05)
@@ -373,7 +377,7 @@ def tripod(mass: float) -> sl.Equilibrium:
 
 
 def in_a_plane() -> sl.Equilibrium:
-    """A platform that moves and turns in the plane of x and z."""
+    """A platform that moves and rotates in the plane of x and z."""
     robot = sl.Robot(
         "planar",
         frame_anchors=[[3, 0, 3], [-3, 0, 3], [3, 0, 0], [-3, 0, 0]],
@@ -391,8 +395,8 @@ def in_a_plane() -> sl.Equilibrium:
 
 @extended
 @pytest.mark.parametrize("pattern", ["3T", "1R2T"])
-def test_platforms_that_turn_not_or_in_a_plane_move_as_on_massless_cables(pattern: str) -> None:
-    """On light cables; and what their guides take stays zero."""
+def test_point_and_planar_platforms_move_as_on_massless_cables(pattern: str) -> None:
+    """On light cables; the constraint forces of the guides are zero."""
     state = tripod(50.0) if pattern == "3T" else in_a_plane()
     given: dict[str, Any] = {"unstrained_length": winched(state, 0, 0.01)}
     run = sl.simulate(state, cable_mass="lumped", nodes=6, **given)
@@ -408,10 +412,10 @@ def test_platforms_that_turn_not_or_in_a_plane_move_as_on_massless_cables(patter
 
 
 @extended
-def test_a_cable_that_hangs_deep_is_a_chain_at_rest_too() -> None:
-    """1.5 m too long, it sags far below its chord and pulls with 6 N."""
+def test_a_very_slack_chain_stays_at_rest() -> None:
+    """1.5 m too long: it sags far below its chord with a tension of 6 N."""
     robot = sl.load_robot("cogiro")
-    start = hung("cogiro", 0.0, 0.0, 2.0)
+    start = preset_at_rest("cogiro", 0.0, 0.0, 2.0)
     longer = start.unstrained_length.copy()
     longer[0] += 1.5
     state = sl.forward(robot, longer, start=start.pose).state
@@ -422,7 +426,7 @@ def test_a_cable_that_hangs_deep_is_a_chain_at_rest_too() -> None:
 
 
 @extended
-def test_a_plan_that_begins_in_motion_goes_on_at_its_speed() -> None:
+def test_a_plan_that_begins_in_motion_continues_at_its_speed() -> None:
     path = sl.quintic_path([(0, 0, 1.5), (1.5, 1.0, 2.5)], durations=(2.0,), rate=500.0)
     later = slice(300, None)
     rest = sl.Path(path.time[later], path.pose[later], path.twist[later], path.twist_rate[later])

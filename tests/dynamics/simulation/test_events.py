@@ -1,4 +1,4 @@
-"""What happens on the way: where the robot comes to rest afterwards, and what is told of it."""
+"""Events during a simulation: the following rest positions, and the reports."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from tests.tiers import wide
 PLACE = (0.4, 0.3, 1.5)
 
 
-def still(robot: sl.Robot | None = None) -> sl.Equilibrium:
+def state_at_rest(robot: sl.Robot | None = None) -> sl.Equilibrium:
     pose = sl.Pose.from_euler(PLACE, 0.0, 0.0, 0.0)
     return sl.inverse(robot or sl.load_robot("article-suspended"), pose, tension=LIFT).state
 
 
-def calmed(state: sl.Equilibrium, events: object) -> sl.Simulation:
-    """Twenty seconds with much damping."""
+def run_with_damping(state: sl.Equilibrium, events: object) -> sl.Simulation:
+    """Twenty seconds with strong damping."""
     damping = sl.Damping(loss_time=0.02, air_damping=2.0)
     return sl.simulate(state, duration=20.0, events=events, damping=damping)  # type: ignore[arg-type]
 
 
 def energy_of(state: sl.Equilibrium, i: int) -> float:
-    """Strain and height of one cable [J], its frame end at zero, by quadrature along it."""
+    """Strain and potential energy of one cable [J], zero at its frame end, by quadrature."""
     cables, robot = state.cables, state.one_robot
     length, axial = cables.unstrained_length[i], robot.cables.axial_stiffness[i]
     weight = robot.cables.linear_density[i] * robot.gravity
@@ -43,8 +43,8 @@ def energy_of(state: sl.Equilibrium, i: int) -> float:
 
 
 def test_after_a_break_the_robot_comes_to_rest_on_the_other_cables() -> None:
-    state = still()
-    run = calmed(state, sl.Break(cable=3, time=0.5))
+    state = state_at_rest()
+    run = run_with_damping(state, sl.Break(cable=3, time=0.5))
     kept = np.delete(np.arange(8), 3)
     robot = sl.without_cables(state.one_robot, 3)
     expected = sl.forward(robot, state.unstrained_length[kept], start=run.pose[-1])
@@ -53,7 +53,7 @@ def test_after_a_break_the_robot_comes_to_rest_on_the_other_cables() -> None:
     assert (run.tensions[run.time > 0.5, 3] == 0.0).all()
     assert np.isnan(run.length[run.time > 0.5, 3]).all()
     assert np.abs(run.energy.error).max() < 1e-6 * np.ptp(run.energy.kinetic)
-    assert (np.diff(run.energy.lost) >= 0.0).all()  # the cable that hangs below its anchor takes none of it
+    assert (np.diff(run.energy.lost) >= 0.0).all()  # the cable that is suspended at its anchor carries no load
     assert (run.energy.removed[run.time <= 0.5] == 0.0).all()
     assert run.energy.removed[-1] == pytest.approx(energy_of(state, 3), rel=1e-7)
     told = run.events[0]
@@ -64,8 +64,8 @@ def test_after_a_break_the_robot_comes_to_rest_on_the_other_cables() -> None:
 
 @pytest.mark.parametrize(("event", "mass"), [(sl.Drop(20.0, 0.5), -20.0), (sl.PickUp(15.0, 0.5), 15.0)])
 def test_after_a_load_is_dropped_or_picked_up_the_robot_rests_with_its_new_mass(event: sl.Drop, mass: float) -> None:
-    state = still()
-    run = calmed(state, event)
+    state = state_at_rest()
+    run = run_with_damping(state, event)
     robot = state.one_robot.replace(mass=state.one_robot.mass + mass)
     expected = sl.forward(robot, state.unstrained_length, start=state.pose)
     np.testing.assert_allclose(run.pose.position[-1], expected.pose.position, atol=1e-6)
@@ -93,7 +93,7 @@ def test_all_winches_brake_together_evenly() -> None:
 
 
 @pytest.mark.parametrize("winches", ["ideal", sl.SecondOrder(8.0)])
-def test_a_winch_that_stalls_stands_while_the_others_go_on(winches: sl.SecondOrder) -> None:
+def test_a_stalled_winch_stands_and_the_others_continue(winches: sl.SecondOrder) -> None:
     plan = moving()
     run = sl.simulate(plan, events=sl.Stall(2, 0.8), duration=4.0, winches=winches)
     after = run.time >= 0.8
@@ -102,13 +102,13 @@ def test_a_winch_that_stalls_stands_while_the_others_go_on(winches: sl.SecondOrd
     np.testing.assert_allclose(run.length[-1, others], plan.unstrained_length[-1, others], atol=1e-6)
 
 
-# peaks of another simulation of the prototype, with its winches: +13 and +8 N at 0.06 m/s, +63 and +39 N at 0.3 m/s
+# peaks of another simulation of the prototype with its winches: +13 and +8 N at 0.06 m/s, +63 and +39 N at 0.3 m/s
 @pytest.mark.parametrize(("speed", "locked", "braked"), wide([(0.3, 63.0, 39.0), (0.06, 13.0, 8.0)]))
-def test_stops_between_two_poses_of_the_prototype_raise_tensions_as_known(
+def test_stops_of_the_prototype_raise_tensions_as_in_another_simulation(
     speed: float, locked: float, braked: float
 ) -> None:
     ends = np.array([[0.0, 0.0, 1.5], [-0.13, 1.42, 0.68]])
-    duration = 2.1875 * float(np.linalg.norm(ends[1] - ends[0])) / speed  # of which 2.1875 is fastest in the middle
+    duration = 2.1875 * float(np.linalg.norm(ends[1] - ends[0])) / speed  # 2.1875 times the mean speed in the middle
     path = sl.septic_path(ends, durations=duration, rate=100.0)
     plan = sl.inverse(sl.load_robot("article-prototype"), path, tension=LIFT)
     middle = 0.5 * duration
@@ -121,9 +121,9 @@ def test_stops_between_two_poses_of_the_prototype_raise_tensions_as_known(
         assert peak == pytest.approx(expected, abs=1.2)
 
 
-def test_what_happens_twice_happens_in_order() -> None:
+def test_repeated_events_occur_in_order() -> None:
     events: list[Event] = [sl.Break(5, 1.5), sl.Drop(5.0, 0.7), sl.Brake(1.0), sl.Break(2, 0.7)]
-    run = sl.simulate(still(), events=events, duration=2.0)
+    run = sl.simulate(state_at_rest(), events=events, duration=2.0)
     assert [(told.kind, told.cable) for told in run.events if told.kind != "slack"] == [
         ("drop", None),
         ("break", 2),
@@ -147,15 +147,15 @@ def test_what_happens_twice_happens_in_order() -> None:
         ("break", ("events", "'break'")),
     ],
 )
-def test_events_that_cannot_be_are_refused(events: object, parts: tuple[str, ...]) -> None:
+def test_impossible_events_are_refused(events: object, parts: tuple[str, ...]) -> None:
     with refused(*parts, kind=sl.InvalidValueError):
-        sl.simulate(still(), events=events, duration=1.0)  # type: ignore[arg-type]
+        sl.simulate(state_at_rest(), events=events, duration=1.0)  # type: ignore[arg-type]
 
 
-def test_a_gust_pushes_the_platform_with_half_of_its_force_on_the_cables() -> None:
+def test_half_of_the_wind_force_on_cables_acts_on_the_platform() -> None:
     robot = sl.load_robot("article-suspended")
     robot = robot.replace(cables=robot.cables.replace(diameter=0.01))
-    state, wind = still(robot), np.array([0.0, 15.0, 0.0])
+    state, wind = state_at_rest(robot), np.array([0.0, 15.0, 0.0])
     run = sl.simulate(state, wind=wind, duration=1e-3, step=1e-3, record=1e-3)
     force = np.zeros(3)
     ends = np.asarray(PLACE) + robot.platform_anchors
@@ -165,10 +165,10 @@ def test_a_gust_pushes_the_platform_with_half_of_its_force_on_the_cables() -> No
         force += 0.5 * length * 0.5 * 1.2 * 1.2 * 0.01 * np.linalg.norm(across) * across
     np.testing.assert_allclose(run.twist[-1, :3] * robot.mass, force * 1e-3, atol=2e-7 * float(np.linalg.norm(force)))
     with refused("cables: diameter", "not given"):
-        sl.simulate(still(), wind=wind, duration=1.0)
+        sl.simulate(state_at_rest(), wind=wind, duration=1.0)
 
 
-def test_a_plan_without_an_answer_is_refused_by_its_first_sample() -> None:
+def test_a_plan_with_infeasible_samples_is_refused_with_the_first_one() -> None:
     robot = sl.load_robot("article-suspended")
     plan = sl.inverse(robot, sl.quintic_path([(0, 0, 1.5), (9, 0, 1.5)], durations=20.0, rate=10.0))
     first = int(np.argmin(plan.feasible))
@@ -192,13 +192,13 @@ def test_a_plan_without_an_answer_is_refused_by_its_first_sample() -> None:
         ({"record": 1e-5}, "record", "1e-05 s"),
     ],
 )
-def test_what_cannot_be_simulated_is_refused(given: dict[str, object], item: str, value: str) -> None:
+def test_impossible_simulations_are_refused(given: dict[str, object], item: str, value: str) -> None:
     arguments: dict[str, object] = {"duration": 1.0, **given}
     with refused(item, value, kind=sl.InvalidValueError):
-        sl.simulate(still(), **arguments)  # type: ignore[arg-type]
+        sl.simulate(state_at_rest(), **arguments)  # type: ignore[arg-type]
 
 
-def test_what_has_no_energy_is_refused() -> None:
+def test_models_without_energy_are_refused() -> None:
     robot, pose = sl.load_robot("article-suspended"), sl.Pose.from_euler(PLACE, 0.0, 0.0, 0.0)
     with refused("start: model", "Parabolic()", "Catenary() or Elastic()"):
         sl.simulate(sl.inverse(robot, pose, model=sl.Parabolic()).state, duration=1.0)
@@ -208,17 +208,17 @@ def test_what_has_no_energy_is_refused() -> None:
         sl.simulate(sl.inverse(rubbing, path, winding="path"))
 
 
-def test_energy_that_grows_by_itself_stops_the_run_and_names_time_and_cable(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_growing_energy_ends_the_run_with_time_and_cable(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sagline.dynamics.simulation.simulate.checked_step", lambda *_: 0.09)
-    state = still()
+    state = state_at_rest()
     with refused("step", next_step="Give step=0.018.", kind=sl.InvalidValueError) as caught:
         sl.simulate(state, wrench=np.array([50.0, 0, 0, 0, 0, 0]), duration=60.0, integrator="splitting")
     assert re.search(r"at 0\.\d+ s, .* cable \d", caught.value.value)
 
 
-def test_energy_that_fades_by_itself_stops_the_run_too() -> None:
+def test_vanishing_energy_ends_the_run() -> None:
     with refused("step", next_step="Give step=0.01.") as caught:
-        sl.simulate(still(), wrench=np.array([50.0, 0, 0, 0, 0, 0]), duration=60.0, step=0.05)
+        sl.simulate(state_at_rest(), wrench=np.array([50.0, 0, 0, 0, 0, 0]), duration=60.0, step=0.05)
     assert re.search(r"^0\.05 s, .* at \d+\.\d s, .* cable \d", caught.value.value)
 
 
@@ -233,7 +233,7 @@ def test_damping_is_that_of_the_linear_system() -> None:
 
 
 def linear(state: sl.Equilibrium, push: Array, times: Array) -> Array:
-    """Motions (N, 6) of the linear system that a small wrench sets in motion, cables damped along their chords."""
+    """Motions (N, 6) of the linear system after a small wrench, with damping along the chords of the cables."""
     from scipy.linalg import expm
 
     robot = state.one_robot

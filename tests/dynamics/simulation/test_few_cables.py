@@ -1,4 +1,4 @@
-"""Suspended robots with three to five cables: they hang, swing and, where they stand on their heads, fall."""
+"""Suspended robots with three to five cables: equilibrium, swing, and fall from an unstable equilibrium."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ STIFF = sl.Cable(linear_density=1e-5, axial_stiffness=2e7)
 def hung(
     cables: int, frame_radius: float = RADIUS, rope: sl.Cable = STIFF, high: float = -0.2, **fields: object
 ) -> sl.Robot:
-    """A platform under as many cables; with the frame as wide as the platform they are upright, all alike."""
+    """A platform under m cables; if the frame is as wide as the platform, the cables are vertical and equal."""
     angle = 2.0 * np.pi * np.arange(cables) / cables
     circle = np.stack((np.cos(angle), np.sin(angle), 0.0 * angle), axis=1)
     return sl.Robot(
@@ -40,18 +40,18 @@ def at_rest(robot: sl.Robot, wrench: np.ndarray | None = None) -> sl.Equilibrium
 
 
 @pytest.mark.parametrize("cables", [3, 4, 5])
-def test_parallel_cables_are_a_pendulum_to_and_fro_and_a_trifilar_one_about(cables: int) -> None:
-    """Sway sqrt(g/l) as of a point, since the platform stays level; turning sqrt(M g R^2/(I l)), which weighs I."""
+def test_parallel_cables_give_a_pendulum_and_a_trifilar_pendulum(cables: int) -> None:
+    """Sway sqrt(g/l) as for a point, because the platform stays level; rotation sqrt(M g R^2/(I l)), which gives I."""
     modes = sl.modes(at_rest(hung(cables)))
     sway = np.sqrt(9.81 / LENGTH) / (2.0 * np.pi)
     turn = np.sqrt(MASS * 9.81 * RADIUS**2 / (INERTIA[2, 2] * LENGTH)) / (2.0 * np.pi)
     np.testing.assert_allclose(np.sort(modes.frequency[:3]), np.sort([sway, sway, turn]), rtol=2e-5)
-    assert modes.frequency[3] > 30.0 * sway  # the others stretch the cables
+    assert modes.frequency[3] > 30.0 * sway  # the other motions stretch the cables
 
 
 @pytest.mark.parametrize("cables", [3, 5])
 def test_with_cable_mass_the_swing_is_that_of_heavy_ropes(cables: int) -> None:
-    """By Rayleigh's quotient of a straight rope of mass m a cable: (M + n m/2) g/(M + n m/3) for g."""
+    """Rayleigh's quotient of a straight rope of mass m per cable: (M + n m/2) g/(M + n m/3) in place of g."""
     rope = sl.Cable(linear_density=0.05, axial_stiffness=2e7)
     robot = hung(cables, rope=rope)
     modes = sl.vibration(at_rest(robot), up_to=2.0)
@@ -60,12 +60,12 @@ def test_with_cable_mass_the_swing_is_that_of_heavy_ropes(cables: int) -> None:
     expected = np.sqrt(9.81 / LENGTH * (MASS + ropes / 2.0) / (MASS + ropes / 3.0)) / (2.0 * np.pi)
     sways = modes.frequency[np.abs(modes.frequency - expected) < 1e-3]
     assert sways.size == 2
-    np.testing.assert_allclose(sways, expected, rtol=1e-4)  # the quotient is above, by the second order of m/M
+    np.testing.assert_allclose(sways, expected, rtol=1e-4)  # the quotient is larger by the second order of m/M
     assert (sways <= expected * (1.0 + 1e-6)).all()
 
 
 @pytest.mark.parametrize("angle", [0.02, 0.5])
-def test_the_free_swing_is_a_pendulums_however_wide(angle: float) -> None:
+def test_the_free_swing_is_that_of_a_pendulum_at_any_amplitude(angle: float) -> None:
     """Released from rest at an angle: the period is 4 sqrt(l/g) K(sin^2(angle/2))."""
     robot = hung(3)
     aside = np.array([MASS * 9.81 * np.tan(angle), 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -81,12 +81,12 @@ def test_the_free_swing_is_a_pendulums_however_wide(angle: float) -> None:
 
 
 def test_a_zv_of_the_swing_stops_a_crane() -> None:
-    """Three cables change their lengths; those of a quintic leave a swing, those of a shaped one next to none."""
+    """Three cables change their lengths; a quintic profile leaves a swing, a shaped one almost none."""
     robot = hung(3, frame_radius=3.0, rope=sl.Cable(0.02, 2e5))
     first, last = np.array([4.0, 4.0, 4.0]), np.array([3.6, 4.1, 4.1])
     goal = sl.forward(robot, last)
     swing = sl.modes(goal.state).frequency[:2]
-    share = sl.quintic_path([(0, 0, 0), (1, 0, 0)], durations=0.8, rate=1000.0)  # how much of the change is done
+    share = sl.quintic_path([(0, 0, 0), (1, 0, 0)], durations=0.8, rate=1000.0)  # share of the change
     left = []
     for path in (share, sl.shaped(share, sl.ZV(swing))):
         lengths = first + path.pose.position[:, :1] * (last - first)
@@ -100,10 +100,10 @@ def test_a_zv_of_the_swing_stops_a_crane() -> None:
 
 
 @pytest.mark.parametrize("cables", [3, 4])
-def test_one_that_stands_on_its_head_falls_the_way_that_is_told(cables: int) -> None:
+def test_an_unstable_platform_falls_in_the_reported_direction(cables: int) -> None:
     robot = hung(cables, frame_radius=3.0, rope=sl.Cable(0.02, 2e5), high=1.5)
     lengths = np.full(cables, 4.0)
-    # the height at which it stands, by symmetry: balance along z alone
+    # height of the upright position, by symmetry: balance along z only
     one = sl.Catenary()
 
     def lift(z: float) -> float:
@@ -130,11 +130,11 @@ def test_one_that_stands_on_its_head_falls_the_way_that_is_told(cables: int) -> 
     motion = np.append(moved, run.pose.rotation[k].as_rotvec())
     aside = motion - ways @ np.linalg.lstsq(ways, motion, rcond=None)[0]
     assert np.linalg.norm(aside) < 0.02 * np.linalg.norm(motion)
-    assert tilt.max() > 1.0  # and goes on
+    assert tilt.max() > 1.0  # and continues
     lower = sl.equilibria(robot, lengths, starts=60).solutions
     assert (lower.pose.position @ [0, 0, 1] + lower.pose.matrix[:, 2, 2] * 1.5 < z + 1.5 - 0.5).all()
 
 
-def test_a_margin_needs_as_many_cables_as_freedoms() -> None:
+def test_a_margin_requires_as_many_cables_as_degrees_of_freedom() -> None:
     with refused("hung-3: number of cables", "3", ">= 6 for 3R3T"):
         sl.margin(hung(3), sl.Pose.from_euler((0.0, 0.0, 1.0), 0.0, 0.0, 0.0))

@@ -1,4 +1,4 @@
-"""What damping takes out of cables: as cables with mass lose it, and as the tensions that are told of say."""
+"""Damping of cables: losses compared with cables with mass, and with the recorded tensions."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ PULLEY, DEAD = sl.Winch(0.05), sl.Winch(dead_cable=3.0)
 
 @extended
 @pytest.mark.parametrize("behind", [None, PULLEY, DEAD, sl.Winch(0.05, dead_cable=3.0)])
-def test_cables_without_mass_lose_what_light_ones_with_mass_lose_while_they_are_wound_in(behind: sl.Winch) -> None:
+def test_losses_of_massless_cables_agree_with_light_ones_during_winding(behind: sl.Winch) -> None:
     robot = sl.load_robot("article-suspended")
-    rope = robot.cables.replace(linear_density=0.1 * robot.cables.linear_density)  # heavy ones lose more in waves
+    rope = robot.cables.replace(linear_density=0.1 * robot.cables.linear_density)  # heavy cables lose more in waves
     robot = robot.replace(winches=behind, cables=rope)
     path = sl.septic_path([(0, 0, 1.0), (0, 0, 2.5)], durations=1.5, rate=500.0)
     plan = sl.inverse(robot, path, tension=LIFT)
@@ -32,7 +32,7 @@ def test_cables_without_mass_lose_what_light_ones_with_mass_lose_while_they_are_
 
 
 @pytest.mark.parametrize("integrator", ["splitting", "runge-kutta"])
-def test_tensions_are_those_that_move_the_platform_damping_included(
+def test_recorded_tensions_include_damping(
     integrator: Integrator,
 ) -> None:
     robot, step = sl.load_robot("article-suspended"), 1e-4

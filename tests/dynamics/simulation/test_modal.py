@@ -1,4 +1,4 @@
-"""Small motions by modes: each against its closed form, and robots against lumped cables of many nodes."""
+"""Small motions by modes, each compared with its closed form, and robots compared with lumped cables."""
 
 from functools import cache
 from itertools import pairwise
@@ -24,14 +24,14 @@ GUST = ([0, 0.02, 0.1, 0.2, 0.21], np.outer([0, 1, 1, 1, 0], [3.0, 2.0, -3.0, 1.
 
 
 def wound() -> tuple[list[float], list[Array]]:
-    """A millimeter of one cable is let out and half of one of another wound in, and back."""
+    """Wind out a millimeter of one cable and wind in half of one of another, and back."""
     back, there = state().unstrained_length, state().unstrained_length.copy()
     there[[0, 3]] += [1e-3, -0.5e-3]
     return [0.0, 0.2, 0.4, 0.6], [back, there, there, back]
 
 
 def test_modes_under_straight_forces_are_exact() -> None:
-    """Against an integrator of high order; and the energy is work less loss."""
+    """Compared with an integrator of high order; energy is work minus loss."""
     rng = np.random.default_rng(1)
     frequency, ratio, step = rng.uniform(1, 20, 3), np.array([0.0, 0.02, 0.7]), 0.01
     force = rng.normal(size=(101, 3))
@@ -43,7 +43,7 @@ def test_modes_under_straight_forces_are_exact() -> None:
         return np.concatenate((y[3:], push - 2 * ratio * frequency * y[3:] - frequency**2 * y[:3]))
 
     exact = np.zeros(6)
-    for span in pairwise(time):  # from corner to corner of the force: none spoils the order
+    for span in pairwise(time):  # from corner to corner of the force, to keep the order
         exact = solve_ivp(rates, span, exact, "DOP853", rtol=1e-12, atol=1e-14).y[:, -1]
     assert found.amplitude[-1] == pytest.approx(exact[:3], abs=1e-12)
     assert found.rate[-1] == pytest.approx(exact[3:], abs=1e-11)
@@ -56,8 +56,8 @@ def test_modes_under_straight_forces_are_exact() -> None:
 
 @extended
 @pytest.mark.parametrize(("what", "off"), [("wrench", 2e-3), ("unstrained_length", 1e-2)])
-def test_small_motions_are_those_of_lumped_cables(what: str, off: float) -> None:
-    """Platform, cables and energy against 40 nodes a cable; massless cables are ten times further off, and more."""
+def test_small_motions_agree_with_lumped_cables(what: str, off: float) -> None:
+    """Platform, cables and energy compared with 40 nodes per cable; massless cables differ at least ten times more."""
     given: dict[str, Any] = {what: GUST if what == "wrench" else wound(), "duration": 1.0}
     run = sl.simulate(state(), cable_mass="modal", **given)
     lumped = sl.simulate(state(), cable_mass="lumped", nodes=40, **given)
@@ -78,8 +78,8 @@ def test_small_motions_are_those_of_lumped_cables(what: str, off: float) -> None
         assert run.tensions == pytest.approx(lumped.tensions, abs=0.01 * pulled)
 
 
-def test_what_modes_leave_to_rest_is_little() -> None:
-    """By Betti's theorem a cable let out drives the modes; at rest they sum to the exact sensitivity of the pose."""
+def test_the_residual_of_omitted_modes_is_small() -> None:
+    """By Betti's theorem a length change excites the modes; at rest their sum is the exact sensitivity of the pose."""
     answer, rest = modal_model(state(), sl.Damping()), sl.stiffness(state())
     m = state().robot.cable_count  # type: ignore[union-attr]
     assert np.abs(answer.motion[:, :m]).max() < 0.02 * np.abs(rest.length_sensitivity).max()
@@ -87,7 +87,7 @@ def test_what_modes_leave_to_rest_is_little() -> None:
 
 
 def test_tensions_of_a_mode_are_its_dynamic_stiffness_less_the_inertia_of_the_cable() -> None:
-    """From the platform end, by the exact dynamic stiffness, the force changes by rho omega^2 times the shape."""
+    """The exact dynamic stiffness changes the force at the platform end by rho omega^2 times the shape."""
     answer, cables = modal_model(state(), sl.Damping()), state().cables
     frequency, shape = answer.found.frequency[:6], answer.found.cable_shape[:6]
     exact = sl.dynamic_stiffness(state(), frequency).real
@@ -103,7 +103,7 @@ def test_tensions_of_a_mode_are_its_dynamic_stiffness_less_the_inertia_of_the_ca
     assert off.max() < 2e-6
 
 
-def test_damped_modes_come_to_the_rest_of_a_given_wrench() -> None:
+def test_damped_modes_come_to_the_equilibrium_with_a_wrench() -> None:
     push = np.array([0.0, 0.0, -3.0, 0.0, 0.0, 0.0])
     damping = sl.Damping(modal_damping=0.3)
     wrench = ([0.0, 0.1], [np.zeros(6), push])
@@ -125,7 +125,7 @@ def test_damped_modes_come_to_the_rest_of_a_given_wrench() -> None:
         ({"damping": sl.Damping(air_damping=50.0)}, "damping", "a ratio of 1.24 at 2.01 Hz with cable mass"),
     ],
 )
-def test_what_modes_do_not_know_is_refused(given: dict[str, Any], item: str, value: str) -> None:
+def test_unsupported_options_are_refused(given: dict[str, Any], item: str, value: str) -> None:
     with refused(item, value) as caught:
         sl.simulate(state(), **{"cable_mass": "modal", "duration": 0.5, **given})
     assert len(str(caught.value)) < 300

@@ -1,4 +1,4 @@
-"""A simulation that is looked at on its way is the same as one that is not, to the last bit."""
+"""A simulation that is read during its run is equal to one that is not, to the last bit."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def state() -> sl.Equilibrium:
         first=3,
     ),
 )
-def test_in_parts_it_is_what_it_is_at_once(elements: int, told: dict[str, Any]) -> None:
+def test_a_run_in_parts_agrees_with_one_run(elements: int, told: dict[str, Any]) -> None:
     mass: dict[str, Any] = {"cable_mass": "lumped", "nodes": elements} if elements else {}
     start, gust = state(), ([0.0, 0.05, 0.1], np.outer([0.0, 1.0, 0.0], [300.0, 0.0, 0.0, 0.0, 0.0, 10.0]))
     at_once = sl.simulate(start, duration=0.405, wrench=gust, **mass, **told)
@@ -61,7 +61,7 @@ def test_in_parts_it_is_what_it_is_at_once(elements: int, told: dict[str, Any]) 
     assert (found.integrator, found.damping, found.step) == (at_once.integrator, at_once.damping, at_once.step)
 
 
-def test_what_has_been_told_stays_as_it_was_told() -> None:
+def test_returned_results_do_not_change_later() -> None:
     run = started_run(initial_conditions(state(), None, None, 0.4), events=EVENTS[:1])
     early = run.until(0.1)
     copied = early.tensions.copy(), early.pose.position.copy(), early.largest_tension

@@ -1,4 +1,4 @@
-"""Motion in time against another integration, MuJoCo, balances of energy, and what was planned."""
+"""Motion in time compared with another integration, MuJoCo, energy balances, and plans."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SHIFT = np.array([0.004, -0.003, 0.0033])  # m; 6 mm
 GUST = ([0.0, 0.003, 0.03], np.outer([0, 1, 1], [3.0, 2.0, -3.0, 1.0, 0.8, 0.5]))
 
 
-def away_from(expected: Array, run: sl.Simulation) -> float:
+def largest_distance(expected: Array, run: sl.Simulation) -> float:
     """Largest distance of positions and of quaternions, m and about half a rad."""
     same = np.sign(np.sum(expected[:, 3:] * run.pose.quaternion, axis=1))[:, None]
     place = np.abs(run.pose.position - expected[:, :3]).max()
@@ -29,12 +29,12 @@ def away_from(expected: Array, run: sl.Simulation) -> float:
 
 
 @pytest.mark.parametrize(("integrator", "order"), [("splitting", 2), ("runge-kutta", 4)])
-def test_it_goes_where_another_integration_goes_with_the_order_of_the_method(integrator: Code, order: int) -> None:
+def test_motion_converges_to_another_integration_with_the_order_of_the_method(integrator: Code, order: int) -> None:
     robot, step = lopsided("article-suspended"), 0.008 if integrator == "runge-kutta" else 0.004
     state, lengths = beside(robot, (0.5, 0.3, 1.5), 10.0 * SHIFT)
     expected = integrated(robot, sl.Catenary(), state.pose, lengths, np.linspace(0.0, 0.64, 21))
     errors = [
-        away_from(expected, sl.simulate(state, unstrained_length=lengths, duration=0.64, step=h, record=0.032,
+        largest_distance(expected, sl.simulate(state, unstrained_length=lengths, duration=0.64, step=h, record=0.032,
                                         integrator=integrator))
         for h in (step, 0.5 * step, 0.25 * step)
     ]  # fmt: skip
@@ -70,14 +70,14 @@ def test_a_robot_at_rest_stays_there(integrator: Code) -> None:
         lopsided("article-suspended"), sl.Pose.from_euler([0.5, 0.3, 1.5], 0.1, 0, 0), tension=LIFT
     ).state
     run = sl.simulate(state, duration=10.0, integrator=integrator)
-    walk = np.sqrt(10.0 / run.step) * np.spacing(1.5)  # m: of places that are rounded in every step
+    walk = np.sqrt(10.0 / run.step) * np.spacing(1.5)  # m, due to rounding of positions in each step
     assert np.abs(run.pose.position - state.pose.position).max() < 5.0 * walk
     assert np.abs(run.twist).max() < 1e-11
 
 
 @pytest.mark.parametrize(
     ("away", "least"), wide([(0.03, 10.0), (0.006, 40.0)])
-)  # the latter slackens cables again and again
+)  # in the last one cables become slack repeatedly
 @pytest.mark.parametrize(("integrator", "most"), [("splitting", 5e-5), ("runge-kutta", 1e-4)])
 def test_energy_has_no_trend_in_a_minute(integrator: Code, most: float, away: float, least: float) -> None:
     state, lengths = beside(sl.load_robot("cogiro"), (0.0, 0.0, 2.0), np.array([away, 0.0, 0.0]))
@@ -88,7 +88,7 @@ def test_energy_has_no_trend_in_a_minute(integrator: Code, most: float, away: fl
     assert abs(trend) < most
 
 
-def test_the_work_of_moving_winches_is_that_of_h_and_not_of_the_tension() -> None:
+def test_the_work_of_winches_is_that_of_h() -> None:
     robot = sl.load_robot("article-suspended")
     path = sl.septic_path([(0, 0, 1), (0.3, 0.2, 2), (0, 0, 1)], durations=[1.0, 1.0], rate=1000.0)
     run = sl.simulate(sl.inverse(robot, path, tension=LIFT), record=1e-3)
@@ -110,7 +110,7 @@ def test_the_work_of_moving_winches_is_that_of_h_and_not_of_the_tension() -> Non
 @pytest.mark.parametrize(
     ("place", "goal", "static"), [((0, 0, 1.5), (3, 0, 1.5), 5.95), ((-1.5, 0, 1.5), (1.5, 0, 1.5), 2.82)]
 )
-def test_planned_lengths_leave_no_vibration_where_static_ones_do(place: Array, goal: Array, static: float) -> None:
+def test_planned_lengths_leave_less_vibration_than_static_ones(place: Array, goal: Array, static: float) -> None:
     robot = sl.load_robot("article-suspended")
     path = sl.quintic_path([place, goal], durations=2.0, rate=1000.0)
     run = sl.simulate(sl.inverse(robot, path, tension=LIFT), duration=6.0)
@@ -126,7 +126,7 @@ def test_planned_lengths_leave_no_vibration_where_static_ones_do(place: Array, g
 
 
 @extended
-def test_over_pulleys_and_dead_cable_a_plan_is_followed_and_its_energy_kept() -> None:
+def test_with_pulleys_and_dead_length_a_plan_is_followed_and_energy_is_balanced() -> None:
     robot = sl.load_robot("article-suspended").replace(winches=sl.Winch(0.05, dead_cable=3.0, dead_rise=2.5))
     path = sl.septic_path([(0, 0, 1.5), (1, 0.5, 1.8)], durations=1.5, rate=1000.0)
     plan = sl.inverse(robot, path, tension=LIFT)
@@ -137,7 +137,7 @@ def test_over_pulleys_and_dead_cable_a_plan_is_followed_and_its_energy_kept() ->
     np.testing.assert_allclose(run.tensions[0], plan.state.cables.frame_end_tension[0], rtol=1e-9)
 
 
-def test_the_wrench_that_a_plan_was_made_for_acts_and_another_takes_its_place() -> None:
+def test_the_wrench_of_a_plan_acts_unless_another_is_given() -> None:
     robot = sl.load_robot("article-suspended")
     path = sl.septic_path([(0, 0, 1.5), (0.6, 0.3, 1.7)], durations=1.0, rate=1000.0)
     load = np.outer(1.0 + path.time, [3.0, -5.0, -40.0, 1.0, 2.0, 0.5])
@@ -158,7 +158,7 @@ ENDS = {"3T": np.zeros((3, 3)), "1R2T": [[-0.2, 0, 0.1], [0.2, 0, 0.1], [0.0, 0.
 
 
 @pytest.mark.parametrize("pattern", ["3T", "1R2T", "2T"])
-def test_platforms_of_fewer_motions_keep_to_them(pattern: Literal["3T", "1R2T", "2T"]) -> None:
+def test_platforms_with_fewer_degrees_of_freedom_stay_within_them(pattern: Literal["3T", "1R2T", "2T"]) -> None:
     normal, rope = None if pattern == "3T" else (0.0, 1.0, 0.0), sl.Cable(0.05, 5e4)
     few = {"inertia": np.diag([0.3, 0.2, 0.3]), "motion_pattern": pattern, "plane_normal": normal}
     robot = sl.Robot("few", FRAMES[pattern], ENDS[pattern], rope, 10.0, **few)  # type: ignore[arg-type]
@@ -173,7 +173,7 @@ def test_platforms_of_fewer_motions_keep_to_them(pattern: Literal["3T", "1R2T", 
 @pytest.mark.parametrize("cable_mass", wide(["none", "modal", "lumped"], first=2))
 @pytest.mark.parametrize(("duration", "last"), [(0.005, [0.0, 0.005]), (0.0234, [0.01, 0.02, 0.0234])])
 def test_the_end_is_always_recorded(cable_mass: Literal["none", "lumped", "modal"], duration: float, last: Any) -> None:
-    """At the first step that is not earlier; the last sample is that of a run that records every step."""
+    """At the first step that is not earlier; the last sample agrees with a run that records every step."""
     state = sl.inverse(sl.load_robot("expo2015-lucia"), sl.Pose([-0.6, 0.0, 3.5], np.eye(3))).state
     given: dict[str, Any] = {"wrench": GUST, "cable_mass": cable_mass, "nodes": 6, "step": 1e-4}
     run = sl.simulate(state, duration=duration, **given)
@@ -187,8 +187,8 @@ def test_the_end_is_always_recorded(cable_mass: Literal["none", "lumped", "modal
 
 
 @pytest.mark.parametrize("cable_mass", wide(["none", "modal", "lumped"], first=2))
-def test_twists_are_of_the_origin_as_those_of_paths(cable_mass: Literal["none", "lumped", "modal"]) -> None:
-    """Against differences of the poses, of a platform that turns about a center of mass that is elsewhere."""
+def test_twists_refer_to_the_origin_as_in_paths(cable_mass: Literal["none", "lumped", "modal"]) -> None:
+    """Compared with differences of the poses, for a platform that rotates about a distant center of mass."""
     robot = sl.load_robot("expo2015-lucia").replace(center_of_mass=[0.05, -0.1, 0.2])
     state = sl.inverse(robot, sl.Pose([-0.6, 0.0, 3.5], np.eye(3))).state
     turning = (np.array([0.0, 0.1, 0.2, 0.3]), np.outer([0, 1, -1, 0], [3.0, 2.0, -3.0, 5.0, 4.0, 3.0]))
@@ -212,7 +212,7 @@ def test_a_run_has_the_twists_of_its_path() -> None:
     assert np.abs(np.cross(path.twist[:, 3:], robot.center_of_mass)).max() > 1e-3
 
 
-def test_a_robot_at_a_pose_and_a_plan_of_one_pose_are_starts_at_rest() -> None:
+def test_robots_at_a_pose_and_plans_of_one_pose_start_at_rest() -> None:
     robot, here, push = sl.load_robot("article-suspended"), (1.0, 1.0, 1.5), [0, 0, 50.0, 0, 0, 0]
     plan = sl.inverse(robot, here)
     expected = sl.simulate(plan.state, duration=0.3, wrench=push).pose.position

@@ -1,4 +1,4 @@
-"""The machine behind a controller: the same bits as `simulate`, nothing allocated, sensors."""
+"""The simulated machine of a controller: equal to `simulate`, without allocation, with sensors."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PLACE = sl.Pose.from_euler([0.1, 0.05, 1.0], 0.0, 0.0, 0.0)
 
 @pytest.mark.parametrize("winches", ["ideal", "robot", sl.SecondOrder(10.0)])
 @pytest.mark.parametrize("pulleys", wide([False, True]))
-def test_it_goes_where_simulate_goes_to_the_last_bit(winches: sl.SecondOrder, pulleys: bool) -> None:
+def test_motion_is_equal_to_simulate_to_the_last_bit(winches: sl.SecondOrder, pulleys: bool) -> None:
     robot = prototype(pulley_radius=0.03, dead_cable=1.0) if pulleys else prototype()
     robot = robot.replace(center_of_mass=[0.02, -0.03, 0.05])
     state, damping = sl.inverse(robot, PLACE).state, sl.Damping(1e-3, 0.1)
@@ -55,7 +55,7 @@ def test_steps_allocate_nothing() -> None:
     assert after - before < 2000
 
 
-def test_at_rest_sensors_read_what_there_is() -> None:
+def test_sensors_at_rest_read_true_values() -> None:
     robot = prototype()
     state = sl.inverse(robot, PLACE).state
     machine = sl.Simulator(robot, state, seed=4)
@@ -67,7 +67,7 @@ def test_at_rest_sensors_read_what_there_is() -> None:
     assert np.abs(machine.reading.position - PLACE.position).max() < 1e-14
 
 
-def test_one_seed_has_one_noise_and_another_another() -> None:
+def test_noise_depends_on_the_seed() -> None:
     robot, short = prototype(), prototype(load_cell_range=125.0)
     length = sl.inverse(robot, PLACE).unstrained_length
     first, same, other = (sl.Simulator(robot, PLACE, seed=seed).step(length, 0.01).load_cell for seed in (1, 1, 2))
@@ -103,7 +103,7 @@ def test_held_drums_stand_until_they_are_released() -> None:
         machine.hold(8)
 
 
-def test_another_machine_than_the_planned_one_does_not_rest_there() -> None:
+def test_a_machine_with_other_parameters_does_not_rest_there() -> None:
     robot = prototype()
     state = sl.inverse(robot, PLACE).state
     machine = sl.Simulator(robot.replace(mass=1.1 * robot.mass), state)
@@ -112,8 +112,8 @@ def test_another_machine_than_the_planned_one_does_not_rest_there() -> None:
     assert reading.position[2] < PLACE.position[2] - 1e-3
 
 
-def test_an_ideal_winch_that_is_released_sets_off_from_where_it_stood() -> None:
-    """It goes as one that was asked to stand still instead, and to the set points of that period straight."""
+def test_a_released_ideal_winch_starts_from_its_position() -> None:
+    """It moves as after a set point at rest, linearly to the set points of the period."""
     state = sl.inverse(prototype(), PLACE).state
     machine, twin = (sl.Simulator(prototype(), state, winches="ideal") for _ in range(2))
     length = state.unstrained_length
@@ -130,7 +130,7 @@ def test_an_ideal_winch_that_is_released_sets_off_from_where_it_stood() -> None:
             np.testing.assert_allclose(mine, theirs, rtol=1e-9, atol=1e-9)
 
 
-def test_a_reading_does_not_let_the_robot_be_changed() -> None:
+def test_readings_are_copies() -> None:
     machine = sl.Simulator(prototype(), PLACE)
     for array in machine.reading:
         assert array is not None
@@ -140,8 +140,8 @@ def test_a_reading_does_not_let_the_robot_be_changed() -> None:
 
 @pytest.mark.parametrize("dead_cable", wide([0.0, 1.0]))
 @pytest.mark.parametrize("winches", ["ideal", "robot"])
-def test_what_a_period_cannot_be_is_refused_and_changes_nothing(winches: Any, dead_cable: float) -> None:
-    """After every refusal it goes on as its twin does, which was not asked."""
+def test_invalid_periods_are_refused_without_effect(winches: Any, dead_cable: float) -> None:
+    """After each refusal it continues like a second machine without the refused call."""
     robot = prototype(dead_cable=dead_cable)
     machine, twin = (sl.Simulator(robot, PLACE, winches=winches) for _ in range(2))
     length, down, tension = machine.reading.length.copy(), np.array([0, 0, -20.0, 0, 0, 0]), np.full(8, 50.0)
@@ -180,13 +180,13 @@ def test_what_a_period_cannot_be_is_refused_and_changes_nothing(winches: Any, de
     assert machine.time == pytest.approx(0.01 * refusals)
 
 
-def test_a_start_is_of_this_robot() -> None:
+def test_a_start_of_another_robot_is_refused() -> None:
     with refused("start", "of 8 cables", "7, as article-prototype has"):
         sl.Simulator(sl.without_cables(prototype(), 3), sl.inverse(prototype(), PLACE).state)
 
 
 @pytest.mark.parametrize("winches", ["ideal", "robot"])
-def test_a_cable_is_cut_as_simulate_breaks_one(winches: str) -> None:
+def test_a_cut_agrees_with_a_break_of_simulate(winches: str) -> None:
     state = sl.inverse(prototype(), PLACE).state
     machine = sl.Simulator(prototype(), state, winches=winches, step=1e-3)  # type: ignore[arg-type]
     run = sl.simulate(state, duration=0.6, step=1e-3, winches=winches, events=sl.Break(4, 0.2))  # type: ignore[arg-type]
@@ -200,8 +200,8 @@ def test_a_cable_is_cut_as_simulate_breaks_one(winches: str) -> None:
     assert np.linalg.norm(reading.position - PLACE.position) > 0.02
 
 
-def test_a_drive_that_gives_less() -> None:
-    """It holds what its friction holds, then lets the cable go; the reading tells that it is at its limit."""
+def test_a_drive_with_less_force() -> None:
+    """It holds up to its friction, then releases the cable; the reading says that it is at its limit."""
     robot = prototype(load_cell_deviation=0.0, load_cell_bias=0.0, load_cell_gain=1.0)
     state = sl.inverse(robot, PLACE).state
     machine, pull = sl.Simulator(robot, state), state.cables.frame_end_tension[2]
@@ -220,7 +220,7 @@ def test_a_drive_that_gives_less() -> None:
 
 
 def test_the_integral_does_not_grow_while_a_drive_is_at_its_limit() -> None:
-    """A drive that lacked force for 0.3 s comes back to its set point without overshoot."""
+    """A drive without enough force for 0.3 s returns to its set point without overshoot."""
     robot = prototype()
     state = sl.inverse(robot, PLACE).state
     machine, target = sl.Simulator(robot, state), state.unstrained_length
@@ -232,8 +232,8 @@ def test_the_integral_does_not_grow_while_a_drive_is_at_its_limit() -> None:
     assert left[-1] < 1e-3
 
 
-def test_set_points_that_jump_are_come_after_with_the_gain_of_the_loop() -> None:
-    """20 /s: what is left of a jump falls by e in 50 ms; asked for straight, it would be there in a period."""
+def test_jumps_of_set_points_are_followed_with_the_gain_of_the_loop() -> None:
+    """20 /s: the remainder of a jump falls by e in 50 ms; with linear set points it would be reached in a period."""
     robot = prototype(friction=0.0)
     state = sl.inverse(robot, PLACE).state
     machine = sl.Simulator(robot, state)
@@ -244,7 +244,7 @@ def test_set_points_that_jump_are_come_after_with_the_gain_of_the_loop() -> None
     assert left[9] / left[4] == pytest.approx(np.exp(-1.0), rel=0.1)
 
 
-def test_drums_that_are_released_begin_where_they_stood_with_an_empty_integral() -> None:
+def test_released_drums_start_from_their_position_with_zero_integral() -> None:
     robot = prototype()
     state = sl.inverse(robot, PLACE).state
     machine, twin = sl.Simulator(robot, state), sl.Simulator(robot, state)

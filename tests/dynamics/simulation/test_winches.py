@@ -1,4 +1,4 @@
-"""Winches in time: lags, loops, limits, stiction, and the energy of what lies on the drums."""
+"""Winches in time: lags, loops, limits, stiction, and the energy of wound cable."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def lift(robot: sl.Robot, duration: float, height: float = 0.4) -> sl.Plan:
     return sl.inverse(robot, path, tension=LIFT)
 
 
-def test_a_lagging_winch_is_late_by_twice_its_damping_ratio_over_its_frequency() -> None:
+def test_the_delay_of_a_lagging_winch_is_twice_damping_ratio_over_frequency() -> None:
     state = lift(sl.load_robot("article-prototype"), 1.0).state[0]
     rate, times = np.linspace(-0.02, 0.02, 8), np.array([0.0, 4.0])
     lengths = state.unstrained_length + np.outer(times, rate)
@@ -36,7 +36,7 @@ def test_a_lagging_winch_is_late_by_twice_its_damping_ratio_over_its_frequency()
 
 
 @pytest.mark.parametrize("integrator", ["splitting", "runge-kutta"])
-def test_a_lagging_winch_answers_a_step_as_its_transfer_function_says(
+def test_the_step_response_of_a_lagging_winch_is_that_of_its_transfer_function(
     integrator: Integrator,
 ) -> None:
     state = lift(sl.load_robot("article-prototype"), 1.0).state[0]
@@ -60,7 +60,7 @@ def test_a_slow_plan_is_followed_within_its_limits_and_ends_where_it_should() ->
     assert np.abs(run.energy.error).max() < 1e-4 * np.abs(run.energy.supplied).max()
 
 
-def test_a_plan_beyond_the_limits_runs_and_tells_which_winch_saturates_and_when() -> None:
+def test_a_plan_beyond_the_limits_runs_and_reports_saturated_winches() -> None:
     plan = lift(prototype(speed_limit=60.0), 1.0)
     rates = sl.winch_rates(plan)
     assert rates.too_fast is not None
@@ -75,7 +75,7 @@ def test_a_plan_beyond_the_limits_runs_and_tells_which_winch_saturates_and_when(
         assert told[winch] == pytest.approx(first, abs=0.05)
 
 
-def test_friction_holds_a_drum_that_nothing_but_little_moves() -> None:
+def test_friction_holds_a_drum_under_small_forces() -> None:
     robot = prototype(position_gain=0.0, speed_gain=0.0, integral_gain=0.0)
     state = lift(robot, 1.0).state[0]
     small, large = np.array([0, 0, 20.0, 0, 0, 0]), np.array([0, 0, 300.0, 0, 0, 0])
@@ -87,7 +87,7 @@ def test_friction_holds_a_drum_that_nothing_but_little_moves() -> None:
 
 
 @pytest.mark.parametrize("winding", ["constant", "remembered"])
-def test_what_winches_do_is_where_the_energy_is(winding: Winding) -> None:
+def test_the_work_of_winches_is_in_the_energy(winding: Winding) -> None:
     plan = lift(prototype(winding_tension=100.0), 3.0)
     coarse, fine = (
         np.abs(sl.simulate(plan, winches="robot", winding=winding, step=step, duration=4.0).energy.error).max()
@@ -99,28 +99,28 @@ def test_what_winches_do_is_where_the_energy_is(winding: Winding) -> None:
     assert fine < 0.3 * coarse
 
 
-def test_a_drum_that_remembers_gives_back_the_cable_that_it_took() -> None:
+def test_remembered_winding_returns_the_wound_cable() -> None:
     path = sl.septic_path([(0, 0, 0.8), (0.2, 0.1, 1.3), (0, 0, 0.8)], durations=[4.0, 4.0], rate=500.0)
     robot = prototype(friction=0.0)
     plan = sl.inverse(robot, path, tension=LIFT)
     run = sl.simulate(plan, winches="robot", winding="remembered", duration=10.0)
     middle = np.abs(run.length[400] - plan.unstrained_length[2000]).max()
-    assert middle > 1e-3  # wound under tension, less unstrained cable lies on the drum than a constant 0 N would have
+    assert middle > 1e-3  # wound under tension, the drum has less unstrained cable than at a constant 0 N
     assert np.abs(run.length[-1] - plan.unstrained_length[-1]).max() < 0.05 * middle
     assert run.energy.lost[-1] >= 0.0
 
 
-def test_gains_that_a_millisecond_cannot_close_are_refused() -> None:
+def test_gains_that_are_unstable_at_a_millisecond_are_refused() -> None:
     with refused("winches: speed_gain[0]", "50000 N s/m") as caught:
         sl.simulate(lift(prototype(speed_gain=5e4), 1.0), winches="robot")
-    assert caught.value.allowed.startswith("< 2.567e+04 N s/m")  # two inertias of 12.84 kg a period
+    assert caught.value.allowed.startswith("< 2.567e+04 N s/m")  # two inertias of 12.84 kg per period
     with refused("integrator"):
         sl.simulate(lift(prototype(), 1.0), winches="robot", integrator="runge-kutta")
     with refused("step", "0.0003 s", "0.001 s divided by a whole number"):
         sl.simulate(lift(prototype(), 1.0), winches="robot", step=3e-4)
 
 
-def test_a_drum_that_remembers_keeps_length_and_energy_of_what_lies_on_it() -> None:
+def test_remembered_winding_conserves_length_and_energy() -> None:
     robot = prototype(winding_tension=30.0)
     state = lift(robot, 1.0).state[0]
     machine = sl.Simulator(robot, state, winding="remembered")
@@ -128,7 +128,7 @@ def test_a_drum_that_remembers_keeps_length_and_energy_of_what_lies_on_it() -> N
     stiffness, begins = robot.cables.axial_stiffness, BIN * np.arange(plant.layers.shape[1])
 
     def on_drums() -> tuple[Array, float]:
-        """Unstrained lengths there [m], (m,), and all strain energy [J]; the last bin left out."""
+        """Unstrained lengths on drums [m], (m,), and their total strain energy [J]; the last bin is excluded."""
         there = np.clip(begins + BIN - plant.now[d.WOUND][:, None], 0.0, BIN)[:, :-1]
         lengths, strains = there / (1.0 + plant.layers[:, :-1]), plant.layers[:, :-1]
         return lengths.sum(axis=1), float((0.5 * stiffness[:, None] * strains**2 * lengths).sum())
@@ -145,7 +145,7 @@ def test_a_drum_that_remembers_keeps_length_and_energy_of_what_lies_on_it() -> N
     assert abs(plant.audit[d.ON_DRUMS]) > 1e-3
 
 
-def test_cable_that_leaves_a_drum_takes_its_strain_and_its_weight_along() -> None:
+def test_cable_that_leaves_a_drum_keeps_its_strain() -> None:
     """Drums 3 m below and 1 m above the frame ends: energy EA strain^2/2 - w rise per unstrained meter."""
     strain, rise, speed, time = np.array([1e-3, 2e-3]), np.array([3.0, -1.0]), np.array([0.4, -0.2]), 0.01
     data, now, rows = np.zeros((d.DATA_ROWS, 2)), np.zeros((d.DRIVE_ROWS, 2)), np.zeros((CABLE_ROWS, 2))
@@ -158,13 +158,13 @@ def test_cable_that_leaves_a_drum_takes_its_strain_and_its_weight_along() -> Non
     np.testing.assert_allclose(rows[LENGTH], let_out, rtol=1e-14)
     energy = (0.5 * 5e4 * strain**2 - 0.1 * 9.81 * rise) * let_out
     assert drives.audit[d.ON_DRUMS] == pytest.approx(-energy.sum(), rel=1e-12)
-    # H = T + T^2/(2 EA) - w z is the same at the frame end and at the drum
+    # H = T + T^2/(2 EA) - w z is equal at the frame end and at the drum
     whole, weight = 500.0, 0.1 * 9.81
     tension = inspect.unwrap(d.tension_at_drum)(whole, weight * 3.0, 5e4)
     assert tension + 0.5 * tension**2 / 5e4 + weight * 3.0 == pytest.approx(whole, rel=1e-14)
 
 
-def test_a_brake_holds_the_tensions_that_motors_expect_too() -> None:
+def test_a_brake_keeps_the_feedforward_tensions_of_motors() -> None:
     robot = prototype(integral_gain=0.0, friction=0.0)
     path = sl.septic_path([(0, 0, 0.5), (0.6, 0.3, 2.2)], durations=16.0, rate=62.5)
     plan = sl.inverse(robot, path, tension=LIFT)
@@ -173,11 +173,11 @@ def test_a_brake_holds_the_tensions_that_motors_expect_too() -> None:
     run = sl.simulate(plan, winches="robot", events=sl.Brake(8.0, duration=0.2), duration=16.0)
     expected = plan.unstrained_length[500] + 0.1 * rate[500]
     assert np.abs(tension[-1] - tension[500]).max() > 20.0
-    assert np.abs(run.length[-1] - expected).max() < 3e-4  # 1.7 mm where the tensions go on
+    assert np.abs(run.length[-1] - expected).max() < 3e-4  # 1.7 mm with continued tensions
 
 
 @pytest.mark.parametrize("mass", wide(["none", "lumped"]))
-def test_what_begins_is_noted_however_much_of_it(mass: CableMass, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_all_beginnings_of_events_are_recorded(mass: CableMass, monkeypatch: pytest.MonkeyPatch) -> None:
     state = lift(prototype(), 1.0).state[0]
     times = 0.1 * np.arange(11)
     lengths = state.unstrained_length + 0.06 * np.outer(np.arange(11) % 2, np.resize([1.0, -1.0], 8))
@@ -192,7 +192,7 @@ def test_what_begins_is_noted_however_much_of_it(mass: CableMass, monkeypatch: p
 
 
 @pytest.mark.parametrize("winches", ["ideal", sl.SecondOrder(3.0)])
-def test_nothing_lies_on_drums_that_there_are_not(winches: str | sl.SecondOrder) -> None:
+def test_missing_drums_have_no_wound_cable(winches: str | sl.SecondOrder) -> None:
     state = lift(sl.load_robot("article-prototype"), 1.0).state[0]
     with refused("winding", '"remembered"'):
         sl.simulate(state, duration=0.1, winches=winches, winding="remembered")  # type: ignore[arg-type]
@@ -200,7 +200,7 @@ def test_nothing_lies_on_drums_that_there_are_not(winches: str | sl.SecondOrder)
         sl.Simulator(state.one_robot, state, winches=winches, winding="remembered")  # type: ignore[arg-type]
 
 
-def test_what_winches_lack_is_told_with_their_name_once() -> None:
+def test_missing_fields_of_winches_are_named_once() -> None:
     robot = prototype(position_gain=None, speed_gain=None, integral_gain=None)
     with refused("the robot", "without winches: position_gain, speed_gain, integral_gain"):
         sl.simulate(lift(robot, 1.0).state[0], duration=0.1, winches="robot")

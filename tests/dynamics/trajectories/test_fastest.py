@@ -39,13 +39,13 @@ def within(robot: sl.Robot, margin: float) -> sl.Robot:
     return robot.replace(tension_min=robot.tension_min + margin, tension_max=robot.tension_max - margin)
 
 
-def hurried(path: sl.Path, factor: float) -> sl.Path:
-    """The same motion in so much of its time."""
+def faster_motion(path: sl.Path, factor: float) -> sl.Path:
+    """The same motion in a fraction of its time."""
     return sl.Path(path.time * factor, path.pose, path.twist / factor, path.twist_rate / factor**2)
 
 
 def shortest_quintic(robot: sl.Robot, waypoints: list[tuple[float, float, float]], margin: float) -> float:
-    """By bisection, of 500 samples each."""
+    """By bisection, with 500 samples each."""
     low, high = 0.2, 10.0
     while high - low > 1e-4:
         middle = 0.5 * (low + high)
@@ -67,7 +67,7 @@ def arc(rate: float = 100.0) -> sl.Path:
 
 @pytest.mark.parametrize(("margin", "known"), wide([(5.0, (0.877, 1.142)), (0.0, (0.858, 1.118))]))
 def test_it_is_faster_than_the_shortest_quintic(suspended: sl.Robot, margin: float, known: tuple[float, float]) -> None:
-    """By as much as a study found without a margin; docs/howto/without-vibration.md tells the numbers."""
+    """By the ratios of a study without a margin; docs/howto/without-vibration.md has the numbers."""
     quick = sl.fastest(suspended, sl.quintic_path(ALONG_X, durations=2.0), margin)
     quintic = shortest_quintic(suspended, ALONG_X, margin)
     assert quick.duration < 0.78 * quintic
@@ -86,7 +86,7 @@ LONGER = [("turning", None), ("arc", 100.0), ("frame end", None), ("pulleys", No
         *(pytest.param(*case, marks=pytest.mark.soak) for case in CASES if case not in QUICK + LONGER),
     ],
 )
-def test_limits_hold_exactly_and_nothing_is_given_away(cogiro: sl.Robot, kind: str, jerk: float | None) -> None:
+def test_limits_hold_exactly_and_are_reached(cogiro: sl.Robot, kind: str, jerk: float | None) -> None:
     robot = cogiro
     if kind == "frame end":
         robot = robot.replace(tension_limits_of="frame_end", tension_max=800.0, tension_min=30.0)
@@ -105,14 +105,14 @@ def test_limits_hold_exactly_and_nothing_is_given_away(cogiro: sl.Robot, kind: s
         np.testing.assert_allclose(quick.pose.matrix[k], path.pose.matrix[k], atol=1e-9)
     if jerk is None:
         assert quick.jerk is None
-        assert not sl.inverse(limited, hurried(quick, 0.995)).feasible.all()
+        assert not sl.inverse(limited, faster_motion(quick, 0.995)).feasible.all()
     else:
         assert quick.jerk is not None
         sizes = np.linalg.norm(quick.jerk[:, :3], axis=1)
         assert sizes.max() <= jerk * (1.0 + 1e-9)
         assert sizes.max() > 0.99 * jerk
         h = np.diff(quick.time)[0]
-        there = (quick.twist_rate[1:-1] - quick.twist_rate[:-2])[:, :3] / h  # what its samples say
+        there = (quick.twist_rate[1:-1] - quick.twist_rate[:-2])[:, :3] / h  # rates of its samples
         assert np.linalg.norm(there, axis=1).max() <= jerk * 1.001
 
 
@@ -137,8 +137,8 @@ def test_it_stays_on_the_curve(cogiro: sl.Robot) -> None:
         ]
     ),
 )
-def test_where_only_the_jerk_is_bounded_the_time_is_known(name: str, goal: sl.Pose, distance: float) -> None:
-    """A quarter of the time at each of +J, -J, -J, +J leads over J T^3/32."""
+def test_the_time_with_only_a_jerk_limit_is_exact(name: str, goal: sl.Pose, distance: float) -> None:
+    """A quarter of the time at each of +J, -J, -J, +J gives a distance of J T^3/32."""
     path = sl.quintic_path([sl.Pose.from_euler((0, 0, 1.5), 0, 0, 0), goal], durations=2.0)
     limit: dict[str, Any] = {name: 2.0}
     quick = sl.fastest(sl.load_robot("ipanema-1"), path, **limit)
@@ -146,7 +146,7 @@ def test_where_only_the_jerk_is_bounded_the_time_is_known(name: str, goal: sl.Po
 
 
 @extended
-def test_much_jerk_comes_near_the_fastest_of_all(suspended: sl.Robot) -> None:
+def test_a_high_jerk_limit_approaches_the_fastest_motion(suspended: sl.Robot) -> None:
     path = sl.quintic_path(ALONG_X, durations=2.0)
     least = sl.fastest(suspended, path).duration
     times = [sl.fastest(suspended, path, jerk=jerk).duration for jerk in (300.0, 1000.0)]
@@ -155,14 +155,14 @@ def test_much_jerk_comes_near_the_fastest_of_all(suspended: sl.Robot) -> None:
 
 
 @pytest.mark.parametrize("jerk", wide([None, 50.0]))
-def test_winches_keep_their_speed(cogiro: sl.Robot, jerk: float | None) -> None:
+def test_winch_speeds_stay_within_limits(cogiro: sl.Robot, jerk: float | None) -> None:
     winch = sl.Winch(drum_radius=0.06, groove_pitch=0.006, gear=10.0, speed_limit=300.0)
     robot = cogiro.replace(winches=winch, cables=cogiro.cables.replace(diameter=0.004))
     path = sl.quintic_path([(-1, 0, 1.5), (2, 1, 2)], durations=3.0)
     quick = sl.fastest(robot, path, jerk=jerk)
     speed = np.abs(sl.winch_rates(sl.inverse(within(robot, 5.0), quick)).motor_speed)
     assert quick.duration > 1.1 * sl.fastest(cogiro, path, jerk=jerk).duration
-    if jerk is None:  # but for what cables stretch where the acceleration jumps
+    if jerk is None:  # except for the stretch of the cables at jumps of the acceleration
         assert np.median(np.sort(speed.max(axis=1))[-50:]) == pytest.approx(300.0, rel=0.05)
     else:
         assert 270.0 < speed.max() <= 300.0
@@ -170,8 +170,8 @@ def test_winches_keep_their_speed(cogiro: sl.Robot, jerk: float | None) -> None:
 
 @extended
 @pytest.mark.parametrize("jerk", [None, 60.0])
-def test_winches_of_which_only_a_radius_is_known_keep_their_speed_too(jerk: float | None) -> None:
-    """The prototype's own speed limit, 15 rad/s of its drums of 30 mm, and one that holds it back."""
+def test_winches_with_only_a_radius_stay_within_speed_limits(jerk: float | None) -> None:
+    """The speed limit of the prototype, 15 rad/s of its drums of 30 mm, and a lower one."""
     robot = sl.load_robot("article-prototype")
     path = sl.quintic_path([(-0.3, 0, 1.0), (0.4, 0.2, 1.2)], durations=3.0)
     assert robot.winches is not None
@@ -197,8 +197,8 @@ def test_a_speed_limit_needs_a_radius(cogiro: sl.Robot) -> None:
 
 
 @pytest.mark.parametrize("seed", wide(range(4)))
-def test_half_planes_are_what_linear_programs_find(cogiro: sl.Robot, seed: int) -> None:
-    """The largest of any direction in (u, x), over tensions as variables, is that over the half planes."""
+def test_half_planes_agree_with_linear_programs(cogiro: sl.Robot, seed: int) -> None:
+    """The maximum in any direction of (u, x) over tensions is the maximum over the half planes."""
     rng = np.random.default_rng(seed)
     robot = cogiro.replace(center_of_mass=(0.05, 0.02, -0.1), tension_max=900.0)
     if seed == 3:
@@ -233,9 +233,9 @@ def test_profiles_of_constant_bounds_are_known() -> None:
     assert bang.duration == pytest.approx(2.0 / np.sqrt(a), rel=1e-12)
     held = fastest_speed_profile(place, planes((1.0, 0.0, a), (-1.0, 0.0, b), (0.0, 1.0, v**2)))
     assert held is not None
-    expected = 1.0 / v + 0.5 * v * (1.0 / a + 1.0 / b)  # two ramps and a way at the full speed
-    assert held.duration == pytest.approx(expected, rel=2e-3)  # the ramps end between places
-    assert fastest_speed_profile(place, planes((-1.0, 0.0, -1.0))) is None  # it can only speed up
+    expected = 1.0 / v + 0.5 * v * (1.0 / a + 1.0 / b)  # two ramps and a part at full speed
+    assert held.duration == pytest.approx(expected, rel=2e-3)  # the ramps end between grid points
+    assert fastest_speed_profile(place, planes((-1.0, 0.0, -1.0))) is None  # only acceleration is possible
     time = np.linspace(0.0, bang.duration, 9)
     np.testing.assert_allclose(bang.at(time)[0, :5], 0.5 * a * time[:5] ** 2, rtol=1e-12)
 
@@ -253,7 +253,7 @@ def test_dwells_are_kept_and_progress_is_reported(suspended: sl.Robot, jerk: flo
     assert not quick.twist[middle].any()
 
 
-def test_what_cannot_be_done_is_refused(suspended: sl.Robot) -> None:
+def test_impossible_motions_are_refused(suspended: sl.Robot) -> None:
     path = sl.quintic_path(ALONG_X, durations=2.0)
     for name, value in (("margin", -1.0), ("jerk", 0.0), ("jerk", np.nan), ("angular_jerk", -2.0)):
         bad: dict[str, Any] = {name: value}
@@ -271,8 +271,8 @@ def test_what_cannot_be_done_is_refused(suspended: sl.Robot) -> None:
 
 
 @pytest.mark.parametrize("kind", ["chord", "frame end", "pulleys"])
-def test_the_polygons_border_is_where_the_exact_inverse_ends(cogiro: sl.Robot, kind: str) -> None:
-    """Heavy cables: the largest acceleration, by bisection with `inverse`, is the polygon's after rounds of sag."""
+def test_the_boundary_of_the_polygon_agrees_with_inverse(cogiro: sl.Robot, kind: str) -> None:
+    """Heavy cables: the largest acceleration, by bisection with `inverse`, is that of the polygon after iterations."""
     robot = cogiro.replace(cables=sl.Cable(0.3, 5e5), tension_min=100.0, tension_max=1500.0)
     if kind == "frame end":
         robot = robot.replace(tension_limits_of="frame_end")
@@ -313,8 +313,8 @@ def test_bounds_hold_at_both_ends_of_every_step() -> None:
                 assert (planes.rates[end] @ point <= planes.bound[end] + 1e-9).all()
 
 
-def test_what_must_brake_must_come_fast() -> None:
-    """In the second half it brakes by 1 or more, so it must enter that with a square of 1 or more."""
+def test_a_forced_deceleration_requires_an_entry_speed() -> None:
+    """In the second half it decelerates by 1 or more, so it must enter with a square of 1 or more."""
     place = np.linspace(0.0, 1.0, 101)
     for most, possible in ((0.5, False), (1.5, True)):
         up = np.where(place < 0.5, most, -1.0)

@@ -16,8 +16,8 @@ STOPS = [
         ((0.0, 0.0, 1.5), 0.0, 0.0, 0.0),
         ((3.0, 1.0, 1.5), 0.1, 0.2, -0.3),
         ((3.0, 1.0, 1.5), 0.1, 0.2, -0.3),  # a dwell
-        ((3.0, 1.0, 1.5), 0.5, 0.2, -0.3),  # only turns
-        ((0.0, 1.0, 2.5), 0.5, 0.2, -0.3),  # only moves
+        ((3.0, 1.0, 1.5), 0.5, 0.2, -0.3),  # only rotation
+        ((0.0, 1.0, 2.5), 0.5, 0.2, -0.3),  # only translation
     )
 ]
 OFF_GRID = (1.2345, 0.5, 1.71, 2.0)
@@ -41,10 +41,10 @@ def test_one_impulse_changes_nothing(make: type, durations: tuple[float, ...]) -
     np.testing.assert_allclose(again.pose.quaternion, path.pose.quaternion, atol=1e-13)
     np.testing.assert_allclose(again.twist, path.twist, atol=1e-11)
     np.testing.assert_allclose(again.twist_rate, path.twist_rate, atol=1e-8)
-    np.testing.assert_allclose(there(again.jerk)[:-1], there(path.jerk)[:-1], atol=1e-5)  # at the very end it rests
+    np.testing.assert_allclose(there(again.jerk)[:-1], there(path.jerk)[:-1], atol=1e-5)  # at rest at the very end
 
 
-def test_a_straight_move_is_the_sum_of_delayed_ones() -> None:
+def test_a_straight_motion_is_the_sum_of_delayed_ones() -> None:
     shaper, T = sl.ZV([1.7, 2.9]), 2.0
     path = sl.quintic_path([(0, 0, 1.5), (3, 0, 1.5)], durations=T, rate=100.0)
     calm = sl.shaped(path, shaper)
@@ -61,13 +61,13 @@ def test_a_straight_move_is_the_sum_of_delayed_ones() -> None:
 
 
 @pytest.mark.parametrize("durations", [OFF_GRID, ON_GRID])
-def test_each_move_is_shaped_by_itself(durations: tuple[float, ...]) -> None:
+def test_each_segment_is_shaped_separately(durations: tuple[float, ...]) -> None:
     shaper = sl.ZVD(2.5)
     path = sl.septic_path(STOPS, durations=durations, rate=200.0)
     calm = sl.shaped(path, shaper)
-    longer = np.array(durations) + shaper.duration * np.array([1, 0, 1, 1])  # a dwell is as long as it was
+    longer = np.array(durations) + shaper.duration * np.array([1, 0, 1, 1])  # the duration of a dwell is unchanged
     np.testing.assert_allclose(there(calm.rests), np.append(0.0, np.cumsum(longer)), atol=1e-12)
-    # on every leg the platform is on the line between its stops, and turned about their axis
+    # on each segment the platform is on the line between its waypoints, rotated about their axis
     which = np.minimum(np.searchsorted(there(calm.rests)[1:], calm.time, side="right"), 3)
     for k, (a, b) in enumerate(pairwise(STOPS)):
         part = calm.pose[which == k]
@@ -77,7 +77,7 @@ def test_each_move_is_shaped_by_itself(durations: tuple[float, ...]) -> None:
         turn = (b.rotation * a.rotation.inv()).as_rotvec()
         turned = (part.rotation * a.rotation.inv()).as_rotvec()
         assert np.abs(np.cross(turned, turn)).max() < 1e-12
-    # and its rates are those of its poses
+    # and the rates are those of the poses
     h = 1.0 / 200.0
     quiet = np.ones(len(calm) - 3, dtype=bool)  # the last step is shorter
     centers = calm.time[1:-2]
@@ -89,7 +89,7 @@ def test_each_move_is_shaped_by_itself(durations: tuple[float, ...]) -> None:
 
 
 def arc(rate: float, radius: float = 2.0) -> sl.Path:
-    """A quarter circle that turns with the platform and tilts it, from rest to rest in 2 s."""
+    """A quarter circle with rotation and tilt of the platform, from rest to rest in 2 s."""
     time = np.arange(round(2.0 * rate) + 1) / rate
     s = time / 2.0
     angle = (10 * s**3 - 15 * s**4 + 6 * s**5) * 0.5 * np.pi
@@ -121,7 +121,7 @@ def test_the_length_along_a_curve_is_convolved() -> None:
     s = np.clip((calm.time[:, None] - shaper.time) / 2.0, 0.0, 1.0)
     angle = (10 * s**3 - 15 * s**4 + 6 * s**5) @ shaper.amplitude * 0.5 * np.pi
     x, y, _ = calm.pose.position.T
-    # 0.1 angle^2 makes a radian of the arc a little longer as it goes on: length by length, not angle by angle
+    # 0.1 angle^2 increases the length per radian along the arc: the length is shaped, not the angle
     np.testing.assert_allclose(np.arctan2(y, x), angle, atol=5e-3)
     plain = sl.path_from_samples(
         arc(200.0).time, sl.Pose.from_euler(arc(200.0).pose.position * [1, 1, 0] + [0, 0, 1.5], 0.0, 0.0, 0.0)
@@ -130,12 +130,12 @@ def test_the_length_along_a_curve_is_convolved() -> None:
     np.testing.assert_allclose(np.arctan2(calm.pose.position[:, 1], calm.pose.position[:, 0]), angle, atol=2e-6)
 
 
-def test_sampled_paths_rest_where_their_samples_stand() -> None:
+def test_sampled_paths_rest_at_constant_samples() -> None:
     path = sl.quintic_path(STOPS, durations=ON_GRID, rate=100.0)
     bare = sl.Path(path.time, path.pose, path.twist, path.twist_rate, path.jerk)
     known, found = sl.shaped(path, sl.ZV(2.0)), sl.shaped(bare, sl.ZV(2.0))
     np.testing.assert_allclose(found.pose.position[-1], known.pose.position[-1], atol=1e-12)
-    dwell = slice(1, 3)  # every sample of the dwell stands
+    dwell = slice(1, 3)  # all samples of the dwell are at rest
     np.testing.assert_allclose(there(found.rests)[[0, 1, -3, -2, -1]], there(known.rests)[[0, 1, 2, 3, 4]], atol=1e-9)
     assert there(known.rests)[dwell].size == 2
 
@@ -186,7 +186,7 @@ def test_piecewise_polynomials_are_exact_up_to_their_degree(known: int, at_end: 
 
 @pytest.mark.parametrize(("make", "close"), [(sl.quintic_path, 1e-12), (sl.septic_path, 1e-10)])
 @pytest.mark.parametrize("durations", [OFF_GRID, ON_GRID])
-def test_between_samples_moves_are_the_polynomials_that_they_were(
+def test_motions_between_samples_are_the_original_polynomials(
     make: type, close: float, durations: tuple[float, ...]
 ) -> None:
     coarse, fine = (make(STOPS, durations=durations, rate=rate) for rate in (50.0, 1000.0))
@@ -203,8 +203,8 @@ def test_between_samples_moves_are_the_polynomials_that_they_were(
         np.testing.assert_allclose(jet.twists(motion)[0], fine.twist[part], rtol=0.0, atol=300.0 * close)
 
 
-def test_the_rates_of_a_bent_curve_are_those_of_its_poses() -> None:
-    """By differences: each rate is the slope of the one before, along the parameter and in time."""
+def test_the_rates_of_a_curve_are_those_of_its_poses() -> None:
+    """By differences: each rate is the slope of the previous one, along the parameter and in time."""
     s = np.linspace(0.0, 1.0, 201)
     position = np.stack((np.sin(2 * s), np.cos(3 * s), s**3), axis=1)
     curve = SplineCurve.through(sl.Pose.from_euler(position, 0.4 * np.sin(2 * s), 0.5 * s**2, 1.5 * s), s)

@@ -19,7 +19,7 @@ SHAPERS = {
 
 
 def left_by_impulses(shaper: sl.Shaper, frequency: float, damping_ratio: float) -> float:
-    """Amplitude that an oscillator keeps after the impulses, by integration, of that after one, a while later."""
+    """Amplitude of an oscillator after the impulses, by integration, relative to that after one impulse."""
     turning = 2.0 * np.pi * frequency
 
     def rates(_: float, state: np.ndarray) -> list[float]:
@@ -37,14 +37,14 @@ def left_by_impulses(shaper: sl.Shaper, frequency: float, damping_ratio: float) 
 
 @pytest.mark.parametrize("name", SHAPERS)
 @pytest.mark.parametrize("damping_ratio", wide([0.1, 0.0]))
-def test_the_residual_is_what_an_oscillator_keeps(name: str, damping_ratio: float) -> None:
+def test_the_residual_is_that_of_an_oscillator(name: str, damping_ratio: float) -> None:
     shaper = SHAPERS[name]()
     for frequency in (0.7, 1.8, 2.3, 2.9):
         expected = left_by_impulses(shaper, frequency, damping_ratio)
         assert shaper.residual(frequency, damping_ratio) == pytest.approx(expected, abs=1e-9)
 
 
-def test_what_they_are_made_for_they_leave_at_rest() -> None:
+def test_the_residual_vanishes_at_the_design_frequency() -> None:
     assert sl.ZV(1.8).residual(1.8) < 1e-15
     assert sl.ZV(1.8, 0.2).residual(1.8, 0.2) < 1e-15
     assert sl.ZVD(1.8, 0.2).residual(1.8, 0.2) < 1e-15
@@ -52,14 +52,14 @@ def test_what_they_are_made_for_they_leave_at_rest() -> None:
     assert sl.EI(1.8, 0.05).residual(1.8) == pytest.approx(0.05, abs=1e-15)
 
 
-def test_the_derivative_of_zvd_vanishes_too() -> None:
+def test_the_derivative_of_zvd_vanishes() -> None:
     near = np.array([1e-2, 5e-3])
     first, second = sl.ZV(1.0).residual(1.0 + near), sl.ZVD(1.0).residual(1.0 + near)
     assert first[0] / first[1] == pytest.approx(2.0, rel=1e-3)
     assert second[0] / second[1] == pytest.approx(4.0, rel=1e-3)
 
 
-def test_ei_stays_below_its_tolerance_and_vanishes_beside_it() -> None:
+def test_ei_stays_below_its_tolerance_with_two_zeros() -> None:
     residual = sl.EI(1.0, 0.05).residual(np.linspace(0.8, 1.2, 4001))
     inside = np.flatnonzero(residual <= 0.05 + 1e-12)
     assert inside[-1] - inside[0] == inside.size - 1  # one band
@@ -78,13 +78,13 @@ def test_products_convolve() -> None:
     np.testing.assert_array_equal(product.frequency, [1.8, 2.9])
     np.testing.assert_allclose((other * one).time, product.time)
     twice = sl.ZV(2.0) * sl.ZV(2.0)
-    np.testing.assert_allclose(twice.amplitude, sl.ZVD(2.0).amplitude)  # the two in the middle are one
+    np.testing.assert_allclose(twice.amplitude, sl.ZVD(2.0).amplitude)  # the two impulses in the middle coincide
     np.testing.assert_allclose(twice.time, sl.ZVD(2.0).time)
 
 
 @pytest.mark.parametrize("make", [sl.ZV, sl.ZVD, sl.EI])
 @pytest.mark.parametrize("frequency", [0.0, -1.0, np.nan, np.inf, [1.0, 0.0], [], [[1.0]], "fast", None])
-def test_frequencies_that_are_none_are_refused(make: type, frequency: object) -> None:
+def test_invalid_frequencies_are_refused(make: type, frequency: object) -> None:
     with pytest.raises(sl.InvalidValueError, match="frequency"):
         make(frequency)
 
@@ -96,7 +96,7 @@ def test_options_out_of_range_are_refused(make: type, name: str, option: object)
         make([1.0, 2.0], option)
 
 
-def test_impulses_that_are_none_are_refused() -> None:
+def test_invalid_impulses_are_refused() -> None:
     with refused("amplitude", "2 that sum to 0.9"):
         sl.Shaper([0.0, 1.0], [0.5, 0.4])
     with refused("time[1]", "0.0 s"):

@@ -1,4 +1,4 @@
-"""The dynamic stiffness of the cables of a robot: at rest, against component modes, with damping."""
+"""Dynamic stiffness of the cables of a robot: at rest, compared with component modes, with damping."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tests.tiers import wide
 
 @pytest.mark.parametrize("name", by_tier(sl.robot_names()))
 def test_at_rest_it_is_the_static_stiffness(name: str) -> None:
-    """By the closed form; and by the integral of C, with what is behind the frame ends, all the same."""
+    """By the closed form, and by the integral of C including the routing after the frame ends."""
     state = middle(name)
     static = sl.stiffness(state).cable_stiffness
     size = np.abs(static).max(axis=(1, 2))[:, None, None]
@@ -36,7 +36,7 @@ def test_at_rest_it_is_the_static_stiffness(name: str) -> None:
 
 
 def test_two_thousand_extreme_cables_at_rest() -> None:
-    """What is added near frequency zero is the moving mass alone: nothing of the loss in inverting C."""
+    """The difference near zero frequency is the moving mass only, without the rounding of the inversion of C."""
     random = np.random.default_rng(1)
     count = 2000
     weight = 10.0 ** random.uniform(-2, 3, count)
@@ -62,11 +62,11 @@ def test_two_thousand_extreme_cables_at_rest() -> None:
 
 
 @pytest.mark.parametrize("name", wide(["cogiro", "article-suspended", "expo2015-lucia", "ipanema-2-pulleys"], first=3))
-def test_component_modes_against_the_exact_stiffness(name: str) -> None:
+def test_component_modes_agree_with_the_exact_stiffness(name: str) -> None:
     state = middle(name)
     components = component_modes(vibration_model(state).strings, 0, 80.0)
     static = sl.stiffness(state).cable_stiffness
-    for frequency in (1.0, 8.0, 16.0, 19.5):  # none near a motion of a cable, which would magnify rounding
+    for frequency in (1.0, 8.0, 16.0, 19.5):  # no frequency near that of a cable, which would magnify rounding
         exact = sl.dynamic_stiffness(state, frequency).real - static
         size = np.abs(exact).max(axis=(1, 2))[:, None, None] + np.abs(static).max(axis=(1, 2))[:, None, None]
         assert (np.abs(_of_modes(components, 2.0 * np.pi * frequency) - exact) <= 1e-8 * size).all()
@@ -87,8 +87,8 @@ def test_it_is_symmetric_and_real_without_damping() -> None:
     assert not found.imag.any()
 
 
-def test_damping_takes_energy_out() -> None:
-    """The imaginary part is positive definite: of force in phase with velocity; and grows from zero as told."""
+def test_damping_dissipates_energy() -> None:
+    """The imaginary part, force in phase with velocity, is positive definite and grows from zero as documented."""
     state = middle("cogiro")
     for damping in (sl.Damping(loss_time=1e-4), sl.Damping(air_damping=0.02), sl.Damping(modal_damping=0.01)):
         found = sl.dynamic_stiffness(state, [0.5, 3.0, 12.0], damping)
@@ -100,8 +100,8 @@ def test_damping_takes_energy_out() -> None:
     assert whole == pytest.approx((1.0 + 0.02j) * static, rel=1e-6, abs=1e-6)
 
 
-def test_damped_against_finite_elements() -> None:
-    """A sagging cable with stretch that loses and air that brakes, as a chain with dashpots, extrapolated."""
+def test_damped_cables_agree_with_finite_elements() -> None:
+    """A sagging cable with losses of stretch and air as a chain with dashpots, extrapolated."""
     from tests.kernels.dynamics.test_collocation import CABLES
 
     table, omega, eta, drag = CABLES["sagging"], 2.0 * np.pi * 0.8, 3e-3, 0.05
@@ -113,13 +113,13 @@ def test_damped_against_finite_elements() -> None:
 
 
 @pytest.mark.parametrize("frequency", [-1.0, np.nan, [[1.0]], 1e15])
-def test_frequencies_that_are_none(frequency: object) -> None:
+def test_invalid_frequencies(frequency: object) -> None:
     with pytest.raises(sl.InvalidValueError, match="frequency"):
         sl.dynamic_stiffness(middle("cogiro"), frequency)  # type: ignore[call-overload]
 
 
 def test_a_pose_that_is_not_feasible_has_no_dynamics() -> None:
-    """Refused alike by all that take a single state; `vibration` has a status for it."""
+    """All functions of a single state refuse it; `vibration` has a status for it."""
     state = sl.inverse(sl.load_robot("cogiro"), sl.Pose((0, 0, 40), np.eye(3))).state
     calls: tuple[tuple[Callable[[sl.Equilibrium], object], str], ...] = (
         (sl.frequency_slopes, "a state without lengths"),
@@ -132,7 +132,7 @@ def test_a_pose_that_is_not_feasible_has_no_dynamics() -> None:
             of(state)
 
 
-def test_shallow_models_have_no_vibrations_of_their_own() -> None:
+def test_shallow_models_are_refused() -> None:
     robot = sl.load_robot("cogiro")
     state = sl.inverse(robot, sl.Pose((0, 0, 2), np.eye(3)), sl.Parabolic()).state
     with pytest.raises(sl.InvalidValueError, match="Catenary"):

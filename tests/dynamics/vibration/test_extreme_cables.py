@@ -1,4 +1,4 @@
-"""Cables from hardly any tension to any, ropes and steel: count, component modes and status agree."""
+"""Cables with very low to very high tension, of rope and steel: count, component modes and status agree."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from tests.tiers import wide
 
 
 @pytest.mark.parametrize("count", [150, pytest.param(5000, marks=pytest.mark.soak)])
-def test_the_count_is_that_of_the_component_modes(count: int) -> None:
-    """Two ways that share nothing but the equation: collocation with pivots, spectral elements with eigenvalues."""
+def test_the_count_agrees_with_component_modes(count: int) -> None:
+    """Two independent computations: collocation with pivots, spectral elements with eigenvalues."""
     random = np.random.default_rng(4)
     compared = 0
     for _ in range(count):
@@ -38,8 +38,8 @@ def test_the_count_is_that_of_the_component_modes(count: int) -> None:
 
 @pytest.mark.parametrize("count", [3, pytest.param(100, marks=pytest.mark.soak)])
 @pytest.mark.parametrize("name", wide(["cogiro", "falcon-7", "ipanema-2-pulleys"], first=2))
-def test_robots_with_lengths_a_little_wrong_are_answered(name: str, count: int) -> None:
-    """Some cables then hardly pull: all modes are found, or the slack cable is named; never an error."""
+def test_robots_with_slightly_wrong_lengths_have_results(name: str, count: int) -> None:
+    """Some cables are almost without tension: all modes are found, or the slack cable is named, without an error."""
     random = np.random.default_rng(9)
     robot = sl.load_robot(name)
     assert robot.test_box is not None

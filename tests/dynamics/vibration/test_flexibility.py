@@ -1,4 +1,4 @@
-"""Derivatives of cables' flexibility against complex steps through its integral over the cable."""
+"""Derivatives of the flexibility of cables compared with complex steps of its integral over the cable."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -23,7 +23,7 @@ class Hanging(NamedTuple):
 
 
 def cables(count: int, seed: int) -> Iterator[Hanging]:
-    """Taut to deep, level to steep, the lowest point inside or not."""
+    """Taut to very slack, level to steep, with the lowest point inside or outside."""
     rng = np.random.default_rng(seed)
     for _ in range(count):
         length, weight, stiffness = 10.0 ** rng.uniform([0.0, -3.0, 4.0], [2.0, 2.0, 7.0])
@@ -36,7 +36,7 @@ def cables(count: int, seed: int) -> Iterator[Hanging]:
 
 
 def state_of(one: Hanging) -> sl.Equilibrium:
-    """A cable as part of a state: only its force, length and data are looked at."""
+    """A cable as a part of a state: only its force, length and data are used."""
     robot = sl.Robot(
         "one", [[0, 0, 0]], [[0, 0, 0]], sl.Cable(one.weight, one.stiffness), 1.0, motion_pattern="3T", gravity=1.0
     )
@@ -49,7 +49,7 @@ def state_of(one: Hanging) -> sl.Equilibrium:
 
 
 @pytest.mark.parametrize("count", [10, *wide([40], first=0), pytest.param(2000, marks=pytest.mark.soak)])
-def test_every_derivative_is_a_complex_step(count: int) -> None:
+def test_derivatives_agree_with_complex_steps(count: int) -> None:
     for one in cables(count, seed=3):
         force, weight, length, stiffness = one
         found = flexibility(state_of(one), force[None])

@@ -1,4 +1,4 @@
-"""Maps of frequencies: every pose as by itself, and what their files say."""
+"""Maps of frequencies: poses compared with single computations, and contents of files."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def found() -> sl.FrequencyMap:
     return made
 
 
-def test_every_pose_is_as_by_itself(found: sl.FrequencyMap) -> None:
+def test_poses_agree_with_single_computations(found: sl.FrequencyMap) -> None:
     for k in (0, 1, 2, 17):
         alone = sl.vibration(sl.inverse(ROBOT, POSES[k]).state, up_to=8.0)
         assert found.status[k] == sl.VibrationStatus.SOLVED
@@ -39,14 +39,14 @@ def test_every_pose_is_as_by_itself(found: sl.FrequencyMap) -> None:
     "damping",
     wide(
         [
-            sl.Damping(loss_time=1e-3),  # couples modes: a sum over them has 1.17 times the peak, beside it
+            sl.Damping(loss_time=1e-3),  # couples modes: a sum over them has 1.17 times the peak beside it
             sl.Damping(modal_damping=0.01),
             sl.Damping(air_damping=0.02),
             sl.Damping(3e-4, 0.003, 0.005),
         ]
     ),
 )
-def test_the_strongest_answer_is_that_of_the_response(damping: sl.Damping) -> None:
+def test_the_largest_response_agrees_with_frequency_response(damping: sl.Damping) -> None:
     some = POSES[np.array([0, 1, 2, 17])]
     found = sl.frequency_map(ROBOT, some, up_to=8.0, damping=damping)
     for k in range(4):
@@ -58,13 +58,13 @@ def test_the_strongest_answer_is_that_of_the_response(damping: sl.Damping) -> No
         assert found.peak_frequency[k] == pytest.approx(frequency[np.argmax(norms)], abs=2e-4)
 
 
-def test_a_pose_without_an_answer_is_told(found: sl.FrequencyMap) -> None:
+def test_a_pose_without_a_response_is_marked(found: sl.FrequencyMap) -> None:
     assert found.status[3] == sl.VibrationStatus.NO_LENGTHS
     for name in ("frequency", "massless_frequency", "platform_share", "peak", "peak_frequency"):
         assert np.flatnonzero(np.isnan(getattr(found, name))).tolist() == [3]
 
 
-def test_where_no_mode_is_low_enough_the_answer_at_rest_is_the_strongest() -> None:
+def test_without_low_modes_the_static_response_is_the_largest() -> None:
     few = sl.frequency_map(ROBOT, POSES[:1], up_to=0.5)
     static = sl.stiffness(sl.inverse(ROBOT, POSES[0]).state).compliance[:3, :3]
     assert np.isnan(few.frequency[0])
@@ -73,7 +73,7 @@ def test_where_no_mode_is_low_enough_the_answer_at_rest_is_the_strongest() -> No
 
 
 @pytest.mark.parametrize("damping", [None, sl.Damping()])
-def test_undamped_peaks_have_no_top(damping: sl.Damping | None) -> None:
+def test_undamped_peaks_are_infinite(damping: sl.Damping | None) -> None:
     assert np.isinf(sl.frequency_map(ROBOT, POSES[:1], up_to=8.0, damping=damping).peak[0])
 
 

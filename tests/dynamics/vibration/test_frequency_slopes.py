@@ -1,4 +1,4 @@
-"""Derivatives of frequencies against differences of `modes` and `vibration`, and against the scale of all forces."""
+"""Derivatives of frequencies compared with differences of `modes` and `vibration`, and with the scale of all forces."""
 
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -36,7 +36,7 @@ def massless(state: sl.Equilibrium) -> Array:
 
 
 def with_cable_mass(state: sl.Equilibrium) -> Array:
-    """Where the exact dynamic stiffness has no inverse, beside the lowest frequencies of `vibration`."""
+    """Singularities of the exact dynamic stiffness near the lowest frequencies of `vibration`."""
     near = sl.vibration(state, up_to=UP_TO).frequency[:LOWEST]
     pair = np.stack((near * (1.0 - 1e-7), near * (1.0 + 1e-7)))
     robot, rest = state.one_robot, sl.stiffness(state)
@@ -52,13 +52,13 @@ def with_cable_mass(state: sl.Equilibrium) -> Array:
 
 
 def slope(at: Callable[[float], Array], step: float) -> Array:
-    """Derivative at 0, from differences of which three orders are taken away."""
+    """Derivative at 0 from differences with three eliminated orders."""
     found: Array = (16.0 * richardson(at, 0.5 * step) - richardson(at, step)) / 15.0
     return found
 
 
 def differences(state: sl.Equilibrium, frequencies: Frequencies, cable: int) -> Iterator[tuple[str, Array]]:
-    """Derivatives by length, density and axial stiffness of one cable, by mass, and some of inertia and wrench."""
+    """Derivatives by length, density and axial stiffness of one cable, by mass, and several by inertia and wrench."""
     robot, model, lengths, wrench = state.one_robot, state.cables.model, state.unstrained_length, state.wrench
     density, stiffness, one = (
         robot.cables.linear_density,
@@ -85,7 +85,7 @@ def differences(state: sl.Equilibrium, frequencies: Frequencies, cable: int) -> 
         yield "wrench", slope(lambda h: at(push=h * robot.mass * PUSH), 3e-2) / robot.mass
 
 
-def told(slopes: sl.FrequencySlopes, cable: int) -> dict[str, Array]:
+def printed_slopes(slopes: sl.FrequencySlopes, cable: int) -> dict[str, Array]:
     return {
         "length": slopes.length_sensitivity[:, cable],
         "density": slopes.density_sensitivity[:, cable],
@@ -99,7 +99,7 @@ def told(slopes: sl.FrequencySlopes, cable: int) -> dict[str, Array]:
 @pytest.mark.parametrize(("robot", "model"), CASES, ids=lambda one: getattr(one, "name", type(one).__name__))
 def test_massless_frequencies_by_differences(robot: sl.Robot, model: sl.CableModel) -> None:
     state = one_pose(robot, model)
-    found = told(sl.frequency_slopes(state), 1)
+    found = printed_slopes(sl.frequency_slopes(state), 1)
     for name, expected in differences(state, massless, 1):
         np.testing.assert_allclose(found[name], expected, rtol=0.0, atol=1e-6 * np.abs(expected).max(), err_msg=name)
 
@@ -110,7 +110,7 @@ HEAVY = [CASES[0], *(pytest.param(*case, marks=pytest.mark.soak) for case in CAS
 @pytest.mark.parametrize(("robot", "model"), HEAVY, ids=lambda one: getattr(one, "name", type(one).__name__))
 def test_frequencies_with_cable_mass_by_differences(robot: sl.Robot, model: sl.CableModel) -> None:
     state = one_pose(robot, model)
-    found = told(sl.frequency_slopes(sl.vibration(state, up_to=UP_TO)), 1)
+    found = printed_slopes(sl.frequency_slopes(sl.vibration(state, up_to=UP_TO)), 1)
     for name, expected in differences(state, with_cable_mass, 1):
         atol = 1e-6 * np.abs(expected).max()
         np.testing.assert_allclose(found[name][:LOWEST], expected, rtol=0.0, atol=atol, err_msg=name)
@@ -118,7 +118,7 @@ def test_frequencies_with_cable_mass_by_differences(robot: sl.Robot, model: sl.C
 
 @pytest.mark.parametrize("name", wide(["article-mixed", "fast", "cogiro", "ipanema-1"], first=2))
 @pytest.mark.parametrize("heavy", [False, True], ids=["massless", "with cable mass"])
-def test_forces_and_masses_of_another_scale_leave_frequencies_as_they_are(name: str, heavy: bool) -> None:
+def test_frequencies_do_not_depend_on_the_scale_of_forces_and_masses(name: str, heavy: bool) -> None:
     robot = sl.load_robot(name)
     state = one_pose(robot, sl.Catenary())
     lowest = sl.modes(state).frequency
@@ -147,7 +147,7 @@ def test_a_wrench_moves_the_pose_and_with_it_the_frequencies(heavy: bool) -> Non
 
 
 @pytest.mark.parametrize("heavy", [False, True], ids=["massless", "with cable mass"])
-def test_frequencies_that_are_one_part_by_their_eigenvalues(heavy: bool) -> None:
+def test_equal_frequencies_split_by_eigenvalues(heavy: bool) -> None:
     corners = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
     frame = np.column_stack((4.0 * corners, np.full(4, 5.0)))
     robot = sl.Robot("square", frame, np.zeros((4, 3)), sl.Cable(0.05, 5e4), 10.0, motion_pattern="3T", tension_min=5.0)
@@ -170,7 +170,7 @@ def test_frequencies_that_are_one_part_by_their_eigenvalues(heavy: bool) -> None
         apart = (frequencies(step * change) - frequencies(-step * change)[::-1]) / (2.0 * step)
         np.testing.assert_allclose(slopes.length_sensitivity[pair, 0], apart, rtol=2e-6)
         one, other = slopes.mass_sensitivity[pair].tolist()
-        assert one == pytest.approx(other, rel=1e-7)  # no mass parts them
+        assert one == pytest.approx(other, rel=1e-7)  # the mass does not separate them
 
 
 def test_no_mode_below_the_frequency_has_no_rows() -> None:
@@ -179,7 +179,7 @@ def test_no_mode_below_the_frequency_has_no_rows() -> None:
     assert slopes.inertia_sensitivity.shape == (0, 3, 3)
 
 
-def test_what_is_refused() -> None:
+def test_refusals() -> None:
     plan = sl.inverse(COGIRO, sl.Pose([[0, 0, 1.5], [0, 0, 90.0]], np.tile(np.eye(3), (2, 1, 1))))
     shallow = feasible_plan(COGIRO, 1, 1, sl.Parabolic()).state[0]
     cases: tuple[tuple[Any, *tuple[str, ...]], ...] = (
@@ -206,7 +206,7 @@ def test_cables_over_pulleys_are_refused() -> None:
 
 
 @pytest.mark.parametrize("level", [0.0, 1e-12, 1e-3, 1.0, 50.0])
-def test_elements_are_short_and_their_number_ends_where_a_cable_folds(level: float) -> None:
+def test_the_number_of_elements_is_limited_for_folding_cables(level: float) -> None:
     cable = StringData(np.array([level, 0.0, 4.0]), 1.0, 9.0, 1e5, 0.1)
     edges, omega = _edges(cable, 40.0), 40.0
     assert (edges[0], edges[-1]) == (0.0, 9.0)

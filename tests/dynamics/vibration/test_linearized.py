@@ -1,4 +1,4 @@
-"""Linear systems against `stiffness`, `modes`, a robot written out from the public cable models, and its motion."""
+"""Linear systems compared with `stiffness`, `modes`, a robot from the public cable models, and its motion."""
 
 from typing import Any
 
@@ -48,7 +48,7 @@ ALL_CASES = wide([*CASES, (OVER_PULLEYS, sl.Catenary())], first=len(CASES))
 
 
 @pytest.mark.parametrize(("robot", "model"), ALL_CASES, ids=lambda one: getattr(one, "name", type(one).__name__))
-def test_gains_at_rest_are_those_of_stiffness(robot: sl.Robot, model: sl.CableModel) -> None:
+def test_static_gains_agree_with_stiffness(robot: sl.Robot, model: sl.CableModel) -> None:
     state = one_pose(robot, model)
     system, known, m = sl.linearized(state), sl.stiffness(state), robot.cable_count
     gain = system.D - system.C @ np.linalg.solve(system.A, system.B)
@@ -61,7 +61,7 @@ def test_gains_at_rest_are_those_of_stiffness(robot: sl.Robot, model: sl.CableMo
 @pytest.mark.parametrize("robot", wide([*ROBOTS, OVER_PULLEYS], first=len(ROBOTS)), ids=lambda robot: robot.name)
 def test_poles_are_the_modes(robot: sl.Robot) -> None:
     pose = one_pose(robot, sl.Catenary()).pose
-    state = sl.inverse(robot, pose).state  # without a moment given, which `modes` halves
+    state = sl.inverse(robot, pose).state  # without a given moment, which `modes` halves
     frequency = sl.modes(state).frequency
     poles = sl.linearized(state).poles
     close(np.sort(poles.imag[poles.imag > 0.0]), 2.0 * np.pi * frequency, 1e-11)
@@ -69,12 +69,12 @@ def test_poles_are_the_modes(robot: sl.Robot) -> None:
     upper = damped[damped.imag > 0.0]
     np.testing.assert_allclose(-upper.real / np.abs(upper), 0.03, rtol=1e-9)
     np.testing.assert_allclose(np.sort(np.abs(upper)), 2.0 * np.pi * frequency, rtol=1e-9)
-    assert np.abs(damped).min() < 1e-9  # lengths that stay where they are
+    assert np.abs(damped).min() < 1e-9  # constant lengths
 
 
 @pytest.mark.parametrize("model", MODELS, ids=lambda model: type(model).__name__)
 @pytest.mark.parametrize("frequency", [0.7, 6.0])
-def test_responses_are_those_of_a_robot_written_out(model: sl.CableModel, frequency: float) -> None:
+def test_responses_agree_with_an_independent_robot(model: sl.CableModel, frequency: float) -> None:
     state = one_pose(COGIRO, model)
     by_motion, by_length = slopes_of(wrench_after, state)
     tension_by_motion, tension_by_length = slopes_of(tensions_after, state)
@@ -87,7 +87,7 @@ def test_responses_are_those_of_a_robot_written_out(model: sl.CableModel, freque
         close(found[rows, 8:], expected[:, 8:], 3e-7)
 
 
-def test_a_wound_cable_moves_the_platform_as_integrated() -> None:
+def test_winding_moves_the_platform_as_integrated() -> None:
     state = tilted()
     system, lengths, mass = sl.linearized(state), state.unstrained_length.copy(), mass_of(state)
     wound = 1e-6 * np.array([1.0, -0.5, 0.3, 0.0, 0.8, -1.0, 0.2, 0.4])
@@ -105,7 +105,7 @@ def test_a_wound_cable_moves_the_platform_as_integrated() -> None:
     close(output[::500, :6], moved[:6].T, 1e-4)  # of second order in the motion, and interpolated
 
 
-def test_what_is_lost_is_that_of_cables_of_complex_stiffness() -> None:
+def test_losses_agree_with_cables_of_complex_stiffness() -> None:
     state, eta, frequency = tilted(), 1e-6, 4.0
     omega, cables = 2.0 * np.pi * frequency, state.cables
     weight = np.broadcast_to(cables.cable.linear_density * cables.gravity, 8)
@@ -135,13 +135,13 @@ def test_what_is_lost_is_that_of_cables_of_complex_stiffness() -> None:
     expected = np.vstack((motion, tension))
     found = response(sl.linearized(state, sl.Damping(loss_time=eta), "speeds"), frequency)
     for part in (slice(0, 3), slice(3, 6), slice(6, 14)):
-        for inputs, turned in ((slice(0, 8), 1j), (slice(8, 14), 1.0)):  # lengths lag speeds by a quarter
+        for inputs, turned in ((slice(0, 8), 1j), (slice(8, 14), 1.0)):  # lengths lag speeds by a quarter period
             here, there = turned * found[part, inputs], turned * expected[part, inputs]
             close(here, there, 1e-8)
             close(here.imag, there.imag, 1e-4)  # of second order in the loss
 
 
-def test_names_and_units_go_with_the_columns() -> None:
+def test_columns_have_names_and_units() -> None:
     system = sl.linearized(tilted(), inputs="speeds")
     assert (len(system.state_names), len(system.input_names), len(system.output_names)) == (20, 14, 22)
     assert (len(system.input_units), len(system.output_units)) == (14, 22)
@@ -156,7 +156,7 @@ def test_names_and_units_go_with_the_columns() -> None:
     assert system.state_names[-1] == "length 7"
 
 
-def test_what_is_refused() -> None:
+def test_refusals() -> None:
     state = tilted()
     plan = sl.inverse(COGIRO, sl.Pose([[0, 0, 1.5], [0, 0, 90.0]], np.tile(np.eye(3), (2, 1, 1))))
     unbounded = '0 with inputs="lengths": a step of a length would cause infinite tensions'

@@ -1,4 +1,4 @@
-"""Modes as a list: names, kinds, who swings, and what has become of the massless ones."""
+"""Modes as a list: names, kinds, shares of parts, and corresponding massless modes."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ ROBOT = sl.load_robot("article-suspended")
 STATE = sl.inverse(ROBOT, sl.Pose([3.0, 2.0, 1.5], np.eye(3)), tension=sl.MinimumNorm()).state
 
 
-def test_every_frequency_says_of_which_robot_it_is() -> None:
+def test_every_frequency_names_its_robot() -> None:
     found = vibration(STATE, up_to=6.0, damping=sl.Damping(modal_damping=0.02))
     listed = listed_modes(found)
     swinging = [mode for mode in listed if mode.kind == "with cable mass"]
@@ -28,8 +28,8 @@ def test_every_frequency_says_of_which_robot_it_is() -> None:
         assert mode.loss == pytest.approx(0.02, rel=1e-9)
 
 
-def test_massless_modes_are_found_again_in_those_with_cable_mass() -> None:
-    """With cables of a thousandth of the mass each massless mode is one mode; with real ones it is spread over some."""
+def test_massless_modes_correspond_to_modes_with_cable_mass() -> None:
+    """With a thousandth of the cable mass each massless mode is one mode; with the real mass it is several."""
     cables = ROBOT.cables.replace(linear_density=1e-4 * ROBOT.cables.linear_density)
     light = sl.inverse(ROBOT.replace(cables=cables), STATE.pose, tension=sl.MinimumNorm()).state
     found = vibration(light, up_to=12.0)
@@ -42,8 +42,8 @@ def test_massless_modes_are_found_again_in_those_with_cable_mass() -> None:
     assert np.all(spread.sum(axis=1) < 1.0 + 1e-9)
 
 
-def test_cables_without_inertia_follow_as_those_of_the_same_lengths_do() -> None:
-    """To first order: half the motion leaves a quarter of the difference to the catenary of the new end."""
+def test_quasi_static_cables_follow_with_constant_lengths() -> None:
+    """To first order: half the motion leaves a quarter of the difference from the catenary of the new end."""
     generator = np.random.default_rng(3)
     motion = generator.normal(size=(6, 1)) * 1e-5
     rest = STATE.cables.points(41)
@@ -63,7 +63,7 @@ def test_cables_without_inertia_follow_as_those_of_the_same_lengths_do() -> None
     assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.15)
 
 
-def test_the_stretch_of_straight_cables_takes_what_a_complex_stiffness_takes() -> None:
+def test_losses_of_straight_cables_agree_with_a_complex_stiffness() -> None:
     cables = ROBOT.cables.replace(linear_density=1e-6)
     light = sl.inverse(ROBOT.replace(cables=cables), STATE.pose).state
     platform = sl.modes(light)
@@ -80,8 +80,8 @@ def test_the_stretch_of_straight_cables_takes_what_a_complex_stiffness_takes() -
 @pytest.mark.parametrize(
     "winches", wide([None, sl.Winch(dead_cable=6.0), sl.Winch(0.1, dead_cable=3.0, dead_rise=2.0)])
 )
-def test_massless_cables_lose_and_lie_as_those_that_weigh_hardly_anything(winches: sl.Winch | None) -> None:
-    """What is behind their exits gives way and loses too; elastic springs soft enough that it takes a fair part."""
+def test_massless_cables_agree_with_very_light_ones(winches: sl.Winch | None) -> None:
+    """The routing after the exits contributes compliance and losses; soft elastic springs make it visible."""
     cables = ROBOT.cables.replace(linear_density=2e-6, axial_stiffness=2e4)
     light = sl.inverse(ROBOT.replace(cables=cables, winches=winches), STATE.pose, tension=sl.MinimumNorm()).state
     platform = sl.modes(light)

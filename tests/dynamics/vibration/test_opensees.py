@@ -1,4 +1,4 @@
-"""Statics and frequencies of whole robots against OpenSees, as stored by `opensees.py`."""
+"""Statics and frequencies of whole robots compared with OpenSees, as stored by `opensees.py`."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ def test_every_state_is_stored() -> None:
 
 
 @pytest.mark.parametrize("k", range(len(STATES)))
-def test_frequencies_of_opensees(k: int) -> None:
+def test_frequencies_agree_with_opensees(k: int) -> None:
     name, position = STATES[k]
     state = sl.inverse(sl.load_robot(name), sl.Pose(position, np.eye(3))).state
     assert state.cables.unstrained_length == pytest.approx(STORED[k]["unstrained_length_m"], rel=1e-9)
-    assert STORED[k]["moved_m"] < 2e-8  # equilibrium of OpenSees with these lengths; its platform yields by 1e-9 m
+    assert STORED[k]["moved_m"] < 2e-8  # equilibrium of OpenSees with these lengths; its platform deforms by 1e-9 m
     frequency = np.array(STORED[k]["frequency_hz"])
     found = sl.vibration(state, up_to=1.02 * float(frequency.max()))
     assert found.frequency[:COUNT] == pytest.approx(frequency, rel=5e-7)

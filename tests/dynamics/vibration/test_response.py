@@ -1,4 +1,4 @@
-"""Compliance of robots whose cables have mass against oscillating wrenches."""
+"""Compliance of robots with cable mass under oscillating wrenches."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ DAMPINGS = {
 def test_modes_agree_with_the_exact_stiffness(name: str, damping: str) -> None:
     found = sl.frequency_response(middle(name), np.linspace(0.0, 15.0, 31), DAMPINGS[damping])
     assert found.checked_frequency.size == found.deviation.size == 8
-    # loss in the stretch of bent cables takes more of a cable's modes than there are
+    # losses in the stretch of bent cables require more modes of a cable than computed
     assert found.deviation.max() < (1e-4 if DAMPINGS[damping].loss_time else 1e-5)
     assert found.deviation[0] < 1e-10
 
@@ -36,8 +36,8 @@ def test_at_rest_it_is_the_static_compliance() -> None:
         assert compliance == pytest.approx(static, rel=1e-9, abs=1e-9 * np.abs(static).max())
 
 
-def test_at_a_peak_it_is_the_mode_over_its_loss() -> None:
-    """Well apart from others, a lightly damped mode answers with phi phi^T/(2 i zeta omega^2)."""
+def test_the_peak_response_is_that_of_the_mode() -> None:
+    """A well separated, lightly damped mode responds with phi phi^T/(2 i zeta omega^2)."""
     state = middle("cogiro")
     damping = sl.Damping(air_damping=5e-4, loss_time=2e-5)
     modes = sl.vibration(state, up_to=12.0, damping=damping)
@@ -49,7 +49,7 @@ def test_at_a_peak_it_is_the_mode_over_its_loss() -> None:
     assert found.compliance[0] == pytest.approx(expected, abs=2e-2 * np.abs(expected).max())
 
 
-def test_massless_cables_answer_as_the_modes_of_the_platform() -> None:
+def test_massless_cables_respond_with_the_modes_of_the_platform() -> None:
     state, frequency = middle("cogiro"), np.array([1.0, 3.3, 9.0])
     found, modes = sl.frequency_response(state, frequency), sl.modes(state)
     terms = (2.0 * np.pi) ** 2 * (modes.frequency**2 - frequency[:, None] ** 2)
@@ -58,19 +58,19 @@ def test_massless_cables_answer_as_the_modes_of_the_platform() -> None:
 
 
 def test_strings_lower_and_split_the_peak() -> None:
-    """What massless cables miss: with 1 % damping the strings of cogiro take half of the peak away."""
+    """The effect of cable mass: with 1 % damping the strings of cogiro halve the peak."""
     found = sl.frequency_response(at("cogiro", (3.0, 2.0, 2.0)), np.linspace(1.0, 8.0, 1401), DAMPINGS["modal"])
     peaks = [np.abs(one[:, 0, 0]).max() for one in (found.compliance, found.massless_compliance)]
     assert 0.40 < peaks[0] / peaks[1] < 0.45
 
 
 @pytest.mark.parametrize("frequency", [[], 1.0, [[1.0]], [-1.0], [np.nan], [900.0], [1e14]])
-def test_frequencies_that_are_none(frequency: object) -> None:
+def test_invalid_frequencies(frequency: object) -> None:
     with pytest.raises(sl.InvalidValueError, match="frequency"):
         sl.frequency_response(middle("cogiro"), frequency)  # type: ignore[call-overload]
 
 
-def test_a_pose_without_an_answer_is_refused() -> None:
+def test_an_infeasible_pose_is_refused() -> None:
     plan = sl.inverse(sl.load_robot("cogiro"), sl.Pose((0.0, 0.0, 50.0), np.eye(3)))
     with pytest.raises(sl.InvalidValueError, match="without lengths"):
         sl.frequency_response(plan.state, [1.0])

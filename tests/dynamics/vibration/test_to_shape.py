@@ -17,7 +17,7 @@ def at_the_goal(robot: sl.Robot, path: sl.Path) -> sl.Modes:
     return sl.modes(sl.inverse(robot, path.pose[-1], tension=sl.MinimumNorm()).state)
 
 
-def test_the_excitation_of_a_straight_move_is_the_formula_in_words(robot: sl.Robot) -> None:
+def test_the_excitation_of_a_straight_motion_agrees_with_its_formula(robot: sl.Robot) -> None:
     robot = robot.replace(center_of_mass=(0.02, -0.01, 0.05))
     start, goal = sl.Pose.from_euler((0, 0, 1.5), 0, 0, 0), sl.Pose.from_euler((2, 0.5, 1.7), 0, 0, 0)
     path = sl.septic_path([start, goal], durations=1.5)
@@ -44,10 +44,10 @@ def test_along_x_two_modes_and_along_z_one(robot: sl.Robot) -> None:
     modes = at_the_goal(robot, along_z)
     found = sl.to_shape(modes, along_z)
     assert found.shape == (1,)
-    assert np.abs(modes.shape[2, modes.frequency == found]) > 0.9 / np.sqrt(robot.mass)  # it moves up and down
+    assert np.abs(modes.shape[2, modes.frequency == found]) > 0.9 / np.sqrt(robot.mass)  # a vertical motion
 
 
-def test_the_strongest_of_several_moves_counts(robot: sl.Robot) -> None:
+def test_the_segment_with_the_largest_excitation_is_used(robot: sl.Robot) -> None:
     goal = (0, 0, 1.5)
     there = sl.quintic_path([(0, 0, 1.0), goal], durations=2.0)
     modes = at_the_goal(robot, there)
@@ -56,7 +56,7 @@ def test_the_strongest_of_several_moves_counts(robot: sl.Robot) -> None:
     np.testing.assert_array_equal(sl.to_shape(modes, gently_up), sl.to_shape(modes, along_y))
 
 
-def test_what_has_nothing_to_shape_is_refused(robot: sl.Robot) -> None:
+def test_motions_without_excitation_are_refused(robot: sl.Robot) -> None:
     path = sl.quintic_path([(0, 0, 1.5), (1, 0, 1.5)], durations=2.0, rate=5.0)
     plan = sl.inverse(robot, path)
     with refused("modes", "of 11 states", "of a single state") as caught:

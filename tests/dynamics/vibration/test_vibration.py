@@ -1,4 +1,4 @@
-"""Modes of robots whose cables have mass: against stored finite elements, the exact count, and complex roots."""
+"""Modes of robots with cable mass compared with stored finite elements, the exact count, and complex roots."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def test_lowest_six_of_article_suspended_by_finite_elements(position: tuple[floa
 
 @pytest.mark.parametrize("name", wide(["cogiro", "article-suspended", "fast", "ipanema-2-pulleys"], first=3))
 def test_every_frequency_by_the_exact_count(name: str) -> None:
-    """Below f - 1e-5 Hz are k - 1 modes, below f + 1e-5 Hz are k: each is right to 1e-5 Hz, and none is missing."""
+    """k - 1 modes are below f - 1e-5 Hz, and k modes below f + 1e-5 Hz: all are exact, none is missed."""
     state = middle(name)
     up_to = 0.5 if name == "fast" else 10.0
     found, setting = sl.vibration(state, up_to=up_to), vibration_model(state)
@@ -56,7 +56,7 @@ def test_the_count_at_frequencies_to_fifty_hertz() -> None:
         assert (found.frequency < frequency).sum() == modes_below(setting, 0, frequency)
 
 
-def test_lowest_twelve_of_cogiro_do_not_depend_on_the_cut() -> None:
+def test_lowest_twelve_of_cogiro_do_not_depend_on_the_number_of_elements() -> None:
     state = at("cogiro", (0.0, 0.0, 2.0))
     few, many = sl.vibration(state, up_to=20.0), sl.vibration(state, up_to=80.0)
     assert few.frequency[:12] == pytest.approx(many.frequency[:12], abs=5e-6)
@@ -64,7 +64,7 @@ def test_lowest_twelve_of_cogiro_do_not_depend_on_the_cut() -> None:
 
 
 @pytest.mark.parametrize("name", wide(["cogiro", "ipanema-2-pulleys"]))
-def test_shapes_carry_the_energy_they_say(name: str) -> None:
+def test_shapes_have_the_stated_energy(name: str) -> None:
     """Unit modal mass: of the platform by its mass matrix, of each cable by quadrature over its shape."""
     state = middle(name)
     found = sl.vibration(state, up_to=9.0)
@@ -81,8 +81,8 @@ def test_shapes_carry_the_energy_they_say(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", wide(["cogiro", "ipanema-2-pulleys"]))
-def test_loss_against_roots_in_the_complex_plane(name: str) -> None:
-    """D(omega) u = 0 at omega (i zeta + sqrt(1 - zeta^2)) to first order: twice the damping, twice the root's shift."""
+def test_losses_agree_with_roots_in_the_complex_plane(name: str) -> None:
+    """D(omega) u = 0 at omega (i zeta + sqrt(1 - zeta^2)) to first order: the shift is proportional to the damping."""
     state = middle(name)
     for damping in (sl.Damping(loss_time=2e-6), sl.Damping(air_damping=2e-5)):
         found = sl.vibration(state, up_to=7.0, damping=damping)
@@ -123,8 +123,8 @@ def _root(state: sl.Equilibrium, damping: sl.Damping, omega: complex) -> complex
     return one
 
 
-def test_a_platform_on_weightless_cables_is_that_of_modes() -> None:
-    """Cables that hardly weigh anything ring far above; the platform's modes are the massless ones."""
+def test_a_platform_on_weightless_cables_agrees_with_modes() -> None:
+    """Very light cables have very high frequencies; the modes of the platform are the massless ones."""
     robot = sl.load_robot("cogiro")
     light = robot.replace(cables=sl.Cable(1e-7 * np.ones(8), robot.cables.axial_stiffness))
     state = sl.inverse(light, sl.Pose((0.5, 0.3, 2.0), np.eye(3)), tension=sl.MinimumNorm()).state
@@ -134,7 +134,7 @@ def test_a_platform_on_weightless_cables_is_that_of_modes() -> None:
     assert found.platform_share == pytest.approx(1.0, abs=1e-5)
 
 
-def test_elastic_cables_without_weight_ring_too() -> None:
+def test_elastic_cables_without_weight_vibrate() -> None:
     robot = sl.load_robot("cogiro")
     state = sl.inverse(robot, sl.Pose((0.5, 0.3, 2.0), np.eye(3)), sl.Elastic()).state
     found, setting = sl.vibration(state, up_to=12.0), vibration_model(state)
@@ -143,7 +143,7 @@ def test_elastic_cables_without_weight_ring_too() -> None:
     assert modes_below(setting, 0, 12.0) == found.count
 
 
-def test_a_mode_just_at_the_limit_is_on_the_side_that_the_count_says() -> None:
+def test_a_mode_at_the_limit_agrees_with_the_count() -> None:
     state = middle("cogiro")
     frequency = sl.vibration(state, up_to=10.0).frequency[5]
     for up_to in (frequency, frequency * (1.0 - 1e-9), frequency * (1.0 + 1e-9)):
@@ -167,7 +167,7 @@ def test_an_unstable_equilibrium_has_directions_and_no_frequencies() -> None:
 
 @pytest.mark.parametrize("yaw", [0.0, 0.3, 1.0, 2.0])
 @pytest.mark.parametrize("density", [1e-6, 0.01, 1.0])
-def test_a_motion_that_nothing_holds_has_exactly_no_frequency(yaw: float, density: float) -> None:
+def test_an_unconstrained_motion_has_zero_frequency(yaw: float, density: float) -> None:
     rope = sl.Cable(linear_density=density, axial_stiffness=1e5)
     robot = sl.Robot("p", [[0, 0, 12.0]], [[0, 0, 0.5]], rope, mass=100.0, inertia=np.diag([5.0, 6.0, 7.0]))
     state = sl.forward(robot, [10.0], start=sl.Pose.from_euler([0, 0, 1.4], 0, 0, yaw)).state
@@ -175,10 +175,10 @@ def test_a_motion_that_nothing_holds_has_exactly_no_frequency(yaw: float, densit
     found = sl.vibration(state, up_to=30.0)
     assert found.frequency[0] == found.massless_frequency[0] == 0.0
     assert found.complete
-    assert found.frequency[1] > 0.1  # the pendulum's
+    assert found.frequency[1] > 0.1  # of the pendulum
 
 
-def test_an_unstable_equilibrium_answers_no_oscillating_force() -> None:
+def test_an_unstable_equilibrium_has_no_frequency_response() -> None:
     robot = sl.load_robot("article-suspended").replace(center_of_mass=(0.0, 0.0, 5.0))
     state = sl.inverse(robot, sl.Pose([0.0, 0.0, 1.5], np.eye(3))).state
     with refused("state", "an unstable equilibrium"):
@@ -187,8 +187,8 @@ def test_an_unstable_equilibrium_answers_no_oscillating_force() -> None:
         sl.to_shape(sl.modes(state), sl.quintic_path([(0, 0, 1.5), (1, 0, 1.5)], durations=2.0))
 
 
-def test_a_slack_cable_is_named_and_the_others_ring() -> None:
-    """One cable far too long: it hangs folded, and the robot vibrates on the other seven."""
+def test_a_slack_cable_is_named_and_the_others_vibrate() -> None:
+    """One cable is far too long and folded, and the robot vibrates on the other seven."""
     robot = sl.load_robot("cogiro")
     state = sl.inverse(robot, sl.Pose((0.0, 0.0, 2.0), np.eye(3)), sl.Elastic()).state
     lengths = np.array(state.unstrained_length)
@@ -206,7 +206,7 @@ def test_a_slack_cable_is_named_and_the_others_ring() -> None:
     assert np.isnan(sl.dynamic_stiffness(slack, 3.0)[3]).all()
 
 
-def test_a_pose_without_an_answer() -> None:
+def test_an_infeasible_pose() -> None:
     plan = sl.inverse(sl.load_robot("cogiro"), sl.Pose((0.0, 0.0, 50.0), np.eye(3)))
     found = sl.vibration(plan.state, up_to=5.0)
     assert found.status is sl.VibrationStatus.NO_LENGTHS
@@ -214,7 +214,7 @@ def test_a_pose_without_an_answer() -> None:
 
 
 @pytest.mark.parametrize("up_to", [0.0, -1.0, np.nan, np.inf, 1e-60, "ten", 1e14])
-def test_limits_that_are_none(up_to: object) -> None:
+def test_invalid_limits(up_to: object) -> None:
     with pytest.raises(sl.InvalidValueError):
         sl.vibration(middle("cogiro"), up_to=up_to)  # type: ignore[call-overload]
 
@@ -234,8 +234,8 @@ def test_modes_and_count_that_disagree_are_an_error(monkeypatch: pytest.MonkeyPa
 
 
 @pytest.mark.parametrize("name", ["cogiro", "article-prototype", "expo2015-lucia"])
-def test_modes_say_which_lie_above_the_first_string(name: str) -> None:
-    """By bisection on the count of all cables."""
+def test_modes_above_the_first_string_frequency_are_marked(name: str) -> None:
+    """By bisection of the count of all cables."""
     state = middle(name)
     found = sl.modes(state)
     assert found.above_strings.tolist() == (found.frequency > _first_string(state)).tolist()
