@@ -12,7 +12,7 @@ import sagline as sl
 from benchmarks.measure import Row, best_of_calls, best_seconds, print_table
 from sagline.statics.tables import cable_table, pose_rows
 from sagline.workspaces.boundary import boundary
-from sagline.workspaces.margin_rows import MarginRows
+from sagline.workspaces.margin import MarginRows
 from sagline.workspaces.wrench_sets import NO_LOAD
 from tests.workspaces.levels import ipanema, level_of
 from tests.workspaces.rays import ray_hull

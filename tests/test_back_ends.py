@@ -21,7 +21,7 @@ import sagline as sl
 from sagline.core.arrays import Array
 from sagline.kernels import library
 from sagline.kernels.cable.batch import batch_end
-from sagline.kernels.calibration.starting_lengths import starting_lengths
+from sagline.kernels.calibration.observe import starting_lengths
 from sagline.kernels.dynamics.rigid_body import platform_state
 from sagline.kernels.forward.forward import forward_poses
 from sagline.kernels.inverse.poses import inverse_poses

@@ -66,7 +66,7 @@ def shortened_commands(stocked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sagline.cli.run.FIGURES", ())
     monkeypatch.setattr("sagline.cli.run.CELLS", 4)
     monkeypatch.setattr("sagline.cli.run._figures", lambda *_: ())
-    monkeypatch.setattr("sagline.workspaces.nearest._EVALUATIONS", 30)
+    monkeypatch.setattr("sagline.workspaces.levels._EVALUATIONS", 30)
     monkeypatch.setattr("sagline.article.report.ReportPart.build", lambda part: Chapter(part.key, part.key, "", ()))
     monkeypatch.setattr("sagline.cli.output.Output.draw", lambda *_: None)
 

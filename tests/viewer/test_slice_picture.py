@@ -5,7 +5,7 @@ import pytest
 
 from sagline.viewer.slices import APART, FINER, INSIDE_OPACITY, OUTSIDE_OPACITY, MarginScale, picture_of
 from sagline.viewer.tension_scale import ForceUnit
-from sagline.workspaces.region import Plane, slice_of
+from sagline.workspaces.levels import Plane, slice_of
 from tests.viewer.analytic import PER_METER, RADIUS, WALL, ball
 
 LOW, HIGH = np.array([-2.0, -1.8, -1.9]), np.array([0.9, 2.0, 2.0])

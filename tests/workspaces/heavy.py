@@ -9,8 +9,8 @@ import numpy as np
 
 import sagline as sl
 from sagline.core.arrays import Array
-from sagline.workspaces.space import BY_BOX
 from sagline.workspaces.surface import normals_of
+from sagline.workspaces.workspace import BY_BOX
 
 BLOCK = 20_000  # positions for one call
 ASIDE = 1e-3  # [m], that verdicts are asked beside the boundary

@@ -4,7 +4,7 @@ import numpy as np
 
 import sagline as sl
 from sagline.core.arrays import Array
-from sagline.workspaces.margin_rows import MarginRows
+from sagline.workspaces.margin import MarginRows
 from tests.workspaces.shapes import Level
 
 

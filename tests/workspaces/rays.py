@@ -15,8 +15,7 @@ from numpy.typing import ArrayLike
 from sagline.core.arguments import whole_number
 from sagline.core.arrays import Array, Indices, exactly, locked
 from sagline.core.errors import InvalidValueError
-from sagline.workspaces.crossing import Brackets, brackets, crossings, crossings_of, distance_to_box
-from sagline.workspaces.grid import Level, level_values
+from sagline.workspaces.grid import Brackets, Level, brackets, crossings, crossings_of, distance_to_box, level_values
 from sagline.workspaces.surface import Surface
 
 ITERATIONS: Final = 100  # of facets that replace one another along a ray: three are usual

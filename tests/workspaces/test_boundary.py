@@ -5,7 +5,7 @@ from scipy.spatial.transform import Rotation
 
 from sagline.core.arrays import Array
 from sagline.workspaces.boundary import Boundary, boundary
-from sagline.workspaces.walks import labels_of
+from sagline.workspaces.surface import labels_of
 from tests.refusal import refused
 from tests.tiers import extended, wide
 from tests.workspaces.shapes import Counted, Level, any_of, ball, both, brick, outside, torus

@@ -3,7 +3,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from sagline.core.arrays import Array
-from sagline.workspaces.crossing import brackets, crossings, distance_to_box
+from sagline.workspaces.grid import brackets, crossings, distance_to_box
 from tests.workspaces.shapes import Counted, Level
 
 LINES = 200

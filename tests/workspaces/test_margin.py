@@ -13,7 +13,7 @@ import sagline as sl
 from sagline import InvalidValueError
 from sagline.core.arrays import Array
 from sagline.kernels import tables
-from sagline.workspaces.margin_rows import MarginRows
+from sagline.workspaces.margin import MarginRows
 from tests.refusal import refused
 from tests.tiers import wide
 from tests.workspaces.all_facets import PATTERNS, all_facets, crafted, mean_arm, no_load, pulls_on_a_grid

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from sagline.core.arrays import Array
-from sagline.workspaces.levels import Details
-from sagline.workspaces.region import Plane, slice_of
+from sagline.workspaces.levels import Details, Plane, slice_of
 
 
 def places(positions: Array) -> Details:

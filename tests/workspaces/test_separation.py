@@ -12,7 +12,7 @@ from sagline.core.arrays import Array, Flags
 from sagline.workspaces.boundary import boundary
 from sagline.workspaces.grid import sample_grid
 from sagline.workspaces.separation import exclusion, separated
-from sagline.workspaces.walks import FINE, labels_of
+from sagline.workspaces.surface import FINE, labels_of
 from tests.tiers import wide
 from tests.workspaces.shapes import any_of, ball, brick
 

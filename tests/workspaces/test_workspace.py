@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 import sagline as sl
 from sagline.core.arrays import Array
 from sagline.workspaces.criterion import Given, Judged
-from sagline.workspaces.space import BY_BOX
+from sagline.workspaces.workspace import BY_BOX
 from tests.refusal import refused
 from tests.tiers import extended
 

@@ -13,7 +13,7 @@ from sagline.core.numbers import n
 from sagline.plot.labels import PLACE
 from sagline.plot.sheet import BLUE, VERMILLION
 from sagline.present.page import Chapter, Finding, Panel, table_of
-from sagline.workspaces.region import Plane, slice_of
+from sagline.workspaces.levels import Plane, slice_of
 
 CELLS = 24  # cells along the longest edge of the frame
 HEIGHT = 3.0  # half the height of the frame [m]

@@ -22,7 +22,7 @@ from sagline.calibration.parameters import (
 )
 from sagline.core.arrays import Array, Indices, locked
 from sagline.kernels.calibration import kinds
-from sagline.kernels.calibration.starting_lengths import starting_lengths
+from sagline.kernels.calibration.observe import starting_lengths
 from sagline.kernels.memory import memory_for
 from sagline.kinematics.forward import search
 from sagline.robot.pose import Pose

@@ -51,8 +51,7 @@ def run(
     from sagline.files.robot_file import load_robot
     from sagline.motion.rest_to_rest import article_path
     from sagline.tension.methods import MinimumNorm
-    from sagline.workspaces.space import amount_of
-    from sagline.workspaces.workspace import workspace
+    from sagline.workspaces.workspace import amount_of, workspace
 
     models = Empirical(), Catenary()
     # The article's equation (55) selects the tensions closest to the previous ones. However, its figures show lower

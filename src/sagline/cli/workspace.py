@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from sagline.interference.pairs import Obstacle
     from sagline.workspaces.criterion import Criterion
     from sagline.workspaces.proof import Proof
-    from sagline.workspaces.space import Limit, Workspace
+    from sagline.workspaces.workspace import Limit, Workspace
 
 MOST_LIMITS = 12  # largest number of limits that are printed
 LoadsOption = Annotated[
@@ -182,8 +182,8 @@ def workspace(
     from sagline.cli.values import robot_with_payload
     from sagline.files.writing import file_stem
     from sagline.robot.pose import PoseBox
-    from sagline.workspaces.orientations import Tilts
     from sagline.workspaces.proof import ProofVerdict, prove
+    from sagline.workspaces.region import Tilts
     from sagline.workspaces.workspace import workspace
 
     limits = (reserve, max_sag, min_stiffness, min_frequency, clearance)
@@ -238,7 +238,7 @@ def _rows_of_limits(space: Workspace) -> list[list[object]]:
 
 
 def _tell(space: Workspace, proof: Proof | None) -> None:
-    from sagline.workspaces.space import amount_of, facts_of, span_of
+    from sagline.workspaces.workspace import amount_of, facts_of, span_of
 
     facts = [("area" if space.unit == "m²" else "volume", amount_of(space))]
     facts += [(head, text) for head, text in facts_of(space) if head != "nearest"]

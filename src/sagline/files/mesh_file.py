@@ -18,7 +18,7 @@ from sagline.core.errors import FileError, InvalidValueError, SaglineError
 from sagline.files.quantity import in_si
 from sagline.files.reading import read_bytes, value_errors
 from sagline.files.writing import atomic_file, check_file
-from sagline.interference.mesh import MOST, Mesh, check_coordinates, extent_text
+from sagline.interference.obstacles import MOST, Mesh, check_coordinates, extent_text
 from sagline.workspaces.surface import Surface
 
 LIMIT: Final = 200.0  # largest size of a file [MB]

@@ -18,8 +18,7 @@ from sagline.core.arrays import locked, number
 from sagline.files.netcdf import Format, choice_attributes, choice_of
 from sagline.files.robot_file import parse_robot
 from sagline.files.variables import Quantity, check_indices, check_variables, fields_of, variables_of_result
-from sagline.interference.mesh import Mesh
-from sagline.interference.obstacles import Box, Capsule, Sphere
+from sagline.interference.obstacles import Box, Capsule, Mesh, Sphere
 from sagline.robot.pose import Pose, PoseBox
 from sagline.tension.methods import METHODS
 from sagline.workspaces.criteria import (
@@ -32,10 +31,10 @@ from sagline.workspaces.criteria import (
     PositionError,
 )
 from sagline.workspaces.criterion import Criterion
-from sagline.workspaces.nearest import Nearest
-from sagline.workspaces.orientations import Orientations
-from sagline.workspaces.space import Workspace
+from sagline.workspaces.levels import Nearest
+from sagline.workspaces.region import Orientations
 from sagline.workspaces.surface import Components, Surface
+from sagline.workspaces.workspace import Workspace
 from sagline.workspaces.wrench_sets import WrenchSet
 
 if TYPE_CHECKING:

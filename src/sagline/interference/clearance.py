@@ -17,8 +17,7 @@ from sagline.core.memory import check_memory
 from sagline.core.progress import blocks
 from sagline.core.results import Result
 from sagline.core.table import Columns, Tabular
-from sagline.interference.mesh import Mesh, extent_text
-from sagline.interference.obstacles import Box, Capsule, Sphere
+from sagline.interference.obstacles import Box, Capsule, Mesh, Sphere, extent_text
 from sagline.interference.pairs import Obstacle, box_rows, cable_rows, pairs_of, rod_row, rows_of_parts
 from sagline.kernels.interference import shapes
 from sagline.kernels.interference.catenary_distance import least_distances, work_arrays_for_pieces

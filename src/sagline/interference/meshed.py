@@ -18,8 +18,7 @@ import numpy as np
 
 from sagline.core.arrays import Array, locked
 from sagline.core.errors import SaglineError
-from sagline.interference.mesh import Mesh
-from sagline.interference.obstacles import Box, Capsule, Sphere
+from sagline.interference.obstacles import Box, Capsule, Mesh, Sphere
 from sagline.interference.pairs import Pairs
 from sagline.kernels.interference import shapes
 from sagline.kernels.interference.catenary_distance import BEGIN, BULGE, END, PIECE_COLUMNS, cut_piece

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sagline.core.arrays import Array, Indices, locked
-from sagline.interference.mesh import Mesh
-from sagline.interference.obstacles import Box, Capsule, Sphere
+from sagline.interference.obstacles import Box, Capsule, Mesh, Sphere
 from sagline.kernels.codes import CATENARY
 from sagline.kernels.interference import shapes
 from sagline.robot.batch import Robots, robot_fields

@@ -41,7 +41,7 @@ from sagline.plot.sheet import (
 from sagline.plot.style import PLAIN, Using
 from sagline.present.summaries import middle_plan
 from sagline.robot.robot import Robot
-from sagline.workspaces.space import Workspace
+from sagline.workspaces.workspace import Workspace
 
 if TYPE_CHECKING:
     from sagline.core.arrays import Array, Flags, Indices

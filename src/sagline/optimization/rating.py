@@ -35,7 +35,7 @@ from sagline.statics.tables import body_table, cable_table, pose_rows
 from sagline.tension.method import kernel_options
 from sagline.tension.methods import MinimumNorm
 from sagline.workspaces.levels import middle_wrench
-from sagline.workspaces.margin_rows import MarginRows, mean_arms
+from sagline.workspaces.margin import MarginRows, mean_arms
 from sagline.workspaces.wrench_sets import NO_LOAD, WrenchSet
 
 BLOCK = 1 << 12  # poses per block, about 0.1 s; interrupts are handled between blocks

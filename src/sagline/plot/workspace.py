@@ -23,8 +23,9 @@ from sagline.plot.sheet import GAP_COLOR, axes_or_new, format_axes, sheet
 from sagline.plot.style import current
 from sagline.robot.pose import Pose
 from sagline.viewer.tension_scale import CABLES, cable_color
-from sagline.workspaces.region import AXES, Plane, Slice, flat_axis, slice_of
-from sagline.workspaces.space import BY_BOX, Workspace, amount_of
+from sagline.workspaces.levels import Plane, Slice, slice_of
+from sagline.workspaces.region import AXES, flat_axis
+from sagline.workspaces.workspace import BY_BOX, Workspace, amount_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -29,7 +29,7 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.reach import is_underconstrained
 from sagline.robot.robot import Robot
-from sagline.workspaces.space import Workspace
+from sagline.workspaces.workspace import Workspace
 
 if TYPE_CHECKING:
     from sagline.core.arrays import Array

@@ -22,8 +22,7 @@ from sagline.statics.tables import robot_terms
 from sagline.sweep.folder import SweepFolder, check_made_here, open_folder, unknown_value
 from sagline.sweep.request import Request, RequestBox, variables_of
 from sagline.tension.method import Options, kernel_options
-from sagline.workspaces.margin import MarginStatus
-from sagline.workspaces.margin_rows import MarginRows
+from sagline.workspaces.margin import MarginRows, MarginStatus
 
 # statuses of feasible, infeasible, open and lost requests
 INVERSE_ENDS: Final = (PoseStatus.SOLVED, PoseStatus.INFEASIBLE, PoseStatus.BORDERLINE, PoseStatus.NOT_CONVERGED)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from sagline.core.arrays import Array, Indices
 from sagline.viewer.readout import css_color, html_block
 from sagline.viewer.tension_scale import Colors, ForceUnit
-from sagline.workspaces.region import Slice
+from sagline.workspaces.levels import Slice
 
 INSIDE: Final = 4  # number of bands above 0, the last one unbounded
 OUTSIDE: Final = 2  # number of bands below 0, the first one unbounded

@@ -22,10 +22,8 @@ from sagline.viewer.slices import MarginScale
 from sagline.viewer.tension_scale import ForceUnit, cable_color
 from sagline.workspaces.boundary import Outline, outline
 from sagline.workspaces.criteria import LeastMargin
-from sagline.workspaces.levels import Details, Levels
-from sagline.workspaces.nearest import nearest_to
-from sagline.workspaces.orientations import Orientations
-from sagline.workspaces.region import Find, Region, region_of
+from sagline.workspaces.levels import Details, Find, Levels, nearest_to
+from sagline.workspaces.region import Orientations, Region, region_of
 from sagline.workspaces.wrench_sets import WrenchSet
 
 OPACITY: Final = 0.35  # opacity, so that the robot inside is visible

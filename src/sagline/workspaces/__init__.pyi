@@ -11,14 +11,14 @@ from .criterion import Criterion as Criterion
 from .margin import Margin as Margin
 from .margin import MarginStatus as MarginStatus
 from .margin import margin as margin
-from .orientations import Orientations as Orientations
-from .orientations import Tilts as Tilts
 from .proof import Proof as Proof
 from .proof import ProofVerdict as ProofVerdict
 from .proof import prove as prove
-from .space import Workspace as Workspace
+from .region import Orientations as Orientations
+from .region import Tilts as Tilts
 from .surface import Components as Components
 from .surface import Surface as Surface
+from .workspace import Workspace as Workspace
 from .workspace import workspace as workspace
 from .wrench_sets import Accelerations as Accelerations
 from .wrench_sets import WrenchBox as WrenchBox

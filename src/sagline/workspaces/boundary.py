@@ -12,11 +12,14 @@ from sagline.core.arguments import whole_number
 from sagline.core.arrays import Array, Flags, Indices, exactly, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.results import Result
-from sagline.workspaces.crossing import Brackets, brackets, crossings, distance_to_box
 from sagline.workspaces.grid import (
+    Brackets,
     Grid,
     Level,
     Net,
+    brackets,
+    crossings,
+    distance_to_box,
     level_values,
     merge_vertices,
     refine_grid,
@@ -25,8 +28,15 @@ from sagline.workspaces.grid import (
 )
 from sagline.workspaces.levels import Levels
 from sagline.workspaces.region import Region
-from sagline.workspaces.surface import Components, Surface, components_of, normals_of, vertex_areas, volumes_of
-from sagline.workspaces.walks import labels_of
+from sagline.workspaces.surface import (
+    Components,
+    Surface,
+    components_of,
+    labels_of,
+    normals_of,
+    vertex_areas,
+    volumes_of,
+)
 
 MOST_CELLS: Final = 128  # along an axis
 MOST_HALVED: Final = 256  # largest number of cells along an axis; this gives 17 million nodes, 0.5 GB

@@ -19,7 +19,7 @@ from sagline.cables.models import model_of
 from sagline.core.arrays import Array, Flags, locked
 from sagline.core.numbers import counted
 from sagline.interference.clearance import ClearanceRows, check_obstacles, obstacles_of
-from sagline.interference.mesh import Mesh
+from sagline.interference.obstacles import Mesh
 from sagline.interference.pairs import Obstacle
 from sagline.kinematics.confirm import confirm
 from sagline.robot.pose import Pose

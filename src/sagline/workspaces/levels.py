@@ -1,4 +1,4 @@
-"""Signed feasibility function of the position."""
+"""Signed feasibility function of the position, its values in a plane, and the pose that is nearest to feasibility."""
 
 from __future__ import annotations
 
@@ -10,15 +10,21 @@ import numpy as np
 
 from sagline.cables.model import CableModel
 from sagline.core.arrays import Array, Indices, locked
+from sagline.core.numbers import n
 from sagline.core.progress import blocks
+from sagline.core.results import Result
 from sagline.kernels import codes
+from sagline.kinematics.inverse import inverse
+from sagline.kinematics.status import PoseStatus
+from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 from sagline.workspaces.criteria import LeastMargin
 from sagline.workspaces.criterion import Criterion, Given
-from sagline.workspaces.margin_rows import Bracket, MarginRows
-from sagline.workspaces.orientations import Orientations
-from sagline.workspaces.wrench_sets import WrenchSet
+from sagline.workspaces.grid import Grid
+from sagline.workspaces.margin import Bracket, MarginRows
+from sagline.workspaces.region import AXES, Orientations
+from sagline.workspaces.wrench_sets import NO_LOAD, WrenchSet
 
 Hull = Literal["exact", "inner", "outer"]
 BLOCK: Final = 1 << 12  # poses per block, about 0.1 s; interrupts are handled between blocks
@@ -158,8 +164,219 @@ class Levels:
         return np.where(unsure, farther, 0.0)
 
 
+_IN_PLANE: Final = ((1, 2), (0, 2), (0, 1))  # horizontal and vertical axis of a drawing, for each normal axis
+
+
+class Plane(NamedTuple):
+    """A plane perpendicular to an axis of the world.
+
+    Attributes:
+        normal: Index of the axis, 0 to 2.
+        at: Coordinate of the plane along the axis [m].
+    """
+
+    normal: int
+    at: float
+
+    @property
+    def axes(self) -> tuple[int, int]:
+        """Horizontal and vertical axis of a drawing of the plane."""
+        return _IN_PLANE[self.normal]
+
+    def __str__(self) -> str:
+        """Equation of the plane."""
+        return f"{AXES[self.normal]} = {self.at:.3g} m"
+
+    def positions(self, across: Array, up: Array) -> Array:
+        """Positions (U C, 3) [m] of a grid, row by row; across, up: coordinates of the C columns and U rows [m]."""
+        places = np.empty((up.size, across.size, 3))
+        first, second = self.axes
+        places[..., self.normal] = self.at
+        places[..., first], places[..., second] = across, up[:, None]
+        return places.reshape(-1, 3)
+
+
+Find = Callable[[Array], Details]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Slice:
+    """Levels and margins on a grid in a plane.
+
+    Attributes:
+        plane: The plane.
+        across: Coordinates of the columns [m], shape (C,).
+        up: Coordinates of the rows [m], shape (U,).
+        level: Level of each node, >= 0 in the workspace, shape (U, C).
+        margin: Signed margins [N], shape (U, C): negative if the loads are infeasible, -infinite if the robot is
+            singular.
+        criterion: Index of the limiting criterion, shape (U, C).
+        cable: Limiting cable, -1 for none, shape (U, C).
+    """
+
+    plane: Plane
+    across: Array
+    up: Array
+    level: Array
+    margin: Array
+    criterion: Indices
+    cable: Indices
+
+
+def slice_of(find: Find, plane: Plane, low: Array, high: Array, shape: tuple[int, int]) -> Slice:
+    """Slice through `find`, a function of positions such as `Levels.details`; `low`, `high`: box corners (3,) [m]."""
+    first, second = plane.axes
+    across, up = np.linspace(low[first], high[first], shape[0]), np.linspace(low[second], high[second], shape[1])
+    found = find(plane.positions(across, up))
+    grid = (up.size, across.size)
+    parts = (found.level, found.margin, found.criterion, found.cable)
+    return Slice(plane, locked(across), locked(up), *(locked(part.reshape(grid)) for part in parts))
+
+
 def middle_wrench(wrenches: WrenchSet) -> Array:
     """Middle of a wrench set: force [N], moment [N m], shape (6,). For a polytope, it is the mean of the corners."""
     ends = np.cumsum(wrenches.sizes)
     means = [wrenches.corners[end - size : end].mean(axis=0) for end, size in zip(ends, wrenches.sizes, strict=True)]
     return locked(wrenches.center + sum(means, start=np.zeros(6)))
+
+
+_STARTS: Final = 3  # number of best grid points from which the search starts
+_STEP: Final = 0.1  # initial step, as a share of the box
+_EVALUATIONS: Final = 300  # largest number of evaluations from each start
+_PRECISION: Final = 1e-4  # precision of the position [m]
+_FAR: Final = 1e6  # finite value that replaces an infinite level in the search
+_UNHELD: Final = 1e3  # reduction of the merit at infeasible poses, if criteria need tensions
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Nearest(Result):
+    """Pose that is nearest to feasibility.
+
+    Attributes:
+        pose: A single pose.
+        level: Level of the pose: < 0, or >= 0 if the search has found a feasible region that is smaller than a cell.
+        margin: Margin of the loads at the pose [N].
+        criterion: Index of the most violated criterion.
+        cables: Indices of the cables that make the pose infeasible.
+        reason: Sentence that explains why the pose is infeasible.
+    """
+
+    pose: Pose
+    level: float
+    margin: float
+    criterion: int
+    cables: tuple[int, ...]
+    reason: str
+
+    def __str__(self) -> str:
+        """The reason."""
+        return self.reason
+
+
+def nearest_to(levels: Levels, grid: Grid, low: Array, high: Array) -> Nearest:
+    """Pose with the largest level, by simplex searches from the best nodes of `grid`; `low`, `high`: corners [m]."""
+    nodes = np.stack(np.unravel_index(np.arange(grid.values.size), grid.values.shape), axis=1)
+    positions = np.clip(grid.positions(nodes), low, high)
+    values = _merit(levels, positions)
+    order = np.argsort(values)[::-1][:_STARTS]
+    best, found = positions[order[0]], float(values[order[0]])
+    for start in positions[order][values[order] > -_FAR]:
+        place, value = _simplex_search(levels, start, low, high)
+        if value > found:
+            best, found = place, value
+    details = levels.details(best[None])
+    rows = levels.orientations.at(best[None], int(details.rotation[0]))
+    pose = Pose._adopt(rows[0, :3].copy(), rows[0, 3:].copy())
+    cables, reason = _reason(levels, pose, details)
+    margin, criterion = float(details.margin[0]), int(details.criterion[0])
+    return Nearest(pose, float(details.level[0]), margin, criterion, cables, reason)
+
+
+def _merit(levels: Levels, positions: Array) -> Array:
+    """Finite merit of `positions`: the level, or, for infeasible loads, a value computed from the feasible fraction.
+
+    Margins alone would lead to singular poses, where all margins have a small absolute value.
+    """
+    found = levels.details(positions)
+    bare = levels.margins_of(NO_LOAD, positions, found.rotation)
+    weight = levels.criteria[0].scale(levels.robot)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        short = np.where(bare > 0.0, _share(bare, found.margin), bare / weight) - 1.0
+    tensions = any(one.needs_tensions for one in levels.criteria)
+    short -= _UNHELD if tensions else 0.0  # levels of poses with tensions are above this value
+    return np.maximum(np.where(found.margin >= 0.0, found.level, short), -_FAR)
+
+
+def _share(bare: Array, margin: Array) -> Array:
+    """Lower bound of the feasible fraction of the load. It is a bound because margins are concave in the load."""
+    return np.asarray(bare / (bare - margin))
+
+
+def _simplex_search(levels: Levels, start: Array, low: Array, high: Array) -> tuple[Array, float]:
+    """Position of a local maximum of the merit, found by a simplex search from `start`, and the merit there."""
+    from scipy.optimize import minimize  # the import takes a quarter of a second
+
+    free = np.flatnonzero(high > low)
+    step = _STEP * (high - low)[free]
+    step = np.where(start[free] + step > high[free], -step, step)
+    simplex = start[free] + np.vstack((np.zeros(len(free)), np.diag(step)))
+
+    def below(part: Array) -> float:
+        place = start.copy()
+        place[free] = part
+        return -float(_merit(levels, place[None])[0])
+
+    options = {"maxfev": _EVALUATIONS, "initial_simplex": simplex, "xatol": _PRECISION, "fatol": 0.0}
+    bounds = list(zip(low[free], high[free], strict=True))
+    answer = minimize(below, start[free], method="Nelder-Mead", bounds=bounds, options=options)
+    place = start.copy()
+    place[free] = answer.x
+    return place, -float(answer.fun)
+
+
+def _reason(levels: Levels, pose: Pose, details: Details) -> tuple[tuple[int, ...], str]:
+    """Cables that make a pose infeasible, and a sentence with the reason."""
+    place = ", ".join(n(x, ".3f") for x in pose.position)
+    at = f"at ({place}) m"
+    if details.level[0] >= 0.0:
+        return (), f"{at} a region smaller than a cell of the grid is feasible: search there in a smaller box"
+    index, cable, margin = int(details.criterion[0]), int(details.cable[0]), float(details.margin[0])
+    own = (cable,) if cable >= 0 else ()
+    criterion = levels.criteria[index]
+    if margin >= 0.0:
+        if np.isinf(details.level[0]):
+            how = PoseStatus(int(inverse(levels.robot, pose, levels.model, levels.tension, levels.middle).status))
+            return own, f"{at} {type(levels.tension).__name__} finds no tensions for {criterion.title}: {how.text}"
+        short = -float(details.level[0]) * criterion.scale(levels.robot)
+        return own, f"{at} the {criterion.title} fails by {n(short, '.3g', criterion.unit)}{_of(own)}"
+    if np.isinf(margin):
+        return own, f"{at}, as in the whole box, the platform is singular, or a cable has no length"
+    if criterion.title != "margin":
+        return own, f"{at} the {criterion.title} fails, and the margin is {n(margin, '.3g', 'N')}"
+    plan = inverse(levels.robot, pose, levels.model, wrench=levels.middle)
+    cables = tuple(int(k) for k in np.flatnonzero(plan.blocking)) or own
+    here = pose.position[None]
+    bare = levels.margins_of(NO_LOAD, here, details.rotation)
+    if not bare[0] > 0.0:
+        return cables, f"{at} the weight alone exceeds the limits by {n(-margin, '.3g', 'N')}{_of(cables)}"
+    share = 100.0 * float(_share(bare, details.margin)[0])
+    text = f"{at} the cables bear {n(share, '.2g')} % of the loads; {n(-margin, '.3g', 'N')} are missing{_of(cables)}"
+    if levels.margins_of(_moments_of(levels.wrenches), here, details.rotation)[0] < 0.0:
+        text += "; the moments of the loads alone are infeasible there"
+    return cables, text
+
+
+def _of(cables: tuple[int, ...]) -> str:
+    if not cables:
+        return ""
+    return f" ({'cable' if len(cables) == 1 else 'cables'} {', '.join(map(str, cables))})"
+
+
+def _moments_of(wrenches: WrenchSet) -> WrenchSet:
+    """Wrench set without its forces."""
+    parts = (wrenches.center, wrenches.segments, wrenches.ellipsoids, wrenches.corners, wrenches.accelerations)
+    center, segments, ellipsoids, corners, accelerations = (part.copy() for part in parts)
+    center[:3] = segments[:, :3] = ellipsoids[:, :3] = corners[:, :3] = accelerations[0] = 0.0
+    for part in (center, segments, ellipsoids, corners, accelerations):
+        locked(part)
+    return WrenchSet(center, segments, ellipsoids, corners, wrenches.sizes, accelerations)

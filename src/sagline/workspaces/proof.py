@@ -24,7 +24,7 @@ from sagline.robot.reach import check_cable_count
 from sagline.robot.robot import Robot
 from sagline.statics.tables import robot_terms
 from sagline.tension.method import LIMITS_OF
-from sagline.workspaces.orientations import check_tilt
+from sagline.workspaces.region import check_tilt
 from sagline.workspaces.wrench_sets import WrenchSet, load_of
 
 

@@ -1,19 +1,22 @@
-"""Workspace: the set of positions at which all criteria are met."""
+"""Workspace of a robot: the set of positions at which all criteria are met, with its volume and its limits."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-from typing import Final, get_args
+from dataclasses import dataclass, replace
+from textwrap import wrap
+from typing import Any, Final, NamedTuple, get_args
 
 import numpy as np
 
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary, model_of
 from sagline.core.arguments import brief, callback, choice, instance, whole_number
-from sagline.core.arrays import Array, Flags, locked, number
+from sagline.core.arrays import Array, Codes, Flags, Indices, locked, number
 from sagline.core.errors import InvalidValueError
+from sagline.core.numbers import SPACE, counted, n
 from sagline.core.progress import Progress
+from sagline.core.results import Result, Saved, formats
 from sagline.robot.pose import PoseBox
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
@@ -21,13 +24,217 @@ from sagline.tension.methods import DEFAULT, method_of
 from sagline.workspaces.boundary import MOST_CELLS, boundary, uncertain_volume
 from sagline.workspaces.criteria import LeastMargin
 from sagline.workspaces.criterion import Criterion, check_continuous
-from sagline.workspaces.levels import Hull, Levels
-from sagline.workspaces.nearest import nearest_to
-from sagline.workspaces.orientations import Orientations, Tilts, orientations_of
-from sagline.workspaces.region import AXES, Region, flat_axis, region_of
+from sagline.workspaces.levels import Hull, Levels, Nearest, nearest_to
+from sagline.workspaces.region import AXES, Orientations, Region, Tilts, flat_axis, orientations_of, region_of
 from sagline.workspaces.separation import exclusion, separated
-from sagline.workspaces.space import BY_BOX, Workspace
+from sagline.workspaces.surface import Components, Surface, vertex_areas
 from sagline.workspaces.wrench_sets import WrenchSet, load_of
+
+HULLS: Final[dict[Hull, str]] = {
+    "inner": "inner: every position inside is proved feasible",
+    "outer": "outer: every position outside is proved infeasible",
+}
+BY_BOX: Final = -1  # value of `limiting` at vertices on a face of the box
+MOST_LIMITS: Final = 10  # largest number of shares that are printed
+_MOST_PARTS: Final = 5  # largest number of components whose volumes are printed
+_WIDTH: Final = 80  # width of the printed text, in columns
+_HEAD: Final = 12  # indentation of each line, in columns
+
+
+class Limit(NamedTuple):
+    """Share of the surface that one criterion and one cable limit.
+
+    Attributes:
+        criterion: Title of the criterion.
+        cable: Limiting cable, -1 if there is none.
+        share: Share of the surface outside the faces of the box, 0 to 1.
+        number: Index of the criterion, from 0.
+    """
+
+    criterion: str
+    cable: int
+    share: float
+    number: int
+
+    def __str__(self) -> str:
+        """Names of the criterion and the cable."""
+        return self.criterion if self.cable < 0 else f"{self.criterion}, cable {self.cable}"
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Workspace(Result, Saved):
+    """Result of `workspace`.
+
+    For a planar robot, and in a box without extent along one axis, the workspace is a part of a plane. Then the volume
+    is an area [m2], and the surface encloses a slab around the area.
+
+    Attributes:
+        robot: The robot.
+        box: Box of positions that was searched.
+        wrenches: Loads in addition to the weight.
+        orientations: Orientations of the platform.
+        criteria: Criteria that are met in the workspace, the margin first.
+        model: Cable model.
+        tension: Tension distribution method, for criteria on tensions.
+        moment_arm: Lever arm as in `margin` [m]; None for the mean lever arm.
+        hull: Margin that determines the surface: "exact" for its value, "inner" for its lower bound, "outer" for its
+            upper bound.
+        unit: Unit of the volume, "m³" or "m²".
+        volume: Volume or area in this unit.
+        volume_error: Error bound of the volume; 0 for an empty workspace. It includes the volume between triangles and
+            boundary, and the uncertainty of the margin at vertices. It does not include parts and gaps that are thinner
+            than two cells of the finest grid.
+        components: Components of the workspace.
+        surface: The closed boundary, including the faces of the box that the workspace reaches.
+        limiting: Index of the limiting criterion at each vertex of the surface, shape (V,); -1 on a face of the box.
+        limiting_cable: Limiting cable at each vertex, shape (V,); -1 if there is none.
+        margin: Margin of the loads at each vertex [N], shape (V,).
+        open_faces: Faces of the box that the workspace reaches, for example "x low". The workspace may continue beyond
+            these faces; the volume is the volume inside the box.
+        x: Coordinates of the nodes of the grid [m], shape (X,).
+        y: Coordinates of the nodes along y, shape (Y,).
+        z: Coordinates of the nodes along z, shape (Z,).
+        level: Smallest value of the criteria, each divided by its scale, at these nodes, >= 0 inside, shape (X, Y, Z).
+        nearest: The pose nearest to feasibility if the workspace is empty; otherwise None.
+    """
+
+    robot: Robot
+    box: PoseBox
+    wrenches: WrenchSet
+    orientations: Orientations
+    criteria: tuple[Criterion, ...]
+    model: CableModel
+    tension: TensionMethod
+    moment_arm: float | None
+    hull: Hull
+    unit: str
+    volume: float
+    volume_error: float
+    components: Components
+    surface: Surface
+    limiting: Codes
+    limiting_cable: Indices
+    margin: Array
+    open_faces: tuple[str, ...]
+    x: Array
+    y: Array
+    z: Array
+    level: Array
+    nearest: Nearest | None
+
+    @property
+    def axes(self) -> tuple[Array, Array, Array]:
+        """Coordinates of the nodes of the grid along x, y and z [m]."""
+        return self.x, self.y, self.z
+
+    @property
+    def limits(self) -> tuple[Limit, ...]:
+        """Criteria and cables that limit the workspace, in decreasing order of their shares of the surface."""
+        inner = (self.limiting[self.surface.faces] != BY_BOX).any(axis=1)  # False for triangles on the box
+        areas = vertex_areas(self.surface.vertices, self.surface.faces[inner])
+        k = np.flatnonzero((self.limiting != BY_BOX) & (areas > 0.0))
+        pairs, place = np.unique(
+            np.stack((self.limiting[k], self.limiting_cable[k]), axis=1), axis=0, return_inverse=True
+        )
+        sums = np.bincount(place.ravel(), areas[k], minlength=len(pairs))
+        return tuple(
+            Limit(self.criteria[pairs[i, 0]].title, int(pairs[i, 1]), float(sums[i] / sums.sum()), int(pairs[i, 0]))
+            for i in np.argsort(-sums, kind="stable")
+        )
+
+    @property
+    def field(self) -> Any:
+        """Level, margin, limiting criterion and cable at the points of the grid, with their coordinates.
+
+        The result is an xarray Dataset with dimensions x, y and z. Each call computes it again.
+        """
+        return formats().writer_of(self).field_of(self)
+
+    def levels(self) -> Levels:
+        """Signed feasibility function of the position.
+
+        Returns:
+            A function of positions (N, 3) [m] that returns levels (N,), and has a method `details`.
+        """
+        return Levels(
+            self.robot,
+            self.wrenches,
+            self.orientations,
+            self.criteria,
+            self.model,
+            self.tension,
+            self.moment_arm,
+            flat_axis(self.box),
+            hull=self.hull,
+        )
+
+    def __str__(self) -> str:
+        """Summary in lines of at most 80 columns."""
+        return "\n".join(_summary_lines(self)).replace(SPACE, " ")
+
+
+def _summary_lines(space: Workspace) -> list[str]:
+    """Summary of a workspace in lines of at most 80 columns."""
+    lines = [f"Workspace of {space.robot.name}: {amount_of(space)}"]
+    for head, text in facts_of(space):
+        lines += wrap(text, _WIDTH, initial_indent=f"  {head:<{_HEAD}}", subsequent_indent=" " * (_HEAD + 2))
+    limits = space.limits
+    if limits:
+        lines.append("  limited by, in shares of its surface:")
+        lines += [f"    {n(100.0 * limit.share, '.1f'):>5} %  {limit}" for limit in limits[:MOST_LIMITS]]
+        if len(limits) > MOST_LIMITS:
+            rest = sum(limit.share for limit in limits[MOST_LIMITS:])
+            lines.append(f"    {n(100.0 * rest, '.1f'):>5} %  {counted(len(limits) - MOST_LIMITS, 'other')}")
+    return lines
+
+
+def amount_of(space: Workspace) -> str:
+    """Text of the volume or area with its error bar, "789.4 ± 0.2 m³", and of the number of parts."""
+    if space.nearest is not None:
+        return f"empty, 0 {space.unit}"
+    if space.volume_error <= 1e-9 * space.volume:  # the workspace is the whole box
+        return f"{space.volume:.6g} ± 0 {space.unit}"
+    places = max(0, 1 - int(np.floor(np.log10(space.volume_error))))
+    size = f"{space.volume:.{places}f} ± {space.volume_error:.{places}f} {space.unit}"
+    count = space.components.count
+    where = "" if space.components.separate.all() else " on this grid"
+    return size if count == 1 else f"{size} in {count} parts{where}"
+
+
+def facts_of(space: Workspace) -> list[tuple[str, str]]:
+    """Box, loads, orientations, model and criteria of a workspace, as pairs of a heading and a text."""
+    facts = [("box", f"{span_of(space.box)} m"), ("loads", str(space.wrenches))]
+    facts += [("platform", str(space.orientations)), ("cables", type(space.model).__name__)]
+    if space.hull != "exact":
+        facts.append(("hull", HULLS[space.hull]))
+    if asked := [str(one) for one in space.criteria if not one.always]:
+        facts.append(("criteria", ", ".join(asked)))
+    if space.components.count > 1:
+        sizes = [n(volume, ".3g", space.unit) for volume in space.components.volume[:_MOST_PARTS]]
+        listed = ", ".join(sizes) + ", …" * (space.components.count > _MOST_PARTS)
+        facts.append(("parts", f"{listed}; {_separation_text(space.components)}"))
+    if space.open_faces:
+        faces = ", ".join(space.open_faces)
+        facts.append(("open", f"the workspace reaches the box at {faces}: only its part in this box is known"))
+    if space.nearest is not None:
+        facts.append(("nearest", space.nearest.reason))
+    return facts
+
+
+def _separation_text(components: Components) -> str:
+    """Sentence on the parts: proved separate, or the result of the search for a connection."""
+    proved = int(components.separate.sum())
+    if proved == components.count:
+        return "proved: no path in the box leads from one part to another"
+    rest = "the robot may be able to go from one part to another, because neither a path nor a proof was found"
+    return f"{proved} proved separate; for the others, {rest}" if proved else rest
+
+
+def span_of(box: PoseBox) -> str:
+    """Range of a box of positions along x, y and z [m], as text."""
+    ends = zip(box.low, box.high, strict=True)
+    return ", ".join(f"{n(low)} to {n(high)}" if low < high else n(low) for low, high in ends)
+
 
 LEAST_CELLS: Final = 4
 _CROSSED: Final = 100  # approximate number of evaluated poses per cell at the boundary

@@ -8,7 +8,7 @@ import pytest
 from sagline.core.arrays import Array
 from sagline.kernels.algebra.bounds import HIGH, LOW, START
 from sagline.kernels.codes import POSE_INFEASIBLE, POSE_NOT_CONVERGED, POSE_SOLVED, POSE_UNBOUNDED
-from sagline.kernels.tension import centers as c
+from sagline.kernels.tension import other_methods as c
 from tests.kernels.compiled import from_python
 from tests.kernels.tension.problems import Problem, random_problem, room_of
 from tests.tiers import wide

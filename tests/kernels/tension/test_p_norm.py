@@ -7,12 +7,12 @@ from scipy.optimize import minimize, nnls
 from sagline.core.arrays import Array
 from sagline.kernels.algebra.bounds import HIGH, LOW
 from sagline.kernels.codes import POSE_INFEASIBLE, POSE_SOLVED
-from sagline.kernels.tension import norms
+from sagline.kernels.tension import nearest
 from tests.kernels.compiled import from_python, memory
 from tests.kernels.tension.problems import Problem, nearness, random_problem
 from tests.tiers import wide
 
-share_by_norm = from_python(norms.share_by_norm)
+share_by_norm = from_python(nearest.share_by_norm)
 
 
 def size_at(problem: Problem, offset: Array, p: float, point: Array) -> float:

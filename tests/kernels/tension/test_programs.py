@@ -11,7 +11,7 @@ from sagline.core.arrays import Array
 from sagline.kernels.algebra.bounds import HIGH, LOW, START
 from sagline.kernels.algebra.programs import LP_EMPTY, LP_GAVE_UP, LP_SOLVED, LP_UNBOUNDED
 from sagline.kernels.codes import POSE_INFEASIBLE, POSE_NOT_CONVERGED, POSE_SOLVED, POSE_UNBOUNDED
-from sagline.kernels.tension import norms as p
+from sagline.kernels.tension import nearest as p
 from tests.kernels.compiled import from_python, memory
 from tests.kernels.tension.problems import Problem, basis_of, nearness, random_problem
 from tests.tiers import wide

@@ -18,7 +18,7 @@ from sagline.dynamics.vibration.dynamic_stiffness import Damping
 from sagline.kernels import codes, tables
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.dynamics import chain as c
-from sagline.kernels.dynamics import chain_run, chains
+from sagline.kernels.dynamics import chains
 from sagline.kernels.dynamics import chains as ends
 from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics import rigid_body as body
@@ -160,8 +160,8 @@ class ChainPlant(Plant):
     def arguments(self, rules: Any, numbers: Any, inputs: Any) -> Any:
         """Arguments of the kernel of chains, in the order of `Plant.arguments`."""
         lengths: TimeTable = inputs[0]
-        if self._work.size != chain_run.ROOM + 2 * lengths.value.shape[1]:
-            self._work = np.zeros(chain_run.ROOM + 2 * lengths.value.shape[1])
+        if self._work.size != chains.ROOM + 2 * lengths.value.shape[1]:
+            self._work = np.zeros(chains.ROOM + 2 * lengths.value.shape[1])
         ends = self._table.copy()
         ends[:, tables.PLATFORM_X : tables.PLATFORM_Z + 1] = self._carrier.levers(self._ends)[self.cables]
         freedom = self.robot.freedom

@@ -34,7 +34,7 @@ from sagline.kernels.dynamics import motion
 from sagline.kernels.dynamics import progress as k
 from sagline.kernels.dynamics import rigid_body as body
 from sagline.kernels.dynamics.massless import LOADED
-from sagline.kernels.dynamics.period import begin_period
+from sagline.kernels.dynamics.progress import begin_period
 from sagline.kernels.jit import bound
 from sagline.kinematics.inverse_solver import copy_in
 from sagline.robot.batch import dead_cable

@@ -12,7 +12,7 @@ from sagline.core.arrays import Array, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.fields import NumberFields, rule
 from sagline.kernels.dynamics import drives as d
-from sagline.kernels.dynamics.period import read_cells, read_encoders
+from sagline.kernels.dynamics.progress import read_cells, read_encoders
 from sagline.kernels.jit import bound
 from sagline.robot.drum import drum_lever, drums_of, not_given
 from sagline.robot.robot import Robot

@@ -14,7 +14,6 @@ import math
 import numpy as np
 
 from sagline.core.arrays import Array, Indices
-from sagline.kernels.interference.nearest import nearest_of_curves, nearest_to_box, square_between
 from sagline.kernels.interference.shapes import (
     AXES,
     BOX,
@@ -28,7 +27,10 @@ from sagline.kernels.interference.shapes import (
     bulge,
     level_point,
     nearest_in_box,
+    nearest_of_curves,
+    nearest_to_box,
     point,
+    square_between,
     to_box,
 )
 from sagline.kernels.jit import entry, kernel

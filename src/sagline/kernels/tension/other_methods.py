@@ -1,22 +1,159 @@
-"""Tension distribution methods that are not projections: selection of the method, and the closed forms.
+"""Tension distribution methods that are not projections: their selection, the analytic center, and the closed forms.
 
-The closed forms give tensions near the middle of the limits without a search. At some feasible poses they find no
-distribution.
+The analytic center has the largest product of the distances to all limits. The closed forms give tensions near the
+middle of the limits without a search. At some feasible poses they find no distribution.
 """
 
 from __future__ import annotations
 
+import math
+
 from sagline.core.arrays import Array
 from sagline.kernels import codes
-from sagline.kernels.algebra.bounds import HIGH, LOW, START, TOLERANCE, largest_bound
-from sagline.kernels.algebra.factors import normalize_row, orthogonalize_row
+from sagline.kernels.algebra.bounds import HIGH, LOW, START, STRIP_ROWS, TOLERANCE, largest_bound
+from sagline.kernels.algebra.factors import factor_positive, normalize_row, orthogonalize_row, solve_lower, solve_upper
+from sagline.kernels.algebra.programs import LP_SOLVED, lowest_point
 from sagline.kernels.jit import glue, kernel
 from sagline.kernels.memory import Memory, block
-from sagline.kernels.tension.centers import share_at_center
-from sagline.kernels.tension.nearest import Distribution, ReferencePoint, satisfies_limits, set_point, share_nearest
-from sagline.kernels.tension.norms import share_by_norm, share_lowest_maximum, share_lowest_sum
-from sagline.kernels.tension.on_polygon import distribute_on_polygon
+from sagline.kernels.tension.nearest import (
+    Distribution,
+    ReferencePoint,
+    program_status,
+    satisfies_limits,
+    set_point,
+    share_by_norm,
+    share_lowest_maximum,
+    share_lowest_sum,
+    share_nearest,
+)
+from sagline.kernels.tension.on_polygon import centroid, distribute_on_polygon, feasible_corners
 from sagline.kernels.tension.polygon import WorkArrays
+
+THIN = 1e-9  # relative to the largest tension; a thinner feasible set has no center
+NEWTON_STEPS = 200
+CENTERED = 1e-18  # square of the Newton decrement at which the search ends
+
+
+@kernel
+def share_at_center(bounds: Array, null: Array, point: Array, work: WorkArrays) -> int:
+    """Move the point (r,) to the analytic center. The search starts from the previous center if there is one."""
+    corners, labels, known = work.corners, work.labels, work.known
+    if known[0] > 0 and keeps_limits_inside(bounds, null, point) and _analytic_center(bounds, null, work.rest, point):
+        return codes.POSE_SOLVED
+    known[0] = 0
+    r, m = null.shape
+    if r > 2:
+        status = deepest_point(bounds, null, work, point)
+        if status != codes.POSE_SOLVED:
+            return status
+    else:
+        count = feasible_corners(bounds, null, corners, labels)
+        if count == 0:
+            return codes.POSE_INFEASIBLE
+        for k in range(count):
+            if labels[k] >= 2 * m:
+                return codes.POSE_UNBOUNDED
+        x, y = centroid(corners, count)
+        point[0] = x
+        if r == 2:
+            point[1] = y
+    if not _analytic_center(bounds, null, work.rest, point):
+        return codes.POSE_NOT_CONVERGED
+    known[0] = 1
+    return codes.POSE_SOLVED
+
+
+@kernel
+def keeps_limits_inside(bounds: Array, null: Array, point: Array) -> bool:
+    """True if the distance of `point` from every limit exceeds the smallest thickness."""
+    slack = THIN * largest_bound(bounds)
+    for i in range(null.shape[1]):
+        tension = bounds[START, i]
+        for k in range(point.size):
+            tension += null[k, i] * point[k]
+        if not min(tension - bounds[LOW, i], bounds[HIGH, i] - tension) > slack:
+            return False
+    return True
+
+
+@kernel
+def deepest_point(bounds: Array, null: Array, work: WorkArrays, point: Array) -> int:
+    """Fill the point (r,) whose tensions are farthest from their nearest limits. Returns the pose's status."""
+    r, m = null.shape
+    rows, memory = block(work.rest, r + 1, 2 * m)
+    # one bound per limit; the distance from all limits is an additional unknown, by which the bounds are narrowed
+    halves, memory = block(memory, STRIP_ROWS, 2 * m)
+    vectors, memory = block(memory, 2, r + 1)
+    cost, found = vectors[0], vectors[1]
+    for i in range(m):
+        for k in range(r):
+            rows[k, i], rows[k, m + i] = null[k, i], -null[k, i]
+        rows[r, i] = rows[r, m + i] = -1.0
+        halves[START, i], halves[LOW, i], halves[HIGH, i] = bounds[START, i], bounds[LOW, i], math.inf
+        halves[START, m + i], halves[LOW, m + i] = -bounds[START, i], -bounds[HIGH, i]
+        halves[HIGH, m + i] = math.inf
+    for k in range(r):
+        cost[k] = 0.0
+    cost[r] = -1.0
+    slack = TOLERANCE * largest_bound(bounds)
+    work.basis.labels[0] = -1
+    outcome = lowest_point(rows, halves, cost, slack, work.basis, found)
+    for k in range(r):
+        point[k] = found[k]
+    return codes.POSE_INFEASIBLE if outcome == LP_SOLVED and found[r] < -slack else program_status(outcome)
+
+
+@kernel
+def _analytic_center(bounds: Array, null: Array, memory: Memory, point: Array) -> bool:
+    """Move a point (r,) inside the feasible set to the point with the largest product of distances to all limits.
+
+    The method takes damped Newton steps on the self-concordant barrier function and ignores infinite limits. If the set
+    is too thin to have interior points, the point does not change.
+
+    Returns True if the center was found.
+    """
+    r, m = null.shape
+    vectors, memory = block(memory, 2, r)
+    curve, memory = block(memory, r, r)
+    slope, step = vectors[0], vectors[1]
+    largest = largest_bound(bounds)
+    for _ in range(NEWTON_STEPS):
+        for k in range(r):
+            slope[k] = 0.0
+            for j in range(k + 1):
+                curve[k, j] = 0.0
+        for i in range(m):
+            tension = bounds[START, i]
+            for k in range(r):
+                tension += null[k, i] * point[k]
+            below = tension - bounds[LOW, i]
+            above = bounds[HIGH, i] - tension
+            if not min(below, above) > THIN * largest:
+                return True
+            below = 1.0 / below
+            above = 1.0 / above
+            push = above - below
+            weight = below * below + above * above
+            for k in range(r):
+                slope[k] += push * null[k, i]
+                for j in range(k + 1):
+                    curve[k, j] += weight * null[k, i] * null[j, i]
+        if not factor_positive(curve, 0.0, curve):
+            return False
+        for k in range(r):
+            step[k] = -slope[k]
+        solve_lower(curve, step)
+        decrement = 0.0
+        for k in range(r):
+            decrement += step[k] * step[k]
+        solve_upper(curve, step)
+        share = 1.0 if decrement < 0.0625 else 1.0 / (1.0 + math.sqrt(decrement))
+        for k in range(r):
+            point[k] += share * step[k]
+        if decrement < CENTERED:
+            return True
+    return False
+
 
 # a cable counts as dependent on the fixed cables if the squared length of its remaining row is smaller
 DEPENDENT = 1e-10

@@ -21,8 +21,8 @@ from sagline.viewer.readout import html_block, refused, sentence
 from sagline.viewer.robot_scene import INFEASIBLE, PLATFORM, REST, Nodes
 from sagline.viewer.slices import MarginScale, Picture, picture_of
 from sagline.viewer.tension_scale import force_unit
-from sagline.workspaces.levels import Levels
-from sagline.workspaces.region import Plane, Region, region_of, slice_of
+from sagline.workspaces.levels import Levels, Plane, slice_of
+from sagline.workspaces.region import Region, region_of
 from sagline.workspaces.wrench_sets import WrenchBox
 
 BOUNDARY_WIDTH, LINE_WIDTH, LINE_COLOR = 4.0, 1.5, (120, 128, 138)  # line widths [px], and color
