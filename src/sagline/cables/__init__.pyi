@@ -1,7 +1,7 @@
 """Public names of `sagline.cables`."""
 
 from .cable import Cable as Cable
-from .creep import Creep as Creep
+from .cable import Creep as Creep
 from .model import CableModel as CableModel
 from .model import CableState as CableState
 from .model import CableStatus as CableStatus

@@ -64,7 +64,7 @@ def cell_errors(robot: Robot) -> tuple[Array, Array]:
 def balance_slope(state: Equilibrium) -> Array:
     """Derivatives of the wrench with respect to frame-end tensions, at a fixed platform, (..., n, m) [1, m]."""
     slopes = cable_slopes(state)
-    wrench = on_platform(slopes.by_length, slopes.levers) / tension_slopes(state, slopes).by_length[..., None, :]
+    wrench = on_platform(slopes.by_length, slopes.levers) / tension_slopes(state, slopes)[1][..., None, :]
     found: Array = -first_of(state.robot).freedom @ wrench  # minus, because these are forces on the cable
     return found
 

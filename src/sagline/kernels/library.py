@@ -19,20 +19,12 @@ SUFFIX: Final = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 FOLDER: Final = SOURCES / "compiled"
 FILES: Final = (f"kernels{SUFFIX}", f"kernels_v3{SUFFIX}")
 SHORT_MEMORY, WRONG_TYPES = 1, -1
-FUNCTIONS: Final = (  # functions of Python's stable interface, in the order of `Python` in python.c
-    "PyObject_GetBuffer",
-    "PyBuffer_Release",
-    "PyTuple_Size",
-    "PyTuple_GetItem",
-    "PyFloat_AsDouble",
-    "PyLong_AsLongLong",
-    "PyObject_IsTrue",
-    "PyErr_Occurred",
-    "PyErr_Clear",
-    "PyEval_SaveThread",
-    "PyEval_RestoreThread",
+# functions of Python's stable interface, in the order of `Python` in python.c
+_FUNCTIONS: Final = (
+    "PyObject_GetBuffer PyBuffer_Release PyTuple_Size PyTuple_GetItem PyFloat_AsDouble PyLong_AsLongLong "
+    "PyObject_IsTrue PyErr_Occurred PyErr_Clear PyEval_SaveThread PyEval_RestoreThread"
 )
-
+FUNCTIONS: Final = _FUNCTIONS.split(" ")
 
 # letter of a format -> conversion of a number, and member of its slot
 CONVERSIONS: Final[dict[str, tuple[Callable[[Any], Any], str]]] = {
@@ -43,11 +35,7 @@ CONVERSIONS: Final[dict[str, tuple[Callable[[Any], Any], str]]] = {
 
 
 class LibraryError(Exception):
-    """The library cannot be used.
-
-    Attributes:
-        stale: True if the library exists and was built from other sources.
-    """
+    """The library cannot be used. `stale` is true if it exists and was built from other sources."""
 
     def __init__(self, reason: str, *, stale: bool = False) -> None:
         """Store the reason why the library cannot be used."""
@@ -148,11 +136,7 @@ class Library:
     """Entries of one shared library."""
 
     def __init__(self, file: Path) -> None:
-        """Load a file.
-
-        Raises:
-            LibraryError: If the file is missing, cannot be loaded, or was built from other sources.
-        """
+        """Load `file`. LibraryError if it is missing, cannot be loaded, or was built from other sources."""
         if not file.is_file():
             raise LibraryError(f"the library of compiled kernels, {file.name}, does not exist")
         try:
@@ -175,11 +159,7 @@ class Library:
 
     @classmethod
     def load(cls, folder: Path = FOLDER) -> Library:
-        """The library for this processor.
-
-        Raises:
-            LibraryError: If no library can be used.
-        """
+        """The library for this processor. LibraryError if no library can be used."""
         everywhere, newer = (folder / name for name in FILES)
         library = cls(everywhere)
         if library._library.sagline_is_v3():

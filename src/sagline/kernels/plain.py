@@ -25,8 +25,7 @@ ENTRY: Final = "entry"  # name of the decorator of kernels that Python calls
 def plain(function: F) -> F:
     """A kernel in plain Python, with the line numbers of its file. Functions that the kernel calls must also be plain.
 
-    Args:
-        function: A function of the subset that docs/contributing/c-kernels.md defines.
+    `function` is in the subset that docs/contributing/c-kernels.md defines.
     """
     assert isinstance(function, FunctionType)
     lines, first = inspect.getsourcelines(function)
@@ -38,13 +37,8 @@ def plain(function: F) -> F:
     outer = around.body[0]
     assert isinstance(outer, ast.FunctionDef)
     outer.body[:0] = module.body
-    code = compile(
-        ast.fix_missing_locations(around),
-        function.__code__.co_filename,
-        "exec",
-        annotations.compiler_flag,
-        dont_inherit=True,
-    )
+    tree, file = ast.fix_missing_locations(around), function.__code__.co_filename
+    code = compile(tree, file, "exec", annotations.compiler_flag, dont_inherit=True)
     space: dict[str, Any] = {}
     exec(code, function.__globals__, space)
     found: F = space["around"](**REPLACEMENTS)

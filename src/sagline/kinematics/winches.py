@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Final, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.cables.creep import Creep
+from sagline.cables.cable import Creep
 from sagline.core.arguments import choice, instance, optional
 from sagline.core.arrays import Array, Flags, kernel_input, locked, numbers
 from sagline.core.errors import InvalidValueError

@@ -106,17 +106,12 @@ def frame_end_forces(state: Equilibrium) -> Array:
 _LONGER = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])  # the last column is a change of the cable length by 1 m
 
 
-class TensionSlopes(NamedTuple):
-    """Derivatives of the tension at the frame end of each cable."""
+def tension_slopes(state: Equilibrium, slopes: CableSlopes) -> tuple[Array, Array]:
+    """Derivatives of the tensions at the frame ends with respect to motion and length.
 
-    # with respect to (displacement of the center of mass, rotation vector) at fixed lengths, shape (..., m, 6) [N/m,
-    # N/rad]
-    by_motion: Array
-    by_length: Array  # with respect to the length of the same cable, with a fixed platform, shape (..., m) [N/m]
-
-
-def tension_slopes(state: Equilibrium, slopes: CableSlopes) -> TensionSlopes:
-    """Derivatives of the tensions at the frame ends."""
+    The motion is (displacement of the center of mass, rotation vector) at fixed lengths, shape (..., m, 6) [N/m,
+    N/rad]. The length is that of the same cable, with a fixed platform, shape (..., m) [N/m].
+    """
     unit = np.eye(6)
     ends = unit[:, :3] + np.cross(unit[:, 3:], slopes.levers[..., None, :])
     forces = np.concatenate((ends @ np.swapaxes(slopes.blocks, -1, -2), slopes.by_length[..., None, :]), axis=-2)
@@ -125,7 +120,7 @@ def tension_slopes(state: Equilibrium, slopes: CableSlopes) -> TensionSlopes:
     else:
         ends = np.concatenate((ends, np.zeros_like(slopes.levers)[..., None, :]), axis=-2)
         found = _leaving(state, slopes, forces, ends)
-    return TensionSlopes(found[..., :6], found[..., 6])
+    return found[..., :6], found[..., 6]
 
 
 def _at_anchors(state: Equilibrium, slopes: CableSlopes, forces: Array) -> Array:

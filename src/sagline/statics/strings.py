@@ -39,14 +39,8 @@ def strings_of(state: Equilibrium) -> Strings:
     m = cables.shape[-1]
     material = cables_of(state.robot)
     weight = 0.0 if cables.model.weightless else material.linear_density * first_of(state.robot).gravity
-    known = (
-        cables.horizontal_tension,
-        cables.vertical_force,
-        cables.unstrained_length,
-        weight,
-        material.axial_stiffness,
-        material.linear_density,
-    )
+    forces = (cables.horizontal_tension, cables.vertical_force)
+    known = (*forces, cables.unstrained_length, weight, material.axial_stiffness, material.linear_density)
     table = np.zeros((*cables.shape, columns.STRING_COLUMNS))
     for k, field in enumerate(known):
         table[..., k] = field

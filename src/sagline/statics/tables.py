@@ -39,6 +39,8 @@ def robot_terms(robot: Robots) -> tuple[Array, Array, Array]:
 
 def _cable_rows(robot: Robot) -> Array:
     """Rows of `cable_table` for one robot, (m, CABLE_COLUMNS)."""
+    none = np.zeros(robot.cable_count)
+    run = (none, none) if robot.winches is None else (robot.winches.dead_cable, robot.winches.dead_rise)
     columns = (
         robot.frame_anchors,
         robot.platform_anchors,
@@ -46,16 +48,9 @@ def _cable_rows(robot: Robot) -> Array:
         robot.cables.axial_stiffness[:, None],
         robot.tension_min[:, None],
         robot.tension_max[:, None],
-        _behind(robot),
+        np.stack((*pulleys_of(robot), *run), axis=1),  # pulley radius, entry, dead length and dead rise
     )
     return np.hstack(columns)
-
-
-def _behind(robot: Robot) -> Array:
-    """Routing data of the cables: pulley radius, entry, dead length and dead rise, (m, 4)."""
-    none = np.zeros(robot.cable_count)
-    run = (none, none) if robot.winches is None else (robot.winches.dead_cable, robot.winches.dead_rise)
-    return np.stack((*pulleys_of(robot), *run), axis=1)
 
 
 def chord_geometry(robot: Robots, pose: Pose) -> Array:

@@ -88,17 +88,11 @@ def capacity_margin(state: Equilibrium) -> Array:
     margins = np.empty(len(rows))
     wrenches, memory = np.atleast_2d(state.wrench), memory_for(shared.cable_count)
     freedom, bodies, robots = robot_terms(state.robot)
+    terms = (model.code, *model.parameters), (LIMITS_OF[shared.tension_limits_of], np.nan)
     for part in blocks(len(rows), BLOCK):
-        margins_of_poses(
-            (model.code, *model.parameters),
-            (LIMITS_OF[shared.tension_limits_of], np.nan),
-            (freedom, rows_of(bodies, part), rows_of(robots, part)),
-            rows[part],
-            rows_of(wrenches, part),
-            locked(np.ascontiguousarray(pulls[part])),
-            memory,
-            margins[part],
-        )
+        own = (freedom, rows_of(bodies, part), rows_of(robots, part))
+        pull = locked(np.ascontiguousarray(pulls[part]))
+        margins_of_poses(*terms, own, rows[part], rows_of(wrenches, part), pull, memory, margins[part])
     return margins.reshape(state.pose.shape)
 
 

@@ -161,7 +161,8 @@ def _driven_by_speeds(state: Equilibrium, damping: Damping) -> _Matrices:
     robot, slopes = state.one_robot, _solved_slopes(state)
     freedom, n, m = robot.freedom, len(robot.freedom), robot.cable_count
     freed = np.linalg.inv(freedom @ mass_matrix(state) @ freedom.T) @ freedom  # maps a wrench to the acceleration
-    tension, loss = tension_slopes(state, slopes), _stretch_loss(state, slopes, damping.loss_time)
+    tension_by_place, tension_by_length = tension_slopes(state, slopes)
+    loss = _stretch_loss(state, slopes, damping.loss_time)
     by_motion, by_speed, tension_by_motion, tension_by_speed = loss
     drag = by_motion + _modal_drag(state, damping.modal_damping)
     size, outputs = 2 * n + m, 6 + 2 * m
@@ -175,9 +176,9 @@ def _driven_by_speeds(state: Equilibrium, damping: Damping) -> _Matrices:
     B[speed, :m], B[speed, m:] = -freed @ by_speed, freed
     B[length, :m] = np.eye(m)
     C[:6, place] = freedom.T
-    C[tensions, place] = tension.by_motion @ freedom.T
+    C[tensions, place] = tension_by_place @ freedom.T
     C[tensions, speed] = tension_by_motion @ freedom.T
-    C[tensions, length] = np.diag(tension.by_length)
+    C[tensions, length] = np.diag(tension_by_length)
     C[6 + m :, length] = np.eye(m)
     D[tensions, :m] = np.diag(tension_by_speed)
     return A, B, C, D

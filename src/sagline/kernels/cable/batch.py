@@ -228,13 +228,9 @@ def creep_strains(
 
     Samples whose tension is NaN are omitted. The tension is then linear in time between their neighbors.
 
-    Args:
-        time: Times of the samples [s], increasing, (N,).
-        tension: Tensions [N], (N, m).
-        stiffness: Stiffness of each element [N], (k,).
-        delay: Delay time of each element [s], (k,).
-        settled: True if the first tension has acted for a long time, (1,); if False, the initial strain is zero.
-        strain_out: Filled with the strains, (N, m).
+    time: increasing [s], (N,); tension: (N, m) [N]; stiffness, delay: stiffness [N] and delay time [s] of each element;
+    settled: True if the first tension has acted for a long time, (1,); if False, the initial strain is zero;
+    strain_out: filled, (N, m).
     """
     for i in range(tension.shape[1]):
         for p in range(tension.shape[0]):
@@ -264,15 +260,9 @@ def cable_courses(
 
     A cable without a tension is drawn along its chord. A cable without a chord is drawn as a line between its ends.
 
-    Args:
-        cables: Row of the cable_table, (m, CABLE_COLUMNS).
-        body: Row of the body_table.
-        pose: Pose row.
-        tension: Chord tensions [N], (m,); NaN for a cable without a tension.
-        wraps: Number of points on each pulley, 0 or at least 2. Without a pulley, all are at the frame anchor.
-        rotation: Work array, (3, 3).
-        geometry: Work array, (GEOMETRY_ROWS, m).
-        points: Filled with the points in world axes [m], (m, points, 3).
+    tension: chord tensions [N], (m,); NaN for a cable without a tension. wraps: number of points on each pulley, 0 or
+    at least 2. Without a pulley, all are at the frame anchor. rotation, geometry: work arrays, (3, 3) and
+    (GEOMETRY_ROWS, m). points: filled with the points in world axes [m], (m, points, 3).
     """
     gravity = body[tables.GRAVITY]
     model = Model(codes.CATENARY, 0.0, 0.0, gravity, None)

@@ -60,12 +60,8 @@ def turns_of_lengths(drums: Array, starts: Array, length: Array, turns_out: Arra
 
     Turns are negative beyond the empty drum, and exceed the drum's capacity beyond its last layer.
 
-    Args:
-        drums: Table, (m, DRUM_COLUMNS).
-        starts: Length off the drum at which each layer begins, in decreasing order, (m, layers + 1).
-        length: Lengths at the winding tension [m], (N, m).
-        turns_out: Filled with the turns, (N, m).
-        travel_out: Filled with the changes of length per turn [m], (N, m).
+    drums: table, (m, DRUM_COLUMNS); starts: length off the drum at which each layer begins, in decreasing order, (m,
+    layers + 1); length: lengths at the winding tension [m], (N, m); turns_out, travel_out: filled, (N, m).
     """
     for p in range(length.shape[0]):
         for i in range(length.shape[1]):
@@ -114,13 +110,9 @@ def follow_memory(
     On the drum the cable keeps the strain with which it was wound. The strain at the drum is linear in length between
     two samples. Cable that was never off the drum has the initial strain. Samples with NaN are omitted.
 
-    Args:
-        given: Lengths off the drum [m], (N, m), either unstrained or along the path of winding.
-        strain: Strain of the cable at the drum for each sample, (N, m).
-        rest_strain: Initial strain of the cable on the drum, (m,).
-        unstrained: True if the given lengths are unstrained.
-        found_out: Filled with the converted lengths [m], (N, m).
-        memory: Work array, (MEMORY_ROWS, N).
+    given: lengths off the drum [m], (N, m): unstrained if `unstrained` is true, else along the path of winding; strain:
+    strain of the cable at the drum for each sample, (N, m); rest_strain: initial strain of the cable on the drum, (m,);
+    found_out: filled with the converted lengths [m], (N, m); memory: work array, (MEMORY_ROWS, N).
     """
     for i in range(given.shape[1]):
         depth, begun = 0, False

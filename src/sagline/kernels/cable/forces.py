@@ -18,6 +18,7 @@ from typing import NamedTuple
 from sagline.core.arrays import Array
 from sagline.kernels import codes, tables
 from sagline.kernels.algebra import functions
+from sagline.kernels.algebra.factors import copy
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.models import (
     SMALL_HALLEY_STEP,
@@ -81,10 +82,8 @@ def fill_equivalent_cables(model: Model, cables: Array, rows: Array) -> None:
             lift = rows[g.BEHIND, i] * half / cables[i, tables.STIFFNESS]
             rows[g.ASKED_RISE, i] = rows[g.RISE, i] + (lift + rows[g.OFF_Z, i])
     else:
-        for i in range(m):
-            rows[g.ASKED_SPAN, i] = rows[g.SPAN, i]
-        for i in range(m):
-            rows[g.ASKED_RISE, i] = rows[g.RISE, i]
+        copy(rows[g.SPAN], rows[g.ASKED_SPAN])
+        copy(rows[g.RISE], rows[g.ASKED_RISE])
         for i in range(m):
             rows[g.ASKED_LENGTH, i] += rows[g.OFF_LENGTH, i]
 
@@ -325,12 +324,7 @@ def _has_converged(rows: Array, i: int) -> bool:
 def forces_from_lengths(model: Model, cables: Array, rows: Array, behind: bool | None) -> None:
     """Fill T_x, T_z, tau and status of every cable of a pose from its geometry and length.
 
-    A cable over a pulley is replaced by a cable that starts where the chord touches the pulley. Several passes correct
-    the replacement; docs/model.md, section 10.
-
-    cables: rows of the cable_table, (m, CABLE_COLUMNS); rows: as in `sagline.kernels.cable.geometry`, (CABLE_ROWS, m);
-        behind: `Model.behind` as a separate argument. If no cable has a pulley, it is None, and the code for pulleys is
-        not compiled.
+    `behind` is `Model.behind` as a separate argument. If it is None, the code for pulleys is not compiled.
     """
     if behind is None:
         bare = _EquivalentCables(rows[g.SPAN], rows[g.RISE], rows[g.LENGTH], cables[:, tables.STIFFNESS])

@@ -93,10 +93,7 @@ def cable_geometry(cables: Array, body: Array, pose: Array, rotation: Array, geo
 
 @entry
 def cable_geometries(robots: Array, bodies: Array, poses: Array, rotation: Array, geometries: Array) -> None:
-    """Fill the geometry rows of N poses, (N, GEOMETRY_ROWS, m); for tables and poses see `sagline.kernels.tables`.
-
-    rotation: Work array, (3, 3).
-    """
+    """Fill the geometry rows of N poses, (N, GEOMETRY_ROWS, m); `rotation`: work array, (3, 3)."""
     for p in range(poses.shape[0]):
         robot = robots[min(p, robots.shape[0] - 1)]
         body = bodies[min(p, bodies.shape[0] - 1)]

@@ -58,10 +58,7 @@ def robots_have_machine(robots: Array) -> bool:
 
 @formula
 def free_span(pulley: Pulley, chord: Chord, cosine: float) -> float:
-    """Horizontal distance from the exit point to the platform end [m]; cosine: cos psi.
-
-    chord: the tangent from the platform end to the pulley.
-    """
+    """Horizontal distance from the exit point to the platform end [m]; `cosine`: cos psi; `chord`: the tangent."""
     return chord.length * chord.cosine + pulley.radius * (cosine - pulley.entry * chord.sine)
 
 

@@ -59,8 +59,7 @@ def new_curves(model: Model, cables: Cables, statuses: Codes, memory: Memory) ->
 @kernel
 def sag_forces_at(curves: Curves, tau: Array, sag_force: Array) -> None:
     """Fill the sag forces (m,) at the chord tensions `tau` (m,), and store both in the cables."""
-    for i in range(tau.size):
-        curves.cables.tau[i] = tau[i]
+    copy(tau, curves.cables.tau)
     change = 0.0
     for k in range(CONTACTS if curves.cables.machine else 1):
         _gravest, change = solve_cable_states(curves.model, curves.cables, k == 0, False, curves.statuses)
@@ -93,8 +92,7 @@ def slopes_at(curves: Curves, tau: Array, slope: Array, bend: Array) -> None:
     """Fill `slope` (m,) and curvature `bend` (m,) [1/N] of the sag forces over `tau`, by central differences."""
     cables = curves.cables
     if curves.model.code != codes.CATENARY:
-        for i in range(tau.size):
-            slope[i] = bend[i] = 0.0
+        slope[:] = bend[:] = 0.0
         return
     sag_forces_at(curves, tau, bend)
     _sag_forces_beside(curves, tau, slope)

@@ -229,9 +229,7 @@ def _cable_energy(model: Model, span: float, rise: float, material: Material, le
 def energy_of_cables(model: Model, cables: Array, rows: Array, behind: bool | None) -> tuple[float, float]:
     """Energy [J] of all cables of a pose, and the sum of the magnitudes of its terms.
 
-    cables: rows of the cable_table, (m, CABLE_COLUMNS); rows: as in `sagline.kernels.cable.geometry`, (CABLE_ROWS, m),
-    after `cable_forces`; behind: `Model.behind` as a separate argument. If no cable has a pulley, it is None, and the
-    code for pulleys is not compiled.
+    `behind` is `Model.behind` as a separate argument. If it is None, the code for pulleys is not compiled.
     """
     energy = 0.0
     size = 0.0

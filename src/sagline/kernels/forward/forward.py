@@ -30,14 +30,6 @@ PREDICTION, FROM_START, DOWNHILL = 0, 1, 2  # methods for finding the equilibriu
 
 
 @glue
-def _stability(low: float, high: float) -> int:
-    """Stability of an equilibrium with the smallest stiffness `low` and the largest stiffness `high`."""
-    if low < -FLAT * high:
-        return codes.FORWARD_UNSTABLE
-    return codes.FORWARD_SOLVED if low > FLAT * high else codes.FORWARD_SINGULAR
-
-
-@glue
 def _support_status(model: Model, cables: Array, rows: Array, needed: int) -> int:
     """Status of a stable platform: held by enough taut cables or not; `needed`: required number of taut cables."""
     taut = 0
@@ -106,7 +98,9 @@ def _fill_stability(
     symmetric_part(arcs, space.stiffness, space.matrix)
     low, high = extreme_eigenvalues(space.matrix, space.part, space.step, space.motion, FLAT)
     numbers[f.STIFFNESS_MIN] = low
-    status = _stability(low, high)
+    status = codes.FORWARD_SOLVED if low > FLAT * high else codes.FORWARD_SINGULAR
+    if low < -FLAT * high:
+        status = codes.FORWARD_UNSTABLE
     if not components_along(problem.free, space.gradient, space.part) <= BALANCED * size * problem.unit:
         status = codes.FORWARD_NOT_CONVERGED
     elif status == codes.FORWARD_SOLVED:
@@ -122,8 +116,7 @@ def _store_sample(problem: f.PoseProblem, rows: Array, p: int, results: Array, s
         results[tables.SPAN, p, i] = rows[g.SPAN, i]
         results[tables.RISE, p, i] = rows[g.RISE, i]
     for k in range(tables.WRAP - tables.LENGTH):  # length and forces have the same order in both arrays
-        for i in range(rows.shape[1]):
-            results[tables.LENGTH + k, p, i] = rows[g.LENGTH + k, i]
+        copy(rows[g.LENGTH + k], results[tables.LENGTH + k, p])
     if problem.model.behind is not None:
         for i in range(rows.shape[1]):
             wrapped, dead = behind_at(problem.model, problem.cables, rows, i)
@@ -157,7 +150,7 @@ def forward_poses(
     """
     batch, answer, kept = f.ForwardSamples(*given), f.Solutions(*found), f.LastEquilibrium(*chain)
     code, k_h, k_p, behind = model
-    count, m = batch.lengths.shape
+    count = batch.lengths.shape[0]
     space, rest = f.new_forward_arrays(Memory(*memory), kept.rows, kept.factor)
     free, arcs, start, pose = f.new_motions(rest, batch.freedom.shape[0])
     copy(batch.starts[0], start)
@@ -168,8 +161,7 @@ def forward_poses(
         if not chained:  # a result must not depend on the previous sample
             copy(f.row_of(batch.starts, p), start)
             kept.last[0] = math.nan
-            for i in range(m):
-                kept.rows[g.PARAMETER, i] = math.nan
+            kept.rows[g.PARAMETER] = math.nan
         problem = f.problem_at(Model(code, k_h, k_p, 0.0, behind), batch, p, free, arcs)
         exact = Model(
             codes.ELASTIC if code == codes.ELASTIC else codes.CATENARY, 0.0, 0.0, problem.model.gravity, behind

@@ -109,8 +109,7 @@ def predict(
         known = solve_step(space.factor, space.part, space.step) <= PREDICTED
     if known:
         step_pose(problem.free, problem.body, start, space.step, space.motion, pose)
-    for i in range(lengths.shape[0]):
-        space.rows[g.LENGTH, i] = lengths[i]
+    copy(lengths, space.rows[g.LENGTH])
     return known
 
 

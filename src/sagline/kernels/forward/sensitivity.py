@@ -6,7 +6,7 @@ import math
 
 from sagline.core.arrays import Array, Codes, Indices
 from sagline.kernels import codes, tables
-from sagline.kernels.algebra.factors import extreme_eigenvalues
+from sagline.kernels.algebra.factors import copy, extreme_eigenvalues
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.geometry import CABLE_ROWS, cable_geometry
 from sagline.kernels.cable.pulley import pulley_at
@@ -100,8 +100,7 @@ def describe_states(
 def _fill_rows(model: Model, cables: Array, results: Array, p: int, rows: Array) -> None:
     """Fill lengths and forces of the cables at pose `p` of a plan, after `cable_geometry`."""
     for k in range(tables.WRAP - tables.LENGTH):  # length and forces have the same order in both arrays
-        for i in range(rows.shape[1]):
-            rows[g.LENGTH + k, i] = results[tables.LENGTH + k, p, i]
+        copy(results[tables.LENGTH + k, p], rows[g.LENGTH + k])
     if model.behind is not None:
         for i in range(rows.shape[1]):
             rows[g.FREE_SPAN, i] = results[tables.SPAN, p, i]

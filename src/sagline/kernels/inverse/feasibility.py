@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from sagline.core.arrays import Array, Codes, Flags, Indices
+from sagline.core.arrays import Array, Flags, Indices
 from sagline.kernels import codes, statics
 from sagline.kernels.algebra.bounds import START, STRIP_ROWS
 from sagline.kernels.algebra.factors import copy
@@ -77,8 +77,9 @@ def decide_poses(
             curves, demand, NODES, change, left
         )
         sag_forces_at(curves, change.tau, change.sag_force)
-        if status == codes.POSE_SOLVED:
-            status = _pose_status(statuses[p])
+        for i in range(m if status == codes.POSE_SOLVED else 0):
+            if statuses[p, i] >= codes.CABLE_TOO_SLACK:
+                status = codes.POSE_NOT_CONVERGED
         if status == codes.POSE_SOLVED and not covers:
             status = codes.POSE_NOT_COVERED
         if status != codes.POSE_SOLVED and status != codes.POSE_INFEASIBLE and status != codes.POSE_BORDERLINE:
@@ -102,15 +103,6 @@ def decide_poses(
             _write_proof(demand, change, lever, farkas[p])
         if status == codes.POSE_INFEASIBLE or status == codes.POSE_BORDERLINE:
             _block_cables(cables, demand, change, blocking[p])
-
-
-@glue
-def _pose_status(statuses: Codes) -> int:
-    """Status of a pose with balanced tensions, from the statuses of its cables (m,)."""
-    gravest = codes.CABLE_SOLVED
-    for i in range(statuses.size):
-        gravest = max(gravest, statuses[i])
-    return codes.POSE_NOT_CONVERGED if gravest >= codes.CABLE_TOO_SLACK else codes.POSE_SOLVED
 
 
 @glue

@@ -11,6 +11,7 @@ import math
 
 from sagline.core.arrays import Array, Codes, Indices
 from sagline.kernels import codes, statics, tables
+from sagline.kernels.algebra.factors import copy
 from sagline.kernels.algebra.functions import angle
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable import states
@@ -319,8 +320,7 @@ def _write_behind(solved: bool, model: Model, cables: Cables, results: Array, p:
     if solved:
         # memory for the exit points of the cables, because the previous sag forces are no longer needed
         tension = cables.last_sag_force
-        for i in range(m):
-            tension[i] = cables.tau[i]
+        copy(cables.tau, tension)
         if model.code == codes.CATENARY:
             for i in range(m):
                 x, z = cables.free_tau[i] * cables.free_cosine[i], cables.free_tau[i] * cables.free_sine[i]
@@ -343,5 +343,4 @@ def _write_behind(solved: bool, model: Model, cables: Cables, results: Array, p:
             results[tables.DEAD, p, i] = dead
         for i in range(m):
             results[tables.LENGTH, p, i] += results[tables.WRAPPED, p, i] + results[tables.DEAD, p, i]
-        for i in range(m):
-            results[tables.SINE, p, i] = cables.sine[i]
+        copy(cables.sine, results[tables.SINE, p])

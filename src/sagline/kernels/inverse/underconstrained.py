@@ -119,8 +119,7 @@ def _fill_tension_level(gram: Array, work: Array, along: Array) -> None:
         along[i] = (1.0 + 0.1 * i) * (1.0 if i % 2 == 0 else -1.0)
     for _ in range(ITERATIONS):  # the vector grows by at most 1/RIDGE in each
         for i in range(m):
-            for j in range(m):
-                work[i, j] = gram[i, j]
+            copy(gram[i], work[i])
         solve_general(work, along)
     square, size = dot(along, along), math.nan
     for i in range(m):
